@@ -1,6 +1,6 @@
-"""Registry of the laws of bonds: their names in a case, their keys, and how they are described.
+"""Registry of bond laws: their names in a case, their keys, and their descriptions.
 
-A law is implemented by two classes of the same name, `implementation`: in `interface/laws`, which runs use, and in
+Two classes with the same name implement a law, `implementation`: in `interface/laws`, which runs use, and in
 `verify`, which checks results by its own formulas.
 """
 
@@ -11,17 +11,17 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class BondLawEntry:
-    """Law of bonds as a case names it.
+    """Bond law as a case names it.
 
     Attributes:
         name: value of [interface] law, or criterion.
         implementation: "module.Class".
         keys: keys of [interface] that belong to this law and others that list them.
         needs: keys of all laws that must be given with this one.
-        limits: keys of which one must be finite for any bond to break; none if the law always has a limit.
-        description: of the utilisation that reaches 1 when a bond breaks, or of softening, for the key `law`.
+        limits: keys; one at least must be finite for any bond to break; none if the law always has a limit.
+        description: describes, for the key `law`, the utilisation that reaches 1 when a bond breaks, or the softening.
         symbols: that label the law in pictures: symbol, key, and whether its unit is a stress.
-        softens: the compliance of springs grows before a bond parts.
+        softens: spring compliance grows before a bond parts.
         has_process_zone: elements must resolve the length along which bonds break.
     """
 
@@ -93,5 +93,5 @@ DEFAULT = REGISTRY[0].name
 
 
 def laws_with(key: str) -> tuple[str, ...]:
-    """Names of the laws that a key of [interface] belongs to."""
+    """Law names to which a key of [interface] belongs."""
     return tuple(entry.name for entry in REGISTRY if key in entry.keys)

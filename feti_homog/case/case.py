@@ -56,8 +56,8 @@ class Case:
 
     Attributes:
         materials: by phase, in the file's order.
-        interfaces: none if the bonding is perfect; of several each has its pair of phases.
-        angle, path, single_load, envelope: there if the analysis is of that type; single_load is the section [load].
+        interfaces: none if the bonding is perfect; if several, each has its pair of phases.
+        angle, path, single_load, envelope: there if the analysis has that type; single_load is the section [load].
         petsc: options without dash.
     """
 
@@ -81,7 +81,7 @@ class Case:
 
     @classmethod
     def parse(cls, document: Mapping[str, Any], folder: str | Path = ".") -> Case:
-        """Return the case of nested dictionaries as in the file, with Python's or NumPy's values; see `parse`."""
+        """Return the case from nested dictionaries as in the file, with Python's or NumPy's values; see `parse`."""
         return parse(document, Path(folder))
 
     @property
@@ -91,7 +91,7 @@ class Case:
 
     @property
     def interface(self) -> InterfaceSection | None:
-        """The first interface, None of perfect bonding; all have its contact, criterion and growth."""
+        """The first interface, None for perfect bonding; all have its contact, criterion and growth."""
         return self.interfaces[0] if self.interfaces else None
 
     @property
@@ -103,18 +103,18 @@ class Case:
     def targets(self) -> tuple[Mapping[str, float], ...]:
         """The loads of a path after its unloaded start, or the one load of the case, in full.
 
-        By name: of each component, in the order of the plane state's strains, its strain or its stress; in generalized
+        By name: each component's strain or stress, in the order of the plane state's strains; in generalized
         plane strain then the temperature.
         """
         return completed(tuple(self.section.placed.values()), self.analysis.plane)
 
     @property
     def section(self) -> AnalysisSection:
-        """The section of the analysis."""
+        """The analysis section."""
         return self.angle or self.path or self.single_load or self.envelope or Stiffness()
 
     def material_of(self, phase: str) -> Material:
-        """Return the material of a phase; "fibre:2" without its own takes it from "fibre". Raises KeyError."""
+        """Return a phase's material; "fibre:2" without its own takes it from "fibre". Raises KeyError."""
         return self.materials[provider(phase, self.materials)]
 
     def warnings(self) -> tuple[str, ...]:
@@ -167,7 +167,7 @@ def load(path: str | Path) -> Case:
 
 
 def parse(values: Mapping[str, Any], folder: Path) -> Case:
-    """Return the case of nested dictionaries; its files are relative to `folder`.
+    """Return the case from nested dictionaries; its files are relative to `folder`.
 
     NumPy's scalars and arrays, tuples and paths are as good as TOML's values.
 
@@ -195,7 +195,7 @@ def check_stored(values: Mapping[str, Any]) -> None:
 
 
 def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[str, Any], list[str]]:
-    """Return the contents of sections, with the files of [cell] in `folder` if one is given, and their faults."""
+    """Return the contents of sections, with [cell]'s files in `folder` if one is given, and their faults."""
     reader = TableReader(_selected(document), KEY_OWNERS, _top_level_faults(document))
     selected, faults = reader.selected, reader.faults
     of_rules = [[*rule.faults(document, selected)] for rule in RULES]
@@ -233,7 +233,7 @@ def _selected(document: Mapping[str, Any]) -> Selected:
 
 
 def _top_level_faults(document: Mapping[str, Any]) -> list[str]:
-    """Faults of the names of sections and of the keys before the first section."""
+    """Faults in section names and in the keys before the first section."""
     faults = [f"[{section}]: missing section" for section in REQUIRED if section not in document]
     for name, value in document.items():
         hint = suggestion(name, TOP_LEVEL, KEY_OWNERS)
@@ -253,13 +253,13 @@ def _top_level_faults(document: Mapping[str, Any]) -> list[str]:
 
 
 def _read_section(document: Mapping[str, Any], section: str, reader: TableReader) -> Any:
-    """Return the dataclass of a section, or None if it is faulty or absent."""
+    """Return a section's dataclass, or None if it is faulty or absent."""
     if section not in document and section in (*REQUIRED, *SECTIONS_OF_AN_ANALYSIS):
         return None
     return reader.read(SECTIONS[section], document.get(section, {}), section)
 
 
 def check_phases(case: Case, phases: Iterable[str]) -> None:
-    """Raise CaseError if a phase of the mesh has no material, or a material no phase."""
+    """Raise CaseError if a mesh phase has no material, or a material no phase."""
     if faults := phase_faults(case.materials, phases):
         raise CaseError(*faults)

@@ -1,4 +1,4 @@
-"""Files of a cell: a mesh, a table of its fibres with the size of the cell, or a table that it matches."""
+"""Cell files: a mesh, a fibre table with the cell size, or a table that the cell matches."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ FEWEST_MATCHED = 10  # fibres: of fewer, distances have no distribution
 
 
 def checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """Return the cell with the contents of its files; their faults and faults between its keys go to `faults`."""
+    """Return the cell with its file contents; their faults and faults between its keys go to `faults`."""
     cell = _with_match(cell, folder, faults)
     if cell.fibre_fraction is not None:
         spacing = (cell.coating or 0.0) + (cell.min_gap if cell.geometry == "random" else 0.0)
@@ -75,7 +75,7 @@ def missing(file: Path) -> str:
 def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     """Return the cell with its table read, its number of fibres and its fraction.
 
-    The path of the table is completed; number and fraction are those of the table's fibres where the cell has none of
+    The table's path is completed; number and fraction come from the table's fibres where the cell has none of
     its own; faults are added to `faults`.
     """
     if cell.match is None:
@@ -102,7 +102,7 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
 
 
 def _with_table(cell: Cell, faults: list[str]) -> Cell:
-    """Return the cell with its table, which has the size of the cell."""
+    """Return the cell with its table, which has the cell size."""
     from feti_homog.microstructure.fibre_table import read_table, table_of  # which few cases need
 
     try:
@@ -125,7 +125,7 @@ def _with_table(cell: Cell, faults: list[str]) -> Cell:
 
 
 def _within(table: FibreTable) -> FibreTable:
-    """Return the table without the rows whose centres are outside of the cell by more than LEFT_OUT of their radii."""
+    """Return the table without rows whose centres are outside the cell by more than LEFT_OUT of their radii."""
     if table.width is None or table.height is None:
         return table
     corner = np.array([table.left, table.bottom], float)
@@ -142,7 +142,7 @@ def _within(table: FibreTable) -> FibreTable:
 
 
 def _size(name: str, asked: float | None, table: FibreTable, faults: list[str]) -> float | None:
-    """Width or height of the cell, from the case or from the table, which must not differ."""
+    """Cell width or height, from the case or from the table, which must not differ."""
     stored: float | None = getattr(table, name)
     if asked is None and stored is None and table.name != LIST:
         faults.append(f"[cell] {name}: missing; {table.name} has no line such as # width = 120, height = 80")
@@ -157,7 +157,7 @@ HOLLOW_WORDS = f"expected inner_radius / radius from {WIDEST_CORE[0]:g} to {WIDE
 
 
 def check_shapes(table: FibreTable, faults: list[str]) -> None:
-    """Add the faults of shapes and of hollow fibres to `faults`."""
+    """Add shape and hollow fibre faults to `faults`."""
     rows, before = table.columns, len(faults)
     _tell(table, have_both_sizes(rows), BOTH_SIZES, faults)
     for shape in SHAPES:

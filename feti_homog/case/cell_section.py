@@ -1,4 +1,4 @@
-"""The section [cell] of a case file: the geometry of the periodic cell and its mesh."""
+"""The section [cell] in a case file: the periodic cell's geometry and mesh."""
 
 from __future__ import annotations
 
@@ -244,7 +244,7 @@ class Cell:
 
     @property
     def fractions(self) -> dict[str, float]:
-        """Fibre fraction of each phase of round fibres, in the order of the names; none where files give it."""
+        """Fibre fraction for each round fibre phase, in name order; none where files give it."""
         if self.mix is not None:
             return dict(sorted(self.mix.items()))
         return {} if self.fibre_fraction is None else {FIBRE: self.fibre_fraction}
@@ -262,7 +262,7 @@ class Cell:
 
 
 def size_faults(cell: Cell) -> list[str]:
-    """Faults of element sizes larger than the sizes around."""
+    """Faults in element sizes larger than the sizes around."""
     faults, largest = [], ("mesh_size", cell.mesh_size)
     for name, size in (("interface_size", cell.interface_size), ("tip_size", cell.tip_size)):
         if size is not None and size > largest[1]:

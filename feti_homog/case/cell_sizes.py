@@ -1,7 +1,7 @@
-"""Sizes that follow from a cell: the numbers of its fibres, its width, and the order and size of its elements.
+"""Sizes that follow from a cell: its numbers of fibres, its width, its element order and size.
 
-Fibres of several phases have a fraction and a radius each: `mix` and `radii`.  Order and size of elements follow where
-a cell gives its accuracy.  Mixed elements have a bubble and a pressure of their own.
+Fibres of several phases have a fraction and a radius each: `mix` and `radii`.  Element order and size follow where
+a cell gives its accuracy.  Mixed elements have their own bubble and pressure.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ ROUNDING_POISSON = 0.49999999
 
 
 def is_mixed(order: int, material: Material, plane: str) -> bool:
-    """Return whether the elements of a phase have a bubble and a pressure of their own in the plane problem."""
+    """Return whether a phase's elements have their own bubble and pressure in the plane problem."""
     return order == 2 and isotropic_ratio(material) is not None and not PLANE_STATES[plane].is_sheet
 
 
@@ -48,7 +48,7 @@ def remarks(materials: Mapping[str, Material], plane: str) -> tuple[str, ...]:
 
 
 def _above(limit: float, materials: Mapping[str, Material], plane: str) -> list[str]:
-    """List the phases of a larger ratio that keep their volume: not in plane stress."""
+    """List the phases with a larger ratio that keep their volume: not in plane stress."""
     if PLANE_STATES[plane].is_sheet:
         return []
     ratios = {phase: isotropic_ratio(material) for phase, material in materials.items()}
@@ -81,13 +81,13 @@ def sized(
 ) -> Cell:
     """Return the cell with the mesh_size, the refine and the order that its accuracy asks for.
 
-    Of an accuracy eps, the coarsest mesh is refined r times, with r the least for which `coarse_error` / 4^(p r) <= eps
-    for elements of order p; of orders the one with the fewest nodes, about p^2 4^r. It is a fault if more than
-    MOST_REFINED were needed, and so is a linear order of the table if its elements lock.
+    For an accuracy eps, the coarsest mesh is refined r times, r the least for which `coarse_error` / 4^(p r) <= eps
+    for elements of order p; the order taken has the fewest nodes, about p^2 4^r. It is a fault if more than
+    MOST_REFINED were needed, and so is a linear order in the table if its elements lock.
 
     Args:
         table: [cell] as it is given, with the order or without.
-        free_faces: whether there are faces that no other phase holds firmly: of voids, of bonds that are soft or part.
+        free_faces: whether there are faces that no other phase holds firmly: at voids, at bonds that are soft or part.
     """
     locking, is_given = _above(LOCKING_POISSON, materials, plane), "order" in table
     if is_given and cell.order == 1:
@@ -110,7 +110,7 @@ def sized(
 
 
 def _coarsest(cell: Cell) -> float:
-    """mesh_size of the coarsest mesh: half the distance of as many fibres on a square lattice, in two digits."""
+    """mesh_size of the coarsest mesh: half the distance between as many fibres on a square lattice, in two digits."""
     if cell.table is not None:
         assert cell.table.width is not None and cell.table.height is not None
         fibres, height = len(cell.table.row), cell.table.height / cell.table.width
@@ -121,18 +121,18 @@ def _coarsest(cell: Cell) -> float:
 
 
 def without_chosen(cell: Cell, table: dict[str, Any]) -> dict[str, Any]:
-    """Return the table [cell] of a cell without the sizes that its accuracy chooses."""
+    """Return a cell's table [cell] without the sizes that its accuracy chooses."""
     return table if cell.accuracy is None else {name: table[name] for name in table if name not in CHOSEN}
 
 
 def coarse_error(materials: Mapping[str, Material], plane: str, order: int, free_faces: bool) -> float:
-    """Return an upper estimate of the relative error of the strain energy on the coarsest mesh,
+    """Return an upper estimate of the relative strain energy error on the coarsest mesh,
 
         C_p kappa max s beta^2,  beta = |lambda - 1| / (lambda + 1),
 
-    lambda the eigenvalues of the stiffness of a phase relative to that around it, 0 of free faces, s SOFT_FACTOR where
-    lambda < 1 and else 1, and kappa the condition of the stiffness in the plane of the phase nearest to incompressible,
-    of mixed elements at most MIXED_CONDITION, as is kappa s where all are mixed.
+    lambda the eigenvalues of a phase's stiffness relative to the one around it, 0 at free faces, s SOFT_FACTOR where
+    lambda < 1 and else 1, and kappa the condition of the plane stiffness in the phase nearest to incompressible,
+    for mixed elements at most MIXED_CONDITION, as is kappa s where all are mixed.
     """
     stiffness = {phase: stiffness_of(material, plane) for phase, material in materials.items()}
     ratios = [
@@ -154,10 +154,10 @@ def coarse_error(materials: Mapping[str, Material], plane: str, order: int, free
 
 
 def fibre_counts(cell: Cell) -> dict[str, int]:
-    """Return how many fibres of each phase a random cell has.
+    """Return how many fibres per phase a random cell has.
 
-    Fibres of the fraction c_p and the radius r_p are as many as e_p ~ c_p / r_p^2. Each phase has one, and each further
-    fibre is of the phase with the largest e_p / (2 n_p + 1), the rule of Sainte-Lague: whole numbers next to e_p.
+    Fibres of fraction c_p and radius r_p are as many as e_p ~ c_p / r_p^2. Each phase has one, and each further
+    fibre goes to the phase with the largest e_p / (2 n_p + 1), the rule of Sainte-Lague: whole numbers next to e_p.
     """
     expected = _expected_counts(cell)
     count = max(len(expected), round(fsum(expected.values())))
@@ -168,7 +168,7 @@ def fibre_counts(cell: Cell) -> dict[str, int]:
 
 
 def _expected_counts(cell: Cell) -> dict[str, float]:
-    """Numbers of fibres of each phase that are not whole; their sum is `fibres`, or follows from the width."""
+    """Numbers of fibres per phase that are not whole; their sum is `fibres`, or follows from the width."""
     radii = cell.radii or dict.fromkeys(cell.fractions, 1.0)
     per_area = {phase: share / (pi * radii[phase] ** 2) for phase, share in cell.fractions.items()}
     area = cell.fibres / fsum(per_area.values()) if cell.fibres is not None else (cell.width or 1.0) ** 2
@@ -176,7 +176,7 @@ def _expected_counts(cell: Cell) -> dict[str, float]:
 
 
 def void_count(cell: Cell, fibre_radius: float) -> int:
-    """Return the number of voids of a random cell of width 1 whose fibres have this mean radius.
+    """Return the number of voids in a random cell of width 1 whose fibres have this mean radius.
 
     It is the whole number nearest to the fraction, at least one.
     """
@@ -187,13 +187,13 @@ def void_count(cell: Cell, fibre_radius: float) -> int:
 
 
 def fractions_in_words(cell: Cell) -> str:
-    """Return the keys with the fractions of a cell without a file, and their values."""
+    """Return the keys with the fractions in a cell without a file, and their values."""
     fibres = f"fibre_fraction = {cell.fibre_fraction:g}" if cell.mix is None else f"mix = {toml_value(dict(cell.mix))}"
     return f"{fibres}, voids = {cell.voids:g}" if cell.voids else fibres
 
 
 def mixed_width(cell: Cell) -> float | None:
-    """Width of the cell, or None where `fibre_radius` or the default make it.
+    """Cell width, or None where `fibre_radius` or the default make it.
 
     In it `fibres` fibres have these radii and fractions, W^2 = sum n_p pi r_p^2 / sum c_p.
     """
@@ -204,7 +204,7 @@ def mixed_width(cell: Cell) -> float | None:
 
 
 def mix_faults(cell: Cell) -> list[str]:
-    """List the faults of the numbers of a mix together."""
+    """List the faults in the numbers of a mix together."""
     if cell.mix is None:
         return []
     faults, given = [], f"[cell] mix = {toml_value(dict(cell.mix))}"

@@ -1,4 +1,4 @@
-"""The document of a case: nested tables of TOML's types, from a file or of Python's and NumPy's values."""
+"""The document of a case: nested tables of TOML types, from a file or from Python and NumPy values."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def _to_toml(value: Any, path: TomlPath, faults: list[str]) -> Any:
 def leaves(
     table: Mapping[str, Any], is_value: Callable[[TomlPath, Any], bool] | None = None, above: TomlPath = ()
 ) -> Iterator[tuple[TomlPath, Any]]:
-    """Yield the paths and values of a nested table with dotted keys; empty tables and `is_value` ones are values."""
+    """Yield the paths and values in a nested table with dotted keys; empty tables and `is_value` ones are values."""
     for name, value in table.items():
         path = (*above, *name.split("."))
         if isinstance(value, dict) and value and not (is_value and is_value(path, value)):
@@ -110,7 +110,7 @@ def short_digest(content: bytes) -> str:
 
 
 def _named_items(table: Mapping[Any, Any], path: TomlPath, faults: list[str]) -> list[tuple[str, Any]]:
-    """Return the items of a table; a key that is no text is a fault."""
+    """Return a table's items; a key that is no text is a fault."""
     wrong = [name for name in table if not isinstance(name, str)]
     place = f"[{dotted_key(path)}] " if path else ""
     faults += [f"{place}{name!r}: expected a text as key, not {_article(name)}" for name in wrong]
@@ -118,6 +118,6 @@ def _named_items(table: Mapping[Any, Any], path: TomlPath, faults: list[str]) ->
 
 
 def _article(value: object) -> str:
-    """Return the type of a value in words: "an int", "a list"."""
+    """Return a value's type in words: "an int", "a list"."""
     name = type(value).__name__
     return f"{'an' if name[0] in 'aeiou' else 'a'} {name}"

@@ -263,11 +263,11 @@ class InterfaceSection:
 
 
 def interface_tables(document: Mapping[str, Any]) -> list[Any]:
-    """Return the section [interface], or all of several sections [[interface]]; none if there is none."""
+    """Return the section [interface], or all from several sections [[interface]]; none if there is none."""
     given = document.get("interface", [])
     return given if isinstance(given, list) else [given]
 
 
 def interface_label(number: int, count: int) -> str:
-    """Return the label of an interface in messages; numbers begin at 0, labels at 1."""
+    """Return an interface's label in messages; numbers begin at 0, labels at 1."""
     return "interface" if count == 1 else f"interface {number + 1}"

@@ -1,6 +1,6 @@
-"""Loads by name, and the sections of the analyses: [angle], [path], [load] and [envelope].
+"""Loads by name, and the analysis sections: [angle], [path], [load] and [envelope].
 
-A load has of each component its strain or its stress; along a path it is completed by the load before.
+A load gives for each component its strain or its stress; along a path it is completed by the load before.
 """
 
 from __future__ import annotations
@@ -77,9 +77,9 @@ WAYPOINTS = list_of(
 
 
 def completed(loads: Sequence[Strain | MixedLoad], plane: str) -> tuple[dict[str, float], ...]:
-    """Return the loads of a path in full.
+    """Return a path's loads in full.
 
-    Of each component one name and value, and the temperature in generalized plane strain. Components that a load does
+    One name and value for each component, and the temperature in generalized plane strain. Components that a load does
     not name stay as in the load before, at first a stress of zero.
     """
     state = PLANE_STATES[plane]
@@ -96,7 +96,7 @@ def completed(loads: Sequence[Strain | MixedLoad], plane: str) -> tuple[dict[str
 
 
 def first_named(loads: Sequence[Strain | MixedLoad], plane: str) -> dict[str, int]:
-    """By the name of its stress, which load is the first to name each component; len(loads) if none does."""
+    """By its stress name, which load is the first to name each component; len(loads) if none does."""
     return {
         names[1]: next((k for k, load in enumerate(loads) if not named(load).keys().isdisjoint(names)), len(loads))
         for names in PLANE_STATES[plane].components
@@ -104,7 +104,7 @@ def first_named(loads: Sequence[Strain | MixedLoad], plane: str) -> dict[str, in
 
 
 def named(load: Strain | MixedLoad) -> dict[str, float]:
-    """Return the named components of a load, [E11, E22, gamma12] if it is a strain."""
+    """Return a load's named components, [E11, E22, gamma12] if it is a strain."""
     return load.named if isinstance(load, MixedLoad) else dict(zip(STRAINS, load, strict=True))
 
 

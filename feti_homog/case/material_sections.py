@@ -1,4 +1,4 @@
-"""Reading the sections [material.PHASE], and which material a phase of the mesh has."""
+"""Reading the sections [material.PHASE], and which material a mesh phase has."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def read_materials(document: Mapping[str, Any], plane: str | None, reader: Table
 
 
 def fibre_phases(cell: object) -> tuple[str, ...] | None:
-    """Return the phases of the fibres of a section [cell] without a file, None if its mix is faulty."""
+    """Return the fibre phases in a section [cell] without a file, None if its mix is faulty."""
     mix = cell.get("mix") if isinstance(cell, dict) else None
     if mix is None:
         return (FIBRE,)
@@ -55,7 +55,7 @@ def fibre_phases(cell: object) -> tuple[str, ...] | None:
 
 
 def coating_faults(cell: Cell, materials: Mapping[str, object]) -> list[str]:
-    """Faults of coatings without a material, and of a material of coatings where there are none."""
+    """Faults: coatings without a material, and a coating material where there are none."""
     if cell.has_own_mesh:
         return []
     has_coatings = cell.coating is not None
@@ -69,9 +69,9 @@ def coating_faults(cell: Cell, materials: Mapping[str, object]) -> list[str]:
 
 
 def _phase_fault(phase: str, known: tuple[str, ...] | None, geometry: str | None, owners: Mapping[str, str]) -> str:
-    """Return the fault of the name of a phase, empty if there is none.
+    """Return the fault in a phase name, empty if there is none.
 
-    `known` are the phases of a cell, None if any may occur.
+    `known` are a cell's phases, None if any may occur.
     """
     section = f"[material.{toml_key(phase)}]"
     is_unknown = known is not None and ":" not in phase and phase not in known
@@ -84,7 +84,7 @@ def _phase_fault(phase: str, known: tuple[str, ...] | None, geometry: str | None
 
 
 def _read_material(table: object, section: str, plane: str | None, reader: TableReader) -> Material | None:
-    """Return the material of a section, in the form of its keys; None if it is faulty."""
+    """Return a section's material, in the form of its keys; None if it is faulty."""
     given = _keys_by_form(table)
     forms = list(given) or ["isotropic"]
     if len(forms) > 1:
@@ -105,7 +105,7 @@ def _read_material(table: object, section: str, plane: str | None, reader: Table
 
 
 def _keys_by_form(table: object) -> dict[str, list[str]]:
-    """Return the keys of a table that belong to one form of a material alone, without the forms that have none."""
+    """Return the table keys that belong to one material form alone, without the forms that have none."""
     names = table if isinstance(table, dict) else {}
     forms_of = Counter(name for cls in MATERIAL_FORMS.values() for name in keys_of(cls))
     given = {
@@ -134,7 +134,7 @@ def provider(phase: str, materials: Mapping[str, Material]) -> str:
 
 
 def phase_faults(materials: Mapping[str, Material], phases: Iterable[str]) -> list[str]:
-    """Faults of phases of the mesh without a material, and of materials without a phase."""
+    """Faults: mesh phases without a material, and materials without a phase."""
     phases = list(phases)
     providers = [provider(phase, materials) for phase in phases]
     without = [phase for phase, source in zip(phases, providers, strict=True) if source not in materials]

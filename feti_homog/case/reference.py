@@ -1,4 +1,4 @@
-"""The reference of the case file, made of its keys alone: `feti-homog keys`."""
+"""The case file reference, made from its keys alone: `feti-homog keys`."""
 
 from __future__ import annotations
 
@@ -53,16 +53,16 @@ MATERIAL_MEANING = (
 
 @dataclass(frozen=True)
 class KeyRow:
-    """One key of the case file, in words.
+    """One case file key, in words.
 
     Attributes:
         section: the section's name: "cell", "material", ...; "name" for the key before the first section.
         table: its place in the file: "[cell]", "[material.PHASE], isotropic", ...
         key: its name.
-        accepts: requirement of its value.
-        unit: of the value, empty if it has none.
+        accepts: requirement on its value.
+        unit: the value's, empty if it has none.
         default: as TOML writes it or in a word; "required" if the key must be given where it applies; else empty.
-        applies: for which geometry, type of analysis or method it may be given; empty: for all.
+        applies: for which geometry, analysis type or method it may be given; empty: for all.
         meaning: a sentence or two.
     """
 
@@ -113,7 +113,7 @@ AXIS = KeyRow(SWEEP, f"[{SWEEP}]", "SECTION.KEY", AXIS_EXPECTED, "", "", "", AXI
 
 
 def tables() -> list[TableReference]:
-    """All tables of the case file, in the order of `ORDER`."""
+    """All tables of the case file, ordered as in `ORDER`."""
     found = [
         TableReference("name", NAME.table, "the case as a whole.", (NAME,)),
         *map(_table, (*TABLES, *FIT_TABLES)),
@@ -126,7 +126,7 @@ def tables() -> list[TableReference]:
 
 
 def tables_of(section: str) -> list[TableReference]:
-    """Return the tables of a section. Raises CaseError if there is none of that name."""
+    """Return a section's tables. Raises CaseError if no section has the name."""
     result = [table for table in tables() if table.section == section]
     if not result:
         raise CaseError(f"{section}: unknown section; expected one of {', '.join(ORDER)}")
@@ -134,7 +134,7 @@ def tables_of(section: str) -> list[TableReference]:
 
 
 def rows() -> Iterator[KeyRow]:
-    """All keys of the case file."""
+    """All case file keys."""
     for table in tables():
         yield from table.rows
 

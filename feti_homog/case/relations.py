@@ -1,4 +1,4 @@
-"""Reading the sections [interface], and relations between values of sections: faults, and remarks on loads."""
+"""Reading the sections [interface], and relations between section values: faults, and remarks on loads."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ COMMON = tuple(name for name, entry in keys_of(InterfaceSection).items() if not 
 
 
 def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], plane: str | None) -> list[str]:
-    """List the faults between values of sections that are not faulty themselves; a `plane` of None is faulty."""
+    """List the faults between section values that are not faulty themselves; a `plane` of None is faulty."""
     path, load, angle, envelope = (sections[name] for name in ("path", "single_load", "angle", "envelope"))
     faults, materials = [*_load_faults(path, load, plane)], sections["materials"]
     if place := next(_heated_loads(path, load), ""):
@@ -76,7 +76,7 @@ def _load_faults(path: LoadPath | None, load: SingleLoad | None, plane: str | No
 
 
 def axes_lines(kind: str, section: AnalysisSection, materials: Mapping[str, Material], plane: str) -> tuple[str, ...]:
-    """Return the axes of loads and of constants of phases that could be of a ply, in a line; none in a plane."""
+    """Return the axes of loads and of phase constants that could be a ply's, in a line; none in a plane."""
     if not PLANE_STATES[plane].is_spatial:
         return ()
     from feti_homog.materials.constants import axes_line  # which nothing in a plane needs
@@ -90,7 +90,7 @@ def axes_lines(kind: str, section: AnalysisSection, materials: Mapping[str, Mate
 
 
 def stress_free(section: str, placed: Mapping[str, Strain | MixedLoad], plane: str) -> tuple[str, ...]:
-    """List the components free of stress because no load of a section names them, or none so far; a line each."""
+    """List the components free of stress because no load in a section names them, or none so far; a line each."""
     first = first_named(tuple(placed.values()), plane)
     words = ["", *(f"stress-free until {place}" for place in [*placed][1:]), "never named: stress-free"]
     unnamed = {k: [name for name, number in first.items() if number == k] for k in range(1, len(words))}
@@ -98,7 +98,7 @@ def stress_free(section: str, placed: Mapping[str, Strain | MixedLoad], plane: s
 
 
 def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[InterfaceSection, ...] | None:
-    """Return the sections of interfaces with their arcs, in the order of the file; None if one is faulty."""
+    """Return the interface sections with their arcs, in file order; None if one is faulty."""
     tables = interface_tables(document)
     if document.get("interface") == []:
         reader.faults.append("interface = []: expected a section [interface]")
@@ -121,7 +121,7 @@ def _completed(interface: InterfaceSection) -> InterfaceSection:
 
 
 def _faults_between(interfaces: tuple[InterfaceSection, ...], tables: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Faults of several sections, from these tables: pairs that are missing or named twice, keys that must agree."""
+    """Faults in several sections, from these tables: pairs that are missing or named twice, keys that must agree."""
     faults: list[str] = []
     first: dict[frozenset[str], int] = {}
     for number, interface in enumerate(interfaces[: None if len(interfaces) > 1 else 0]):
@@ -163,7 +163,7 @@ def _of_table(interface: InterfaceSection) -> dict[str, Any]:
 
 
 def _cohesive_faults(interface: InterfaceSection, table: Mapping[str, Any], label: str) -> list[str]:
-    """List the faults of numbers of a softening law, a line each, without keys that `table` lacks."""
+    """List the faults of numbers in a softening law, a line each, without keys that `table` lacks."""
     law = LAWS[interface.criterion]
     if not law.softens:
         return []
@@ -187,7 +187,7 @@ def _friction_faults(interface: InterfaceSection, label: str) -> list[str]:
 
 
 def idle_friction_keys(interfaces: tuple[InterfaceSection, ...]) -> list[str]:
-    """List the keys of friction that have no effect because there is none, a line each."""
+    """List the friction keys that have no effect because there is none, a line each."""
     lines = []
     for number, each in enumerate(interfaces):
         if each.friction_on_damage and each.friction == 0.0:
@@ -197,7 +197,7 @@ def idle_friction_keys(interfaces: tuple[InterfaceSection, ...]) -> list[str]:
 
 
 def _branch_faults(interface: InterfaceSection) -> Iterator[str]:
-    """Yield the faults of the table of a softening branch."""
+    """Yield the faults in a softening branch's table."""
     openings, tractions = interface.openings, interface.tractions
     if openings is None or tractions is None or BRANCH[0] not in LAWS[interface.criterion].keys:
         return

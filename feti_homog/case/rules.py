@@ -1,4 +1,4 @@
-"""The relations between the keys of a case file."""
+"""The relations between keys in a case file."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def _values(selector: Selector) -> Sequence[str]:
 
 
 def _conditional_keys() -> Iterator[Rule]:
-    """Require or refuse sections and keys by the values of selectors."""
+    """Require or refuse sections and keys by selector values."""
     for section, condition in SECTIONS_OF_AN_ANALYSIS.items():
         line = f"[{section}]: missing section; {condition.in_words(section)} needs it"
         yield Rule((), partial(_has_section, section), line, (condition,))
@@ -128,7 +128,7 @@ def _at_most(limit: float, value: Any) -> bool:
 
 
 def _files() -> Iterator[Rule]:
-    """Require the file of a mesh, and a file of fibres or their list beside the size of the cell."""
+    """Require a mesh file, and a fibre file or list beside the cell size."""
     yield exclusive(CELL, "file", "fibre_list")
     yield needed(CELL, "file", f"missing; expected the name of a {MESH_FILE}", MESH)
     line = "missing; expected the name of a .csv file, or fibre_list"
@@ -149,7 +149,7 @@ def _ends(suffixes: tuple[str, ...], value: Any) -> bool:
 
 
 def _bonds() -> Iterator[Rule]:
-    """Yield the rules of debonded arcs, and the requirements of energies and envelopes."""
+    """Yield the rules for debonded arcs, and the requirements for energies and envelopes."""
     start = "[interface] debonded: missing"
     line = f"{start}; {ANGLE_ANALYSIS.in_words('interface')} needs {ARCS.expected}"
     cracked = partial(_any_section, _some_arc)
@@ -200,7 +200,7 @@ def _touches_nowhere(document: Any) -> bool:
 
 
 def _loads() -> Iterator[Rule]:
-    """Allow one form of a path, and the strain or the stress of a component; names in generalized plane strain."""
+    """Allow one form of a path, and a component's strain or stress; names in generalized plane strain."""
     yield replace(needed(("path",), LOADS[0], "missing; give one", unless=LOADS), names=LOADS)
     yield exclusive(("path",), *LOADS)
     line = f"expected a table such as {{E11 = 0.01}} in {GENERALIZED.in_words('path')}"

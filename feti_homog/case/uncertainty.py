@@ -1,4 +1,4 @@
-"""Uncertain numbers of a case: KEY = {mean, std} or {mean, cv} in place of a number, and their correlation."""
+"""Uncertain numbers in a case: KEY = {mean, std} or {mean, cv} in place of a number, and their correlation."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Uncertainty:
     correlation: tuple[tuple[str, str, float], ...] = ()
 
     def matrix(self) -> Float:
-        """(p, p) correlation of all numbers."""
+        """(p, p) correlation between all numbers."""
         names, result = [*self.std], np.eye(len(self.std))
         for first, second, value in self.correlation:
             i, j = names.index(first), names.index(second)
@@ -39,9 +39,9 @@ class Uncertainty:
         return result
 
     def propagated(self, J: Float) -> tuple[Float, Float]:
-        """(n,) standard deviations of first order of n results of derivatives J (n, p), and the shares (n, p) of each.
+        """(n,) first-order standard deviations for n results with derivatives J (n, p), and the shares (n, p) of each.
 
-        The variances are the diagonal of J V J^T; the share of a constant is J_k (V J^T)_k, which may be negative.
+        The variances are the diagonal of J V J^T; a constant's share is J_k (V J^T)_k, which may be negative.
         """
         A = J * np.array([*self.std.values()])  # changes by one standard deviation of each
         scale = np.abs(A).max(axis=1, initial=np.finfo(float).tiny)  # so that no square over- or underflows
@@ -52,7 +52,7 @@ class Uncertainty:
         return scale * np.sqrt(variance), shares
 
     def to_table(self) -> dict[str, Any]:
-        """Return the section [uncertainty] of a case with means in place of numbers; empty without any."""
+        """Return a case's section [uncertainty] with means in place of numbers; empty without any."""
         pairs = {CORRELATION: [list(pair) for pair in self.correlation]} if self.correlation else {}
         return {**self.std, **pairs}
 
@@ -73,7 +73,7 @@ def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty
 def _checked(
     document: Mapping[str, Any], given: Sequence[tuple[TomlPath, Any]], pairs: Any, faults: list[str]
 ) -> Uncertainty:
-    """Return the uncertainties of standard deviations and correlated pairs; empty, with faults, of faulty ones."""
+    """Return uncertainties from standard deviations and correlated pairs; empty, with faults, if faulty."""
     named = {".".join(path): value for path, value in dict(given).items()}
     faults += [*_deviation_faults(document, given), *_pair_faults(pairs, named)]
     if faults:
@@ -99,7 +99,7 @@ def _deviation_faults(document: Mapping[str, Any], given: Sequence[tuple[TomlPat
 
 
 def _pair_faults(pairs: Any, named: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the faults of pairs of correlated constants."""
+    """Yield the faults in pairs of correlated constants."""
     words = f"expected [KEY, KEY, VALUE] of two uncertain constants, {' and '.join(named)}, from -1 to 1"
     known = set[frozenset[str]]()
     for pair in pairs if isinstance(pairs, list) else [pairs]:
@@ -112,7 +112,7 @@ def _pair_faults(pairs: Any, named: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _means(value: Any, path: TomlPath, given: list[tuple[TomlPath, Any]], faults: list[str]) -> Any:
-    """Return a value with the means of uncertain numbers; their deviations are appended to `given`."""
+    """Return a value with the means for uncertain numbers; their deviations are appended to `given`."""
     if isinstance(value, list):
         numbers = [()] if len(value) == 1 else [(str(k + 1),) for k in range(len(value))]
         return [_means(item, (*path, *number), given, faults) for item, number in zip(value, numbers, strict=True)]
@@ -133,18 +133,18 @@ def _means(value: Any, path: TomlPath, given: list[tuple[TomlPath, Any]], faults
 
 
 def _named(path: TomlPath) -> TomlPath:
-    """Return the path of a row and a column of a stiffness by the name of the entry, as of its derivatives."""
+    """Return the path to a stiffness row and column by entry name, as for its derivatives."""
     return (*path[:-2], "C" + "".join(sorted(path[-2:]))) if path[-3:-2] == (STIFFNESS,) else path
 
 
 def _in_lists(path: TomlPath) -> TomlPath:
-    """Return the path of an entry Cij of a stiffness with its row and column."""
+    """Return the path to a stiffness entry Cij with its row and column."""
     result = re.fullmatch(r"C([1-6])([1-6])", path[-1]) if path[-2:-1] == (STIFFNESS,) else None
     return path if result is None else (*path[:-1], *result.groups())
 
 
 def _deviation(value: Mapping[str, Any]) -> float | None:
-    """Return the standard deviation of {mean, std} or {mean, cv}; None if it is faulty."""
+    """Return the standard deviation from {mean, std} or {mean, cv}; None if it is faulty."""
     if value.keys() not in ({"mean", "std"}, {"mean", "cv"}) or not all(map(is_number, value.values())):
         return None
     spread = value["std"] if "std" in value else value["cv"] * abs(value["mean"])
@@ -152,13 +152,13 @@ def _deviation(value: Mapping[str, Any]) -> float | None:
 
 
 def number_at(document: Mapping[str, Any], path: TomlPath) -> float | None:
-    """Return the number at a place, None if there is none; the one of several sections of a name has no number."""
+    """Return the number at a place, None if there is none; one of several sections with the same name has no number."""
     result = _at(document, _in_lists(path))
     return float(result) if is_number(result) else None
 
 
 def with_number(document: Mapping[str, Any], path: TomlPath, value: float) -> tuple[TomlPath, Any]:
-    """Return the key of a number and another value of it; of one in a list the key and value of the list."""
+    """Return a number's key and another value for it; for one in a list the list's key and value."""
     full = _in_lists(path)
     for k in range(1, len(full)):
         result = _at(document, full[:k])

@@ -1,6 +1,6 @@
-"""Energy error of elements along arcs.
+"""Energy error from element sides along arcs.
 
-Sides of elements take area from a body or add to it, and their displacements follow polynomials between nodes.
+Element sides take area from a body or add to it, and their displacements follow polynomials between nodes.
 Each body has its energy alone, without communication; the share that two glued bodies have in common cancels.
 """
 
@@ -19,10 +19,10 @@ from feti_homog.typing import Bool, Float, Int
 
 @dataclass(frozen=True)
 class ArcSides:
-    """The f sides of elements of order p on arcs; the body is on their left.
+    """The f element sides of order p on arcs; the body is on their left.
 
     Attributes:
-        element, side: (f,) the side from corner `side` of the element to the next.
+        element, side: (f,) the element side from corner `side` to the next.
         nodes: (f, p + 1) plane nodes along it.
         points: (f, p + 1, 2) these.
         normals: (f, p + 1, 2) unit normals of the arc at these, out of the body.
@@ -40,7 +40,7 @@ class ArcSides:
 
     @classmethod
     def of(cls, body: RecoveredStress, submeshes: Sequence[Submesh], lattice: ReferenceLattice) -> ArcSides:
-        """Find the sides of subdomains that the lattice refines."""
+        """Find the subdomain sides that the lattice refines."""
         corners = lattice.nodes[lattice.triangles[:, :3]]
         is_zero = np.stack([corners, np.roll(corners, -1, axis=1)]) == 0
         # Side k of the lattice, from its vertex k to the next, is where the coordinate of the third vanishes.
@@ -74,7 +74,7 @@ class ArcSides:
 
     @property
     def ends(self) -> Int:
-        """(f, 2) corners of the elements, 0 to 2, at which they begin and end."""
+        """(f, 2) element corners, 0 to 2, at which they begin and end."""
         return np.stack([self.side, (self.side + 1) % 3], axis=1)
 
 
@@ -84,7 +84,7 @@ def arc_energy(body: RecoveredStress, sides: ArcSides) -> Float:
         -int V (sigma_i : eps_j - t_i . du_j/dn - t_j . du_i/dn) ds - c sum_sides h (D t_i . D u_j + D t_j . D u_i)
 
     with V the distance from the side to the arc, outwards, and t = sigma n: the energy changes at the rate of a
-    boundary that moves.  D are differences of order p between the nodes of a side of length h, c = 1/12 or of order 2
+    boundary that moves.  D are differences of order p between the nodes on a side of length h, c = 1/12 or of order 2
     1/60: t does work on how far interpolation is from u, -h^2 / 12 int t' . u' ds or -h^4 / 960 int t'' . u'' ds.
     """
     if not len(sides.element):
@@ -120,7 +120,7 @@ def arc_energy(body: RecoveredStress, sides: ArcSides) -> Float:
 
 
 def _at(body: RecoveredStress, sides: ArcSides, place: float) -> Float:
-    """(f, m, k) recovered stresses at the place, from 0 to 1, of each side."""
+    """(f, m, k) recovered stresses at the place, from 0 to 1, on each side."""
     result = np.empty((len(sides.element), body.problem.strains, body.loads.shape[1]))
     for k in range(3):
         members = np.flatnonzero(sides.side == k)
@@ -142,5 +142,5 @@ def _summed(weights: Float, left: Float, right: Float) -> Float:
 
 
 def _cross(a: Float, b: Float) -> Float:
-    """(f,) a x b of vectors (f, 2)."""
+    """(f,) cross products a x b of vectors (f, 2)."""
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

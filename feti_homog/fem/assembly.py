@@ -1,4 +1,4 @@
-"""Assembly of one subdomain: stiffness, load of the unit strains, averages, integrals along voids.
+"""Assembly in one subdomain: stiffness, unit strain loads, averages, integrals along voids.
 
 Engineering shears; degrees of freedom are (node, displacement), node-major.  Elements
 are summed triangle by coarse triangle first: a refined one is an element of its own, `MacroElement`, and affine ones
@@ -31,14 +31,14 @@ Mixed = bool | tuple[bool, ...]
 
 @dataclass(frozen=True)
 class Assembly:
-    """Contribution of a subdomain of area |Omega| made of materials L.
+    """Contribution from a subdomain with area |Omega| and materials L.
 
     Attributes:
         K: (dofs, dofs) stiffness, Eq. (28), force per length.
-        Q: (dofs, v) int B^T L, so that the load of the macroscopic strain E is f = -Q E, Eq. (29), and the
-            integral of the stress is |Omega| L E + Q^T u*.
+        Q: (dofs, v) int B^T L, so that the macroscopic strain E has the load f = -Q E, Eq. (29), and the
+            stress integral is |Omega| L E + Q^T u*.
         slopes: (classes, 2) int dN/dx.
-        areas: (materials,) of which |Omega| is the sum.
+        areas: (materials,) with the sum |Omega|.
     """
 
     K: csr_matrix
@@ -55,13 +55,13 @@ class Assembly:
 def assemble(
     mesh: FineMesh, laws: Float, problem: Problem = PLANE, mixed: Mixed = False, material: Int | None = None
 ) -> Assembly:
-    """Assemble the subdomain `mesh` of the stiffness L (v, v), or of several.
+    """Assemble the subdomain `mesh` with one stiffness L (v, v) or several.
 
-    Its first rows and columns belong to strains of displacements, the others to uniform strains.  Quadratic
-    elements of a stiffness that is isotropic in the plane may be mixed: with a bubble and a pressure (`fem.bubble`).
+    Its first rows and columns belong to displacement strains, the others to uniform strains.  Quadratic
+    elements whose stiffness is isotropic in the plane may be mixed: with a bubble and a pressure (`fem.bubble`).
 
     Args:
-        laws: L (v, v), or (materials, v, v) with the `material` (t,) of each coarse triangle.
+        laws: L (v, v), or (materials, v, v) with each coarse triangle's `material` (t,).
         mixed: whether elements are mixed, or whether each material has mixed ones.
     """
     macro, c = MacroElement.of(mesh.lattice), problem.components
@@ -88,7 +88,7 @@ def assemble(
 def element_strain(
     points: Float, triangles: Int32, node_class: Int32, u: Float, problem: Problem = PLANE
 ) -> tuple[Float, Float]:
-    """Mean strains (e, m) of the elements under nodal displacements u (classes, c), and their areas (e,)."""
+    """Mean element strains (e, m) under nodal displacements u (classes, c), and their areas (e,)."""
     strain, area = np.empty((len(triangles), problem.strains)), np.empty(len(triangles))
     parts_of = [np.nonzero(problem.voigt == number) for number in range(problem.strains)]
     for part in _chunks(np.arange(len(triangles)), ELEMENTS_AT_ONCE):
@@ -108,9 +108,9 @@ def _chunks(numbers: Int, size: int) -> list[Int]:
 def _affine(
     macro: MacroElement, mesh: FineMesh, part: Int, tensor: Float, mixed: Float | None
 ) -> tuple[Float, Float, float]:
-    """Couples (t, p, c^2), loads (t, q, 2) and area of affine coarse triangles: pulled back to the unit triangle.
+    """Couples (t, p, c^2), loads (t, q, 2) and area for affine coarse triangles: pulled back to the unit triangle.
 
-    Elements of a stiffness `mixed` are.
+    Elements with a stiffness `mixed` are mixed.
     """
     g, w = gradients(mesh.points[mesh.nodes[part, :3]])
     # The last two of the three linear functions are the reference coordinates: inverse_rk = dr_r / dx_k.
@@ -126,7 +126,7 @@ def _affine(
 def _curved(
     macro: MacroElement, mesh: FineMesh, part: Int, tensor: Float, mixed: Float | None
 ) -> tuple[Float, Float, float]:
-    """Return the same of coarse triangles with curved edges, by integration over each of their elements."""
+    """Return the same for coarse triangles with curved edges, by integration over each of their elements."""
     elements = mesh.lattice.triangles
     points = mesh.points[mesh.nodes[part][:, elements].reshape(-1, elements.shape[1])]
     g, w = gradients(points)
@@ -138,7 +138,7 @@ def _curved(
 
 
 def _sparse(couples: Float, rows: Int32, columns: Int32, n_classes: int) -> csr_matrix:
-    """(c n, c n) sum of the couples (t, p, c^2) of classes `rows` and `columns` (t, p)."""
+    """(c n, c n) sum over the couples (t, p, c^2) between classes `rows` and `columns` (t, p)."""
     c, size = math.isqrt(couples.shape[-1]), rows.size
     by_row = csc_matrix((columns.ravel(), rows.ravel(), np.arange(size + 1)), shape=(n_classes, size)).tocsr()
     places = csr_matrix((by_row.indices, by_row.data, by_row.indptr), shape=(n_classes, n_classes))
@@ -154,7 +154,7 @@ def _sparse(couples: Float, rows: Int32, columns: Int32, n_classes: int) -> csr_
 
 @dataclass(frozen=True)
 class GroupedSum:
-    """Sums of the element matrices' entries of one coarse triangle that belong together.
+    """Sums over element matrix entries that belong together in one coarse triangle.
 
     Attributes:
         entries: all entries, flat, sum after sum.
@@ -166,12 +166,12 @@ class GroupedSum:
 
     @classmethod
     def of(cls, target: Int) -> GroupedSum:
-        """One sum for each value of `target`, the place of an entry, in ascending order."""
+        """One sum for each value in `target`, an entry's place, in ascending order."""
         entries = np.argsort(target, axis=None, kind="stable")
         return cls(entries, np.unique(target.ravel()[entries], return_index=True)[1])
 
     def __call__(self, values: Float) -> Float:
-        """(t, sums, k) from the entries (.., k) of t coarse triangles."""
+        """(t, sums, k) from t coarse triangles' entries (.., k)."""
         each = values.reshape(-1, len(self.entries), values.shape[-1])
         return np.add.reduceat(each[:, self.entries], self.first, axis=1)
 
@@ -181,11 +181,11 @@ class MacroElement:
     """The lattice with q nodes as an element whose nodes couple in the p ordered pairs that share an element.
 
     Attributes:
-        rows, columns: (p,) lattice nodes of each couple, in row-major order.
+        rows, columns: (p,) each couple's lattice nodes, in row-major order.
         couples: from the entries (4**refine, a, a) of the element matrices to the couples.
         nodes: from the nodes (4**refine, a) of the elements to the lattice nodes.
         products: (p, 4) int dN_A/dr_k dN_B/dr_l over the unit triangle, with (k, l) flat.
-        hessians: (p, 9) sums over the elements of the products of second derivatives of their functions (`fem.bubble`)
+        hessians: (p, 9) products of second derivatives of the element functions, summed over elements (`fem.bubble`)
             if they are quadratic.
         integrals: (q, 2) int dN_A/dr_k over the unit triangle.
     """
@@ -201,7 +201,7 @@ class MacroElement:
     @classmethod
     @lru_cache(maxsize=4)
     def of(cls, lattice: ReferenceLattice) -> MacroElement:
-        """Return the element of a lattice."""
+        """Return a lattice's element."""
         elements, q = lattice.triangles, len(lattice.nodes)
         pair = elements[:, :, None] * q + elements[:, None, :]
         couples, nodes, each = GroupedSum.of(pair), GroupedSum.of(elements), np.unique(pair)
@@ -244,7 +244,7 @@ def void_integrals(submesh: Submesh, mesh: FineMesh) -> Float:
 
 
 def nodes_along(submesh: Submesh, mesh: FineMesh, edges: Bool) -> Int:
-    """(sides, M + 1) the nodes of each side of a triangle on one of the marked torus `edges`, the body on the left."""
+    """(sides, M + 1) the nodes of each triangle side on one of the marked torus `edges`, the body on the left."""
     triangle, side = np.nonzero(edges[submesh.edge_class[submesh.triangle_edges]])
     lattice, sides = mesh.lattice.nodes, []
     for k in range(3):  # from vertex k to vertex k + 1

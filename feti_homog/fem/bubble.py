@@ -1,8 +1,8 @@
 """Quadratic triangles with a cubic bubble and a discontinuous linear pressure (Crouzeix and Raviart 1973).
 
-The pressure p = lambda Pi div u, with Pi the projection on linear functions of the reference coordinates, and the
-bubble are eliminated element by element.  So the element has the nodes of a quadratic one, does not lock where lambda
-exceeds the shear modulus mu, and its mean strains, its mean stresses and the loads of uniform strains equal the
+The pressure p = lambda Pi div u, with Pi the projection on linear functions in reference coordinates, and the
+bubble are eliminated element by element.  So the element has a quadratic one's nodes, does not lock where lambda
+exceeds the shear modulus mu, and its mean strains, its mean stresses and its loads under uniform strains equal the
 quadratic ones: the bubble vanishes on the boundary, and Pi keeps means.
 """
 
@@ -25,7 +25,7 @@ T = np.array([[2.0, 1.0], [1.0, 2.0]])
 
 
 def lame(L: Float) -> tuple[float, float]:
-    """lambda and mu of a stiffness (v, v) that is isotropic in the plane."""
+    """lambda and mu from a stiffness (v, v) that is isotropic in the plane."""
     return float(L[0, 1]), float(L[2, 2])
 
 
@@ -57,11 +57,11 @@ def affine_couples(L: Float, inverse: Float, determinant: Float) -> Float:
 
 @dataclass(frozen=True)
 class Elements:
-    """Elements of any shape, of a stiffness that is isotropic in the plane, with their bubble.
+    """Elements of any shape with their bubble; their stiffness is isotropic in the plane.
 
     Attributes:
         lame: lambda and mu.
-        gradients, weights: (e, q, 7, 2) of the shape functions, the bubble's last, and (e, q).
+        gradients, weights: (e, q, 7, 2) for the shape functions, the bubble's last, and (e, q).
         projected: (e, q, 7, 2) Pi dN_a/dx_i at the quadrature points: Pi div u = projected : u.
     """
 
@@ -72,7 +72,7 @@ class Elements:
 
     @classmethod
     def of(cls, points: Float, L: Float) -> Elements:
-        """Integrate the elements of nodes (e, 6, 2)."""
+        """Integrate the elements with nodes (e, 6, 2)."""
         g, w = gradients(points, with_bubble=True)
         linear, (e, q, a, _) = barycentric(BUBBLE), g.shape
         mass = np.einsum("eq,qm,qn->emn", w, linear, linear, optimize=True)
@@ -80,19 +80,19 @@ class Elements:
         return cls(lame(L), g, w, (linear @ np.linalg.solve(mass, moments)).reshape(g.shape))
 
     def couples(self) -> Float:
-        """(e, 6, 6, 4) stiffness of the nodes, with (i, j) flat."""
+        """(e, 6, 6, 4) nodal stiffness, with (i, j) flat."""
         K, n = self._stiffness(slice(None)), 2 * BUBBLE
         nodes = K[:, :n, :n] - K[:, :n, n:] @ np.linalg.solve(K[:, n:, n:], K[:, n:, :n])
         return np.asarray(nodes.reshape(-1, BUBBLE, 2, BUBBLE, 2).transpose(0, 1, 3, 2, 4).reshape(-1, 6, 6, 4))
 
     def with_bubble(self, u: Float) -> Float:
-        """(e, 7, 2, k) displacements (e, 6, 2, k) of nodes, and of the bubble that follows them."""
+        """(e, 7, 2, k) displacements (e, 6, 2, k) at nodes, and the bubble's, which follows them."""
         K, n = self._stiffness(slice(BUBBLE, None)), 2 * BUBBLE
         bubble = np.linalg.solve(K[:, :, n:], K[:, :, :n] @ u.reshape(len(u), n, -1))
         return np.concatenate([u, -bubble[:, None]], axis=1)
 
     def strain(self, u: Float) -> Float:
-        """(e, q, 3, k) of displacements (e, 7, 2, k)."""
+        """(e, q, 3, k) under displacements (e, 7, 2, k)."""
         e, q, a, _ = self.gradients.shape
         slope = self.gradients.transpose(0, 1, 3, 2).reshape(e, 2 * q, a) @ u.reshape(e, a, -1)
         slope = slope.reshape(e, q, 2, 2, -1)
@@ -100,19 +100,19 @@ class Elements:
         return np.stack([slope[:, :, 0, 0], slope[:, :, 1, 1], shear], axis=2)
 
     def dilatation(self, u: Float) -> Float:
-        """(e, q, k) Pi div u, p / lambda, of displacements (e, 7, 2, k)."""
+        """(e, q, k) Pi div u, p / lambda, under displacements (e, 7, 2, k)."""
         e, q, a, _ = self.gradients.shape
         return np.asarray(self.projected.reshape(e, q, 2 * a) @ u.reshape(e, 2 * a, -1))
 
     def stress(self, u: Float) -> Float:
-        """(e, q, 3, k) 2 mu eps + p of displacements (e, 7, 2, k)."""
+        """(e, q, 3, k) 2 mu eps + p under displacements (e, 7, 2, k)."""
         first, shear = self.lame
         stress = shear * np.array([2.0, 2.0, 1.0])[:, None] * self.strain(u)
         stress[:, :, :2] += first * self.dilatation(u)[:, :, None]
         return np.asarray(stress)
 
     def _stiffness(self, functions: slice) -> Float:
-        """(e, 2n, 14) rows of some functions in the stiffness before the bubble is eliminated:
+        """(e, 2n, 14) some functions' rows in the stiffness before the bubble is eliminated:
 
         mu (delta_ij dN_a/dx_k dN_b/dx_k + dN_a/dx_j dN_b/dx_i) + lambda Pi dN_a/dx_i dN_b/dx_j.
         """

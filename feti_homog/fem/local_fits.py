@@ -1,4 +1,4 @@
-"""Polynomials fitted to values of the elements around each vertex, by least squares weighted with areas.
+"""Polynomials fitted to element values around each vertex, by least squares weighted with areas.
 
 On a boundary, where fits have elements on one side alone, known tractions correct them.
 """
@@ -25,7 +25,7 @@ NO_NORMAL = 0.1
 
 @dataclass(frozen=True)
 class PatchNeighbours:
-    """Pairs of neighbours, the first of which is on the boundary, where vertices have few elements of their own.
+    """Neighbour pairs, the first on the boundary, where vertices have few elements of their own.
 
     Attributes:
         at, other: (n,) vertices.
@@ -55,12 +55,12 @@ class PatchNeighbours:
         return cls(at[is_start], other[is_start], np.concatenate([vector, -vector])[is_start])
 
     def shared(self, sums: Float, order: int) -> Float:
-        """(vertices, p, k) shares of vertices on the boundary in the sums (vertices, p, k) of their neighbours."""
+        """(vertices, p, k) shares that boundary vertices have in the sums (vertices, p, k) of their neighbours."""
         moved = _translations(self.vector, order) @ sums[self.other]
         return NEIGHBOURS[order] * gathered(self.at, moved, len(sums))
 
     def shared_moments(self, moments: Float) -> Float:
-        """(6, vertices) shares of vertices on the boundary in the moments (6, vertices) of neighbours."""
+        """(6, vertices) shares that boundary vertices have in the moments (6, vertices) of neighbours."""
         one, x, y, xx, xy, yy = moments[:, self.other]
         a, b = self.vector.T
         moved_x, moved_y = x + a * one, y + b * one
@@ -68,21 +68,21 @@ class PatchNeighbours:
         return NEIGHBOURS[1] * np.stack([np.bincount(self.at, row, moments.shape[1]) for row in moved])
 
     def shared_matrices(self, moments: Float, order: int) -> Float:
-        """(vertices, p, p) the same of moments (vertices, p, p)."""
+        """(vertices, p, p) the same for moments (vertices, p, p)."""
         T = _translations(self.vector, order)
         moved = T @ moments[self.other] @ T.transpose(0, 2, 1)
         return NEIGHBOURS[order] * gathered(self.at, moved, len(moments))
 
 
 def linear_values(vertices: Int, away: Float, weights: Float, values: Float, neighbours: PatchNeighbours) -> Float:
-    """(vertices, k) values at the vertices of linear fits to uniform ones (e, k).
+    """(vertices, k) linear fits at the vertices, from uniform element values (e, k).
 
-    Each is a weighted mean of the values around it, so that sums over elements are not made, but where neighbours share
+    Each is a weighted mean of values around it, so that sums over elements are not made, but where neighbours share
     them.
 
     Args:
         vertices: (3, e) of the elements.
-        away: (2, 3, e) vectors from these to the middle of the element.
+        away: (2, 3, e) vectors from these to the element's middle.
         weights: (e,) areas.
     """
     at, size, e = vertices.ravel(), int(vertices.max()) + 1, len(weights)
@@ -113,7 +113,7 @@ def linear_values(vertices: Int, away: Float, weights: Float, values: Float, nei
 
 
 def polynomials(x: Float, order: int) -> Float:
-    """(.., p) 1, x, y and of order 2 also x^2, x y, y^2 at the places x (.., 2)."""
+    """(.., p) 1, x, y and in order 2 also x^2, x y, y^2 at the places x (.., 2)."""
     one, first, second = np.ones(x.shape[:-1]), x[..., 0], x[..., 1]
     quadratic = (first * first, first * second, second * second) if order == 2 else ()
     return np.stack([one, first, second, *quadratic], axis=-1)
@@ -132,7 +132,7 @@ def _translations(d: Float, order: int) -> Float:
 
 
 def gathered(place: Int, values: Float, size: int) -> Float:
-    """(size, ..) sums of the values (n, .., p, q) at the places (n, ..)."""
+    """(size, ..) sums over the values (n, .., p, q) at the places (n, ..)."""
     n, shape = place.size, values.shape[-2:]
     sums = csc_matrix((np.ones(n), place.ravel(), np.arange(n + 1)), (size, n)) @ values.reshape(n, math.prod(shape))
     return np.asarray(sums.reshape(size, *shape))
@@ -147,10 +147,10 @@ def fitted(moments: Float, sums: Float) -> Float:
 
 @dataclass(frozen=True)
 class KnownTractions:
-    """Tractions of k loads at n vertices.
+    """Tractions under k loads at n vertices.
 
     Attributes:
-        node: (n,) their classes of nodes.
+        node: (n,) their node classes.
         normal: (n, 2) unit vectors out of the body.
         traction: (n, c, k).
     """
@@ -161,7 +161,7 @@ class KnownTractions:
 
     @classmethod
     def at(cls, node: Int, mean: Float, traction: Float) -> KnownTractions:
-        """Make tractions of the mean side normals (n, 2) at vertices; leave out vertices where normals cancel."""
+        """Make tractions from the mean side normals (n, 2) at vertices; leave out vertices where normals cancel."""
         length = np.hypot(*mean.T)
         rows = length > NO_NORMAL
         return cls(node[rows], mean[rows] / length[rows, None], traction[rows])
@@ -169,10 +169,10 @@ class KnownTractions:
     def imposed(self, stress: Float, vertex: Int, voigt: Int, flexibility: Float) -> Float:
         """Return stresses (vertices, m, k) with these tractions at `vertex` (n,).
 
-        Of components `voigt` (c, 2) and a flexibility (m, m).
+        For components `voigt` (c, 2) and a flexibility (m, m).
 
         sigma + d n + n d - (d . n) n n + a t t in the plane, with d = traction - sigma n and a such that the strain
-        along the boundary stays, as it is known on both of its sides; along the fibres sigma + d n.
+        along the boundary stays, as it is known on both its sides; along the fibres sigma + d n.
         """
         n, before = self.normal, stress[vertex]
         d = self.traction - np.einsum("ncdk,nd->nck", before[:, voigt], n)

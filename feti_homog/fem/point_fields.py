@@ -1,4 +1,4 @@
-"""Fields of elements at their quadrature points, with the bubble and pressure of mixed ones, and energies of cracks.
+"""Element fields at quadrature points, with mixed elements' bubble and pressure, and crack energies.
 
 A growing crack releases the energy that elements lose when their nodes are moved.
 """
@@ -16,11 +16,11 @@ from feti_homog.typing import Float
 
 @dataclass(frozen=True)
 class PointFields:
-    """Fields of e elements at q points each, in the order [11, 22, 12].
+    """Fields in e elements at q points each, in the order [11, 22, 12].
 
     Attributes:
-        gradients, weights: (e, q, a, 2) of the shape functions, of mixed elements the bubble's last, and (e, q).
-        u: (e, a, 2) displacements, in mixed elements also of the bubble.
+        gradients, weights: (e, q, a, 2) for the shape functions, in mixed elements the bubble's last, and (e, q).
+        u: (e, a, 2) displacements, in mixed elements also the bubble's.
         strain, stress: (e, q, 3).
         density: (e, q) W whose integral is the strain energy: sigma : eps / 2, and p (div u - p / lambda) / 2 in
             mixed elements.
@@ -35,7 +35,7 @@ class PointFields:
 
 
 def point_fields(points: Float, u: Float, L: Float, is_mixed: bool = False) -> PointFields:
-    """Fields of elements of nodes and displacements (e, a, 2) and of the stiffness L (3, 3)."""
+    """Fields in elements with nodes and displacements (e, a, 2) and the stiffness L (3, 3)."""
     if not is_mixed:
         g, weights = gradients(points)
         strain = voigt(np.einsum("eai,eqad->eqid", u, g))
@@ -50,7 +50,7 @@ def point_fields(points: Float, u: Float, L: Float, is_mixed: bool = False) -> P
 
 
 def voigt(gradient: Float) -> Float:
-    """(e, q, 3) strains [11, 22, 12] of displacement gradients (e, q, 2, 2)."""
+    """(e, q, 3) strains [11, 22, 12] from displacement gradients (e, q, 2, 2)."""
     shear = gradient[..., 0, 1] + gradient[..., 1, 0]
     return np.stack([gradient[..., 0, 0], gradient[..., 1, 1], shear], axis=-1)
 
@@ -64,10 +64,10 @@ def energy_change(points: Float, u: Float, L: Float, moved: Float, changed: Floa
     mixed ones, which stay as they are, the energy is stationary.
 
     Args:
-        points, u: (e, a, 2) nodes of the elements and their displacements.
+        points, u: (e, a, 2) element nodes and their displacements.
         L: (3, 3) stiffness.
         moved, changed: (e, a, 2) dx and du.
-        is_mixed: whether the elements have a bubble and a pressure of their own.
+        is_mixed: whether the elements have their own bubble and pressure.
     """
     fields, nodes = point_fields(points, u, L, is_mixed), points.shape[1]
     grad_u = np.einsum("eai,eqad->eqid", fields.u, fields.gradients)

@@ -21,7 +21,7 @@ class Problem:
     Attributes:
         strain: c rows of two numbers.
         turns: whether a rigid body can turn without strain.
-        loads: v names of the unit loads, the m strains first; the others are uniform in the cell.
+        loads: v unit load names, the m strains first; the others are uniform in the cell.
     """
 
     strain: tuple[tuple[int, int], ...]
@@ -40,7 +40,7 @@ class Problem:
 
     @property
     def stresses(self) -> int:
-        """Loads that work on stresses: strains, of displacements first."""
+        """Loads that work on stresses: displacement strains first."""
         return len(self.loads) - ("temperature" in self.loads)
 
     @cached_property
@@ -54,11 +54,11 @@ class Problem:
         return np.asarray(strain[self.voigt] / shared[self.voigt])
 
     def dofs(self, nodes: Int) -> Int:
-        """(cn,) degrees of freedom of the nodes (n,)."""
+        """(cn,) degrees of freedom at the nodes (n,)."""
         return np.asarray((self.components * nodes[:, None] + np.arange(self.components)).ravel())
 
     def nodes(self, dofs: Int) -> Int:
-        """(n,) the node of each degree of freedom (n,)."""
+        """(n,) each degree of freedom's node (n,)."""
         return np.asarray(dofs // self.components)
 
 

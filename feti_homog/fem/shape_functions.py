@@ -1,4 +1,4 @@
-"""Shape functions of linear and quadratic triangles, and gradients, also of a bubble, at the points of a quadrature."""
+"""Shape functions on linear and quadratic triangles, and gradients, also a bubble's, at quadrature points."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _P2_WEIGHTS = np.tile([0.223381589678011, 0.109951743655322], 3) / 2
 
 @cache
 def quadrature(functions: int) -> tuple[Float, Float]:
-    """(q, a, 2) reference gradients of 3, 6 or, with the bubble 27 r_0 r_1 r_2, 7 functions, and (q,) weights."""
+    """(q, a, 2) reference gradients for 3, 6 or, with the bubble 27 r_0 r_1 r_2, 7 functions, and (q,) weights."""
     if functions == 3:
         return np.array([[[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]]), np.array([0.5])
     x, y = _P2_POINTS.T
@@ -30,7 +30,7 @@ def quadrature(functions: int) -> tuple[Float, Float]:
 
 
 def gradients(corners: Float, with_bubble: bool = False) -> tuple[Float, Float]:
-    """Physical gradients (e, q, a, 2) and weights times Jacobian (e, q) of elements with nodes (e, a, 2)."""
+    """Physical gradients (e, q, a, 2) and weights times Jacobian (e, q) in elements with nodes (e, a, 2)."""
     nodes = corners.shape[1]
     reference, weights = quadrature(nodes + with_bubble)
     (xr, xs), (yr, ys) = np.moveaxis(np.tensordot(corners, reference[:, :nodes], (1, 1)), (1, 3), (0, 1))
@@ -43,7 +43,7 @@ def gradients(corners: Float, with_bubble: bool = False) -> tuple[Float, Float]:
 
 
 def barycentric(nodes: int) -> Float:
-    """(q, 3) barycentric coordinates of the quadrature points of the 3- or 6-node triangle."""
+    """(q, 3) barycentric coordinates of quadrature points in the 3- or 6-node triangle."""
     if nodes == 3:
         return np.full((1, 3), 1 / 3)
     return np.column_stack([1 - _P2_POINTS.sum(axis=1), _P2_POINTS])

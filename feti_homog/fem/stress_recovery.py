@@ -1,8 +1,8 @@
 """Stresses recovered in each subdomain from its element stresses, and the energy of their difference.
 
 Zienkiewicz and Zhu (IJNME 33 (1992) 1331): about each vertex a polynomial of the elements' order is fitted to the
-stresses at the points of integration of the elements around it; within an element the fits of its three vertices are
-blended by its barycentric coordinates, of order 1 their values there.  A subdomain is of one phase, so that no fit
+stresses at the integration points in the elements around it; within an element its three vertices' fits are
+blended by its barycentric coordinates, in order 1 their values there.  A subdomain has one phase, so that no fit
 reaches across an interface, where stresses jump; about a vertex that pieces of one body share it is one of the body.
 """
 
@@ -27,7 +27,7 @@ LINEAR_AT_ONCE = 1 << 12
 
 @dataclass(frozen=True)
 class ElementStresses:
-    """Stresses of the elements `part` under k loads at q points.
+    """Stresses in the elements `part` under k loads at q points.
 
     `points` (e, q, 2), `weights` (e, q), `stress` (e, q, m, k).
     """
@@ -40,18 +40,18 @@ class ElementStresses:
 
 @dataclass(frozen=True)
 class RecoveredStress:
-    """Element stresses and recovered stresses of some subdomains of one phase under k loads.
+    """Element stresses and recovered stresses in some one-phase subdomains under k loads.
 
     Attributes:
-        points: (n, 2) plane nodes of all of them.
-        triangles: (e, 3 or 6) plane nodes of the elements.
-        node_class: (n,) class of each plane node.
-        L, problem: as of `Subdomain`; m strains of displacements, v loads.
+        points: (n, 2) all their plane nodes.
+        triangles: (e, 3 or 6) each element's plane nodes.
+        node_class: (n,) each plane node's class.
+        L, problem: as in `Subdomain`; m displacement strains, v loads.
         u: (classes, c, k) fluctuating displacements.
         loads: (v, k) the strains and other loads.
-        is_mixed: whether the elements have a bubble and a pressure of their own.
-        known: tractions that the recovered stresses of linear elements obey.
-        shared: (n,) classes of vertices whose fits (n, p, m k) take in elements of other pieces of their body.
+        is_mixed: whether the elements have their own bubble and pressure.
+        known: tractions that the recovered stresses in linear elements obey.
+        shared: (n,) vertex classes whose fits (n, p, m k) take in elements from their body's other pieces.
     """
 
     points: Float
@@ -74,7 +74,7 @@ class RecoveredStress:
 
     @property
     def order(self) -> int:
-        """Order of the elements and of the fits."""
+        """Order of both elements and fits."""
         return 1 if self.triangles.shape[1] == 3 else 2
 
     @cached_property
@@ -84,7 +84,7 @@ class RecoveredStress:
 
     @cached_property
     def _coordinates(self) -> Float:
-        """(2, n) of the plane nodes."""
+        """(2, n) plane node coordinates."""
         return self.points.T.copy()
 
     @cached_property
@@ -94,7 +94,7 @@ class RecoveredStress:
 
     @cached_property
     def vertices(self) -> Int:
-        """(e, 3) vertices of the elements, numbered from 0; periodic images are one."""
+        """(e, 3) element vertices, numbered from 0; periodic images are one."""
         return np.asarray(np.take(self.numbers, np.take(self.node_class, self._rows)).T)
 
     @cached_property
@@ -106,19 +106,19 @@ class RecoveredStress:
 
     @cached_property
     def flexibility(self) -> Float:
-        """(m, m) inverse of the stiffness that strains of displacements meet."""
+        """(m, m) inverse of the stiffness that displacement strains meet."""
         m = self.problem.strains
         return np.asarray(np.linalg.inv(self.L[:m, :m]))
 
     @cached_property
     def elements(self) -> list[ElementStresses]:
-        """The stresses of the elements at their points of integration, in chunks."""
+        """The element stresses at their integration points, in chunks."""
         at_once, size = LINEAR_AT_ONCE if self.order == 1 else ELEMENTS_AT_ONCE, len(self.triangles)
         parts = (slice(first, min(first + at_once, size)) for first in range(0, size, at_once))
         return [self._uniform(part) if self.order == 1 else self._varying(part) for part in parts]
 
     def _varying(self, part: slice) -> ElementStresses:
-        """Return the stresses of quadratic elements."""
+        """Return the stresses in quadratic elements."""
         m, nodes = self.problem.strains, self.triangles[part]
         corners, u = self.points[nodes], self.u[self.node_class[nodes]]
         if self.is_mixed:
@@ -136,7 +136,7 @@ class RecoveredStress:
         return ElementStresses(part, points, weights, stress + self.L[:m] @ self.loads)
 
     def _uniform(self, part: slice) -> ElementStresses:
-        """Return the stresses of linear elements; loops of NumPy run over the elements."""
+        """Return the stresses in linear elements; NumPy loops run over the elements."""
         (c, k), m, triangles = self.u.shape[1:], self.problem.strains, self._rows[:, part]
         (x, y), at = (np.take(row, triangles) for row in self._coordinates), np.take(self.node_class, triangles)
         zero, first, second = (np.take(self._by_node, row, axis=1) for row in at)
@@ -157,7 +157,7 @@ class RecoveredStress:
 
     @cached_property
     def fits(self) -> Float:
-        """(vertices, p, m k) coefficients of the polynomials about each vertex, see `polynomials`; p = 1 of order 1."""
+        """(vertices, p, m k) polynomial coefficients about each vertex, see `polynomials`; p = 1 in order 1."""
         neighbours = PatchNeighbours.of(self.vertices, self.points[self.triangles[:, :3]])
         if self.order == 1:
             chunks = [(chunk.points[:, 0], chunk.weights[:, 0], chunk.stress[:, 0]) for chunk in self.elements]
@@ -175,7 +175,7 @@ class RecoveredStress:
         return self._with_shared(fitted(moments, sums + neighbours.shared(sums, self.order)))
 
     def patch_sums(self) -> tuple[Float, Float]:
-        """(vertices, p, p) moments of the elements around each vertex, and (vertices, p, m k) of their stresses."""
+        """(vertices, p, p) moments from the elements around each vertex, and (vertices, p, m k) from their stresses."""
         moments, sums, size = np.zeros(()), np.zeros(()), int(self.vertices.max()) + 1
         for chunk in self.elements:
             corners = self.points[self.triangles[chunk.part, :3]]
@@ -205,7 +205,7 @@ class RecoveredStress:
         return result.reshape(*points.shape[:2], *shape)
 
     def difference(self, with_shares: bool = True) -> tuple[Float, Float]:
-        """(k, k) int ds_i : S : ds_j, ds recovered less own stress; (e, k) shares of the elements in its diagonal.
+        """(k, k) int ds_i : S : ds_j, ds recovered less own stress; (e, k) each element's shares in its diagonal.
 
         Without shares (0, k).
         """
@@ -220,7 +220,7 @@ class RecoveredStress:
         return np.einsum("ab,akbl->kl", self.flexibility, total.reshape(m, k, m, k)), np.concatenate(shares)
 
     def _off(self, chunk: ElementStresses) -> Float:
-        """(q, e, m, k) recovered less own stress at places of the elements, times the root of their weights."""
+        """(q, e, m, k) recovered less own stress at places in the elements, times the root of their weights."""
         if self.order == 2:
             off = self.recovered(chunk.part, barycentric(6)) - chunk.stress
             return np.asarray((off * np.sqrt(chunk.weights)[..., None, None]).swapaxes(0, 1))

@@ -1,6 +1,6 @@
-"""Bounds and closed estimates of composites: their records, and the aligned cylinders that both are made of.
+"""Bounds and closed estimates for composites: their records, and the aligned cylinders that both are made of.
 
-Stiffnesses of the plane are (3, 3) in Voigt order [11, 22, 12] with engineering shear, in any unit of stress.  Phases
+Stiffnesses of the plane are (3, 3) in Voigt order [11, 22, 12] with engineering shear, in any stress unit.  Phases
 of cylinders have Hill's moduli k, l = 2 nu_A k, n = E_A + 4 nu_A^2 k, m = G_T and p = G_A, so that under an axial
 strain e, a change of area theta and a change of temperature T
 
@@ -28,7 +28,7 @@ Pair = tuple[float, float]
 
 @dataclass(frozen=True)
 class Bounds:
-    """Lower and upper bound of the plane bulk modulus and of the shear modulus."""
+    """Lower and upper bounds on the plane bulk modulus and the shear modulus."""
 
     bulk: Pair = described("lower and upper bound of the plane bulk modulus", STRESS, "(2,)")
     shear: Pair = described("lower and upper bound of the shear modulus", STRESS, "(2,)")
@@ -36,7 +36,7 @@ class Bounds:
 
 @dataclass(frozen=True)
 class FibreBounds:
-    """Lower and upper bounds of the constants of any arrangement of bonded fibres."""
+    """Lower and upper bounds on the constants for any arrangement of bonded fibres."""
 
     E_axial: Pair = described("of Young's modulus along the fibres", STRESS, "(2,)")
     nu_axial: Pair | None = described(
@@ -49,13 +49,13 @@ class FibreBounds:
 
 @dataclass(frozen=True)
 class Springs:
-    """An elastic interface of round fibres of one radius: tractions over jumps, positive; infinite is bonded.
+    """An elastic interface around round fibres of one radius: tractions over jumps, positive; infinite is bonded.
 
     Attributes:
-        normal: k_n, of the opening.
-        tangential: k_t, of the slip around the fibre.
-        axial: k_a, of the slip along it.
-        radius: a, in the unit of length of the stiffnesses.
+        normal: k_n, for the opening.
+        tangential: k_t, for the slip around the fibre.
+        axial: k_a, for the slip along it.
+        radius: a, in the stiffnesses' unit of length.
     """
 
     normal: float
@@ -72,7 +72,7 @@ class Springs:
 
 @dataclass(frozen=True)
 class Fibres:
-    """Fibres of one material, and of one radius if they are on springs: their share of the cell, and constants."""
+    """Fibres of one material, and one radius if they are on springs: their share of the cell, and constants."""
 
     fraction: float
     constants: TransverseIsotropy
@@ -116,12 +116,12 @@ class Estimates:
 
 
 def voigt(fractions: ArrayLike, stiffnesses: ArrayLike) -> Float:
-    """Upper bound sum c_i C_i, (3, 3), of fractions (n,) and stiffnesses (n, 3, 3)."""
+    """Upper bound sum c_i C_i, (3, 3), from fractions (n,) and stiffnesses (n, 3, 3)."""
     return np.asarray(np.einsum("i,ijk->jk", np.asarray(fractions, float), np.asarray(stiffnesses, float)))
 
 
 def reuss(fractions: ArrayLike, stiffnesses: ArrayLike) -> Float:
-    """Lower bound (sum c_i C_i^-1)^-1, (3, 3), of fractions (n,) and stiffnesses (n, 3, 3)."""
+    """Lower bound (sum c_i C_i^-1)^-1, (3, 3), from fractions (n,) and stiffnesses (n, 3, 3)."""
     return np.asarray(np.linalg.inv(voigt(fractions, np.linalg.inv(np.asarray(stiffnesses, dtype=float)))))
 
 
@@ -130,11 +130,11 @@ def is_isotropic(stiffness: ArrayLike) -> bool:
 
 
 def hashin_shtrikman(fractions: ArrayLike, stiffnesses: Sequence[ArrayLike]) -> Bounds:
-    """Bounds of an isotropic composite of isotropic phases, (n,) and (n, 3, 3), in the plane.
+    """Bounds on an isotropic composite of isotropic phases, (n,) and (n, 3, 3), in the plane.
 
     k* = (sum c_i/(k_i + mu0))^-1 - mu0, mu* = (sum c_i/(mu_i + h0))^-1 - h0, h0 = k0 mu0/(k0 + 2 mu0), with
     k0, mu0 the least moduli of the phases for the lower bound and the greatest for the upper (Hashin 1965,
-    Walpole 1969). The bound of k holds for a composite of square symmetry too. Raises ValueError if a phase is not
+    Walpole 1969). The bound on k holds for a composite with square symmetry too. Raises ValueError if a phase is not
     isotropic.
     """
     if not all(map(is_isotropic, stiffnesses)):
@@ -213,7 +213,7 @@ def equivalent_fibre(family: Fibres, matrix: TransverseIsotropy) -> TransverseIs
         1/k_e = 1/k + 2/(k_n a),  1/p_e = 1/p + 1/(k_a a),
         1/m_e = 1/m + (x (q_n + q_t) + 12 q_n q_t) / (x + 3 (q_n + q_t)),  x = 1/m + 2/k + 1/m_m,  q_i = 1/(k_i a),
 
-    with the bulk modulus k, the shear moduli m across and p along the fibre, and m_m of the matrix.  k_e and p_e hold
+    with the bulk modulus k, the shear moduli m across and p along the fibre, and m_m for the matrix.  k_e and p_e hold
     in a composite cylinder too (Hashin 1990); m_e does not, for shear across a coated fibre is not uniform in it.
     """
     fibre, springs = family.constants, family.springs
@@ -236,10 +236,10 @@ def equivalent_fibre(family: Fibres, matrix: TransverseIsotropy) -> TransverseIs
 
 
 def fibre_bounds(fractions: Sequence[float], phases: Sequence[TransverseIsotropy]) -> FibreBounds:
-    """Bounds of bonded, transversely isotropic phases that are cylinders along x3 of any section.
+    """Bounds on bonded, transversely isotropic phases: cylinders along x3 with any section.
 
-    `aligned_cylinders` with the least moduli of the phases around, and with the greatest.  Bounds of nu_A are the
-    values of Hill's relation at the bounds of k, so of two phases only.  All but the bounds of G_T hold for square
+    `aligned_cylinders` with the least moduli of the phases around, and with the greatest.  Bounds on nu_A are the
+    values of Hill's relation at the bounds on k, so for two phases only.  All but the bounds on G_T hold for square
     symmetry too.  Hill 1964, Hashin 1965, Walpole 1969.
     """
 

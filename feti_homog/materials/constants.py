@@ -1,7 +1,7 @@
-"""Constants of a stiffness by name: one table, and the records, symbols and axes of its names.
+"""Stiffness constants by name: one table, and records, symbols and axes for its names.
 
 Stiffnesses C are (3, 3) in Voigt order [11, 22, 12], or (6, 6) in the order [11, 22, 33, 23, 13, 12] with x3 along the
-fibres; engineering shears, any unit of stress.  Expansions are strains per unit of temperature, (6,) in the same order.
+fibres; engineering shears, any stress unit.  Expansions are strains per unit of temperature, (6,) in the same order.
 
 Axes 1, 2, 3 of a cell are x1 and x2, across the fibres, and x3, along them.  Axes 1, 2, 3 of a ply, of data sheets and
 of cards are x3, x1, x2: names with `axial`, `transverse`, `x1` or `x2` are the same in both.
@@ -51,7 +51,7 @@ class Moduli:
 
 @dataclass(frozen=True)
 class EngineeringConstants:
-    """Constants in the axes of the cell: nu_ij = -eps_j/eps_i under stress along i."""
+    """Constants in the cell's axes: nu_ij = -eps_j/eps_i under stress along i."""
 
     E1: float = described("Young's modulus along x1", STRESS)
     E2: float = described("Young's modulus along x2", STRESS)
@@ -66,7 +66,7 @@ class EngineeringConstants:
 
 @dataclass(frozen=True)
 class TransverseIsotropy:
-    """Constants of the nearest transversely isotropic material about x3; five of the first seven are independent."""
+    """Constants for the nearest transversely isotropic material about x3; five of the first seven are independent."""
 
     E_axial: float = described("Young's modulus along the fibres", STRESS)
     E_transverse: float = described("Young's modulus across the fibres", STRESS)
@@ -86,7 +86,7 @@ class TransverseIsotropy:
 
 @dataclass(frozen=True)
 class TransverseModuli:
-    """Range of moduli across the fibres, of 720 directions in half a turn about x3."""
+    """Range of moduli across the fibres, over 720 directions in half a turn about x3."""
 
     E_least: float = described("least Young's modulus across the fibres", STRESS)
     E_largest: float = described("the largest one", STRESS)
@@ -116,7 +116,7 @@ def constants(C: Array, heat: Array | None = None) -> dict[str, Any]:
 
 
 def _along_axes(S: Array) -> dict[str, Any]:
-    """Tabulate the moduli and ratios of a compliance along the axes of the cell."""
+    """Tabulate the moduli and ratios of a compliance along the cell's axes."""
     normal, pairs = (2, ((0, 1), (1, 0))) if len(S) == 3 else (3, ((0, 1), (0, 2), (1, 2)))
     table = {f"E{i + 1}": 1 / S[i, i] for i in range(normal)}
     table |= {f"nu{i + 1}{j + 1}": -S[j, i] / S[i, i] for i, j in pairs}
@@ -154,7 +154,7 @@ def transverse_constants(E_axial: float, nu_axial: float, bulk: float, shear: fl
 
 
 def engineering_moduli(stiffness: ArrayLike) -> Moduli:
-    """Return the moduli of a stiffness (3, 3). Raises numpy.linalg.LinAlgError if it is singular."""
+    """Return the moduli from a stiffness (3, 3). Raises numpy.linalg.LinAlgError if it is singular."""
     C = np.asarray(stiffness, dtype=float)
     S, (bulk, shear) = np.linalg.inv(C), isotropic_part(C)
     table = _along_axes(S) | {"eta1": S[2, 0] / S[0, 0], "eta2": S[2, 1] / S[1, 1], "bulk": bulk, "shear": shear}
@@ -162,7 +162,7 @@ def engineering_moduli(stiffness: ArrayLike) -> Moduli:
 
 
 def isotropic_part(stiffness: ArrayLike) -> tuple[float, float]:
-    """Plane bulk modulus k and shear modulus mu of the isotropic stiffness nearest in the Frobenius norm.
+    """Plane bulk modulus k and shear modulus mu for the isotropic stiffness nearest in the Frobenius norm.
 
     k = (C11 + C22 + C12 + C21)/4, mu = (C11 + C22 - C12 - C21 + 4 C33)/8; both are the same in all axes.
     """
@@ -248,7 +248,7 @@ MATERIAL_EXPANSIONS = ("expansion_axial", "expansion_x1", "expansion_x2", *EXPAN
 
 
 class Constant(NamedTuple):
-    """Symbol of a constant, its way, and its names on the card of a transversely isotropic material."""
+    """A constant's symbol, its way, and its names on a transversely isotropic material's card."""
 
     symbol: str
     way: str

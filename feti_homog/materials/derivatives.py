@@ -1,6 +1,6 @@
-"""Derivatives of the laws of phases by their constants, and of constants of a composite by its stiffness.
+"""Derivatives of phase laws by their constants, and of composite constants by the stiffness.
 
-Stiffnesses are (3, 3) or (6, 6) in Voigt order with engineering shears, as of `laws.stiffness_of`.  Functions without
+Stiffnesses are (3, 3) or (6, 6) in Voigt order with engineering shears, as in `laws.stiffness_of`.  Functions without
 absolute values are differentiated by an imaginary step, f'(x) = Im f(x + i h) / h, which is exact to rounding (Squire
 and Trapp, SIAM Review 40 (1998) 110).
 """
@@ -31,10 +31,10 @@ TURN *= np.pi / 180
 
 @dataclass(frozen=True)
 class LawChange:
-    """Derivatives of the law of a phase by one of its constants.
+    """Derivatives of a phase's law by one of its constants.
 
     Attributes:
-        name: the key, of one of several numbers with its place, such as `stiffness.C12` or `expansion.3`.
+        name: the key, for one of several numbers with its place, such as `stiffness.C12` or `expansion.3`.
         value: the constant.
         stiffness: dC, (3, 3) or (6, 6).
         expansion: (6,) d alpha.
@@ -63,7 +63,7 @@ def law_changes(material: Material, plane: str) -> Iterator[LawChange]:
 
 
 def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:
-    """Engineering constants: dC = -C dS C with the compliance S of the plane state, in the axes of the cell."""
+    """Engineering constants: dC = -C dS C with the plane state's compliance S, in the cell's axes."""
     skipped = ("angle", "expansion", *EXPANSION_PAIR)
     names = [field.name for field in fields(material) if field.name not in skipped]
     values = {name: value for name in names if (value := getattr(material, name)) is not None}
@@ -98,9 +98,9 @@ def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, floa
 
 
 def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
-    """Differentiate the part of a complex stiffness or compliance that a plane state has.
+    """Differentiate the part that a plane state has in a complex stiffness or compliance.
 
-    That is all of it, the block of the plane or, in the state `condensed`, this less the share of 33.
+    That is all of it, the plane's block or, in the state `condensed`, this less the share of 33.
     """
     if PLANE_STATES[plane].is_spatial:
         return np.asarray(M.imag / STEP)
@@ -111,7 +111,7 @@ def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
 
 
 def _expansions(material: Material) -> Iterator[tuple[str, float, Float]]:
-    """Yield each expansion that is given, and (3,) along which of the material axes it is."""
+    """Yield each expansion that is given, and (3,) along which material axes it is."""
     if isinstance(material.expansion, tuple):
         for axis, value in enumerate(material.expansion):
             yield f"expansion.{axis + 1}", value, np.eye(3)[axis]

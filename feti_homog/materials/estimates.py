@@ -1,4 +1,4 @@
-"""Closed estimates of the constants of a unidirectional composite, from its phases and their fractions alone.
+"""Closed estimates for a unidirectional composite's constants, from its phases and their fractions alone.
 
 E_A, E_T, nu_A, nu_T: Young's moduli and contractions along and across the fibres; G_A, G_T, k: shear moduli along and
 across them and the bulk modulus across them; alpha: expansions; c: fractions; f, m: fibre and matrix.
@@ -26,7 +26,7 @@ from feti_homog.materials.constants import TransverseIsotropy, is_transversely_i
 
 
 def estimates(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimates:
-    """Return the estimates of each method for fibres in a matrix.
+    """Return each method's estimates for fibres in a matrix.
 
     The rule of mixtures and Mori and Tanaka's estimate are defined for any kinds of fibres, the others for one; on
     springs the last three.  No method gives a constant if a phase is not transversely isotropic about x3, nor an
@@ -63,13 +63,13 @@ def rule_of_mixtures(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Es
 
 
 def chamis(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Return the simplified equations of Chamis; one kind of fibres.
+    """Return Chamis's simplified equations; one kind of fibres.
 
         E_A, nu_A: rule of mixtures,  M = M_m / (1 - sqrt(c) (1 - M_m/M_f)) for M = E_T, G_A, G_T,
         nu_T = E_T/(2 G_T) - 1,  alpha_A = (c E_f alpha_f + (1 - c) E_m alpha_m)/E_A,
         alpha_T = sqrt(c) alpha_Tf + (1 - sqrt(c)) (alpha_Tm + c nu_m E_f/E_A alpha_m),
 
-    E, nu and alpha of the phases being the axial ones where T does not occur.  Chamis 1984, for an isotropic
+    E, nu and alpha in the phases being the axial ones where T does not occur.  Chamis 1984, for an isotropic
     matrix.
     """
     if len(fibres) != 1 or fibres[0].springs is not None:
@@ -97,7 +97,7 @@ def chamis(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
 
 
 def halpin_tsai(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Return the equations of Halpin and Tsai; one kind of fibres.
+    """Return Halpin and Tsai's equations; one kind of fibres.
 
         E_A, nu_A: rule of mixtures,  M = M_m (1 + xi eta c)/(1 - eta c),  eta = (M_f - M_m)/(M_f + xi M_m),
 
@@ -132,7 +132,7 @@ def _phases(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> list[tuple[
 
 
 def _in_parallel(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> dict[str, Any]:
-    """Tabulate E_A, nu_A, alpha_A and alpha_T of the rule of mixtures; no alpha if a phase has none."""
+    """Tabulate E_A, nu_A, alpha_A and alpha_T by the rule of mixtures; no alpha if a phase has none."""
     phases = _phases(matrix, fibres)
     E, nu = sum(c * x.E_axial for c, x in phases), sum(c * x.nu_axial for c, x in phases)
     axial = transverse = 0.0

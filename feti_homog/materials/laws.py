@@ -54,7 +54,7 @@ WORRYING_CONTRAST, LARGEST_CONTRAST = 1e10, 1e14
 
 
 def stiffness_of(material: Material, plane: str) -> Float:
-    """Return the stiffness (3, 3) in the plane, or (6, 6) if the plane state is one of space.
+    """Return the stiffness (3, 3) in the plane, or (6, 6) if the plane state is spatial.
 
     Raises as `plane_stiffness`.
     """
@@ -62,7 +62,7 @@ def stiffness_of(material: Material, plane: str) -> Float:
 
 
 def plane_stiffness(material: Material, plane: str) -> Float:
-    """C with [S11, S22, S12] = C [E11, E22, gamma12], (3, 3), symmetric positive definite, unit of stress.
+    """C with [S11, S22, S12] = C [E11, E22, gamma12], (3, 3), symmetric positive definite, stress unit.
 
     `plane` is "stress" (S33 = 0), "strain" (E33 = 0), or "generalized", where C is that at E33 = 0. Raises ValueError,
     with the keys at fault, if the constants leave C open or no material is stable with them.
@@ -86,7 +86,7 @@ def plane_stiffness(material: Material, plane: str) -> Float:
 
 
 def isotropic_ratio(material: Material) -> float | None:
-    """Poisson's ratio of an isotropic material, None of another, and of one that gives its stiffness.
+    """Poisson's ratio of an isotropic material, None for another, and for one that gives its stiffness.
 
     A transversely isotropic one is isotropic if its constants are, to ISOTROPY.
     """
@@ -100,7 +100,7 @@ def isotropic_ratio(material: Material) -> float | None:
 
 
 def spatial_stiffness(material: Material) -> Float:
-    """C with S = C E in the axes of the cell, (6, 6), symmetric positive definite, unit of stress.
+    """C with S = C E in the cell's axes, (6, 6), symmetric positive definite, unit of stress.
 
     Raises ValueError as `plane_stiffness` does.
     """
@@ -118,7 +118,7 @@ def spatial_stiffness(material: Material) -> Float:
 
 
 def expansion(material: Material) -> Float | None:
-    """Strains per unit of temperature of the free material, in the axes of the cell, (6,); None if not given.
+    """Strains per unit of temperature in the free material, in the cell's axes, (6,); None if not given.
 
     Raises ValueError, with the keys at fault, if they are given twice or by half.
     """
@@ -142,7 +142,7 @@ def expansion(material: Material) -> Float | None:
 def out_of_plane(material: Material, plane: str) -> tuple[Float, Float]:
     """s and e, (3,) each, with S33 = s . [S11, S22, S12] and E33 = e . [S11, S22, S12], in plane strain and stress.
 
-    S33 vanishes in plane stress, E33 in plane strain. NaN if the constants of the material leave it open.
+    S33 vanishes in plane stress, E33 in plane strain. NaN if the material's constants leave it open.
     """
     # E33 = row . [S11, S22, S12] + S33 / young
     if isinstance(material, Isotropic):
@@ -176,7 +176,7 @@ def _angle(material: Material) -> float:
 
 
 def _checked_stiffness(material: General) -> Float:
-    """Return the stiffness of a phase that gives it, (3, 3) or (6, 6), checked."""
+    """Return the stiffness that a phase gives, (3, 3) or (6, 6), checked."""
     given = np.array(material.stiffness)
     noise = 1e-9 * np.abs(given).max()
     if not np.allclose(given, given.T, rtol=0.0, atol=noise):

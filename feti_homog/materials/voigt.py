@@ -34,7 +34,7 @@ class PlaneState:
     Attributes:
         name: value of [analysis] plane.
         title: its name in words.
-        strains, stresses: names of the components, in Voigt order.
+        strains, stresses: component names, in Voigt order.
         is_sheet: whether S33 vanishes; else E33 does, or is a load.
         is_spatial: whether all six strains are loads, and with them a temperature: then axial shear is a problem of its
             own, the stiffness is (6, 6), and constants, estimates and bounds are spatial.
@@ -51,7 +51,7 @@ class PlaneState:
 
     @property
     def components(self) -> tuple[tuple[str, str], ...]:
-        """Names of strain and stress of each component."""
+        """Strain and stress name for each component."""
         return tuple(zip(self.strains, self.stresses, strict=True))
 
     @property
@@ -74,17 +74,17 @@ def plane_state_of(document: Mapping[str, Any]) -> PlaneState:
 
 
 def voigt_names(count: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of the strains and of the stresses, 3 in the plane or 6 in space."""
+    """Strain and stress names, 3 in the plane or 6 in space."""
     return (STRAINS, STRESSES) if count == len(STRAINS) else (SPATIAL_STRAINS, SPATIAL_STRESSES)
 
 
 def strain_tensor(strain: Float) -> Float:
-    """(2, 2) tensor of a strain (3,): E12 = gamma12 / 2."""
+    """(2, 2) tensor for a strain (3,): E12 = gamma12 / 2."""
     return np.array([[strain[0], strain[2] / 2], [strain[2] / 2, strain[1]]])
 
 
 def rotated(stiffness: Float, angle: float) -> Float:
-    """Stiffness, (3, 3) or (6, 6), in the axes of the cell of a material whose axis 1 is turned by `angle` degrees.
+    """Stiffness, (3, 3) or (6, 6), in the cell's axes, for a material whose axis 1 is turned by `angle` degrees.
 
     C = T^T C' T, where T takes strains to the material axes.
     """
@@ -119,7 +119,7 @@ def von_mises(stress: Float, S33: Float) -> Float:
 
 
 def principal(stress: Float, S33: Float) -> Float:
-    """(m, 3) principal stresses, the largest first, of the stresses of `von_mises`; NaN where S33 is."""
+    """(m, 3) principal stresses, the largest first, for the stresses in `von_mises`; NaN where S33 is."""
     S11, S22, S12 = stress.T
     middle, radius = (S11 + S22) / 2, np.hypot((S11 - S22) / 2, S12)
     ordered = np.sort(np.stack([middle - radius, middle + radius, S33], axis=1), axis=1)[:, ::-1]
@@ -132,7 +132,7 @@ def spatial_von_mises(stress: Float, S33: Float, axial: Float) -> Float:
 
 
 def spatial_principal(stress: Float, S33: Float, axial: Float) -> Float:
-    """(m, 3) principal stresses, the largest first, of the stresses of `spatial_von_mises`."""
+    """(m, 3) principal stresses, the largest first, for the stresses in `spatial_von_mises`."""
     tensor = np.empty((len(stress), 3, 3))
     tensor[:, :2, :2], tensor[:, 2, 2] = stress[:, [[0, 2], [2, 1]]], S33
     tensor[:, :2, 2] = tensor[:, 2, :2] = axial[:, ::-1]

@@ -1,4 +1,4 @@
-"""Fibres on the torus: outlines, phases, places where the sides of the cell pass, and pairs of near fibres."""
+"""Fibres on the torus: outlines, phases, places where the cell's sides pass, and pairs of near fibres."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ STEPS = np.array([step for step in product((-1, 0, 1), repeat=2) if any(step)])
 
 @dataclass(frozen=True)
 class Arrangement:
-    """N fibres and voids on the torus of periods `width`, `height`; none touch.
+    """N fibres and voids on the torus with periods `width`, `height`; none touch.
 
     Attributes:
-        outlines: of them, without the rings around some. Fibre k + 1 of a case is number k; voids come after fibres.
+        outlines: of them, without the rings around some. Fibre k + 1 in a case is number k; voids come after fibres.
         phase: (N,) phase of each.
-        coating: (N,) thickness of the ring around each outline, 0 without one.
+        coating: (N,) ring thickness around each outline, 0 without one.
         is_hollow: (N,) which are voids within rings of the fibre's own phase; other rings are coatings.
-        mesh_order: (N,) order of meshing, on which a few triangles depend; by number if None.
-        row: (N,) the place of each in its table; None without one.
+        mesh_order: (N,) meshing order, on which a few triangles depend; by number if None.
+        row: (N,) place of each in its table; None without one.
         remarks: how the cell differs from its table, a line each.
     """
 
@@ -64,7 +64,7 @@ class Arrangement:
         phase: tuple[str, ...],
         coating: Float | float = 0.0,
     ) -> Arrangement:
-        """Discs of centres (N, 2) and radii (N,) with coatings (N,)."""
+        """Discs with centres (N, 2), radii (N,) with coatings (N,)."""
         thickness = np.broadcast_to(coating, radii.shape).astype(float)
         return cls(width, height, Discs(centres, radii), phase, thickness, np.zeros(len(radii), bool))
 
@@ -75,7 +75,7 @@ class Arrangement:
 
     @cached_property
     def radii(self) -> Float:
-        """(N,) radii of discs of equal area, without rings."""
+        """(N,) radii of equal-area discs, without rings."""
         return self.outlines.radii
 
     @property
@@ -85,7 +85,7 @@ class Arrangement:
 
     @property
     def phases(self) -> tuple[str, ...]:
-        """The phases of the cell: the matrix, fibre phases in the order of their first fibres, coatings."""
+        """The cell's phases: the matrix, fibre phases in the order of their first fibres, coatings."""
         named = dict.fromkeys(name for name in self.phase if name != VOID)
         return (MATRIX, *named, *((COATING,) if (self.coated & ~self.is_hollow).any() else ()))
 
@@ -106,7 +106,7 @@ class Arrangement:
         return tuple(VOID if void else own for own, void in both), tuple(own if void else COATING for own, void in both)
 
     def precedence(self, fibre: Int, is_ring: Bool) -> Int:
-        """(k,) numbers from 1 of the rings of fibres (k,), or of their insides.
+        """(k,) numbers from 1 for the rings of fibres (k,), or for their insides.
 
         Coatings come behind all fibres, in the same order.
         """
@@ -119,7 +119,7 @@ class Arrangement:
 
     @property
     def walls(self) -> Float:
-        """(N,) thickness of hollow fibres, 0 of others."""
+        """(N,) thickness of hollow fibres, 0 for others."""
         return np.where(self.is_hollow, self.coating, 0.0)
 
     @property
@@ -134,7 +134,7 @@ class Arrangement:
 
     @property
     def outer_radii(self) -> Float:
-        """(N,) radii of discs of equal area, with rings."""
+        """(N,) radii of equal-area discs, with rings."""
         return np.asarray(self.radii + self.coating)
 
     @cached_property
@@ -147,7 +147,7 @@ class Arrangement:
 
 
 def clearance(arrangement: Arrangement) -> float:
-    """Distance of the sides of the cell from the nearest position at which they would touch an outline."""
+    """Distance from the cell's sides to the nearest position at which they would touch an outline."""
     touching = _tangents(arrangement) / arrangement.size[:, None]
     return float(np.abs((touching - np.round(touching)) * arrangement.width).min())
 
@@ -155,7 +155,7 @@ def clearance(arrangement: Arrangement) -> float:
 def clear_shift(arrangement: Arrangement) -> Arrangement:
     """Return the arrangement moved as a whole.
 
-    The cell's boundary then stays clear of tangency with the outlines.
+    The cell's boundary then avoids tangency with the outlines.
 
     Along each axis the candidates are the middles of the widest gaps between the positions where a boundary
     line touches an outline; among their combinations the one whose corner is farthest from an outline is taken. In
@@ -175,7 +175,7 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
 
 
 def in_voids(arrangement: Arrangement, corners: Float) -> Bool:
-    """(n,) which corners (n, 2) of cells with polygons are in voids; meshes of others need no node at a corner."""
+    """(n,) which corners (n, 2) are in voids, for cells with polygons; other meshes need no node at a corner."""
     result = np.zeros(len(corners), bool)
     if isinstance(arrangement.outlines, ConvexSums):
         voids = arrangement.outlines[arrangement.is_void | arrangement.is_hollow]
@@ -188,7 +188,7 @@ def in_voids(arrangement: Arrangement, corners: Float) -> Bool:
 
 
 def _away(outlines: Outlines, places: Float, size: Float) -> Float:
-    """(n, k, 2) vectors from places (n, 2) to the nearest image of the centre of each outline."""
+    """(n, k, 2) vectors from places (n, 2) to the nearest image of each outline's centre."""
     return np.asarray((outlines.centres - places[:, None] + size / 2) % size - size / 2)
 
 
@@ -213,7 +213,7 @@ def _tangents(arrangement: Arrangement) -> Float:
 def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Float]:
     """All pairs i <= j nearer than `reach`, and the vectors (k, 2) from i to that image of j.
 
-    Images of one disc are pairs i = j; each pair of images comes once or, where i = j, from both ends.
+    Images of one disc are pairs i = j; each image pair comes once or, where i = j, from both ends.
 
     Raises:
         MeshError: there are more than MOST_PAIRS.
@@ -244,9 +244,9 @@ def _pairs(place: Float, count: int, reach: float) -> tuple[Int, Int]:
 
 
 def _refuse_many(points: Float, reach: float) -> None:
-    """Raise MeshError where the pairs of points (n, 2) are too many.
+    """Raise MeshError where points (n, 2) make too many pairs.
 
-    A point has about 2 pi times as many neighbours as are in its square of the diagonal `reach`.
+    A point has about 2 pi times as many neighbours as are in its square with diagonal `reach`.
     """
     if len(points) ** 2 < 2 * MOST_PAIRS or reach <= 0:
         return

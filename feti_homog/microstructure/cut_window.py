@@ -1,4 +1,4 @@
-"""A window cut out of a micrograph made periodic: fibres that overlap across its border are moved apart."""
+"""A window cut from a micrograph, made periodic: fibres that overlap across its border are moved apart."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class _Pairs:
         return np.column_stack([self.first, self.second, np.round(self.shift)])
 
     def joined(self, other: _Pairs) -> _Pairs:
-        """All pairs of both, each once."""
+        """All pairs from both, each once."""
         keys = np.concatenate([self.key, other.key])
         once = np.unique(keys, axis=0, return_index=True)[1]
         least = np.concatenate([self.least, other.least])[once]
@@ -56,16 +56,16 @@ Parting = Callable[[Int, Int, Float], tuple[Float, Float]]
 
 
 def moves(outlines: Outlines, size: Float) -> Float:
-    """(N, 2) the moves d that part outlines which overlap across the border of the torus.
+    """(N, 2) the moves d that part outlines which overlap across the torus border.
 
-    The periods of the torus are `size` (2,).
+    The torus periods are `size` (2,).
 
     They are a local minimum of sum |d|^2 such that no gap across the border is less than the smallest one within, and
     no gap within becomes less than that, all relative to the sum of the radii and that gap between LEAST_GAP and
     MOST_GAP. Each step solves it with the distances |v| >= r replaced by n . v >= r, n the present directions; since
     n . v <= |v|, its solution keeps the distances.
 
-    Of others than discs, with radii of the same areas, n is the direction of the largest n . v - r, where r is the
+    For other outlines, with radii of equal-area discs, n is the direction of the largest n . v - r, where r is the
     reach of both along n, and that is the gap.
 
     Raises:
@@ -89,7 +89,7 @@ def moves(outlines: Outlines, size: Float) -> Float:
 
 
 def _gap_within(centres: Float, radii: Float, size: Float, reach: float, parting: Parting) -> float:
-    """Return the smallest gap / sum of the radii of discs that are not across the border, within its limits."""
+    """Return the smallest gap / radius sum among discs that are not across the border, within its limits."""
     first, second, vector = neighbours(centres, size, reach)
     across = np.abs(centres[second] - centres[first] - vector).max(axis=1) > TOLERANCE * radii.mean()
     normal, least = parting(first, second, vector)

@@ -26,7 +26,7 @@ class FibrePattern:
 
     Attributes:
         width, height: of the rectangle.
-        centres, radii: (N, 2) and (N,) of the discs.
+        centres, radii: (N, 2) and (N,) for the discs.
         periodic: whether discs that leave the rectangle on one side return on the other; otherwise it is a window with
             unknown surroundings.
     """
@@ -44,7 +44,7 @@ class FibrePattern:
 
     @property
     def area(self) -> float:
-        """Area of the rectangle."""
+        """Rectangle area."""
         return self.width * self.height
 
     @property
@@ -67,7 +67,7 @@ class FibrePattern:
 
     @property
     def nearest_side(self) -> Float:
-        """(N,) distance of each centre to the sides of the window; infinite in a periodic cell."""
+        """(N,) distance from each centre to the window's sides; infinite in a periodic cell."""
         if self.periodic:
             return np.full(self.count, np.inf)
         return np.asarray(np.minimum(self.centres, self.size - self.centres).min(axis=1))
@@ -79,7 +79,7 @@ class FibrePattern:
         return np.asarray(np.where(inside < self.size, inside, 0.0))
 
     def images(self, reach: float) -> tuple[Float, Int]:
-        """(m, 2) the centres, first the N of the rectangle, then their images nearer to it than `reach`; owners."""
+        """(m, 2) the centres, first the N in the rectangle, then their images nearer to it than `reach`; owners."""
         own = np.arange(self.count)
         if not self.periodic:
             return self.centres, own
@@ -91,14 +91,14 @@ class FibrePattern:
 
 
 def read_window(path: Path, size: tuple[float, float] | None = None) -> FibrePattern:
-    """Return the fibres of a table, at least two, in a window of this width and height.
+    """Return a table's fibres, at least two, in a window with this width and height.
 
-    Without these, the window is that which the table gives; ellipses count as discs of the same centres and areas.
+    Without these, the window is the one in the table; ellipses count as discs with the same centres and areas.
 
-    Voids are left out. The window begins at the `left` and `bottom` of the table, else at 0.
+    Voids are left out. The window begins at the table's `left` and `bottom`, else at 0.
 
     Raises:
-        CaseError: the table is faulty, or its size unknown; a fibre has its centre outside of the window, or is there
+        CaseError: the table is faulty, or its size unknown; a fibre has its centre outside the window, or is there
             twice.
     """
     table = read_table(path).solid

@@ -45,9 +45,9 @@ class FibreTable:
 
     Attributes:
         name: of the file or list, for faults.
-        row: (N,) line of the file, counted from 1, or place in the list: the name of the fibre in faults.
-        columns: (N,) numbers of all NUMBERS, and which of them the table has.
-        phase: N names, "fibre" where the table gives none, "void" of voids.
+        row: (N,) line in the file, counted from 1, or place in the list: the fibre's name in faults.
+        columns: (N,) numbers for all NUMBERS, and which of them the table has.
+        phase: N names, "fibre" where the table gives none, "void" for voids.
         width, height: of the cell; None if the table does not give it.
         left, bottom: coordinates of its lower left corner; None if the table does not give it.
         remarks: unused parts of the table, a line each.
@@ -66,27 +66,27 @@ class FibreTable:
 
     @cached_property
     def outlines(self) -> Outlines:
-        """(N,) without coatings, in the unit of the table; of tables without faults."""
+        """(N,) without coatings, in the table's unit; for tables without faults."""
         return outlines_of(self.columns)
 
     @property
     def radius(self) -> Float:
-        """(N,) of discs, and of discs of the same area as other outlines."""
+        """(N,) of discs, and of equal-area discs for other outlines."""
         return self.outlines.radii
 
     @property
     def coating(self) -> Float:
-        """(N,) thickness of coatings / radius, 0 without one."""
+        """(N,) coating thickness / radius, 0 without one."""
         return self.columns["coating"]
 
     @property
     def inner_radius(self) -> Float:
-        """(N,) of the void within hollow fibres, 0 of others."""
+        """(N,) of the void within hollow fibres, 0 for others."""
         return self.columns["inner_radius"]
 
     @property
     def strength(self) -> Float:
-        """(N,) bond strength of each fibre / bond strength of the case, 1 where the table gives none."""
+        """(N,) each fibre's bond strength / the case's bond strength, 1 where the table gives none."""
         return self.columns["strength"]
 
     @property
@@ -105,7 +105,7 @@ class FibreTable:
         return self.rows(np.flatnonzero(~self.is_void))
 
     def rows(self, kept: Int) -> FibreTable:
-        """Return the table of the rows `kept` (k,)."""
+        """Return the table with the rows `kept` (k,)."""
         columns = {name: values[kept] for name, values in self.columns.items()}
         return replace(self, row=self.row[kept], columns=columns, phase=tuple(self.phase[k] for k in kept.tolist()))
 
@@ -118,13 +118,13 @@ class FibreTable:
 def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
     """Return the table in a text file, which is not judged as a whole: fibres may overlap.
 
-    A line of names comes first, in whose place `columns` has them: x, y, radius (or a, b), and phase, coating, angle
+    A name line comes first, in whose place `columns` has them: x, y, radius (or a, b), and phase, coating, angle
     if there are any, or other names that `understood` takes; then a line for each fibre. Columns are parted by commas,
     semicolons, tabs or else by spaces; without commas between columns, decimals may have them. What follows "#" is
-    a comment; "# width = 120, height = 80" has the size of the cell, and "left" and "bottom" have its corner.
+    a comment; "# width = 120, height = 80" has the cell size, and "left" and "bottom" have its corner.
 
     Raises:
-        CaseError: the table is faulty; a line for each fault, with the line of the file.
+        CaseError: the table is faulty; a line for each fault, with its line in the file.
     """
     name, faults = path.name, _Faults(path.name)
     sizes: dict[str, float] = {}
@@ -146,7 +146,7 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
 
 
 def table_of(entries: Sequence[Mapping[str, Any]], name: str) -> FibreTable:
-    """Return the table of a list of fibres with the same keys as columns have; its faults count its rows from 1.
+    """Return the table from a fibre list with the same keys as columns have; its faults count its rows from 1.
 
     Raises:
         CaseError: the list is faulty; a line for each fault.
@@ -159,7 +159,7 @@ def table_of(entries: Sequence[Mapping[str, Any]], name: str) -> FibreTable:
 
 
 class _Faults:
-    """Gathers the faults of a table, each with the row that has it."""
+    """Gathers a table's faults, each with the row that has it."""
 
     def __init__(self, name: str) -> None:
         self.lines: list[str] = []
@@ -175,7 +175,7 @@ class _Faults:
 
 
 def _below_names(lines: list[tuple[int, str]], has_names: bool, delimiter: str | None) -> list[tuple[int, str]]:
-    """Return the lines of fibres: without the first if it has names, or no numbers, and without a next one of units."""
+    """Return the fibre lines: without the first if it has names, or no numbers, and without a next one with units."""
     first, *others = [cells_of(line, delimiter) for _, line in lines[:2]]
     if not has_names and any(number_of(word, delimiter) is not None for word in first):
         return lines
@@ -183,7 +183,7 @@ def _below_names(lines: list[tuple[int, str]], has_names: bool, delimiter: str |
 
 
 def _read_sizes(comment: str, row: int, sizes: dict[str, float], faults: _Faults) -> None:
-    """Add the sizes of the cell in a comment to `sizes`."""
+    """Add the cell sizes in a comment to `sizes`."""
     for key, word in SIZE.findall(comment):
         value = number_of(word, ";")
         if value is None or not is_number(value) or (value <= 0 and key in SIZES[:2]):
@@ -196,7 +196,7 @@ def _read_sizes(comment: str, row: int, sizes: dict[str, float], faults: _Faults
 def _check_names(
     words: Sequence[str], read: Sequence[SourceColumn], others: Sequence[str], row: int, faults: _Faults
 ) -> None:
-    """Add the faults of a line of names: none that is known, some twice, misspelt or missing."""
+    """Add the faults in a name line: none that is known, some twice, misspelt or missing."""
     names = [column.name for column in read]
     if not names:
         given = toml_value(", ".join(words))
@@ -214,7 +214,7 @@ def _check_names(
 
 
 def _missing(names: set[str]) -> list[str]:
-    """Columns that a table with these lacks: x, y, and the radius or the sizes of a shape, which stand in its place."""
+    """Columns that a table with these lacks: x, y, and the radius or a shape's sizes, which stand in its place."""
     sizes = next((sizes for sizes in (("radius",), *REPLACING) if names & set(sizes)), ("radius",))
     return [name for name in ("x", "y", *sizes) if name not in names]
 
@@ -234,7 +234,7 @@ def _split(
 def _table(
     name: str, rows: Mapping[int, Mapping[str, Any]], names: set[str], sizes: Mapping[str, float], faults: _Faults
 ) -> FibreTable:
-    """Return the table of rows whose cells are numbers, or texts where they are faulty."""
+    """Return the table with rows whose cells are numbers, or texts where they are faulty."""
     for row, cells in rows.items():
         for words in _cell_faults(cells):
             faults.add(row, words)
@@ -259,7 +259,7 @@ def _table(
 
 
 def _cell_faults(cells: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the faults of one row."""
+    """Yield one row's faults."""
     has_size = any(set(sizes) <= cells.keys() for sizes in REPLACING)
     for key in ("x", "y", *([] if has_size else ["radius"])):
         if key not in cells:
@@ -272,7 +272,7 @@ def _cell_faults(cells: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _phase_faults(cells: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the faults of the phase of one row."""
+    """Yield the faults in the phase of one row."""
     phase = cells.get("phase", "fibre")
     if phase == VOID:
         yield from (f"{key} = {toml_value(cells[key])}: a void has none" for key in OF_FIBRES if cells.get(key))

@@ -1,4 +1,4 @@
-"""The arrangement of the fibres of a table: images of one fibre, and faults."""
+"""The arrangement of a table's fibres: images of one fibre, and faults."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ MOST_LISTED = 30  # moved fibres that are listed one by one
 
 
 def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> Arrangement:
-    """Return the fibres of a table, in the order of its rows, then its voids.
+    """Return a table's fibres, in row order, then its voids.
 
-    Periodic images are one, the first of them. In a window that is cut out of something larger, fibres that overlap
+    Periodic images are one, the first of them. In a window that is cut from something larger, fibres that overlap
     across its border are moved apart.
 
-    A table that gives the corner of its cell keeps it, if the sides are clear of tangency with its discs and the corner
-    in no void (`in_voids`); that of a random cell gives the mesh of that cell. Else all is shifted (`clear_shift`),
-    rounded and meshed in the order of the coordinates, so that tables that differ by a shift, by the order of rows or
+    A table that gives its cell's corner keeps it, if the sides avoid tangency with its discs and the corner
+    in no void (`in_voids`); a random cell's table gives that cell's mesh. Else all is shifted (`clear_shift`),
+    rounded and meshed in coordinate order, so that tables that differ by a shift, by the order of rows or
     by units have one mesh. Outlines that are not round are rounded wherever they are.
 
     Raises:
@@ -93,7 +93,7 @@ def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ..
 
 
 def _nested(table: FibreTable, rows: Int, centres: Float, height: float) -> Arrangement:
-    """Return the rows (k,) about these centres / width of the cell.
+    """Return the rows (k,) about these centres / cell width.
 
     A ring around each outline that has a coating or that is a void in a hollow fibre.
     """
@@ -107,7 +107,7 @@ def _nested(table: FibreTable, rows: Int, centres: Float, height: float) -> Arra
 
 
 def _rounded(arrangement: Arrangement) -> Arrangement:
-    """Return the arrangement with coordinates of TABLE_DECIMALS, 0 on either side, in a cell of HEIGHT_DECIMALS."""
+    """Return the arrangement with coordinates to TABLE_DECIMALS, 0 on either side, in a cell of HEIGHT_DECIMALS."""
     outlines, least = arrangement.outlines.rounded(TABLE_DECIMALS), 10.0**-TABLE_DECIMALS
     return replace(
         arrangement,
@@ -154,14 +154,14 @@ def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
 
 
 def fibre_rows(table: FibreTable, window: str) -> Int:
-    """(fibres,) places in the table of the fibres of its cell, in the order of their numbers."""
+    """(fibres,) places in the table where its cell's fibres are, by fibre number."""
     size = np.array([table.width, table.height], float)
     first, _ = _without_images(table, table.centres - _corner(table), size, window == "cut")
     return np.flatnonzero(first & ~table.is_void)
 
 
 def _corner(table: FibreTable) -> Float:
-    """(2,) the lower left corner of the cell; the lowest coordinates of centres if the table gives none."""
+    """(2,) the cell's lower left corner; the lowest centre coordinates if the table gives none."""
     given = np.array([table.left, table.bottom], float)
     return np.where(np.isnan(given), table.centres.min(axis=0), given)
 
@@ -174,7 +174,7 @@ def _raise_faults(table: FibreTable, faults: list[str]) -> None:
 def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> list[str]:
     """Faults of fibres that are no part of the cell, or too large or too small for it.
 
-    Discs reach into a periodic cell; of a cut window the centres are within.
+    Discs reach into a periodic cell; in a cut window the centres are within.
     """
     radius, called = _largest_sizes(table)
     faults = []
@@ -226,7 +226,7 @@ def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool
 def _contacts(table: FibreTable, kept: Int, outer: Outlines, size: Float, is_cut: bool) -> list[str]:
     """Faults of fibres, the rows `kept` (k,) with their coatings, that overlap or touch.
 
-    Of a cut window only within it.
+    In a cut window only within it.
     """
     first, second, gap, together, across = _gaps(table, kept, outer, size)
     bad = np.flatnonzero((gap < LEAST_GAP * together / 2) & ~(across & is_cut))

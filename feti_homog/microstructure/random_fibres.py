@@ -36,7 +36,7 @@ class NearestNeighbours:
     Attributes:
         distances: (N, k), the nearest first; infinite where a window has no more fibres.
         directions: (N, k) degrees from x1 towards x2, in [0, 360).
-        weights: (N, k), of each column with the sum 1: of a distance in the distribution.  Those of a periodic cell are
+        weights: (N, k), of each distance in the distribution; each column has the sum 1.  In a periodic cell they are
             1/N.  In a window a distance d counts if the circle of that radius lies within, so that no fibre outside can
             be nearer, with the weight 1 / ((width - 2 d) (height - 2 d)) [Hanisch 1984], for the longer the fewer
             count.  A column is zero if none of its distances counts.
@@ -73,7 +73,7 @@ class NearestNeighbours:
 
 
 def nearest_neighbours(pattern: FibrePattern, count: int = 3) -> NearestNeighbours:
-    """Return the neighbours of each fibre; in a periodic cell images count, also its own."""
+    """Return each fibre's neighbours; in a periodic cell images count, also its own."""
     candidates, _ = pattern.images(_reach(pattern, count))
     known = min(count, len(candidates) - 1)
     distances, directions = np.full((pattern.count, count), np.inf), np.full((pattern.count, count), np.nan)
@@ -86,7 +86,7 @@ def nearest_neighbours(pattern: FibrePattern, count: int = 3) -> NearestNeighbou
 
 
 def _reach(pattern: FibrePattern, count: int) -> float:
-    """Return a distance within which each fibre of a periodic cell has so many neighbours."""
+    """Return a distance within which each fibre in a periodic cell has so many neighbours."""
     own_images = (count + 1) // 2 * pattern.size.min()
     if not pattern.periodic or pattern.count <= count:
         return float(own_images)
@@ -106,7 +106,7 @@ def _weights(pattern: FibrePattern, distances: Float) -> Float:
 
 
 def knows_neighbours(measured: FibrePattern) -> bool:
-    """Return whether a pattern has distances of nearest and of second neighbours that count."""
+    """Return whether a pattern has distances of nearest and second neighbours that count."""
     return bool(nearest_neighbours(measured, SHELLS).weights.any(axis=0).all())
 
 
@@ -120,7 +120,7 @@ def wanted_distances(measured: FibrePattern, count: int) -> Float:
 
 
 def match_distance(pattern: FibrePattern, wanted: Float) -> float:
-    """Root mean square difference between the sorted distances of a periodic pattern and `wanted` (N, SHELLS).
+    """Root mean square difference between the sorted distances in a periodic pattern and `wanted` (N, SHELLS).
 
     Both are in mean diameters.  It is the quadratic Wasserstein distance of the distributions, over both neighbours.
     """
@@ -129,7 +129,7 @@ def match_distance(pattern: FibrePattern, wanted: Float) -> float:
 
 
 def matched(pattern: FibrePattern, gap: float, wanted: Float, generator: np.random.Generator) -> Float:
-    """Centres (N, 2) of the fibres of a periodic pattern, moved such that `match_distance` to `wanted` falls.
+    """Fibre centres (N, 2) in a periodic pattern, moved such that `match_distance` to `wanted` falls.
 
     One fibre after the other, drawn at random, is moved to a place drawn about its own, near or far, if it keeps `gap`
     to all others there and the distance of the distributions does not grow.  Sums are made one term after the other, so
@@ -189,9 +189,9 @@ def _mean_square(distances: Float, wanted: Float) -> float:
 
 
 def relax(centres: Float, radii: Float, max_steps: int, size: tuple[float, float] = (1.0, 1.0)) -> tuple[Float, float]:
-    """Centres (N, 2) moved until discs on the torus of periods `size` do not overlap, and the clearance reached.
+    """Centres (N, 2) moved until discs on the torus with periods `size` do not overlap, and the clearance reached.
 
-    The clearance is the smallest ratio of distance to sum of radii; at least 1 is success. Heavy-ball descent
+    The clearance is the smallest ratio of distance to radius sum; at least 1 is success. Heavy-ball descent
     x += 0.25 f + 0.9 dx: no reductions over the discs, so that every machine gets the same numbers.
     """
     periods, target = np.array(size), radii * (1 + RADIUS_EXCESS)
@@ -210,7 +210,7 @@ def relax(centres: Float, radii: Float, max_steps: int, size: tuple[float, float
 
 
 def _sum_at(rows: Int, vectors: Float, count: int) -> Float:
-    """Return sums (count, 2) of the vectors (k, 2) of each row, added one after the other."""
+    """Return sums (count, 2) over each row's vectors (k, 2), added one after the other."""
     return np.stack([np.bincount(rows, vectors[:, axis], count) for axis in (0, 1)], axis=1)
 
 

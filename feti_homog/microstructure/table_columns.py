@@ -1,4 +1,4 @@
-"""Tables of fibres as spreadsheets and other programs write them: their lines, and the names of their columns.
+"""Fibre tables as spreadsheets and other programs write them: their lines and column names.
 
 Columns have units in brackets, diameters, areas and axes of ellipses.
 """
@@ -42,7 +42,7 @@ UNITS_OF_EXCEL = bytes.maketrans(b"\xb5\xb0\xb2", b"uo2")
 
 
 def lines_of(path: Path) -> Iterator[tuple[int, str, str]]:
-    """Yield the number of each line, its cells, empty if it has none, and the comment behind "#".
+    """Yield each line's number, its cells, empty if it has none, and the comment behind "#".
 
     Raises:
         CaseError: the file cannot be read, or is no text.
@@ -71,17 +71,17 @@ def _text(path: Path) -> str:
 
 
 def delimiter_of(line: str) -> str | None:
-    """Return the delimiter of the columns of a table by its first line; None of spaces."""
+    """Return a table's column delimiter by its first line; None for spaces."""
     return next((mark for mark in ";\t," if mark in line), None)
 
 
 def cells_of(line: str, delimiter: str | None) -> list[str]:
-    """Return the cells of a row, without quotation marks."""
+    """Return a row's cells, without quotation marks."""
     return [word.strip().strip('"').strip() for word in line.split(delimiter)]
 
 
 def row_fault(line: str, cells: Sequence[str], count: int) -> str:
-    """Return the fault of a row whose cells are not as many as the names are; empty if it has none."""
+    """Return the fault in a row whose cells are not as many as the names are; empty if it has none."""
     if line.count('"') % 2:
         return "a quotation mark is not closed"
     return "" if len(cells) == count else f"has {len(cells)} columns; expected {count}, as there are names"
@@ -142,7 +142,7 @@ class SourceColumn:
     value: Callable[[float], float]
 
     def read(self, word: str, delimiter: str | None) -> float | str:
-        """Return the value of a cell: a number, or its text if it is none."""
+        """Return a cell's value: a number, or its text if it is none."""
         number = None if self.name == "phase" else number_of(word, delimiter)
         return word if number is None else self.value(number)
 
@@ -153,13 +153,13 @@ def _bare(word: str) -> str:
 
 
 def _bare_names(words: Sequence[str]) -> list[str]:
-    """Return bare names; MATLAB's orientation is an angle; other programs' are in radians, or of another axis."""
+    """Return bare names; MATLAB's orientation is an angle; other programs' are in radians, or from another axis."""
     bare = list(map(_bare, words))
     return ["angle" if name == "orientation" else name for name in bare] if MATLABS_AXIS in bare else bare
 
 
 def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceColumn], list[str]]:
-    """Return the columns of a line of names that are `known`, in any case, and the other words."""
+    """Return the columns in a name line that are `known`, in any case, and the other words."""
     bare = _bare_names(words)
     values = {"angle": _turned} if AXES_OF_PICTURES & set(bare) else {}
     columns = [SourceColumn(place, name, values.get(name, _same)) for place, name in enumerate(bare) if name in known]

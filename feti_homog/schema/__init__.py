@@ -1,4 +1,4 @@
-"""Tables of keys: types of values, tables read with all of their faults, relations between keys, words of faults.
+"""Key tables: value types, tables read with all their faults, relations between keys, fault wording.
 
 Imports nothing.  Main entries: `values`, types each with words and a test; `keys.key`, `keys.TableReader`, `keys.Rule`.
 """

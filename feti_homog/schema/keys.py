@@ -1,4 +1,4 @@
-"""Reading tables of a case file into frozen dataclasses whose fields carry their rules, and relations between keys."""
+"""Reading case file tables into frozen dataclasses whose fields carry their rules, and relations between keys."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ITEMS = "items"
 
 @dataclass(frozen=True)
 class Selector:
-    """The key of a section whose value decides which other keys belong to the case.
+    """A section's key whose value decides which other keys belong to the case.
 
     `word` is the key that messages name, if it has several names.
     """
@@ -61,16 +61,16 @@ class Key:
     """A key of a table.
 
     Attributes:
-        type: type of its value.
+        type: its value's type.
         meaning: a sentence or two for the reference.
-        unit: of the value, empty if it has none.
+        unit: unit symbol, empty if it has none.
         default: in words; empty if there is none.
         only: conditions under all of which it belongs to the table.
         required: whether it must be there where it belongs.
         instead: replacement where it does not belong; empty if there is none.
-        unless: other keys of the table, beside any of which it is not required.
+        unless: other keys of the table; beside any of them it is not required.
         by_pair: whether it may differ between several sections [[interface]].
-        presentation: whether it decides how results are drawn and labelled, and nothing of their numbers.
+        presentation: whether it decides how results are drawn and labelled, and changes no number.
     """
 
     type: ValueType
@@ -85,7 +85,7 @@ class Key:
     presentation: bool = False
 
     def fault(self, name: str, table: Mapping[str, Any]) -> str:
-        """Return the fault of the key of this name in a table, whatever the case; empty if there is none."""
+        """Return the fault of the key with this name in a table, whatever the case; empty if there is none."""
         if name not in table:
             return f": missing; expected {self.type.expected}" if self.required and not self.only else ""
         words = self.type.complaint(table[name])
@@ -102,10 +102,10 @@ def key(
     only: Condition | tuple[Condition, ...] = (),
     **attributes: Any,
 ) -> Any:
-    """Return a dataclass field read from the key of its name; required where it belongs if it has no default.
+    """Return a dataclass field read from the key with its name; required where it belongs if it has no default.
 
     Without the key its value is None if `absent` says the meaning; `default_words` stand for another default, and
-    `attributes` are further ones of `Key`.
+    `attributes` are further `Key` attributes.
     """
     conditions = only if isinstance(only, tuple) else (only,)
     default = None if absent else default
@@ -119,7 +119,7 @@ def key(
 
 
 def keys_of(table_class: type[Any]) -> dict[str, Key]:
-    """Return the keys of a table by name; derived fields are none."""
+    """Return a table's keys by name; derived fields are none."""
     return {each.name: each.metadata["key"] for each in dataclasses.fields(table_class) if "key" in each.metadata}
 
 
@@ -138,9 +138,9 @@ class TableReader:
     faults: list[str] = field(default_factory=list)
 
     def read(self, table_class: type[T], table: object, section: str, prefix: str = "") -> T | None:
-        """Return the table as an instance of `table_class`; None, and a line for each fault, if it is faulty.
+        """Return the table as a `table_class` instance; None, and a line for each fault, if it is faulty.
 
-        `prefix` stands before the keys of a table within a section.
+        `prefix` stands before a table's keys within a section.
         """
         if not isinstance(table, dict):
             self.faults.append(f"{section} = {toml_value(table)}: expected a section [{section}]")
@@ -190,14 +190,14 @@ def to_table(instance: Any, selected: Selected) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Rule:
-    """Requirement at a path of a document under some conditions.
+    """Requirement at a document path under some conditions.
 
     Attributes:
         path: from the section to a table or value; where there is none, the rule holds. Empty: the whole document.
         holds: whether the value there is valid; None if no value may stand there.
         words: expectation that an invalid value fails, or the end of the line made of the value and the selection.
         when: conditions all of which must hold.
-        names: keys of the table that the fault names, the given ones if there are any; empty: it names the value.
+        names: table keys that the fault names, the given ones if there are any; empty: it names the value.
     """
 
     path: TablePath
@@ -207,7 +207,7 @@ class Rule:
     names: tuple[str, ...] = ()
 
     def faults(self, document: Mapping[str, Any], selected: Selected) -> Iterator[str]:
-        """Yield a line for each invalid place of the document."""
+        """Yield a line for each invalid place in the document."""
         if not all(condition.holds(selected) for condition in self.when):
             return
         for section, place, value in _places(document, self.path):
@@ -224,7 +224,7 @@ class Rule:
 
 
 def has(table: Any, *names: str) -> bool:
-    """Return whether the value is a table with all of these keys."""
+    """Return whether the value is a table with all these keys."""
     return isinstance(table, dict) and {*names} <= table.keys()
 
 

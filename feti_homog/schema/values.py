@@ -1,4 +1,4 @@
-"""Types of values in a case file: each in words, as a test, and as it is stored."""
+"""Value types in a case file: each in words, as a test, and as it is stored."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ MAGNITUDES = f"; numbers other than 0 have magnitudes from {SMALLEST:g} to {LARG
 
 @dataclass(frozen=True)
 class ValueType:
-    """Type of a value.
+    """A value's type.
 
     Attributes:
         expected: in words, for faults and for the reference.
         accepts: whether a value, of TOML's types, is valid.
-        store: the form in which the dataclass of its table keeps a valid value.
-        table: the dataclass of the value if it is a table; `TableReader` reads it.
-        item: of a list with tables in it, the type of its entries.
+        store: the form in which its table's dataclass keeps a valid value.
+        table: the value's dataclass if it is a table; `TableReader` reads it.
+        item: the entry type of a list with tables in it.
         options: of a choice, the texts that it may be.
     """
 
@@ -57,7 +57,7 @@ def _scatter(value: Any) -> str:
 
 
 def magnitudes_in_words(value: Any) -> str:
-    """Return the limits of magnitudes, where a number in a value is beyond them; else empty."""
+    """Return the magnitude limits, where a number in a value is beyond them; else empty."""
     if isinstance(value, list | tuple):
         return next(filter(None, map(magnitudes_in_words, value)), "")
     is_of_type = isinstance(value, int | float) and not isinstance(value, bool)
@@ -109,7 +109,7 @@ def list_of(
 
 
 def either(expected: str, *types: ValueType) -> ValueType:
-    """Return a value of any of some types."""
+    """Return a value that may have any of some types."""
     table = next((each.table for each in types if each.table is not None), None)
     return ValueType(
         expected,
@@ -120,12 +120,12 @@ def either(expected: str, *types: ValueType) -> ValueType:
 
 
 def table_of(table: type[Any], expected: str, *, least: int = 0) -> ValueType:
-    """Return a table of at least so many keys, which `TableReader` reads."""
+    """Return a table with at least so many keys, which `TableReader` reads."""
     return ValueType(expected, lambda v: isinstance(v, dict) and len(v) >= least, lambda v: v, table)
 
 
 def file_name(expected: str, *suffixes: str) -> ValueType:
-    """Return the name of a file with one of some suffixes."""
+    """Return a file name with one of some suffixes."""
     return ValueType(expected, lambda value: text.accepts(value) and value.endswith(suffixes), Path)
 
 

@@ -1,4 +1,4 @@
-"""The words of faults: values and keys as TOML writes them, and where an unknown name may belong."""
+"""Fault wording: values and keys as TOML writes them, and where an unknown name may belong."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def dotted_key(path: Iterable[str]) -> str:
 
 
 def suggestion(name: str, known: Iterable[str], owners: Mapping[str, str]) -> str:
-    """Return the end of a fault on an unknown name: where it belongs, the nearest known name, or all of them.
+    """Return the end of a fault on an unknown name: where it belongs, the nearest known name, or all known names.
 
     `owners` gives the place of each key that belongs elsewhere.
     """

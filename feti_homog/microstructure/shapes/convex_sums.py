@@ -20,7 +20,7 @@ SIDES = 3, 12
 
 @dataclass(frozen=True)
 class ConvexSums(ConvexCurves):
-    """The k sums c + V + F D of convex hulls V and the unit disc D, as `Outlines`.
+    """The k sums c + V + F D with convex hulls V and the unit disc D, as `Outlines`.
 
     V is the hull of `cores` (k, m, 2), about the origin; `frames` F (k, 2, 2); `centres` c (k, 2). The core of circles
     and ellipses is the origin; a core of fewer corners than m repeats one of them.
@@ -114,8 +114,8 @@ class ConvexSums(ConvexCurves):
 class PolygonalRows:
     """Rows with `sides`, as `Shape`.
 
-    Regular polygons of that circumradius, the first corner at `angle`, rounded by circles that touch both sides at a
-    corner; `corner` is their radius / radius of the circle within the sides.
+    Regular polygons with that circumradius, the first corner at `angle`, rounded by circles that touch both sides at a
+    corner; `corner` is their radius / the incircle's radius.
     """
 
     name, sizes, has_tips = "polygons", ("radius",), False

@@ -25,14 +25,14 @@ class Ellipses(ConvexCurves):
 
     @classmethod
     def of(cls, centres: Float, a: Float, b: Float, angle: Float) -> Ellipses:
-        """Return the ellipses of semi-axes a, b (k,), the first at `angle` (k,) in degrees from x."""
+        """Return the ellipses with semi-axes a, b (k,), the first at `angle` (k,) in degrees from x."""
         cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
         axes = np.stack([np.stack([cosine, sine], axis=1), np.stack([-sine, cosine], axis=1)], axis=2)
         return cls(centres, axes * np.stack([a, b], axis=1)[:, None])
 
     @classmethod
     def round(cls, circles: Float) -> Ellipses:
-        """Return the circles of centre and radius (k, 3)."""
+        """Return the circles with centre and radius (k, 3)."""
         return cls(circles[:, :2], circles[:, 2, None, None] * np.eye(2))
 
     @property
@@ -190,7 +190,7 @@ class EllipticRows:
 
 @dataclass(frozen=True)
 class Discs(ConvexCurves):
-    """k of them, as `Outlines`; `centres` (k, 2), `radii` (k,)."""
+    """k discs, as `Outlines`; `centres` (k, 2), `radii` (k,)."""
 
     radii: Float
 

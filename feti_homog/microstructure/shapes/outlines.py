@@ -1,4 +1,4 @@
-"""Protocols of fibre outlines and of row shapes, and the common base of curves of any shape."""
+"""Protocols for fibre outlines and row shapes, and the common base for curves of any shape."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ class Outlines(Protocol):
 
     @property
     def radii(self) -> Float:
-        """(k,) of discs of the same area."""
+        """(k,) radii of equal-area discs."""
 
     @property
     def longest(self) -> Float:
-        """(k,) a bound of the distance of the points from the centres."""
+        """(k,) a bound on the distance of the points from the centres."""
 
     @property
     def extents(self) -> Float:
@@ -49,13 +49,13 @@ class Outlines(Protocol):
     def __getitem__(self, rows: Int | Bool) -> Self: ...
 
     def at(self, centres: Float) -> Self:
-        """Outlines of the same shapes about other centres (k, 2)."""
+        """Outlines with the same shapes about other centres (k, 2)."""
 
     def per(self, unit: float) -> Self:
         """Shapes, and centres, with all lengths divided by a unit."""
 
     def rounded(self, decimals: int) -> Self:
-        """Outlines with coordinates of so many decimals."""
+        """Outlines with coordinates to so many decimals."""
 
     def grown(self, thickness: Float) -> Self:
         """Outlines around these with rings of that `thickness` (k,)."""
@@ -81,7 +81,7 @@ class Outlines(Protocol):
 
 @dataclass(frozen=True)
 class ConvexCurves:
-    """Curves about the centres (k, 2), given by the rows of all fields: common base of `Outlines` of any shape."""
+    """Curves about the centres (k, 2), given by the rows of all fields: common base for `Outlines` of any shape."""
 
     centres: Float
 
@@ -118,7 +118,7 @@ class ConvexCurves:
 
 
 class ColumnRange(NamedTuple):
-    """A column of numbers: the value of an empty cell, and the bound that numbers keep or do not reach."""
+    """A number column: an empty cell's value, and the bound that numbers keep or do not reach."""
 
     empty: float
     least: float = -np.inf
@@ -126,13 +126,13 @@ class ColumnRange(NamedTuple):
 
 
 class Shape(Protocol):
-    """A shape that rows of a table may have, other than a disc.
+    """A shape that table rows may have, other than a disc.
 
     Attributes:
         name: of several fibres with it.
         columns: columns that other shapes do not need.
-        sizes: columns of the lengths that are the largest; in place of the radius if that is not among them.
-        has_tips: whether its mesh may have nodes at tips of debonded arcs.
+        sizes: columns with the lengths that are the largest; in place of the radius if that is not among them.
+        has_tips: whether its mesh may have nodes at debonded arc tips.
     """
 
     @property
@@ -151,10 +151,10 @@ class Shape(Protocol):
         """(N,) which rows have it."""
 
     def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:
-        """Faults of rows that have it or seem to: which rows (N,), and the words."""
+        """Faults in rows that have it or seem to: which rows (N,), and the words."""
 
     def outlines(self, rows: Columns, centres: Float) -> Outlines:
-        """Return the outlines of rows (k,) with the shape, about centres (k, 2)."""
+        """Return the outlines for rows (k,) with the shape, about centres (k, 2)."""
 
 
 def directions(angle: Float) -> Float:

@@ -1,4 +1,4 @@
-"""The shapes that rows of a table may have, and the outlines of all its rows."""
+"""The shapes that table rows may have, and the outlines of all rows."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def given_shapes(rows: Columns, has_tips: bool) -> list[Shape]:
 
 
 def columns_without_tips(rows: Columns) -> dict[str, Float]:
-    """Columns (N,) of rows of such shapes, NaN of other rows; none without such rows."""
+    """Columns (N,) for rows with such shapes, NaN in other rows; none without such rows."""
     shapes = given_shapes(rows, has_tips=False)
     own = np.logical_or.reduce([np.zeros(len(rows["x"]), bool), *(shape.given(rows) for shape in shapes)])
     names = {name for shape in shapes for name in (*shape.sizes, *shape.columns, "angle")}
@@ -40,7 +40,7 @@ def have_both_sizes(rows: Columns) -> Bool:
 
 
 def outlines_of(rows: Columns) -> Outlines:
-    """Return the outlines (N,) of rows without faults, without their coatings, in the unit of the table."""
+    """Return the outlines (N,) of rows without faults, without coatings, in the table's unit."""
     centres, radius = (
         np.column_stack([rows["x"], rows["y"]]),
         np.where(np.isnan(rows["radius"]), rows["a"], rows["radius"]),
@@ -74,11 +74,11 @@ def with_parts(outlines: Outlines, parts: Sequence[tuple[Bool, Outlines]]) -> Ou
 
 
 def elliptic(outlines: Outlines) -> Ellipses:
-    """Ellipses, and in place of other outlines discs of the same areas."""
+    """Ellipses, and for other outlines equal-area discs."""
     has_core = outlines.cores.any(axis=(1, 2))[:, None, None]
     return Ellipses(outlines.centres, np.where(has_core, outlines.radii[:, None, None] * np.eye(2), outlines.frames))
 
 
 def _padded(cores: Float, corners: int) -> Float:
-    """Cores (k, m, 2) of so many corners, the last one repeated."""
+    """Cores (k, m, 2) with so many corners, the last one repeated."""
     return np.pad(cores, ((0, 0), (0, corners - cores.shape[1]), (0, 0)), mode="edge")
