@@ -278,7 +278,7 @@ class FibreInterfaces:
         return np.asarray(length * self._degrees)
 
     def share(self, length: Float) -> float:
-        """Return the summed lengths (f,) as a share in the whole interface length."""
+        """Return the share of lengths (f,) in the whole interface length."""
         return float(length.sum() / (self._length.sum() or 1.0))
 
     def shares(self, status: Status) -> Float:

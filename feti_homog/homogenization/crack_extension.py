@@ -32,7 +32,7 @@ VOID = -1
 
 
 class CrackExtension:
-    """Subdomain elements, found around points, whose energies a crack extension changes."""
+    """Subdomain elements, found around points, from which a crack extension's energy is summed."""
 
     def __init__(self, subdomain: Subdomain, period: Float) -> None:
         """Find the elements around points; the cell has `period` (2,)."""

@@ -107,7 +107,7 @@ def energy_errors(
 
 
 def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
-    """Return element and arc errors relative to the mesh with `fewer` halvings.  Collective."""
+    """Return ratios of element and arc errors to errors with `fewer` halvings.  Collective."""
     order = cell.lattice.order
     if cell.summary.across and fewer:
         return SAMPLED[any(s.is_mixed for s in cell.subdomains)]

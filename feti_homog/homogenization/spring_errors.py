@@ -92,8 +92,8 @@ class SpringSides:
     def _of_sides(self, holds: Bool, stiffness: Float, jump: Float) -> Float:
         """(k, k) spring energy at nodes less springs along this rank's sides, less the part known on arcs.
 
-        Both energies belong to the functions that nodes define on sides; the exact jump d adds to the spring energy,
-        and to the work by t over the distance between d and these functions, as much as these lack.
+        Both energies are of the functions that nodes define on sides; the exact jump d adds to the energy of springs,
+        and to the energy of t on the distance from d to these functions, as much as these lack.
         """
         side = np.flatnonzero(holds[self._nodes].all(axis=1))
         nodes, ds, shape = self._nodes[side], self._ds[side], self._shape[:, side]
