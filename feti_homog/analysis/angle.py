@@ -15,7 +15,9 @@ from feti_homog.homogenization.averaging import Response, asymmetry
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Return `angle`, a point an angle: the stress under the case's strain, else the stiffness by unit loads.
+    """Return `angle`, a point an angle.
+
+    A point is the stress under the case's strain, else the stiffness by unit loads.
 
     Each angle begins with the previous angle's multipliers.
     """

@@ -165,7 +165,9 @@ class _Finder:
         return total
 
     def _first(self, factors: Float, before: Float, directions: Float) -> list[list[float]]:
-        """Return each ray's least factor, its bond's fibre, interface and direction, and break shares.
+        """Return each ray's least factor, its bond and break shares.
+
+        In a row: factor, then fibre, interface and direction of the bond, then shares of the break.
 
         Bonds that break together: lowest fibre, then interface, then angle.  Collective.
         """

@@ -12,7 +12,9 @@ from feti_homog.analysis.tip_records import IN_PLANE_LOADS, tip_rates
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Return `load`, the state under the load with debonded faces from the start, open or in contact.
+    """Return `load`, the state with faces debonded from the start.
+
+    Under the load they are open or in contact.
 
     Adds `tips` on its arcs if only plane strains are there; `sensitivities` if the case asks.
     """

@@ -40,7 +40,9 @@ SUFFIXES = ("", "_axial")
 
 @dataclass
 class Work:
-    """Energies per cell area up to a point: breaks lose the loads' work less the stored energy.
+    """Energies per cell area up to a point.
+
+    Breaks lose the loads' work less the stored energy.
 
     Attributes:
         all_equilibria: every bond breaks at its own load, the first leg with its snap-back.

@@ -43,7 +43,10 @@ class CheckRecorder:
     faults: list[str] = field(default_factory=list)
 
     def record(self, name: str, response: Response) -> str:
-        """Record a response's checks, with a fault if it breaks a law; return a line about it."""
+        """Record a response's checks and return a line about it.
+
+        There is a fault if the response breaks a law.
+        """
         state, error = response.state, response.checks.get("jump")
         self.iterations.append(state.iterations)
         self.reasons.append(state.solution.reason)

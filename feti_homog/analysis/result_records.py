@@ -54,7 +54,9 @@ class MeshErrors:
 
 @dataclass(frozen=True, eq=False)  # arrays have no single answer to "equal"
 class Tips:
-    """The t debonding tips at a point, bonds that hold next to broken ones, by fibre, interface and direction.
+    """The t debonding tips at a point, by fibre, interface and direction.
+
+    Tips are bonds that hold next to broken ones.
 
     An energy per area drives them, compared with G_c(psi): the energy of their spring or, where `growth` is "released",
     the energy that their break would release.

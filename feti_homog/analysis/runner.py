@@ -1,4 +1,7 @@
-"""One case from its description to its result: tear, solve, homogenize, check, and write if there is a folder."""
+"""One case from its description to its result.
+
+Tear, solve, homogenize, check, and write if there is a folder.
+"""
 
 from __future__ import annotations
 

@@ -27,7 +27,9 @@ def read(directory: Path) -> dict[str, Any]:
 
 
 def check_to_draw(directory: Path) -> None:
-    """Check that result.h5 and result.json in `directory` are from one run; result.h5 may be alone.  Call on one rank.
+    """Check that `directory` has one run's files.  Call on one rank.
+
+    They are result.h5 and result.json; result.h5 may be alone.
 
     Raises:
         CaseError: result.h5 is missing, or a file is damaged, or from another program or run.

@@ -1,4 +1,7 @@
-"""Debonding tips in result.json: the law that moves them, energies that drive them on, release rates, modes."""
+"""Debonding tips in result.json.
+
+The law that moves them, energies that drive them on, release rates, modes.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Debonded arcs in a cell: whether they select any node, where their tips are, how fine the mesh is there."""
+"""Debonded arcs in a cell.
+
+Whether they select any node, where their tips are, how fine the mesh is there.
+"""
 
 from __future__ import annotations
 
@@ -97,7 +100,10 @@ class EstimatedNodes:
         return cls(numbers[inner[side]], pair[pair >= 0][side], directions, is_vertex)
 
     def moved_tips(self, case: Case, fibres: int) -> tuple[MovedTips, ...]:
-        """Find each interface's tips that the mesher moved into a near vertex; none in a user's mesh."""
+        """Find each interface's tips that the mesher moved into a near vertex.
+
+        A user's mesh has none.
+        """
         if case.cell.has_own_mesh:
             return (debonded_arcs.NOT_MOVED,) * len(case.interfaces)
         distance, moved = float(np.degrees(MERGED)), []

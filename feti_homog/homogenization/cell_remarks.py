@@ -129,7 +129,9 @@ def longest_edge(mesh: CoarseMesh) -> float:
 
 
 def process_zone(case: Case) -> float | None:
-    """Return the least length E' G_Ic / sigma_c^2 for bonds that break by energy; None for others.
+    """Return the least process zone length E' G_Ic / sigma_c^2.
+
+    It is given for bonds that break by energy; None for others.
 
     sigma_c = sqrt(2 k_n G_Ic), or a cohesive law's strength, in its shorter pure mode.  E' is Young's
     modulus in the plane state, E / (1 - nu^2) in plane strain, along the most compliant axis in all phases.
@@ -145,7 +147,9 @@ def process_zone(case: Case) -> float | None:
 
 
 def warnings(case: Case, width: float, edge: float) -> list[str]:
-    """Warn about elements on the interface that do not resolve the process zone, and about cohesive laws.
+    """Warn about unresolved process zones and about cohesive laws.
+
+    Zones are unresolved where elements on the interface are too long for them.
 
     Args:
         width: cell width.

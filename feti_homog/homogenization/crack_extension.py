@@ -95,7 +95,9 @@ def _of_all(comm: MPI.Comm, rows: list[Array], none: Array) -> Array:
 
 
 def reach_of_tips(tips: Float, spokes: Float, bodies: Int, boundaries: tuple[Float, Int], period: Float) -> Float:
-    """(t,) radius around each tip in which its crack may be extended: no other tip, no boundary but its circle.
+    """(t,) radius around each tip in which its crack may be extended.
+
+    No other tip lies within it, and no boundary but the tip's circle.
 
     Args:
         tips, spokes: (t, 2) places, and places relative to their circle centres.

@@ -196,7 +196,10 @@ def distribute(
 def _cut_across(
     case: Case, torus: Torus, lattice: ReferenceLattice, n_ranks: int, policy: PartitionPolicy
 ) -> Partition | None:
-    """Return the cell cut across materials; None if it is not asked for, or leaves a rank without a piece."""
+    """Return the cell cut across materials.
+
+    None if it is not asked for, or leaves a rank without a piece.
+    """
     triangles = len(torus.mesh.triangles)
     pieces = policy.across_pieces(triangles * lattice.intervals**2, n_ranks) if can_be_cut_across(case) else 0
     if not 0 < pieces <= triangles:

@@ -37,7 +37,9 @@ LEAST_OF_TWO_UNEVEN, LEAST_OF_TWO_TOUCHING = 0.05, 1.0
 
 @dataclass(frozen=True)
 class EnergyErrors:
-    """Errors in E_i . Sigma_j, (k, k), for k responses to the strains E_i in a cell with area |UC|.
+    """Errors in E_i . Sigma_j, (k, k), for k responses.
+
+    The responses have the strains E_i in a cell with area |UC|.
 
     Attributes:
         elements: 1/|UC| int ds_i : S : ds_j of recovered less element stresses, and spring energy beyond tips; the
@@ -117,7 +119,9 @@ def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
 
 
 def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
-    """Return whether a mesh refined less has the error: not where errors fall more slowly, at corners and tips.
+    """Return whether a mesh refined less has the error.
+
+    Not where errors fall more slowly, at corners and tips.
 
     False for cells with fibres other than circles and ellipses or with voids bounded by straight sides; for debonded
     arcs with quadratic elements or with tips to which the mesh is not graded: `tip_size` is given, or bonds break.

@@ -1,4 +1,6 @@
-"""Pieces that a cell is cut into, its memory, the ranks that it can use, and how often its dual operator is applied.
+"""Pieces that a cell is cut into, and their cost.
+
+The memory it needs, the ranks it can use, and how often its dual operator is applied.
 
 Memory is linear in the degrees of freedom, because bodies are cut into equally large pieces.  `scripts/measure_cost.py`
 measures its constants.
@@ -91,7 +93,10 @@ class PartitionPolicy:
     strip_dofs: int = 30_000
 
     def across_pieces(self, dofs: int, n_ranks: int) -> int:
-        """Return the pieces, equally many per rank, for cuts across materials; 0 for body by body."""
+        """Return how many pieces a cut across materials has.
+
+        Equally many on each rank; 0 for a cut body by body.
+        """
         if dofs > self.across_dofs:
             return 0
         if n_ranks <= self.whole_ranks and dofs <= self.whole_dofs:
@@ -105,7 +110,9 @@ BY_COST = PartitionPolicy(across_dofs=400_000)
 
 
 def can_be_cut_across(case: Case) -> bool:
-    """Return whether subdomains may reach across materials: nothing parts, and the case leaves the cut to the program.
+    """Return whether subdomains may reach across materials.
+
+    They may if nothing parts, and the case leaves the cut to the program.
 
     Jumps at nearly incompressible phases and between very different stiffnesses are scaled body by body; dual
     solver options are meant for bodies.
@@ -131,7 +138,9 @@ def wanted_pieces(
     n_ranks: int,
     policy: PartitionPolicy = DEFAULT_POLICY,
 ) -> Int:
-    """(b,) pieces in each body, from the case, else from the policy; at least one for each rank.
+    """(b,) pieces in each body, from the case, else from the policy.
+
+    There is at least one piece for each rank.
 
     Args:
         load: (b,) coarse triangles in each body.
@@ -191,14 +200,19 @@ def memory(nodes: Sequence[int], subdomains: Sequence[int], components: Sequence
 
 
 def memory_to_the_end(case: Case, few: float, multipliers: int, columns: int, ranks: int) -> float:
-    """Estimate the largest rank's bytes when a path has broken all bonds; `few` are its bytes before."""
+    """Estimate the largest rank's bytes when all bonds have broken.
+
+    `few` are its bytes before the path breaks bonds.
+    """
     stored = columns if columns <= NEVER_REFACTORED_ROWS else INFLUENCE_COLUMNS
     faces = FACE_PAIR_BYTES * multipliers**2 if case.has_friction else 0
     return few + columns / ranks * (PATH_BYTES + stored * PAIR_BYTES) + faces
 
 
 def recommended_ranks(dofs: int, bodies: int) -> int:
-    """Return how many ranks a cell can use: at most its bodies, which more ranks would cut.
+    """Return how many ranks a cell can use.
+
+    No more than its bodies, because more ranks would cut them.
 
     Cut bodies cost iterations; in cells that are cut across materials coarse triangles stand for bodies.
     """

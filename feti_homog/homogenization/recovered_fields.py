@@ -51,7 +51,9 @@ def recover(cell: TornCell, response: Response | None) -> RecoveredFields:
 
 
 def _part_fields(cell: TornCell, loads: Float, u: Float) -> tuple[Float, Float, Float, Float]:
-    """Return total displacements H y + u*, Eq. (14), and u* (n, c) at the plane nodes in this rank's parts.
+    """Return nodal and element fields in this rank's parts.
+
+    Total displacements H y + u*, Eq. (14), and u* (n, c) at their plane nodes.
 
     Then means over their elements under the loads (v,): strains with the other loads, and stresses on them, (m, v).
     """

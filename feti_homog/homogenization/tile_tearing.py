@@ -1,4 +1,6 @@
-"""Cells cut on rank 0, or large ones where they are meshed: each rank cuts its tiles, and no rank has all tiles.
+"""Cells cut on rank 0, or large ones where they are meshed.
+
+For large cells each rank cuts its tiles, and no rank has all tiles.
 
 Matrix pieces lie within tiles, and a fibre lies in one tile, so subdomains depend on the case and the number of
 ranks, not on the rank that filled a tile.
@@ -97,7 +99,10 @@ def _filled(noded: NodedCell | None, regions: Regions, comm: MPI.Intracomm) -> t
 
 
 def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) -> Int:
-    """(m,) the subdomain of each triangle on this rank, numbered from 0 tile by tile within a constituent."""
+    """(m,) the subdomain of each triangle on this rank.
+
+    Subdomains are numbered from 0 tile by tile within a constituent.
+    """
     a, b, _ = torus.sides
     within = (tile[a] == tile[b]) & (torus.constituent[a] == torus.constituent[b])
     label = components(len(tile), a[within], b[within])

@@ -82,7 +82,10 @@ def nodes_of_parts(s: Subdomain) -> int:
 
 
 def _restricted(mesh: FineMesh, members: Int) -> tuple[FineMesh, Int]:
-    """Restrict the mesh to the coarse triangles `members` (t,); also return (c,) its classes in the mesh."""
+    """Restrict the mesh to the coarse triangles `members` (t,).
+
+    Returns it and (c,) its classes in the whole mesh.
+    """
     nodes, local = present(mesh.nodes[members], len(mesh.points))
     classes, node_class = present(mesh.node_class[nodes], mesh.n_classes)
     numbers, curved = (local.astype(np.int32), node_class.astype(np.int32)), mesh.curved[members]
@@ -192,7 +195,9 @@ def locks(subdomains: Sequence[Subdomain | UniformPart], comm: MPI.Intracomm) ->
 def nested_lattice(
     lattice: ReferenceLattice, subdomains: Sequence[Subdomain], comm: MPI.Intracomm, across: bool
 ) -> ReferenceLattice:
-    """Return the coarser mesh's lattice: refined once less, or twice after many halvings if no phase locks.
+    """Return the coarser mesh's lattice.
+
+    It is refined once less, or twice after many halvings if no phase locks.
 
     Not twice if subdomains reach across materials.  Collective.
     """
