@@ -15,9 +15,11 @@ from feti_homog.homogenization.averaging import Response, asymmetry
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Return `angle`, a point an angle: the stress under the strain of the case, else the stiffness by unit loads.
+    """Return `angle`, a point an angle.
 
-    Each angle begins with the multipliers of the angle before.
+    A point is the stress under the case's strain, else the stiffness by unit loads.
+
+    Each angle begins with the previous angle's multipliers.
     """
     section = context.case.section
     assert isinstance(section, Angle)

@@ -1,4 +1,4 @@
-"""Records of the cell, its fibres, the solver, the checks and the sensitivities in result.json."""
+"""Records about cell, fibres, solver, checks and sensitivities in result.json."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class CellInfo:
 
 @dataclass(frozen=True, kw_only=True)
 class FibreInfo:
-    """One fibre, as `fibre = N` of a case file selects it."""
+    """One fibre, as `fibre = N` in a case file selects it."""
 
     number: int = described("number in `fibre = N` of case files, from 1")
     phase: str = described("name of its phase")
@@ -59,7 +59,7 @@ class FibreInfo:
 
 @dataclass(frozen=True)
 class SolverInfo:
-    """Solution of the dual problem, in numbers."""
+    """Dual problem solution, in numbers."""
 
     ranks: int = described("MPI ranks")
     bodies: int = described("bodies, the matrix and the fibres")
@@ -79,7 +79,7 @@ class SolverInfo:
 
 @dataclass(frozen=True)
 class Checks:
-    """The largest relative error of each law over all states."""
+    """The largest relative error in each law over all states."""
 
     strain: float = described("mean strain, with the opening of debonded faces, equals E")
     hill: float = described("Hill's lemma: mean of stress times strain equals Sigma E")
@@ -99,14 +99,14 @@ class Checks:
     symmetry: float | None = described("L^ef is symmetric; of bonded or frictionless free faces only", default=None)
 
     def by_law(self) -> dict[str, float]:
-        """Return the errors of the laws that were checked, by name."""
+        """Return each checked law's error by name."""
         errors: dict[str, float] = plain(self)
         return errors
 
 
 @dataclass(frozen=True)
 class StiffnessBounds:
-    """Bounds of L^ef by the phases, whatever their arrangement."""
+    """Phase bounds on L^ef, whatever the phases' arrangement."""
 
     voigt: Float = described("upper bound of the stiffness: uniform strain", STRESS, "(3, 3)")
     reuss: Float = described("lower bound of the stiffness: uniform stress", STRESS, "(3, 3)")
@@ -115,7 +115,7 @@ class StiffnessBounds:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sensitivities:
-    """Derivatives of the n constants of a cell by the p constants of its phases and interfaces, at fixed geometry."""
+    """Derivatives of n cell constants by p phase and interface constants, at fixed geometry."""
 
     parameters: tuple[str, ...] = described("constants of the case, such as `material.fibre.young`")
     parameter_values: Float = described("their values, each in its unit", "", "(p,)")
@@ -131,6 +131,6 @@ class Sensitivities:
 
     @property
     def elasticities(self) -> Float:
-        """(n, p) d ln constant / d ln parameter; NaN of constants that are 0."""
+        """(n, p) d ln constant / d ln parameter; NaN for constants that are 0."""
         values = np.where(self.constant_values == 0.0, np.nan, self.constant_values)
         return np.asarray(self.derivatives * self.parameter_values / values[:, None])

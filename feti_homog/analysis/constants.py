@@ -1,4 +1,4 @@
-"""Constants that follow from the stiffness of a linear cell, with bounds and closed-form estimates."""
+"""Constants that follow from a linear cell's stiffness, with bounds and closed-form estimates."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ SAME_RADIUS = 1e-6
 
 
 def constants(cell: TornCell, secants: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the entries of `Result` that follow from `effective_stiffness` and `thermal_stress`.  Collective.
+    """Return `Result` entries that follow from `effective_stiffness` and `thermal_stress`.  Collective.
 
-    None where faces touch without tension, for each column is a secant of its own load, and none in the plane with
+    None where faces touch without tension: each column is a secant under its own load.  None in the plane with
     interfaces.
     """
     case, is_spatial = cell.case, len(cell.problems) > 1
@@ -44,7 +44,7 @@ def constants(cell: TornCell, secants: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def stiffness_constants(stiffness: Float, thermal: Float | None) -> dict[str, Any]:
-    """Return the constants of a stiffness (3, 3) or (6, 6), with the thermal stress (6,), as entries of `Result`."""
+    """Return constants from a stiffness (3, 3) or (6, 6), with the thermal stress (6,), as `Result` entries."""
     if len(stiffness) == 3:
         return {"moduli": named_constants.engineering_moduli(stiffness)}
     compliance = np.linalg.inv(stiffness)
@@ -59,7 +59,7 @@ def stiffness_constants(stiffness: Float, thermal: Float | None) -> dict[str, An
 
 
 def _comparisons(cell: TornCell, fractions: Mapping[str, float]) -> dict[str, Any]:
-    """Return closed-form estimates of round fibres, and bounds of rigidly bonded fibres of any section.
+    """Return closed-form estimates for round fibres, and bounds for any rigidly bonded fibres.
 
     Estimates exist for fibres without coatings, held in the matrix by the same bonds, with springs of one radius;
     bounds for transversely isotropic phases.
@@ -92,7 +92,7 @@ def _comparisons(cell: TornCell, fractions: Mapping[str, float]) -> dict[str, An
 
 
 def _has_estimates(case: Case, phases: Sequence[str], radii: Sequence[Float], has_springs: bool) -> bool:
-    """Return whether estimates exist for fibres with the radii of each phase, NaN if they are not round."""
+    """Return whether estimates exist for fibre `radii` in each phase, NaN if not round."""
     if COATING in phases or any(interface.between is not None for interface in case.interfaces):
         return False
     return not any(np.isnan(r).any() or (has_springs and np.ptp(r) > SAME_RADIUS * r.max()) for r in radii)

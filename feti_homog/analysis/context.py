@@ -1,4 +1,4 @@
-"""One run of an analysis: the cell under its loads, checks, records of states and points, progress."""
+"""One analysis run: the cell under its loads, checks, recorded states and points, progress."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ if TYPE_CHECKING:
 
 
 class CellLoads:
-    """Loads of a cell, and its averages under them.
+    """Cell loads, and the averages under them.
 
     Attributes:
-        problems: the problem of the plane, in which faces may touch, then the axial one of generalized plane strain.
-        interfaces: interfaces of all problems together.
-        names: unit loads of all problems.
+        problems: the plane problem, in which faces may touch, then the axial one in generalized plane strain.
+        interfaces: the interfaces in all problems together.
+        names: unit loads in all problems.
     """
 
     def __init__(self, cell: TornCell, contact: bool) -> None:
@@ -43,26 +43,26 @@ class CellLoads:
 
     @property
     def plane(self) -> Homogenization:
-        """The problem of the plane."""
+        """The plane problem."""
         return self.problems[0]
 
     def load(self, target: Mapping[str, float]) -> Load:
-        """Return the load of all problems that a waypoint names."""
+        """Return the load, in all problems, that a waypoint names."""
         stress = dict(zip(SPATIAL_STRAINS, SPATIAL_STRESSES, strict=True)) | {"temperature": "temperature"}
         values = [target.get(name, target.get(stress[name], 0.0)) for name in self.names]
         return Load(np.array(values), np.array([name not in target for name in self.names]))
 
     def zero_multipliers(self) -> list[Float]:
-        """Zero first multipliers of each unit load."""
+        """Zero first multipliers for each unit load."""
         return [np.zeros(problem.cell.solver.rows) for problem in self.problems for _ in problem.loads]
 
     def by_problem(self, responses: Sequence[Response]) -> list[list[Response]]:
-        """Return the responses to the unit loads of each problem."""
+        """Group the unit load responses by problem."""
         rest = iter(responses)
         return [[next(rest) for _ in problem.loads] for problem in self.problems]
 
     def responses(self, state: Equilibrium, scale: float, brief: bool = False) -> list[Response]:
-        """Return the averages of `scale` times the equilibrium of all problems.
+        """Average `scale` times the equilibrium in all problems.
 
         Collective; arguments and errors as in `Homogenization.response`.
         """
@@ -76,7 +76,7 @@ class CellLoads:
         return [name for name, is_free in zip(self.names, masks, strict=True) if is_free]
 
     def excess(self, responses: Sequence[Response]) -> float:
-        """Return the ratio of strains under a load to strains of the bonded cell.  Collective."""
+        """Return the ratio of strains under a load to strains in the bonded cell.  Collective."""
         pairs = zip((problem.interface.scales for problem in self.problems), (r.state for r in responses), strict=True)
         return max(scales.excess(state.solution.strain, state.asked) for scales, state in pairs)
 
@@ -89,7 +89,7 @@ class CellLoads:
         return phase_laws.secants(*(np.stack([sign * r.stress for r in group], axis=1) for group in groups))
 
     def means(self, responses: Sequence[Response]) -> dict[str, Float | float]:
-        """Return macroscopic `strain` and `stress` of all problems, and `temperature` if it is a load."""
+        """Return macroscopic `strain` and `stress` in all problems, and `temperature` if it is a load."""
         strain = phase_laws.components(*(response.strain for response in responses))
         stress = phase_laws.components(*(response.stress for response in responses))
         heat = {"temperature": float(responses[0].strain[-1])} if "temperature" in self.names else {}
@@ -98,16 +98,16 @@ class CellLoads:
 
 @dataclass
 class AnalysisContext:
-    """One run of an analysis.
+    """One analysis run.
 
     Attributes:
         loads: the cell under its loads.
-        checks: checks of all responses so far.
-        states: recorder of states.
-        checkpoint: store of the events of a path; `resume` goes on from it.
-        log: called with a line about each event of a path; `events` names the file of all lines.
-        undetermined: strains that nothing determines, of every point under one load.
-        excess: largest ratio of strains under one load to strains of the bonded cell.
+        checks: checks on all responses so far.
+        states: state recorder.
+        checkpoint: stores the events on a path; `resume` goes on from it.
+        log: called with a line about each event on a path; `events` names the file with all lines.
+        undetermined: strains that nothing determines, for every point under one load.
+        excess: largest ratio of strains under one load to strains in the bonded cell.
         notes: remarks on the result.
     """
 
@@ -125,7 +125,7 @@ class AnalysisContext:
 
     @classmethod
     def of(cls, cell: TornCell, progress: Progress, states: StateRecorder | None = None) -> AnalysisContext:
-        """Make the context of a cell without a checkpoint; by default it records no states."""
+        """Make a cell's context without a checkpoint; by default it records no states."""
         contact = cell.case.interface is not None and cell.case.interface.contact
         recorder = StateRecorder(cell, None, False, progress.say) if states is None else states
         checks, checkpoint = CheckRecorder(cell.solver.rtol), NoCheckpoint(cell.comm)
@@ -133,12 +133,12 @@ class AnalysisContext:
 
     @property
     def plane(self) -> Homogenization:
-        """The problem of the plane."""
+        """The plane problem."""
         return self.loads.plane
 
     @property
     def cell(self) -> TornCell:
-        """The cell in the problem of the plane."""
+        """The cell in the plane problem."""
         return self.plane.cell
 
     @property
@@ -148,7 +148,7 @@ class AnalysisContext:
 
     @property
     def recovers_again(self) -> bool:
-        """True if displacements inside bodies are found more than once, so that factors of interiors pay."""
+        """True if displacements inside bodies are found more than once, so that interior factors pay."""
         return self.states.has_place or self.needs_sensitivities or self.case.analysis.type == "angle"
 
     @property
@@ -157,7 +157,7 @@ class AnalysisContext:
         return self.case.output.sensitivities
 
     def bonds(self, opening: float | None) -> BondState:
-        """State of the interfaces before any load: prescribed debonded nodes are open."""
+        """Interface state before any load: prescribed debonded nodes are open."""
         return self.plane.intact.with_status(np.where(self.cell.debonded(opening), OPEN, 0).astype(np.int8))
 
     def unit_responses(
@@ -173,7 +173,7 @@ class AnalysisContext:
         return self.loads.secants(responses, sign), responses
 
     def record_unit_states(self, responses: Sequence[Response], load_factor: float, label: str, point: int) -> None:
-        """Record the states of all unit loads.  Collective."""
+        """Record the state under each unit load.  Collective."""
         in_plane = len(self.plane.loads)
         for number, (name, response) in enumerate(zip(self.loads.names, responses, strict=True)):
             plane, axial = (response, None) if number < in_plane else (None, response)
@@ -186,18 +186,18 @@ class AnalysisContext:
 
     @cached_property
     def release_rates(self) -> EnergyReleaseRates:
-        """Energy release rates at the tips of debonded arcs.  Collective when first read."""
+        """Energy release rates at debonded arc tips.  Collective when first read."""
         from feti_homog.homogenization.energy_release import EnergyReleaseRates  # bonded cells have no tips
 
         return EnergyReleaseRates(self.cell, self.plane.interface)
 
     @cached_property
     def fibre_interfaces(self) -> FibreInterfaces:
-        """Interfaces of the fibres of the cell.  Collective when first read."""
+        """Fibre interfaces in the cell.  Collective when first read."""
         return FibreInterfaces(self.cell)
 
     def point(self, responses: Sequence[Response]) -> dict[str, Any]:
-        """Return debonding at a point of result.json, under its last strain of the plane, and all iterations.
+        """Return debonding at a result.json point, under its last plane strain, and all iterations.
 
         Collective.
         """
@@ -213,7 +213,7 @@ class AnalysisContext:
         return debonding | last.counts | {"iterations": sum(r.state.iterations for r in responses)}
 
     def loaded_point(self, responses: Sequence[Response]) -> dict[str, Any]:
-        """Return means, energies and debonding at a point of result.json under one load.  Collective."""
+        """Return means, energies and debonding at a result.json point under one load.  Collective."""
         self.undetermined.append(self.loads.undetermined(responses))
         self.excess = max(self.excess, self.loads.excess(responses))
         energies = {

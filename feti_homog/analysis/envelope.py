@@ -1,4 +1,4 @@
-"""`analysis.type = "envelope"`: the onset of debonding in a plane of macroscopic stresses or strains.
+"""`analysis.type = "envelope"`: debonding onset in a plane of macroscopic stresses or strains.
 
 The cell is linear, so tractions under all loads are superposed from unit loads: no direction costs a solve.
 """
@@ -38,7 +38,7 @@ class Rays:
 
     Attributes:
         strain, stress: (n, m) directions.
-        strain_before, stress_before: (m,) starts, after the change of temperature.
+        strain_before, stress_before: (m,) starts, after the temperature change.
         temperature: the change.
     """
 
@@ -60,7 +60,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     `envelope` lists directions with the load at which the first bond breaks; the other entries follow from unit loads.
 
     Raises:
-        CaseError: faces of the mesh are debonded and may touch.
+        CaseError: faces in the mesh are debonded and may touch.
     """
     section, bonds = context.case.section, context.bonds(None)
     assert isinstance(section, Envelope)
@@ -88,9 +88,9 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 def rays_of(
     plane: Sequence[str], angles: Float, stiffness: Float, thermal_stress: Float | None, temperature: float
 ) -> Rays:
-    """Return the rays in directions (n,), degrees, of a plane with the axes `plane`.
+    """Return the rays in directions (n,), degrees, in a plane with the axes `plane`.
 
-    Rays of stresses have E = C^-1 S and begin at zero stress after a change of temperature, rays of strains at zero
+    Stress rays have E = C^-1 S and begin at zero stress after a temperature change, strain rays begin at zero
     strain.
     """
     strains, stresses = voigt_names(len(stiffness))
@@ -107,7 +107,7 @@ def rays_of(
 
 
 class _Finder:
-    """Finder of the first bond that breaks on each ray."""
+    """Finds the first bond that breaks on each ray."""
 
     def __init__(self, context: AnalysisContext, responses: Sequence[Response], law: BondLaw, onset: Onset) -> None:
         """Take the responses to the unit loads.  Collective."""
@@ -124,7 +124,7 @@ class _Finder:
         self._order = np.lexsort((np.round(self._direction, DIRECTION_DIGITS), self._pair, self._fibre))
 
     def points(self, rays: Rays) -> Iterator[dict[str, Any]]:
-        """Yield the entry of each ray in result.json, without its direction.  Collective."""
+        """Yield each ray's entry in result.json, without its direction.  Collective."""
         names = voigt_names(rays.strain.shape[1])[0]
         start = np.tensordot(self._unit_loads(rays.strain_before[None], rays.temperature, names), self._unit, axes=1)[0]
         used = self._onset.utilisation(start, np.arange(len(start)))
@@ -148,13 +148,13 @@ class _Finder:
                 yield rays.at(ray, float(factor)) | place | dict(zip(self._break_names, shares, strict=True))
 
     def _unit_loads(self, strain: Float, temperature: float, names: Sequence[str]) -> Float:
-        """(n, l) shares of each unit load in strains (n, m) of these names and a change of temperature."""
+        """(n, l) each unit load's share in strains (n, m) with these names and a temperature change."""
         column = {name: strain[:, number] for number, name in enumerate(names)}
         column["temperature"] = np.full(len(strain), temperature)
         return np.stack([column[load] for load in self._loads], axis=1)
 
     def _error_utilisation(self, loads: Float) -> Float:
-        """(n, k) utilisations by the bond stresses of all problems under unit loads (n, l).  Collective."""
+        """(n, k) utilisations by the bond stresses in all problems under unit loads (n, l).  Collective."""
         first, total = 0, np.zeros((len(loads), len(self._fibre)))
         for problem, part in zip(self._problems, ((0, 1), (2,))[: len(self._problems)], strict=True):
             end = first + len(problem.solver.problem.loads)
@@ -165,7 +165,9 @@ class _Finder:
         return total
 
     def _first(self, factors: Float, before: Float, directions: Float) -> list[list[float]]:
-        """Return for each ray the least factor, fibre, interface and direction of its bond, and shares of the break.
+        """Return each ray's least factor, its bond and break shares.
+
+        In a row: factor, then fibre, interface and direction of the bond, then shares of the break.
 
         Bonds that break together: lowest fibre, then interface, then angle.  Collective.
         """
@@ -187,7 +189,7 @@ class _Finder:
 
 
 def _unit_tractions(context: AnalysisContext, responses: Sequence[Response]) -> Float:
-    """(l, k, c) tractions of this rank's nodes under each unit load: normal, tangential, and axial in space."""
+    """(l, k, c) tractions at this rank's nodes under each unit load: normal, tangential, and axial in space."""
     components = [problem.cell.solver.problem.components for problem in context.loads.problems]
     tractions, column = list[Float](), 0
     groups = context.loads.by_problem(responses)

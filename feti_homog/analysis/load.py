@@ -12,9 +12,11 @@ from feti_homog.analysis.tip_records import IN_PLANE_LOADS, tip_rates
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Return `load`, the state under the load with debonded faces from the start, open or in contact.
+    """Return `load`, the state with faces debonded from the start.
 
-    `tips` of its arcs if only strains of the plane are there; `sensitivities` if the case asks.
+    Under the load they are open or in contact.
+
+    Adds `tips` on its arcs if only plane strains are there; `sensitivities` if the case asks.
     """
     cell, (target,) = context.loads.interfaces, context.case.targets
     bonds = context.bonds(None)

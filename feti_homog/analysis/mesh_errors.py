@@ -1,4 +1,4 @@
-"""Estimated mesh errors in a stiffness, in constants that follow from it, and in the energy of states."""
+"""Estimated mesh errors in a stiffness, in constants that follow from it, and in state energies."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ROUNDING = 1e-9  # of bounds, relative
 
 
 def unit_errors(context: AnalysisContext, responses: list[Response]) -> tuple[list[EnergyErrors], list[Response]]:
-    """Estimate the errors of the responses to all unit loads, by problem; return the responses with elements' shares.
+    """Estimate errors in all unit load responses, by problem; return the responses with element shares.
 
     Without `mesh_error` no errors; without a use for shares the responses as they are.  Collective.
     """
@@ -49,14 +49,14 @@ def unit_errors(context: AnalysisContext, responses: list[Response]) -> tuple[li
 def mesh_error(
     context: AnalysisContext, secants: Mapping[str, Any], of_plus: list[EnergyErrors], of_minus: list[EnergyErrors]
 ) -> dict[str, Any]:
-    """Return the entry `mesh_error` of `Result`, empty without errors.
+    """Return the `Result` entry `mesh_error`, empty without errors.
 
     A constant f(C) errs by max(|f(C - signed) - f(C)|, |f(C - least) - f(C)|).  Notes errors above the accuracy of the
     case, and values outside their bounds, which are faults beyond any mesh error.
 
     Args:
         secants: `effective_stiffness` and entries that follow from it, as in `Result`.
-        of_plus, of_minus: errors of plus and, where faces touch, minus the unit loads.
+        of_plus, of_minus: errors under plus and, where faces touch, minus the unit loads.
     """
     if not of_plus:
         return {}
@@ -79,7 +79,7 @@ def mesh_error(
 
 
 def note_accuracy(context: AnalysisContext, energy: float) -> None:
-    """Note a sufficient mesh if the relative error of the energy is above the accuracy of the case.  Collective."""
+    """Note a sufficient mesh if the relative energy error exceeds the case's accuracy.  Collective."""
     cell = context.case.cell
     if cell.accuracy is None or (energy := context.cell.comm.bcast(energy)) <= cell.accuracy:
         return
@@ -93,10 +93,10 @@ def note_accuracy(context: AnalysisContext, energy: float) -> None:
 def _note_bounds(
     context: AnalysisContext, secants: Mapping[str, Any], values: Named, errors: Named, energy: float
 ) -> None:
-    """Note constants outside the bounds of their phases; report a fault beyond any possible mesh error.
+    """Note constants outside their bounds; report faults beyond any possible mesh error.
 
-    No constant errs relatively by more than `energy`, the largest relative error of the strain energy, of which the
-    estimate counts OFF times.  Bounds apply to cells of their symmetry, and follow from the meshed shares of phases.
+    No constant errs relatively by more than `energy`, the largest relative strain energy error, of which the
+    estimate counts OFF times.  Bounds apply to cells with their symmetry, and follow from the meshed phase shares.
     """
     limits: dict[str, Sequence[float]] = {}
     plane = secants.get("bounds")
@@ -122,7 +122,7 @@ def _note_bounds(
 
 
 def state_error(context: AnalysisContext, responses: Sequence[Response]) -> tuple[dict[str, float], list[Response]]:
-    """Return `mesh_error`, the relative error of the energy of one state, and its responses with elements' shares.
+    """Return `mesh_error`, one state's relative energy error, and its responses with element shares.
 
     Without `mesh_error` no error; without a use for shares the responses as they are.  Collective.
     """
@@ -140,7 +140,7 @@ def state_error(context: AnalysisContext, responses: Sequence[Response]) -> tupl
 
 
 def check_accuracy(context: AnalysisContext) -> None:
-    """Note the error of the cell under the first load, before any bond breaks, if the case asks for an accuracy.
+    """Note the mesh error under the first load if the case asks for accuracy.
 
     Collective.
     """
@@ -156,12 +156,12 @@ def check_accuracy(context: AnalysisContext) -> None:
 
 
 def energy_error(stiffness: Float, errors: list[EnergyErrors]) -> dict[str, float]:
-    """Return `mesh_error` of a secant stiffness, the largest relative error of the strain energy."""
+    """Return `mesh_error` for a secant stiffness, the largest relative strain energy error."""
     return {"mesh_error": _energy(stiffness, {name: _secants(errors, name) for name in PARTS})} if errors else {}
 
 
 def _secants(errors: Sequence[EnergyErrors], name: str) -> dict[str, Float]:
-    """Return the errors of one kind in `effective_stiffness` and `thermal_stress`."""
+    """Return one kind of errors in `effective_stiffness` and `thermal_stress`."""
     if not errors:
         return {}
     entries = phase_laws.secants(*(getattr(error, name) for error in errors))
@@ -169,7 +169,7 @@ def _secants(errors: Sequence[EnergyErrors], name: str) -> dict[str, Float]:
 
 
 def _constants(stiffness: Float, heat: Float | None) -> dict[str, Float]:
-    """Return the constants of a stiffness by name, and the `thermal_expansion`."""
+    """Return a stiffness's constants by name, and the `thermal_expansion`."""
     entries = stiffness_constants(stiffness, heat)
     compliance = entries.pop("compliance", None)
     named: dict[str, Any] = {}
@@ -181,7 +181,7 @@ def _constants(stiffness: Float, heat: Float | None) -> dict[str, Float]:
 
 
 def _energy(stiffness: Float, parts: Mapping[str, Mapping[str, Float]]) -> float:
-    """Return the largest relative error of the strain energy under any strain.
+    """Return the largest relative strain energy error under any strain.
 
     If the stiffness is not positive definite, the largest under unit strains.
     """

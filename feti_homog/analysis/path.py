@@ -1,4 +1,4 @@
-"""`analysis.type = "path"`: load-induced debonding along a path of macroscopic strain, Section III.F and Fig. 5."""
+"""`analysis.type = "path"`: load-induced debonding along a macroscopic strain path, Section III.F and Fig. 5."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ LEAST_STRESS = 1e-9  # in a fault, relative to the largest
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Return the path of the case, until its bonds break; see `follow`."""
+    """Follow the case's path until its bonds break; see `follow`."""
     section = context.case.section
     assert isinstance(section, LoadPath)
     return follow(context, section, criterion_of(context.cell, grows=True))
@@ -52,7 +52,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, Any]:
     """Return `path`, a point an event (or increment), each written to the checkpoint at once.
 
-    `states` has the numbers of points with recorded fields, chosen when all points are found.
+    `states` numbers the points with recorded fields, chosen when all points are found.
     """
     check_accuracy(context)
     count = _events_in_checkpoint(context, law)
@@ -108,12 +108,12 @@ def _remark_loose_fibres(context: AnalysisContext, last: Point) -> None:
 
 
 def _document(context: AnalysisContext, entries: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return the parts of result.json by which points are marked."""
+    """Return the result.json parts by which points are marked."""
     return {"case": context.case.resolved(), "path": entries}
 
 
 def _events_in_checkpoint(context: AnalysisContext, law: BondLaw) -> int:
-    """Count the usable events of the checkpoint; clear it unless the run resumes.
+    """Count usable checkpoint events; clear the checkpoint unless the run resumes.
 
     Raises:
         CaseError: the checkpoint cannot be used.
@@ -134,7 +134,7 @@ def _events_in_checkpoint(context: AnalysisContext, law: BondLaw) -> int:
 def _points(
     context: AnalysisContext, path: LoadPath, law: BondLaw, stored_events: int
 ) -> Iterator[tuple[Point, tuple[Energies, float] | None, list[Response]]]:
-    """Yield points with responses: of the checkpoint, with the energies up to each, then new ones.
+    """Yield points with responses: first from the checkpoint, with energies up to each, then new ones.
 
     Where nothing carries the stresses any more, or faces with friction cannot go on, the path ends with a fault.
 
@@ -184,7 +184,7 @@ def _with_advice(error: NotCarriedError, place: str, path: LoadPath) -> NotCarri
 
 
 def _sliding_cell(context: AnalysisContext) -> SlidingCell:
-    """Return the faces of the case with the friction of its interfaces.  Collective; raises as `SlidingCell`."""
+    """Return the case's faces with their interface friction.  Collective; raises as `SlidingCell`."""
     cell, pair = context.loads.interfaces, context.loads.interfaces.nodes.pair
     friction, of_damage = np.array([interface.rubbing for interface in context.case.interfaces]).T
     return SlidingCell(cell, friction[pair], of_damage[pair])
@@ -197,7 +197,7 @@ def _label(path: LoadPath, number: int) -> str:
 def _entry(
     context: AnalysisContext, law: BondLaw, point: Point, responses: Sequence[Response], work: Work
 ) -> dict[str, Any]:
-    """Return the entry of a point in result.json.  Collective."""
+    """Return a point's entry in result.json.  Collective."""
     energies, damage = work.all_equilibria, law.damage(point.state.bonds)
     entry: dict[str, Any] = {
         "load_factor": point.load_factor,
@@ -219,7 +219,7 @@ def _entry(
 
 
 def _goes_on(context: AnalysisContext, path: LoadPath, point: Point, count: int) -> bool:
-    """Return whether the path goes on after the last of so many points."""
+    """Return whether the path goes on after `count` points."""
     if not point.state.converged:  # a state that does not hold decided on the next break
         return False
     if count == path.max_events and point.load_factor < 1.0:
@@ -234,9 +234,9 @@ def _goes_on(context: AnalysisContext, path: LoadPath, point: Point, count: int)
 def _recorded(
     context: AnalysisContext, path: LoadPath, law: BondLaw, entries: Sequence[dict[str, Any]], last: Point
 ) -> dict[str, Any]:
-    """Record tips and fields of the kept points, read from the checkpoint; it may lack the last one.  Collective.
+    """Record tips and fields at kept points, read from the checkpoint; it may lack the last.  Collective.
 
-    Returns `states`, the numbers of points with recorded fields.
+    Returns `states`, the point numbers with recorded fields.
     """
     legs = len(context.case.targets) if path.method == "events" else 0
     numbers = kept(entries, context.case.output.states, legs, marks(_document(context, entries)))

@@ -1,4 +1,4 @@
-"""Events of a path: energies up to each, their form in the checkpoint, and lines about them."""
+"""Path events: energies up to each, their form in the checkpoint, and lines about them."""
 
 from __future__ import annotations
 
@@ -40,12 +40,14 @@ SUFFIXES = ("", "_axial")
 
 @dataclass
 class Work:
-    """Energies per area of the cell up to a point: breaks lose the work of the loads less the stored energy.
+    """Energies per cell area up to a point.
+
+    Breaks lose the loads' work less the stored energy.
 
     Attributes:
         all_equilibria: every bond breaks at its own load, the first leg with its snap-back.
-        load_controlled: loss if the load only rises on the first leg, as in a test: a bond of a snap-back breaks at the
-            largest load t so far, and loses (t / its load)^2 times as much, for all is of degree one in the load.
+        load_controlled: loss if the load only rises on the first leg, as in a test: a bond in a snap-back breaks at the
+            largest load t so far, and loses (t / its load)^2 times as much, as all is of degree one in the load.
     """
 
     all_equilibria: Energies = NO_ENERGIES
@@ -54,7 +56,7 @@ class Work:
     _largest_load: float = 0.0
 
     def arrive(self, point: Point) -> None:
-        """Add the energies of the way from the last point to this one."""
+        """Add the energies on the way from the last point to this one."""
         # Beyond the first leg loads do not fall.
         rise = self._largest_load / self._load if self._load else 1.0
         controlled = self.load_controlled + rise**2 * point.energies.released
@@ -71,7 +73,7 @@ def stored(
 ) -> tuple[dict[str, Any], Arrays]:
     """Take a point with its responses apart, into plain numbers and distributed arrays for the checkpoint.
 
-    A path goes on from the multipliers of its last state.
+    A path goes on from its last state's multipliers.
     """
     after = point.after
     numbers: dict[str, Any] = {
@@ -125,7 +127,7 @@ def restored(event: Arrays, cell: CoupledInterfaces) -> tuple[Point, tuple[Energ
 
 
 def averages(event: Arrays, point: Point, loads: CellLoads) -> list[Response]:
-    """Return the stored responses of a restored event.  Collective."""
+    """Return a restored event's stored responses.  Collective."""
     responses = list[Response]()
     for suffix, problem, state in zip(SUFFIXES, loads.problems, point.state.problems, strict=False):
         strain, stress = event[f"means{suffix}"]
@@ -138,7 +140,7 @@ def averages(event: Arrays, point: Point, loads: CellLoads) -> list[Response]:
 
 
 def found_again(point: Point, cell: CoupledInterfaces, law: BondLaw) -> Point:
-    """Return the point of a lean event with the equilibrium of its load and bonds.  Collective."""
+    """Return a lean event's point with the equilibrium under its load and bonds.  Collective."""
     loads = ((problem.load.values, problem.load.by_stress) for problem in point.state.problems)
     values, by_stress = zip(*loads, strict=True)
     load = Load(np.concatenate(values), np.concatenate(by_stress))
@@ -149,14 +151,14 @@ def found_again(point: Point, cell: CoupledInterfaces, law: BondLaw) -> Point:
 
 
 def read(context: AnalysisContext, law: BondLaw, number: int) -> tuple[Arrays, Point]:
-    """Return an event of the checkpoint and its point, whose multipliers are found again if missing.  Collective."""
+    """Read a checkpoint event and its point, whose multipliers are found again if missing.  Collective."""
     event, cell = context.checkpoint.read(number), context.loads.interfaces
     point, _ = restored(event, cell)
     return event, point if has_multipliers(event) else found_again(point, cell, law)
 
 
 def holding(context: AnalysisContext, law: BondLaw, count: int) -> int:
-    """Return how many of `count` events of the checkpoint hold.
+    """Return how many of `count` checkpoint events hold.
 
     Confirms the last events, after which F lambda did not confirm all problems, up to a failed check or a wrong mean.
     Collective.
@@ -181,7 +183,7 @@ def holding(context: AnalysisContext, law: BondLaw, count: int) -> int:
 
 
 def _taken_apart(state: Equilibrium, kernel: int) -> tuple[dict[str, Any], Arrays]:
-    """Take the equilibrium of one problem apart; `kernel` amplitudes are NaN if not confirmed."""
+    """Take one problem's equilibrium apart; `kernel` amplitudes are NaN if not confirmed."""
     solution = state.solution
     numbers: dict[str, Any] = {
         "numbers": [state.iterations, state.solves, state.free_motions, solution.iterations, solution.reason],
@@ -197,7 +199,7 @@ def _taken_apart(state: Equilibrium, kernel: int) -> tuple[dict[str, Any], Array
 
 
 def _put_together(event: Arrays, interface: ContactProblem, suffix: str) -> Equilibrium:
-    """Rebuild the equilibrium from the parts of `_taken_apart`."""
+    """Rebuild the equilibrium from the parts that `_taken_apart` made."""
     lam, jump, alpha = (event.get(f"{name}{suffix}", EMPTY) for name in ("lam", "jump", "alpha"))
     strain = event[f"strain{suffix}"]
     iterations, solves, free_motions, last, reason = event[f"numbers{suffix}"].tolist()
@@ -213,23 +215,23 @@ def _put_together(event: Arrays, interface: ContactProblem, suffix: str) -> Equi
 
 
 def _bonds_apart(bonds: BondState, suffix: str) -> Arrays:
-    """Return the state of bonds as distributed arrays with this suffix."""
+    """Return the bond state as distributed arrays with this suffix."""
     return {f"{name}{suffix}": values for name, values in vars(bonds).items() if values is not None}
 
 
 def _bonds_together(event: Arrays, suffix: str) -> BondState:
-    """Rebuild the state of bonds from the arrays of `_bonds_apart`."""
+    """Rebuild the bond state from the arrays that `_bonds_apart` made."""
     return BondState(*(event.get(f"{field.name}{suffix}") for field in fields(BondState)))  # type: ignore[arg-type]
 
 
 class EventProgress:
-    """Lines about the events of a path, and a bar of the share of the path, while a context lasts.
+    """Lines about path events, and a bar for the path's progress, while a context lasts.
 
     The first, the last and urgent lines are printed, other lines once a second at most; the bar on terminals alone.
     """
 
     def __init__(self, progress: Progress, layout: str, file: str, clock: Callable[[], float] = time.monotonic) -> None:
-        """Take the layout of the bar, STEPS_BAR or EVENTS_BAR, and the file of all lines."""
+        """Take the bar layout, STEPS_BAR or EVENTS_BAR, and the file for all lines."""
         self._progress, self._layout, self._file, self._clock = progress, layout, file, clock
         self._next_line, self._held_back, self._left_out = float("-inf"), "", 0
         self._bar: Any = None

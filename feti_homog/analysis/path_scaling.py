@@ -1,6 +1,6 @@
 """Scaling of paths with the toughness: one run calibrates it.
 
-On springs of fixed stiffness a bond breaks by energy at tractions that grow with the root of the toughness, and the
+On springs with fixed stiffness a bond breaks by energy at tractions that grow as the root of the toughness, and the
 cell with contact is homogeneous of degree one in its loads.  So a toughness s^2 times as large, under s times the
 loads, has the same events at s times the strains and stresses, and s^2 times the energies.
 """
@@ -24,7 +24,7 @@ Record = TypeVar("Record", PathPoint, Peak, Tips)
 
 
 def ratio(document: Mapping[str, Any], toughness: float) -> float:
-    """Return s = sqrt(toughness / toughness of the case), of several interfaces by the first.
+    """Return s = sqrt(toughness / case toughness), with several interfaces by the first.
 
     Raises ValueError for a result that does not scale.
     """
@@ -49,13 +49,13 @@ def point(old: PathPoint, s: float) -> PathPoint:
 
 
 def peak(old: Peak, s: float) -> Peak:
-    """Return the peak of scaled points."""
+    """Scale a peak as the points are scaled."""
     names = ("stress", "strain", "first_break_stress", "first_break_strain", "stress_left")
     return _scaled(_scaled(old, names, s), ("dissipated",), s**2)
 
 
 def _scaled(old: Record, names: tuple[str, ...], factor: float) -> Record:
-    """Return a record with some of its numbers and arrays multiplied; None stays."""
+    """Multiply a record's named numbers and arrays; None stays."""
     values = {name: getattr(old, name) for name in names}
     changes = {name: _times(value, factor) for name, value in values.items() if value is not None}
     return replace(old, **changes)

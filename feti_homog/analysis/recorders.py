@@ -1,4 +1,4 @@
-"""Recorders of a run: convergence and errors of the laws that responses obey, and states with their fields."""
+"""Run recorders: convergence and errors in the laws that responses obey, and states with their fields."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ CONTACT_TOLERANCE = 1e-6
 
 @dataclass
 class CheckRecorder:
-    """Checks of all responses of a run.
+    """Checks on all responses in a run.
 
     Attributes:
-        rtol: relative tolerance of the Krylov method.
-        iterations, reasons: of every dual solve so far.
-        errors: largest error of each law so far.
+        rtol: the Krylov method's relative tolerance.
+        iterations, reasons: from every dual solve so far.
+        errors: largest error in each law so far.
         faults: lines about solves that did not converge and checks that failed.
     """
 
@@ -43,7 +43,10 @@ class CheckRecorder:
     faults: list[str] = field(default_factory=list)
 
     def record(self, name: str, response: Response) -> str:
-        """Record the checks of a response, with a fault if it breaks a law; returns a line about it."""
+        """Record a response's checks and return a line about it.
+
+        There is a fault if the response breaks a law.
+        """
         state, error = response.state, response.checks.get("jump")
         self.iterations.append(state.iterations)
         self.reasons.append(state.solution.reason)
@@ -70,7 +73,7 @@ class CheckRecorder:
                 self.faults.append(f"{name}: check {law}: {error:.1e}, expected at most {tolerance:.1e}; result marked")
 
     def tolerance(self, law: str) -> float:
-        """Largest error of a check that passes."""
+        """Return the largest error with which a check passes."""
         if law.startswith("kkt_"):
             return CONTACT_TOLERANCE
         return min(CHECK_ERROR_PER_RTOL * self.rtol, MAX_CHECK_ERROR)
@@ -86,7 +89,7 @@ class CheckRecorder:
 
 
 class StateRecorder:
-    """Recorder of the states of a run, to a file and to memory, or neither.
+    """State recorder for a run, to a file and to memory, or neither.
 
     Attributes:
         has_place: whether states go anywhere.

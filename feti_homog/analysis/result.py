@@ -1,4 +1,4 @@
-"""Result of a case: an object for Python programs, the content of result.json, and fields in memory."""
+"""A case's result: an object for Python programs, the result.json content, and fields in memory."""
 
 from __future__ import annotations
 
@@ -45,15 +45,15 @@ Part = TypeVar("Part", MeshPart, FibrePart, InterfacePart, StatePart)
 
 @dataclass(frozen=True, repr=False)
 class Fields:
-    """This rank's part of the fields; `gathered` has all parts.
+    """This rank's part in the fields; `gathered` has all parts.
 
     Attributes:
-        header: size of the cell, phases, units.
+        header: cell size, phases, units.
         mesh: points (n, 2), triangles (m, 3 or 6), their bodies and phases; nodes are torn between subdomains.
         fibres: number as in case files (f,), body, phase, centre (f, 2) and radius (f,), on rank 0.
-        interface: points (k, 2), normal (k, 2), length (k,) and fibre (k,) of the fibre-matrix interface nodes, and the
-            numbers of their nodes in the gathered mesh.
-        states: for each load case, or point of an angle or path: displacement (n, 2), stress (m, 3), traction, jump
+        interface: points (k, 2), normal (k, 2), length (k,) and fibre (k,) at the fibre-matrix interface nodes, and the
+            numbers that their nodes have in the gathered mesh.
+        states: for each load case, or point on an angle or path: displacement (n, 2), stress (m, 3), traction, jump
             (k, 2) and status (k,), with strain, mean stress, load factor and label.
     """
 
@@ -68,7 +68,7 @@ class Fields:
         return f"Fields({len(self.mesh.points)} nodes, {len(self.mesh.triangles)} elements, {len(self.states)} states)"
 
     def gathered(self) -> Fields | None:
-        """Return the fields of all ranks as one part, on rank 0; None elsewhere.  Collective."""
+        """Gather all ranks' fields as one part, on rank 0; None elsewhere.  Collective."""
         first = self.comm.exscan(len(self.mesh.points)) or 0
         mesh = _gathered(self.comm, replace(self.mesh, triangles=self.mesh.triangles + np.int64(first)))
         fibres, interface = _gathered(self.comm, self.fibres), _gathered(self.comm, self.interface)
@@ -80,7 +80,7 @@ class Fields:
 
 
 def _gathered(comm: Intracomm, part: Part) -> Part | None:
-    """Return the rows of all ranks, in their order, on rank 0."""
+    """Gather all ranks' rows, in rank order, on rank 0."""
     parts = {name: comm.gather(getattr(part, name)) for name in tables(part)}
     if comm.rank:
         return None
@@ -90,20 +90,20 @@ def _gathered(comm: Intracomm, part: Part) -> Part | None:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)  # arrays have no single answer to "equal"
 class Result:
-    """The result of a case, the same on every rank but for `fields`.
+    """A case's result, the same on every rank but for `fields`.
 
     Printed, it is a short summary; in a notebook, tables.  `schema_keys` lists all written keys.
 
     Attributes:
-        effective_stiffness: (3, 3), of generalized plane strain (6, 6), L^ef, with stresses under the unit strains as
-            columns; of analysis "stiffness".
+        effective_stiffness: (3, 3), in generalized plane strain (6, 6), L^ef, with stresses under the unit strains as
+            columns; for analysis "stiffness".
         effective_stiffness_compression: L^ef under minus the unit strains, if debonded faces touch without tension.
-        compliance, thermal_stress, thermal_expansion: of generalized plane strain, (6, 6) and (6,), else None.
-        moduli, bounds: of perfectly bonded cells, else None.
-        mesh_error: estimated mesh errors of a stiffness and its constants, unless the case forgoes them.
-        sensitivities: derivatives of a stiffness by the constants of the case, if it asks for them, else None.
-        tips: energy release rates of a stiffness with debonded arcs, else None; points of angles have their own.
-        angle, path, envelope: the points of these analyses, else None; `points` has angles and paths as arrays.
+        compliance, thermal_stress, thermal_expansion: in generalized plane strain, (6, 6) and (6,), else None.
+        moduli, bounds: for perfectly bonded cells, else None.
+        mesh_error: estimated mesh errors in a stiffness and its constants, unless the case forgoes them.
+        sensitivities: derivatives of a stiffness by the case's constants, if it asks for them, else None.
+        tips: energy release rates for a stiffness with debonded arcs, else None; angle points have their own.
+        angle, path, envelope: these analyses' points, else None; `points` has angles and paths as arrays.
         fields: mesh, interface and states on this rank if they were asked for, else None; not written to result.json.
     """
 
@@ -188,18 +188,18 @@ class Result:
 
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> Result:
-        """Return the result with the content of result.json.  Raises KeyError if a key is missing."""
+        """Build the result from result.json content.  Raises KeyError if a key is missing."""
         return restored(cls, document)
 
     @property
     def document(self) -> dict[str, Any]:
-        """Return the content of result.json, in its order; arrays are NumPy's."""
+        """Return the result.json content, in its order; arrays are NumPy's."""
         document: dict[str, Any] = plain(self)
         return document
 
     @property
     def points(self) -> dict[str, NDArray[Any]]:
-        """Return arrays over the n points of an angle or a path by name, empty for other analyses.
+        """Return arrays over n angle or path points by name, empty for other analyses.
 
         `angle` or `load_factor` (n,), `strain` and `stress` (n, 3) or (n, 6), `stiffness` (n, 3, 3) or (n, 6, 6),
         `debonded_length` (n, f), `bonded`, `open`, `closed`, ... (n,); NaN where a point has no such number; no tips.
@@ -209,7 +209,7 @@ class Result:
         return {name: np.array([point.get(name, np.nan) for point in documents]) for name in names}
 
     def rising_strain(self) -> dict[str, Float]:
-        """Return corners (v,) of the leading strain, first, and of all stresses, by name, along a path of one leg.
+        """Return corners (v,) for the leading strain, first, and all stresses, by name, on a one-leg path.
 
         In a test with rising load the stress drops where bonds break, or under a given stress the strain jumps, to the
         next branch that holds.
@@ -227,10 +227,10 @@ class Result:
         return {self.peak.strain_name: columns.pop(self.peak.strain_name)} | columns
 
     def path_scaled(self, *, toughness: float) -> Result:
-        """Return the result of the path with another toughness, of the first interface, and s times the loads.
+        """Scale a path's result to another first interface toughness and s times the loads.
 
-        s = sqrt(toughness / toughness of the case), alike for all interfaces.  Strains and stresses are s times,
-        energies s^2 times as large, at equal events and load factors: bonds break by energy on springs of given
+        s = sqrt(toughness / case toughness), alike for all interfaces.  Strains and stresses are s times,
+        energies s^2 times as large, at equal events and load factors: bonds break by energy on springs with given
         stiffness.  Fields, states and digest belong to no run, and are left out.
 
         Raises ValueError for any other result, and for a toughness that is not positive.
@@ -250,9 +250,9 @@ class Result:
         )
 
     def first_drop(self) -> tuple[Float, int]:
-        """Return the stress (3,) or (6,) after the first break of a path of one leg, under the load of the break.
+        """Return the stress (3,) or (6,) after a one-leg path's first break, under the breaking load.
 
-        And the number of the point on its branch.  Raises ValueError for any other result.
+        Also returns the point's number on its branch.  Raises ValueError for any other result.
         """
         from feti_homog.results import path_curves
 
@@ -277,5 +277,5 @@ class Result:
 
 
 def schema_keys() -> Iterator[ResultKey]:
-    """Yield the keys of result.json with type, unit and meaning: its reference table."""
+    """Yield result.json keys with type, unit and meaning: its reference table."""
     return keys(Result)

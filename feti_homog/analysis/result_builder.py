@@ -22,7 +22,7 @@ REMARKABLE_LOSS = 0.005  # of the fibres' area, by polygons
 
 
 def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields | None) -> Result:
-    """Return the result with the entries of an analysis.  Collective."""
+    """Build the result with an analysis's entries.  Collective."""
     cell, progress, checks = context.cell, context.progress, context.checks
     fractions = cell.fractions()
     # Straight edges cut off a part of the fibres.
@@ -70,7 +70,7 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
 
 
 def _fibres(cell: TornCell) -> tuple[FibreInfo, ...]:
-    """Return the records of the fibres of the cell."""
+    """Return the cell's fibre records."""
     summary, factors = cell.summary, cell.strength_factors
     bodies, varies = summary.fibre_bodies, not (factors == 1.0).all()
     ellipses = Ellipses(summary.centres, summary.frames)
@@ -91,7 +91,7 @@ def _fibres(cell: TornCell) -> tuple[FibreInfo, ...]:
 
 
 def _solver_info(context: AnalysisContext) -> SolverInfo:
-    """Return the record of the solvers of all problems.  Collective."""
+    """Return one record for the solvers in all problems.  Collective."""
     cell = context.cell
     plan, solver = cell.summary, cell.solver
     solvers = [problem.solver for problem in cell.problems]

@@ -1,6 +1,6 @@
-"""Records of the points and tips of result.json; `result.Result` has them.
+"""Point and tip records in result.json; `result.Result` has them.
 
-Strains are [E11, E22, gamma12], stresses [S11, S22, S12], in the unit of the moduli, per unit of depth; of generalized
+Strains are [E11, E22, gamma12], stresses [S11, S22, S12], in the moduli's unit, per unit depth; in generalized
 plane strain [E11, E22, E33, gamma23, gamma13, gamma12] and [S11, S22, S33, S23, S13, S12].
 """
 
@@ -35,7 +35,7 @@ DEBONDED_SHARES = "the same of the interfaces of each section [[interface]], in 
 
 @dataclass(frozen=True, kw_only=True, eq=False)  # arrays have no single answer to "equal"
 class MeshErrors:
-    """Estimated mesh errors, by the distance of recovered stresses to element stresses."""
+    """Estimated mesh errors, by the distance between recovered and element stresses."""
 
     effective_stiffness: Float = described("error of each entry", STRESS, EITHER_STIFFNESS)
     effective_stiffness_compression: Float | None = described(
@@ -54,7 +54,9 @@ class MeshErrors:
 
 @dataclass(frozen=True, eq=False)  # arrays have no single answer to "equal"
 class Tips:
-    """The t tips of debonding at a point, bonds that hold next to broken ones, by fibre, interface and direction.
+    """The t debonding tips at a point, by fibre, interface and direction.
+
+    Tips are bonds that hold next to broken ones.
 
     An energy per area drives them, compared with G_c(psi): the energy of their spring or, where `growth` is "released",
     the energy that their break would release.
@@ -72,9 +74,9 @@ class Tips:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TipRates:
-    """Energy release rates at the tips of debonded arcs on round fibres, at constant macroscopic strain.
+    """Energy release rates at debonded arc tips on round fibres, at constant macroscopic strain.
 
-    Of t pairs of a load and a tip, by load, fibre, interface and direction.
+    Has t pairs, each a load and a tip, by load, fibre, interface and direction.
     """
 
     load: tuple[str, ...] = described(
@@ -131,7 +133,7 @@ class AnglePoint:
 
 @dataclass(frozen=True, kw_only=True)
 class PathPoint:
-    """A point of a path: a break, a change of contact, the end of a leg, or of an increment."""
+    """A path point: a break, a contact change, or the end of a leg or increment."""
 
     load_factor: float = described("position on the whole path, 0 to 1, every leg taking the same share")
     strain: Float = described("macroscopic strain", "", EITHER, STRAINS, spatial_components=SPATIAL_STRAINS)
@@ -198,9 +200,9 @@ class PathPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class Peak:
-    """The largest stress of a path up to its deepest fall.
+    """The largest stress on a path up to its deepest fall.
 
-    It is the stress of the leading strain, the largest one that the loads change.
+    It is the stress component of the leading strain, the largest one that the loads change.
     """
 
     stress_name: str = described("name of the component")
@@ -250,7 +252,7 @@ class LoadPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class EnvelopePoint:
-    """The onset of debonding along one direction of a plane of macroscopic stresses or strains.
+    """Debonding onset along one direction in a plane of macroscopic stresses or strains.
 
     All but the direction is absent where no load along it breaks a bond.
     """

@@ -1,4 +1,7 @@
-"""One case from its description to its result: tear, solve, homogenize, check, and write if there is a folder."""
+"""One case from its description to its result.
+
+Tear, solve, homogenize, check, and write if there is a folder.
+"""
 
 from __future__ import annotations
 
@@ -38,11 +41,11 @@ def run(
 ) -> Result:
     """Run the case, write its results to `directory`, and return them.  Collective.
 
-    `resume` goes on from a path's checkpoint, or reads the finished result; `keep_fields` returns the fields of a run
+    `resume` goes on from a path's checkpoint, or reads the finished result; `keep_fields` returns a run's fields
     too.
 
     Raises:
-        CaseError, MeshError: before any result is written; also for a checkpoint of another run, and for a folder
+        CaseError, MeshError: before any result is written; also for another run's checkpoint, and for a folder
             that another run writes to.
         ConvergenceError: after the result has been written and marked.
     """
@@ -63,7 +66,7 @@ def run(
 
 
 def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: bool = True) -> Result:
-    """Return the result of a case on every rank, without a file.  Collective.
+    """Return a case's result on every rank, without a file.  Collective.
 
     Raises:
         CaseError, MeshError: the case cannot be run.
@@ -84,7 +87,7 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
 
 
 def _begun(case: Case, comm: MPI.Intracomm, quiet: bool) -> Progress:
-    """Print the warnings and remarks about a case, and return the progress of its run."""
+    """Print the warnings and remarks about a case, and return its run's progress."""
     progress = Progress(comm, quiet)
     for label, lines in (("warning", case.warnings()), ("remark", case.remarks())):
         for line in lines:
@@ -150,7 +153,7 @@ def _run_and_write(cell: TornCell, directory: Path, progress: Progress, resume: 
 
 
 def _analyse(context: AnalysisContext) -> dict[str, Any]:
-    """Return the entries of `Result` that the analysis asked for makes."""
+    """Run the analysis asked for and return its `Result` entries."""
     with context.progress.stage("solve") as line:
         module = import_module(f"feti_homog.analysis.{context.case.analysis.type}")
         analysis: dict[str, Any] = module.run(context)
@@ -162,7 +165,7 @@ def _analyse(context: AnalysisContext) -> dict[str, Any]:
 
 
 def _write(result: Result, directory: Path, cell: TornCell) -> None:
-    """Write result.json, then files made from it; remove other files of an earlier result."""
+    """Write result.json, then files made from it; remove an earlier result's other files."""
     on_root_only(cell.comm, result_json.write, directory, result.document)
     written = {result_json.NAME}
     if result.result_h5 is not None:

@@ -1,4 +1,4 @@
-"""Derivatives of a stiffness with its constants, and of a state; scatter that uncertain phases make of them."""
+"""Derivatives of a stiffness with its constants, and of a state; their scatter with uncertain phases."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ Constant = tuple[str, float]
 def sensitivities(
     context: AnalysisContext, document: Mapping[str, Any], responses: Sequence[Response], one_sided: bool
 ) -> dict[str, Any]:
-    """Return `sensitivities` of `Result` from the responses to all unit loads.  Collective.
+    """Return the `Result` entry `sensitivities` from all unit load responses.  Collective.
 
-    If faces touch without tension, `one_sided`, each column is differentiated at the status of its own load.
+    If faces touch without tension, `one_sided`, each column is differentiated at its own load's status.
 
     Args:
         document: the entries `effective_stiffness` and, if a temperature is a load, `thermal_stress`.
@@ -55,9 +55,9 @@ def sensitivities(
 
 
 def load_sensitivities(context: AnalysisContext, load: Load, responses: Sequence[Response]) -> dict[str, Any]:
-    """Return `sensitivities` of the state under one load, at its status.  Collective.
+    """Return `sensitivities` for the state under one load, at its status.  Collective.
 
-    With the stiffness A of the cell at this status, A x = s, of which the load prescribes each component of x or s,
+    With the cell stiffness A at this status, A x = s, where the load prescribes each component in x or in s,
     A dx = -dA x for the free strains, and the stored energy changes by d(x.s / 2).
     """
     fixed = _at_status(context, "load", responses, range(len(context.loads.problems)))
@@ -85,7 +85,7 @@ def load_sensitivities(context: AnalysisContext, load: Load, responses: Sequence
 def _entry(
     values: Mapping[str, float], columns: Mapping[Constant, Sequence[float]], at_fixed_status: bool
 ) -> dict[str, Any]:
-    """Return the entry `sensitivities` of `Result`, from derivatives by constant."""
+    """Return the `Result` entry `sensitivities`, from derivatives by constant."""
     matrix = np.array([*columns.values()]).T
     record = Sensitivities(
         parameters=tuple(name for name, _ in columns),
@@ -108,7 +108,7 @@ def _secants(energies: Sequence[Float]) -> tuple[Float, Float | None]:
 
 
 def _entries(C: Float, thermal: Float | None) -> dict[str, float]:
-    """Return all entries of a secant stiffness, which is not symmetric, and the thermal stress by name."""
+    """Return all entries of a secant stiffness, which is not symmetric, and thermal stress by name."""
     entries = {f"C{i + 1}{j + 1}": float(value) for (i, j), value in np.ndenumerate(C)}
     return entries | dict(zip(THERMAL_STRESSES[:3], map(float, [] if thermal is None else thermal), strict=False))
 
@@ -116,7 +116,7 @@ def _entries(C: Float, thermal: Float | None) -> dict[str, float]:
 def _at_status(
     context: AnalysisContext, name: str, states: Sequence[Response], problems: Sequence[int]
 ) -> list[list[Response]]:
-    """Return the responses to the unit loads of some problems at the fixed status of one state.  Collective."""
+    """Return unit load responses in some problems at one state's fixed status.  Collective."""
     groups, bonds = list[list[Response]](), states[0].state.bonds
     for problem in (context.loads.problems[k] for k in problems):
         count, zero = len(problem.loads), np.zeros(problem.cell.solver.rows)

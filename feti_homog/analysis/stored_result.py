@@ -1,4 +1,4 @@
-"""The result in a folder, checked to be complete and of one run."""
+"""The result in a folder, checked to be complete and from one run."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from feti_homog.results import checkpoint_file, field_file, result_json, seals
 
 
 def read(directory: Path) -> dict[str, Any]:
-    """Return the document of `directory`/result.json, with result.h5 of the same run.  Call on one rank.
+    """Read `directory`/result.json, with result.h5 from the same run.  Call on one rank.
 
     Raises:
-        CaseError: a file is missing, damaged, or of another program or run.
+        CaseError: a file is missing, damaged, or from another program or run.
     """
     document = result_json.read(directory)
     result = _restored(directory, document)
@@ -27,10 +27,12 @@ def read(directory: Path) -> dict[str, Any]:
 
 
 def check_to_draw(directory: Path) -> None:
-    """Check that result.h5 and result.json in `directory` are of one run; result.h5 may be alone.  Call on one rank.
+    """Check that `directory` has one run's files.  Call on one rank.
+
+    They are result.h5 and result.json; result.h5 may be alone.
 
     Raises:
-        CaseError: result.h5 is missing, or a file is damaged, or of another program or run.
+        CaseError: result.h5 is missing, or a file is damaged, or from another program or run.
     """
     if os.path.lexists(directory / result_json.NAME):  # a link in a circle is there, too
         read(directory)
@@ -39,10 +41,10 @@ def check_to_draw(directory: Path) -> None:
 
 
 def finished(directory: Path, case: Case) -> bool:
-    """Return whether `directory` has the complete result of a case and no checkpoint.  Call on one rank.
+    """Return whether `directory` has a case's complete result and no checkpoint.  Call on one rank.
 
     Raises:
-        CaseError: the result is damaged, or of another case.
+        CaseError: the result is damaged, or belongs to another case.
     """
     if (directory / checkpoint_file.FOLDER).is_dir() or not (directory / result_json.NAME).is_file():
         return False

@@ -1,4 +1,7 @@
-"""Tips of debonding in result.json: the law that moves them, energies that drive them on, release rates, modes."""
+"""Debonding tips in result.json.
+
+The law that moves them, energies that drive them on, release rates, modes.
+"""
 
 from __future__ import annotations
 
@@ -25,10 +28,10 @@ DIRECTION_DIGITS = 9
 
 
 def criterion_of(cell: TornCell, grows: bool = False) -> BondLaw:
-    """Return the law of the bonds of a cell; debonding that `grows` makes tips of its own.  Collective.
+    """Return a cell's bond law; debonding that `grows` makes its own tips.  Collective.
 
     Raises:
-        CaseError: tips need the inverse of the dual operator, which the solver does not have.
+        CaseError: tips need the inverse dual operator, which the solver does not have.
     """
     law = cell.bond_law if grows else cell.bond_law.onset()
     if not (isinstance(law, SpringEnergy) and cell.case.interfaces[0].growth == "released"):
@@ -66,7 +69,7 @@ def tip_rates(context: AnalysisContext, responses: Sequence[Response], loads: Se
 
 
 def tips(context: AnalysisContext, law: BondLaw, point: Point) -> Tips:
-    """Return the tips of a point on every rank, by fibre, interface and direction.  Collective.
+    """Return a point's tips on every rank, by fibre, interface and direction.  Collective.
 
     Tips are bonds that hold next to broken ones.  G_I and G_II are energies per area with the sum used^2 G_c(psi),
     where used = sqrt(G / G_c(psi)), parted by tan^2 psi = G_II / G_I.
@@ -89,14 +92,14 @@ def tips(context: AnalysisContext, law: BondLaw, point: Point) -> Tips:
 
 
 def _sections(cell: TornCell, pair: Float | Int) -> tuple[int, ...] | None:
-    """Return the numbers of sections [[interface]] from 1; None if there is one."""
+    """Return [[interface]] section numbers from 1; None if there is one section."""
     return tuple((pair + 1).astype(int).tolist()) if len(cell.case.interfaces) > 1 else None
 
 
 def bond_directions(cell: TornCell) -> Float:
-    """(k,) directions in degrees, above -180, from the centres of fibres to this rank's interface nodes.
+    """(k,) directions in degrees, above -180, from fibre centres to this rank's interface nodes.
 
-    A fibre without centre has the directions of its normals.
+    A fibre without centre has its normals' directions.
     """
     normal = cell.solver.jump_operator.nodes.normal
     of_normals = np.degrees(np.arctan2(normal[:, 1], normal[:, 0]))

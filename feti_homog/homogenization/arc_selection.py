@@ -1,4 +1,7 @@
-"""Debonded arcs in a cell: whether they select any node, where their tips are, how fine the mesh is there."""
+"""Debonded arcs in a cell.
+
+Whether they select any node, where their tips are, how fine the mesh is there.
+"""
 
 from __future__ import annotations
 
@@ -28,12 +31,12 @@ LEAST_SIZE = 1e-5  # at tips / width of the cell, by default
 
 
 def on_interface(case: Case, interface: InterfaceSection, fibres: int) -> dict[int, list[float]]:
-    """Return directions in [0, 360) of the tips of arcs at all openings, by the fibre's number from 0."""
+    """Return tip directions in [0, 360) for arcs at all openings, by fibre number from 0."""
     return debonded_arcs.tips(interface.debonded, case.section.openings, fibres)
 
 
 def marks(case: Case, fibres: int) -> dict[int, list[float]]:
-    """Return directions of all tips by the number of their curve (`BareOutline.of`)."""
+    """Return all tip directions by their curve's number (`BareOutline.of`)."""
     by_curve: dict[int, set[float]] = {}
     for interface in case.interfaces:
         is_within = interface.between is not None and {COATING, MATRIX} & set(interface.between) == {COATING}
@@ -43,7 +46,7 @@ def marks(case: Case, fibres: int) -> dict[int, list[float]]:
 
 
 def size(case: Case, estimate: ElementEstimate) -> float | None:
-    """Return the element size at tips / width of the cell, None for the size at the interface.
+    """Return element size at tips / cell width, None for the interface size.
 
     Without `tip_size` in the case it is, with the mean radius / width R,
 
@@ -67,7 +70,7 @@ def size(case: Case, estimate: ElementEstimate) -> float | None:
 
 @dataclass(frozen=True)
 class EstimatedNodes:
-    """(k,) nodes of interfaces on rank 0, before the refinement: fibres from 1, interfaces, directions in degrees."""
+    """(k,) interface nodes on rank 0, before refinement: fibres from 1, interfaces, directions in degrees."""
 
     fibre: Int
     pair: Int
@@ -76,9 +79,9 @@ class EstimatedNodes:
 
     @classmethod
     def of(cls, torus: Torus, lattice: ReferenceLattice, pairs: Int, numbers: Int, centres: Float) -> EstimatedNodes:
-        """Place nodes on the chords of edges that may debond, but for vertices that never part.
+        """Place nodes on chords that may debond, except vertices that never part.
 
-        `pairs` as in `share_entities`, `numbers` (constituents,) of fibres.
+        `pairs` as in `share_entities`, `numbers` (constituents,) number the fibres.
         """
         first, second, edge = torus.sides
         pair = pairs[torus.mesh.phase[first], torus.mesh.phase[second]]
@@ -97,7 +100,10 @@ class EstimatedNodes:
         return cls(numbers[inner[side]], pair[pair >= 0][side], directions, is_vertex)
 
     def moved_tips(self, case: Case, fibres: int) -> tuple[MovedTips, ...]:
-        """Find the tips of each interface that the mesher has moved into a near vertex; none in a user's mesh."""
+        """Find each interface's tips that the mesher moved into a near vertex.
+
+        A user's mesh has none.
+        """
         if case.cell.has_own_mesh:
             return (debonded_arcs.NOT_MOVED,) * len(case.interfaces)
         distance, moved = float(np.degrees(MERGED)), []
@@ -108,18 +114,18 @@ class EstimatedNodes:
         return tuple(moved)
 
     def within(self, pair: int) -> EstimatedNodes:
-        """Return the nodes of one interface of the case."""
+        """Return the nodes on one interface section."""
         at = self.pair == pair
         return EstimatedNodes(self.fibre[at], self.pair[at], self.direction[at], self.is_vertex[at])
 
     def selects(self, arc: Arc, opening: float | None, fibre: int | None, moved: MovedTips) -> bool:
-        """Return whether any node, of the fibre if there is one, is within the arc."""
+        """Return whether any node, on the fibre if one is given, is within the arc."""
         inside = debonded_arcs.debonded([arc], opening, self.fibre, self.direction, moved)
         return bool((inside if fibre is None else inside[self.fibre == fibre]).any())
 
 
 def fibre_faults(case: Case, centres: Float) -> list[str]:
-    """List faults of the fibres of arcs, for centres (fibres, 2) of the fibres, NaN without a centre."""
+    """List faults in fibres with arcs, for fibre centres (fibres, 2), NaN without a centre."""
     return [
         fault
         for pair, interface in enumerate(case.interfaces)
@@ -128,7 +134,7 @@ def fibre_faults(case: Case, centres: Float) -> list[str]:
 
 
 def faults(case: Case, nodes: EstimatedNodes, moved: Sequence[MovedTips]) -> list[str]:
-    """List faults of arcs, and of openings of [angle], other than 0 that select no node of a fibre."""
+    """List faulty arcs, and [angle] openings other than 0 that select no fibre node."""
     openings: Sequence[float | None] = case.section.openings or [None]
     lines = []
     for pair, interface in enumerate(case.interfaces):

@@ -1,6 +1,6 @@
-"""Macroscopic response of the torn cell, the laws that every response must obey, and debonded lengths of fibres.
+"""Macroscopic response of the torn cell, the laws it must obey, and debonded fibre lengths.
 
-Strains E are [E11, E22, gamma12] in the plane, then the other loads of the problem; stresses are alike.
+Strains E are [E11, E22, gamma12] in the plane, then the problem's other loads; stresses are alike.
 """
 
 from __future__ import annotations
@@ -32,23 +32,23 @@ class Response:
         strain: (v,) E.
         stress: (v,) Sigma = <sigma>, which does work on E.
         scale: the response is `scale` times `state`.
-        stored: energy per area of the cell, 1/2 <sigma:eps> of the displacements and the energy of springs.
-        in_springs: energy of springs, 1/2 sum lam^2 C / |UC|.
+        stored: energy per cell area, 1/2 <sigma:eps> from the displacements plus spring energy.
+        in_springs: spring energy, 1/2 sum lam^2 C / |UC|.
         state: interface states, multipliers, jumps and amplitudes.
-        u: (boundary dofs,) fluctuating displacement u* on the boundaries of this rank's subdomains; (0,) if brief.
-        checks: relative errors of the laws.
-            `strain`: <eps> = E, Eq. (3), with the opening of debonded faces and the strain of voids, by their
-            boundaries, as parts of <eps>; of a cell that is one subdomain its mesh is closed.
-            `hill`: <sigma:eps> = Sigma:E, Eq. (8), springs included, with friction the work of forces on debonded faces
-            too; relative to <sigma:eps> or, if less, to Reuss' bound of the energy of a bonded cell, for a debonded
-            cell may store nothing; of a cell that is one subdomain by the factor (`CondensedLoads.energy`).
-            `jump`: the largest opening of a glued node relative to the largest displacement, which does not vanish
-            where forces do; absent of a cell that is one subdomain.
-            `stress`: the largest error of a prescribed stress relative to the largest stress or, if less, to the least
-            stress of the strains in a bonded cell.  And the KKT certificate of contact.
-        counts: numbers of `bonded`, `open` and `closed` interface nodes.
-        damage: (k,) of the bonds, 0 intact to 1 broken.
-        shares: (m,) shares of this rank's elements in the estimated error of E . Sigma; None without estimate.
+        u: (boundary dofs,) fluctuating displacement u* on this rank's subdomain boundaries; (0,) if brief.
+        checks: relative error in each law.
+            `strain`: <eps> = E, Eq. (3), where <eps> includes the debonded faces' opening and the voids' strain, found
+            from their boundaries; for a cell that is one subdomain, whether its mesh is closed.
+            `hill`: <sigma:eps> = Sigma:E, Eq. (8), springs included, with friction the work done on debonded faces
+            too; relative to <sigma:eps> or, if less, to Reuss' energy bound for a bonded cell, because a debonded
+            cell may store nothing; for a cell that is one subdomain, by the factor (`CondensedLoads.energy`).
+            `jump`: the largest opening at a glued node relative to the largest displacement, which does not vanish
+            where forces do; absent for a cell that is one subdomain.
+            `stress`: the largest error in a prescribed stress relative to the largest stress or, if less, to the least
+            stress from the strains in a bonded cell.  And the KKT certificate of contact.
+        counts: how many interface nodes are `bonded`, `open` and `closed`.
+        damage: (k,) bond damage, 0 intact to 1 broken.
+        shares: (m,) this rank's element shares in the estimated error of E . Sigma; None without estimate.
     """
 
     strain: Float
@@ -65,7 +65,7 @@ class Response:
 
     @property
     def leading(self) -> str:
-        """Names and values of the largest strain of the plane and its stress."""
+        """Names and values for the largest plane strain and its stress."""
         k = int(np.abs(self.strain[: len(STRAINS)]).argmax())
         return f"{STRAINS[k]} {self.strain[k]:.4g}, {STRESSES[k]} {self.stress[k]:.4g}"
 
@@ -79,7 +79,7 @@ class Homogenization:
     """Averages over a torn cell with its interfaces.
 
     Attributes:
-        law: law of the bonds, without energies that tips release.
+        law: bond law, without energies that tips release.
         interface: the contact problem.
     """
 
@@ -90,17 +90,17 @@ class Homogenization:
 
     @property
     def intact(self) -> BondState:
-        """State of the interfaces with all bonds."""
+        """Interface state with all bonds."""
         nodes = len(self.interface.nodes.row)
         return BondState(np.zeros(nodes, np.int8), self.law.begin(nodes), np.zeros(nodes, bool))
 
     @property
     def loads(self) -> tuple[str, ...]:
-        """Names of the unit loads."""
+        """Unit load names."""
         return self.cell.solver.problem.loads
 
     def respond(self, strains: Float, bonds: BondState, starts: Sequence[Float]) -> list[Response]:
-        """Solve the unit-cell problem under every strain of (k, v) and average.  Collective.
+        """Solve the unit-cell problem under each strain (k, v) and average.  Collective.
 
         `bonds` have the debonded nodes and first contact statuses; `starts` are first multipliers.
 
@@ -113,9 +113,9 @@ class Homogenization:
         return [self.response(self.interface.equilibrium(Load.strain(E), bonds, start), 1.0) for E, start in pairs]
 
     def response(self, state: Equilibrium, scale: float, brief: bool = False) -> Response:
-        """Return the averages of `scale` times an equilibrium.  Collective.
+        """Average `scale` times an equilibrium.  Collective.
 
-        If `brief`, a state that F lambda did not confirm has averages by its multipliers and checks of contact alone.
+        If `brief`, a state that F lambda did not confirm is averaged from its multipliers, with contact checks alone.
 
         Raises:
             ConvergenceError: its numbers are not finite.
@@ -153,7 +153,7 @@ class Homogenization:
         return self._scaled(state, scale, stress, energy, u, checks)
 
     def _stretched(self, state: Equilibrium) -> float:
-        """Return lam C lam per area, twice the energy of springs, also of bonds that rub.  Collective."""
+        """Return lam C lam per area, twice the spring energy, rubbing bonds included.  Collective."""
         springs = state.solution.compliance * state.solution.lam
         twice = float(state.solution.lam @ springs) + energy_beside_springs(self.interface, state)
         return float(self.cell.comm.allreduce(twice)) / self.cell.summary.area
@@ -168,19 +168,19 @@ class Homogenization:
         return Response(*means, scale, *energies, state, scale * u, errors, self.counts(state.status), damage)
 
     def damage(self, bonds: BondState) -> Float:
-        """(k,) damage of the bonds, 0 intact to 1 broken."""
+        """(k,) bond damage, 0 intact to 1 broken."""
         damage = self.law.damage(bonds)
         return (bonds.status != BONDED).astype(float) if damage is None else damage
 
     def _rubbing(self, state: Equilibrium) -> float:
-        """Return the sum of force times slip of faces with friction, per area, which is not stored.  Collective."""
+        """Sum force times slip on faces with friction, per area, which is not stored.  Collective."""
         if state.bonds.gap_and_slip is None:
             return 0.0
         work = float(state.solution.lam @ state.solution.jump) - energy_beside_springs(self.interface, state)
         return float(self.cell.comm.allreduce(work)) / self.cell.summary.area
 
     def _unmet_stress(self, state: Equilibrium, stress: Float) -> float:
-        """Return the error of the prescribed stresses, relative to the load and to the stresses.  Collective."""
+        """Return the prescribed stress error, relative to the load and to the stresses.  Collective."""
         load, scales = state.load, self.interface.scales
         # Scaled by the roots of their stiffnesses, so that none is small next to another.
         root, imposed = scales.roots, scales.imposed_strain(state.asked)
@@ -214,7 +214,7 @@ class Homogenization:
 
     @cached_property
     def _strain_inside(self) -> float:
-        """The largest share of an inner node in int eps*, relative: 0 of closed meshes and voids.  Collective."""
+        """The largest inner node share in int eps*, relative: 0 for closed meshes and voids.  Collective."""
         inner, size = 0.0, 0.0
         for s, boundary in zip(self.cell.subdomains, self.cell.solver.interface_operators.dofs, strict=True):
             size = max(size, float(np.sqrt(s.area)))
@@ -244,13 +244,13 @@ class Homogenization:
 
 
 class FibreInterfaces:
-    """Interfaces of the f fibres of a cell, by their numbers; a coated fibre may have two.
+    """Interfaces of a cell's f fibres, by number; a coated fibre may have two.
 
     A node has its tributary length, debonded or not.
     """
 
     def __init__(self, cell: TornCell) -> None:
-        """Sum the lengths of all interfaces.  Collective."""
+        """Sum all interface lengths.  Collective."""
         self._comm, self._nodes = cell.comm, cell.solver.jump_operator.nodes
         self._fibres, self._pairs = cell.summary.fibres, len(cell.case.interfaces)
         self._fibre = cell.summary.fibre_number(self._nodes.fibre) - 1
@@ -261,28 +261,28 @@ class FibreInterfaces:
         self._degrees = np.where(np.isnan(radius), 360.0 / np.where(self._length > 0, self._length, 1.0), round_fibre)
 
     def debonded_length(self, status: Status) -> Float:
-        """(f,) debonded length of each fibre's interface; `status` (k,) of this rank's nodes.  Collective."""
+        """(f,) debonded length on each fibre's interface; `status` (k,) at this rank's nodes.  Collective."""
         return self._sums(self._nodes.length * (status != BONDED))
 
     def damaged_length(self, damage: Float) -> Float:
-        """(f,) length of each fibre's interface with damage (k,) between 0 and 1, which still holds.  Collective."""
+        """(f,) length on each fibre's interface with damage (k,) between 0 and 1, which still holds.  Collective."""
         return self._sums(self._nodes.length * ((damage > 0.0) & (damage < 1.0)))
 
     def loose(self, status: Status) -> list[int]:
-        """Return the numbers, from 1, of fibres without a bond that holds.  Collective."""
+        """Return fibre numbers, from 1, without a bond that holds.  Collective."""
         bonded = self._sums(self._nodes.length * (status == BONDED))
         return [int(number) for number in np.flatnonzero((bonded == 0.0) & (self._length > 0.0)) + 1]
 
     def angle(self, length: Float) -> Float:
-        """(f,) degrees of arc of lengths (f,): 360 times their share if not round, or coated with an interface."""
+        """(f,) arc degrees for lengths (f,): 360 times their share if not round, or coated with an interface."""
         return np.asarray(length * self._degrees)
 
     def share(self, length: Float) -> float:
-        """Return the share of lengths (f,) in all interfaces."""
+        """Return the share of lengths (f,) in the whole interface length."""
         return float(length.sum() / (self._length.sum() or 1.0))
 
     def shares(self, status: Status) -> Float:
-        """(i,) debonded share of the length of the interfaces of each section [[interface]].  Collective."""
+        """(i,) debonded share in each [[interface]] section's length.  Collective."""
         length, debonded = (
             np.bincount(self._nodes.pair, values, self._pairs).astype(float)
             for values in (self._nodes.length, self._nodes.length * (status != BONDED))

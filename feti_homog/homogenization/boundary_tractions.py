@@ -1,4 +1,4 @@
-"""Tractions of interfaces and voids, which recovered stresses of bodies obey: forces of multipliers over lengths."""
+"""Interface and void tractions that recovered body stresses obey: multiplier forces over lengths."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ INSIDE = -1  # place of a class that is not on a boundary
 
 
 class Group(NamedTuple):
-    """Stresses of some subdomains of one phase, their arcs, and (classes,) places among displacements of boundaries."""
+    """Stresses in some subdomains of one phase, their arcs, and (classes,) places among boundary displacements."""
 
     stress: RecoveredStress
     sides: ArcSides
@@ -37,8 +37,8 @@ def boundary_tractions(
 ) -> dict[int, KnownTractions]:
     """Return, by the group, tractions where two sides on arcs meet, and zero ones at voids.  Collective.
 
-    Tractions are forces over the lengths of nodes; on the mesh of the forces, which is not `nested`, over the lengths
-    of sides, so that tractions of uniform stresses are exact.
+    Tractions are forces over node lengths; on the mesh that has the forces, which is not `nested`, over side
+    lengths, so that uniform stresses give exact tractions.
     """
     forces, lengths = _forces(cell, responses, groups)
     sums, of_node = list[Float](), np.append(lengths, 0.0)  # at INSIDE
@@ -67,10 +67,10 @@ def boundary_tractions(
 
 
 def _forces(cell: TornCell, responses: Sequence[Response], groups: Sequence[Group]) -> tuple[Float, Float]:
-    """(boundary dofs, k) forces -B^T lam of interfaces on the nodes of bodies, and (boundary dofs,) lengths.
+    """(boundary dofs, k) interface forces -B^T lam on body nodes, and (boundary dofs,) lengths.
 
     Lengths are 0 where no tractions follow: if a phase locks, or rigid bonds end at debonded faces.  Subdomains across
-    materials have all dofs of their parts in place of boundary dofs.  Collective.
+    materials have all dofs in their parts instead.  Collective.
     """
     k, state, nodes = len(responses), responses[0].state, cell.solver.jump_operator.nodes
     if cell.summary.across:

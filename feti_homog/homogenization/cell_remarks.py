@@ -1,4 +1,4 @@
-"""Interfaces of a case between the phases of its cell, unexpected properties of the cell, and unresolved bonds."""
+"""Interfaces between a cell's phases, unexpected cell properties, and unresolved bonds."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ LARGEST_REFINE, SMALLEST_SIZE = 8, 1e-5
 
 
 def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
-    """(phases, phases) numbers of the case's interfaces between two phases; -1 where they never part.
+    """(phases, phases) the case's interface number between two phases; -1 where they never part.
 
     An interface without `between` lies between the matrix, the first phase, and all other phases; perfect bonding too.
     """
@@ -44,7 +44,7 @@ def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
 
 
 def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -> list[str]:
-    """List faults of interfaces between phases that the cell lacks, or that touch nowhere in it.
+    """List interfaces between phases that the cell lacks, or that touch nowhere in it.
 
     Phases `first` (n,) touch phases `second` (n,).
     """
@@ -129,10 +129,12 @@ def longest_edge(mesh: CoarseMesh) -> float:
 
 
 def process_zone(case: Case) -> float | None:
-    """Return the least length E' G_Ic / sigma_c^2 of bonds that break by energy; None of other bonds.
+    """Return the least process zone length E' G_Ic / sigma_c^2.
 
-    sigma_c = sqrt(2 k_n G_Ic), or the strength of a cohesive law, in the shorter of its pure modes.  E' is Young's
-    modulus of the plane state, E / (1 - nu^2) in plane strain, along the most compliant axis of all phases.
+    It is given for bonds that break by energy; None for others.
+
+    sigma_c = sqrt(2 k_n G_Ic), or a cohesive law's strength, in its shorter pure mode.  E' is Young's
+    modulus in the plane state, E / (1 - nu^2) in plane strain, along the most compliant axis in all phases.
     """
     lengths = [1 / (2 * bond.normal_stiffness) for bond in case.interfaces if bond.toughness and bond.normal_stiffness]
     for bond in case.interfaces:
@@ -145,11 +147,13 @@ def process_zone(case: Case) -> float | None:
 
 
 def warnings(case: Case, width: float, edge: float) -> list[str]:
-    """Warn about elements on the interface that do not resolve the process zone, and about cohesive laws.
+    """Warn about unresolved process zones and about cohesive laws.
+
+    Zones are unresolved where elements on the interface are too long for them.
 
     Args:
-        width: of the cell.
-        edge: `longest_edge` of the coarse mesh, which `refine` halves.
+        width: cell width.
+        edge: `longest_edge` in the coarse mesh, which `refine` halves.
     """
     length, softens, lines = process_zone(case), phase_laws.has_softening(case), _law_warnings(case)
     resolved = RESOLVED_SOFTENING if softens else RESOLVED
@@ -171,7 +175,7 @@ def warnings(case: Case, width: float, edge: float) -> list[str]:
 
 
 def _law_warnings(case: Case) -> list[str]:
-    """Warn if the energy of a cohesive law depends on the order of modes, and if its teeth overshoot."""
+    """Warn if a cohesive law's energy depends on mode order, and if its teeth overshoot."""
     if not phase_laws.has_softening(case):
         return []
     lines, law = [], phase_laws.bond_law(case.interfaces, np.zeros(0, np.int64))

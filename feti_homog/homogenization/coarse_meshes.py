@@ -1,4 +1,7 @@
-"""The coarse mesh of a case: begun on rank 0; nodes on lines, and the tiles of large cells, are made by all ranks."""
+"""The coarse mesh of a case.
+
+Rank 0 begins it; all ranks make nodes on lines, and the tiles of large cells.
+"""
 
 from __future__ import annotations
 
@@ -88,7 +91,10 @@ def fill_tiles(cell: NodedCell | CoarseMesh | None, comm: MPI.Intracomm) -> Coar
 
 
 def deal_tiles(tiles: list[T], loads: list[int], comm: MPI.Intracomm) -> list[tuple[int, T]]:
-    """Deal the tiles of rank 0, of sizes `loads`; return the numbers and tiles that this rank fills.  Collective."""
+    """Deal tiles from rank 0 to all ranks.  Collective.
+
+    The tiles have sizes `loads`; returns the numbers and tiles that this rank fills.
+    """
     parts: list[list[tuple[int, T]]] = [[] for _ in range(comm.size)]
     for k, rank in enumerate(balanced(np.array(loads, np.int64), comm.size).tolist()):
         parts[rank].append((k, tiles[k]))

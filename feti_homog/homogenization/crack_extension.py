@@ -1,8 +1,8 @@
-"""A virtual extension of the crack at the tip of a debonded arc, and the energy that it releases.
+"""Virtual crack extension at a debonded arc's tip, and the energy that it releases.
 
-The nodes around the tip turn about the centre of the fibre by s q, and their displacements with them; q is 1 near the
+The nodes around the tip turn about the fibre centre by s q, and their displacements with them; q is 1 near the
 tip and falls to 0 farther away.  The tip moves along the interface by s R, bonded nodes stay bonded, and gaps stay as
-they are: an admissible variation of the equilibrium, whose energy changes with the energy of the elements.
+they are: an admissible variation of the equilibrium, whose energy changes with the element energies.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ VOID = -1
 
 
 class CrackExtension:
-    """Elements of a subdomain, found around points, from which the energy of a crack's extension is summed."""
+    """Subdomain elements, found around points, from which a crack extension's energy is summed."""
 
     def __init__(self, subdomain: Subdomain, period: Float) -> None:
-        """`period` (2,) of the cell."""
+        """Find the elements around points; the cell has `period` (2,)."""
         mesh = subdomain.mesh
         self.subdomain, self._period = subdomain, period
         self._tree = cKDTree(wrapped(mesh.points, period), boxsize=period)
@@ -44,10 +44,10 @@ class CrackExtension:
         self._elements_of = csr_matrix(entries, shape=(len(mesh.points), len(mesh.triangles)))
 
     def energy_change(self, tip: Float, spoke: Float, reach: float, u: Float, E: Float) -> float:
-        """Return the change of energy when the crack at a tip turns by a unit angle.
+        """Return the energy change when a tip's crack turns by a unit angle.
 
         Args:
-            tip, spoke: (2,) place, and place relative to the centre of the circle.
+            tip, spoke: (2,) place, and place relative to the circle centre.
             reach: distance beyond which nothing turns.
             u: (dofs,) u*.
             E: (2, 2) macroscopic strain.
@@ -69,9 +69,9 @@ class CrackExtension:
 
 
 def body_boundaries(comm: MPI.Comm, subdomains: Sequence[Subdomain]) -> tuple[Float, Int]:
-    """(k, 2) nodes on the boundaries of the bodies of all ranks, and (k,) their bodies; VOID at voids.  Collective.
+    """(k, 2) nodes on body boundaries, from all ranks, and (k,) their bodies; VOID at voids.  Collective.
 
-    Each body has its own nodes where two bodies meet.  Cuts between the pieces of a body are no boundaries.
+    Each body has its own nodes where two bodies meet.  Cuts between a body's pieces are no boundaries.
     """
     borders = [np.bincount(s.submesh.edge_class[s.submesh.triangle_edges].ravel()) == 1 for s in subdomains]
     rows = []
@@ -89,18 +89,20 @@ def body_boundaries(comm: MPI.Comm, subdomains: Sequence[Subdomain]) -> tuple[Fl
 
 
 def _of_all(comm: MPI.Comm, rows: list[Array], none: Array) -> Array:
-    """Return the rows of all ranks; `none` has no rows.  Collective."""
+    """Gather the rows from all ranks; `none` has no rows.  Collective."""
     joined: Array = np.concatenate(comm.allgather(np.concatenate([none, *rows])))
     return joined
 
 
 def reach_of_tips(tips: Float, spokes: Float, bodies: Int, boundaries: tuple[Float, Int], period: Float) -> Float:
-    """(t,) radius around each tip in which its crack may be extended: no other tip, no boundary but its circle.
+    """(t,) radius around each tip in which its crack may be extended.
+
+    No other tip lies within it, and no boundary but the tip's circle.
 
     Args:
-        tips, spokes: (t, 2) places, and places relative to the centres of their circles.
-        bodies: (t, 2) constituents on both sides of each tip.
-        boundaries: nodes and bodies of `body_boundaries`.
+        tips, spokes: (t, 2) places, and places relative to their circle centres.
+        bodies: (t, 2) constituents on both sides at each tip.
+        boundaries: nodes and bodies from `body_boundaries`.
     """
     radius, (points, body) = np.linalg.norm(spokes, axis=1), boundaries
     reach = np.minimum(radius, REACH_OF_A_PERIOD / REACH * period.min())
@@ -124,5 +126,5 @@ def wrapped(points: Float, period: Float) -> Float:
 
 
 def nearest_image(offset: Float, period: Float) -> Float:
-    """Return the shortest images of offsets (..., 2)."""
+    """Shift offsets (..., 2) to their shortest images."""
     return np.asarray(offset - np.round(offset / period) * period)

@@ -1,7 +1,7 @@
-"""Bodies in several pieces: vertices that pieces share, sums over pieces, and fits of stresses about these vertices.
+"""Bodies in several pieces: vertices that pieces share, sums over pieces, and stress fits there.
 
-Each vertex and each coarse edge on a cut has a home rank, which knows all pieces that have it.  Patches of elements
-about shared vertices are of the body, not of its pieces.
+Each vertex and each coarse edge on a cut has a home rank, which knows all pieces that have it.  Element patches
+about shared vertices belong to the body, not to its pieces.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ LAYERS = 3
 
 
 class SharedVertices:
-    """Shared vertices in the meshes of this rank, each of some pieces.
+    """Shared vertices in this rank's meshes; each mesh joins some pieces.
 
     Attributes:
-        meshes: numbers of this rank's meshes with shared vertices.
-        classes: (n,) classes of the shared vertices in each of these meshes.
-        sides: (f, 2) vertices of the sides of elements on cuts, in each.
+        meshes: which of this rank's meshes have shared vertices.
+        classes: (n,) shared vertex classes in each such mesh.
+        sides: (f, 2) vertices on element sides along cuts, in each.
         is_first: (f,) whether each side belongs to the first of its two pieces.
     """
 
@@ -54,7 +54,7 @@ class SharedVertices:
                 self.is_first.append(np.repeat(edge_copies[mesh][on_cut, 1] == 1, line.shape[1] - 1))
 
     def sum(self, parts: Sequence[Float]) -> list[Float]:
-        """(n, k) sums over pieces of the values `parts` (n, k) at the shared vertices of each mesh.  Collective."""
+        """(n, k) sums over pieces for values `parts` (n, k) at each mesh's shared vertices.  Collective."""
 
         def sums(number: Int, values: Float) -> Float:
             totals = np.zeros((int(number.max(initial=-1)) + 1, values.shape[1]))
@@ -65,7 +65,7 @@ class SharedVertices:
         return _split(self._at_home(self._rows, np.concatenate([np.zeros((0, width)), *parts]), sums), self.classes)
 
     def _copies(self, rows: Sequence[Int]) -> list[Int]:
-        """(n, 2) numbers of copies of the rows (n, 3) of each mesh, and 1 at the first copy, else 0.  Collective."""
+        """(n, 2) copy counts for each mesh's rows (n, 3), and 1 at the first copy, else 0.  Collective."""
 
         def copies(number: Int, _: Int) -> Int:
             _, first, count = np.unique(number, return_index=True, return_counts=True)
@@ -75,7 +75,7 @@ class SharedVertices:
         return _split(self._at_home(all_rows, all_rows, copies), rows)
 
     def _at_home(self, rows: Int, values: Array, combine: Callable[[Int, Array], Array]) -> Array:
-        """Return `combine` of the numbers of rows (n, 3) and of their values (n, k), on all ranks.  Collective."""
+        """Call `combine` with row numbers (n, 3) and their values (n, k), on all ranks.  Collective."""
         comm, home = self._comm, rows[:, 1:].sum(axis=1) // 2 % self._comm.size
         rows, values, source, place = exchange(
             comm, home, rows, values, np.full(len(rows), comm.rank), np.arange(len(rows))
@@ -90,14 +90,14 @@ class SharedVertices:
 
 
 def _split(values: Array, parts: Sequence[Array]) -> list[Array]:
-    """Split the rows of values into as many as each part has."""
+    """Split value rows into as many as each part has."""
     return [values[a:b] for a, b in pairwise(np.cumsum([0, *map(len, parts)]).tolist())]
 
 
 def _border(submeshes: Sequence[Submesh], mesh: FineMesh) -> tuple[Int, Int, Int, Int]:
-    """Return vertices (n, 3) on the borders of pieces in a joined mesh: body, entity, place; and their classes (n,).
+    """Return vertices (n, 3) on piece borders in a joined mesh: body, entity, place; and their classes (n,).
 
-    Then the coarse edges there (e, 3), alike, and the classes of vertices along them (e, m).
+    Then the coarse edges there (e, 3), alike, and the vertex classes along them (e, m).
     """
     first, borders = 0, []
     for s in submeshes:
@@ -119,9 +119,9 @@ def _border(submeshes: Sequence[Submesh], mesh: FineMesh) -> tuple[Int, Int, Int
 
 
 def border_lines(s: Submesh, mesh: FineMesh, classes: Int32) -> tuple[Int, Int, Int]:
-    """Return triangles (e,) at the border of a piece, their edges (e,) there, and classes (e, M + 1) along the edges.
+    """Return triangles (e,) at a piece's border, their edges (e,) there, and classes (e, M + 1) along the edges.
 
-    `classes` (t, q) are classes of the lattice nodes.
+    `classes` (t, q) are lattice node classes.
     """
     edge, inner = s.edge_class[s.triangle_edges], np.arange(mesh.lattice.intervals - 1)
     triangle, k = np.nonzero(np.bincount(edge.ravel(), minlength=len(s.edge_keys))[edge] == 1)
@@ -133,7 +133,7 @@ def border_lines(s: Submesh, mesh: FineMesh, classes: Int32) -> tuple[Int, Int, 
 
 
 def fits_across_cuts(shared: SharedVertices, bodies: Sequence[RecoveredStress]) -> dict[int, tuple[Int, Float]]:
-    """Return, by the mesh, classes of vertices (n,) and the fits (n, p, m k) that cuts change.  Collective."""
+    """Return, by mesh, vertex classes (n,) and fits (n, p, m k) that cuts change.  Collective."""
     pieces = zip(shared.meshes, shared.classes, shared.sides, shared.is_first, strict=True)
     strips = [_Strip.of(bodies[mesh], classes, sides, first) for mesh, classes, sides, first in pieces]
     patches = _over_pieces(shared, strips, [strip.stress.patch_sums() for strip in strips])
@@ -155,14 +155,14 @@ def fits_across_cuts(shared: SharedVertices, bodies: Sequence[RecoveredStress]) 
 
 @dataclass(frozen=True)
 class _Strip:
-    """Elements about the shared vertices of one mesh; their vertices are numbered from 0.
+    """Elements about one mesh's shared vertices; their vertices are numbered from 0.
 
     Attributes:
         stress: on these elements alone.
-        is_vertex: (classes,) whether a class is a vertex of these elements.
+        is_vertex: (classes,) whether a class is a vertex in these elements.
         shared: (n,) the shared vertices.
-        sides: (f, 2) sides of elements, each once in its body; `vector` (f, 2) from the first vertex to the second.
-        bounds: (b,) vertices at which a side has no other element of the body.
+        sides: (f, 2) element sides, each once in its body; `vector` (f, 2) from the first vertex to the second.
+        bounds: (b,) vertices at which a side has no other element in the body.
     """
 
     stress: RecoveredStress
@@ -192,7 +192,7 @@ class _Strip:
         return cls(stress, is_vertex, stress.numbers[classes], sides[once], vector[once], np.unique(sides[single]))
 
     def neighbours(self, at_boundary: Bool) -> PatchNeighbours:
-        """Return pairs whose first is on the boundary of the body, as shared vertices (n,) are if `at_boundary`."""
+        """Return pairs whose first is on the body boundary, as shared vertices (n,) are if `at_boundary`."""
         is_bound = np.zeros(int(self.is_vertex.sum()), bool)
         is_bound[self.bounds] = True
         is_bound[self.shared] = at_boundary
@@ -202,14 +202,14 @@ class _Strip:
 
 
 def _code(a: Int, b: Int, size: int) -> Int:
-    """Return one number for each pair of vertices, of `size` vertices."""
+    """Return one number for each vertex pair, among `size` vertices."""
     return np.asarray(np.minimum(a, b) * size + np.maximum(a, b))
 
 
 def _over_pieces(
     shared: SharedVertices, strips: Sequence[_Strip], pairs: Sequence[tuple[Float, Float]]
 ) -> list[tuple[Float, Float]]:
-    """Sum moments and sums (vertices, p, ..) of strips over all pieces, at shared vertices.  Collective."""
+    """Add strip moments and sums (vertices, p, ..) over all pieces, at shared vertices.  Collective."""
     parts = [
         np.concatenate([a[strip.shared], b[strip.shared]], axis=2) for strip, (a, b) in zip(strips, pairs, strict=True)
     ]

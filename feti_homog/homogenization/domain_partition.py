@@ -1,4 +1,4 @@
-"""The cut cell, on rank 0: from its coarse mesh to the submeshes of each rank."""
+"""The cut cell, on rank 0: from its coarse mesh to each rank's submeshes."""
 
 from __future__ import annotations
 
@@ -37,19 +37,19 @@ class CellSummary:
 
     Attributes:
         width, height: periods.
-        phases: names of the material phases, the matrix first.
-        bodies, subdomains, coarse_triangles: numbers of them.
+        phases: material phase names, the matrix first.
+        bodies, subdomains, coarse_triangles: how many there are.
         interface_edge: longest coarse edge between phases.
-        numbers: (constituents,) numbers from 1, as in case files, of fibres and of the fibres that coatings coat; 0 of
+        numbers: (constituents,) numbers from 1, as in case files, for fibres and the fibres that coatings coat; 0 for
             the matrix.
         is_fibre: (constituents,) mark fibres, not the matrix and coatings.
-        constituent_phase: (constituents,) place of the phase of each in `phases`.
+        constituent_phase: (constituents,) place of each one's phase in `phases`.
         centres, radii: (constituents, 2) and (constituents,) centres, in the cell, and radii of fibres, else NaN.
-        frames: (constituents, 2, 2) as in `Ellipses`, of fibres that are circles or ellipses; else NaN.
-        snapped: largest distance by which nodes of a user's mesh were moved to make sides match.
+        frames: (constituents, 2, 2) as in `Ellipses`, for fibres that are circles or ellipses; else NaN.
+        snapped: largest distance that a node in a user's mesh was moved to make sides match.
         voids: number of voids.
-        match_distance: distance of the fibres to the table that they match, see `random_fibres`; None without table.
-        remarks: unexpected properties of the cell, a line each.
+        match_distance: distance from the fibres to the table that they match, see `random_fibres`; None without table.
+        remarks: unexpected cell properties, a line each.
         across: whether subdomains are pieces across materials.
         interface_nodes: number of interface nodes, if `across`, which has no multipliers there.
     """
@@ -92,11 +92,11 @@ class CellSummary:
 
     @property
     def coatings(self) -> Float:
-        """(fibres,) thickness of coatings, 0 without one; NaN of fibres that are not round."""
+        """(fibres,) coating thickness, 0 without one; NaN for fibres that are not round."""
         return coating_thickness(self.numbers, self.is_fibre, Ellipses(self.centres, self.frames).semi_axes)
 
     def fibre_number(self, constituent: Int) -> Int:
-        """(k,) fibre `numbers` of constituents (k,)."""
+        """(k,) fibre `numbers` for constituents (k,)."""
         return np.asarray(self.numbers[constituent])
 
     def warnings(self) -> list[str]:
@@ -117,12 +117,12 @@ class CellSummary:
 
 @dataclass(frozen=True)
 class RankShare:
-    """Share of one rank in the cut cell.
+    """One rank's share in the cut cell.
 
     Attributes:
-        summary, table: of the whole cell.
+        summary, table: for the whole cell.
         pairs: (phases, phases) as in `cell_remarks.pairs_of`.
-        submeshes: submeshes of the rank.
+        submeshes: the rank's submeshes.
     """
 
     summary: CellSummary
@@ -137,7 +137,7 @@ def distribute(
     """Cut the cell into subdomains; return a share for each rank.
 
     Raises:
-        CaseError: an arc of the case lies on a fibre that cannot have it, or selects no node.
+        CaseError: an arc lies on a fibre that cannot have it, or selects no node.
     """
     torus = Torus.of(mesh)
     numbers, is_fibre = fibre_numbers(torus)
@@ -196,7 +196,10 @@ def distribute(
 def _cut_across(
     case: Case, torus: Torus, lattice: ReferenceLattice, n_ranks: int, policy: PartitionPolicy
 ) -> Partition | None:
-    """Return the cell cut across materials; None if it is not asked for, or leaves a rank without a piece."""
+    """Return the cell cut across materials.
+
+    None if it is not asked for, or leaves a rank without a piece.
+    """
     triangles = len(torus.mesh.triangles)
     pieces = policy.across_pieces(triangles * lattice.intervals**2, n_ranks) if can_be_cut_across(case) else 0
     if not 0 < pieces <= triangles:
@@ -209,7 +212,7 @@ def _cut_across(
 
 
 def match_distance(case: Case, width: float, height: float, centres: Float, radii: Float) -> float | None:
-    """Return the match distance of fibres with these centres (n, 2) and radii (n,)."""
+    """Return the match distance for fibre centres (n, 2) and radii (n,)."""
     window = case.cell.matched
     if window is None:
         return None
@@ -219,7 +222,7 @@ def match_distance(case: Case, width: float, height: float, centres: Float, radi
 
 
 def in_cell(points: Float, period: Float) -> Float:
-    """Return the images of points (k, 2) in [0, period); points at its end by rounding go to 0."""
+    """Shift points (k, 2) into [0, period); points at its end by rounding go to 0."""
     inside = np.mod(points, period)
     return np.where(inside > (1 - ROUNDING) * period, 0.0, inside)
 

@@ -1,10 +1,10 @@
-"""The energy release rate G = -d(energy) / d(debonded length), at constant strain, at the tips of debonded arcs.
+"""Energy release rate G = -d(energy) / d(debonded length), at constant strain, at debonded arc tips.
 
-For rigid bonds G follows from a virtual extension of the crack, and errs like the energy, on any mesh.  Its modes have
-the shares of the work that closes the last part of the crack (virtual crack closure).  Shares depend on the length of
-this part, for between two materials the stress oscillates towards the tip.
+For rigid bonds G follows from a virtual crack extension, and errs like the energy, on any mesh.  Its modes have
+their shares in the work that closes the crack's last part (virtual crack closure).  Shares depend on the length of
+this part, because between two materials the stress oscillates towards the tip.
 
-For elastic bonds G = <t_n>^2 / (2 k_n) + t_t^2 / (2 k_t) is the energy of the spring at the tip.
+For elastic bonds G = <t_n>^2 / (2 k_n) + t_t^2 / (2 k_t) is the spring energy at the tip.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ MODE_LENGTH = 1e-3
 
 @dataclass(frozen=True)
 class EnergyRelease:
-    """At t tips under one load, in the order of fibres, interfaces and directions.
+    """Energy release at t tips under one load, ordered by fibre, interface and direction.
 
     Attributes:
         fibre: (t,) numbers from 1.
-        pair: (t,) interfaces of the case.
-        direction: (t,) degrees in (-180, 180] about the centre of the fibre.
+        pair: (t,) interface sections.
+        direction: (t,) degrees in (-180, 180] about the fibre centre.
         modes: (t, 2) G_I and G_II.
         length: (t,) closed length by which rigid bonds have these modes.
     """
@@ -70,12 +70,12 @@ class EnergyRelease:
 
 
 class EnergyReleaseRates:
-    """Energy release rates of a torn cell, response by response.
+    """Energy release rates in a torn cell, response by response.
 
     Attributes:
-        interface: contact problem of the responses.
-        points, bodies, pair, direction, length: (n, 2) and (n,) of the interface nodes of all ranks: positions, outer
-            and inner constituents, interfaces of the case, degrees about the centre of the inner one, lengths.
+        interface: the responses' contact problem.
+        points, bodies, pair, direction, length: (n, 2) and (n,) at all ranks' interface nodes: positions, outer
+            and inner constituents, interface sections, degrees about the inner one's centre, lengths.
     """
 
     def __init__(self, cell: TornCell, interface: ContactProblem) -> None:
@@ -95,7 +95,7 @@ class EnergyReleaseRates:
         self._tree = cKDTree(wrapped(self.points, self._period), boxsize=self._period)
 
     def of(self, response: Response) -> EnergyRelease:
-        """G and its modes at all tips of a response.  Collective."""
+        """Return G and its modes at all tips in a response.  Collective."""
         solution, status = response.state.solution, self._gathered(response.state.status)
         tips = self._chains.tips(status)
         # Tips on circles, in the order of fibres, interfaces and directions.
@@ -116,15 +116,15 @@ class EnergyReleaseRates:
         )
 
     def _numbers(self, tips: CrackTips) -> Int:
-        """(t,) numbers of the fibres of tips, also of fibres within coatings."""
+        """(t,) fibre numbers for tips, also for fibres within coatings."""
         return self.cell.summary.fibre_number(self.bodies[tips.node, 1])
 
     def _radius(self, tips: CrackTips) -> Float:
-        """(t,) radii of the circles of tips; NaN without a circle."""
+        """(t,) circle radii at tips; NaN without a circle."""
         return np.asarray(self.cell.summary.radii[self.bodies[tips.node, 1]])
 
     def _modes(self, tips: CrackTips, response: Response, force: Float, closing: Float) -> Float:
-        """(t, 2) G_I and G_II for forces (n, 2) and the work of closing (t, 2), of scale 1.  Collective."""
+        """(t, 2) G_I and G_II for forces (n, 2) and closing work (t, 2), at scale 1.  Collective."""
         stiffness = self._stiffness[self.pair[tips.node]]
         is_rigid = np.isinf(stiffness)
         traction = force[tips.node] / self.length[tips.node, None]
@@ -137,7 +137,7 @@ class EnergyReleaseRates:
         return modes
 
     def _released(self, tips: CrackTips, response: Response) -> Float:
-        """(t,) G of a virtual extension of the crack at each tip.  Collective."""
+        """(t,) G from a virtual crack extension at each tip.  Collective."""
         if not len(tips.node):
             return np.zeros(0)
         solution, bodies, place = response.state.solution, self.bodies[tips.node], self.points[tips.node]
@@ -155,7 +155,7 @@ class EnergyReleaseRates:
         return np.asarray(-outward * allreduce_sum(self.cell.comm, change) / self._radius(tips))
 
     def _distance(self, nodes: Int, origin: int) -> Float:
-        """(k,) distances of nodes from the node `origin`."""
+        """(k,) node distances from the node `origin`."""
         away = nearest_image(self.points[nodes] - self.points[origin], self._period)
         return np.asarray(np.linalg.norm(away, axis=1))
 
@@ -185,6 +185,6 @@ class EnergyReleaseRates:
         return work, length
 
     def _gathered(self, values: Array) -> Array:
-        """Return the values of the interface nodes of all ranks.  Collective."""
+        """Gather the interface node values from all ranks.  Collective."""
         gathered: Array = np.concatenate(self.cell.comm.allgather(values))
         return gathered

@@ -1,4 +1,4 @@
-"""Mesh error in the energy of each pair of responses, estimated by recovered stresses."""
+"""Mesh error in each response pair's energy, estimated by recovered stresses."""
 
 from __future__ import annotations
 
@@ -37,14 +37,16 @@ LEAST_OF_TWO_UNEVEN, LEAST_OF_TWO_TOUCHING = 0.05, 1.0
 
 @dataclass(frozen=True)
 class EnergyErrors:
-    """Errors of E_i . Sigma_j, (k, k), of k responses under the strains E_i of a cell of area |UC|.
+    """Errors in E_i . Sigma_j, (k, k), for k responses.
+
+    The responses have the strains E_i in a cell with area |UC|.
 
     Attributes:
-        elements: 1/|UC| int ds_i : S : ds_j of recovered less element stresses, and energy of springs beyond tips; the
+        elements: 1/|UC| int ds_i : S : ds_j of recovered less element stresses, and spring energy beyond tips; the
             stiffness is too high.
-        arcs: errors of straight or parabolic sides along arcs, and of springs along sides, of either sign.
-        shares: (m, k) shares of this rank's elements in the diagonal of `elements`; without rows if not asked for.
-        least_of_two: smallest ratio, off the diagonal, of the error to both parts without cancellation.
+        arcs: errors from straight or parabolic sides along arcs, and from springs along sides, of either sign.
+        shares: (m, k) this rank's element shares in the `elements` diagonal; without rows if not asked for.
+        least_of_two: smallest ratio, off the diagonal, between the error and both parts without cancellation.
     """
 
     elements: Float
@@ -59,12 +61,12 @@ class EnergyErrors:
 
     @property
     def least(self) -> Float:
-        """(k, k) smallest error that cancellation of both parts leaves."""
+        """(k, k) smallest error that remains when both parts cancel."""
         return LEAST_SHARE * (self.elements - self.arcs)
 
     @property
     def absolute(self) -> Float:
-        """(k, k) estimates of |computed - exact|."""
+        """(k, k) estimated |computed - exact|."""
         size = np.sqrt(np.abs(np.diag(self.elements)) + np.abs(np.diag(self.arcs)))
         share = np.full((len(size),) * 2, self.least_of_two)
         np.fill_diagonal(share, LEAST_SHARE)
@@ -78,11 +80,11 @@ def energy_errors(
     keep: bool = True,
     nested: bool | None = None,
 ) -> EnergyErrors:
-    """Estimate the errors of responses of one problem, a few subdomains at a time.  Collective.
+    """Estimate response errors in one problem, a few subdomains at a time.  Collective.
 
     Args:
         contact: whether faces touch.
-        keep: whether later states need the factors of interiors, and the caller `shares`.
+        keep: whether later states need the interior factors, and the caller `shares`.
         nested: whether to use the mesh refined less; by default where `is_nested`.
     """
     k, area = len(responses), cell.summary.area
@@ -107,7 +109,7 @@ def energy_errors(
 
 
 def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
-    """Return ratios of errors of elements and of arcs to errors on the mesh with `fewer` halvings.  Collective."""
+    """Return ratios of element and arc errors to errors with `fewer` halvings.  Collective."""
     order = cell.lattice.order
     if cell.summary.across and fewer:
         return SAMPLED[any(s.is_mixed for s in cell.subdomains)]
@@ -117,7 +119,9 @@ def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
 
 
 def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
-    """Return whether a mesh refined less has the error: not where errors fall more slowly, at corners and tips.
+    """Return whether a mesh refined less has the error.
+
+    Not where errors fall more slowly, at corners and tips.
 
     False for cells with fibres other than circles and ellipses or with voids bounded by straight sides; for debonded
     arcs with quadratic elements or with tips to which the mesh is not graded: `tip_size` is given, or bonds break.
@@ -142,7 +146,7 @@ def _has_corners(cell: TornCell) -> bool:
 def _recovered(
     cell: TornCell, responses: Sequence[Response], keep: bool, lattice: ReferenceLattice
 ) -> Iterator[tuple[RecoveredStress, ArcSides]]:
-    """Yield recovered stresses and arcs of this rank's subdomains, refined by the lattice, group by group.
+    """Yield recovered stresses and arcs in this rank's subdomains, refined by the lattice, group by group.
 
     Collective before the first.
     """
@@ -174,7 +178,7 @@ def _recovered(
 def _nested_displacements(
     cell: TornCell, u: Float, loads: Float, keep: bool, lattice: ReferenceLattice
 ) -> Iterator[tuple[Members, FineMesh, Float, Int]]:
-    """Yield the groups of `_displacements`, in equilibrium on the mesh of a coarser lattice."""
+    """Yield the `_displacements` groups, in equilibrium on a coarser lattice's mesh."""
     fresh = nested_interiors(cell.solver.interface_operators, cell.lattice, lattice)
     for interior in cell.nested_interiors if keep else fresh:
         displacement = interior.displacement(u, loads)
@@ -186,11 +190,11 @@ def _nested_displacements(
 def _displacements(
     cell: TornCell, u: Float, loads: Float, keep: bool, lattice: ReferenceLattice
 ) -> Iterator[tuple[Members, FineMesh, Float, Int]]:
-    """Yield groups of subdomains of one phase, their mesh by the lattice, displacements (classes, c, k) and places.
+    """Yield subdomain groups of one phase, their lattice mesh, displacements (classes, c, k) and places.
 
-    Places (c classes,) are displacements of all boundaries or, across materials, of all parts; INSIDE of others.
+    Places (c classes,) count displacements on all boundaries or, across materials, in all parts; INSIDE elsewhere.
 
-    Across materials a coarser lattice takes displacements of the mesh at its nodes: their error is hardly less than
+    Across materials a coarser lattice takes the mesh displacements at its nodes: their error is hardly less than
     in equilibrium on its own mesh.
     """
     boundary, is_nested, across = cell.solver.interface_operators, lattice is not cell.lattice, cell.summary.across

@@ -1,6 +1,8 @@
-"""Pieces that a cell is cut into, its memory, the ranks that it can use, and how often its dual operator is applied.
+"""Pieces that a cell is cut into, and their cost.
 
-Memory is linear in the degrees of freedom, for bodies are cut into pieces of one size.  `scripts/measure_cost.py`
+The memory it needs, the ranks it can use, and how often its dual operator is applied.
+
+Memory is linear in the degrees of freedom, because bodies are cut into equally large pieces.  `scripts/measure_cost.py`
 measures its constants.
 """
 
@@ -52,29 +54,29 @@ ITERATIONS_OF_A_SOLVE, ITERATIONS_WITH_COATINGS, SOLVES_OF_A_CONTACT, SOLVES_OF_
 
 @dataclass(frozen=True)
 class PartitionPolicy:
-    """Default numbers of pieces of the mesh and of bodies; sizes in degrees of freedom after refinement.
+    """Default piece counts for the mesh and bodies; sizes in degrees of freedom after refinement.
 
     Attributes:
-        piece_dofs: size of a piece; smaller pieces make the coarse problem slower, larger ones the factors and the
+        piece_dofs: piece size; smaller pieces make the coarse problem slower, larger ones the factors and the
             dense matrices.
-        piece_boundary_dofs: largest boundary of a piece to other bodies; for pieces of narrow bodies.
+        piece_boundary_dofs: largest boundary between a piece and other bodies; for pieces in narrow bodies.
         cut_factor: a bonded body is cut if it, or its boundary, is larger than a piece's by this factor.
-        even_cut_factor, even_share: factor in place of `cut_factor` for bodies up to this share of the load of a rank,
+        even_cut_factor, even_share: factor in place of `cut_factor` for bodies up to this share in a rank's load,
             which are distributed evenly without cuts.
         breakable_boundary_dofs: where bonds may break, a body is cut if its boundary is larger: the cell is solved so
-            often that uncut bodies pay as long as dense matrices of their boundaries are small.
-        tiles: of the coarse mesh.
+            often that uncut bodies pay as long as their boundaries' dense matrices are small.
+        tiles: tiles in the coarse mesh.
         across_dofs: where nothing can part, cells up to this size are cut across materials, not body by body.
-        across_piece_dofs: size of such a piece, with as many multipliers as a smaller piece of a body.
+        across_piece_dofs: such a piece's size, with as many multipliers as a smaller piece within a body.
         whole_dofs: such a cell on one rank is not cut up to this size: one sparse factor takes less time than dense
-            matrices of pieces, and twice their memory.
-        whole_ranks: up to so many ranks have one piece each of such a cell, with Schur complements factored together;
+            piece matrices, which need half its memory.
+        whole_ranks: up to so many ranks have one piece each in such a cell, with Schur complements factored together;
             for more ranks these are too large.
         strip_dofs: cells from this size on are halved into strips: smaller ones have short boundaries anyway, and
-            mesh errors, estimated up to boundaries, depend less on the direction of METIS' cuts.
+            mesh errors, estimated up to boundaries, depend less on the direction that METIS cuts in.
 
     `scripts/benchmark scripts/cases/benchmark_1m.toml --tools feti` times the bonded ones, `scripts/benchmark_path`
-    those of bodies that may part, and `scripts/benchmark --table small` the last five.
+    the ones for bodies that may part, and `scripts/benchmark --table small` the last five.
     """
 
     piece_dofs: int = 2200
@@ -91,7 +93,10 @@ class PartitionPolicy:
     strip_dofs: int = 30_000
 
     def across_pieces(self, dofs: int, n_ranks: int) -> int:
-        """Return the pieces, equally many on each rank, of a cell cut across materials; 0 for body by body."""
+        """Return how many pieces a cut across materials has.
+
+        Equally many on each rank; 0 for a cut body by body.
+        """
         if dofs > self.across_dofs:
             return 0
         if n_ranks <= self.whole_ranks and dofs <= self.whole_dofs:
@@ -105,10 +110,12 @@ BY_COST = PartitionPolicy(across_dofs=400_000)
 
 
 def can_be_cut_across(case: Case) -> bool:
-    """Return whether subdomains may reach across materials: nothing parts, and the case leaves the cut to the program.
+    """Return whether subdomains may reach across materials.
 
-    Jumps of nearly incompressible phases and of very different stiffness are scaled body by body; options of the dual
-    solver are meant for bodies.
+    They may if nothing parts, and the case leaves the cut to the program.
+
+    Jumps at nearly incompressible phases and between very different stiffnesses are scaled body by body; dual
+    solver options are meant for bodies.
     """
     asked, free = case.decomposition, ("auto", None, None, "torus")
     if case.interfaces or (asked.cut, asked.subdomains, asked.max_dofs, case.cell.bodies) != free:
@@ -131,10 +138,12 @@ def wanted_pieces(
     n_ranks: int,
     policy: PartitionPolicy = DEFAULT_POLICY,
 ) -> Int:
-    """(b,) pieces of each body, from the case, else from the policy; at least one for each rank.
+    """(b,) pieces in each body, from the case, else from the policy.
+
+    There is at least one piece for each rank.
 
     Args:
-        load: (b,) coarse triangles of each body.
+        load: (b,) coarse triangles in each body.
         edges: (b,) coarse edges that each body shares with others.
     """
     # A coarse triangle brings about M^2 / 2 nodes.
@@ -158,7 +167,7 @@ def wanted_pieces(
 
 
 def applications(case: Case, problem: Problem, across: bool = False) -> int:
-    """Estimate how many times the analysis applies the dual operator of a problem.
+    """Estimate how often the analysis applies a problem's dual operator.
 
     Coatings cost no iterations where pieces reach `across` materials.
     """
@@ -172,17 +181,17 @@ def applications(case: Case, problem: Problem, across: bool = False) -> int:
 
 
 def _asks_for_tips(case: Case) -> bool:
-    """Return whether an envelope with arcs needs the inverse of the dual operator, which many solves call for."""
+    """Return whether an envelope with arcs needs the inverse dual operator, for its many solves."""
     bond = case.interface
     by_energy = bond is not None and bond.criterion in laws_with("growth") and bond.growth == "released"
     return case.section.breaks and by_energy
 
 
 def memory(nodes: Sequence[int], subdomains: Sequence[int], components: Sequence[int], columns: int) -> float:
-    """Estimate the bytes of the largest rank; `nodes` and `subdomains` are of each rank.
+    """Estimate the largest rank's bytes; `nodes` and `subdomains` are per rank.
 
     Args:
-        components: displacements of a node in each problem.
+        components: displacements at a node in each problem.
         columns: multipliers that have influence columns.
     """
     in_one_factor = max(components) * max(nodes) if max(subdomains) == 1 else 0
@@ -191,16 +200,21 @@ def memory(nodes: Sequence[int], subdomains: Sequence[int], components: Sequence
 
 
 def memory_to_the_end(case: Case, few: float, multipliers: int, columns: int, ranks: int) -> float:
-    """Estimate the bytes of the largest rank when all bonds of a path have broken; `few` are its bytes before."""
+    """Estimate the largest rank's bytes when all bonds have broken.
+
+    `few` are its bytes before the path breaks bonds.
+    """
     stored = columns if columns <= NEVER_REFACTORED_ROWS else INFLUENCE_COLUMNS
     faces = FACE_PAIR_BYTES * multipliers**2 if case.has_friction else 0
     return few + columns / ranks * (PATH_BYTES + stored * PAIR_BYTES) + faces
 
 
 def recommended_ranks(dofs: int, bodies: int) -> int:
-    """Return how many ranks a cell can use: no more than its bodies, for more ranks would cut them.
+    """Return how many ranks a cell can use.
 
-    Cut bodies cost iterations; of cells that are cut across materials coarse triangles stand for bodies.
+    No more than its bodies, because more ranks would cut them.
+
+    Cut bodies cost iterations; in cells that are cut across materials coarse triangles stand for bodies.
     """
     return max(1, min(bodies, ceil(dofs / DOFS_OF_A_RANK)))
 

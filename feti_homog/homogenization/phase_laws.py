@@ -1,8 +1,8 @@
-"""The problems of a case on the plane mesh, the stiffness of its phases in them, its springs and laws of bonds.
+"""A case's problems on the plane mesh, with their phase stiffness, springs and bond laws.
 
-In generalized plane strain the loads of the plane problem are e = [E11, E22, gamma12, E33, T], T a change of
-temperature, and A = N^T C N with N e = [E11, E22, gamma12, E33] - alpha T.  So A e is [S11, S22, S12, S33] and the
-conjugate of T, and 1/2 e.A e the stored energy.
+In generalized plane strain the plane problem's loads are e = [E11, E22, gamma12, E33, T], T a temperature
+change, and A = N^T C N with N e = [E11, E22, gamma12, E33] - alpha T.  So A e is [S11, S22, S12, S33] and the
+conjugate to T, and 1/2 e.A e the stored energy.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ POWERS = {"strength": 1, "toughness": 2}
 
 
 def problems(case: Case) -> tuple[Problem, ...]:
-    """Return the problem of the plane and, if strains along the fibres are loads, the axial one.
+    """Return the plane problem and, if strains along the fibres are loads, the axial one.
 
     A temperature is a load if the phases have thermal expansions.
     """
@@ -45,12 +45,12 @@ def problems(case: Case) -> tuple[Problem, ...]:
 
 
 def plane_problem(case: Case) -> Problem:
-    """Return the problem of the displacements in the plane."""
+    """Return the problem for displacements in the plane."""
     return problems(case)[0]
 
 
 def plane_law(case: Case, phase: str) -> Float:
-    """(v, v) stiffness A of a phase in the plane problem."""
+    """(v, v) phase stiffness A in the plane problem."""
     material, problem = case.material_of(phase), plane_problem(case)
     if problem == PLANE:
         return plane_stiffness(material, case.analysis.plane)
@@ -63,17 +63,17 @@ def plane_law(case: Case, phase: str) -> Float:
 
 
 def is_mixed(case: Case, phase: str) -> bool:
-    """Return whether the elements of a phase have a bubble and a pressure of their own in the plane problem."""
+    """Return whether a phase's elements have their own bubble and pressure in the plane problem."""
     return cell_sizes.is_mixed(case.cell.order, case.material_of(phase), case.analysis.plane)
 
 
 def axial_law(case: Case, phase: str) -> Float:
-    """(2, 2) stiffness of a phase in the axial problem."""
+    """(2, 2) phase stiffness in the axial problem."""
     return spatial_stiffness(case.material_of(phase))[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)]
 
 
 def law_derivatives(case: Case, phase: str, change: LawChange) -> tuple[Float, ...]:
-    """Return the derivatives of `plane_law` and, if there is an axial problem, of `axial_law`."""
+    """Differentiate `plane_law` and, if there is an axial problem, `axial_law`."""
     problem, dC = plane_problem(case), change.stiffness
     if problem == PLANE:
         return (dC,)
@@ -92,8 +92,8 @@ def law_derivatives(case: Case, phase: str, change: LawChange) -> tuple[Float, .
 def secants(plane: Float, *axial: Float) -> dict[str, Float]:
     """Return `stiffness`, (3, 3) or with an axial problem (6, 6), and if a temperature is a load `thermal_stress` (6,).
 
-    They follow from stresses under unit loads, (v, v) of the plane problem and (2, 2) of the axial one; the thermal
-    stress is that under a unit of it.
+    They follow from stresses under unit loads, (v, v) in the plane problem and (2, 2) in the axial one; the thermal
+    stress is the one under a unit temperature.
     """
     if not axial:
         return {"stiffness": plane}
@@ -103,12 +103,12 @@ def secants(plane: Float, *axial: Float) -> dict[str, Float]:
 
 
 def components(plane: Float, *axial: Float) -> Float:
-    """(3,) or, with an axial problem, (6,) components of a strain or stress from its parts in each problem."""
+    """(3,) or, with an axial problem, (6,) strain or stress components from their parts in each problem."""
     return spatial_vector(plane, *axial) if axial else plane
 
 
 def spatial_vector(plane: Float | None, axial: Float | None) -> Float:
-    """(6,) from numbers [11, 22, 12, 33, ...] of the plane problem and [13, 23] of the axial one; None is zero."""
+    """(6,) from numbers [11, 22, 12, 33, ...] in the plane problem and [13, 23] in the axial one; None is zero."""
     vector = np.zeros(6)
     if plane is not None:
         vector[IN_PLANE] = plane[:4]
@@ -118,19 +118,19 @@ def spatial_vector(plane: Float | None, axial: Float | None) -> Float:
 
 
 def springs(case: Case) -> InterfaceSprings:
-    """Return normal and tangential springs of the problem in the plane."""
+    """Return normal and tangential springs for the plane problem."""
     stiffness = ((bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf) for bond in case.interfaces)
     return InterfaceSprings(tuple(stiffness), has_softening(case))
 
 
 def axial_springs(case: Case) -> InterfaceSprings:
-    """Return the springs of the problem along the fibres; without a stiffness of their own as around the fibre."""
+    """Return the springs along the fibres; without their own stiffness, as around the fibre."""
     stiffness = ((bond.axial_stiffness or bond.tangential_stiffness or math.inf,) for bond in case.interfaces)
     return InterfaceSprings(tuple(stiffness), has_softening(case))
 
 
 def has_softening(case: Case) -> bool:
-    """Return whether the law of the bonds changes their compliance."""
+    """Return whether the bond law changes the bonds' compliance."""
     return case.interface is not None and bond_laws.LAWS[case.interface.criterion].softens
 
 
@@ -141,10 +141,10 @@ def has_springs(case: Case) -> bool:
 
 
 def strength_factors(case: Case, fibres: int) -> Float:
-    """(fibres,) strength of the bonds of each fibre / strength in the case.
+    """(fibres,) each fibre's bond strength / strength in the case.
 
-    f = (-ln(1 - U))^(1/m) / Gamma(1 + 1/m) with uniform U, Weibull's distribution of modulus m and mean 1, times the
-    column `strength` of a table of fibres.  Fibre N takes the N-th number of the generator in any cell.
+    f = (-ln(1 - U))^(1/m) / Gamma(1 + 1/m) with uniform U, Weibull's distribution with modulus m and mean 1, times the
+    column `strength` in a fibre table.  Fibre N takes the generator's N-th number in any cell.
     """
     factors, scatter = np.ones(fibres), case.interface.scatter if case.interface else None
     if scatter is not None:
@@ -161,9 +161,9 @@ def strength_factors(case: Case, fibres: int) -> Float:
 
 @dataclass(frozen=True)
 class SectionValues:
-    """Values of the keys of sections [interface] at nodes (k,) of the sections `pair` (k,).
+    """Values that [interface] sections give their keys, at nodes (k,) on the sections `pair` (k,).
 
-    `factor` (k,), by the fibre of each node, multiplies strengths, and squared toughnesses.
+    `factor` (k,), by each node's fibre, multiplies strengths, and squared toughnesses.
     """
 
     bonds: Sequence[InterfaceSection]
@@ -171,29 +171,29 @@ class SectionValues:
     factor: float | Float
 
     def __call__(self, key: str, *more: str) -> float | Float:
-        """Return the value of a key, or the next key with a value, at all nodes or (k,) at each; else inf."""
+        """Return the first value among the keys, for all nodes or (k,) at each; else inf."""
         sections = self.everywhere(key, *more)
         values = float(sections[0]) if len(sections) == 1 else sections[self.pair]
         power = POWERS.get(key.rpartition("_")[2], 0)
         return values * self.factor**power if power else values
 
     def everywhere(self, key: str, *more: str) -> Float:
-        """(s,) values of all sections, for the factor 1."""
+        """(s,) values in all sections, for the factor 1."""
         names = (key, *more)
         values = [next((v for n in names if (v := getattr(bond, n)) is not None), math.inf) for bond in self.bonds]
         return np.array(values or [math.inf], float)
 
     def common(self, key: str) -> Any:
-        """Return the common value of all sections."""
+        """Return the value that all sections share."""
         return getattr(self.bonds[0], key)
 
 
 def bond_law(bonds: Sequence[InterfaceSection], pair: Int, factor: float | Float = 1.0) -> BondLaw:
-    """Return the law of the bonds at nodes (k,), arguments as in `SectionValues`; without sections no bond breaks."""
+    """Return the bond law at nodes (k,), arguments as in `SectionValues`; without sections no bond breaks."""
     name = bonds[0].criterion if bonds else bond_laws.DEFAULT
     return law_class(name).of_keys(SectionValues(bonds, pair, factor))
 
 
 def has_process_zone(case: Case) -> bool:
-    """Return whether elements must resolve the length along which the bonds of a case break."""
+    """Return whether elements must resolve the length along which bonds break."""
     return case.interface is not None and bond_laws.LAWS[case.interface.criterion].has_process_zone

@@ -1,4 +1,4 @@
-"""Fields of a response: displacements at nodes, strains and stresses of elements, tractions and jumps."""
+"""Response fields: displacements at nodes, strains and stresses in elements, tractions and jumps."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from feti_homog.typing import Float
 
 @dataclass(frozen=True)
 class RecoveredFields:
-    """This rank's fields of a response, of c displacements and v loads.
+    """This rank's response fields, with c displacements and v loads.
 
     Attributes:
         displacement, fluctuation: (n, c).
         strain, stress: (m, v) means over the elements: loads in each, and stresses that do work on them.
         traction, jump: (k, c).
-        shares: (m,) shares of elements in the estimated error of E . Sigma; NaN without estimate.
+        shares: (m,) element shares in the estimated error of E . Sigma; NaN without estimate.
     """
 
     displacement: Float
@@ -34,7 +34,7 @@ class RecoveredFields:
 
 
 def recover(cell: TornCell, response: Response | None) -> RecoveredFields:
-    """Recover the fields of a response; zero without one.  Collective."""
+    """Recover a response's fields; zero without one.  Collective."""
     nodes, problem = cell.jumps.nodes, cell.solver.problem
     if response is None:
         c, v = problem.components, len(problem.loads)
@@ -51,7 +51,9 @@ def recover(cell: TornCell, response: Response | None) -> RecoveredFields:
 
 
 def _part_fields(cell: TornCell, loads: Float, u: Float) -> tuple[Float, Float, Float, Float]:
-    """Return total displacements H y + u*, Eq. (14), and u* (n, c) at the plane nodes of this rank's parts.
+    """Return nodal and element fields in this rank's parts.
+
+    Total displacements H y + u*, Eq. (14), and u* (n, c) at their plane nodes.
 
     Then means over their elements under the loads (v,): strains with the other loads, and stresses on them, (m, v).
     """
@@ -82,7 +84,7 @@ def _shares(cell: TornCell, response: Response) -> Float:
 
 
 def _sizes(cell: TornCell) -> list[tuple[int, int]]:
-    """Return the numbers of nodes and elements of this rank's parts."""
+    """Count nodes and elements in this rank's parts."""
     return [(len(s.mesh.points), len(s.mesh.triangles)) for s in cell.parts]
 
 

@@ -1,13 +1,13 @@
-"""Derivatives of a stiffness by the constants of phases and of elastic interfaces, without further solves.
+"""Derivatives of a stiffness by phase and elastic interface constants, without further solves.
 
-With e_i the strains of the unit load i, its other uniform loads behind, the stiffness of a linear cell is
+With e_i the strains under the unit load i, its other uniform loads behind, a linear cell's stiffness is
 
     |UC| C_ij = sum_phases A : int e_i (x) e_j + sum_rows [u]_i k [u]_j,
 
 and since its fields make it stationary, dC_ij has dA and dk in place of A and k: exact for the discrete cell.  Bodies
 need the integrals alone, once per phase.  With faces in contact the cell is linear as long as no face opens or closes.
 
-By the fraction f of growing fibres, d f / d ln R = 2 f, a stiffness has the derivative of the energies on the moving
+By the fraction f of growing fibres, d f / d ln R = 2 f, a stiffness changes as the energies do on the moving
 mesh, at fixed nodal u - E x: exact for the mesh, wherever the nodes between the fibres move.
 """
 
@@ -40,12 +40,12 @@ IMAGES = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2)
 
 @dataclass(frozen=True)
 class Derivative:
-    """Derivatives of the stresses under unit loads by one constant.
+    """Stress derivatives by one constant, under unit loads.
 
     Attributes:
         name: the key with its section, such as `material.fibre.young`.
         value: the constant.
-        energies: (v, v) derivatives of the stresses of each problem under its unit loads.
+        energies: (v, v) stress derivatives in each problem under its unit loads.
     """
 
     name: str
@@ -54,7 +54,7 @@ class Derivative:
 
 
 def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response]]) -> list[Derivative]:
-    """Return the derivatives by all constants, from the responses of each problem to its unit loads.  Collective."""
+    """Differentiate by all constants, from each problem's responses to its unit loads.  Collective."""
     case, area = cells[0].case, cells[0].summary.area
     integrals = [_integrals(cell, group) for cell, group in zip(cells, responses, strict=True)]
     changes = [*_by_phases(cells[0], [grams for grams, _ in integrals])]
@@ -71,7 +71,7 @@ def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response
 
 
 def _by_phases(cell: TornCell, grams: Sequence[Mapping[str, Float]]) -> Iterator[Derivative]:
-    """Yield the derivatives by the constants of phases, from the integrals of each problem."""
+    """Yield derivatives by phase constants, from each problem's integrals."""
     case, is_heated = cell.case, "temperature" in cell.solver.problem.loads
     for phase in grams[0]:
         for change in law_changes(case.materials[phase], case.analysis.plane):
@@ -84,9 +84,9 @@ def _by_phases(cell: TornCell, grams: Sequence[Mapping[str, Float]]) -> Iterator
 
 
 def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str, Float], Float]:
-    """(v, k, v, k) int e_i (x) e_j over the bodies of each material under k unit loads; (k, k) changes by growth.
+    """(v, k, v, k) int e_i (x) e_j over each material's bodies under k unit loads; (k, k) changes by growth.
 
-    Changes are derivatives of the energies by ln R of all fibres, 0 unless the case has such fibres.  Collective.
+    Changes are energy derivatives by ln R of all fibres, 0 unless the case has such fibres.  Collective.
     """
     problem, loads = cell.solver.problem, np.stack([response.strain for response in responses], axis=1)
     boundary = np.stack([response.u for response in responses], axis=1)
@@ -112,13 +112,13 @@ def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str,
 
 @dataclass(frozen=True)
 class _Fields:
-    """Fields of e elements at q points under k loads.
+    """Fields in e elements at q points under k loads.
 
-    In mixed elements the energy is stationary for the bubble too; with the pressure lambda Pi div u it is the energy of
-    the strains less lambda r^2, r = div u - Pi div u.
+    In mixed elements the energy is stationary for the bubble too; with the pressure lambda Pi div u it is the strain
+    energy less lambda r^2, r = div u - Pi div u.
 
     Attributes:
-        gradients, weights: (e, q, a, 2) of the shape functions of the nodes, and (e, q).
+        gradients, weights: (e, q, a, 2) for the nodes' shape functions, and (e, q).
         slopes: (e, q, 2, c, k) du_i / dx_d.
         strain: (e, q, m, k) with the loads.
         rest: (e, q, k) r; None in other elements.
@@ -132,7 +132,7 @@ class _Fields:
 
     @classmethod
     def of(cls, s: UniformPart, nodes: Int32, u: Float, loads: Float) -> _Fields:
-        """Find the fields of elements with nodes (e, a), displacements u (e, a, c, k) and loads (m, k)."""
+        """Find the fields in elements with nodes (e, a), displacements u (e, a, c, k) and loads (m, k)."""
         points, (_, a, c, k) = s.mesh.points[nodes], u.shape
         elements = bubble.Elements.of(points, s.L) if s.is_mixed else None
         g, w = gradients(points) if elements is None else (elements.gradients, elements.weights)
@@ -144,7 +144,7 @@ class _Fields:
         return cls(g[:, :, :a], w, slopes, strain + loads, rest)
 
     def products(self) -> Float:
-        """(mk + 1, mk + 1) int f f^T of the strains and 1; products of 11 and 22 have -d lambda r^2 of isotropic dA."""
+        """(mk + 1, mk + 1) int f f^T for the strains and 1; 11 and 22 products have -d lambda r^2 from isotropic dA."""
         *points, _, k = self.strain.shape
         gram = _gram(np.concatenate([self.strain.reshape(*points, -1), np.ones((*points, 1))], axis=2), self.weights)
         if self.rest is not None:
@@ -175,7 +175,7 @@ class _Fields:
 
 
 def _strains(slopes: Float, problem: Problem) -> Float:
-    """(e, q, m, k) strains of the slopes (e, q, 2, c, k)."""
+    """(e, q, m, k) strains from the slopes (e, q, 2, c, k)."""
     strain = np.zeros((*slopes.shape[:2], problem.strains, slopes.shape[4]))
     for (i, d), number in np.ndenumerate(problem.voigt):
         strain[:, :, number] += slopes[:, :, d, i]
@@ -183,13 +183,13 @@ def _strains(slopes: Float, problem: Problem) -> Float:
 
 
 def _gram(fields: Float, weights: Float) -> Float:
-    """(n, n) int f f^T of fields (e, q, n)."""
+    """(n, n) int f f^T for fields (e, q, n)."""
     flat = fields.reshape(weights.size, -1)
     return np.asarray(flat.T @ (weights.reshape(-1, 1) * flat))
 
 
 def _stretched_springs(cell: TornCell, responses: Sequence[Response]) -> Float:
-    """(sections, components, k, k) sums of [u]_i k [u]_j = lam_i C lam_j over the rows of bonds.  Collective."""
+    """(sections, components, k, k) sums of [u]_i k [u]_j = lam_i C lam_j over bond rows.  Collective."""
     nodes, c, k = cell.solver.jump_operator.nodes, cell.solver.problem.components, len(responses)
     work = np.zeros((len(cell.case.interfaces), c, k, k))
     lam = np.stack([response.scale * response.state.solution.lam for response in responses], axis=1)
@@ -201,7 +201,7 @@ def _stretched_springs(cell: TornCell, responses: Sequence[Response]) -> Float:
 
 
 def _spring_constants(case: Case) -> Iterator[tuple[str, float, tuple[list[tuple[int, int]], list[tuple[int, int]]]]]:
-    """Yield each finite stiffness of an interface, with its sections and components in each problem."""
+    """Yield each finite interface stiffness, with its sections and components in each problem."""
     several = len(case.interfaces) > 1
     for number, bond in enumerate(case.interfaces):
         section = f"interface.{number + 1}" if several else "interface"
@@ -219,16 +219,16 @@ def _spring_constants(case: Case) -> Iterator[tuple[str, float, tuple[list[tuple
 
 
 def _fractions(case: Case) -> Iterator[float]:
-    """Yield the fraction of equal fibres in a pattern, bonded to the matrix without a coating; else nothing."""
+    """Yield the fibre fraction in a pattern of equal, uncoated, bonded fibres; else nothing."""
     cell = case.cell
     if cell.geometry in PATTERNS and cell.coating is None and not case.interfaces and cell.fibre_fraction is not None:
         yield cell.fibre_fraction
 
 
 def _velocity(points: Float, cell: CellSummary) -> Float:
-    """(n, 2) V = dx / d ln R at points (n, 2) where all fibres of a pattern grow.
+    """(n, 2) V = dx / d ln R at points (n, 2) where all fibres in a pattern grow.
 
-    x - c in a fibre of centre c and radius R, falling to 0 halfway to the next fibre.
+    x - c in a fibre with centre c and radius R, falling to 0 halfway to the next fibre.
     """
     centres, radii, period = cell.centres[cell.is_fibre], cell.radii[cell.is_fibre], cell.period
     V = np.zeros_like(points)

@@ -1,4 +1,4 @@
-"""Errors of springs at nodes in the energy of each pair of responses, added to errors of elements and arcs."""
+"""Errors that springs at nodes make in each response pair's energy, besides element and arc errors."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ POINTS, WEIGHTS = roots_legendre(6)
 
 
 class SpringSides:
-    """Sides of elements along springs, and the interface nodes of all ranks: everything that no state changes."""
+    """Element sides along springs, and all ranks' interface nodes: everything that no state changes."""
 
     def __init__(
         self,
@@ -33,7 +33,7 @@ class SpringSides:
         lattice: ReferenceLattice,
         period: Float,
     ) -> None:
-        """Find the sides of fibres in the `parts`, refined by the lattice; `period` (2,) of the cell.  Collective."""
+        """Find fibre sides in the `parts`, refined by the lattice; `period` (2,) is the cell's.  Collective."""
         self._comm, self._jumps, self._order, self._period = neighbours.comm, jumps, lattice.order, period
         self._chains = InterfaceChains(neighbours.adjacency)
         nodes = jumps.nodes
@@ -69,8 +69,8 @@ class SpringSides:
         """(k, k) energies beyond tips, and on sides without the part that `arc_energy` has.  Collective.
 
         Args:
-            status: (n,) states of this rank's interface nodes.
-            compliance, lam: (rows,) and (rows, k) compliances and multipliers of k responses.
+            status: (n,) states at this rank's interface nodes.
+            compliance, lam: (rows,) and (rows, k) compliances and multipliers for k responses.
         """
         nodes = self._jumps.nodes
         rows = nodes.row[:, None] + np.arange(self._jumps.components)
@@ -90,10 +90,10 @@ class SpringSides:
         return np.asarray(beyond), allreduce_sum(self._comm, self._of_sides(holds, stiffness, jump))
 
     def _of_sides(self, holds: Bool, stiffness: Float, jump: Float) -> Float:
-        """(k, k) energy of springs at nodes less springs along sides of this rank, less the part known on arcs.
+        """(k, k) spring energy at nodes less springs along this rank's sides, less the part known on arcs.
 
         Both energies are of the functions that nodes define on sides; the exact jump d adds to the energy of springs,
-        and of t on the distance of d to these functions, as much as these lack.
+        and to the energy of t on the distance from d to these functions, as much as these lack.
         """
         side = np.flatnonzero(holds[self._nodes].all(axis=1))
         nodes, ds, shape = self._nodes[side], self._ds[side], self._shape[:, side]
@@ -110,7 +110,7 @@ class SpringSides:
         return np.asarray(lumped - on_sides - on_arcs - on_arcs.T)
 
     def _in_space(self, components: Float) -> Float:
-        """(n, 2, k) vectors in the plane of components (n, 2, k) along normal and tangent; (n, 1, k) stay."""
+        """(n, 2, k) plane vectors from components (n, 2, k) along normal and tangent; (n, 1, k) stay."""
         if components.shape[1] == 1:
             return components
         normal = self._normal
@@ -119,10 +119,10 @@ class SpringSides:
 
 
 def _sides(part: UniformPart, number: Int, fibre: Int, lattice: ReferenceLattice) -> tuple[Int, Float, Float]:
-    """Return the sides of a part that is a fibre: interface nodes (f, order + 1), normals (f, q, 2), turns (f,).
+    """Return a fibre part's sides: interface nodes (f, order + 1), normals (f, q, 2), turns (f,).
 
-    Normals at Gauss points are as long as the arc that a unit of place has.  `number` (classes,) are interface nodes of
-    all ranks, -1 elsewhere, `fibre` (n,) the inner body of each.
+    Normals at Gauss points are as long as the arc per unit place.  `number` (classes,) are interface nodes on
+    all ranks, -1 elsewhere, `fibre` (n,) each one's inner body.
     """
     triangle, k, line = border_lines(part.submesh, part.mesh, part.mesh.node_class[part.mesh.nodes])
     nodes = number[line]

@@ -1,6 +1,8 @@
-"""Cells cut on rank 0, or large ones where they are meshed: each rank cuts its tiles, and no rank has all tiles.
+"""Cells cut on rank 0, or large ones where they are meshed.
 
-Pieces of the matrix lie within tiles, and a fibre lies in one tile, so subdomains depend on the case and the number of
+For large cells each rank cuts its tiles, and no rank has all tiles.
+
+Matrix pieces lie within tiles, and a fibre lies in one tile, so subdomains depend on the case and the number of
 ranks, not on the rank that filled a tile.
 """
 
@@ -48,7 +50,7 @@ def can_be_torn_by_tiles(
 ) -> bool:
     """Return whether nothing needs the mesh on one rank.
 
-    One rank is needed for tips of arcs, bodies cut by the sides, the matrix in fewer pieces than tiles, and cells that
+    One rank is needed for arc tips, bodies cut by the sides, the matrix in fewer pieces than tiles, and cells that
     are expected to be small enough for cuts across materials.  A user's mesh is on one rank already.
     """
     on_one_rank = case.arcs or case.cell.bodies == "plane" or case.decomposition.subdomains is not None
@@ -62,7 +64,7 @@ def can_be_torn_by_tiles(
 def tear_by_tiles(
     case: Case, noded: NodedCell | None, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy
 ) -> RankShare:
-    """Return this rank's share of the cell with noded lines on rank 0.  Collective.
+    """Return this rank's share in the cell with noded lines on rank 0.  Collective.
 
     Raises:
         CaseError, MeshError: on every rank, as `tiled_cell` and `filling.fill`.
@@ -85,7 +87,7 @@ def tear_by_tiles(
 
 
 def _filled(noded: NodedCell | None, regions: Regions, comm: MPI.Intracomm) -> tuple[Torus, Int]:
-    """Return the torus of the tiles that this rank fills, and the tile (m,) of each triangle.  Collective."""
+    """Return the torus that this rank's tiles fill, and each triangle's tile (m,).  Collective."""
     tiles = on_root_only(comm, tiles_to_fill, noded) or []
     dealt = deal_tiles(tiles, [len(tile.nodes) for tile in tiles], comm)
     fillings = agree(comm, fill_own, [(k, tile.tile) for k, tile in dealt])
@@ -97,7 +99,10 @@ def _filled(noded: NodedCell | None, regions: Regions, comm: MPI.Intracomm) -> t
 
 
 def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) -> Int:
-    """(m,) the subdomain of each triangle of this rank, numbered from 0 tile by tile within a constituent."""
+    """(m,) the subdomain of each triangle on this rank.
+
+    Subdomains are numbered from 0 tile by tile within a constituent.
+    """
     a, b, _ = torus.sides
     within = (tile[a] == tile[b]) & (torus.constituent[a] == torus.constituent[b])
     label = components(len(tile), a[within], b[within])
@@ -112,7 +117,7 @@ def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) ->
 def _numbered(torus: Torus, tile: Int, local: Int, comm: MPI.Intracomm) -> tuple[Int, Int, Int]:
     """Count subdomains by body and tile over all ranks.  Collective.
 
-    Returns the subdomain (m,) of each triangle of this rank, bodies (s,) and numbers of triangles (s,) of subdomains.
+    Returns the subdomain (m,) of each triangle on this rank, then each subdomain's body (s,) and triangle count (s,).
     """
     first = np.unique(local, return_index=True)[1]
     parts = comm.allgather((torus.constituent[first], tile[first], np.bincount(local)))
@@ -123,7 +128,7 @@ def _numbered(torus: Torus, tile: Int, local: Int, comm: MPI.Intracomm) -> tuple
 
 
 def _neighbours(torus: Torus, subdomain: Int) -> tuple[Int, Int, Int, Int]:
-    """Return pairs of subdomains (n,) and (n,) that meet at edges of this rank.
+    """Return subdomain pairs (n,) and (n,) that meet at this rank's edges.
 
     Then edges (k,) with one triangle on this rank and the other one elsewhere, and its subdomain here (k,).
     """
@@ -136,14 +141,14 @@ def _neighbours(torus: Torus, subdomain: Int) -> tuple[Int, Int, Int, Int]:
 
 
 def _assigned(load: Int, neighbours: list[tuple[Int, Int, Int, Int]], n_ranks: int) -> Int:
-    """(s,) rank of each subdomain, by the `neighbours` of all ranks."""
+    """(s,) each subdomain's rank, by all ranks' `neighbours`."""
     a, b, edge, side = (np.concatenate(rows) for rows in zip(*neighbours, strict=True))
     side = side[np.argsort(edge, kind="stable")]
     return assign_ranks(load, np.append(a, side[::2]), np.append(b, side[1::2]), n_ranks)
 
 
 def _pinned(torus: Torus, comm: MPI.Intracomm) -> int:
-    """Key of the class of all ranks that is pinned, see `submesh.pinned_class`.  Collective."""
+    """Find the key of the one class on all ranks that is pinned, see `submesh.pinned_class`.  Collective."""
     at_interface, in_matrix = np.zeros((2, len(torus.class_keys)), bool)
     at_interface[torus.node_class[torus.mesh.arc_edges]] = True
     in_matrix[torus.node_class[torus.mesh.triangles[torus.constituent == 0]]] = True
@@ -153,10 +158,10 @@ def _pinned(torus: Torus, comm: MPI.Intracomm) -> int:
 
 
 def tiled_cell(case: Case, noded: NodedCell) -> tuple[Int, Int, Int]:
-    """Return facts of a tiled cell: `cell_remarks.pairs_of`, `Torus.nesting`, shared coarse edges (constituents,).
+    """Return facts about a tiled cell: `cell_remarks.pairs_of`, `Torus.nesting`, shared coarse edges (constituents,).
 
     Raises:
-        CaseError: an interface of the case is between phases that do not touch.
+        CaseError: an interface is between phases that do not touch.
     """
     regions, around, curves = noded.regions, noded.lines.around, noded.lines.curves
     # The last of `constituent` is the matrix, which is around where `around` is MATRIX, -1.
@@ -178,14 +183,14 @@ def tiled_cell(case: Case, noded: NodedCell) -> tuple[Int, Int, Int]:
 
 
 def tiles_to_fill(noded: NodedCell) -> list[NumberedTile]:
-    """Return the numbered tiles of a cell with noded lines."""
+    """Return a noded cell's numbered tiles."""
     lines, arrangement = noded.lines, noded.arrangement
     stands_for = representatives(lines.points, arrangement.width, arrangement.height).astype(np.int64)
     return [NumberedTile(nodes, stands_for[nodes], tile) for nodes, tile in noded.parts]
 
 
 def summary_of(case: Case, noded: NodedCell, subdomains: int, triangles: int) -> CellSummary:
-    """Return the summary of the cell with these numbers of subdomains and coarse triangles."""
+    """Summarize the cell with so many subdomains and coarse triangles."""
     regions, lines, arrangement = noded.regions, noded.lines, noded.arrangement
     inside = regions.constituent[:-1]
     solid = np.flatnonzero(inside >= 0)

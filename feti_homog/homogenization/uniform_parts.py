@@ -1,7 +1,7 @@
-"""Parts of subdomains in one body each, and displacements inside bodies on a mesh that is refined less.
+"""Subdomain parts in one body each, and displacements inside bodies on a mesh that is refined less.
 
-A subdomain of one material is a part itself; one across materials has a part for each body that it reaches.  The mesh
-that is refined less has a quarter or a sixteenth of the elements; its nodes are among the nodes of the mesh.
+A subdomain in one material is a part itself; one across materials has a part for each body that it reaches.  The mesh
+that is refined less has a quarter or a sixteenth of the elements; its nodes are among the finer mesh's nodes.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ class UniformPart:
     """Part of a subdomain, in one body.
 
     Attributes:
-        place: number of the subdomain on its rank.
-        submesh, mesh: coarse share and refined mesh of the part.
+        place: subdomain number on its rank.
+        submesh, mesh: the part's coarse share and refined mesh.
         dofs: (cn,) its degrees of freedom in the subdomain.
         L, problem: as in `Subdomain`.
-        is_mixed: whether its elements have a bubble and a pressure of their own.
+        is_mixed: whether its elements have their own bubble and pressure.
     """
 
     place: int
@@ -57,7 +57,7 @@ class UniformPart:
 
 
 def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterator[UniformPart]:
-    """Yield the parts of all subdomains, in each by phase and body; `phase_of` (constituents,) are names of phases."""
+    """Yield all subdomains' parts, in each by phase and body; `phase_of` (constituents,) names phases."""
     for place, s in enumerate(subdomains):
         if s.material is None:
             yield UniformPart(place, s.submesh, s.mesh, np.arange(s.n_dofs), s.L, s.problem, s.is_mixed)
@@ -73,7 +73,7 @@ def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterat
 
 
 def nodes_of_parts(s: Subdomain) -> int:
-    """Count the plane nodes of all parts of a subdomain; a node of several parts counts for each."""
+    """Count plane nodes in a subdomain's parts; a node in several parts counts for each."""
     body, nodes = np.repeat(s.submesh.constituent, s.mesh.nodes.shape[1]), s.mesh.nodes.ravel()
     last = np.empty(len(s.mesh.points), np.int64)
     last[nodes] = body
@@ -82,7 +82,10 @@ def nodes_of_parts(s: Subdomain) -> int:
 
 
 def _restricted(mesh: FineMesh, members: Int) -> tuple[FineMesh, Int]:
-    """Return the mesh of the coarse triangles `members` (t,) alone, and (c,) its classes in the mesh."""
+    """Restrict the mesh to the coarse triangles `members` (t,).
+
+    Returns it and (c,) its classes in the whole mesh.
+    """
     nodes, local = present(mesh.nodes[members], len(mesh.points))
     classes, node_class = present(mesh.node_class[nodes], mesh.n_classes)
     numbers, curved = (local.astype(np.int32), node_class.astype(np.int32)), mesh.curved[members]
@@ -92,7 +95,7 @@ def _restricted(mesh: FineMesh, members: Int) -> tuple[FineMesh, Int]:
 def share_parts(
     comm: MPI.Intracomm, parts: Sequence[UniformPart], table: SubdomainTable, pairs: Int, lattice: ReferenceLattice
 ) -> SharedEntities:
-    """Share the nodes of parts as `share_entities` shares nodes of subdomains, listed in `table`.  Collective."""
+    """Share part nodes as `share_entities` shares subdomain nodes, listed in `table`.  Collective."""
     body = np.array([p.submesh.body for p in parts])
     member = np.repeat(np.arange(len(parts)), [len(p.mesh.nodes) for p in parts])
     index, phase = np.array([p.submesh.index for p in parts]), tuple(p.submesh.phase for p in parts)
@@ -104,7 +107,7 @@ def share_parts(
 
 
 class ForcesBetweenParts:
-    """Multipliers of the constraints between parts, which keep each part in equilibrium with its displacements."""
+    """Constraint multipliers between parts, which keep each part in equilibrium with its displacements."""
 
     def __init__(self, comm: MPI.Intracomm, parts: Sequence[UniformPart], jumps: JumpOperator) -> None:
         """Assemble the coarse triangles at constraints.  Collective."""
@@ -123,7 +126,7 @@ class ForcesBetweenParts:
         self._inverse = blocks.inverse(np.ones(jumps.owned[1] - jumps.owned[0]))
 
     def multipliers(self, u: Float, loads: Float) -> Float:
-        """(owned rows,) lam = (B B^T)^-1 B f, f = -K u - Q E, of displacements u (dofs,) and loads E.  Collective."""
+        """(owned rows,) lam = (B B^T)^-1 B f, f = -K u - Q E, for displacements u (dofs,) and loads E.  Collective."""
         forces = np.zeros(len(u))
         forces[self._dofs] = -self._K @ u[self._dofs] - self._Q @ loads
         return np.asarray(self._inverse @ self._jumps.sum(self._jumps.B @ forces))
@@ -137,9 +140,9 @@ class NestedInterior:
         members: the subdomains.
         mesh: their meshes, joined.
         fixed: (c n,) prescribed displacements: on the boundary, and 0 where a class is pinned.
-        place: (fixed,) places among the displacements of all boundaries; PINNED where a class is pinned.
+        place: (fixed,) places among the displacements on all boundaries; PINNED where a class is pinned.
         interior: the free displacements.
-        loads: (free, v) forces Q of the unit loads on free displacements; None without voids.
+        loads: (free, v) unit load forces Q on free displacements; None without voids.
     """
 
     members: list[Subdomain]
@@ -153,7 +156,7 @@ class NestedInterior:
     def of(
         cls, places: Sequence[int], boundary: InterfaceOperators, lattice: ReferenceLattice, nested: Int
     ) -> NestedInterior:
-        """Refine, assemble and factor; `nested` numbers the nodes of the lattice among the nodes of the finer one."""
+        """Refine, assemble and factor; `nested` numbers the lattice nodes among the finer lattice's nodes."""
         members = [boundary.subdomains[place] for place in places]
         first, meshes, numbers = members[0], [refine(s.submesh, lattice) for s in members], list[Int]()
         for k, s, mesh in zip(places, members, meshes, strict=True):
@@ -173,7 +176,7 @@ class NestedInterior:
         return cls(members, mesh, fixed, place[fixed], interior, loads)
 
     def displacement(self, u: Float, loads: Float) -> Float:
-        """(classes, c, k) u* of u (boundary dofs, k) on all boundaries under the loads (v, k)."""
+        """(classes, c, k) u* from u (boundary dofs, k) on all boundaries under the loads (v, k)."""
         problem = self.members[0].problem
         on_boundary = np.vstack([u, np.zeros((1, u.shape[1]))])[self.place]  # PINNED is the last row
         all_dofs = np.empty((len(self.fixed) + len(self.interior.dofs), u.shape[1]))
@@ -184,7 +187,7 @@ class NestedInterior:
 
 
 def locks(subdomains: Sequence[Subdomain | UniformPart], comm: MPI.Intracomm) -> bool:
-    """Return whether linear elements of a phase of any rank hardly change their volume.  Collective."""
+    """Return whether linear elements in a phase on any rank hardly change volume.  Collective."""
     locking = any(s.problem.components == 2 and s.L[0, 1] > LOCKING * s.L[2, 2] for s in subdomains)
     return bool(comm.allreduce(locking, MPI.LOR))
 
@@ -192,7 +195,9 @@ def locks(subdomains: Sequence[Subdomain | UniformPart], comm: MPI.Intracomm) ->
 def nested_lattice(
     lattice: ReferenceLattice, subdomains: Sequence[Subdomain], comm: MPI.Intracomm, across: bool
 ) -> ReferenceLattice:
-    """Return the lattice of the coarser mesh: refined once less, or twice after many halvings if no phase locks.
+    """Return the coarser mesh's lattice.
+
+    It is refined once less, or twice after many halvings if no phase locks.
 
     Not twice if subdomains reach across materials.  Collective.
     """
@@ -203,14 +208,14 @@ def nested_lattice(
 def nested_interiors(
     boundary: InterfaceOperators, lattice: ReferenceLattice, coarser: ReferenceLattice
 ) -> Iterator[NestedInterior]:
-    """Yield the interiors of this rank's subdomains, refined by the lattice, on the coarser one, group by group."""
+    """Yield this rank's subdomain interiors, refined by the lattice, on the coarser one, group by group."""
     nested = coarser.within(lattice)
     for group in groups(boundary.subdomains, coarser):
         yield NestedInterior.of(group, boundary, coarser, nested)
 
 
 def groups(subdomains: Sequence[Subdomain | UniformPart], lattice: ReferenceLattice) -> Iterator[list[int]]:
-    """Yield places of consecutive subdomains of one phase, of ELEMENTS_AT_ONCE elements at most."""
+    """Yield the places of consecutive subdomains in one phase, with ELEMENTS_AT_ONCE elements at most."""
     group, elements = list[int](), 0
     for place, s in enumerate(subdomains):
         count = len(s.mesh.nodes) * len(lattice.triangles)

@@ -61,12 +61,12 @@ class TornCell:
 
     @cached_property
     def offsets(self) -> Int:
-        """First degree of freedom of each part in this rank's vectors."""
+        """Each part's first degree of freedom in this rank's vectors."""
         return np.cumsum([0, *(len(part.dofs) for part in self.parts)])
 
     @cached_property
     def parts(self) -> list[UniformPart]:
-        """Parts of this rank's subdomains in one body each, numbered over all ranks.  Collective when first read."""
+        """This rank's subdomain parts in one body each, numbered over all ranks.  Collective when first read."""
         phases = [self.summary.phases[k] for k in self.summary.constituent_phase.tolist()]
         parts = list(uniform_parts.parts_of(self.subdomains, phases))
         if not self.summary.across:
@@ -88,14 +88,14 @@ class TornCell:
         return uniform_parts.ForcesBetweenParts(self.comm, self.parts, self.jumps)
 
     def displacement(self, solution: DualSolution) -> Float:
-        """(dofs,) u* on the parts of this rank.  Collective."""
+        """(dofs,) u* on this rank's parts.  Collective."""
         u = self.solver.boundary_displacement(solution)
         return np.concatenate([np.zeros(0), *(part for _, part in self.displacements(u, solution.strain))])
 
     def displacements(self, u: Float, loads: Float, keep: bool = True) -> Iterator[tuple[UniformPart, Float]]:
         """Yield each part with its u* (dofs, k) for u (boundary dofs, k) on all boundaries and the loads (v, k).
 
-        `keep` stores the factors of interiors.
+        `keep` stores the interior factors.
         """
         place, extended = -1, np.zeros(0)
         for part in self.parts:
@@ -104,21 +104,21 @@ class TornCell:
             yield part, extended[part.dofs]
 
     def across_bonds(self, solution: DualSolution, u: Float) -> tuple[Float, Float]:
-        """(owned rows of `jumps`,) lam and openings for the displacements u of parts.  Collective."""
+        """(owned rows of `jumps`,) lam and openings for the part displacements u.  Collective."""
         if not self.summary.across or not self.jumps.global_rows:  # without jumps there is a single part
             return solution.lam, solution.opening
         return self._forces.multipliers(u, solution.strain), self.jumps.sum(self.jumps.B @ u)
 
     @cached_property
     def neighbours(self) -> InterfaceNeighbours:
-        """The interface nodes of all ranks.  Collective when first read."""
+        """All ranks' interface nodes.  Collective when first read."""
         from feti_homog.feti.decomposition.neighbours import InterfaceNeighbours  # most cells have no interfaces
 
         return InterfaceNeighbours(self.comm, self.solver.jump_operator, self.subdomains)
 
     @cached_property
     def spring_sides(self) -> SpringSides:
-        """Sides of elements along springs.  Collective when first read."""
+        """Element sides along springs.  Collective when first read."""
         from feti_homog.homogenization.spring_errors import SpringSides
 
         jumps = self.solver.jump_operator
@@ -126,7 +126,7 @@ class TornCell:
 
     @cached_property
     def class_nodes(self) -> Int:
-        """(c,) a plane node of each class of this rank's parts, one part after the other."""
+        """(c,) a plane node for each class in this rank's parts, one part after the other."""
         nodes, first = [np.zeros(0, np.int64)], 0
         for mesh in (part.mesh for part in self.parts):
             nodes.append(np.empty(mesh.n_classes, np.int64))
@@ -136,12 +136,12 @@ class TornCell:
 
     @cached_property
     def strength_factors(self) -> Float:
-        """(fibres,) strength of the bonds of each fibre / strength in the case."""
+        """(fibres,) each fibre's bond strength / strength in the case."""
         return phase_laws.strength_factors(self.case, self.summary.fibres)
 
     @cached_property
     def bond_law(self) -> BondLaw:
-        """Law of the bonds at this rank's interface nodes."""
+        """Bond law at this rank's interface nodes."""
         nodes = self.solver.jump_operator.nodes
         varies = not (self.strength_factors == 1.0).all()
         factor = self.strength_factors[self.summary.fibre_number(nodes.fibre) - 1] if varies else 1.0
@@ -149,18 +149,18 @@ class TornCell:
 
     @cached_property
     def directions(self) -> Float:
-        """(k,) directions in degrees from the centres of fibres to this rank's interface nodes."""
+        """(k,) directions in degrees from fibre centres to this rank's interface nodes."""
         nodes = self.solver.jump_operator.nodes
         return debonded_arcs.angles(nodes.points, nodes.fibre, self.summary.centres, self.summary.period)
 
     @cached_property
     def nested_lattice(self) -> ReferenceLattice:
-        """The lattice of the mesh that is refined less.  Collective when first read."""
+        """The lattice for the mesh that is refined less.  Collective when first read."""
         return uniform_parts.nested_lattice(self.lattice, self.subdomains, self.comm, self.summary.across)
 
     @cached_property
     def nested_interiors(self) -> list[uniform_parts.NestedInterior]:
-        """The interiors of this rank's subdomains on the mesh that is refined less."""
+        """This rank's subdomain interiors on the mesh that is refined less."""
         return list(uniform_parts.nested_interiors(self.solver.interface_operators, self.lattice, self.nested_lattice))
 
     def debonded(self, opening: float | None) -> Bool:
@@ -185,7 +185,7 @@ class TornCell:
         return {phase: self.comm.allreduce(area) for phase, area in local.items()}
 
     def fractions(self) -> dict[str, float]:
-        """Share of each phase in the area of the cell; without voids in the area of the mesh.  Collective."""
+        """Each phase's share in the cell area; without voids in the mesh area.  Collective."""
         areas = self.areas()
         total = self.summary.area if self.summary.voids else sum(areas.values())
         return {phase: area / total for phase, area in areas.items()}
@@ -207,7 +207,7 @@ def tear(
     thresholds: Thresholds = DEFAULTS,
     policy: PartitionPolicy = DEFAULT_POLICY,
 ) -> TornCell:
-    """Return the torn cell of a case, its subdomains factored. Collective.
+    """Tear a case's cell and factor its subdomains.  Collective.
 
     Raises:
         CaseError, MeshError: on every rank.
@@ -236,7 +236,7 @@ def tear(
 
 
 def assemble_axial(case: Case, summary: CellSummary, subdomains: Sequence[Subdomain]) -> list[Subdomain]:
-    """Return the subdomains of this rank with the displacement along the fibres, on their meshes."""
+    """Assemble this rank's subdomains for the displacement along the fibres, on their meshes."""
     law = partial(phase_laws.axial_law, case)
     return [
         Subdomain.on(
@@ -251,7 +251,7 @@ def assemble_subdomains(
 ) -> tuple[RankShare, SharedEntities, ReferenceLattice, list[Subdomain]]:
     """Mesh the cell, cut it on rank 0; refine and assemble the subdomains on their ranks.  Collective.
 
-    Returns this rank's share, its entities shared with other ranks, the lattice of the refinement, and the subdomains.
+    Returns this rank's share, its entities shared with other ranks, the refinement lattice, and the subdomains.
     Raises as `tear`.
     """
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
@@ -275,7 +275,7 @@ def assemble_subdomains(
 def _assemble(
     case: Case, summary: CellSummary, submeshes: SubmeshesOfRank, lattice: ReferenceLattice
 ) -> list[Subdomain]:
-    """Return the subdomains of this rank, refined and assembled."""
+    """Refine and assemble this rank's subdomains."""
     problem, law, subdomains = phase_laws.plane_problem(case), partial(phase_laws.plane_law, case), list[Subdomain]()
     for s in submeshes.cut():
         phase_of = summary.constituent_phase[s.constituent]
@@ -287,13 +287,13 @@ def _assemble(
 
 
 def _laws(summary: CellSummary, submesh: Submesh, law: Callable[[str], Float]) -> Float:
-    """Return the stiffnesses of a subdomain by the `law` of each phase, as `assemble` takes them."""
+    """Return a subdomain's stiffnesses by each phase's `law`, as `assemble` takes them."""
     laws = np.stack([law(phase) for phase in _phases(summary, submesh)])
     return np.asarray(laws[0] if submesh.phase else laws)
 
 
 def _phases(summary: CellSummary, submesh: Submesh) -> list[str]:
-    """Return the names of the phases of a subdomain, in their order."""
+    """Return a subdomain's phase names, in their order."""
     if submesh.phase:
         return [submesh.phase]
     return [summary.phases[k] for k in np.unique(summary.constituent_phase[submesh.constituent]).tolist()]
