@@ -43,9 +43,8 @@ def test_a_page_that_fetches_would_be_seen(chromium: Any, tmp_path: Path) -> Non
     assert any(entry["level"] == "SEVERE" for entry in chromium.get_log("browser"))
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_pictures_are_drawn(chromium: Any, reports: dict[str, Path], kind: str) -> None:
-    opened(chromium, reports[kind])
+def test_pictures_are_drawn(chromium: Any, reports: dict[str, Path]) -> None:
+    opened(chromium, reports["stiffness"])
     images = chromium.find_elements(By.TAG_NAME, "img")
     assert len(images) >= 2 and all(image.get_property("naturalWidth") > 100 for image in images)
 
