@@ -22,7 +22,7 @@ MOST = 5.0
 STRONG = {"strength": 1e3, "toughness": 1e6, "tractions": 1e3, "openings": 1e3}
 PIXELS, FORMATS = (5, 10), (".msh", ".inp", ".vtk", ".vtu", ".mesh")
 NUMBERS = {"matrix": 0, "fibre": 1}  # of Medit's references, which have no names
-SIZES, ACCURACIES = {"mesh_size", "interface_size", "refine"}, (0.02, 0.2)
+SIZES, ACCURACIES = {"mesh_size", "interface_size", "refine"}, (0.02, 0.1)
 ROUNDING = 1e-10
 
 

@@ -17,7 +17,7 @@ from differential.other_files import card, mesh_format
 from differential.random_cases import Drawn
 from differential.setting import Compared, Setting
 from differential.twin import SolvedAnew
-from feti_homog.errors import NotCarriedError
+from feti_homog.errors import CaseError, NotCarriedError
 from feti_homog.verify.certificate import verify
 
 STATES = 4  # of a result are solved anew
@@ -125,7 +125,7 @@ DRAWN = (
     Relation("accuracy", accuracy, _is_meshed, weight=2, exact=True),
     Relation("quadrilaterals", quadrilateral_mesh, _is_linear, weight=1, exact=True),
     Relation("format of the mesh", mesh_format, _has_file, weight=6),
-    Relation("card", card, _has_card, weight=6),
+    Relation("card", card, _has_card, weight=6, refusals=(CaseError,)),
     Relation("limit load", limit_load, _is_path, weight=3),
     Relation("onset", other_results.onset, _is_envelope, weight=6),
 )

@@ -23,7 +23,7 @@ LINES = {
     "commands": 560,
     "fem": 1165,
     "feti": 6541,
-    "homogenization": 3476,
+    "homogenization": 3527,
     "interface": 4095,
     "materials": 1440,
     "mesh": 6922,
@@ -35,7 +35,7 @@ LINES = {
     "system": 2186,
     "verify": 3494,
 }
-FILES, TOTAL = 310, 48532
+FILES, TOTAL = 310, 48604
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 14.2, 7.5
 # Numbers at the level of modules; pairs of module and name that other packages import.
