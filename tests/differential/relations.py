@@ -16,6 +16,7 @@ from differential.limit_loads import limit_load
 from differential.other_files import card, mesh_format
 from differential.random_cases import Drawn
 from differential.setting import Compared, Setting
+from differential.transforms import sections
 from differential.twin import SolvedAnew
 from feti_homog.errors import CaseError, NotCarriedError
 from feti_homog.verify.certificate import verify
@@ -73,7 +74,9 @@ def _has_estimate(drawn: Drawn, base: Any) -> bool:
 
 
 def _is_meshed(drawn: Drawn, base: Any) -> bool:
-    return drawn.analysis != "path" and "file" not in drawn.document["cell"]
+    # Accurate meshes of debonded arcs have many elements.
+    arcs = any("debonded" in section for section in sections(drawn.document))
+    return drawn.analysis != "path" and not arcs and "file" not in drawn.document["cell"]
 
 
 def _has_file(drawn: Drawn, base: Any) -> bool:
