@@ -54,7 +54,7 @@ def distances(pattern: FibrePattern) -> Float:
 
 
 def smallest_gap(pattern: FibrePattern) -> float:
-    """Smallest distance between the circles of two fibres, or of one and its image; infinite without pairs."""
+    """Return the smallest gap between two fibres, periodic images included; infinite for a single fibre."""
     if not pattern.periodic and pattern.count == 1:
         return np.inf
     tree = cKDTree(pattern.images(float(pattern.size.min()))[0])

@@ -43,10 +43,6 @@ class CaseError(FetiHomogError):
     exit_code = EXIT_INPUT
 
 
-class CheckpointError(CaseError):
-    """Checkpoint events are missing, unreadable or from another run."""
-
-
 class MeshError(FetiHomogError):
     """The cell cannot be meshed, or a user's mesh is faulty; each fault names nodes or elements."""
 

@@ -105,7 +105,7 @@ class StateRecorder:
     def record(
         self, plane: Response | None, axial: Response | None, load_factor: float, label: str, point: int
     ) -> None:
-        """Take responses, one of which may be None, as the next state.  Collective."""
+        """Record the next state, with the response in the plane, along the fibres, or both.  Collective."""
         if self._file is None and not self._keep:
             return
         state: StatePart

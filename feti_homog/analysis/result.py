@@ -90,7 +90,7 @@ def _gathered(comm: Intracomm, part: Part) -> Part | None:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)  # arrays have no single answer to "equal"
 class Result:
-    """A case's result, the same on every rank but for `fields`.
+    """Result of a case.  All ranks have the same one, except for `fields`.
 
     Printed, it is a short summary; in a notebook, tables.  `schema_keys` lists all written keys.
 

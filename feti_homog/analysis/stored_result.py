@@ -14,7 +14,7 @@ from feti_homog.results import checkpoint_file, field_file, result_json, seals
 
 
 def read(directory: Path) -> dict[str, Any]:
-    """Read `directory`/result.json, with result.h5 from the same run.  Call on one rank.
+    """Read the result in a folder: result.json, and result.h5 if the case keeps fields.  Call on one rank.
 
     Raises:
         CaseError: a file is missing, damaged, or from another program or run.

@@ -152,7 +152,7 @@ def _deviation(value: Mapping[str, Any]) -> float | None:
 
 
 def number_at(document: Mapping[str, Any], path: TomlPath) -> float | None:
-    """Return the number at a place, None if there is none; one of several sections with the same name has no number."""
+    """Return the number at a place of the case; None for other values, and in a section that stands several times."""
     result = _at(document, _in_lists(path))
     return float(result) if is_number(result) else None
 

@@ -126,7 +126,7 @@ def _affine(
 def _curved(
     macro: MacroElement, mesh: FineMesh, part: Int, tensor: Float, mixed: Float | None
 ) -> tuple[Float, Float, float]:
-    """Return the same for coarse triangles with curved edges, by integration over each of their elements."""
+    """Assemble coarse triangles with curved edges: integrate over each element, for no two are alike."""
     elements = mesh.lattice.triangles
     points = mesh.points[mesh.nodes[part][:, elements].reshape(-1, elements.shape[1])]
     g, w = gradients(points)

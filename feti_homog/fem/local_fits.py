@@ -68,7 +68,7 @@ class PatchNeighbours:
         return NEIGHBOURS[1] * np.stack([np.bincount(self.at, row, moments.shape[1]) for row in moved])
 
     def shared_matrices(self, moments: Float, order: int) -> Float:
-        """(vertices, p, p) the same for moments (vertices, p, p)."""
+        """(vertices, p, p) sums of neighbour moments (vertices, p, p), moved to each vertex."""
         T = _translations(self.vector, order)
         moved = T @ moments[self.other] @ T.transpose(0, 2, 1)
         return NEIGHBOURS[order] * gathered(self.at, moved, len(moments))

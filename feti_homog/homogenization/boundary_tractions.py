@@ -25,7 +25,7 @@ INSIDE = -1  # place of a class that is not on a boundary
 
 
 class Group(NamedTuple):
-    """Stresses in some subdomains of one phase, their arcs, and (classes,) places among boundary displacements."""
+    """Recovered stresses and arcs in a group of subdomains, with (classes,) places among boundary displacements."""
 
     stress: RecoveredStress
     sides: ArcSides

@@ -190,7 +190,7 @@ def _nested_displacements(
 def _displacements(
     cell: TornCell, u: Float, loads: Float, keep: bool, lattice: ReferenceLattice
 ) -> Iterator[tuple[Members, FineMesh, Float, Int]]:
-    """Yield subdomain groups of one phase, their lattice mesh, displacements (classes, c, k) and places.
+    """Yield groups of subdomains with one phase: mesh, displacements (classes, c, k), and their places.
 
     Places (c classes,) count displacements on all boundaries or, across materials, in all parts; INSIDE elsewhere.
 

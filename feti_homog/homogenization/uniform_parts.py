@@ -134,7 +134,7 @@ class ForcesBetweenParts:
 
 @dataclass(frozen=True)
 class NestedInterior:
-    """Coarser meshes of some subdomains of one phase, c displacements a node.
+    """Coarser mesh of a group of subdomains with one phase, with c displacements per node.
 
     Attributes:
         members: the subdomains.

@@ -74,7 +74,7 @@ class Load:
         return [Load(*part) for part in zip(np.split(self.values, ends), np.split(self.by_stress, ends), strict=True)]
 
     def after(self, share: float, end: Load) -> Load:
-        """Return the load after a share of the way to another one of the same kinds, without rounding of zeros."""
+        """Return (1 - share) load + share end; components that cancel to rounding are zero."""
         values = (1.0 - share) * self.values + share * end.values
         largest = np.abs([self.values, end.values]).max(axis=0)
         return Load(np.where(np.abs(values) <= LOAD_ROUNDING * largest, 0.0, values), self.by_stress)

@@ -49,7 +49,7 @@ class FibreBounds:
 
 @dataclass(frozen=True)
 class Springs:
-    """An elastic interface around round fibres of one radius: tractions over jumps, positive; infinite is bonded.
+    """Spring stiffnesses around round fibres of one radius: traction / jump, positive; infinite where bonded.
 
     Attributes:
         normal: k_n, for the opening.
@@ -72,7 +72,7 @@ class Springs:
 
 @dataclass(frozen=True)
 class Fibres:
-    """Fibres of one material, and one radius if they are on springs: their share of the cell, and constants."""
+    """Volume fraction, constants and springs of the fibres of one phase; on springs they have one radius."""
 
     fraction: float
     constants: TransverseIsotropy
@@ -153,7 +153,7 @@ def hashin_shtrikman(fractions: ArrayLike, stiffnesses: Sequence[ArrayLike]) -> 
 def aligned_cylinders(
     fractions: Sequence[float], phases: Sequence[TransverseIsotropy], surroundings: tuple[float, float, float]
 ) -> TransverseIsotropy:
-    """Estimate the constants where every phase is a cylinder in the same surroundings k0, m0, p0 and far field.
+    """Estimate constants: each phase is a cylinder in one reference medium k0, m0, p0, under the same far field.
 
     With x_i = k_i + m0 and h0 = k0 m0/(k0 + 2 m0),
 

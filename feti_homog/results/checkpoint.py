@@ -16,7 +16,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from feti_homog.case.case import Case
-from feti_homog.errors import CaseError, CheckpointError
+from feti_homog.errors import CaseError
 from feti_homog.results import atomic, checkpoint_file
 from feti_homog.results.checkpoint_file import FOLDER, NAME, Arrays, packed, records, unpacked
 from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
@@ -45,7 +45,7 @@ class NoCheckpoint:
         """Return the number of events, after a check of each.
 
         Raises:
-            CheckpointError: an event is unreadable or of another run.
+            CaseError: an event is unreadable or of another run.
         """
         return 0
 
@@ -115,7 +115,7 @@ class Checkpoint(NoCheckpoint):
         try:
             return on_root(self.comm, self._count)
         except CaseError as error:
-            raise CheckpointError(*(f"--resume: {fault}" for fault in error.faults)) from error
+            raise CaseError(*(f"--resume: {fault}" for fault in error.faults)) from error
 
     def read(self, number: int) -> Arrays:
         event = on_root_only(self.comm, lambda: unpacked(next(records(self.path, self._ends[number]))[1]))

@@ -157,7 +157,7 @@ OUTPUT_COLUMNS = (
     Column("fraction_PHASE", "", "share of a phase in the meshed area, if there are more than matrix and fibre"),
     Column("porosity", "", "share of voids in the area of the cell, where there are some"),
     Column("match_distance", "", "of cells with `match`: how far they are from the table, in mean diameters"),
-    Column("refine", "", "halvings of the mesh, of one that is solved once more those of its finer mesh"),
+    Column("refine", "", "halvings of the mesh"),
     Column("elements", "", "triangles of the refined mesh"),
     Column("nodes", "", "nodes of the refined mesh, once for each body in each subdomain: depends on ranks"),
     Column("ranks", "", "MPI ranks"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -23,6 +23,7 @@ NOISE = 1e-3  # share of the largest constant of a kind below which constants ar
 SAME_RADIUS = 1e-8  # of a radius
 TINY = 1e-300
 WEIGHTS = (1.0, -0.7, 0.5, 0.9, -0.8)
+SPRINGS = ("normal_stiffness", "tangential_stiffness", "axial_stiffness")
 Case = dict[str, Any]
 
 
@@ -34,6 +35,8 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
             findings.record("tables", np.inf, "sensitivities, which the case asks for")
         return
     names = document["sensitivities"]["parameters"]
+    missing = sorted({*_parameters(cell)}.difference(names))
+    findings.record("tables", [np.inf] * len(missing), lambda k: f"sensitivities, {missing[k]}")
     values = np.array([_place(dict(cell.files.case), name)[2] for name in names])
     # Changes over which the laws are nearly linear.
     ratios = np.array([name.endswith(".poisson") for name in names]) & (values < 0.5)
@@ -47,6 +50,25 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
         _check_secants(findings, cell, states, cases, direction)
     else:
         _check_linear(findings, cell, states, cases, direction)
+
+
+def _parameters(cell: DiscreteCell) -> Iterator[str]:
+    """Yield the names of all constants of phases and springs that the answer depends on."""
+    material, sections = cell.files.case["material"], cell.files.interfaces
+    for phase in {*cell.files.phases} & material.keys():
+        for key, value in material[phase].items():
+            if "thermal_stress" in cell.files.document or not key.startswith("expansion"):
+                yield from (f"material.{phase}.{key}{place}" for place in _places(np.array(value, float)))
+    for number, section in enumerate(sections, start=1):
+        name = f"interface.{number}" if len(sections) > 1 else "interface"
+        yield from (f"{name}.{key}" for key in SPRINGS if np.isfinite(float(section.get(key) or np.inf)))
+
+
+def _places(numbers: Float) -> list[str]:
+    """Return the endings of parameter names: none for one number, .k for several, .Cij for a stiffness."""
+    if numbers.ndim > 1:
+        return [f".C{i + 1}{j + 1}" for i, j in np.argwhere(np.triu(numbers))]
+    return [f".{k + 1}" for k in range(len(numbers))] if numbers.ndim else [""]
 
 
 def _check_secants(

@@ -198,7 +198,6 @@ REASONS = {
     "copies of other numbers, for readers": (
         "fibres", "peak", "mark", "debonding_angle", "debonded_share", "dissipation_ratio", "parameter_values",
     ),
-    "scatter, which follows from derivatives and the case": ("uncertainty",),
 }  # fmt: skip
 ATOMS = ("case", "result_h5")
 NO_REASON, THINNED = "no law", "at points whose fields are not in the files"

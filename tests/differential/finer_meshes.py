@@ -37,6 +37,8 @@ def finer_mesh(setting: Setting) -> Compared:
         coarse = setting.solved(document, out=setting.work / "coarse")  # states that are kept have estimates
     cell = document["cell"]
     fine = setting.solved(document | {"cell": cell | {"refine": cell.get("refine", 0) + 1}})
+    if fine["cell"]["elements"] <= coarse["cell"]["elements"]:
+        return Compared(DIFFERENT, "number of elements")
     if setting.drawn.analysis == "stiffness":
         change = np.subtract(fine["effective_stiffness"], coarse["effective_stiffness"])
         return _ratio(change, coarse["mesh_error"]["effective_stiffness"], "effective_stiffness")

@@ -17,7 +17,7 @@ PACKAGE = Path(__file__).parents[2] / "feti_homog"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 # Lines, of the modules beside the packages under ".".
 LINES = {
-    ".": 491,
+    ".": 487,
     "analysis": 3000,
     "case": 3089,
     "commands": 560,
@@ -33,9 +33,9 @@ LINES = {
     "schema": 525,
     "studies": 3233,
     "system": 2186,
-    "verify": 3494,
+    "verify": 3515,
 }
-FILES, TOTAL = 310, 48604
+FILES, TOTAL = 310, 48621
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 14.2, 7.5
 # Numbers at the level of modules; pairs of module and name that other packages import.

@@ -278,6 +278,6 @@ class CoulombFaces(FaceSystem):
         return float(forces @ (after - before)), self.heat_behind(status, before, after)
 
     def heat_behind(self, status: Status, before: Float, after: Float) -> float:
-        """Return the heat of one implicit step: slips times final forces, of faces that finally slide."""
+        """Return the heat of one implicit step: sum of slip times final force over the faces that slide at its end."""
         slips = (after - before)[1 : 2 * self.nodes : 2]
         return float((self.forces(after)[1] * slips)[np.abs(status) == 1].sum())

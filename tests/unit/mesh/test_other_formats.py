@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.other_formats import written
-from unit.mesh.faulty_meshes import RIGHT_SIDE, grid, node, turned
+from unit.mesh.faulty_meshes import RIGHT_SIDE, MshFile, grid, node, turned
 from unit.mesh.second_order import second_order
 
 from feti_homog.errors import MeshError
@@ -101,3 +101,15 @@ def _edges(mesh):
 def _sorted(mesh):
     rows = np.column_stack([np.sort(mesh.triangles, axis=1), mesh.phase])
     return rows[np.lexsort(rows.T)]
+
+
+def test_a_mesh_without_sides_is_refused_with_snapping_and_without(tmp_path):
+    """All edges of a tetrahedron's surface lie between two triangles."""
+    nodes = {1: (0.0, 0.0, 0.0), 2: (1.0, 0.0, 0.0), 3: (0.0, 1.0, 0.0), 4: (0.2, 0.3, 0.0)}
+    corners = ((1, 2, 3), (1, 2, 4), (2, 3, 4), (3, 1, 4))
+    MshFile(nodes, {k: (2, 1, 1, own) for k, own in enumerate(corners, start=1)}, {1: "matrix"}).write(
+        tmp_path / "a.msh"
+    )
+    for snap in (None, 1e-3):
+        with pytest.raises(MeshError):
+            read(tmp_path / "a.msh", snap=snap)
