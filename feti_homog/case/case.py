@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from feti_homog.case.cell_section import GEOMETRY, Cell
 from feti_homog.case.document import read_document, short_digest, to_document
 from feti_homog.case.interface_section import Arc, InterfaceSection, interface_tables
 from feti_homog.case.loads import AnalysisSection, Angle, Envelope, LoadPath, SingleLoad, Stiffness, completed
-from feti_homog.case.material_sections import phase_faults, provider, read_materials
+from feti_homog.case.material_sections import provider, read_materials
 from feti_homog.case.relations import axes_lines, idle_friction_keys, read_interfaces, relation_faults, stress_free
 from feti_homog.case.rules import RULES
 from feti_homog.case.section_values import ANALYSIS_TYPE, CRITERION, METHOD, PLANE
@@ -140,8 +140,8 @@ class Case:
             METHOD: None if self.path is None else self.path.method,
             CRITERION: None if self.interface is None else self.interface.criterion,
         }
-        cell = cell_sizes.without_chosen(self.cell, to_table(self.cell, selected))
-        document: dict[str, Any] = {"name": self.name, "cell": cell}
+        chosen: dict[str, Any] = {} if self.cell.accuracy is None else dict.fromkeys(cell_sizes.CHOSEN)
+        document: dict[str, Any] = {"name": self.name, "cell": to_table(replace(self.cell, **chosen), selected)}
         document["material"] = {phase: to_table(material, selected) for phase, material in self.materials.items()}
         sections = {section: getattr(self, FIELDS.get(section, section)) for section in SECTIONS if section != "cell"}
         given = {section: contents for section, contents in sections.items() if contents is not None}
@@ -261,5 +261,11 @@ def _read_section(document: Mapping[str, Any], section: str, reader: TableReader
 
 def check_phases(case: Case, phases: Iterable[str]) -> None:
     """Raise CaseError if a mesh phase has no material, or a material no phase."""
-    if faults := phase_faults(case.materials, phases):
+    sources = {phase: provider(phase, case.materials) for phase in phases}
+    without = [phase for phase, source in sources.items() if source not in case.materials]
+    faults = [f"[material.{toml_key(phase)}]: missing section; the mesh has this phase" for phase in without]
+    unused = [phase for phase in case.materials if phase not in sources.values()]
+    has = ", ".join(map(toml_key, sources))
+    faults += [f"[material.{toml_key(phase)}]: the mesh has no such phase; it has {has}" for phase in unused]
+    if faults:
         raise CaseError(*faults)

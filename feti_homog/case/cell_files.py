@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feti_homog.case.cell_section import TOUCHING, Cell, size_faults
+from feti_homog.case.cell_section import TOUCHING, Cell
 from feti_homog.case.cell_sizes import mix_faults
 from feti_homog.case.section_values import MESH_SUFFIXES, TABLE_SUFFIXES
 from feti_homog.errors import CaseError
@@ -42,7 +42,13 @@ def checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
                 f"{limit_in_words(limit, cell.fibre_fraction, 4)} for "
                 f"geometry = {toml_value(cell.geometry)}: {reason}"
             )
-    faults += size_faults(cell) + mix_faults(cell)
+    largest = ("mesh_size", cell.mesh_size)
+    for name, size in (("interface_size", cell.interface_size), ("tip_size", cell.tip_size)):
+        if size is not None and size > largest[1]:
+            faults.append(f"[cell] {name} = {size}: expected at most {largest[0]}, which is {largest[1]}")
+        elif size is not None:
+            largest = name, size
+    faults += mix_faults(cell)
     return _with_files(cell, folder, faults)
 
 

@@ -259,14 +259,3 @@ class Cell:
     def has_own_mesh(self) -> bool:
         """Return whether the user brings the mesh."""
         return self.geometry == "mesh"
-
-
-def size_faults(cell: Cell) -> list[str]:
-    """Faults in element sizes larger than the sizes around."""
-    faults, largest = [], ("mesh_size", cell.mesh_size)
-    for name, size in (("interface_size", cell.interface_size), ("tip_size", cell.tip_size)):
-        if size is not None and size > largest[1]:
-            faults.append(f"[cell] {name} = {size}: expected at most {largest[0]}, which is {largest[1]}")
-        elif size is not None:
-            largest = name, size
-    return faults

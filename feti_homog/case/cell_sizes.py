@@ -120,11 +120,6 @@ def _coarsest(cell: Cell) -> float:
     return min(LARGEST, float(f"{PITCH_SHARE * sqrt(height / fibres):.2g}"))
 
 
-def without_chosen(cell: Cell, table: dict[str, Any]) -> dict[str, Any]:
-    """Return a cell's table [cell] without the sizes that its accuracy chooses."""
-    return table if cell.accuracy is None else {name: table[name] for name in table if name not in CHOSEN}
-
-
 def coarse_error(materials: Mapping[str, Material], plane: str, order: int, free_faces: bool) -> float:
     """Return an upper estimate of the relative strain energy error on the coarsest mesh,
 

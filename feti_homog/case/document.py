@@ -17,6 +17,7 @@ from feti_homog.system.runtime import input_files
 
 MAX_BYTES = 1 << 24
 MAX_DEPTH = 50
+TOO_DEEP = f"tables and arrays are nested more than {MAX_DEPTH} deep"
 
 TomlPath = tuple[str, ...]
 
@@ -33,20 +34,16 @@ def read_document(path: str | Path) -> dict[str, Any]:
         line = error.object.count(b"\n", 0, error.start) + 1
         raise CaseError(f"{path}: not UTF-8 text (line {line})") from None
     except RecursionError:
-        raise _too_deep(path) from None
+        raise CaseError(f"{path}: {TOO_DEEP}") from None
     except ValueError as error:  # of too long a number too
         place = f"line {content.count(chr(10)) + 1}, the end"
         raise CaseError(f"{path}: not TOML: {str(error).replace('end of document', place)}") from None
     except OSError as error:
         raise CaseError(f"{path}: cannot be read: {error.strerror}") from None
     if _is_deeper(document, MAX_DEPTH):
-        raise _too_deep(path)
+        raise CaseError(f"{path}: {TOO_DEEP}")
     # Where the locale has no UTF-8, Python escapes the bytes of names of files.
     return {"name": os.fsencode(path.stem).decode("utf-8", "replace")} | document
-
-
-def _too_deep(path: Path) -> CaseError:
-    return CaseError(f"{path}: tables and arrays are nested more than {MAX_DEPTH} deep")
 
 
 def _is_deeper(document: dict[str, Any], depth: int) -> bool:

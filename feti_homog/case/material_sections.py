@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
 from typing import Any
@@ -17,7 +16,12 @@ from feti_homog.schema.keys import TableReader, keys_of
 from feti_homog.schema.wording import suggestion, toml_key, toml_value
 
 SUGGESTED = (MATRIX, FIBRE, COATING, "fibre:2")  # of phases that may have any name
-CONSTANTS = frozenset(name for form in MATERIAL_FORMS.values() for name in keys_of(form))
+FORMS_OF = {
+    name: [form for form, constants in MATERIAL_FORMS.items() if name in keys_of(constants)]
+    for contents in MATERIAL_FORMS.values()
+    for name in keys_of(contents)
+}
+"""Forms with each constant."""
 
 
 def read_materials(document: Mapping[str, Any], plane: str | None, reader: TableReader) -> dict[str, Material]:
@@ -54,9 +58,9 @@ def fibre_phases(cell: object) -> tuple[str, ...] | None:
     return tuple(mix) if FRACTIONS.accepts(mix) else None
 
 
-def coating_faults(cell: Cell, materials: Mapping[str, object]) -> list[str]:
+def coating_faults(cell: Cell | None, materials: object) -> list[str]:
     """Faults: coatings without a material, and a coating material where there are none."""
-    if cell.has_own_mesh:
+    if cell is None or cell.has_own_mesh or not isinstance(materials, dict):
         return []
     has_coatings = cell.coating is not None
     if cell.table is not None:
@@ -75,7 +79,7 @@ def _phase_fault(phase: str, known: tuple[str, ...] | None, geometry: str | None
     """
     section = f"[material.{toml_key(phase)}]"
     is_unknown = known is not None and ":" not in phase and phase not in known
-    if is_unknown or not PHASE.fullmatch(phase) or phase in CONSTANTS:
+    if is_unknown or not PHASE.fullmatch(phase) or phase in FORMS_OF:
         elsewhere = {} if phase == FIBRE else owners
         return f"{section}: unknown phase; {suggestion(phase, known or SUGGESTED, elsewhere)}"
     if ":" in phase and geometry in CIRCULAR:
@@ -85,10 +89,13 @@ def _phase_fault(phase: str, known: tuple[str, ...] | None, geometry: str | None
 
 def _read_material(table: object, section: str, plane: str | None, reader: TableReader) -> Material | None:
     """Return a section's material, in the form of its keys; None if it is faulty."""
-    given = _keys_by_form(table)
+    given: dict[str, list[str]] = {}
+    for name, (form, *further) in FORMS_OF.items():
+        if isinstance(table, dict) and name in table and not further:
+            given.setdefault(form, []).append(name)
     forms = list(given) or ["isotropic"]
     if len(forms) > 1:
-        groups = " and ".join(f"{', '.join(names)} ({form})" for form, names in given.items())
+        groups = " and ".join(f"{', '.join(keys)} ({form})" for form, keys in given.items())
         reader.faults.append(f"[{section}] {groups}: exclude each other; a material is of one kind")
         return None
     material: Material | None = reader.read(MATERIAL_FORMS[forms[0]], table, section)
@@ -102,17 +109,6 @@ def _read_material(table: object, section: str, plane: str | None, reader: Table
             except ValueError as error:
                 reader.faults.append(f"[{section}] {error}")
     return material
-
-
-def _keys_by_form(table: object) -> dict[str, list[str]]:
-    """Return the table keys that belong to one material form alone, without the forms that have none."""
-    names = table if isinstance(table, dict) else {}
-    forms_of = Counter(name for cls in MATERIAL_FORMS.values() for name in keys_of(cls))
-    given = {
-        form: [name for name in keys_of(cls) if name in names and forms_of[name] == 1]
-        for form, cls in MATERIAL_FORMS.items()
-    }
-    return {form: names for form, names in given.items() if names}
 
 
 def missing_expansions(materials: Mapping[str, Material], needed_by: str) -> list[str]:
@@ -131,15 +127,3 @@ def missing_expansions(materials: Mapping[str, Material], needed_by: str) -> lis
 def provider(phase: str, materials: Mapping[str, Material]) -> str:
     """Return the phase whose material a phase has: itself, or "fibre" for "fibre:2"."""
     return phase if phase in materials else phase.partition(":")[0]
-
-
-def phase_faults(materials: Mapping[str, Material], phases: Iterable[str]) -> list[str]:
-    """Faults: mesh phases without a material, and materials without a phase."""
-    phases = list(phases)
-    providers = [provider(phase, materials) for phase in phases]
-    without = [phase for phase, source in zip(phases, providers, strict=True) if source not in materials]
-    unused = [phase for phase in materials if phase not in providers]
-    has = ", ".join(map(toml_key, phases))
-    return [f"[material.{toml_key(phase)}]: missing section; the mesh has this phase" for phase in without] + [
-        f"[material.{toml_key(phase)}]: the mesh has no such phase; it has {has}" for phase in unused
-    ]

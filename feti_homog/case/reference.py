@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,13 +34,6 @@ from feti_homog.schema.values import text
 
 ORDER = ("name", "cell", "material", *[*SECTIONS][1:], "petsc", UNCERTAINTY, SWEEP, UNKNOWN, MEASURED)
 """Sections in the order of the reference."""
-
-FIT_TABLES = (
-    SectionTable(UNKNOWN, f"[{UNKNOWN}] SECTION.KEY", Unknown),
-    SectionTable(MEASURED, f"[{MEASURED}] NAME", Measured),
-    SectionTable(MEASURED, f"[{MEASURED}] {CURVE}", MeasuredCurve),
-)
-"""Tables of the file of `feti-homog fit`, beside those of its cases."""
 
 WIDTH = 100  # characters of a printed line
 INDENT: dict[str, Any] = {"initial_indent": "      ", "subsequent_indent": "      ", "break_on_hyphens": False}
@@ -114,15 +107,18 @@ AXIS = KeyRow(SWEEP, f"[{SWEEP}]", "SECTION.KEY", AXIS_EXPECTED, "", "", "", AXI
 
 def tables() -> list[TableReference]:
     """All tables of the case file, ordered as in `ORDER`."""
-    found = [
+    references = [
         TableReference("name", NAME.table, "the case as a whole.", (NAME,)),
-        *map(_table, (*TABLES, *FIT_TABLES)),
+        *map(_table, TABLES),
+        _table(SectionTable(UNKNOWN, f"[{UNKNOWN}] SECTION.KEY", Unknown)),
+        _table(SectionTable(MEASURED, f"[{MEASURED}] NAME", Measured)),
+        _table(SectionTable(MEASURED, f"[{MEASURED}] {CURVE}", MeasuredCurve)),
         TableReference("petsc", "[petsc]", PETSC_MEANING, (PETSC_OPTION,)),
         TableReference(UNCERTAINTY, f"[{UNCERTAINTY}]", UNCERTAINTY_MEANING, (DEVIATION, PAIRS)),
         _table(SectionTable(SWEEP, f"[{SWEEP}]", SweepSection), AXIS),
         TableReference(SWEEP, RANGE, "Values of a key that lie between two ends.", _rows(SWEEP, RANGE, RANGE_KEYS)),
     ]
-    return sorted(found, key=lambda table: ORDER.index(table.section))
+    return sorted(references, key=lambda table: ORDER.index(table.section))
 
 
 def tables_of(section: str) -> list[TableReference]:
@@ -131,12 +127,6 @@ def tables_of(section: str) -> list[TableReference]:
     if not result:
         raise CaseError(f"{section}: unknown section; expected one of {', '.join(ORDER)}")
     return result
-
-
-def rows() -> Iterator[KeyRow]:
-    """All case file keys."""
-    for table in tables():
-        yield from table.rows
 
 
 def _table(table: SectionTable, *rows: KeyRow) -> TableReference:
@@ -167,15 +157,15 @@ def _rows(section: str, place: str, keys: Mapping[str, Key]) -> tuple[KeyRow, ..
 
 def as_text(references: Sequence[TableReference]) -> str:
     """Return the tables in plain text: each key with its values, its conditions and its meaning."""
-    headings = (textwrap.fill(f"{table.place}: {table.meaning}", WIDTH) for table in references)
-    tables = zip(headings, references, strict=True)
-    return "\n\n".join("\n".join([heading, *map(_row_text, table.rows)]) for heading, table in tables)
-
-
-def _row_text(row: KeyRow) -> str:
-    unit = f" ({row.unit})" if row.unit else ""
-    default = f"default {row.default}" if row.default else "optional"
-    presence, only = ("required", " if") if row.default == "required" else (default, "; only if")
-    when = f"{only} {row.applies}" if row.applies else ""
-    lines = (f"{row.accepts}{unit}; {presence}{when}", row.meaning)
-    return "\n".join([f"\n  {row.key}", *(textwrap.fill(line, WIDTH, **INDENT) for line in lines)])
+    blocks = []
+    for table in references:
+        lines = [textwrap.fill(f"{table.place}: {table.meaning}", WIDTH)]
+        for row in table.rows:
+            unit = f" ({row.unit})" if row.unit else ""
+            default = f"default {row.default}" if row.default else "optional"
+            presence, only = ("required", " if") if row.default == "required" else (default, "; only if")
+            when = f"{only} {row.applies}" if row.applies else ""
+            words = (f"{row.accepts}{unit}; {presence}{when}", row.meaning)
+            lines += [f"\n  {row.key}", *(textwrap.fill(line, WIDTH, **INDENT) for line in words)]
+        blocks.append("\n".join(lines))
+    return "\n\n".join(blocks)

@@ -38,24 +38,19 @@ COMMON = tuple(name for name, entry in keys_of(InterfaceSection).items() if not 
 def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], plane: str | None) -> list[str]:
     """List the faults between section values that are not faulty themselves; a `plane` of None is faulty."""
     path, load, angle, envelope = (sections[name] for name in ("path", "single_load", "angle", "envelope"))
-    faults, materials = [*_load_faults(path, load, plane)], sections["materials"]
-    if place := next(_heated_loads(path, load), ""):
-        faults += missing_expansions(materials, place)
-    if isinstance(document.get("material"), dict) and sections["cell"]:
-        faults += coating_faults(sections["cell"], document["material"])
+    faults = [*_load_faults(path, load, plane)]
+    heated = []
+    for kind, section in (("load", load), ("path", path)):
+        placed = {} if section is None else section.placed
+        heated += [f"[{kind}] {place}.{TEMPERATURE}" for place, given in placed.items() if TEMPERATURE in named(given)]
+    if envelope is not None and envelope.temperature is not None:
+        heated.append(f"[envelope] {TEMPERATURE}")
+    if heated:
+        faults += missing_expansions(sections["materials"], heated[0])
+    faults += coating_faults(sections["cell"], document.get("material"))
     if angle is not None and angle.strain is not None and not any(angle.strain):
         faults.append("[angle] strain: expected a strain other than zero")
-    if envelope is not None and envelope.temperature is not None:
-        faults += missing_expansions(materials, "[envelope] temperature")
     return faults
-
-
-def _heated_loads(path: LoadPath | None, load: SingleLoad | None) -> Iterator[str]:
-    """Yield the places of loads that name a temperature."""
-    for kind, section in (("load", load), ("path", path)):
-        for place, given in ({} if section is None else section.placed).items():
-            if TEMPERATURE in named(given):
-                yield f"[{kind}] {place}.{TEMPERATURE}"
 
 
 def _load_faults(path: LoadPath | None, load: SingleLoad | None, plane: str | None) -> Iterator[str]:
@@ -98,29 +93,28 @@ def stress_free(section: str, placed: Mapping[str, Strain | MixedLoad], plane: s
 
 
 def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[InterfaceSection, ...] | None:
-    """Return the interface sections with their arcs, in file order; None if one is faulty."""
+    """Return the interface sections in file order; None if one is faulty.
+
+    Each has its law as `criterion`, and the numbers that follow from its softening branch.
+    """
     tables = interface_tables(document)
     if document.get("interface") == []:
         reader.faults.append("interface = []: expected a section [interface]")
     labels = [interface_label(n, len(tables)) for n in range(len(tables))]
-    pairs = zip(tables, labels, strict=True)
-    read = [reader.read(InterfaceSection, table, label) for table, label in pairs]
-    if any(interface is None for interface in read):
+    interfaces: list[InterfaceSection] = []
+    for label, table in zip(labels, tables, strict=True):
+        if interface := reader.read(InterfaceSection, table, label):
+            named = replace(interface, criterion=interface.law or interface.criterion, law=None)
+            interfaces.append(replace(named, **_of_branch(named)))
+    if len(interfaces) < len(tables):
         return None
-    interfaces = tuple(map(_completed, filter(None, read)))
     reader.faults += _faults_between(interfaces, tables)
     for label, interface, table in zip(labels, interfaces, tables, strict=True):
-        reader.faults += [*_cohesive_faults(interface, table, label), *_friction_faults(interface, label)]
-    return interfaces
+        reader.faults += [f"[{label}] {line}" for line in _faults_within(interface, table)]
+    return tuple(interfaces)
 
 
-def _completed(interface: InterfaceSection) -> InterfaceSection:
-    """Return a section with its law as `criterion`, and with the numbers that follow from a table."""
-    named = replace(interface, criterion=interface.law or interface.criterion, law=None)
-    return replace(named, **_of_table(named))
-
-
-def _faults_between(interfaces: tuple[InterfaceSection, ...], tables: Sequence[Mapping[str, Any]]) -> list[str]:
+def _faults_between(interfaces: Sequence[InterfaceSection], tables: Sequence[Mapping[str, Any]]) -> list[str]:
     """Faults in several sections, from these tables: pairs that are missing or named twice, keys that must agree."""
     faults: list[str] = []
     first: dict[frozenset[str], int] = {}
@@ -148,8 +142,8 @@ def _written(value: Any) -> str:
     return "none" if table is None else toml_value(table)
 
 
-def _of_table(interface: InterfaceSection) -> dict[str, Any]:
-    """Return normal stiffness, strength and toughness of a table that begins at its peak, where they are not given."""
+def _of_branch(interface: InterfaceSection) -> dict[str, Any]:
+    """Return normal stiffness, strength and toughness of a branch that begins at its peak, where they are not given."""
     openings, tractions = interface.openings, interface.tractions
     if BRANCH[0] not in LAWS[interface.criterion].keys:
         return {}
@@ -162,28 +156,21 @@ def _of_table(interface: InterfaceSection) -> dict[str, Any]:
     return {name: number for name, number in zip(names, numbers, strict=True) if getattr(interface, name) is None}
 
 
-def _cohesive_faults(interface: InterfaceSection, table: Mapping[str, Any], label: str) -> list[str]:
-    """List the faults of numbers in a softening law, a line each, without keys that `table` lacks."""
-    law = LAWS[interface.criterion]
-    if not law.softens:
-        return []
-    words = f"law = {toml_value(law.name)}"
-    unlimited = [name for name in (*STIFFNESSES, *COHESIVE[:2]) if getattr(interface, name) is None]
-    needed = [name for name in unlimited if name in law.needs]
-    faults = [f"[{label}] {name}: {words} needs a finite one" for name in needed if name in table]
-    faults += [f"[{label}] {line}" for line in _branch_faults(interface)]
-    return faults if faults or needed else [f"[{label}] {line}" for line in _short_of_energy(interface)]
-
-
-def _friction_faults(interface: InterfaceSection, label: str) -> list[str]:
-    """List the keys that exclude friction, a line each."""
+def _faults_within(interface: InterfaceSection, table: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the faults of numbers in a section: its softening law, without keys that `table` lacks, and friction."""
+    law, words = LAWS[interface.criterion], f"friction = {interface.friction:g}: expected 0 with"
+    if law.softens:
+        needed = [name for name in law.needs if name not in COHESIVE[2:] and getattr(interface, name) is None]
+        line = f"law = {toml_value(law.name)} needs a finite one"
+        faults = [f"{name}: {line}" for name in filter(table.__contains__, needed)]
+        faults += _branch_faults(interface)
+        yield from faults if faults or needed else _short_of_energy(interface)
     if interface.friction == 0.0:
-        return []
-    law, words = LAWS[interface.criterion], f"[{label}] friction = {interface.friction:g}"
-    faults = [] if interface.contact else [f"{words}: expected 0 with contact = false: faces that overlap do not press"]
-    if "growth" in law.keys and interface.growth == "released":
-        faults.append(f'{words}: expected 0 with growth = "released"; growth = "springs" goes with it')
-    return faults
+        return
+    if not interface.contact:
+        yield f"{words} contact = false: faces that overlap do not press"
+    if interface.growth == "released" and "growth" in law.keys:
+        yield f'{words} growth = "released"; growth = "springs" goes with it'
 
 
 def idle_friction_keys(interfaces: tuple[InterfaceSection, ...]) -> list[str]:
@@ -197,32 +184,21 @@ def idle_friction_keys(interfaces: tuple[InterfaceSection, ...]) -> list[str]:
 
 
 def _branch_faults(interface: InterfaceSection) -> Iterator[str]:
-    """Yield the faults in a softening branch's table."""
+    """Yield the faults in a softening branch, or the numbers that contradict it."""
     openings, tractions = interface.openings, interface.tractions
     if openings is None or tractions is None or BRANCH[0] not in LAWS[interface.criterion].keys:
         return
     if len(openings) != len(tractions):
         yield f"openings, tractions: {len(openings)} and {len(tractions)} numbers; expected as many of both"
-    elif openings[0] <= 0.0 or any(a >= b for a, b in pairwise(openings)):
+    elif openings[0] <= 0.0 or sorted({*openings}) != [*openings]:
         yield f"openings = {toml_value(list(openings))}: expected a rising list of numbers above 0"
-    elif not _softens(tractions):
+    elif tractions[0] <= 0.0 or tractions[-1] != 0.0 or sorted(tractions) != [*tractions[::-1]]:
         yield f"tractions = {toml_value(list(tractions))}: expected a softening branch, which falls from its peak to 0"
     else:
-        yield from _unlike_branch(interface)
-
-
-def _softens(tractions: Sequence[float]) -> bool:
-    """Return whether tractions never rise, and end with none."""
-    return tractions[0] > 0.0 and tractions[-1] == 0.0 and all(a >= b for a, b in pairwise(tractions))
-
-
-def _unlike_branch(interface: InterfaceSection) -> Iterator[str]:
-    """Yield the numbers that contradict the softening branch."""
-    of_branch = _of_table(replace(interface, normal_stiffness=None, normal_strength=None, normal_toughness=None))
-    given = {name: getattr(interface, name) for name in of_branch}
-    for name, number in of_branch.items():
-        if not math.isclose(given[name], number, rel_tol=SAME):
-            yield f"{name} = {given[name]:g}: expected {number:g}, that of openings and tractions, or none"
+        bare = replace(interface, normal_stiffness=None, normal_strength=None, normal_toughness=None)
+        for name, number in _of_branch(bare).items():
+            if not math.isclose(given := getattr(interface, name), number, rel_tol=SAME):
+                yield f"{name} = {given:g}: expected {number:g}, that of openings and tractions, or none"
 
 
 def _short_of_energy(interface: InterfaceSection) -> Iterator[str]:

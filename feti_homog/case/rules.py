@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import product
-from operator import eq
+from operator import ne
 from typing import Any
 
 from feti_homog.case.bond_laws import REGISTRY, STIFFNESSES, STRENGTHS
@@ -30,22 +30,11 @@ from feti_homog.case.section_values import (
     TABLE_SUFFIXES,
     VOIDS_OF_A_RANDOM_CELL,
 )
-from feti_homog.case.sections import OUT_OF_PLANE_STRESSES, SECTIONS, SECTIONS_OF_AN_ANALYSIS
+from feti_homog.case.sections import SECTIONS, SECTIONS_OF_AN_ANALYSIS
 from feti_homog.case.uncertainty import DIFFERENTIABLE
 from feti_homog.materials.voigt import PLANE_STATES, SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
-from feti_homog.schema.keys import (
-    ITEMS,
-    Rule,
-    Selector,
-    TablePath,
-    belonging,
-    exclusive,
-    has,
-    keys_of,
-    needed,
-    refused,
-)
-from feti_homog.schema.values import INF, Test
+from feti_homog.schema.keys import ITEMS, Rule, Selector, TablePath, belonging, exclusive, has, keys_of, needed
+from feti_homog.schema.values import INF, Test, is_number
 from feti_homog.schema.wording import toml_value
 
 CELL, INTERFACE, LOADS = ("cell",), ("interface",), ("strain", "to", "waypoints")
@@ -67,7 +56,7 @@ def _conditional_keys() -> Iterator[Rule]:
     """Require or refuse sections and keys by selector values."""
     for section, condition in SECTIONS_OF_AN_ANALYSIS.items():
         line = f"[{section}]: missing section; {condition.in_words(section)} needs it"
-        yield Rule((), partial(_has_section, section), line, (condition,))
+        yield needed((), section, line, condition)
         yield belonging((section,), condition, _values(ANALYSIS_TYPE))
     for path, contents in PLACES_OF_TABLES:
         for name, entry in keys_of(contents).items():
@@ -79,52 +68,36 @@ def _conditional_keys() -> Iterator[Rule]:
                 yield needed(path, name, line, *entry.only, unless=entry.unless)
 
 
-def _has_section(section: str, document: Any) -> bool:
-    return section in document
-
-
 def _cell() -> Iterator[Rule]:
     """Yield the requirements and exclusions among the keys of [cell]."""
     yield exclusive(CELL, "width", "fibre_radius")
-    line = "exclude each other; accuracy chooses the sizes"
-    yield Rule(
-        CELL, lambda cell: not any(has(cell, "accuracy", name) for name in CHOSEN), line, names=("accuracy", *CHOSEN)
-    )
+    names, line = ("accuracy", *CHOSEN), "exclude each other; accuracy chooses the sizes"
+    yield Rule(CELL, lambda cell: not has(cell, "accuracy") or {*CHOSEN}.isdisjoint(cell), line, names=names)
     yield exclusive(CELL, "fibre_fraction", "mix")
     yield exclusive(CELL, "match", "mix")
-    yield _belongs_beside("radii", "mix", "; use fibre_radius")
+    line = "belongs to mix, which is missing; use fibre_radius"
+    yield replace(needed(CELL, "mix", line, beside="radii"), names=("radii",))
     yield exclusive(CELL, "fibre_radius", "radii")
     line = "exclude each other beside radii; one follows from the other"
     yield Rule(CELL, lambda cell: not has(cell, "radii", "fibres", "width"), line, names=("fibres", "width"))
     number = keys_of(Cell)["fibres"].type.expected
     line = f"missing; expected {number}, or the width of the cell"
     yield needed(CELL, "fibres", line, beside="radii", unless=("width",))
-    yield _belongs_beside("void_radius", "voids")
+    line = "belongs to voids, which is missing"
+    yield replace(needed(CELL, "voids", line, beside="void_radius"), names=("void_radius",))
     line = f"expected {VOIDS_OF_A_RANDOM_CELL.expected}"
-    yield refused((*CELL, "voids"), lambda value: isinstance(value, bool), line, RANDOM)
+    yield Rule((*CELL, "voids"), lambda value: not isinstance(value, bool), line, (RANDOM,))
     line = "expected true or false: the mesh has its voids"
-    yield refused((*CELL, "voids"), lambda value: not isinstance(value, bool), line, MESH)
+    yield Rule((*CELL, "voids"), lambda value: isinstance(value, bool), line, (MESH,))
     yield exclusive(CELL, "match", "voids", words="exclude each other; cells that match a table have no voids")
-    names, line = ("match", "radius_spread"), "exclude each other; the table gives the radii"
-    yield Rule(CELL, lambda cell: not has(cell, *names) or _at_most(0, cell["radius_spread"]), line, names=names)
-    fewer = partial(_at_most, math.nextafter(FEWEST_MATCHED, 0))
+    pair, line = ("match", "radius_spread"), "exclude each other; the table gives the radii"
+    yield Rule(CELL, lambda cell: not has(cell, *pair) or cell["radius_spread"] == 0, line, names=pair)
     yield Rule(
         CELL,
-        lambda cell: not has(cell, "match", "fibres") or not fewer(cell["fibres"]),
+        lambda cell: not (has(cell, "match", "fibres") and is_number(n := cell["fibres"]) and n < FEWEST_MATCHED),
         lambda cell, _: f" = {cell['fibres']}: expected at least {FEWEST_MATCHED} with match",
         names=("fibres",),
     )
-
-
-def _belongs_beside(name: str, owner: str, words: str = "") -> Rule:
-    """Require `owner` wherever `name` is given in [cell]."""
-    line = f"belongs to {owner}, which is missing{words}"
-    return Rule(CELL, lambda cell: not has(cell, name) or owner in cell, line, names=(name,))
-
-
-def _at_most(limit: float, value: Any) -> bool:
-    """Return whether the value is a number up to the limit."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and value <= limit
 
 
 def _files() -> Iterator[Rule]:
@@ -135,17 +108,17 @@ def _files() -> Iterator[Rule]:
     yield needed(CELL, "file", line, TABLE, unless=("fibre_list",))
     for suffixes, expected, geometry in ((TABLE_SUFFIXES, MESH_FILE, MESH), (MESH_SUFFIXES, ".csv file", TABLE)):
         line = f"expected the name of a {expected} for {geometry.in_words('cell')}"
-        yield refused((*CELL, "file"), partial(_ends, suffixes), line, geometry)
+        yield Rule((*CELL, "file"), partial(_has_other_end, suffixes), line, (geometry,))
     for wrong, right, geometry in (("overlaps", "snap", MESH), ("snap", "overlaps", TABLE)):
         line = f'expected "none" or "{right}" for {geometry.in_words("cell")}'
-        yield refused((*CELL, "repair"), partial(eq, wrong), line, geometry)
+        yield Rule((*CELL, "repair"), partial(ne, wrong), line, (geometry,))
     for name in ("width", "height"):
         line = "missing; fibre_list has no line such as # width = 120, height = 80"
         yield needed(CELL, name, line, TABLE, beside="fibre_list")
 
 
-def _ends(suffixes: tuple[str, ...], value: Any) -> bool:
-    return isinstance(value, str) and value.endswith(suffixes)
+def _has_other_end(suffixes: tuple[str, ...], name: Any) -> bool:
+    return not str(name).endswith(suffixes)
 
 
 def _bonds() -> Iterator[Rule]:
@@ -166,12 +139,17 @@ def _bonds() -> Iterator[Rule]:
             yield needed(INTERFACE, name, missing, BREAKING, CRITERION.among(law.name))
     type_ = ENVELOPE_ANALYSIS.in_words("")
     line = f"[interface]: missing section; {type_} needs it"
-    yield Rule((), partial(_has_section, "interface"), line, (ENVELOPE_ANALYSIS,))
+    yield needed((), "interface", line, ENVELOPE_ANALYSIS)
     for plane, names in ((IN_THE_PLANE, STRENGTHS[:2]), (GENERALIZED, STRENGTHS)):
         line = f"[interface] {', '.join(names)}: missing; {type_} needs one"
         yield Rule((), partial(_any_section, partial(_breaks, names)), line, (ENVELOPE_ANALYSIS, plane))
+
+    def touches_nowhere(document: Any) -> bool:
+        tables = [table for table in interface_tables(document) if isinstance(table, dict)]
+        return all(table.get("contact") is False for table in tables) or not any(map(_some_arc, tables))
+
     line = f"expected false with debonded arcs; {type_} superposes loads, which contact forbids"
-    yield Rule((), _touches_nowhere, f"[interface] contact: {line}", (ENVELOPE_ANALYSIS,))
+    yield Rule((), touches_nowhere, f"[interface] contact: {line}", (ENVELOPE_ANALYSIS,))
 
 
 def _any_section(test: Test, document: Any) -> bool:
@@ -192,49 +170,29 @@ def _breaks(strengths: Sequence[str], table: Any) -> bool:
     return any(is_finite) or any(has(table, key) and table[key] in unlimited for key in ("criterion", "law"))
 
 
-def _touches_nowhere(document: Any) -> bool:
-    """Return whether no debonded arcs come with contact."""
-    tables = interface_tables(document)
-    is_free = all(has(table, "contact") and table["contact"] is False for table in tables if isinstance(table, dict))
-    return is_free or not any(map(_some_arc, tables))
-
-
-def _loads() -> Iterator[Rule]:
-    """Allow one form of a path, and a component's strain or stress; names in generalized plane strain."""
+def _loads_and_outputs() -> Iterator[Rule]:
+    """Allow one form of a path, a component's strain or stress, and what analysis and plane state can give."""
     yield replace(needed(("path",), LOADS[0], "missing; give one", unless=LOADS), names=LOADS)
     yield exclusive(("path",), *LOADS)
     line = f"expected a table such as {{E11 = 0.01}} in {GENERALIZED.in_words('path')}"
-    yield refused(("path", "waypoints", ITEMS), lambda value: isinstance(value, list), line, GENERALIZED)
+    yield Rule(("path", "waypoints", ITEMS), lambda value: not isinstance(value, list), line, (GENERALIZED,))
     for path, pair in product(PLACES_OF_LOADS, PLANE_STATES["generalized"].components):
         yield exclusive(path, *pair)
-
-
-def _outputs() -> Iterator[Rule]:
-    """Refuse outputs that some analyses cannot give."""
     others = ANALYSIS_TYPE.among(*(name for name in _values(ANALYSIS_TYPE) if name not in DIFFERENTIABLE))
     line = f"belongs to [analysis] type = {' or '.join(map(toml_value, DIFFERENTIABLE))}"
-    yield refused(("output", "sensitivities"), lambda value: value is True, line, others)
-
-
-def _along_fibres() -> Iterator[Rule]:
-    """Refuse components along the fibres outside generalized plane strain."""
-    along = [name for name in (*SPATIAL_STRESSES, *SPATIAL_STRAINS) if name not in (*STRESSES, *STRAINS)]
-    for path, names in ((("output", "stress"), OUT_OF_PLANE_STRESSES), (("envelope", "plane", ITEMS), along)):
-        yield replace(belonging(path, GENERALIZED, _values(PLANE)), holds=partial(_is_none_of, names))
-
-
-def _is_none_of(names: Sequence[str], value: Any) -> bool:
-    return value not in names
+    yield Rule(("output", "sensitivities"), lambda value: value is not True, line, (others,))
+    along = {*SPATIAL_STRESSES, *SPATIAL_STRAINS} - {*STRESSES, *STRAINS}
+    for place in (("output", "stress"), ("envelope", "plane", ITEMS)):
+        rule = belonging(place, GENERALIZED, _values(PLANE))
+        yield replace(rule, holds=lambda value: str(value) not in along)
 
 
 RULES = (
     *_conditional_keys(),
     *_cell(),
     *_files(),
-    *_outputs(),
     exclusive(("decomposition",), "subdomains", "max_dofs"),
     *_bonds(),
-    *_loads(),
-    *_along_fibres(),
+    *_loads_and_outputs(),
 )
 """In the order of their faults."""

@@ -76,15 +76,16 @@ VOIDS_OF_A_RANDOM_CELL = real(least=0.0, most=0.5)
 VOIDS = either(f"true of a mesh, or {VOIDS_OF_A_RANDOM_CELL.expected}", VOIDS_OF_A_RANDOM_CELL, boolean)
 RADII = _by_phase("numbers from 1e-9 to 1e9", "{glass = 6.0, carbon = 3.5}", real(least=1e-9, most=1e9))
 FIBRE = integer(least=1)
-FIBRES = either("", choice("all"), FIBRE, list_of(FIBRE, "", least=1)).named(
-    'the number of a fibre, counted from 1, a list of numbers, or "all"',
-    lambda value: value if value == "all" else tuple(value if isinstance(value, list) else [value]),
+_FIBRES = list_of(FIBRE, "", least=1)
+FIBRES = replace(
+    either('the number of a fibre, counted from 1, a list of numbers, or "all"', choice("all"), FIBRE, _FIBRES),
+    store=lambda value: value if value == "all" else tuple(value if isinstance(value, list) else [value]),
 )
 KEPT = integer(least=2, most=10**9)
 STATES = either(f'"all", "peaks" or {KEPT.expected}', choice("all", "peaks"), KEPT)
 PAIR = list_of(text, f"the names of two phases, such as {PAIR_EXAMPLE}", count=2, unique=True)
 STRENGTH, STIFFNESS = _positive_or_inf("a traction"), _positive_or_inf("a stiffness")
-TOUGHNESS = real(above=0.0).named("an energy per area above 0")
+TOUGHNESS = replace(real(above=0.0), expected="an energy per area above 0")
 NUMBERS_ABOVE = list_of(real(least=0.0), "a list of two numbers or more, none below 0", least=2)
 _ANGLES = list_of(real(least=0.0, most=360.0), "a rising list of numbers from 0 to 360", least=1, unique=True)
 OPENINGS = replace(_ANGLES, accepts=lambda v: _ANGLES.accepts(v) and all(a < b for a, b in pairwise(v)))

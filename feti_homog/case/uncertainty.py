@@ -67,14 +67,7 @@ def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty
     given = [(path, value) for path, value in stds if value != {}]
     for section in document:
         document[section] = _means(document[section], (section,), given, faults)
-    return _checked(document, given, table.get(CORRELATION, []), faults)
-
-
-def _checked(
-    document: Mapping[str, Any], given: Sequence[tuple[TomlPath, Any]], pairs: Any, faults: list[str]
-) -> Uncertainty:
-    """Return uncertainties from standard deviations and correlated pairs; empty, with faults, if faulty."""
-    named = {".".join(path): value for path, value in dict(given).items()}
+    named, pairs = {".".join(path): value for path, value in dict(given).items()}, table.get(CORRELATION, [])
     faults += [*_deviation_faults(document, given), *_pair_faults(pairs, named)]
     if faults:
         return Uncertainty({})
@@ -103,9 +96,11 @@ def _pair_faults(pairs: Any, named: Mapping[str, Any]) -> Iterator[str]:
     words = f"expected [KEY, KEY, VALUE] of two uncertain constants, {' and '.join(named)}, from -1 to 1"
     known = set[frozenset[str]]()
     for pair in pairs if isinstance(pairs, list) else [pairs]:
-        if not _is_pair(pair, named):
+        is_triple = isinstance(pair, list) and len(pair) == len(("KEY", "KEY", "VALUE"))
+        names = frozenset(map(str, pair[:2])) if is_triple else frozenset[str]()
+        if len(names & named.keys()) != 2 or not is_number(pair[2]) or abs(pair[2]) > 1:
             yield f"[{UNCERTAINTY}] {CORRELATION} = {toml_value(pair)}: {words}"
-        elif (names := frozenset(pair[:2])) in known:
+        elif names in known:
             yield f"[{UNCERTAINTY}] {CORRELATION} = {toml_value(pair)}: this pair is given twice"
         else:
             known.add(names)
@@ -180,10 +175,3 @@ def _at(document: Any, path: TomlPath) -> Any:
             result = {str(number): each for number, each in enumerate(result, start=1)}
         result = result.get(name) if isinstance(result, dict) else None
     return result
-
-
-def _is_pair(pair: Any, named: Mapping[str, Any]) -> bool:
-    if not isinstance(pair, list) or len(pair) != len(("KEY", "KEY", "VALUE")):
-        return False
-    *names, value = pair
-    return names[0] != names[1] and all(str(name) in named for name in names) and is_number(value) and abs(value) <= 1

@@ -219,8 +219,8 @@ class Rule:
         """Return the keys of a table, or a value with its key, as the fault of a place names them."""
         if not self.names:
             return f" {place} = {toml_value(value)}" if place else ""
-        above, given = f"{place}." if place else "", [name for name in self.names if name in value]
-        return f" {', '.join(above + name for name in given or self.names)}"
+        above, names = f"{place}." if place else "", [name for name in self.names if name in value] or self.names
+        return f" {', '.join(above + name for name in names)}"
 
 
 def has(table: Any, *names: str) -> bool:
@@ -256,11 +256,6 @@ def belonging(
         return f": belongs to {owner}{f'; use {instead}' if instead else ''}"
 
     return Rule(path, None, words, (*when, condition.selector.among(*others)))
-
-
-def refused(path: TablePath, is_refused: Test, words: str, *when: Condition) -> Rule:
-    """Refuse values by a test, under some conditions."""
-    return Rule(path, lambda value: not is_refused(value), words, when)
 
 
 def _places(document: Mapping[str, Any], path: TablePath) -> Iterator[tuple[str, str, Any]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -38,10 +38,6 @@ class ValueType:
     table: type[Any] | None = None
     item: ValueType | None = None
     options: tuple[str, ...] = ()
-
-    def named(self, expected: str, store: Callable[[Any], Any] | None = None) -> ValueType:
-        """Return the same values in other words, stored in another way if one is given."""
-        return replace(self, expected=expected, store=store or self.store)
 
     def complaint(self, value: Any) -> str:
         """Return the expectation that a value fails, empty if it is valid."""

@@ -42,7 +42,7 @@ def words_of_the_code() -> frozenset[str]:
 def keys() -> dict[str, set[str]]:
     """Return the keys of each section of a case file."""
     found: dict[str, set[str]] = {}
-    for row in reference.rows():
+    for row in (row for table in reference.tables() for row in table.rows):
         found.setdefault(row.section, set()).add(row.key)
     return found
 

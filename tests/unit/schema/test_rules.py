@@ -13,7 +13,7 @@ from unit.case.valid_cases import VALID_CASES
 
 from feti_homog.case.case import parse
 from feti_homog.errors import CaseError
-from feti_homog.schema.keys import ITEMS, Rule, Selector, exclusive, needed, refused
+from feti_homog.schema.keys import ITEMS, Rule, Selector, exclusive, needed
 
 NO_TOML = {"syntax", "syntax_unclosed", "key_twice", "section_twice", "number_too_long"}
 SOURCES = [tomllib.loads(text) for text in VALID_CASES.values()]
@@ -40,7 +40,7 @@ def test_faults_name_the_section_and_the_place_in_it():
     in_a_list = exclusive(("a", "loads", ITEMS), "x", "y")
     document = {"a": {"loads": [{"x": 1}, {"x": 1, "y": 1}, 3]}}
     assert faults(in_a_list, document) == ["[a] loads[1].x, loads[1].y: exclude each other; give one"]
-    assert faults(refused(("a", "x"), lambda value: value == 1, "no"), {"a": {"x": 1}}) == ["[a] x = 1: no"]
+    assert faults(Rule(("a", "x"), lambda value: value != 1, "no"), {"a": {"x": 1}}) == ["[a] x = 1: no"]
 
 
 def test_sections_of_one_name_are_numbered():
