@@ -14,7 +14,7 @@ from feti_homog.case.case import Case
 from feti_homog.errors import EXIT_DONE, CaseError, LibraryError
 from feti_homog.system.parallel.mpi_errors import on_root, on_root_only, run_main
 from feti_homog.system.petsc import libraries
-from feti_homog.system.petsc.option_table import unknown_to_petsc
+from feti_homog.system.petsc.option_table import unknown_options
 from feti_homog.system.petsc.option_values import faulty_values, named_values, petsc_words, split_argv
 from feti_homog.system.runtime import standard_streams
 from feti_homog.system.runtime.environment import ignore_settings_of_the_folder, prefer_own_toolkits
@@ -177,7 +177,7 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
 
     def main() -> int:
         options = named_values(petsc)
-        faults = [*faulty_values(options), *unknown_to_petsc(options)]
+        faults = [*faulty_values(options), *unknown_options(options)]
         if faults:
             raise CaseError(*faults)
         try:

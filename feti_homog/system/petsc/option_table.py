@@ -120,32 +120,20 @@ CLOSE = 0.9
 
 
 def unknown_options(names: Iterable[str]) -> list[str]:
-    """One fault for each name (without dash) that begins with feti_ but is no option of the solver."""
-    unknown = [n for n in names if n.startswith("feti_") and n not in TABLE and not solver_prefix(n)]
-    return [f"-{name}: unknown option; {suggestion(name)}" for name in unknown]
-
-
-def unknown_to_petsc(names: Iterable[str]) -> list[str]:
-    """One fault for each name (without dash) that neither PETSC_NAMES has nor begins with feti_.
-
-    A name that lacks the prefix of one of OPTIONS is left to `without_prefix`.
-    """
+    """One fault for each name (without dash) of neither the solver's options nor PETSc's own."""
     faults = []
     for name in names:
-        if name in PETSC_NAMES or name.startswith("feti_") or f"feti_{name}" in TABLE:
-            continue
-        nearest = difflib.get_close_matches(name, PETSC_NAMES, 1, CLOSE)
-        if nearest:
-            faults.append(f"-{name}: unknown option; did you mean -{nearest[0]}?")
-        elif not name.startswith(PETSC_BEGINNINGS):
-            faults.append(f"-{name}: unknown option; solvers of this program have options that begin with -feti_")
+        hint = ""
+        if name.startswith("feti_"):
+            hint = "" if name in TABLE or solver_prefix(name) else f"unknown option; {suggestion(name)}"
+        elif f"feti_{name}" in TABLE:
+            hint = f"not an option of this program; did you mean -feti_{name}?"
+        elif name not in PETSC_NAMES and (nearest := difflib.get_close_matches(name, PETSC_NAMES, 1, CLOSE)):
+            hint = f"unknown option; did you mean -{nearest[0]}?"
+        elif name not in PETSC_NAMES and not name.startswith(PETSC_BEGINNINGS):
+            hint = "unknown option; solvers of this program have options that begin with -feti_"
+        faults += [f"-{name}: {hint}"] if hint else []
     return faults
-
-
-def without_prefix(names: Iterable[str]) -> list[str]:
-    """One fault for each name (without dash) that lacks the prefix feti_ of an option of the solver."""
-    lacking = [name for name in names if f"feti_{name}" in TABLE]
-    return [f"-{name}: not an option of this program; did you mean -feti_{name}?" for name in lacking]
 
 
 def only_prints(name: str) -> bool:

@@ -7,22 +7,20 @@ import os
 import re
 import stat
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from feti_homog.system.petsc.option_table import DIRECT_PREFIXES, OPTIONS, SHOWING
 from feti_homog.system.runtime import input_files
 
 Value = str | int | float | bool
+OptionRule = tuple[str, Callable[[str], bool]]
+"""Values that an option takes, in words and as a test of a text, which is empty if no value is given."""
 TRUE, FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
-LARGEST_INTEGER = 2**31 - 1  # of a PETSc with 32-bit integers
 VIEWER = re.compile(r"(ascii)?(:(?P<file>[^:]*)(:(default|ascii_\w+)?(:(write|append))?)?)?")
-NEW_FILE = "a file of an existing folder, or no value"
 FLAGS = (
     *("feti_view", "malloc_debug", "malloc_test", "log_view_memory", "log_view_gpu_time"),
     *("options_left", "skip_petscrc", "on_error_abort", "on_error_mpiabort", "no_signal_handler"),
 )
-OWN_SHORT = ("-h",)
 CASE_FILE = ".toml"
 
 
@@ -48,21 +46,13 @@ def can_be_written(file: str) -> bool:
     return not stat.S_ISDIR(kind) and os.access(file, os.W_OK)
 
 
-@dataclass(frozen=True)
-class OptionRule:
-    """Values that an option takes, in words and as a test of a text, which is empty if no value is given."""
-
-    expected: str
-    holds: Callable[[str], bool]
-
-
 def faulty_values(options: Mapping[str, Value]) -> list[str]:
     """One fault for each option (name without dash) that cannot have its value."""
     texts = {name: _text(value) for name, value in options.items()}
     return sorted(
-        f"{in_words(name, text)}: expected {rule.expected}"
+        f"{in_words(name, text)}: expected {rule[0]}"
         for name, text in texts.items()
-        if (rule := PRINTS if is_viewer(name) else RULES.get(name)) and not rule.holds(text)
+        if (rule := PRINTS if is_viewer(name) else RULES.get(name)) and not rule[1](text)
     )
 
 
@@ -96,33 +86,39 @@ def _text(value: Value) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def _real(expected: str, holds: Callable[[float], bool]) -> OptionRule:
-    def rule(text: str) -> bool:
-        try:
-            return holds(float(text)) and "_" not in text
-        except ValueError:
-            return False
-
-    return OptionRule(expected, rule)
+def _real(text: str) -> float:
+    """Return the number, NaN if there is none."""
+    try:
+        return math.nan if "_" in text else float(text)
+    except ValueError:
+        return math.nan
 
 
-def _integer(lower: int, upper: int = LARGEST_INTEGER) -> OptionRule:
+def _integer(lower: int, upper: int) -> OptionRule:
     def holds(text: str) -> bool:
         return re.fullmatch(r"\+?[0-9]{1,10}", text) is not None and lower <= int(text) <= upper
 
-    return OptionRule(f"an integer of at least {lower} and at most {upper}", holds)
+    return f"an integer of at least {lower} and at most {upper}", holds
 
 
-def _is_viewer(text: str) -> bool:
-    """Return whether the text is a place to print, in a folder that exists."""
+def _is_false(text: str) -> bool:
+    return text.lower() in FALSE
+
+
+def _is_switch(text: str) -> bool:
+    return text.lower() in ("", *TRUE, *FALSE)
+
+
+def _is_place(text: str) -> bool:
+    """Return whether the text is a switch, or a place to print in a folder that exists."""
     match = VIEWER.fullmatch(text)
-    return match is not None and (not match["file"] or can_be_written(match["file"]))
+    return _is_switch(text) or (match is not None and (not match["file"] or can_be_written(match["file"])))
 
 
 def _is_new_file(text: str) -> bool:
-    """Return whether the text is empty, or up to its first colon a file that can be written."""
+    """Return whether the text is a switch, or up to its first colon a file that can be written."""
     file = text.partition(":")[0]
-    return not file or SWITCH.holds(file) or can_be_written(file)
+    return _is_switch(file) or can_be_written(file)
 
 
 def _has_options(file: str) -> bool:
@@ -135,40 +131,38 @@ def _has_options(file: str) -> bool:
     return all(not line or line.startswith(("-", "#", "!", "%", "alias ")) for line in lines)
 
 
-SWITCH = OptionRule("true or false, or no value", lambda text: text.lower() in ("", *TRUE, *FALSE))
-PRINTS = OptionRule(
-    "true or false, no value, or ascii:FILE of an existing folder",
-    lambda text: SWITCH.holds(text) or _is_viewer(text),
-)
-SHARE = _real("a number above 0 and below 1", lambda number: 0.0 < number < 1.0)
-NOT_NEGATIVE = _real("a number of at least 0", lambda number: 0.0 <= number < math.inf)
-
-
+SWITCH: OptionRule = "true or false, or no value", _is_switch
+PRINTS: OptionRule = "true or false, no value, or ascii:FILE of an existing folder", _is_place
 # With a relative tolerance of 1 or more nothing is solved.
+SHARE: OptionRule = "a number above 0 and below 1", lambda text: 0.0 < _real(text) < 1.0
+NEW_FILE = "a file of an existing folder, or no value"
+
 RULES: dict[str, OptionRule] = {
-    **{name: SWITCH for name in FLAGS},
+    **dict.fromkeys(FLAGS, SWITCH),
     **{
-        option.name: OptionRule(f"one of {option.value.replace('|', ', ')}", option.value.split("|").__contains__)
+        option.name: (f"one of {option.value.replace('|', ', ')}", option.value.split("|").__contains__)
         for option in OPTIONS
         if "|" in option.value and not option.value.endswith("...")
     },
     **{f"{prefix}ksp_rtol": SHARE for prefix in ("feti_", *DIRECT_PREFIXES)},
     "feti_coarse_threshold": SHARE,
-    "feti_ksp_atol": NOT_NEGATIVE,
-    "feti_ksp_divtol": _real("a number above 1", lambda number: 1.0 < number < math.inf),
-    "feti_ksp_max_it": _integer(1),
+    "feti_ksp_atol": ("a number of at least 0", lambda text: 0.0 <= _real(text) < math.inf),
+    "feti_ksp_divtol": ("a number above 1", lambda text: 1.0 < _real(text) < math.inf),
+    "feti_ksp_max_it": _integer(1, 2**31 - 1),  # of a PETSc with 32-bit integers
     "feti_schur_mat_mumps_icntl_14": _integer(0, 10_000),
-    "feti_schur_pc_type": OptionRule("cholesky, for what is condensed is symmetric", "cholesky".__eq__),
-    "feti_schur_pc_factor_mat_solver_type": OptionRule("mumps, which alone makes Schur complements", "mumps".__eq__),
-    "feti_ksp_error_if_not_converged": OptionRule(
-        "nothing: the run reports it and keeps its results", lambda text: text.lower() in FALSE
+    "feti_schur_pc_type": ("cholesky, for what is condensed is symmetric", "cholesky".__eq__),
+    "feti_schur_pc_factor_mat_solver_type": ("mumps, which alone makes Schur complements", "mumps".__eq__),
+    "feti_ksp_error_if_not_converged": (
+        "nothing: the run reports it and keeps its results",
+        lambda text: text.lower() in FALSE,
     ),
-    "fp_trap": OptionRule(
-        "nothing: numbers that are not finite are checked where they may occur", lambda text: text.lower() in FALSE
+    "fp_trap": (
+        "nothing: numbers that are not finite are checked where they may occur",
+        lambda text: text.lower() in FALSE,
     ),
-    **{name: OptionRule(NEW_FILE, _is_new_file) for name in ("info", "malloc_dump", "malloc_view")},
-    "options_file": OptionRule("a file with an option of PETSc in each line", _has_options),
-    "log_trace": OptionRule(NEW_FILE, lambda text: not text or can_be_written(text)),
+    **dict.fromkeys(("info", "malloc_dump", "malloc_view"), (NEW_FILE, _is_new_file)),
+    "options_file": ("a file with an option of PETSc in each line", _has_options),
+    "log_trace": (NEW_FILE, lambda text: not text or can_be_written(text)),
 }
 """For each of these options, what is expected in words, and whether a text is that."""
 
@@ -186,11 +180,12 @@ def split_argv(argv: Sequence[str]) -> tuple[list[str], list[str]]:
         if _is_petsc(word):
             petsc.append(word)
             name = word[1:]
-        elif name and not word.startswith("--") and word not in OWN_SHORT and _may_be_value(name, word):
-            petsc.append(word)
-            name = ""
         else:
-            ours.append(word)
+            is_flag_value = _is_switch(word) or VIEWER.fullmatch(word) is not None
+            # A value, right or wrong, is no case file, and no path after a flag.
+            is_path = not is_flag_value and (os.sep in word or os.path.exists(word))
+            is_ours = re.match("--|-h$", word) or (word.endswith(CASE_FILE) and name != "options_file")
+            (petsc if name and not is_ours and not (is_flag(name) and is_path) else ours).append(word)
             name = ""
     return ours, petsc
 
@@ -221,15 +216,4 @@ def petsc_words(options: Mapping[str, str]) -> list[str]:
 
 
 def _is_petsc(word: str) -> bool:
-    return re.match(r"-[A-Za-z]", word) is not None and word not in OWN_SHORT
-
-
-def _may_be_value(name: str, word: str) -> bool:
-    """Return whether a word is the value, right or wrong, of the option before it.
-
-    A value is no case file, and no path after a flag.
-    """
-    if word.endswith(CASE_FILE) and name != "options_file":
-        return False
-    is_flag_value = SWITCH.holds(word) or VIEWER.fullmatch(word) is not None
-    return not is_flag(name) or is_flag_value or not (os.sep in word or os.path.exists(word))
+    return re.match(r"-(?!h$)[A-Za-z]", word) is not None

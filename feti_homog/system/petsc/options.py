@@ -18,7 +18,6 @@ from feti_homog.system.petsc.option_table import (
     solver_prefix,
     suggestion,
     unknown_options,
-    without_prefix,
 )
 from feti_homog.system.petsc.option_values import (
     Value,
@@ -50,8 +49,7 @@ def case_options(options: Mapping[str, Value]) -> Iterator[None]:
     on_command_line = given_options()
     options = {name.lower(): value for name, value in options.items()}
     options_of_run = {**options, **on_command_line}
-    faults = [*unknown_options(options_of_run), *without_prefix(options_of_run), *faulty_values(options_of_run)]
-    if faults:
+    if faults := [*unknown_options(options), *faulty_values(options_of_run)]:
         raise CaseError(*faults)
     settled = {name: flag_value(value) if is_flag(name) else value for name, value in options_of_run.items()}
     changed = [name for name in options_of_run if settled[name] != on_command_line.get(name) and not is_own_flag(name)]
@@ -117,6 +115,8 @@ def _refuse_unread(names: list[str]) -> None:
 
 # Options with the prefixes of PETSc's solvers that the program reads itself.
 OWN = ("feti_pc_type", "feti_coarse_space", "feti_coarse_threshold")
+SOLVERS = {"feti_": ("feti_ksp_", "feti_pc_")} | {prefix: (prefix,) for prefix in DIRECT_PREFIXES}
+"""Prefixes of options that each solver reads, by the solver's own."""
 NO_SUCH_METHOD = "requested KSP type"
 
 
@@ -126,38 +126,19 @@ def faults_of_solvers(options: Mapping[str, str]) -> list[str]:
     Each solver is made and applied once: a method may lack something only then.  PETSc marks options that
     they read, and prints all that they could read with -help.  Options that print are hidden meanwhile.
     """
-    faults, viewers = [], {name: value for name, value in options.items() if is_viewer(name)}
-    with _hidden(viewers):
-        for prefix in ("feti_", *DIRECT_PREFIXES):
-            prefixes = ("feti_ksp_", "feti_pc_") if prefix == "feti_" else (prefix,)
+    faults, viewers, database = [], [*filter(is_viewer, options)], PETSc.Options()
+    for name in viewers:
+        database.delValue(name)
+    try:
+        for prefix, prefixes in SOLVERS.items():
             names = [name for name in options if solver_prefix(name) in prefixes and name not in (*OWN, *viewers)]
             if (names or "help" in options) and (fault := _complaint(prefix)):
                 names.sort(key=lambda name: not name.endswith("_type"))  # types first: they decide what others mean
                 faults.append(f"{' '.join(in_words(name, options[name]) for name in names)}: {fault}")
-    return faults
-
-
-@contextmanager
-def _hidden(options: Mapping[str, str]) -> Iterator[None]:
-    """Take options out of the database during the block."""
-    database = PETSc.Options()
-    for name in options:
-        database.delValue(name)
-    try:
-        yield
     finally:
-        for name, value in options.items():
-            database.setValue(name, value or None)
-
-
-def _complaint(prefix: str) -> str:
-    """PETSc's complaint about the options of a solver, empty if there is none."""
-    try:
-        _solve_once(prefix)
-    except PETSc.Error as error:
-        words = error_words(error)
-        return "PETSc has no such Krylov method" if NO_SUCH_METHOD in words else words
-    return ""
+        for name in viewers:
+            _set(database, name, options[name])
+    return faults
 
 
 class _Identity:
@@ -170,8 +151,8 @@ class _Identity:
         x.copy(y)
 
 
-def _solve_once(prefix: str) -> None:
-    """Solve with a 1 x 1 matrix by the options under `prefix`: the Krylov method's are `feti_`."""
+def _complaint(prefix: str) -> str:
+    """PETSc's complaint about the options of a solver of a 1 x 1 matrix, empty if there is none."""
     is_krylov, comm = prefix == "feti_", PETSc.COMM_SELF
     if is_krylov:
         A = PETSc.Mat().createPython((1, 1), _Identity(), comm=comm)
@@ -198,6 +179,10 @@ def _solve_once(prefix: str) -> None:
         ksp.setUp()
         b.set(1.0)
         ksp.solve(b, x)
+    except PETSc.Error as error:
+        words = error_words(error)
+        return "PETSc has no such Krylov method" if NO_SUCH_METHOD in words else words
     finally:
         for petsc_object in (ksp, A, x, b):
             petsc_object.destroy()
+    return ""
