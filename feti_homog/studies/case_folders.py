@@ -26,7 +26,7 @@ from feti_homog.results import atomic, checkpoint_file, output_folder, result_js
 from feti_homog.schema.values import INF
 from feti_homog.studies.sweep_cases import Sweep, SweepCase, identity_of
 from feti_homog.system.runtime import input_files
-from feti_homog.system.runtime.file_locks import Lock, LockHeld, is_locked
+from feti_homog.system.runtime.file_locks import Lock, LockHeld, holder
 from feti_homog.version import __version__
 
 INDEX_FILE, TABLE_FILE, ERROR_FILE, CASE_FILE, LOCK_FILE = (
@@ -174,7 +174,7 @@ def case_state(directory: Path, entry: SweepCase) -> CaseState:
     """Return case progress; RUNNING while another process holds the case's lock.  On one rank."""
     state = stored_state(directory, entry)
     is_open = state.status in (Status.WAITING, Status.FAILED)
-    return CaseState(Status.RUNNING) if is_open and is_locked(directory / entry.folder / LOCK_FILE) else state
+    return CaseState(Status.RUNNING) if is_open and holder(directory / entry.folder / LOCK_FILE) else state
 
 
 def stored_state(directory: Path, entry: SweepCase) -> CaseState:

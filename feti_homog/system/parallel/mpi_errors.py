@@ -30,11 +30,7 @@ def on_root(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any
     Collective; the other ranks' arguments do not matter. The result must be picklable; `function` must
     not communicate.
     """
-    value, error = _attempt(function, *args, **kwargs) if comm.rank == 0 else (None, None)
-    result: T
-    result, message = comm.bcast((value, _portable(comm, error)), root=0)
-    if message is not None:
-        raise message if isinstance(error, MemoryError) else error or message
+    result: T = comm.bcast(on_root_only(comm, function, *args, **kwargs), root=0)
     return result
 
 
@@ -54,7 +50,10 @@ def agree(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) 
     FetiHomogError of the first rank that met one, NoMemoryError of one without memory. Collective; `function` must not
     communicate.
     """
-    result, error = _attempt(function, *args, **kwargs)
+    return _agreed(comm, *_attempt(function, *args, **kwargs))
+
+
+def _agreed(comm: Comm, result: T | None, error: Exception | None) -> T:
     messages = [message for message in comm.allgather(_portable(comm, error)) if message is not None]
     if messages:
         if error is not None and not isinstance(error, FetiHomogError | MemoryError):
@@ -82,7 +81,7 @@ def agree_after(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs:
         request.Wait()
     elif not _comes(request, ARRIVAL_TIMEOUT_S):
         end_job(comm, error)
-    return agree(comm, _returned, result, error) if failed[0] else result  # type: ignore[return-value]
+    return _agreed(comm, result, error) if failed[0] else result  # type: ignore[return-value]
 
 
 def run_main(comm: Comm, main: Callable[[], int]) -> int:
@@ -107,11 +106,14 @@ def end_job(comm: Comm, error: BaseException) -> NoReturn:
     """Tell of an error that one rank has met alone, and end the processes of all."""
     ending = _without_memory(comm, error) if isinstance(error, MemoryError) else error
     if isinstance(ending, FetiHomogError):
-        complain(_lines(ending))
-        abort(comm, ending.exit_code)
-    text = "".join(traceback.format_exception(error))
-    complain(f"rank {comm.rank} of {comm.size}:\n{text}")
-    abort(comm, EXIT_DEFECT)
+        code, lines = ending.exit_code, _lines(ending)
+    else:
+        code = EXIT_DEFECT
+        lines = f"rank {comm.rank} of {comm.size}:\n{''.join(traceback.format_exception(error))}"
+    complain(lines)
+    sys.stdout.flush()
+    comm.Abort(code)
+    raise SystemExit(code)
 
 
 def _without_memory(comm: Comm, error: MemoryError) -> NoMemoryError:
@@ -119,13 +121,6 @@ def _without_memory(comm: Comm, error: MemoryError) -> NoMemoryError:
     detail = f": {error}" if str(error) else ""
     hint = "`feti-homog check` estimates what a case needs, and more ranks share it"
     return NoMemoryError(f"rank {comm.rank} of {comm.size} has no memory left{detail}; {hint}")
-
-
-def abort(comm: Comm, exit_code: int) -> NoReturn:
-    """End the processes of all ranks; mpirun returns the exit code."""
-    sys.stdout.flush()
-    comm.Abort(exit_code)
-    raise SystemExit(exit_code)
 
 
 def others_come(comm: Comm, timeout: float) -> bool:
@@ -163,12 +158,6 @@ def _attempt(function: Callable[..., T], *args: Any, **kwargs: Any) -> tuple[T |
         return None, FetiHomogError(f"{error.filename}: {error.strerror}")  # a file's fault, not the program's
     except Exception as error:
         return None, error
-
-
-def _returned(result: T, error: Exception | None) -> T:
-    if error is not None:
-        raise error
-    return result
 
 
 def _portable(comm: Comm, error: Exception | None) -> Exception | None:

@@ -29,9 +29,13 @@ def require() -> None:
     Raises:
         LibraryError: one line for each that is missing, broken or without MPI, with the remedy.
     """
-    faults = [_fault("mpi4py", MPI4PY), _fault("petsc4py", petsc4py_advice()), _fault("h5py", H5PY) or _serial_h5py()]
-    if any(faults):
-        raise LibraryError(*filter(None, faults))
+    advice = {"mpi4py": MPI4PY, "petsc4py": petsc4py_advice(), "h5py": H5PY}
+    faults = [fault for name, remedy in advice.items() if (fault := _fault(name, remedy))]
+    if "h5py" in sys.modules and not (h5py := sys.modules["h5py"]).get_config().mpi:
+        remedy = f"import feti_homog before h5py, or {H5PY}, and remove this one"
+        faults.append(f"h5py {h5py.__file__} is built without MPI: {remedy}")
+    if faults:
+        raise LibraryError(*faults)
 
 
 def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
@@ -54,7 +58,15 @@ def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
         raise LibraryError(_unfit("petsc4py", error, petsc4py_advice())) from error
     from petsc4py import PETSc
 
-    atexit.register(_end_petsc, comm)
+    from feti_homog.system.petsc import c_functions
+
+    def end() -> None:
+        code = 0 if PETSc.Sys.isFinalized() else c_functions.finalize()  # each start asks for its end
+        if code:
+            complain(f"error: PETSc cannot end (error code {code}); results are written")
+            comm.Abort(EXIT_DEFECT)
+
+    atexit.register(end)
     if process_memory.limits_addresses():
         _reserve_buffers()
     options = PETSc.Options()
@@ -74,18 +86,6 @@ def _reserve_buffers() -> None:
     matrix.assemble()
     for petsc_object in (matrix.matMult(matrix), matrix):
         petsc_object.destroy()
-
-
-def _end_petsc(comm: Intracomm) -> None:
-    from petsc4py import PETSc
-
-    from feti_homog.system.petsc import c_functions
-
-    # Each start asks for its end.
-    code = 0 if PETSc.Sys.isFinalized() else c_functions.finalize()
-    if code:
-        complain(f"error: PETSc cannot end (error code {code}); results are written")
-        comm.Abort(EXIT_DEFECT)
 
 
 def petsc4py_advice(debian: Path = DEBIAN_PETSC, path: Sequence[str] = sys.path) -> str:
@@ -124,15 +124,4 @@ def _unfit(name: str, error: Exception, advice: str) -> str:
     return (
         f"{name} was built for another NumPy than {np.__version__}: install NumPy of the major version that it was "
         "built for, as scripts/bootstrap does"
-    )
-
-
-def _serial_h5py() -> str:
-    """Empty if h5py is built with MPI, else the remedy."""
-    import h5py
-
-    return (
-        ""
-        if h5py.get_config().mpi
-        else f"h5py {h5py.__file__} is built without MPI: import feti_homog before h5py, or {H5PY}, and remove this one"
     )

@@ -110,7 +110,23 @@ class PartialFactor:
 
         Entry (m - 1 - i, m - 1 - j) belongs to L on rows i and j of `rows`.  Entries below the diagonal are arbitrary.
         """
-        return _block(self._factor.contents, self._place[len(self._place) - self._m :])
+        factor, place = self._factor.contents, self._place[len(self._place) - self._m :]
+        m, k = len(place), factor.nsuper
+        first, rows, values = (_array(pointer, k + 1, c_int) for pointer in (factor.super, factor.pi, factor.px))
+        row, value = _array(factor.s, factor.ssize, c_int), _array(factor.x, factor.xsize, c_double)
+        at = np.full(factor.n, -1)
+        at[place] = np.arange(m)[::-1]
+        U = np.zeros((m, m), order="F")
+        for j in np.unique(np.searchsorted(first, place, "right") - 1).tolist():
+            i, columns = at[row[rows[j] : rows[j + 1]]], at[first[j] : first[j + 1]]
+            block = value[values[j] : values[j + 1]].reshape(len(columns), len(i))
+            if i.min() < 0 or columns.min() < 0:
+                block, columns, i = block[columns >= 0][:, i >= 0], columns[columns >= 0], i[i >= 0]
+            if all((np.diff(numbers) == -1).all() for numbers in (columns, i)):  # as a rule: one block
+                U.T[columns[-1] : columns[0] + 1, i[-1] : i[0] + 1] = block[::-1, ::-1]
+            else:
+                U.T[np.ix_(columns, i)] = block
+        return U
 
     def forward(self, B: Float) -> Float:
         """(n, k) L^-1 B for B (n, k): first the other rows in the `order` given, then `rows`."""
@@ -166,26 +182,6 @@ def _analyse(matrix: _Sparse, order: Int, factor: Any, common: Any) -> Int:
     if not done:
         raise MemoryError("CHOLMOD could not analyse the matrix")
     return place
-
-
-def _block(factor: _Factor, place: Int) -> Float:
-    """Return `last_block` of the rows in these places (m,) of a supernodal factor."""
-    m, k = len(place), factor.nsuper
-    first, rows, values = (_array(pointer, k + 1, c_int) for pointer in (factor.super, factor.pi, factor.px))
-    row, value = _array(factor.s, factor.ssize, c_int), _array(factor.x, factor.xsize, c_double)
-    at = np.full(factor.n, -1)
-    at[place] = np.arange(m)[::-1]
-    U = np.zeros((m, m), order="F")
-    for j in np.unique(np.searchsorted(first, place, "right") - 1).tolist():
-        i, columns = at[row[rows[j] : rows[j + 1]]], at[first[j] : first[j + 1]]
-        block = value[values[j] : values[j + 1]].reshape(len(columns), len(i))
-        if i.min() < 0 or columns.min() < 0:
-            block, columns, i = block[columns >= 0][:, i >= 0], columns[columns >= 0], i[i >= 0]
-        if all((np.diff(numbers) == -1).all() for numbers in (columns, i)):  # as a rule: one block
-            U.T[columns[-1] : columns[0] + 1, i[-1] : i[0] + 1] = block[::-1, ::-1]
-        else:
-            U.T[np.ix_(columns, i)] = block
-    return U
 
 
 def _free(factor: Any, common: Any) -> None:

@@ -13,7 +13,6 @@ import re
 import socket
 import time
 from pathlib import Path
-from types import TracebackType
 
 from feti_homog.errors import FetiHomogError
 
@@ -62,9 +61,11 @@ class Lock:
 
     def release(self) -> None:
         """Give the lock back, if it is held, and remove its file unless others share it."""
-        if self._file >= 0 and self._is_alone():
-            with contextlib.suppress(OSError):
-                self.path.unlink()
+        with contextlib.suppress(OSError):  # of others that share it
+            if self._file >= 0:
+                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                if self._is_at_path():
+                    self.path.unlink()
         files.discard(self.path)
         self._close()
 
@@ -72,51 +73,33 @@ class Lock:
         self.acquire()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.release()
 
     def _take(self) -> None:
+        deadline, kind = time.monotonic() + self.timeout, fcntl.LOCK_SH if self.shared else fcntl.LOCK_EX
         try:
             self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
-            self._try_until(time.monotonic() + self.timeout)
+            while not _is_taken(self._file, kind):
+                if time.monotonic() > deadline:
+                    raise LockHeld(_written(self._file))
+                time.sleep(0.01)
             if not self.shared:
                 with contextlib.suppress(OSError):  # it holds on a full disk too, without the name of its holder
                     os.truncate(self._file, 0)
                     os.pwrite(self._file, this_process().encode(), 0)
         except OSError as error:
             self._close()
-            kind = LocksUnsupported if error.errno in UNSUPPORTED else FetiHomogError
-            raise kind(f"cannot lock {self.path}: {error.strerror}") from error
+            failure = LocksUnsupported if error.errno in UNSUPPORTED else FetiHomogError
+            raise failure(f"cannot lock {self.path}: {error.strerror}") from error
         except LockHeld:
             self._close()
             raise
-
-    def _try_until(self, deadline: float) -> None:
-        kind = fcntl.LOCK_SH if self.shared else fcntl.LOCK_EX
-        while True:
-            try:
-                return fcntl.flock(self._file, kind | fcntl.LOCK_NB)
-            except OSError as error:
-                if error.errno not in HELD:
-                    raise
-                if time.monotonic() > deadline:
-                    raise LockHeld(_written(self._file)) from error
-            time.sleep(0.01)
 
     def _close(self) -> None:
         if self._file >= 0:
             os.close(self._file)
             self._file = -1
-
-    def _is_alone(self) -> bool:
-        """Return whether nobody shares the lock; then it is exclusive."""
-        try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            return False
-        return self._is_at_path()
 
     def _is_at_path(self) -> bool:
         try:
@@ -125,24 +108,22 @@ class Lock:
             return False
 
 
+def _is_taken(file: int, kind: int) -> bool:
+    """Lock an open file; False if somebody else holds it.  Raises OSError where locks fail otherwise."""
+    try:
+        fcntl.flock(file, kind | fcntl.LOCK_NB)
+    except OSError as error:
+        if error.errno not in HELD:
+            raise
+        return False
+    return True
+
+
 def holder(path: Path) -> str | None:
     """Who holds the lock exclusively just now, in words; None if nobody does."""
-    try:
-        file = os.open(path, os.O_RDWR)
-    except OSError:
-        return None
-    try:
-        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        return None
-    except OSError as error:
-        return _written(file) if error.errno in HELD else None
-    finally:
-        os.close(file)
-
-
-def is_locked(path: Path) -> bool:
-    """Return whether somebody holds the lock exclusively just now."""
-    return holder(path) is not None
+    with contextlib.suppress(OSError), path.open("rb+") as stream:
+        return None if _is_taken(stream.fileno(), fcntl.LOCK_SH) else _written(stream.fileno())
+    return None
 
 
 def this_process() -> str:

@@ -63,15 +63,13 @@ def described(
     unit: str = "",
     shape: str = "",
     components: tuple[str, ...] = (),
-    entries: Mapping[str, str] | None = None,
-    dtype: str = "float64",
-    name: str = "",
-    spatial_components: tuple[str, ...] = (),
-    **options: Any,
+    *,
+    default: Any = dataclasses.MISSING,
+    **attributes: Any,
 ) -> Any:
-    """Return a dataclass field with a description; `options` go to `dataclasses.field`."""
-    description = Description(meaning, unit, shape, components, entries or {}, dtype, name, spatial_components)
-    return dataclasses.field(metadata={DESCRIPTION: description}, **options)
+    """Return a dataclass field with a description; `attributes` are further ones of it."""
+    description = Description(meaning, unit, shape, components, **attributes)
+    return dataclasses.field(default=default, metadata={DESCRIPTION: description})
 
 
 def descriptions(record: type | Any) -> dict[str, Description]:
@@ -111,7 +109,8 @@ def restored(kind: type[T], document: Mapping[str, Any]) -> T:
             continue
         value = values[field.name] = _restored_value(hints[field.name], document[field.name])
         shape = field.metadata[DESCRIPTION].shape
-        if isinstance(value, np.ndarray) and value.ndim not in {_axes(words) for words in shape.split(" or ")}:
+        axes = [words.rstrip("(),").count(",") + 1 for words in shape.split(" or ")]
+        if isinstance(value, np.ndarray) and value.ndim not in axes:
             raise TypeError(f"{field.name} is no array {shape}")
     return kind(**values)
 
@@ -153,11 +152,6 @@ def _restored_value(hint: Any, value: Any) -> Any:
     if origin is Mapping and (inner := typing.get_args(hint)[1]) in KINDS:
         return {name: _restored_value(inner, item) for name, item in value.items()}
     return value
-
-
-def _axes(shape: str) -> int:
-    """Return the number of axes of an array of a shape in words, as "(n, 2)"."""
-    return sum(bool(size.strip("() ")) for size in shape.split(","))
 
 
 def _require(value: Any, kind: Any) -> None:

@@ -90,7 +90,8 @@ def print_product(text: str) -> None:
     try:
         print(escaped(text, KEPT), flush=True)
     except OSError as error:
-        _give_up()
+        with contextlib.suppress(OSError, ValueError):  # PETSc's output goes nowhere too, and Python's last
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         if not isinstance(error, BrokenPipeError):  # a reader that left, as `head` does, wants no more
             raise FetiHomogError(f"standard output cannot be written: {error.strerror}") from error
 
@@ -99,9 +100,3 @@ def complain(*lines: str) -> None:
     """Print lines on standard error, if that can be written."""
     with contextlib.suppress(OSError):
         print(*(escaped(line, KEPT) for line in lines), sep="\n", file=sys.stderr, flush=True)
-
-
-def _give_up() -> None:
-    """Discard standard output from now on, PETSc's too and at the end of Python, without an error."""
-    with contextlib.suppress(OSError, ValueError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

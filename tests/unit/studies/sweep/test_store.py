@@ -14,7 +14,8 @@ from support.sweep_files import sweep_file
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.results import atomic
 from feti_homog.studies import case_folders, sweep_cases
-from feti_homog.system.runtime.file_locks import Lock, LockHeld, is_locked
+from feti_homog.system.runtime.file_locks import Lock, LockHeld
+from feti_homog.system.runtime.file_locks import holder as holder_of
 
 HOLDER = """
 import sys
@@ -48,18 +49,18 @@ def test_a_lock_excludes_unless_both_share_it(tmp_path, theirs, ours, free):
         else:
             with pytest.raises(LockHeld, match="another process" if theirs else f"process {process.pid}"):
                 lock.acquire()
-        assert is_locked(path) != theirs
+        assert bool(holder_of(path)) != theirs
     finally:
         process.communicate()
     with Lock(path):
-        assert is_locked(path)
-    assert not is_locked(path)
+        assert holder_of(path)
+    assert not holder_of(path)
 
 
 def test_a_lock_that_cannot_be_made_is_reported(tmp_path):
     with pytest.raises(FetiHomogError, match="cannot lock"):
         Lock(tmp_path / "none" / "lock").acquire()
-    assert not is_locked(tmp_path / "none" / "lock")
+    assert not holder_of(tmp_path / "none" / "lock")
 
 
 def test_a_file_is_replaced_whole_or_not_at_all(tmp_path):
