@@ -1,4 +1,4 @@
-"""Key tables: value types, tables read with all their faults, relations between keys, fault wording.
+"""Key tables: value types, tables read with all their faults, fault wording.
 
-Imports nothing.  Main entries: `values`, types each with words and a test; `keys.key`, `keys.TableReader`, `keys.Rule`.
+Imports nothing.  Main entries: `values`, types each with words and a test; `keys.key`, `keys.TableReader`.
 """

@@ -1,21 +1,18 @@
-"""Reading case file tables into frozen dataclasses whose fields carry their rules, and relations between keys."""
+"""Reading case file tables into frozen dataclasses whose fields carry their rules."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from feti_homog.schema.values import INF, Test, ValueType
+from feti_homog.schema.values import INF, ValueType
 from feti_homog.schema.wording import suggestion, toml_key, toml_value
 
 T = TypeVar("T")
-TablePath = tuple[str, ...]
-ITEMS = "items"
-"""In a path: the entries of a list."""
 
 
 @dataclass(frozen=True)
@@ -186,95 +183,3 @@ def to_table(instance: Any, selected: Selected) -> dict[str, Any]:
         for name, entry in keys_of(type(instance)).items()
         if (value := getattr(instance, name)) is not None and all(each.holds(selected) for each in entry.only)
     }
-
-
-@dataclass(frozen=True)
-class Rule:
-    """Requirement at a document path under some conditions.
-
-    Attributes:
-        path: from the section to a table or value; where there is none, the rule holds. Empty: the whole document.
-        holds: whether the value there is valid; None if no value may stand there.
-        words: expectation that an invalid value fails, or the end of the line made of the value and the selection.
-        when: conditions all of which must hold.
-        names: table keys that the fault names, the given ones if there are any; empty: it names the value.
-    """
-
-    path: TablePath
-    holds: Test | None
-    words: str | Callable[[Any, Selected], str]
-    when: tuple[Condition, ...] = ()
-    names: tuple[str, ...] = ()
-
-    def faults(self, document: Mapping[str, Any], selected: Selected) -> Iterator[str]:
-        """Yield a line for each invalid place in the document."""
-        if not all(condition.holds(selected) for condition in self.when):
-            return
-        for section, place, value in _places(document, self.path):
-            if self.holds is None or not self.holds(value):
-                words = f": {self.words}" if isinstance(self.words, str) else self.words(value, selected)
-                yield f"[{section}]{self._keys(place, value)}{words}" if self.path else words[2:]
-
-    def _keys(self, place: str, value: Any) -> str:
-        """Return the keys of a table, or a value with its key, as the fault of a place names them."""
-        if not self.names:
-            return f" {place} = {toml_value(value)}" if place else ""
-        above, names = f"{place}." if place else "", [name for name in self.names if name in value] or self.names
-        return f" {', '.join(above + name for name in names)}"
-
-
-def has(table: Any, *names: str) -> bool:
-    """Return whether the value is a table with all these keys."""
-    return isinstance(table, dict) and {*names} <= table.keys()
-
-
-def exclusive(path: TablePath, *names: str, words: str = "exclude each other; give one") -> Rule:
-    """Allow at most one of these keys."""
-    return Rule(path, lambda table: sum(has(table, name) for name in names) < 2, words, names=names)
-
-
-def needed(
-    path: TablePath, name: str, words: str, *when: Condition, beside: str = "", unless: Sequence[str] = ()
-) -> Rule:
-    """Require a key, or one of others in its place, under some conditions or beside another key."""
-
-    def holds(table: Any) -> bool:
-        is_asked = isinstance(table, dict) and (not beside or beside in table)
-        return not is_asked or any(each in table for each in (name, *unless))
-
-    return Rule(path, holds, words, when, (name,))
-
-
-def belonging(
-    path: TablePath, condition: Condition, values: Sequence[str], *when: Condition, instead: str = ""
-) -> Rule:
-    """Refuse the key or section at the end of the path where the selector has other values than the condition."""
-    others = tuple(value for value in values if value not in condition.values)
-
-    def words(_: Any, selected: Selected) -> str:
-        owner = f"{condition.in_words(path[0])}, not {toml_value(selected[condition.selector])}"
-        return f": belongs to {owner}{f'; use {instead}' if instead else ''}"
-
-    return Rule(path, None, words, (*when, condition.selector.among(*others)))
-
-
-def _places(document: Mapping[str, Any], path: TablePath) -> Iterator[tuple[str, str, Any]]:
-    """Yield section, place there and value at a path; of a list of sections, numbered from 1, each one's."""
-
-    def within(section: str, place: str, value: Any, rest: TablePath) -> Iterator[tuple[str, str, Any]]:
-        if not rest:
-            if value is not None:
-                yield section, place, value
-        elif rest[0] == ITEMS and isinstance(value, list):
-            for k, item in enumerate(value):
-                yield from within(section, f"{place}[{k}]", item, rest[1:])
-        elif isinstance(value, dict) and rest[0] in value:
-            yield from within(section, f"{place}.{rest[0]}" if place else rest[0], value[rest[0]], rest[1:])
-
-    if not path:
-        yield "", "", document
-        return
-    content = document.get(path[0])
-    sections = content if isinstance(content, list) else [content]
-    for number, section in enumerate(sections, 1):
-        yield from within(path[0] if len(sections) == 1 else f"{path[0]} {number}", "", section, path[1:])

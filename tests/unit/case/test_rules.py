@@ -12,8 +12,9 @@ from unit.case.faulty_cases import FAULTY_CASES
 from unit.case.valid_cases import VALID_CASES
 
 from feti_homog.case.case import parse
+from feti_homog.case.rules import ITEMS, Rule, exclusive, needed
 from feti_homog.errors import CaseError
-from feti_homog.schema.keys import ITEMS, Rule, Selector, exclusive, needed
+from feti_homog.schema.keys import Selector
 
 NO_TOML = {"syntax", "syntax_unclosed", "key_twice", "section_twice", "number_too_long"}
 SOURCES = [tomllib.loads(text) for text in VALID_CASES.values()]
