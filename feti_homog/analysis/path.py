@@ -186,8 +186,8 @@ def _with_advice(error: NotCarriedError, place: str, path: LoadPath) -> NotCarri
 def _sliding_cell(context: AnalysisContext) -> SlidingCell:
     """Return the case's faces with their interface friction.  Collective; raises as `SlidingCell`."""
     cell, pair = context.loads.interfaces, context.loads.interfaces.nodes.pair
-    friction, of_damage = np.array([interface.rubbing for interface in context.case.interfaces]).T
-    return SlidingCell(cell, friction[pair], of_damage[pair])
+    friction, on_damage = np.array([(each.friction, each.friction_on_damage) for each in context.case.interfaces]).T
+    return SlidingCell(cell, friction[pair], (friction * on_damage)[pair])
 
 
 def _label(path: LoadPath, number: int) -> str:

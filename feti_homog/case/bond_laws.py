@@ -45,21 +45,12 @@ BRANCH = ("openings", "tractions")
 OF_STRENGTHS = ((r"R^\mathrm{n}", "normal_strength", True), (r"R^\mathrm{t}", "tangential_strength", True))
 
 REGISTRY = (
-    BondLawEntry(
-        "max",
-        "strength.MaxStrength",
-        STRENGTHS,
-        "the largest of t_n / R^n, |t_t| / R^t and along the fibre |t_a| / R^a",
-        OF_STRENGTHS,
-        limits=STRENGTHS,
-    ),
-    BondLawEntry(
-        "quadratic",
-        "strength.QuadraticStrength",
-        STRENGTHS,
-        "the root of the sum of their squares",
-        OF_STRENGTHS,
-        limits=STRENGTHS,
+    *(
+        BondLawEntry(name, f"strength.{name.capitalize()}Strength", STRENGTHS, words, OF_STRENGTHS, limits=STRENGTHS)
+        for name, words in (
+            ("max", "the largest of t_n / R^n, |t_t| / R^t and along the fibre |t_a| / R^a"),
+            ("quadratic", "the root of the sum of their squares"),
+        )
     ),
     BondLawEntry(
         "energy",

@@ -256,11 +256,6 @@ class InterfaceSection:
         absent="the matrix and all others",
     )
 
-    @property
-    def rubbing(self) -> tuple[float, float]:
-        """Coefficients of debonded faces and of damaged shares."""
-        return self.friction, self.friction * self.friction_on_damage
-
 
 def interface_tables(document: Mapping[str, Any]) -> list[Any]:
     """Return the section [interface], or all from several sections [[interface]]; none if there is none."""

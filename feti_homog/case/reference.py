@@ -49,8 +49,6 @@ class KeyRow:
     """One case file key, in words.
 
     Attributes:
-        section: the section's name: "cell", "material", ...; "name" for the key before the first section.
-        table: its place in the file: "[cell]", "[material.PHASE], isotropic", ...
         key: its name.
         accepts: requirement on its value.
         unit: the value's, empty if it has none.
@@ -59,8 +57,6 @@ class KeyRow:
         meaning: a sentence or two.
     """
 
-    section: str
-    table: str
     key: str
     accepts: str
     unit: str
@@ -71,7 +67,12 @@ class KeyRow:
 
 @dataclass(frozen=True)
 class TableReference:
-    """A table of the case file: its section, its place in the file, its purpose, and its keys."""
+    """A table of the case file: its purpose and its keys.
+
+    Attributes:
+        section: the section's name: "cell", "material", ...; "name" for the key before the first section.
+        place: its place in the file: "[cell]", "[material.PHASE], isotropic", ...
+    """
 
     section: str
     place: str
@@ -79,36 +80,34 @@ class TableReference:
     rows: tuple[KeyRow, ...]
 
 
-NAME = KeyRow("name", "before the first section", "name", text.expected, "", "the file's name", "", "Name of the case.")
-RANGE = f"a range in [{SWEEP}]"
 PETSC_MEANING = (
     "PETSc's options without their dash. Those of the command line come first; PETSc's own, as -log_view, belong there "
     "alone."
 )
-PETSC_OPTION = KeyRow(
-    "petsc", "[petsc]", "feti_OPTION", OPTION_EXPECTED, "", "", "",
-    "An option of the solver, such as feti_ksp_rtol = 1e-10; `feti-homog options` lists them.",
-)  # fmt: skip
 UNCERTAINTY_MEANING = (
     "scatter of numbers, which `feti-homog uncertainty` passes on to constants, onsets and peaks, of first order. "
     "`feti-homog run` takes none."
 )
+NAME = KeyRow("name", text.expected, "", "the file's name", "", "Name of the case.")
+PETSC_OPTION = KeyRow(
+    "feti_OPTION", OPTION_EXPECTED, "", "", "",
+    "An option of the solver, such as feti_ksp_rtol = 1e-10; `feti-homog options` lists them.",
+)  # fmt: skip
 DEVIATION = KeyRow(
-    UNCERTAINTY, f"[{UNCERTAINTY}]", "SECTION.KEY", "a number above 0", "that of the key", "", "",
+    "SECTION.KEY", "a number above 0", "that of the key", "", "",
     "Standard deviation of a number, whose value is the mean. In place of both, the number itself may be {mean, std} "
     "or {mean, cv}, cv = std / |mean|.",
 )  # fmt: skip
-PAIRS = KeyRow(
-    UNCERTAINTY, f"[{UNCERTAINTY}]", CORRELATION, "a list of [KEY, KEY, VALUE], values from -1 to 1", "", "", "",
-    "Correlation of pairs of these numbers.",
-)  # fmt: skip
-AXIS = KeyRow(SWEEP, f"[{SWEEP}]", "SECTION.KEY", AXIS_EXPECTED, "", "", "", AXIS_MEANING)
+PAIR_WORDS = "a list of [KEY, KEY, VALUE], values from -1 to 1"
+PAIRS = KeyRow(CORRELATION, PAIR_WORDS, "", "", "", "Correlation of pairs of these numbers.")
+AXIS = KeyRow("SECTION.KEY", AXIS_EXPECTED, "", "", "", AXIS_MEANING)
 
 
 def tables() -> list[TableReference]:
     """All tables of the case file, ordered as in `ORDER`."""
+    ranges = _rows(SWEEP, RANGE_KEYS)
     references = [
-        TableReference("name", NAME.table, "the case as a whole.", (NAME,)),
+        TableReference("name", "before the first section", "the case as a whole.", (NAME,)),
         *map(_table, TABLES),
         _table(SectionTable(UNKNOWN, f"[{UNKNOWN}] SECTION.KEY", Unknown)),
         _table(SectionTable(MEASURED, f"[{MEASURED}] NAME", Measured)),
@@ -116,7 +115,7 @@ def tables() -> list[TableReference]:
         TableReference("petsc", "[petsc]", PETSC_MEANING, (PETSC_OPTION,)),
         TableReference(UNCERTAINTY, f"[{UNCERTAINTY}]", UNCERTAINTY_MEANING, (DEVIATION, PAIRS)),
         _table(SectionTable(SWEEP, f"[{SWEEP}]", SweepSection), AXIS),
-        TableReference(SWEEP, RANGE, "Values of a key that lie between two ends.", _rows(SWEEP, RANGE, RANGE_KEYS)),
+        TableReference(SWEEP, f"a range in [{SWEEP}]", "Values of a key that lie between two ends.", ranges),
     ]
     return sorted(references, key=lambda table: ORDER.index(table.section))
 
@@ -130,20 +129,17 @@ def tables_of(section: str) -> list[TableReference]:
 
 
 def _table(table: SectionTable, *rows: KeyRow) -> TableReference:
-    place = f"{table.place}, {table.form}" if table.form else table.place
     first_paragraph = (inspect.getdoc(table.contents) or "").partition("\n\n")[0]
     meaning = " ".join(first_paragraph.split())
     if table.contents is Isotropic:  # the first form
         meaning = f"{MATERIAL_MEANING} {meaning}"
-    return TableReference(table.section, place, meaning, (*rows, *_rows(table.section, place, keys_of(table.contents))))
+    return TableReference(table.section, table.place, meaning, (*rows, *_rows(table.section, keys_of(table.contents))))
 
 
-def _rows(section: str, place: str, keys: Mapping[str, Key]) -> tuple[KeyRow, ...]:
+def _rows(section: str, keys: Mapping[str, Key]) -> tuple[KeyRow, ...]:
     above = [SECTIONS_OF_AN_ANALYSIS[section]] if section in SECTIONS_OF_AN_ANALYSIS else []
     return tuple(
         KeyRow(
-            section,
-            place,
             name,
             entry.type.expected,
             entry.unit,

@@ -97,7 +97,6 @@ METHOD = Selector("path", "method")
 CRITERION = Selector("interface", "criterion", word="law")
 
 ANGLE_ANALYSIS, PATH_ANALYSIS = ANALYSIS_TYPE.among("angle"), ANALYSIS_TYPE.among("path")
-LOAD_ANALYSIS = ANALYSIS_TYPE.among("load")
 ENVELOPE_ANALYSIS, BREAKING = ANALYSIS_TYPE.among("envelope"), ANALYSIS_TYPE.among("path", "envelope")
 BY_ENERGY, BY_STRENGTH, BY_AXIAL_STRENGTH, SOFTENING, BY_TABLE = (
     CRITERION.among(*laws_with(key))

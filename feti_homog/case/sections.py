@@ -14,14 +14,7 @@ from typing import Any
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.interface_section import Arc, InterfaceSection, Scatter
 from feti_homog.case.loads import Angle, Envelope, LoadPath, MixedLoad, SingleLoad
-from feti_homog.case.section_values import (
-    ANGLE_ANALYSIS,
-    ENVELOPE_ANALYSIS,
-    LOAD_ANALYSIS,
-    PATH_ANALYSIS,
-    SEED,
-    STATES,
-)
+from feti_homog.case.section_values import ANALYSIS_TYPE, PATH_ANALYSIS, SEED, STATES
 from feti_homog.materials.forms import MATERIAL_FORMS
 from feti_homog.schema.keys import Key, key, keys_of
 from feti_homog.schema.values import boolean, choice, file_name, integer, is_number, real, text
@@ -223,12 +216,7 @@ SECTIONS: dict[str, type[Any]] = {
     "output": Output,
 }
 
-SECTIONS_OF_AN_ANALYSIS = {
-    "angle": ANGLE_ANALYSIS,
-    "path": PATH_ANALYSIS,
-    "load": LOAD_ANALYSIS,
-    "envelope": ENVELOPE_ANALYSIS,
-}
+SECTIONS_OF_AN_ANALYSIS = {name: ANALYSIS_TYPE.among(name) for name in ("angle", "path", "load", "envelope")}
 """Sections that must be given for one type of analysis, and belong to no other."""
 
 REQUIRED = ("cell", "material", "analysis")
@@ -241,20 +229,18 @@ class SectionTable:
 
     Attributes:
         section: the section in which it stands.
-        place: its place in the file, in words.
+        place: its place in the file, in words, with its form if there are several.
         contents: the dataclass that lists its keys.
-        form: which of several forms of the table this is, empty if there is one.
     """
 
     section: str
     place: str
     contents: type[Any]
-    form: str = ""
 
 
 TABLES = (
     *(SectionTable(section, f"[{section}]", contents) for section, contents in SECTIONS.items()),
-    *(SectionTable("material", "[material.PHASE]", contents, form) for form, contents in MATERIAL_FORMS.items()),
+    *(SectionTable("material", f"[material.PHASE], {form}", contents) for form, contents in MATERIAL_FORMS.items()),
     SectionTable("interface", "an arc of [interface] debonded", Arc),
     SectionTable("interface", "[interface] scatter", Scatter),
     SectionTable("path", "a load of [path] to or waypoints", MixedLoad),
@@ -263,8 +249,9 @@ TABLES = (
 
 
 KEY_OWNERS = {
-    name: " or ".join(table.place for table in TABLES if name in keys_of(table.contents))
-    for name in dict.fromkeys(name for table in TABLES for name in keys_of(table.contents))
+    name: " or ".join(dict.fromkeys(each.place.partition(",")[0] for each in TABLES if name in keys_of(each.contents)))
+    for table in TABLES
+    for name in keys_of(table.contents)
 }
 """By key, the tables to which it belongs, in words."""
 

@@ -42,8 +42,8 @@ def words_of_the_code() -> frozenset[str]:
 def keys() -> dict[str, set[str]]:
     """Return the keys of each section of a case file."""
     found: dict[str, set[str]] = {}
-    for row in (row for table in reference.tables() for row in table.rows):
-        found.setdefault(row.section, set()).add(row.key)
+    for table in reference.tables():
+        found.setdefault(table.section, set()).update(row.key for row in table.rows)
     return found
 
 
