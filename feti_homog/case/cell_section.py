@@ -9,17 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from feti_homog.case.section_values import (
-    CELL_FILE,
-    FIBRE_LIST,
-    FRACTIONS,
-    NAMES_OF_COLUMNS,
-    PHASES,
-    RADII,
-    SEED,
-    TABLE_FILE,
-    VOIDS,
-)
+from feti_homog.case import section_values as kinds
 from feti_homog.microstructure.phase_names import FIBRE
 from feti_homog.schema.keys import Selector, key
 from feti_homog.schema.values import choice, integer, real
@@ -141,13 +131,13 @@ class Cell:
         default_words="required, or given by match, or by width and radii",
     )
     mix: Mapping[str, float] | None = random_key(
-        FRACTIONS,
+        kinds.FRACTIONS,
         "Fibres of several phases, in place of fibre_fraction: the area of those of each / area of the cell. Each "
         "needs its [material.NAME].",
         absent="none",
     )
     radii: Mapping[str, float] | None = random_key(
-        RADII,
+        kinds.RADII,
         "Mean radius of the fibres of each phase of mix, in place of fibre_radius. Of fibres, or of as many as a cell "
         "of this width takes, each phase gets the nearest whole number, at least one; its radii are then scaled such "
         "that its fraction is exact.",
@@ -155,7 +145,7 @@ class Cell:
         absent="equal ones",
     )
     voids: float | bool | None = key(
-        VOIDS,
+        kinds.VOIDS,
         "Of a random cell voids among the fibres, min_gap from them and from each other: their area / area of the "
         "cell. Of a mesh, true: where it has no elements there are voids; without it such holes are faults.",
         absent="none", only=GEOMETRY.among("random", "mesh"),
@@ -167,7 +157,7 @@ class Cell:
         absent="1",
     )
     match: Path | None = key(
-        TABLE_FILE,
+        kinds.TABLE_FILE,
         "A table of the fibres in a window of a micrograph, relative to the case file: columns x, y, radius, and a "
         'comment such as "# width = 120, height = 80". The cell gets its radii and, as near as can be, its '
         "distributions of the distances of nearest and second neighbours, but none below min_gap. Ellipses count as "
@@ -179,7 +169,7 @@ class Cell:
         real(least=0.0, most=1.0), "Smallest gap between fibres / their mean diameter.", default=0.05
     )
     seed: int = random_key(
-        SEED,
+        kinds.SEED,
         "Seed of the random arrangement; the same seed gives the same cell on any machine and any number of ranks.",
         default=0,
     )
@@ -187,7 +177,7 @@ class Cell:
         real(least=0.0, most=0.5), "Largest difference of a radius from the mean / mean radius.", default=0.0
     )
     file: Path | None = key(
-        CELL_FILE,
+        kinds.CELL_FILE,
         'Relative to the case file. Of geometry = "mesh" the mesh: triangles of three or six nodes that fill a '
         'rectangle, in physical surfaces "matrix", "fibre", "glass", ...; the nodes on opposite sides match. Fibres '
         "may have any shape. Of Abaqus' files (.inp) element sets have these names; of .vtu and .vtk files cell data "
@@ -201,7 +191,7 @@ class Cell:
         absent="required, or fibre_list of a table",
     )
     phases: Mapping[str, tuple[str | int, ...]] | None = key(
-        PHASES,
+        kinds.PHASES,
         "Names and numbers in the file, by the phase that they are of, where they are not the phases' names: physical "
         "surfaces of gmsh; element sets and materials of sections of Abaqus; numbers of VTK's cell data and Medit's "
         "references. Capitals do not matter. debonded has those of lines that are debonded from the start.",
@@ -223,13 +213,13 @@ class Cell:
         only=MESH,
     )
     columns: tuple[str, ...] | None = key(
-        NAMES_OF_COLUMNS,
+        kinds.NAMES_OF_COLUMNS,
         "Names of the columns of a table, in place of a line of names; others than those of file are not read.",
         only=TABLE,
         absent="the first line of the table",
     )
     fibre_list: tuple[Mapping[str, Any], ...] | None = key(
-        FIBRE_LIST, "The fibres, in place of file.", only=TABLE, absent="given by file"
+        kinds.FIBRE_LIST, "The fibres, in place of file.", only=TABLE, absent="given by file"
     )
     window: str = key(
         choice("periodic", "cut"),

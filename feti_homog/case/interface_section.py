@@ -7,25 +7,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from feti_homog.case import section_values as kinds
 from feti_homog.case.bond_laws import DEFAULT, LAWS, REGISTRY
-from feti_homog.case.section_values import (
-    ANALYSIS_TYPE,
-    BREAKING,
-    BY_AXIAL_STRENGTH,
-    BY_ENERGY,
-    BY_STRENGTH,
-    BY_TABLE,
-    FIBRES,
-    GENERALIZED,
-    NUMBERS_ABOVE,
-    PAIR,
-    PATH_ANALYSIS,
-    SEED,
-    SOFTENING,
-    STIFFNESS,
-    STRENGTH,
-    TOUGHNESS,
-)
 from feti_homog.schema.keys import key
 from feti_homog.schema.values import POSITIVE_OR_INF, boolean, choice, integer, list_of, real, table_of
 
@@ -41,7 +24,7 @@ class Arc:
     """
 
     fibre: str | tuple[int, ...] = key(
-        FIBRES,
+        kinds.FIBRES,
         "Which fibres, in the order of the arrangement; of the hexagonal cell 1 is at the corners, 2 in the middle.",
     )
     centre: float = key(
@@ -55,7 +38,7 @@ class Arc:
         "Whole opening of the arc, measured at the centre of the fibre. 0 is perfect bonding; at 360 nothing holds the "
         "fibre, and its rigid motions are left out.",
         unit="degrees",
-        only=ANALYSIS_TYPE.among("stiffness", "path", "load", "envelope"),
+        only=kinds.ANALYSIS_TYPE.among("stiffness", "path", "load", "envelope"),
     )
 
 
@@ -69,7 +52,7 @@ class Scatter:
         "about 1.2 / m: 0.23 of m = 5, 0.15 of 8, 0.06 of 20.",
     )
     seed: int = key(
-        SEED,
+        kinds.SEED,
         "Seed of the factors: with it fibre N has the same factor in any cell and mesh, on any number of ranks.",
         default=0,
     )
@@ -102,14 +85,14 @@ class InterfaceSection:
         "debonded faces slip freely: Coulomb's cone of both shears is round, so no path would be straight between "
         "changes of status.",
         default=0.0,
-        only=PATH_ANALYSIS,
+        only=kinds.PATH_ANALYSIS,
     )
     friction_on_damage: bool = pair_key(
         boolean,
         "true: friction acts on the damaged share of bonds that hold, too, with the whole of their pressure. false: on "
         "broken bonds alone.",
         default=False,
-        only=(PATH_ANALYSIS, SOFTENING),
+        only=(kinds.PATH_ANALYSIS, kinds.SOFTENING),
     )
     debonded: tuple[Arc, ...] = pair_key(
         ARCS,
@@ -118,43 +101,46 @@ class InterfaceSection:
         default=(),
     )
     normal_stiffness: float | None = pair_key(
-        STIFFNESS,
+        kinds.STIFFNESS,
         "Normal traction / opening, k_n: of bonds that hold in tension and compression, of broken faces in contact.",
         unit="stress / length",
         absent="inf",
     )
     tangential_stiffness: float | None = pair_key(
-        STIFFNESS, "Tangential traction / slip, k_t, of the bonds that hold.", unit="stress / length", absent="inf"
+        kinds.STIFFNESS,
+        "Tangential traction / slip, k_t, of the bonds that hold.",
+        unit="stress / length",
+        absent="inf",
     )
     axial_stiffness: float | None = pair_key(
         POSITIVE_OR_INF,
         "Traction along the fibre / slip along it, k_a, of the bonds that hold; inf: no slip along it.",
         unit="stress / length",
         absent="tangential_stiffness",
-        only=GENERALIZED,
+        only=kinds.GENERALIZED,
     )
     normal_strength: float | None = pair_key(
-        STRENGTH,
+        kinds.STRENGTH,
         "R^n: the normal traction at which a bond breaks, or N: at which its damage begins. A force per area: it does "
         "not depend on the mesh.",
         unit="stress",
         absent="inf",
-        only=(BREAKING, BY_STRENGTH),
+        only=(kinds.BREAKING, kinds.BY_STRENGTH),
     )
     tangential_strength: float | None = pair_key(
-        STRENGTH,
+        kinds.STRENGTH,
         "R^t: the tangential traction at which a bond breaks, or S: at which its damage begins; of cohesive laws along "
         "the fibre, too.",
         unit="stress",
         absent="inf",
-        only=(BREAKING, BY_STRENGTH),
+        only=(kinds.BREAKING, kinds.BY_STRENGTH),
     )
     axial_strength: float | None = pair_key(
         POSITIVE_OR_INF,
         "R^a: the traction along the fibre at which a bond breaks; inf: it breaks none.",
         unit="stress",
         absent="tangential_strength",
-        only=(BREAKING, GENERALIZED, BY_AXIAL_STRENGTH),
+        only=(kinds.BREAKING, kinds.GENERALIZED, kinds.BY_AXIAL_STRENGTH),
     )
     law: str | None = key(
         choice(*LAWS),
@@ -165,80 +151,83 @@ class InterfaceSection:
         + '. Compression neither breaks nor damages a bond. With teeth = 1 a cohesive law is "energy" with growth = '
         '"springs" in pure modes.',
         absent="criterion",
-        only=BREAKING,
+        only=kinds.BREAKING,
     )
     criterion: str = key(
         choice(*LAWS),
         'The older word for law, with the same values: criterion = "energy" is law = "energy".',
         default=DEFAULT,
-        only=BREAKING,
+        only=kinds.BREAKING,
     )
     normal_toughness: float | None = pair_key(
-        TOUGHNESS,
+        kinds.TOUGHNESS,
         "G_n, the energy per area that a bond takes in pure opening: no less than N^2 / (2 normal_stiffness).",
         unit="stress * length",
         default=None,
-        only=(BREAKING, SOFTENING),
+        only=(kinds.BREAKING, kinds.SOFTENING),
     )
     tangential_toughness: float | None = pair_key(
-        TOUGHNESS,
+        kinds.TOUGHNESS,
         "G_t, the energy per area in pure shear. At the share B of shear in the energy of undamaged springs damage "
         "begins at (t_n / N)^2 + (t_t / S)^2 = 1 and takes G_n + (G_t - G_n) B^mixing_exponent.",
         unit="stress * length",
         default=None,
-        only=(BREAKING, SOFTENING),
+        only=(kinds.BREAKING, kinds.SOFTENING),
     )
     mixing_exponent: float = pair_key(
-        real(above=0.0), "Exponent of Benzeggagh and Kenane's toughness.", default=2.0, only=(BREAKING, SOFTENING)
+        real(above=0.0),
+        "Exponent of Benzeggagh and Kenane's toughness.",
+        default=2.0,
+        only=(kinds.BREAKING, kinds.SOFTENING),
     )
     teeth: int | None = key(
         integer(least=1, most=10_000),
         "Steps of damage; each is an event. Any number takes the energy of the law.",
         absent="as few as softening_tolerance allows",
-        only=(BREAKING, SOFTENING),
+        only=(kinds.BREAKING, kinds.SOFTENING),
     )
     softening_tolerance: float = key(
         real(above=0.0, most=1.0),
         "By how much of the peak traction the first tooth may exceed it.",
         default=0.02,
-        only=(BREAKING, SOFTENING),
+        only=(kinds.BREAKING, kinds.SOFTENING),
     )
     openings: tuple[float, ...] | None = key(
-        NUMBERS_ABOVE,
+        kinds.NUMBERS_ABOVE,
         "The softening branch in pure opening: rising openings, the first at the peak, which the line of the "
         "normal_stiffness reaches (by default its traction / its opening), the last with no traction.",
         unit="length",
         default=None,
-        only=(BREAKING, BY_TABLE),
+        only=(kinds.BREAKING, kinds.BY_TABLE),
     )
     tractions: tuple[float, ...] | None = key(
-        NUMBERS_ABOVE,
+        kinds.NUMBERS_ABOVE,
         "Tractions at the openings, falling to 0. In other modes the branch is stretched to their toughness.",
         unit="stress",
         default=None,
-        only=(BREAKING, BY_TABLE),
+        only=(kinds.BREAKING, kinds.BY_TABLE),
     )
     toughness: float | None = pair_key(
-        TOUGHNESS,
+        kinds.TOUGHNESS,
         "G_Ic, energy per area. A bond breaks when G_I + G_II = <t_n>^2 / (2 k_n) + t_t^2 / (2 k_t) reaches "
         "G_c = G_Ic (1 + tan^2((1 - mode_sensitivity) psi)), tan^2 psi = G_II / G_I; along the fibre "
         "G_III = t_a^2 / (2 k_a) adds to G_II.",
         unit="stress * length",
-        only=BY_ENERGY,
+        only=kinds.BY_ENERGY,
     )
     growth: str = key(
         choice("released", "springs"),
         'Where debonding has begun: "released": a bond beside a broken one breaks when that releases G_c times its '
         'length, which hardly depends on the mesh; "springs": by the energy of its spring, as any other.',
         default="released",
-        only=BY_ENERGY,
+        only=kinds.BY_ENERGY,
         instead="no growth: a law that softens takes the energy of its teeth, at tips too",
     )
     mode_sensitivity: float = pair_key(
         real(least=0.0, most=1.0),
         "How much of the toughness in opening holds in shear: 1 all modes have the same, 0 shear alone breaks nothing.",
         default=0.25,
-        only=BY_ENERGY,
+        only=kinds.BY_ENERGY,
     )
     scatter: Scatter | None = key(
         table_of(Scatter, "a table such as {shape = 8.0, seed = 1}"),
@@ -247,10 +236,10 @@ class InterfaceSection:
         "process zone. Strengths and toughness of this section are then those of a mean fibre, f = 1. The column "
         "strength of a table of fibres gives factors too; both are multiplied.",
         absent="none",
-        only=BREAKING,
+        only=kinds.BREAKING,
     )
     between: tuple[str, str] | None = pair_key(
-        PAIR,
+        kinds.PAIR,
         "The two phases whose interfaces these are, in any order; pairs that no section names never part. Needed where "
         "there are several sections [[interface]].",
         absent="the matrix and all others",

@@ -11,15 +11,7 @@ from dataclasses import dataclass
 from itertools import accumulate
 from typing import Any, ClassVar
 
-from feti_homog.case.section_values import (
-    BY_EVENTS,
-    BY_INCREMENTS,
-    GENERALIZED,
-    IN_THE_PLANE,
-    OPENINGS,
-    STRAIN,
-    STRAIN_COMPONENTS,
-)
+from feti_homog.case import section_values as kinds
 from feti_homog.materials.voigt import PLANE_STATES, SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS
 from feti_homog.schema.keys import Condition, key
 from feti_homog.schema.values import choice, either, integer, list_of, real, table_of
@@ -45,22 +37,22 @@ class MixedLoad:
 
     E11: float | None = _strain("E11")
     E22: float | None = _strain("E22")
-    E33: float | None = _strain("E33", GENERALIZED)
-    gamma23: float | None = _strain("gamma23", GENERALIZED)
-    gamma13: float | None = _strain("gamma13", GENERALIZED)
+    E33: float | None = _strain("E33", kinds.GENERALIZED)
+    gamma23: float | None = _strain("gamma23", kinds.GENERALIZED)
+    gamma13: float | None = _strain("gamma13", kinds.GENERALIZED)
     gamma12: float | None = _strain("gamma12")
     S11: float | None = _stress("S11")
     S22: float | None = _stress("S22")
-    S33: float | None = _stress("S33", GENERALIZED)
-    S23: float | None = _stress("S23", GENERALIZED)
-    S13: float | None = _stress("S13", GENERALIZED)
+    S33: float | None = _stress("S33", kinds.GENERALIZED)
+    S23: float | None = _stress("S23", kinds.GENERALIZED)
+    S13: float | None = _stress("S13", kinds.GENERALIZED)
     S12: float | None = _stress("S12")
     temperature: float | None = key(
         real(),
         "A change of temperature, 0 until it is named. Every phase must give its expansion.",
         unit="temperature",
         default=None,
-        only=GENERALIZED,
+        only=kinds.GENERALIZED,
     )
 
     @property
@@ -72,7 +64,9 @@ class MixedLoad:
 
 LOAD = table_of(MixedLoad, "a table of strains and stresses such as {S11 = 60.0, S22 = 0.0}", least=1)
 WAYPOINTS = list_of(
-    either("", STRAIN, LOAD), f"a list of strains {STRAIN_COMPONENTS} or of tables such as {{S11 = 60.0}}", least=1
+    either("", kinds.STRAIN, LOAD),
+    f"a list of strains {kinds.STRAIN_COMPONENTS} or of tables such as {{S11 = 60.0}}",
+    least=1,
 )
 
 
@@ -150,12 +144,12 @@ PLANE_OF_LOADS = either(
 class Angle(AnalysisSection):
     """Openings of the arcs, one after the other."""
 
-    values: tuple[float, ...] = key(OPENINGS, "Openings of all arcs of [interface] debonded.", unit="degrees")
+    values: tuple[float, ...] = key(kinds.OPENINGS, "Openings of all arcs of [interface] debonded.", unit="degrees")
     strain: Strain | None = key(
-        STRAIN,
+        kinds.STRAIN,
         "Macroscopic strain, other than zero; by default the three unit strains, which give the effective stiffness.",
         absent="unit strains",
-        only=IN_THE_PLANE,
+        only=kinds.IN_THE_PLANE,
     )
 
     @property
@@ -192,7 +186,7 @@ class Envelope(AnalysisSection):
         "strains. Every phase must give its expansion.",
         unit="temperature",
         default=None,
-        only=GENERALIZED,
+        only=kinds.GENERALIZED,
     )
 
 
@@ -204,10 +198,10 @@ class LoadPath(AnalysisSection):
     is_followed: ClassVar[bool] = True
 
     strain: Strain | None = key(
-        STRAIN,
+        kinds.STRAIN,
         "The strain at the end, other than zero: a single waypoint.",
         default=None,
-        only=IN_THE_PLANE,
+        only=kinds.IN_THE_PLANE,
         instead="to = {E11 = ...}",
     )
     to: MixedLoad | None = key(
@@ -231,19 +225,19 @@ class LoadPath(AnalysisSection):
         integer(least=1, most=1_000_000),
         "Number of load steps of the whole path, at least one for each waypoint. Steps end on every waypoint if it "
         "is a multiple of their number; others pass by the corners of the path.",
-        only=BY_INCREMENTS,
+        only=kinds.BY_INCREMENTS,
     )
     release: str = key(
         choice("all", "worst"),
         'In a step "all" bonds over their strength break at once, or the "worst" first, until none is over.',
         default="all",
-        only=BY_INCREMENTS,
+        only=kinds.BY_INCREMENTS,
     )
     max_events: int = key(
         integer(least=1, most=10**9),
         "Stop after so many events, with exit code 3; --resume with a higher number goes on.",
         default=100_000,
-        only=BY_EVENTS,
+        only=kinds.BY_EVENTS,
     )
 
     @property

@@ -8,31 +8,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from feti_homog.case.sections import (
-    AXIS_EXPECTED,
-    AXIS_MEANING,
-    CURVE,
-    MEASURED,
-    OPTION_EXPECTED,
-    RANGE_KEYS,
-    SECTIONS,
-    SECTIONS_OF_AN_ANALYSIS,
-    SWEEP,
-    TABLES,
-    UNKNOWN,
-    Measured,
-    MeasuredCurve,
-    SectionTable,
-    SweepSection,
-    Unknown,
-)
+from feti_homog.case import sections
 from feti_homog.case.uncertainty import CORRELATION, UNCERTAINTY
 from feti_homog.errors import CaseError
 from feti_homog.materials.forms import Isotropic
 from feti_homog.schema.keys import Key, keys_of
 from feti_homog.schema.values import text
 
-ORDER = ("name", "cell", "material", *[*SECTIONS][1:], "petsc", UNCERTAINTY, SWEEP, UNKNOWN, MEASURED)
+ORDER = (
+    *("name", "cell", "material", *[*sections.SECTIONS][1:]),
+    *("petsc", UNCERTAINTY, sections.SWEEP, sections.UNKNOWN, sections.MEASURED),
+)
 """Sections in the order of the reference."""
 
 WIDTH = 100  # characters of a printed line
@@ -90,7 +76,7 @@ UNCERTAINTY_MEANING = (
 )
 NAME = KeyRow("name", text.expected, "", "the file's name", "", "Name of the case.")
 PETSC_OPTION = KeyRow(
-    "feti_OPTION", OPTION_EXPECTED, "", "", "",
+    "feti_OPTION", sections.OPTION_EXPECTED, "", "", "",
     "An option of the solver, such as feti_ksp_rtol = 1e-10; `feti-homog options` lists them.",
 )  # fmt: skip
 DEVIATION = KeyRow(
@@ -100,22 +86,26 @@ DEVIATION = KeyRow(
 )  # fmt: skip
 PAIR_WORDS = "a list of [KEY, KEY, VALUE], values from -1 to 1"
 PAIRS = KeyRow(CORRELATION, PAIR_WORDS, "", "", "", "Correlation of pairs of these numbers.")
-AXIS = KeyRow("SECTION.KEY", AXIS_EXPECTED, "", "", "", AXIS_MEANING)
+AXIS = KeyRow("SECTION.KEY", sections.AXIS_EXPECTED, "", "", "", sections.AXIS_MEANING)
 
 
 def tables() -> list[TableReference]:
     """All tables of the case file, ordered as in `ORDER`."""
-    ranges = _rows(SWEEP, RANGE_KEYS)
+    ranges = _rows(sections.SWEEP, sections.RANGE_KEYS)
     references = [
         TableReference("name", "before the first section", "the case as a whole.", (NAME,)),
-        *map(_table, TABLES),
-        _table(SectionTable(UNKNOWN, f"[{UNKNOWN}] SECTION.KEY", Unknown)),
-        _table(SectionTable(MEASURED, f"[{MEASURED}] NAME", Measured)),
-        _table(SectionTable(MEASURED, f"[{MEASURED}] {CURVE}", MeasuredCurve)),
+        *map(_table, sections.TABLES),
+        _table(sections.SectionTable(sections.UNKNOWN, f"[{sections.UNKNOWN}] SECTION.KEY", sections.Unknown)),
+        _table(sections.SectionTable(sections.MEASURED, f"[{sections.MEASURED}] NAME", sections.Measured)),
+        _table(
+            sections.SectionTable(sections.MEASURED, f"[{sections.MEASURED}] {sections.CURVE}", sections.MeasuredCurve)
+        ),
         TableReference("petsc", "[petsc]", PETSC_MEANING, (PETSC_OPTION,)),
         TableReference(UNCERTAINTY, f"[{UNCERTAINTY}]", UNCERTAINTY_MEANING, (DEVIATION, PAIRS)),
-        _table(SectionTable(SWEEP, f"[{SWEEP}]", SweepSection), AXIS),
-        TableReference(SWEEP, f"a range in [{SWEEP}]", "Values of a key that lie between two ends.", ranges),
+        _table(sections.SectionTable(sections.SWEEP, f"[{sections.SWEEP}]", sections.SweepSection), AXIS),
+        TableReference(
+            sections.SWEEP, f"a range in [{sections.SWEEP}]", "Values of a key that lie between two ends.", ranges
+        ),
     ]
     return sorted(references, key=lambda table: ORDER.index(table.section))
 
@@ -128,7 +118,7 @@ def tables_of(section: str) -> list[TableReference]:
     return result
 
 
-def _table(table: SectionTable, *rows: KeyRow) -> TableReference:
+def _table(table: sections.SectionTable, *rows: KeyRow) -> TableReference:
     first_paragraph = (inspect.getdoc(table.contents) or "").partition("\n\n")[0]
     meaning = " ".join(first_paragraph.split())
     if table.contents is Isotropic:  # the first form
@@ -137,7 +127,7 @@ def _table(table: SectionTable, *rows: KeyRow) -> TableReference:
 
 
 def _rows(section: str, keys: Mapping[str, Key]) -> tuple[KeyRow, ...]:
-    above = [SECTIONS_OF_AN_ANALYSIS[section]] if section in SECTIONS_OF_AN_ANALYSIS else []
+    above = [sections.SECTIONS_OF_AN_ANALYSIS[section]] if section in sections.SECTIONS_OF_AN_ANALYSIS else []
     return tuple(
         KeyRow(
             name,

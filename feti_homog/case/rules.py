@@ -10,26 +10,13 @@ from itertools import product
 from operator import ne
 from typing import Any
 
+from feti_homog.case import section_values as kinds
 from feti_homog.case.bond_laws import REGISTRY, STIFFNESSES, STRENGTHS
 from feti_homog.case.cell_files import FEWEST_MATCHED
 from feti_homog.case.cell_section import MESH, MESHED, RANDOM, TABLE, Cell
 from feti_homog.case.cell_sizes import CHOSEN
 from feti_homog.case.interface_section import ARCS, Arc, Scatter, interface_tables
 from feti_homog.case.loads import MixedLoad
-from feti_homog.case.section_values import (
-    ANALYSIS_TYPE,
-    ANGLE_ANALYSIS,
-    BREAKING,
-    CRITERION,
-    ENVELOPE_ANALYSIS,
-    GENERALIZED,
-    IN_THE_PLANE,
-    MESH_FILE,
-    MESH_SUFFIXES,
-    PLANE,
-    TABLE_SUFFIXES,
-    VOIDS_OF_A_RANDOM_CELL,
-)
 from feti_homog.case.sections import SECTIONS, SECTIONS_OF_AN_ANALYSIS
 from feti_homog.case.uncertainty import DIFFERENTIABLE
 from feti_homog.materials.voigt import PLANE_STATES, SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
@@ -152,7 +139,7 @@ def _conditional_keys() -> Iterator[Rule]:
     for section, condition in SECTIONS_OF_AN_ANALYSIS.items():
         line = f"[{section}]: missing section; {condition.in_words(section)} needs it"
         yield needed((), section, line, condition)
-        yield belonging((section,), condition, _values(ANALYSIS_TYPE))
+        yield belonging((section,), condition, _values(kinds.ANALYSIS_TYPE))
     for path, contents in PLACES_OF_TABLES:
         for name, entry in keys_of(contents).items():
             for k, condition in enumerate(entry.only):
@@ -180,7 +167,7 @@ def _cell() -> Iterator[Rule]:
     yield needed(CELL, "fibres", line, beside="radii", unless=("width",))
     line = "belongs to voids, which is missing"
     yield replace(needed(CELL, "voids", line, beside="void_radius"), names=("void_radius",))
-    line = f"expected {VOIDS_OF_A_RANDOM_CELL.expected}"
+    line = f"expected {kinds.VOIDS_OF_A_RANDOM_CELL.expected}"
     yield Rule((*CELL, "voids"), lambda value: not isinstance(value, bool), line, (RANDOM,))
     line = "expected true or false: the mesh has its voids"
     yield Rule((*CELL, "voids"), lambda value: isinstance(value, bool), line, (MESH,))
@@ -198,10 +185,13 @@ def _cell() -> Iterator[Rule]:
 def _files() -> Iterator[Rule]:
     """Require a mesh file, and a fibre file or list beside the cell size."""
     yield exclusive(CELL, "file", "fibre_list")
-    yield needed(CELL, "file", f"missing; expected the name of a {MESH_FILE}", MESH)
+    yield needed(CELL, "file", f"missing; expected the name of a {kinds.MESH_FILE}", MESH)
     line = "missing; expected the name of a .csv file, or fibre_list"
     yield needed(CELL, "file", line, TABLE, unless=("fibre_list",))
-    for suffixes, expected, geometry in ((TABLE_SUFFIXES, MESH_FILE, MESH), (MESH_SUFFIXES, ".csv file", TABLE)):
+    for suffixes, expected, geometry in (
+        (kinds.TABLE_SUFFIXES, kinds.MESH_FILE, MESH),
+        (kinds.MESH_SUFFIXES, ".csv file", TABLE),
+    ):
         line = f"expected the name of a {expected} for {geometry.in_words('cell')}"
         yield Rule((*CELL, "file"), partial(_has_other_end, suffixes), line, (geometry,))
     for wrong, right, geometry in (("overlaps", "snap", MESH), ("snap", "overlaps", TABLE)):
@@ -219,32 +209,32 @@ def _has_other_end(suffixes: tuple[str, ...], name: Any) -> bool:
 def _bonds() -> Iterator[Rule]:
     """Yield the rules for debonded arcs, and the requirements for energies and envelopes."""
     start = "[interface] debonded: missing"
-    line = f"{start}; {ANGLE_ANALYSIS.in_words('interface')} needs {ARCS.expected}"
+    line = f"{start}; {kinds.ANGLE_ANALYSIS.in_words('interface')} needs {ARCS.expected}"
     cracked = partial(_any_section, _some_arc)
-    yield Rule((), lambda document: "interface" in document and cracked(document), line, (ANGLE_ANALYSIS,))
+    yield Rule((), lambda document: "interface" in document and cracked(document), line, (kinds.ANGLE_ANALYSIS,))
     # An empty list is meant; of a user's mesh a curve may be debonded.
     ways = ("debonded", *STIFFNESSES, "axial_stiffness")
     line = f"{start}; expected {ARCS.expected}, or []: nothing else can open"
     opens = partial(_any_section, lambda table: any(name in table for name in ways))
-    yield Rule((), opens, line, (ANALYSIS_TYPE.among("stiffness", "load"), MESHED))
+    yield Rule((), opens, line, (kinds.ANALYSIS_TYPE.among("stiffness", "load"), MESHED))
     yield exclusive(INTERFACE, "law", "criterion", words="exclude each other; criterion is the older word for law")
     for law in REGISTRY:
         for name in law.needs:
             missing = f"missing; law = {toml_value(law.name)} needs it"
-            yield needed(INTERFACE, name, missing, BREAKING, CRITERION.among(law.name))
-    type_ = ENVELOPE_ANALYSIS.in_words("")
+            yield needed(INTERFACE, name, missing, kinds.BREAKING, kinds.CRITERION.among(law.name))
+    type_ = kinds.ENVELOPE_ANALYSIS.in_words("")
     line = f"[interface]: missing section; {type_} needs it"
-    yield needed((), "interface", line, ENVELOPE_ANALYSIS)
-    for plane, names in ((IN_THE_PLANE, STRENGTHS[:2]), (GENERALIZED, STRENGTHS)):
+    yield needed((), "interface", line, kinds.ENVELOPE_ANALYSIS)
+    for plane, names in ((kinds.IN_THE_PLANE, STRENGTHS[:2]), (kinds.GENERALIZED, STRENGTHS)):
         line = f"[interface] {', '.join(names)}: missing; {type_} needs one"
-        yield Rule((), partial(_any_section, partial(_breaks, names)), line, (ENVELOPE_ANALYSIS, plane))
+        yield Rule((), partial(_any_section, partial(_breaks, names)), line, (kinds.ENVELOPE_ANALYSIS, plane))
 
     def touches_nowhere(document: Any) -> bool:
         tables = [table for table in interface_tables(document) if isinstance(table, dict)]
         return all(table.get("contact") is False for table in tables) or not any(map(_some_arc, tables))
 
     line = f"expected false with debonded arcs; {type_} superposes loads, which contact forbids"
-    yield Rule((), touches_nowhere, f"[interface] contact: {line}", (ENVELOPE_ANALYSIS,))
+    yield Rule((), touches_nowhere, f"[interface] contact: {line}", (kinds.ENVELOPE_ANALYSIS,))
 
 
 def _any_section(test: Test, document: Any) -> bool:
@@ -269,16 +259,16 @@ def _loads_and_outputs() -> Iterator[Rule]:
     """Allow one form of a path, a component's strain or stress, and what analysis and plane state can give."""
     yield replace(needed(("path",), LOADS[0], "missing; give one", unless=LOADS), names=LOADS)
     yield exclusive(("path",), *LOADS)
-    line = f"expected a table such as {{E11 = 0.01}} in {GENERALIZED.in_words('path')}"
-    yield Rule(("path", "waypoints", ITEMS), lambda value: not isinstance(value, list), line, (GENERALIZED,))
+    line = f"expected a table such as {{E11 = 0.01}} in {kinds.GENERALIZED.in_words('path')}"
+    yield Rule(("path", "waypoints", ITEMS), lambda value: not isinstance(value, list), line, (kinds.GENERALIZED,))
     for path, pair in product(PLACES_OF_LOADS, PLANE_STATES["generalized"].components):
         yield exclusive(path, *pair)
-    others = ANALYSIS_TYPE.among(*(name for name in _values(ANALYSIS_TYPE) if name not in DIFFERENTIABLE))
+    others = kinds.ANALYSIS_TYPE.among(*(name for name in _values(kinds.ANALYSIS_TYPE) if name not in DIFFERENTIABLE))
     line = f"belongs to [analysis] type = {' or '.join(map(toml_value, DIFFERENTIABLE))}"
     yield Rule(("output", "sensitivities"), lambda value: value is not True, line, (others,))
     along = {*SPATIAL_STRESSES, *SPATIAL_STRAINS} - {*STRESSES, *STRAINS}
     for place in (("output", "stress"), ("envelope", "plane", ITEMS)):
-        rule = belonging(place, GENERALIZED, _values(PLANE))
+        rule = belonging(place, kinds.GENERALIZED, _values(kinds.PLANE))
         yield replace(rule, holds=lambda value: str(value) not in along)
 
 
