@@ -9,7 +9,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from feti_homog.case import cell_sizes
+from feti_homog.case import cell_sizes, sections
 from feti_homog.case.cell_files import checked_cell
 from feti_homog.case.cell_section import GEOMETRY, Cell
 from feti_homog.case.document import read_document, short_digest, to_document
@@ -19,20 +19,6 @@ from feti_homog.case.material_sections import provider, read_materials
 from feti_homog.case.relations import axes_lines, idle_friction_keys, read_interfaces, relation_faults, stress_free
 from feti_homog.case.rules import RULES
 from feti_homog.case.section_values import ANALYSIS_TYPE, CRITERION, METHOD, PLANE
-from feti_homog.case.sections import (
-    FIT_SECTIONS,
-    KEY_OWNERS,
-    REQUIRED,
-    SECTIONS,
-    SECTIONS_OF_AN_ANALYSIS,
-    SWEEP,
-    TOP_LEVEL,
-    Analysis,
-    Decomposition,
-    Output,
-    Scalar,
-    read_petsc,
-)
 from feti_homog.case.uncertainty import UNCERTAINTY
 from feti_homog.errors import CaseError
 from feti_homog.materials.forms import Material
@@ -44,7 +30,7 @@ from feti_homog.system.runtime import input_files
 
 FIELDS = {"load": "single_load"}  # of a section whose name is that of a method
 STUDIES = {
-    SWEEP: "this file describes many cases; `feti-homog sweep` runs them",
+    sections.SWEEP: "this file describes many cases; `feti-homog sweep` runs them",
     UNCERTAINTY: "a run takes no scatter; `feti-homog uncertainty` passes it on to results",
 }
 """Sections of files with many cases, each with the command that takes them."""
@@ -64,15 +50,15 @@ class Case:
     name: str
     cell: Cell
     materials: dict[str, Material]
-    analysis: Analysis
+    analysis: sections.Analysis
     interfaces: tuple[InterfaceSection, ...]
     angle: Angle | None
     path: LoadPath | None
     single_load: SingleLoad | None
     envelope: Envelope | None
-    decomposition: Decomposition
-    output: Output
-    petsc: dict[str, Scalar]
+    decomposition: sections.Decomposition
+    output: sections.Output
+    petsc: dict[str, sections.Scalar]
 
     @classmethod
     def load(cls, path: str | Path) -> Case:
@@ -143,9 +129,9 @@ class Case:
         chosen: dict[str, Any] = {} if self.cell.accuracy is None else dict.fromkeys(cell_sizes.CHOSEN)
         document: dict[str, Any] = {"name": self.name, "cell": to_table(replace(self.cell, **chosen), selected)}
         document["material"] = {phase: to_table(material, selected) for phase, material in self.materials.items()}
-        sections = {section: getattr(self, FIELDS.get(section, section)) for section in SECTIONS if section != "cell"}
-        given = {section: contents for section, contents in sections.items() if contents is not None}
-        document |= {section: to_table(contents, selected) for section, contents in given.items()}
+        for section in sections.SECTIONS:
+            if section != "cell" and (contents := getattr(self, FIELDS.get(section, section))) is not None:
+                document[section] = to_table(contents, selected)
         if len(self.interfaces) > 1:
             document["interface"] = [to_table(interface, selected) for interface in self.interfaces]
         return document | {"petsc": dict(self.petsc)}
@@ -154,7 +140,8 @@ class Case:
         """Hash everything that the case computes, and writes if `with_output`; not its name, options, max_events."""
         document = {k: v for k, v in self.resolved().items() if k not in ("name", "output", "petsc")}
         if with_output:
-            document["output"] = {k: getattr(self.output, k) for k, e in keys_of(Output).items() if not e.presentation}
+            computed = [name for name, entry in keys_of(sections.Output).items() if not entry.presentation]
+            document["output"] = {name: getattr(self.output, name) for name in computed}
         document.get("path", {}).pop("max_events", None)
         document["cell"] = {k: v for k, v in document["cell"].items() if k not in ("file", "match")}
         content = b"".join(input_files.read(path) for path in (self.cell.file, self.cell.match) if path is not None)
@@ -176,16 +163,16 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
         TypeError: `values` is no mapping.
     """
     document = to_document(values)
-    sections, faults = _read_sections(document, folder)
+    contents, faults = _read_sections(document, folder)
     if not faults:
-        faults += contrast_lines(sections["materials"], sections["analysis"].plane)[0]
+        faults += contrast_lines(contents["materials"], contents["analysis"].plane)[0]
     if not faults:
-        cell, materials = sections["cell"], sections["materials"]
-        plane, free_faces = sections["analysis"].plane, bool(sections["interfaces"]) or cell.has_voids
-        sections["cell"] = cell_sizes.sized(cell, document["cell"], materials, plane, free_faces, faults)
+        cell, materials = contents["cell"], contents["materials"]
+        plane, free_faces = contents["analysis"].plane, bool(contents["interfaces"]) or cell.has_voids
+        contents["cell"] = cell_sizes.sized(cell, document["cell"], materials, plane, free_faces, faults)
     if faults:
         raise CaseError(*faults)
-    return Case(name=document.get("name", "case"), **sections)
+    return Case(name=document.get("name", "case"), **contents)
 
 
 def check_stored(values: Mapping[str, Any]) -> None:
@@ -196,25 +183,25 @@ def check_stored(values: Mapping[str, Any]) -> None:
 
 def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[str, Any], list[str]]:
     """Return the contents of sections, with [cell]'s files in `folder` if one is given, and their faults."""
-    reader = TableReader(_selected(document), KEY_OWNERS, _top_level_faults(document))
+    reader = TableReader(_selected(document), sections.KEY_OWNERS, _top_level_faults(document))
     selected, faults = reader.selected, reader.faults
     of_rules = [[*rule.faults(document, selected)] for rule in RULES]
     foreign = {rule.path[0] for rule, lines in zip(RULES, of_rules, strict=True) if lines and rule.holds is None}
     cell = _read_section(document, "cell", reader)
-    sections = {
+    contents = {
         "cell": None if "cell" in foreign or cell is None or not folder else checked_cell(cell, folder, faults),
         "materials": read_materials(document, selected[PLANE], reader),
         "analysis": _read_section(document, "analysis", reader),
         "decomposition": _read_section(document, "decomposition", reader),
         "interfaces": read_interfaces(document, reader),
-        **{FIELDS.get(name, name): _read_section(document, name, reader) for name in SECTIONS_OF_AN_ANALYSIS},
+        **{FIELDS.get(name, name): _read_section(document, name, reader) for name in sections.SECTIONS_OF_AN_ANALYSIS},
         "output": _read_section(document, "output", reader),
-        "petsc": read_petsc(document.get("petsc", {}), faults),
+        "petsc": sections.read_petsc(document.get("petsc", {}), faults),
     }
     faults += chain.from_iterable(of_rules)
     # What has keys of other cases is not looked into.
-    faults += relation_faults(sections | {FIELDS.get(name, name): None for name in foreign}, document, selected[PLANE])
-    return sections, faults
+    faults += relation_faults(contents | {FIELDS.get(name, name): None for name in foreign}, document, selected[PLANE])
+    return contents, faults
 
 
 def _selected(document: Mapping[str, Any]) -> Selected:
@@ -225,7 +212,7 @@ def _selected(document: Mapping[str, Any]) -> Selected:
         first = first | {"criterion": first["law"]}
     tables, selected = dict(document) | {"interface": first}, dict[Selector, str | None]()
     for selector in selectors:
-        section, table = SECTIONS[selector.section], tables.get(selector.section)
+        section, table = sections.SECTIONS[selector.section], tables.get(selector.section)
         default = getattr(section, selector.key, None)
         value = table.get(selector.key, default) if isinstance(table, Mapping) else default
         selected[selector] = value if keys_of(section)[selector.key].type.accepts(value) else None
@@ -234,17 +221,17 @@ def _selected(document: Mapping[str, Any]) -> Selected:
 
 def _top_level_faults(document: Mapping[str, Any]) -> list[str]:
     """Faults in section names and in the keys before the first section."""
-    faults = [f"[{section}]: missing section" for section in REQUIRED if section not in document]
+    faults = [f"[{section}]: missing section" for section in sections.REQUIRED if section not in document]
     for name, value in document.items():
-        hint = suggestion(name, TOP_LEVEL, KEY_OWNERS)
-        if name in FIT_SECTIONS:
+        hint = suggestion(name, sections.TOP_LEVEL, sections.KEY_OWNERS)
+        if name in sections.FIT_SECTIONS:
             hint = "it belongs to the file of a fit; `feti-homog fit` runs it"
         if name in STUDIES:
             words = f"{name} = {toml_value(value)}: expected a section [{name}]"
             faults.append(f"[{name}]: {STUDIES[name]}" if isinstance(value, dict) else words)
-        elif name not in TOP_LEVEL and isinstance(value, dict):
+        elif name not in sections.TOP_LEVEL and isinstance(value, dict):
             faults.append(f"[{toml_key(name)}]: unknown section; {hint}")
-        elif name not in TOP_LEVEL:
+        elif name not in sections.TOP_LEVEL:
             faults.append(f"{toml_key(name)}: unknown key; {hint}")
     name = document.get("name", "case")
     if complaint := text.complaint(name):
@@ -254,9 +241,9 @@ def _top_level_faults(document: Mapping[str, Any]) -> list[str]:
 
 def _read_section(document: Mapping[str, Any], section: str, reader: TableReader) -> Any:
     """Return a section's dataclass, or None if it is faulty or absent."""
-    if section not in document and section in (*REQUIRED, *SECTIONS_OF_AN_ANALYSIS):
+    if section not in document and section in (*sections.REQUIRED, *sections.SECTIONS_OF_AN_ANALYSIS):
         return None
-    return reader.read(SECTIONS[section], document.get(section, {}), section)
+    return reader.read(sections.SECTIONS[section], document.get(section, {}), section)
 
 
 def check_phases(case: Case, phases: Iterable[str]) -> None:

@@ -8,26 +8,9 @@ from contextlib import contextmanager
 from petsc4py import PETSc
 
 from feti_homog.errors import CaseError
+from feti_homog.system.petsc import option_table as table
+from feti_homog.system.petsc import option_values as values
 from feti_homog.system.petsc.c_functions import error_words, option_was_used
-from feti_homog.system.petsc.option_table import (
-    DIRECT_PREFIXES,
-    MUMPS_PREFIXES,
-    TABLE,
-    almost_in_table,
-    only_prints,
-    solver_prefix,
-    suggestion,
-    unknown_options,
-)
-from feti_homog.system.petsc.option_values import (
-    Value,
-    faulty_values,
-    flag_value,
-    in_words,
-    is_flag,
-    is_own_flag,
-    is_viewer,
-)
 
 # Options that PETSc looks for only in KSPSolve.
 READ_WHEN_SOLVING = {
@@ -36,7 +19,7 @@ READ_WHEN_SOLVING = {
 
 
 @contextmanager
-def case_options(options: Mapping[str, Value]) -> Iterator[None]:
+def case_options(options: Mapping[str, values.Value]) -> Iterator[None]:
     """Insert the options that the command line does not give, and take them out afterwards.
 
     PETSc has no flags that are true or false, but flags that are there or not: false ones are taken out meanwhile.
@@ -49,10 +32,11 @@ def case_options(options: Mapping[str, Value]) -> Iterator[None]:
     on_command_line = given_options()
     options = {name.lower(): value for name, value in options.items()}
     options_of_run = {**options, **on_command_line}
-    if faults := [*unknown_options(options), *faulty_values(options_of_run)]:
+    if faults := [*table.unknown_options(options), *values.faulty_values(options_of_run)]:
         raise CaseError(*faults)
-    settled = {name: flag_value(value) if is_flag(name) else value for name, value in options_of_run.items()}
-    changed = [name for name in options_of_run if settled[name] != on_command_line.get(name) and not is_own_flag(name)]
+    settled = {name: values.flag_value(text) if values.is_flag(name) else text for name, text in options_of_run.items()}
+    settable = [name for name in options_of_run if not values.is_own_flag(name)]
+    changed = [name for name in settable if settled[name] != on_command_line.get(name)]
     try:
         for name in changed:
             _set(database, name, settled[name])
@@ -63,7 +47,7 @@ def case_options(options: Mapping[str, Value]) -> Iterator[None]:
             _set(database, name, on_command_line.get(name))
 
 
-def _set(database: PETSc.Options, name: str, value: Value | None) -> None:
+def _set(database: PETSc.Options, name: str, value: values.Value | None) -> None:
     """Set an option, without a value if that is empty; None takes it out."""
     if value is None:
         database.delValue(name)
@@ -78,12 +62,12 @@ def given_options() -> dict[str, str]:
 
 def choices(prefix: str) -> list[str]:
     """Return the options under a prefix that choose something and do not only print."""
-    return [name for name in given_options() if name.startswith(prefix) and not only_prints(name)]
+    return [name for name in given_options() if name.startswith(prefix) and not table.only_prints(name)]
 
 
 def without_iterations() -> str:
     """Return a line on the given options that print iterations, for a run that has none; empty without any."""
-    printing = [f"-{name}" for name in given_options() if name.startswith("feti_ksp_") and only_prints(name)]
+    printing = [f"-{name}" for name in given_options() if name.startswith("feti_ksp_") and table.only_prints(name)]
     return f"{', '.join(printing)}: the run has no iterations to print" if printing else ""
 
 
@@ -92,7 +76,7 @@ def _refuse_early(options: Mapping[str, str]) -> None:
     if faults := faults_of_solvers(options):
         raise CaseError(*faults)
     # Larger solvers alone read some options: names that are not almost ours are left to `refuse_unused`.
-    _refuse_unread([name for name in options if almost_in_table(name) and not is_flag(name)])
+    _refuse_unread([name for name in options if table.almost_in_table(name) and not values.is_flag(name)])
 
 
 def refuse_unused() -> None:
@@ -104,18 +88,18 @@ def refuse_unused() -> None:
         CaseError: an option with our prefix is no option of any solver.
     """
     names = PETSc.Options().getAll().keys() - READ_WHEN_SOLVING
-    _refuse_unread([name for name in names if name.startswith("feti_") and name not in TABLE])
+    _refuse_unread([name for name in names if name.startswith("feti_") and name not in table.TABLE])
 
 
 def _refuse_unread(names: list[str]) -> None:
     """Raise a CaseError with one fault for each name that no solver has read, if there is any."""
     if unread := [name for name in sorted(names) if not option_was_used(name)]:
-        raise CaseError(*(f"-{name}: no solver has such an option; {suggestion(name)}" for name in unread))
+        raise CaseError(*(f"-{name}: no solver has such an option; {table.suggestion(name)}" for name in unread))
 
 
 # Options with the prefixes of PETSc's solvers that the program reads itself.
 OWN = ("feti_pc_type", "feti_coarse_space", "feti_coarse_threshold")
-SOLVERS = {"feti_": ("feti_ksp_", "feti_pc_")} | {prefix: (prefix,) for prefix in DIRECT_PREFIXES}
+SOLVERS = {"feti_": ("feti_ksp_", "feti_pc_")} | {prefix: (prefix,) for prefix in table.DIRECT_PREFIXES}
 """Prefixes of options that each solver reads, by the solver's own."""
 NO_SUCH_METHOD = "requested KSP type"
 
@@ -126,15 +110,15 @@ def faults_of_solvers(options: Mapping[str, str]) -> list[str]:
     Each solver is made and applied once: a method may lack something only then.  PETSc marks options that
     they read, and prints all that they could read with -help.  Options that print are hidden meanwhile.
     """
-    faults, viewers, database = [], [*filter(is_viewer, options)], PETSc.Options()
+    faults, viewers, database = [], [*filter(values.is_viewer, options)], PETSc.Options()
     for name in viewers:
         database.delValue(name)
     try:
         for prefix, prefixes in SOLVERS.items():
-            names = [name for name in options if solver_prefix(name) in prefixes and name not in (*OWN, *viewers)]
+            names = [name for name in options if table.solver_prefix(name) in prefixes and name not in (*OWN, *viewers)]
             if (names or "help" in options) and (fault := _complaint(prefix)):
                 names.sort(key=lambda name: not name.endswith("_type"))  # types first: they decide what others mean
-                faults.append(f"{' '.join(in_words(name, options[name]) for name in names)}: {fault}")
+                faults.append(f"{' '.join(values.in_words(name, options[name]) for name in names)}: {fault}")
     finally:
         for name in viewers:
             _set(database, name, options[name])
@@ -173,7 +157,7 @@ def _complaint(prefix: str) -> str:
             pc.setPythonContext(_Identity())
         else:
             pc.setType(PETSc.PC.Type.CHOLESKY)
-        if prefix in MUMPS_PREFIXES:
+        if prefix in table.MUMPS_PREFIXES:
             pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
         ksp.setFromOptions()
         ksp.setUp()
