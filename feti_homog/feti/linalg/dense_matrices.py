@@ -18,7 +18,7 @@ from feti_homog.system.petsc.options import choices
 from feti_homog.typing import Float, Int
 
 if TYPE_CHECKING:
-    from feti_homog.system.petsc.partial_cholesky import PartialFactor
+    from feti_homog.feti.linalg.partial_cholesky import PartialFactor
 
 # MUMPS' status of a workspace that is too small, and per cent more than its estimate that it then gets.
 TOO_SMALL, MORE_WORKSPACE = (-8, -9), (None, 100, 1000)
@@ -106,7 +106,7 @@ def condensed_with_loads(
 
 def _can_be_ordered() -> bool:
     """Return whether CHOLMOD can eliminate in a given order, and no option asks for anything of MUMPS."""
-    from feti_homog.system.petsc import partial_cholesky  # only large subdomains need it
+    from feti_homog.feti.linalg import partial_cholesky  # only large subdomains need it
 
     return partial_cholesky.is_available() and not choices("feti_schur_")
 
@@ -117,7 +117,7 @@ def _by_cholmod(matrix: csr_matrix, rows: Int, loads: Float, order: Int, keep_fa
     D > 0 on `rows` makes K + D definite even if K is singular. With y = L^-1 Q and the block L_bb of L on `rows`,
     S = L_bb L_bb^T - D and q = L_bb y_b.
     """
-    from feti_homog.system.petsc.partial_cholesky import PartialFactor  # only large subdomains need it
+    from feti_homog.feti.linalg.partial_cholesky import PartialFactor  # only large subdomains need it
 
     n, shift = len(rows), matrix.diagonal()[rows]
     D = csr_matrix((shift, (rows, rows)), shape=matrix.shape)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
-from feti_homog.system.petsc.partial_cholesky import PartialFactor, is_available
+from feti_homog.feti.linalg.partial_cholesky import PartialFactor, is_available
 
 pytestmark = pytest.mark.skipif(not is_available(), reason="CHOLMOD's structures are those of other versions")
 
