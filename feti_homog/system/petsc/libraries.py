@@ -5,13 +5,13 @@ from __future__ import annotations
 import atexit
 import importlib
 import re
+import resource
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from feti_homog.errors import EXIT_DEFECT, LibraryError
-from feti_homog.system.runtime import process_memory
 from feti_homog.system.runtime.standard_streams import complain
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
             comm.Abort(EXIT_DEFECT)
 
     atexit.register(end)
-    if process_memory.limits_addresses():
+    if resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY:
         _reserve_buffers()
     options = PETSc.Options()
     if not options.hasName("options_left"):

@@ -50,20 +50,10 @@ OPTIONS = (
         "feti_pc_type",
         "auto|none|lumped|dirichlet|influence",
         "auto",
-        "preconditioner of the dual problem; influence: exact, by columns of unit jumps",
+        "dual preconditioner; influence: exact, by unit jumps",
     ),
-    Option(
-        "feti_dual_operator",
-        "auto|implicit|explicit",
-        "auto",
-        "subdomains by triangular solves, or by dense matrices on their boundaries",
-    ),
-    Option(
-        "feti_coarse_space",
-        "auto|natural|adaptive",
-        "auto",
-        "rigid-body motions only, or soft modes of the subdomains too",
-    ),
+    Option("feti_dual_operator", "auto|implicit|explicit", "auto", "subdomains by triangular solves or dense matrices"),
+    Option("feti_coarse_space", "auto|natural|adaptive", "auto", "rigid-body motions only, or soft modes too"),
     Option("feti_coarse_threshold", "<real>", "0.35", "softer modes join the coarse space; fewer iterations if larger"),
     Option(
         "feti_influence_columns",

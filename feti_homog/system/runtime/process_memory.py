@@ -73,8 +73,3 @@ def require_limits() -> None:
     ]
     if faults:
         raise FetiHomogError(*faults)
-
-
-def limits_addresses() -> bool:
-    """Return whether the process may have so many addresses only."""
-    return resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY

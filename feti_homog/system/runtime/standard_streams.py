@@ -37,8 +37,18 @@ def end_on_signals() -> None:
     awaited = {number for number in ENDING if signal.getsignal(number) is not signal.SIG_IGN}
     # Writing shows that the reader of a pipe has closed it.
     signal.pthread_sigmask(signal.SIG_BLOCK, {*awaited, signal.SIGPIPE})
+
+    def wait_and_end() -> None:
+        number = signal.sigwait(awaited)
+        if launched_rank() == 0:
+            complain(f"interrupted by {signal.Signals(number).name}")
+        else:
+            time.sleep(SILENT_SECONDS)
+        file_locks.remove_files()
+        os._exit(128 + number)
+
     if awaited:
-        threading.Thread(target=_wait_and_end, args=(awaited,), daemon=True).start()
+        threading.Thread(target=wait_and_end, daemon=True).start()
 
 
 def launched_rank() -> int:
@@ -47,16 +57,6 @@ def launched_rank() -> int:
     Does not need MPI.
     """
     return int(next((os.environ[name] for name in RANK_VARIABLES if os.environ.get(name, "").isdecimal()), 0))
-
-
-def _wait_and_end(awaited: set[signal.Signals]) -> None:
-    number = signal.sigwait(awaited)
-    if launched_rank() == 0:
-        complain(f"interrupted by {signal.Signals(number).name}")
-    else:
-        time.sleep(SILENT_SECONDS)
-    file_locks.remove_files()
-    os._exit(128 + number)
 
 
 def prepare() -> None:
