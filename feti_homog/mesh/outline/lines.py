@@ -238,8 +238,7 @@ class EdgeSamples:
         lengths = lines.lengths
         count = len(lengths)
         line, share = np.repeat(np.arange(count), fewest), np.tile(np.linspace(0, 1, fewest), count)
-        along = lines.points(line, share).reshape(count, fewest, 2)
-        sizes = np.minimum(field.on_lines(along).ravel(), lines.caps(line, share))
+        sizes = np.minimum(field.at(lines.points(line, share)), lines.caps(line, share))
         while True:
             way = np.diff(share) * lengths[line[:-1]]
             wide = (np.diff(line) == 0) & (way > field.step * np.minimum(sizes[:-1], sizes[1:]))

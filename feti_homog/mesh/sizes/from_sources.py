@@ -11,8 +11,7 @@ from feti_homog.typing import Float
 
 # Growth of the edge length per distance, at most.
 MAX_GROWTH = 0.4
-# Sources that count at a position, the nearest, and those that may at any of a line.
-NEAREST, NEAREST_OF_LINE = 16, 32
+NEAREST = 16  # sources that count at a position
 # Positions whose sources are looked for at once, for the memory that this takes.
 CHUNK = 100_000
 
@@ -50,54 +49,6 @@ class SourcedSize:
             sizes = (self._lengths[nearest] + self._growths[nearest] * distance).reshape(len(some), count)
             parts.append(np.minimum(self.largest, sizes.min(axis=1)))
         return np.concatenate(parts)
-
-    def on_lines(self, points: Float) -> Float:
-        """(c, m) at points (c, m, 2) of lines, as for each point.
-
-        Sources are looked for once for all of a short line.
-        """
-        middle = points[:, points.shape[1] // 2]
-        half = np.sqrt(((points - middle[:, None]) ** 2).sum(axis=2).max(axis=1, initial=0.0))
-        # Longer ones have too many sources near them.
-        short = half < self._bound
-        sizes = np.empty(points.shape[:2])
-        sizes[~short] = self(points[~short].reshape(-1, 2)).reshape(-1, points.shape[1])
-        lines, chunk = np.flatnonzero(short), max(1, self._chunk // NEAREST_OF_LINE)
-        for k in range(0, len(lines), chunk):
-            some = lines[k : k + chunk]
-            sizes[some] = self._on_some(points[some], middle[some], half[some])
-        return sizes
-
-    def _on_some(self, points: Float, middle: Float, half: Float) -> Float:
-        """(c, m) on short lines whose points are at most `half` (c,) from their `middle` (c, 2)."""
-        count = min(NEAREST_OF_LINE, len(self._places))
-        reach = self._bound + float(half.max(initial=0.0))
-        distance, close = self._tree.query(wrap(middle, self._size), k=count, distance_upper_bound=reach)
-        distance, close = distance.reshape(len(middle), count), close.reshape(len(middle), count)
-        length, growth = self._lengths[close], self._growths[close]
-        # What counts at all points of a line bounds it from above; sources that are above everywhere do not matter.
-        everywhere = distance + half[:, None] < self._bound
-        above = np.where(everywhere, length + growth * (distance + half[:, None]), self.largest).min(axis=1)
-        below = length + growth * np.maximum(0.0, distance - half[:, None])
-        line, which = np.nonzero(below < np.minimum(above, self.largest)[:, None])
-        source = close[line, which]
-        squares = np.zeros((len(line), points.shape[1]))
-        for axis, period in enumerate(self._size):
-            way = points[line, :, axis] - self._places[source, axis][:, None]
-            way -= period * np.round(way / period)
-            way *= way
-            squares += way
-        away = np.sqrt(squares)
-        candidates = self._lengths[source][:, None] + self._growths[source][:, None] * away
-        candidates[away >= self._bound] = self.largest
-        sizes = np.full(points.shape[:2], self.largest)
-        first = np.flatnonzero(np.diff(line, prepend=-1))
-        if len(first):
-            sizes[line[first]] = np.minimum(self.largest, np.minimum.reduceat(candidates, first, axis=0))
-        # What a line's own sources are does not depend on the lines that it is looked at with.
-        full = distance[:, -1] < self._bound + half
-        sizes[full] = self(points[full].reshape(-1, 2)).reshape(-1, points.shape[1])
-        return sizes
 
 
 def wrap(points: Float, size: Float) -> Float:

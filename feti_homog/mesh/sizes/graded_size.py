@@ -192,13 +192,6 @@ class SizeField:
         sizes = self.base(points)
         return sizes if self.graded is None else np.minimum(sizes, self.graded(points))
 
-    def on_lines(self, points: Float) -> Float:
-        """Sizes (c, m) at positions (c, m, 2) along c lines, as by `at`."""
-        sizes = self.base.on_lines(points)
-        if self.graded is None:
-            return sizes
-        return np.minimum(sizes, self.graded(points.reshape(-1, 2)).reshape(points.shape[:2]))
-
 
 def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips: Float) -> SizeField:
     """Return the edge size at positions on the torus, by passages and vertices, and smaller near discs and tips.
