@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import breadth_first_order
 
 from feti_homog.errors import MeshError
 from feti_homog.schema.wording import toml_value
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Int
 
 Numbers = np.ndarray[Any, Any]
 
@@ -28,10 +28,6 @@ WRONG_WORD = {
     "i8": re.compile(rb"(?<!\S)(?![-+]?\d+(?!\S))\S+"),
     "f8": re.compile(rb"(?i)(?<!\S)(?![-+]?((\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?|nan|inf)(?!\S))\S+"),
 }
-# Whole numbers in binary .msh files: C's int and size_t.
-INT, SIZE = "i4", "u8"
-# Whole numbers from here on are not exact as floating-point numbers.
-LARGEST = 2**53
 
 
 class NotANumber(ValueError):
@@ -118,108 +114,6 @@ class Scanner:
         """Raise MeshError with the line that has been reached."""
         line = self.content[: self.place].rstrip().count(b"\n") + 1
         raise MeshError(fault if self.is_binary else f"line {line}: {fault}")
-
-
-class Section:
-    """Take the numbers in section `$name` of a .msh file, which begin at `start`.
-
-    Text is read at once, as whole (`i8`) or real numbers (`f8`). A binary file has the byte order `<` or `>`; its
-    numbers are read as they are taken.
-    """
-
-    def __init__(self, name: str, content: bytes, start: int, order: str, kind: str) -> None:
-        self.name, self.content, self.order, self.place = name, content, order, start
-        if order:
-            return
-        self.stop, self.place = end_of(name, content, start), 0
-        try:
-            self.values = numbers(content[start : self.stop], kind)
-        except NotANumber as error:
-            line = content.count(b"\n", 0, start + error.place) + 1
-            self.refuse(f"line {line}, {error}")
-
-    def refuse(self, fault: str) -> NoReturn:
-        """Raise MeshError with the name of the section."""
-        raise MeshError(f"${self.name}: {fault}")
-
-    def take(self, count: int, kind: np.dtype[Any]) -> Numbers:
-        """Take (count,) numbers, of a NumPy type in a binary file."""
-        size = kind.itemsize if self.order else 1
-        remaining = (len(self.content if self.order else self.values) - self.place) // size
-        if not 0 <= count <= remaining:
-            self.refuse(f"{count} numbers should follow, and {remaining} do: the file is damaged or broken off")
-        start, self.place = self.place, self.place + count * size
-        return np.frombuffer(self.content[start : self.place], kind) if self.order else self.values[start : self.place]
-
-    def reals(self, count: int) -> Float:
-        """Take (count,) real numbers."""
-        return np.asarray(self.take(count, np.dtype(f"{self.order}f8")), float)
-
-    def records(self, count: int, reals: int, kind: str = INT) -> tuple[Int, Float]:
-        """Take (count,) whole numbers and, after each, real ones (count, reals)."""
-        pair = np.dtype([("whole", f"{self.order}{kind}"), ("reals", f"{self.order}f8", (reals,))])
-        if self.order:
-            taken = self.take(count, pair)
-            return self.checked(taken["whole"]), taken["reals"].astype(float)
-        rows = self.take(count * (1 + reals), pair).reshape(count, 1 + reals)
-        return self.checked(rows[:, 0]), rows[:, 1:]
-
-    def whole(self, count: int, kind: str = INT) -> Int:
-        """Take (count,) whole numbers, of type `kind` in a binary file."""
-        return self.records(count, 0, kind)[0]
-
-    def count(self) -> int:
-        """Take one whole number, a count of entries."""
-        return int(self.whole(1, SIZE)[0])
-
-    def line(self) -> int:
-        """Take one whole number, a line of text in binary files too."""
-        if not self.order:
-            return self.count()
-        stop = self.content.find(b"\n", self.place, self.place + 30)
-        text = self.content[self.place : stop].strip()
-        if not re.fullmatch(rb"\d{1,15}", text):
-            self.refuse("there is no line with a count at its beginning")
-        self.place = stop + 1
-        return int(text)
-
-    def rest(self) -> Numbers:
-        """Return all numbers that follow, as C's int in a binary file, where they go on to its end."""
-        if not self.order:
-            return self.values[self.place :]
-        count = (len(self.content) - self.place) // 4
-        return np.frombuffer(self.content, f"{self.order}i4", count, self.place).astype(np.int64)
-
-    def skip(self, count: int) -> None:
-        """Leave out the first numbers of `rest`."""
-        self.place += count * (4 if self.order else 1)
-
-    def end(self) -> int:
-        """Return the place in the file after the numbers, all of which must have been taken."""
-        if self.order:
-            if re.compile(rb"\s*\$End" + self.name.encode()).match(self.content, self.place) is None:
-                self.refuse(f"there is no $End{self.name} after the numbers that its counts announce")
-            return self.place
-        if self.place < len(self.values):
-            self.refuse(f"{len(self.values) - self.place} numbers are left after those that its counts announce")
-        return self.stop
-
-    def checked(self, values: Numbers) -> Int:
-        """Convert numbers into whole ones."""
-        if len(values) == 0 or (np.abs(values.max()) < LARGEST and np.abs(values.min()) < LARGEST):
-            integers = values.astype(np.int64)
-            if np.array_equal(integers, values):
-                return integers
-        bad = next(value for value in values.tolist() if not (abs(value) < LARGEST and value == int(value)))
-        self.refuse(f"{bad:g}: expected a whole number of at most 15 digits")
-
-
-def end_of(name: str, content: bytes, start: int) -> int:
-    """Return the place of the line `$Endname` from `start` on."""
-    stop = content.find(f"\n$End{name}".encode(), start - 1)
-    if stop < 0:
-        raise MeshError(f"${name}: there is no $End{name}: the file is damaged or broken off")
-    return stop
 
 
 def chain(following: Int) -> Int:
