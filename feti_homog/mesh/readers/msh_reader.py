@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 from types import MappingProxyType
 
@@ -17,7 +16,7 @@ from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, can_debond, edge_keys
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers import abaqus_file, gmsh_file, mesh_checks, vtk_file, vtu_file
 from feti_homog.mesh.readers.named_phases import Selectors, unknown_phases, with_phases
-from feti_homog.mesh.readers.raw_mesh import RawMesh, at
+from feti_homog.mesh.readers.raw_mesh import RawMesh
 from feti_homog.mesh.readers.round_interfaces import with_bent_edges, with_circles, with_ellipses
 from feti_homog.microstructure.shapes.ellipses import Ellipses
 from feti_homog.typing import Float, Int, Int32
@@ -29,12 +28,10 @@ LOADERS = {
     ".vtk": vtk_file.load,
     ".mesh": vtk_file.load_medit,
 }
-# Sine of the angle at a node of the hull, and cosine between vectors of a lattice, that are zero but for rounding.
-STRAIGHT, RIGHT = 1e-5, 1e-6
+# Sine of the angle at a node of the hull that is zero but for rounding.
+STRAIGHT = 1e-5
 # Slope of sides that may be meant to be upright; share of the hull that a cell with voids fills at least.
 UPRIGHT, FILLED = 1e-2, 0.4
-LARGEST_MULTIPLE = 6  # of the vectors of a lattice in those of its rectangle
-SHIFTS = (0.5, 0.25, 0.75, 0.375, 0.625, 0.125, 0.875)
 
 
 def read_cell(cell: Cell) -> CoarseMesh:
@@ -89,8 +86,6 @@ def made(raw: RawMesh, path: str, has_voids: bool = True) -> CoarseMesh:
     for level in (np.zeros(2), size):
         plane = np.where(np.abs(plane - level) < mesh_checks.SAME_PLACE * size.max(), level, plane)
     corners = mesh_checks.missing_corners(plane, origin, size)
-    if corners and (advice := _shift(plane, raw.triangles, size)):
-        corners = [f"{corners[0]}; {advice}"]
     _refuse(path, mesh_checks.overlapping(raw), mesh_checks.hanging_nodes(raw, plane, size), corners)
     _refuse(path, mesh_checks.too_large(plane, raw.triangles, size))
     _refuse(path, mesh_checks.not_periodic(raw, plane, size), mesh_checks.unrefined_sides(plane, size))
@@ -179,7 +174,7 @@ def _match(plane: Float, low: Int, high: Int, along: int, reach: float) -> None:
 
 
 def _lattice(plane: Float, triangles: Int32) -> list[str]:
-    """Return the fault if triangles fill a parallelogram or a hexagon, with a rectangle for the same lattice."""
+    """Return the fault if triangles fill a parallelogram or a hexagon."""
     hull = ConvexHull(plane)
     corners = plane[hull.vertices]
     before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
@@ -194,44 +189,5 @@ def _lattice(plane: Float, triangles: Int32) -> list[str]:
     is_upright = half == 2 and bool((lengths.min(axis=1) <= UPRIGHT * lengths.max(axis=1)).all())
     if np.abs(sides[:half] + sides[half:]).max() > STRAIGHT * np.abs(sides).max() or is_upright:
         return []
-    # Opposite sides of the hexagon are these vectors apart.
-    first, second = (sides[0], sides[1]) if half == 2 else (sides[0] + sides[1], sides[1] + sides[2])
     name = "parallelogram" if half == 2 else "hexagon"
-    return [f"the cell is a {name}, expected a rectangle: {_rectangle(first, second)}"]
-
-
-def _rectangle(first: Float, second: Float) -> str:
-    """Describe the smallest rectangle in the lattice of two vectors, and how to make it."""
-    numbers = range(-LARGEST_MULTIPLE, LARGEST_MULTIPLE + 1)
-    vectors = np.array([m * first + n * second for m, n in product(numbers, numbers) if (m, n) != (0, 0)])
-    right = vectors[(vectors[:, 0] > 0) | ((vectors[:, 0] == 0) & (vectors[:, 1] > 0))]
-    length = np.linalg.norm(right, axis=1)
-    cosine = np.abs(right @ vectors.T) / np.outer(length, np.linalg.norm(vectors, axis=1))
-    area = np.abs(np.cross(right[:, None], vectors))
-    area[cosine > RIGHT] = np.inf
-    if not np.isfinite(area).any():
-        return 'shear its lattice to a ratio of integers, see "Lattices that are no rectangle" in meshes/README.md'
-    slope = np.minimum(*np.abs(right.T)) / length
-    smallest = area.min()
-    # Of equal ones the rectangle along the axes.
-    pairs = np.argwhere(area < smallest * (1 + RIGHT))
-    i, j = min(pairs.tolist(), key=lambda pair: (round(float(slope[pair[0]]), 6), float(length[pair[0]])))
-    u, v = sorted((right[i], vectors[j]), key=lambda w: abs(w[1]))
-    count = round(float(smallest / abs(np.cross(first, second))))
-    sizes = " x ".join(f"{np.linalg.norm(w):.6g}" for w in (u, v))
-    turned = "" if abs(u[1]) <= RIGHT * abs(u[0]) else f", along {at(u)}: turn the lattice first"
-    copies = f"copies of the cell moved by {at(first)} and {at(second)}"
-    ways = f'cut it from {copies}, or list the fibres, geometry = "table"'
-    return f"its lattice has the rectangle {sizes} of {count} cells{turned}; {ways}"
-
-
-def _shift(plane: Float, triangles: Int32, size: Float) -> str:
-    """Describe a shift that puts the cell's corners into material; empty if none is found."""
-    a, b, c = np.moveaxis(plane[triangles], 1, 0)
-    for fractions in product(SHIFTS, SHIFTS):
-        place = np.array(fractions) * size
-        sides = [np.cross(q - p, place - p) for p, q in ((a, b), (b, c), (c, a))]
-        if (np.min(sides, axis=0) > 0).any():
-            shifted = f"mesh the cell with all places moved by {at(-place)} modulo {at(size)}"
-            return f"if a hole is there, {shifted}: then its corners are in material"
-    return ""
+    return [f'the cell is a {name}, expected a rectangle: see "Lattices that are no rectangle" in meshes/README.md']

@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from feti_homog.errors import MeshError
-from feti_homog.mesh.coarse_mesh import areas, edges, twins
-from feti_homog.mesh.periodic_topology import components
+from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, first_of
 from feti_homog.microstructure.phase_names import PHASE, VOID
 from feti_homog.schema.wording import toml_key, toml_value
@@ -18,7 +17,6 @@ from feti_homog.schema.wording import toml_key, toml_value
 NUMBER = re.compile("number [0-9]+")
 """Groups that have no other name."""
 HOLE = "expected no elements in a void, which is a hole in the mesh (with voids = true in [cell])"
-SIDE = 10**6  # of the cell, in steps within which middles of edges are at the same place
 Selectors = Mapping[str, tuple[str | int, ...]]
 
 
@@ -82,49 +80,22 @@ def unknown_phases(mesh: RawMesh) -> list[str]:
 
 
 def _way_out(mesh: RawMesh) -> str:
-    """Propose the matrix and the largest other group for [cell.phases], with all shares of the area."""
+    """Propose the two largest groups for [cell.phases], with all shares of the area."""
     shares: dict[str, float] = {}
     with np.errstate(all="ignore"):  # coordinates are judged later
         sizes = np.bincount(mesh.group, np.abs(areas(mesh.points[:, :2], mesh.triangles)), len(mesh.groups))
         for names, percent in zip(mesh.groups, 100 * sizes / sizes.sum(), strict=True):
             if names and names[0] != VOID:
                 shares[names[0]] = shares.get(names[0], 0.0) + percent
-        first = _surrounding(mesh)
     if not shares:
         return ""
-    order = sorted(shares, key=lambda name: (name != first, -shares[name]))
+    order = sorted(shares, key=lambda name: -shares[name])
     entries = ", ".join(
         f"{phase} = {_as_selected(name)}" for phase, name in zip(("matrix", "fibre"), order, strict=False)
     )
     named = first_of((f"{_as_selected(name)}: {share:.3g} %" for name, share in shares.items()), len(shares), 20)
     matrix = _as_selected(order[0])
     return f". If {matrix} is the matrix, add to [cell]: phases = {{{entries}}}. Shares of the area: {named}"
-
-
-def _surrounding(mesh: RawMesh) -> str:
-    """Return the group that surrounds all others, empty if there is none.
-
-    It is connected around the periodic cell along both axes: on a torus of 3 x 3 cells all copies of an element of it
-    are in one connected part.
-    """
-    names = [group[0] if group else "" for group in mesh.groups]
-    number = np.unique(names, return_inverse=True)[1][mesh.group]
-    low, size = mesh.points[:, :2].min(axis=0), np.ptp(mesh.points[:, :2], axis=0)
-    middles = (mesh.points[edges(mesh.triangles), :2].mean(axis=1) - low) / size
-    if not np.isfinite(middles).all():
-        return ""
-    key = (np.rint(middles * SIDE).astype(np.int64) % SIDE) @ [SIDE, 1]
-    one, other = twins(key)
-    alike = number[one // 3] == number[other // 3]
-    one, other, count = one[alike], other[alike], len(mesh.triangles)
-    step = np.rint(middles[one] - middles[other]).astype(np.int64)
-    copies = np.indices((3, 3)).reshape(2, -1, 1)
-    i, j = (copies[axis] + step[:, axis] for axis in (0, 1))
-    first = one // 3 + count * (3 * copies[0] + copies[1])
-    second = other // 3 + count * (3 * (i % 3) + j % 3)
-    parts = components(9 * count, first.ravel(), second.ravel()).reshape(9, count)
-    around = np.flatnonzero((parts == parts[0]).all(axis=0))
-    return names[mesh.group[around[0]]] if len(around) else ""
 
 
 def known_names(mesh: RawMesh, of_curves: bool = False) -> str:
