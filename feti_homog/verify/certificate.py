@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import signal
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from feti_homog.errors import CaseError
+from feti_homog.system.runtime.own_process import in_own_process
 from feti_homog.verify.check_constants import check_constants
 from feti_homog.verify.check_loads import StateNumbers, States, check_loads
 from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh, check_mesh_error, check_rates
@@ -26,46 +24,6 @@ from feti_homog.verify.reading import COATING, altered, opened
 
 # Raised by numbers of unexpected kind or shape.
 DAMAGE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, MemoryError, RecursionError)
-
-T = TypeVar("T")
-PATIENCE = 300.0  # seconds
-
-
-def in_own_process(directory: Path, function: Callable[[Path], T], patience: float = PATIENCE) -> T:
-    """function(directory). Raises CaseError: from the function, or if its process crashes or outlasts `patience`."""
-    context = multiprocessing.get_context("fork")
-    receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_send, args=(sender, function, directory), daemon=True)
-    process.start()
-    sender.close()
-    try:
-        if not receiver.poll(patience):
-            raise CaseError(f"{directory}: its files are damaged: reading them does not come to an end")
-        answer = receiver.recv()
-    except EOFError:
-        raise CaseError(f"{directory}: its files are damaged: HDF5 crashes on them") from None
-    finally:
-        process.kill()
-        process.join()
-    if isinstance(answer, CaseError):
-        raise answer
-    result: T = answer
-    return result
-
-
-def _send(end: Connection, function: Callable[[Path], T], directory: Path) -> None:
-    # The parent's thread listens for signals; Ctrl-C ends both processes.
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-    # Handlers of PETSc, in a program that has started it, would not come to an end here.
-    for crash in (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT):
-        signal.signal(crash, signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_SETMASK, ())
-    try:
-        end.send(function(directory))
-    except CaseError as error:
-        end.send(error)
-    except MemoryError as error:
-        end.send(CaseError(f"{directory}: its files are damaged: {error}"))
 
 
 @dataclass(frozen=True)

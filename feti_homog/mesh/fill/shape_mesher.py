@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.mesh.coarse_mesh import CoarseMesh
-from feti_homog.mesh.readers.gmsh_file import load
+from feti_homog.mesh.readers.gmsh_file import MshContent, raw_mesh
 from feti_homog.mesh.readers.msh_reader import made
 from feti_homog.mesh.sizes.element_estimate import refuse_many
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, wrap
@@ -73,9 +73,7 @@ def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> C
             _set_sizes(gmsh, Path(folder) / "sizes", arrangement, smallest, size_at)
             gmsh.model.mesh.generate(2)
             gmsh.model.mesh.setOrder(2)
-            gmsh.option.setNumber("Mesh.Binary", 1)  # to the last bit
-            gmsh.write(f"{folder}/cell.msh")
-            raw = load(Path(folder) / "cell.msh")
+            raw = raw_mesh(MshContent.of(gmsh))
         precedence = np.array([number[tag] for _, tag in gmsh.model.getEntities(2)], np.int32)
     mesh = made(raw, "table")
     return replace(

@@ -1,25 +1,89 @@
-"""The triangles of a .msh file of gmsh."""
+"""Triangles and lines of a .msh file, versions 2 to 2.2, 4.0 and 4.1, which gmsh reads in a process of its own.
+
+gmsh runs scripts, opens files beside a mesh and passes over unknown text: it reads a copy of the sections that make a
+mesh, alone in a folder, and the number of elements is compared with the file's.
+"""
 
 from __future__ import annotations
 
+import codecs
+import io
+import re
+from collections import defaultdict
 from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import ModuleType
 
 import numpy as np
 
-from feti_homog.errors import MeshError
-from feti_homog.mesh.readers import msh_content
-from feti_homog.mesh.readers.msh_content import KINDS, MshContent
+from feti_homog.errors import CaseError, MeshError
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, Block, RawMesh, assembled, at, first_of
+from feti_homog.mesh.tiles.filling import gmsh_session
+from feti_homog.schema.wording import toml_value
 from feti_homog.system.runtime import input_files
+from feti_homog.system.runtime.own_process import in_own_process
 from feti_homog.typing import Float, Int
 
-# Types of lines and of triangles, which quadrilaterals are cut into.
-LINES, TRIANGLES = (1, 8), (2, 9, 3, 10, 16)
+# Types of points, lines and triangles, which quadrilaterals are cut into.
+POINT, LINES, TRIANGLES = 15, (1, 8), (2, 9, 3, 10, 16)
+VERSIONS = (2.0, 2.1, 2.2, 4.0, 4.1)
+# Sections that gmsh is given, and others without nodes or elements.
+GIVEN = ("MeshFormat", "Entities", "PartitionedEntities", "Nodes", "ParametricNodes", "Elements")
+OTHERS = {"Comments", "Periodic", "GhostElements", "Parametrizations", "NodeData", "ElementData", "ElementNodeData"}
+OTHERS |= {"InterpolationScheme"}
+SECTION = re.compile(rb"\s*\$(\w+)[ \t\r]*(?=\n)")
+NAME = re.compile(rb'^[ \t]*(\d{1,15})[ \t]+(-?\d{1,15})[ \t]+"([^"\n]*)"', re.MULTILINE)
+# Bytes that gmsh may need: so many in any file, or so many for each of the file's.
+MOST_BYTES, MOST_RATIO = 2**31, 50
 
 # Numbers (m,), nodes (m, k) and entities (m,) of the elements of one type.
 Elements = tuple[Int, Int, Int]
+
+
+@dataclass(frozen=True)
+class MshContent:
+    """Nodes, elements and physical groups.
+
+    Attributes:
+        tags, points: (n,) and (n, 3) numbers and positions of the nodes.
+        elements: by gmsh's types, entity by entity.
+        groups: physical groups of each entity (dimension, number).
+        names: names of physical groups (dimension, number) that have one.
+        kinds: names of the types.
+    """
+
+    tags: Int
+    points: Float
+    elements: dict[int, Elements]
+    groups: dict[tuple[int, int], tuple[int, ...]]
+    names: dict[tuple[int, int], str] = field(default_factory=dict)
+    kinds: dict[int, str] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, gmsh: ModuleType) -> MshContent:
+        """Return gmsh's model."""
+        model = gmsh.model
+        tags, points, _ = model.mesh.getNodes()
+        groups, blocks = {}, defaultdict[int, list[Elements]](list)
+        for dimension, entity in model.getEntities():
+            physical = np.abs(model.getPhysicalGroupsForEntity(dimension, entity))  # negative where turned
+            groups[dimension, entity] = tuple(physical.tolist())
+            for kind, numbers, nodes in zip(*model.mesh.getElements(dimension, entity), strict=True):
+                rows = nodes.astype(np.int64).reshape(len(numbers), -1)
+                blocks[int(kind)].append((numbers.astype(np.int64), rows, np.full(len(numbers), entity)))
+        elements = {
+            kind: tuple(np.concatenate(parts) for parts in zip(*rows, strict=True)) for kind, rows in blocks.items()
+        }
+        names = {group: model.getPhysicalName(*group) for group in model.getPhysicalGroups()}
+        kinds = {kind: model.mesh.getElementProperties(kind)[0] for kind in elements}
+        return cls(tags.astype(np.int64), points.reshape(-1, 3), elements, groups, names, kinds)
+
+    def name(self, dimension: int, group: int) -> str:
+        """Return the name of a physical group, or its number."""
+        return self.names.get((dimension, group)) or f"number {group}"
 
 
 def load(path: Path) -> RawMesh:
@@ -29,91 +93,174 @@ def load(path: Path) -> RawMesh:
         OSError: it cannot be read.
         MeshError: it is damaged, or it has other elements.
     """
-    content = msh_content.read(input_files.read(path))
-    tags, points = np.zeros(0, np.int64), np.zeros((0, 3))
-    if content.nodes:
-        tags, points = (np.concatenate(parts) for parts in zip(*content.nodes, strict=True))
-    elements: dict[int, Elements] = {}
-    for kind, blocks in content.elements.items():
-        numbers, nodes, entity = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
-        order = np.argsort(entity, kind="stable")
-        if len(order):
-            elements[kind] = numbers[order], nodes[order], entity[order]
-    faults = _misnumbered(tags, elements) or _other_kinds(tags, points, elements)
-    curves = _curves(content, elements)
-    if faults := faults or _without_lines(content, curves):
+    data = input_files.read(path)
+    sections = _sections(data.removeprefix(codecs.BOM_UTF8))
+    count = _announced(sections)
+    with TemporaryDirectory() as folder:
+        copy = Path(folder, "mesh.msh")
+        copy.write_bytes(
+            b"".join(b"$%b%b\n$End%b\n" % (k.encode(), sections[k], k.encode()) for k in GIVEN if k in sections)
+        )
+        try:
+            content = in_own_process(copy, _read_by_gmsh, memory=max(MOST_BYTES, MOST_RATIO * len(data)))
+        except CaseError:
+            raise MeshError("the file is damaged: gmsh crashes on it, or needs too much time or memory") from None
+    read = sum(len(numbers) for numbers, *_ in content.elements.values())
+    if read != count:
+        raise MeshError(f"$Elements: {count} elements are announced, and {read} are there, each with its own number")
+    return raw_mesh(replace(content, names=_names(sections.get("PhysicalNames", b"\n0"))))
+
+
+def raw_mesh(content: MshContent) -> RawMesh:
+    """Return the triangles and curves; MeshError if there are other elements."""
+    elements, curves = content.elements, _curves(content)
+    if faults := _misnumbered(content) or _other_kinds(content):
         raise MeshError(*faults)
-    triangles, groups = _triangles(content, elements)
+    if not len(curves.get(DEBONDED, (0,))):
+        raise MeshError(f'no lines in the physical curve "{DEBONDED}"')
+    blocks, groups = list[Block](), list[tuple[int, ...]]()
+    for numbers, nodes, entity in (elements[kind] for kind in TRIANGLES if kind in elements):
+        entities = np.unique(entity)
+        blocks.append(Block(numbers, nodes, len(groups) + np.searchsorted(entities, entity)))
+        groups += [content.groups.get((2, number), ()) for number in entities.tolist()]
     names, aliases = (
         [tuple(map(name, group)) for group in groups] for name in (partial(content.name, 2), "number {}".format)
     )
-    return assembled(tags, points, triangles, names, curves, aliases=aliases)
+    return assembled(content.tags, content.points, blocks, names, curves, aliases=aliases)
 
 
-def _triangles(content: MshContent, elements: Mapping[int, Elements]) -> tuple[list[Block], list[tuple[int, ...]]]:
-    """Return the triangles, and the numbers of the physical surfaces of their entities."""
-    triangles, groups = list[Block](), list[tuple[int, ...]]()
-    for kind in TRIANGLES:
-        if kind in elements:
-            numbers, nodes, entity = elements[kind]
-            entities = np.unique(entity)
-            triangles.append(Block(numbers, nodes, len(groups) + np.searchsorted(entities, entity)))
-            groups += [content.groups.get((2, number), ()) for number in entities.tolist()]
-    return triangles, groups
+def _sections(content: bytes) -> dict[str, bytes]:
+    """Return the text of each section that makes the mesh, from the end of its first line on."""
+    start = content[:4096].lstrip()
+    if start.startswith(b"$NOD"):
+        raise MeshError("format 1 of gmsh: save it in format 2.2 or 4.1")
+    if not start.startswith((b"$MeshFormat", b"$Comments", b"$PhysicalNames")):
+        raise MeshError("not a gmsh mesh file: it does not begin with $MeshFormat")
+    sections, place, end = dict[str, bytes](), 0, len(content.rstrip())
+    while place < end:
+        header = SECTION.match(content, place)
+        name = "" if header is None else header[1].decode(errors="replace")
+        if header is None or name not in {*GIVEN, *OTHERS, "PhysicalNames"}:
+            place += len(content[place:end]) - len(content[place:end].lstrip())
+            line, text = content.count(b"\n", 0, place) + 1, content[place : place + 80].partition(b"\n")[0]
+            word = toml_value(text.decode(errors="replace").strip())
+            raise MeshError(f"line {line}: {word}: expected a section of a mesh, such as $Nodes, or $Comments")
+        if name in sections:
+            raise MeshError(f"${name}: it is there twice")
+        stop = content.find(b"\n$End%b" % header[1], header.end())
+        if stop < 0:
+            raise MeshError(f"${name}: there is no $End{name}: the file is damaged or broken off")
+        if name not in OTHERS:
+            sections[name] = content[header.end() : stop]
+        place = stop + len(f"\n$End{name}")
+    if "MeshFormat" not in sections:
+        raise MeshError("there is no $MeshFormat")
+    return sections
 
 
-def _misnumbered(tags: Int, elements: Mapping[int, Elements]) -> list[str]:
-    """List numbers that are there twice, or else, of each type, the first element with a lost node."""
-    numbers = np.concatenate([np.zeros(0, np.int64), *(tag for tag, _, _ in elements.values())])
+def _form(head: bytes) -> tuple[bool, str]:
+    """Return whether elements stand in blocks, from version 4 on, and the byte order; none of text."""
+    version, *rest = head.split()[:3]
+    number = float(version) if re.fullmatch(rb"[0-9]\.?[0-9]{0,9}", version) else 0.0
+    if number not in VERSIONS:
+        raise MeshError(f"format {toml_value(version.decode(errors='replace'))} of gmsh: expected 2.2, 4.0 or 4.1")
+    if rest not in ([b"0", b"8"], [b"1", b"8"]):
+        raise MeshError("$MeshFormat: expected 0 8 behind the version of text and 1 8 of binary files")
+    return number >= 4, "" if rest[0] == b"0" else ">" if b"\n\0\0\0\1" in head else "<"
+
+
+def _announced(sections: Mapping[str, bytes]) -> int:
+    """Return the announced number of elements; in text each has a line, for gmsh passes over more."""
+    has_blocks, order = _form(sections["MeshFormat"])
+    if "Elements" not in sections:
+        return 0
+    text = sections["Elements"]
+    if order and has_blocks:
+        return int(np.frombuffer(text[1:17].ljust(16, b"\0"), f"{order}u8")[1])
+    counts = re.match(rb"\s*(\d{1,15})\s+(\d{1,15})" if has_blocks else rb"\s*(\d{1,15})(?=\s)", text + b"\n")
+    if counts is None:
+        raise MeshError("$Elements: expected the number of elements at its beginning")
+    expected = 1 + sum(map(int, counts.groups()))
+    lines = expected if order else sum(not line.isspace() for line in io.BytesIO(text))
+    if lines != expected:
+        raise MeshError(f"$Elements: {lines} lines, and its counts announce {expected}, one for each element")
+    return int(counts.groups()[-1])
+
+
+def _names(text: bytes) -> dict[tuple[int, int], str]:
+    entries = NAME.findall(text)
+    if text.split(maxsplit=1)[:1] != [str(len(entries)).encode()]:
+        raise MeshError(f"$PhysicalNames: {len(entries)} names, and not as many as its first line announces")
+    names = {(int(dimension), int(number)): name.decode(errors="replace") for dimension, number, name in entries}
+    if len(names) < len(entries):
+        raise MeshError("$PhysicalNames: one of the numbers has two names")
+    return names
+
+
+def _read_by_gmsh(path: Path) -> MshContent:
+    with gmsh_session() as gmsh:
+        content = _merged(gmsh, path)
+        if not any(dimension and entity == 0 for dimension, entity in content.groups):
+            return content
+        # Other programs write physical groups alone: each stands for an entity.
+        gmsh.clear()
+        gmsh.option.setNumber("Mesh.SwitchElementTags", 1)
+        content = _merged(gmsh, path)
+        return replace(content, groups={key: (key[1],) if key[1] else () for key in content.groups})
+
+
+def _merged(gmsh: ModuleType, path: Path) -> MshContent:
+    gmsh.logger.start()
+    gmsh.option.setNumber("Mesh.PartitionCreateTopology", 0)  # which adds elements between partitions
+    try:
+        gmsh.merge(str(path))
+        refusals = []
+    except Exception:  # gmsh raises nothing more special
+        refusals = ["Error: the file is damaged"]
+    # Wrong extreme numbers in the head of a section do no harm; "Error loading" says no more than the last one.
+    passed = ("Info", "Progress", "Warning: Min/Max", "Error: Error loading")
+    if faults := [line for line in gmsh.logger.get() if not line.startswith(passed)] + refusals:
+        raise MeshError(f"gmsh cannot read it: {faults[0].partition(': ')[2]}")
+    gmsh.logger.stop()
+    return MshContent.of(gmsh)
+
+
+def _misnumbered(content: MshContent) -> list[str]:
+    """List numbers that are there twice."""
+    numbers = np.concatenate([np.zeros(0, np.int64), *(tag for tag, _, _ in content.elements.values())])
     faults = []
-    for name, ordered in (("node", np.sort(tags)), ("element", np.sort(numbers))):
+    for name, ordered in (("node", np.sort(content.tags)), ("element", np.sort(numbers))):
         twice = np.unique(ordered[1:][ordered[1:] == ordered[:-1]])
         if len(twice):
             faults.append(f"{name} {first_of(map(str, twice), len(twice))}: the number is there twice")
-    if faults:
-        return faults
-    for numbers, nodes, _ in elements.values():
-        bad = np.argwhere(~np.isin(nodes, tags))
-        faults += [f"element {numbers[row]}: there is no node {nodes[row, column]}" for row, column in bad[:1]]
     return faults
 
 
-def _other_kinds(tags: Int, points: Float, elements: Mapping[int, Elements]) -> list[str]:
+def _other_kinds(content: MshContent) -> list[str]:
     """List elements that are neither triangles nor quadrilaterals of first or second order, and the lack of these."""
     faults = []
-    kinds = [kind for kind in sorted(elements) if KINDS[kind][1] >= 1 and kind not in LINES]
+    kinds = sorted({*content.elements} - {POINT, *LINES})
     for kind in (kind for kind in kinds if kind not in TRIANGLES):
-        numbers, nodes, _ = elements[kind]
-        centre = points[np.isin(tags, nodes[0])].mean(axis=0)
-        remedy = "mesh the surfaces only" if KINDS[kind][1] == 3 else "mesh with Mesh.ElementOrder = 1 or 2"
+        numbers, nodes, _ = content.elements[kind]
+        centre = content.points[np.isin(content.tags, nodes[0])].mean(axis=0)
         faults.append(
-            f"element {numbers[0]} at {at(centre)}, the first of {len(numbers)}, is a {KINDS[kind][0]}: only triangles "
-            "of three or six nodes, quadrilaterals of four, eight or nine and lines of two or three can be used "
-            f"({remedy})"
+            f"element {numbers[0]} at {at(centre)}, the first of {len(numbers)}, is a {content.kinds[kind]}: only "
+            "triangles of three or six nodes, quadrilaterals of four, eight or nine and lines of two or three can be "
+            "used (mesh the surfaces only, with Mesh.ElementOrder = 1 or 2)"
         )
     if not kinds:
         faults.append("no triangles in it: mesh the surfaces and put them in physical surfaces before saving")
     return faults
 
 
-def _without_lines(content: MshContent, curves: Mapping[str, Int]) -> list[str]:
-    """Return the fault of a curve DEBONDED that has a name but no lines."""
-    named = {name for (dimension, _), name in content.names.items() if dimension == 1}
-    is_empty = DEBONDED in named and not len(curves.get(DEBONDED, ()))
-    return [f'no lines in the physical curve "{DEBONDED}"'] if is_empty else []
-
-
-def _curves(content: MshContent, elements: Mapping[int, Elements]) -> dict[str, Int]:
-    """Return the nodes (d, 2) at the ends of the lines in each physical curve."""
-    entities = [
-        (group, entity) for (dimension, entity), groups in content.groups.items() if dimension == 1 for group in groups
-    ]
-    curves: dict[str, Int] = {}
-    for group, entity in sorted(set(entities)):
+def _curves(content: MshContent) -> dict[str, Int]:
+    """Return the nodes (d, 2) at the ends of the lines in each physical curve, DEBONDED if it is named."""
+    entities = {(group, key[1]) for key, groups in content.groups.items() if key[0] == 1 for group in groups}
+    named = (name for (dimension, _), name in content.names.items() if dimension == 1 and name == DEBONDED)
+    curves = {name: np.zeros((0, 2), np.int64) for name in named}
+    for group, entity in sorted(entities):
         name = content.name(1, group)
         curves.setdefault(name, np.zeros((0, 2), np.int64))
-        for kind in (kind for kind in LINES if kind in elements):
-            _, nodes, groups = elements[kind]
-            ends = nodes[slice(*np.searchsorted(groups, (entity, entity + 1))), :2]
-            curves[name] = np.concatenate([curves[name], ends])
+        for _, nodes, entities_of in (content.elements[kind] for kind in LINES if kind in content.elements):
+            curves[name] = np.concatenate([curves[name], nodes[entities_of == entity, :2]])
     return curves

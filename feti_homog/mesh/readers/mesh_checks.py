@@ -172,7 +172,8 @@ def missing_corners(plane: Float, origin: Float, size: Float) -> list[str]:
     """Name corners of the bounding rectangle without a node."""
     corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * size
     missing = [at(corner + origin) for corner in corners if not np.all(plane == corner, axis=1).any()]
-    return [f"no node at the corner {', '.join(missing)} of the cell"] if missing else []
+    advice = "of the cell; if a hole is there, shift the fibres until the corners lie in material"
+    return [f"no node at the corner {', '.join(missing)} {advice}"] if missing else []
 
 
 def too_large(plane: Float, triangles: Int32, size: Float) -> list[str]:

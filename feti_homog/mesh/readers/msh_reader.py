@@ -1,10 +1,10 @@
-"""A user's mesh: read from a file, moved onto a rectangle, checked, and made into a coarse mesh."""
+"""A user's mesh: read from a file, its phases named, moved onto a rectangle, checked, made into a coarse mesh."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 from types import MappingProxyType
 
@@ -16,10 +16,11 @@ from feti_homog.errors import MeshError, escaped
 from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, can_debond, edge_keys, edges, paired_sides, representatives
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers import abaqus_file, gmsh_file, mesh_checks, vtk_file, vtu_file
-from feti_homog.mesh.readers.named_phases import Selectors, unknown_phases, with_phases
-from feti_homog.mesh.readers.raw_mesh import RawMesh, at
+from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, first_of
 from feti_homog.mesh.readers.round_interfaces import with_bent_edges, with_circles, with_ellipses
+from feti_homog.microstructure.phase_names import PHASE, VOID
 from feti_homog.microstructure.shapes.ellipses import Ellipses
+from feti_homog.schema.wording import toml_key, toml_value
 from feti_homog.typing import Float, Int, Int32
 
 LOADERS = {
@@ -29,12 +30,14 @@ LOADERS = {
     ".vtk": vtk_file.load,
     ".mesh": vtk_file.load_medit,
 }
-# Sine of the angle at a node of the hull, and cosine between vectors of a lattice, that are zero but for rounding.
-STRAIGHT, RIGHT = 1e-5, 1e-6
+NUMBER = re.compile("number [0-9]+")
+"""Groups that have no other name."""
+HOLE = "expected no elements in a void, which is a hole in the mesh (with voids = true in [cell])"
+Selectors = Mapping[str, tuple[str | int, ...]]
+# Sine of the angle at a node of the hull that is zero but for rounding.
+STRAIGHT = 1e-5
 # Slope of sides that may be meant to be upright; share of the hull that a cell with voids fills at least.
 UPRIGHT, FILLED = 1e-2, 0.4
-LARGEST_MULTIPLE = 6  # of the vectors of a lattice in those of its rectangle
-SHIFTS = (0.5, 0.25, 0.75, 0.375, 0.625, 0.125, 0.875)
 
 
 def read_cell(cell: Cell) -> CoarseMesh:
@@ -89,8 +92,6 @@ def made(raw: RawMesh, path: str, has_voids: bool = True) -> CoarseMesh:
     for level in (np.zeros(2), size):
         plane = np.where(np.abs(plane - level) < mesh_checks.SAME_PLACE * size.max(), level, plane)
     corners = mesh_checks.missing_corners(plane, origin, size)
-    if corners and (advice := _shift(plane, raw.triangles, size)):
-        corners = [f"{corners[0]}; {advice}"]
     _refuse(path, mesh_checks.overlapping(raw), mesh_checks.hanging_nodes(raw, plane, size), corners)
     _refuse(path, mesh_checks.too_large(plane, raw.triangles, size))
     _refuse(path, mesh_checks.not_periodic(raw, plane, size), mesh_checks.unrefined_sides(plane, size))
@@ -179,7 +180,7 @@ def _match(plane: Float, low: Int, high: Int, along: int, reach: float) -> None:
 
 
 def _lattice(plane: Float, triangles: Int32) -> list[str]:
-    """Return the fault if triangles fill a parallelogram or a hexagon, with a rectangle for the same lattice."""
+    """Return the fault if triangles fill a parallelogram or a hexagon."""
     hull = ConvexHull(plane)
     corners = plane[hull.vertices]
     before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
@@ -194,44 +195,99 @@ def _lattice(plane: Float, triangles: Int32) -> list[str]:
     is_upright = half == 2 and bool((lengths.min(axis=1) <= UPRIGHT * lengths.max(axis=1)).all())
     if np.abs(sides[:half] + sides[half:]).max() > STRAIGHT * np.abs(sides).max() or is_upright:
         return []
-    # Opposite sides of the hexagon are these vectors apart.
-    first, second = (sides[0], sides[1]) if half == 2 else (sides[0] + sides[1], sides[1] + sides[2])
     name = "parallelogram" if half == 2 else "hexagon"
-    return [f"the cell is a {name}, expected a rectangle: {_rectangle(first, second)}"]
+    return [f'the cell is a {name}, expected a rectangle: see "Lattices that are no rectangle" in meshes/README.md']
 
 
-def _rectangle(first: Float, second: Float) -> str:
-    """Describe the smallest rectangle in the lattice of two vectors, and how to make it."""
-    numbers = range(-LARGEST_MULTIPLE, LARGEST_MULTIPLE + 1)
-    vectors = np.array([m * first + n * second for m, n in product(numbers, numbers) if (m, n) != (0, 0)])
-    right = vectors[(vectors[:, 0] > 0) | ((vectors[:, 0] == 0) & (vectors[:, 1] > 0))]
-    length = np.linalg.norm(right, axis=1)
-    cosine = np.abs(right @ vectors.T) / np.outer(length, np.linalg.norm(vectors, axis=1))
-    area = np.abs(np.cross(right[:, None], vectors))
-    area[cosine > RIGHT] = np.inf
-    if not np.isfinite(area).any():
-        return 'shear its lattice to a ratio of integers, see "Lattices that are no rectangle" in meshes/README.md'
-    slope = np.minimum(*np.abs(right.T)) / length
-    smallest = area.min()
-    # Of equal ones the rectangle along the axes.
-    pairs = np.argwhere(area < smallest * (1 + RIGHT))
-    i, j = min(pairs.tolist(), key=lambda pair: (round(float(slope[pair[0]]), 6), float(length[pair[0]])))
-    u, v = sorted((right[i], vectors[j]), key=lambda w: abs(w[1]))
-    count = round(float(smallest / abs(np.cross(first, second))))
-    sizes = " x ".join(f"{np.linalg.norm(w):.6g}" for w in (u, v))
-    turned = "" if abs(u[1]) <= RIGHT * abs(u[0]) else f", along {at(u)}: turn the lattice first"
-    copies = f"copies of the cell moved by {at(first)} and {at(second)}"
-    ways = f'cut it from {copies}, or list the fibres, geometry = "table"'
-    return f"its lattice has the rectangle {sizes} of {count} cells{turned}; {ways}"
+def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
+    """Give groups the phases that select one of their names, or else of their aliases.
+
+    Other groups keep their names. `debonded` selects curves.
+
+    Raises:
+        MeshError: a name or number that no element has; one line for each.
+    """
+    pairs = [(phase, name) for phase, selected in phases.items() for name in selected]
+    if faults := _unknown_names(mesh, pairs):
+        raise MeshError(*faults)
+    phase_of = {_key(name): phase for phase, name in pairs if phase != DEBONDED}
+    lines = set(map(_key, phases.get(DEBONDED, ())))
+    curves = {DEBONDED if _key(name) in lines else name: ends for name, ends in mesh.curves.items()}
+    both = zip(mesh.groups, mesh.aliases or ((),) * len(mesh.groups), strict=True)
+    groups = tuple(_selecting(names, phase_of) or _selecting(aliases, phase_of) or names for names, aliases in both)
+    return replace(mesh, groups=groups, curves=curves)
 
 
-def _shift(plane: Float, triangles: Int32, size: Float) -> str:
-    """Describe a shift that puts the cell's corners into material; empty if none is found."""
-    a, b, c = np.moveaxis(plane[triangles], 1, 0)
-    for fractions in product(SHIFTS, SHIFTS):
-        place = np.array(fractions) * size
-        sides = [np.cross(q - p, place - p) for p, q in ((a, b), (b, c), (c, a))]
-        if (np.min(sides, axis=0) > 0).any():
-            shifted = f"mesh the cell with all places moved by {at(-place)} modulo {at(size)}"
-            return f"if a hole is there, {shifted}: then its corners are in material"
-    return ""
+def _unknown_names(mesh: RawMesh, pairs: Iterable[tuple[str, str | int]]) -> list[str]:
+    """List names and numbers that no element has, or no line."""
+    faults = []
+    for phase, name in pairs:
+        of_curves = phase == DEBONDED
+        if _key(name) not in map(_key, _names(mesh, of_curves)):
+            selected = f"[cell.phases] {toml_key(phase)} = {toml_value(name)}"
+            kind = "lines" if of_curves else "elements"
+            faults.append(f"{selected}: no {kind} of that name; {known_names(mesh, of_curves)}")
+    return faults
+
+
+def _selecting(names: tuple[str, ...], phase_of: Mapping[str, str]) -> tuple[str, ...]:
+    """Return the phases that select one of the names, each once."""
+    return tuple(dict.fromkeys(phase_of[_key(name)] for name in names if _key(name) in phase_of))
+
+
+def _key(name: str | int) -> str:
+    """Return a name, or the number of a nameless group, such that capitals do not matter."""
+    return (f"number {name}" if isinstance(name, int) else name).casefold()
+
+
+def unknown_phases(mesh: RawMesh) -> list[str]:
+    """List physical surfaces whose name is not a phase, and a missing matrix."""
+    names = list(dict.fromkeys(name for group in mesh.groups for name in group))
+    has_matrix = "matrix" in names
+    expected = 'expected "matrix", "fibre", "glass", ... of letters, digits, _ and -, "fibre:2"'
+    # Without a matrix all groups are named anew, and numbers need no further word.
+    faults = [
+        f'{mesh.container} "{name}" is not a phase: {HOLE if name == VOID else expected}'
+        for name in names
+        if not PHASE.fullmatch(name) and (has_matrix or not NUMBER.fullmatch(name))
+    ]
+    if not has_matrix:
+        faults.append(f'no {mesh.container} is named "matrix"')
+    if faults:
+        faults[-1] += f"; {known_names(mesh)}{_way_out(mesh)}"
+    return faults
+
+
+def _way_out(mesh: RawMesh) -> str:
+    """Propose the two largest groups for [cell.phases], with all shares of the area."""
+    shares: dict[str, float] = {}
+    with np.errstate(all="ignore"):  # coordinates are judged later
+        sizes = np.bincount(mesh.group, np.abs(areas(mesh.points[:, :2], mesh.triangles)), len(mesh.groups))
+        for names, percent in zip(mesh.groups, 100 * sizes / sizes.sum(), strict=True):
+            if names and names[0] != VOID:
+                shares[names[0]] = shares.get(names[0], 0.0) + percent
+    if not shares:
+        return ""
+    order = sorted(shares, key=lambda name: -shares[name])
+    entries = ", ".join(
+        f"{phase} = {_as_selected(name)}" for phase, name in zip(("matrix", "fibre"), order, strict=False)
+    )
+    named = first_of((f"{_as_selected(name)}: {share:.3g} %" for name, share in shares.items()), len(shares), 20)
+    matrix = _as_selected(order[0])
+    return f". If {matrix} is the matrix, add to [cell]: phases = {{{entries}}}. Shares of the area: {named}"
+
+
+def known_names(mesh: RawMesh, of_curves: bool = False) -> str:
+    """List the names of groups, or of curves; numbers stand for nameless ones."""
+    names = _names(mesh, of_curves)
+    return f"the file has {first_of(map(_as_selected, names), len(names), 20) or 'none'}"
+
+
+def _names(mesh: RawMesh, of_curves: bool) -> list[str]:
+    named = list(mesh.curves) if of_curves else [name for group in (*mesh.groups, *mesh.aliases) for name in group]
+    return list(dict.fromkeys(named))
+
+
+def _as_selected(name: str) -> str:
+    """Return the name or number of a group as a case file has it."""
+    return name.removeprefix("number ") if NUMBER.fullmatch(name) else toml_value(name)

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+import re
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, Block, RawMesh, assembled
-from feti_homog.mesh.readers.scanner import Numbers
+from feti_homog.schema.wording import toml_value
 from feti_homog.typing import Float, Int
+
+Numbers = np.ndarray[Any, Any]
+
+# The first word that is no number, where whole or real numbers are read.
+WRONG_WORD = {
+    "i8": re.compile(rb"(?<!\S)(?![-+]?\d+(?!\S))\S+"),
+    "f8": re.compile(rb"(?i)(?<!\S)(?![-+]?((\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?|nan|inf)(?!\S))\S+"),
+}
 
 # Numbers of nodes by VTK's type of cell; quadrilaterals are cut in two triangles.
 TRIANGLES = {5: 3, 9: 4, 22: 6, 23: 8, 28: 9}
@@ -171,3 +182,29 @@ def _curves(grid: Grid, groups: Int, has_phases: bool) -> dict[str, Int]:
                 if len(lines):
                     curves[name] = np.concatenate([curves.get(name, lines[:0]), lines])
     return curves
+
+
+class NotANumber(ValueError):
+    """A word where a number is expected; `place` is where it begins in the text."""
+
+    def __init__(self, text: bytes, kind: str) -> None:
+        wrong = WRONG_WORD[kind].search(text)
+        self.place = 0 if wrong is None else wrong.start()
+        word = "" if wrong is None else f"{toml_value(wrong[0].decode(errors='replace'))}: "
+        super().__init__(f"{word}expected a {'whole number' if kind == 'i8' else 'number'}")
+
+
+def numbers(text: bytes, kind: str) -> Numbers:
+    """Convert text into numbers, whole (`i8`) or real (`f8`).
+
+    Raises:
+        NotANumber: another word is in it.
+    """
+    if not text.strip():
+        return np.zeros(0, kind)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            return np.fromstring(text, kind, sep=" ")
+        except (DeprecationWarning, ValueError):  # the one becomes the other in a later version of NumPy
+            raise NotANumber(text, kind) from None

@@ -16,8 +16,7 @@ import numpy as np
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.readers.raw_mesh import RawMesh
-from feti_homog.mesh.readers.scanner import NotANumber, Numbers, numbers
-from feti_homog.mesh.readers.unstructured_grid import Grid, mesh_of
+from feti_homog.mesh.readers.unstructured_grid import Grid, NotANumber, Numbers, mesh_of, numbers
 from feti_homog.schema.wording import toml_value
 from feti_homog.system.runtime import input_files
 from feti_homog.typing import Int

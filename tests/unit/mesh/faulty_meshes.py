@@ -204,15 +204,18 @@ FAULTY_MESHES: dict[str, tuple[Callable[[Path], None], str]] = {
     "other text": (_text("Dear gmsh,\n"), "not a gmsh mesh file"),
     "header only": (_text("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"), "no triangles"),
     "broken off": (_broken, "$Nodes: there is no $EndNodes: the file is damaged or broken off"),
-    "unknown node": (_unknown_node, "element 1: there is no node 77"),
-    "a line twice": (_line_twice, "element 12: the number is there twice"),
+    "unknown node": (_unknown_node, "gmsh cannot read it: Wrong node index 77"),
+    "a line twice": (_line_twice, "32 elements are announced, and 31 are there, each with its own number"),
     "no elements": (_mesh(lambda: grid().without(*range(1, 33))), "no triangles"),
     "only lines": (_mesh(lambda: MshFile(grid().nodes, {1: (1, 1, 1, (1, 2))})), "no triangles"),
     "quadrilaterals of second order": (
         _mesh(_quadrilaterals),
         "farther from the middle than half the edge's length",
     ),
-    "third order": (_mesh(_third_order), "lines of two or three can be used (mesh with Mesh.Element"),
+    "third order": (
+        _mesh(_third_order),
+        "lines of two or three can be used (mesh the surfaces only, with Mesh.ElementOrder",
+    ),
     "lines of third order": (
         _mesh(lambda: grid().with_element(60, 26, 0, (9, 14, 9, 14))),
         "element 60 at (0.75, 0.375), the first of 1, is a Line 4: only triangles of three or six nodes,",

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import gmsh  # noqa: F401 - once for all processes that read
 import numpy as np
 import pytest
 from support.abaqus import write_inp
@@ -130,19 +131,19 @@ def test_faults_of_many_kinds_are_counted(tmp_path):
 def test_many_nodes_at_one_place_are_counted(tmp_path):
     """Their pairs would not fit in the memory."""
     count = 20000
-    nodes = {k: (float(k % 2), 0.0, 0.0) for k in range(count)} | {count: (0.5, 1.0, 0.0)}
-    elements = {k: (2, 1, 1, (k, k + 1, count)) for k in range(0, count, 2)}
+    nodes = {k: (float(k % 2), 0.0, 0.0) for k in range(2, count + 2)} | {1: (0.5, 1.0, 0.0)}
+    elements = {k: (2, 1, 1, (k, k + 1, 1)) for k in range(2, count + 2, 2)}
     MshFile(nodes, elements).write(tmp_path / "a.msh")
-    with pytest.raises(MeshError, match=r"nodes at the same place: node 0 \(0, 0\) and node 2 .* and 19995 more$"):
+    with pytest.raises(MeshError, match=r"nodes at the same place: node 2 \(0, 0\) and node 4 .* and 19995 more$"):
         read(tmp_path / "a.msh")
 
 
 def test_many_long_edges_are_not_compared_with_all_nodes(tmp_path):
     """Strips across the cell: each edge is near all nodes."""
     count = 5000
-    nodes = {3 * k + j: (j / 2, (k + 0.5 * (j == 1)) / count, 0.0) for k in range(count) for j in range(3)}
-    corners = {3 * count + j: (float(j % 2), float(j // 2), 0.0) for j in range(4)}
-    elements = {k + 1: (2, 1, 1, (3 * k, 3 * k + 1, 3 * k + 2)) for k in range(count)}
+    nodes = {3 * k + j + 1: (j / 2, (k + 0.5 * (j == 1)) / count, 0.0) for k in range(count) for j in range(3)}
+    corners = {3 * count + j + 1: (float(j % 2), float(j // 2), 0.0) for j in range(4)}
+    elements = {k + 1: (2, 1, 1, (3 * k + 1, 3 * k + 2, 3 * k + 3)) for k in range(count)}
     MshFile(nodes | corners, elements).write(tmp_path / "a.msh")
     with pytest.raises(MeshError, match="14999 edges within the cell have one triangle only, and long ones cross"):
         read(tmp_path / "a.msh")

@@ -1,4 +1,4 @@
-"""Files on which HDF5 crashes, or does not come to an end, are reported in one line."""
+"""Files on which a library crashes, or does not come to an end, are reported in one line."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import signal
 import pytest
 
 from feti_homog.errors import CaseError
-from feti_homog.verify.certificate import in_own_process
+from feti_homog.system.runtime.own_process import in_own_process
 
 
 def crash(_):
@@ -28,7 +28,7 @@ def test_an_answer_comes_back(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("function", "words"), [(crash, "HDF5 crashes on them"), (refuse, "no"), (ask_for_too_much, "256 TiB")]
+    ("function", "words"), [(crash, "reads them crashes"), (refuse, "no"), (ask_for_too_much, "256 TiB")]
 )
 def test_what_goes_wrong_is_reported(tmp_path, function, words):
     with pytest.raises(CaseError, match=f"^{tmp_path}: .*{words}$"):
@@ -43,3 +43,9 @@ def test_what_does_not_end_is_ended(tmp_path):
     os.close(theirs)
     assert os.read(ours, 1) == b""
     os.close(ours)
+
+
+def test_more_memory_than_allowed_is_refused(tmp_path):
+    assert in_own_process(tmp_path, lambda _: len(bytes(1 << 20)), memory=1 << 28) == 1 << 20
+    with pytest.raises(CaseError, match="its files are damaged"):
+        in_own_process(tmp_path, lambda _: len(bytes(1 << 30)), memory=1 << 28)
