@@ -16,7 +16,7 @@ import numpy as np
 from mpi4py.MPI import Intracomm
 
 from feti_homog import Case, launch, run
-from feti_homog.case.uncertainty import read_uncertainty
+from feti_homog.studies.uncertain_numbers import read_uncertainty
 
 CASE: dict[str, Any] = {
     "cell": {"geometry": "hexagonal", "fibre_fraction": 0.55, "mesh_size": 0.3, "order": 1},

@@ -19,7 +19,6 @@ from feti_homog.case.material_sections import provider, read_materials
 from feti_homog.case.relations import axes_lines, idle_friction_keys, read_interfaces, relation_faults, stress_free
 from feti_homog.case.rules import RULES
 from feti_homog.case.section_values import ANALYSIS_TYPE, CRITERION, METHOD, PLANE
-from feti_homog.case.uncertainty import UNCERTAINTY
 from feti_homog.errors import CaseError
 from feti_homog.materials.forms import Material
 from feti_homog.materials.laws import contrast_lines
@@ -31,7 +30,7 @@ from feti_homog.system.runtime import input_files
 FIELDS = {"load": "single_load"}  # of a section whose name is that of a method
 STUDIES = {
     sections.SWEEP: "this file describes many cases; `feti-homog sweep` runs them",
-    UNCERTAINTY: "a run takes no scatter; `feti-homog uncertainty` passes it on to results",
+    sections.UNCERTAINTY: "a run takes no scatter; `feti-homog uncertainty` passes it on to results",
 }
 """Sections of files with many cases, each with the command that takes them."""
 

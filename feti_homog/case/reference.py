@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from feti_homog.case import sections
-from feti_homog.case.uncertainty import CORRELATION, UNCERTAINTY
 from feti_homog.errors import CaseError
 from feti_homog.materials.forms import Isotropic
 from feti_homog.schema.keys import Key, keys_of
@@ -17,7 +16,7 @@ from feti_homog.schema.values import text
 
 ORDER = (
     *("name", "cell", "material", *[*sections.SECTIONS][1:]),
-    *("petsc", UNCERTAINTY, sections.SWEEP, sections.UNKNOWN, sections.MEASURED),
+    *("petsc", sections.UNCERTAINTY, sections.SWEEP, sections.UNKNOWN, sections.MEASURED),
 )
 """Sections in the order of the reference."""
 
@@ -85,7 +84,7 @@ DEVIATION = KeyRow(
     "or {mean, cv}, cv = std / |mean|.",
 )  # fmt: skip
 PAIR_WORDS = "a list of [KEY, KEY, VALUE], values from -1 to 1"
-PAIRS = KeyRow(CORRELATION, PAIR_WORDS, "", "", "", "Correlation of pairs of these numbers.")
+PAIRS = KeyRow(sections.CORRELATION, PAIR_WORDS, "", "", "", "Correlation of pairs of these numbers.")
 AXIS = KeyRow("SECTION.KEY", sections.AXIS_EXPECTED, "", "", "", sections.AXIS_MEANING)
 
 
@@ -101,7 +100,7 @@ def tables() -> list[TableReference]:
             sections.SectionTable(sections.MEASURED, f"[{sections.MEASURED}] {sections.CURVE}", sections.MeasuredCurve)
         ),
         TableReference("petsc", "[petsc]", PETSC_MEANING, (PETSC_OPTION,)),
-        TableReference(UNCERTAINTY, f"[{UNCERTAINTY}]", UNCERTAINTY_MEANING, (DEVIATION, PAIRS)),
+        TableReference(sections.UNCERTAINTY, f"[{sections.UNCERTAINTY}]", UNCERTAINTY_MEANING, (DEVIATION, PAIRS)),
         _table(sections.SectionTable(sections.SWEEP, f"[{sections.SWEEP}]", sections.SweepSection), AXIS),
         TableReference(
             sections.SWEEP, f"a range in [{sections.SWEEP}]", "Values of a key that lie between two ends.", ranges

@@ -25,6 +25,9 @@ Scalar = str | int | float | bool
 PREFIXED = r"feti_\w+"  # options of [petsc]
 OPTION_EXPECTED = "a text, a number, true or false"
 SWEEP = "sweep"
+UNCERTAINTY, CORRELATION = "uncertainty", "correlation"
+DIFFERENTIABLE = ("stiffness", "load")
+"""Types of analyses that have derivatives."""
 UNKNOWN, MEASURED, TEST, CURVE = "unknown", "measured", "test", "curve"
 FIT_SECTIONS = (UNKNOWN, MEASURED, TEST)
 STD = real(above=0.0)

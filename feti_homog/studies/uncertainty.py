@@ -19,16 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from feti_homog.case.document import TomlPath, read_document, to_document
-from feti_homog.case.sections import SWEEP
-from feti_homog.case.uncertainty import (
-    DIFFERENTIABLE,
-    SECTIONS,
-    UNCERTAINTY,
-    Uncertainty,
-    number_at,
-    read_uncertainty,
-    with_number,
-)
+from feti_homog.case.sections import DIFFERENTIABLE, SWEEP, UNCERTAINTY
 from feti_homog.errors import CaseError
 from feti_homog.report.text.constant_tables import mesh_errors, shown
 from feti_homog.report.text.table import Column, Table, with_unit, without_noise
@@ -37,6 +28,7 @@ from feti_homog.studies.axes import Assignment, read_points
 from feti_homog.studies.predictions import Datum, exact_derivatives, responses
 from feti_homog.studies.study import SILENT, Evaluator, Study
 from feti_homog.studies.sweep_cases import Sweep, cases_at
+from feti_homog.studies.uncertain_numbers import SECTIONS, Uncertainty, number_at, read_uncertainty, with_number
 from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.typing import Float
 

@@ -9,7 +9,7 @@ import pytest
 from support.cases import FIBRE, MATRIX
 
 from feti_homog import Case, CaseError, run
-from feti_homog.case.uncertainty import Uncertainty
+from feti_homog.studies.uncertain_numbers import Uncertainty
 from feti_homog.system.runtime.records import plain
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]

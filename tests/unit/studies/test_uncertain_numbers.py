@@ -10,8 +10,9 @@ import pytest
 from support.base_case import changed
 
 from feti_homog.case.case import Case
-from feti_homog.case.uncertainty import UNCERTAINTY, Uncertainty, number_at, read_uncertainty, with_number
+from feti_homog.case.sections import UNCERTAINTY
 from feti_homog.errors import CaseError
+from feti_homog.studies.uncertain_numbers import Uncertainty, number_at, read_uncertainty, with_number
 
 UNCERTAIN = (
     ("young = 88.0", "young = {mean = 88.0, cv = 0.05}"),

@@ -11,14 +11,13 @@ from typing import Any
 import numpy as np
 
 from feti_homog.case.document import TomlPath, leaves
+from feti_homog.case.sections import CORRELATION, UNCERTAINTY
 from feti_homog.schema.values import is_number, magnitudes_in_words
 from feti_homog.schema.wording import dotted_key, toml_value
 from feti_homog.typing import Float
 
-UNCERTAINTY, CORRELATION, STIFFNESS = "uncertainty", "correlation", "stiffness"
+STIFFNESS = "stiffness"
 SECTIONS = ("material", "interface")
-DIFFERENTIABLE = ("stiffness", "load")
-"""Types of analyses that have derivatives."""
 ROUNDING = 1e-12
 EXPECTED = "expected {mean, std} or {mean, cv}, numbers, std and cv above 0"
 
