@@ -129,14 +129,19 @@ class Homogenization:
             strain, stress = state.solution.strain, self.interface.stress(state.solution)
             energy = float(stress @ strain) - self._rubbing(state)
             return self._scaled(state, scale, stress, energy, np.zeros(0), {})
-        solver, state = self.cell.solver, self.interface.completed(state)
+        cell, solver, state = self.cell, self.cell.solver, self.interface.completed(state)
         strain, u = state.solution.strain, solver.boundary_displacement(state.solution)
-        stress, star, energy = self._averages(strain, u)
+        # <sigma>, <eps*> over bodies and voids, and <sigma:eps>.
+        without_u, from_u = solver.condensed.stiffness @ strain, solver.loads.T @ u
+        work = strain @ solver.condensed.energy @ strain + 2 * strain @ from_u
+        work += u @ solver.interface_operators.apply_schur(u)
+        sums = np.concatenate([without_u + from_u, self._strain_of_displacements.T @ u, [work]])
+        stress, star, (energy,) = np.split(allreduce_sum(cell.comm, sums) / cell.summary.area, [len(strain), -1])
         springs = state.solution.compliance * state.solution.lam
         active = self.interface.active(state.status) * (slipped(self.interface, state) == 0.0)
         opened = state.solution.jump * (1 - active) + springs
         opening = allreduce_sum(self.cell.comm, self._strain_of_jumps.T @ opened)
-        energy += self._stretched(state)
+        energy = float(energy) + self._stretched(state)
         rubbing = self._rubbing(state)
         acting = self.interface.acting(state.bonds, strain, state.asked)
         largest = (self._largest(u) + self.interface.scales.imposed(acting)) or 1.0
@@ -226,17 +231,6 @@ class Homogenization:
                 inside[s.problem.dofs(np.array([s.submesh.pinned]))] = False
             inner = max(inner, float(np.abs(s.mean_strain(np.flatnonzero(inside))).max(initial=0.0)))
         return float(self.cell.comm.allreduce(inner, MPI.MAX) / self.cell.comm.allreduce(size, MPI.MAX))
-
-    def _averages(self, E: Float, u: Float) -> tuple[Float, Float, float]:
-        """<sigma>, <eps*> over bodies and voids, and <sigma:eps>; collective."""
-        cell, v = self.cell, len(E)
-        without_u, from_u = cell.solver.condensed.stiffness @ E, cell.solver.loads.T @ u
-        energy = (
-            E @ cell.solver.condensed.energy @ E + 2 * E @ from_u + u @ cell.solver.interface_operators.apply_schur(u)
-        )
-        sums = np.concatenate([without_u + from_u, self._strain_of_displacements.T @ u, [energy]])
-        sums = allreduce_sum(cell.comm, sums) / cell.summary.area
-        return sums[:v], sums[v:-1], float(sums[-1])
 
     def _largest(self, values: Float) -> float:
         """max |values| over all ranks."""

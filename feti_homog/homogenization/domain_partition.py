@@ -21,10 +21,12 @@ from feti_homog.homogenization.partition_policy import (
 from feti_homog.interface import debonded_arcs
 from feti_homog.interface.debonded_arcs import MovedTips
 from feti_homog.mesh.coarse_mesh import CoarseMesh, voids
+from feti_homog.mesh.fill.gmsh_mesher import NodedCell
 from feti_homog.mesh.mesh_fibres import coating_thickness, fibre_circles, fibre_frames, fibre_numbers
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks, pinned_class
+from feti_homog.mesh.tiles.filling import arc_edges
 from feti_homog.microstructure.shapes.ellipses import Ellipses
 from feti_homog.typing import Bool, Float, Int
 
@@ -191,6 +193,44 @@ def distribute(
     )
     submeshes = cut_for_ranks(torus, cut.subdomain, table, n_ranks, pinned_class(torus))
     return [RankShare(summary, table, pairs, share) for share in submeshes]
+
+
+def summary_of(case: Case, noded: NodedCell, subdomains: int, triangles: int) -> CellSummary:
+    """Summarize the cell with so many subdomains and coarse triangles."""
+    regions, lines, arrangement = noded.regions, noded.lines, noded.arrangement
+    inside = regions.constituent[:-1]
+    solid = np.flatnonzero(inside >= 0)
+    circle = solid[np.unique(inside[solid], return_index=True)[1]]
+    disc = lines.disc[circle]
+    is_fibre = arrangement.precedence(disc, lines.is_coating[circle]) == disc + 1
+    centres = in_cell(noded.scale * arrangement.centres[disc], np.array([regions.width, regions.height]))
+    radii = regions.ellipses.circles[circle, 2]
+    ends = noded.scale * lines.points[arc_edges(lines.curves)[0]]
+    nothing = np.full((1, 2), np.nan)
+    return CellSummary(
+        width=regions.width,
+        height=regions.height,
+        phases=regions.phases,
+        bodies=len(regions.phase),
+        subdomains=subdomains,
+        coarse_triangles=triangles,
+        interface_edge=float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max(initial=0.0)),
+        numbers=np.append(0, disc + 1),
+        is_fibre=np.append(False, is_fibre),
+        constituent_phase=regions.phase,
+        centres=np.concatenate([nothing, centres]),
+        radii=np.append(np.nan, radii),
+        frames=np.concatenate([np.full((1, 2, 2), np.nan), regions.ellipses.frames[circle]]),
+        moved_tips=({},) * len(case.interfaces),
+        snapped=0.0,
+        voids=arrangement.voids,
+        match_distance=match_distance(case, regions.width, regions.height, centres[is_fibre], radii[is_fibre]),
+        remarks=(
+            *arrangement.remarks,
+            *table_remarks(case),
+            *subdomain_remarks(case, len(regions.phase), subdomains, triangles),
+        ),
+    )
 
 
 def _cut_across(

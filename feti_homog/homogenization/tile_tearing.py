@@ -1,38 +1,43 @@
-"""Cells cut on rank 0, or large ones where they are meshed.
+"""Cells meshed by all ranks, and cut on rank 0, or large ones where they are meshed.
 
-For large cells each rank cuts its tiles, and no rank has all tiles.
-
-Matrix pieces lie within tiles, and a fibre lies in one tile, so subdomains depend on the case and the number of
-ranks, not on the rank that filled a tile.
+Rank 0 begins the coarse mesh; all ranks make nodes on lines, and the tiles of large cells.  There each rank cuts its
+tiles, and no rank has all tiles.  Matrix pieces lie within tiles, and a fibre lies in one tile, so subdomains depend on
+the case and the number of ranks, not on the rank that filled a tile.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import chain
+from operator import itemgetter
+from typing import TypeVar
 
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.case.case import Case
+from feti_homog.case.case import Case, check_phases
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import assign_ranks, cut_into_pieces
-from feti_homog.homogenization import cell_remarks
-from feti_homog.homogenization.cell_remarks import subdomain_remarks, table_remarks
-from feti_homog.homogenization.coarse_meshes import deal_tiles, fill_own, fill_tiles, place_nodes
-from feti_homog.homogenization.domain_partition import CellSummary, RankShare, distribute, in_cell, match_distance
+from feti_homog.homogenization import arc_selection, cell_remarks
+from feti_homog.homogenization.domain_partition import RankShare, distribute, summary_of
 from feti_homog.homogenization.partition_policy import PartitionPolicy, can_be_cut_across, wanted_pieces
+from feti_homog.mesh.arrange import listed_arrangement
 from feti_homog.mesh.coarse_mesh import CoarseMesh, representatives
-from feti_homog.mesh.fill.gmsh_mesher import NodedCell
+from feti_homog.mesh.fill.gmsh_mesher import NodedCell, UnmeshedCell, begin
 from feti_homog.mesh.outline.lines import MATRIX
 from feti_homog.mesh.periodic_topology import Torus, components, places_by_depth
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.sizes.element_estimate import ElementEstimate
+from feti_homog.mesh.sizes.graded_size import SizeField
 from feti_homog.mesh.submesh import SubdomainTable, cut_for_ranks, joined, pinning
-from feti_homog.mesh.tiles.filling import arc_edges
-from feti_homog.mesh.tiles.tiles import FilledTile, NumberedTile, Regions, tile_torus
-from feti_homog.system.parallel.distributed_arrays import alltoall, scatter
+from feti_homog.mesh.tiles.filling import Filling, Tile, fill
+from feti_homog.mesh.tiles.tiles import FilledTile, NumberedTile, Regions, TilePolicy, tile_torus
+from feti_homog.system.parallel.distributed_arrays import alltoall, gather, scatter
+from feti_homog.system.parallel.dividing import balanced
 from feti_homog.system.parallel.mpi_errors import agree, on_root, on_root_only
 from feti_homog.typing import Float, Int
+
+T = TypeVar("T")
 
 
 def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy) -> RankShare:
@@ -43,6 +48,86 @@ def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: Part
         return tear_by_tiles(case, noded, lattice, comm, policy)
     mesh = fill_tiles(noded, comm)
     return scatter(comm, on_root_only(comm, distribute, case, mesh, lattice, comm.size, policy) or [])
+
+
+def place_nodes(case: Case, comm: MPI.Intracomm, policy: TilePolicy) -> NodedCell | CoarseMesh | None:
+    """Return a user's mesh, or the cell with nodes on lines, placed by all ranks, and empty tiles.  Collective.
+
+    None but on rank 0.
+
+    Raises:
+        CaseError, MeshError: on every rank, as `begin_mesh`.
+    """
+    cell = on_root_only(comm, begin_mesh, case, policy)
+    unmeshed = cell if isinstance(cell, UnmeshedCell) else None
+    if not comm.bcast(unmeshed is not None):
+        assert not isinstance(cell, UnmeshedCell)
+        return cell
+    field: SizeField = comm.bcast(None if unmeshed is None else unmeshed.bare.field)
+    lines = scatter(comm, [] if unmeshed is None else unmeshed.bare.lines.parts(comm.size))
+    stations = gather(comm, agree(comm, lines.stations, field))
+
+    def with_nodes(unmeshed: UnmeshedCell) -> NodedCell:
+        return unmeshed.with_nodes(unmeshed.bare.lines.joined(stations))
+
+    return on_root_only(comm, with_nodes, unmeshed)
+
+
+def begin_mesh(case: Case, policy: TilePolicy) -> UnmeshedCell | NodedCell | CoarseMesh:
+    """Return a user's mesh, or the cell as far as rank 0 makes it alone.
+
+    Raises:
+        CaseError: a phase has no material, or a material no phase.
+        MeshError: the cell cannot be meshed, or its mesh file is faulty.
+    """
+    cell: UnmeshedCell | NodedCell | CoarseMesh
+    if case.cell.has_own_mesh:
+        from feti_homog.mesh.readers.msh_reader import read_cell  # with the readers of all formats
+
+        cell = read_cell(case.cell)
+    else:
+        listed = listed_arrangement(case.cell)
+        estimate = ElementEstimate.of(case.cell, listed)
+        section = replace(case.cell, tip_size=arc_selection.size(case, estimate))
+        cell = begin(section, listed, arc_selection.marks(case, estimate.fibres), policy)
+    check_phases(case, cell.phases)
+    return cell
+
+
+def fill_tiles(cell: NodedCell | CoarseMesh | None, comm: MPI.Intracomm) -> CoarseMesh | None:
+    """Return the mesh on rank 0, whose tiles from `place_nodes` all ranks fill.  Collective.
+
+    Raises:
+        MeshError: on every rank, if one cannot fill a tile.
+    """
+    tiles = [] if cell is None or isinstance(cell, CoarseMesh) else [tile for _, tile in cell.parts]
+    gathered = gather(comm, agree(comm, fill_own, deal_tiles(tiles, [len(tile.points) for tile in tiles], comm)))
+    fillings = [filling for _, filling in sorted(chain.from_iterable(gathered), key=itemgetter(0))]
+
+    def joined(cell: NodedCell | CoarseMesh) -> CoarseMesh:
+        return cell if isinstance(cell, CoarseMesh) else cell.mesh(fillings)
+
+    return on_root_only(comm, joined, cell)
+
+
+def deal_tiles(tiles: list[T], loads: list[int], comm: MPI.Intracomm) -> list[tuple[int, T]]:
+    """Deal tiles from rank 0 to all ranks.  Collective.
+
+    The tiles have sizes `loads`; returns the numbers and tiles that this rank fills.
+    """
+    parts: list[list[tuple[int, T]]] = [[] for _ in range(comm.size)]
+    for k, rank in enumerate(balanced(np.array(loads, np.int64), comm.size).tolist()):
+        parts[rank].append((k, tiles[k]))
+    return scatter(comm, parts)
+
+
+def fill_own(tiles: list[tuple[int, Tile]]) -> list[tuple[int, Filling]]:
+    """Fill numbered tiles.
+
+    Raises:
+        MeshError: gmsh cannot fill one.
+    """
+    return [(k, fill(tile)) for k, tile in tiles]
 
 
 def can_be_torn_by_tiles(
@@ -187,41 +272,3 @@ def tiles_to_fill(noded: NodedCell) -> list[NumberedTile]:
     lines, arrangement = noded.lines, noded.arrangement
     stands_for = representatives(lines.points, arrangement.width, arrangement.height).astype(np.int64)
     return [NumberedTile(nodes, stands_for[nodes], tile) for nodes, tile in noded.parts]
-
-
-def summary_of(case: Case, noded: NodedCell, subdomains: int, triangles: int) -> CellSummary:
-    """Summarize the cell with so many subdomains and coarse triangles."""
-    regions, lines, arrangement = noded.regions, noded.lines, noded.arrangement
-    inside = regions.constituent[:-1]
-    solid = np.flatnonzero(inside >= 0)
-    circle = solid[np.unique(inside[solid], return_index=True)[1]]
-    disc = lines.disc[circle]
-    is_fibre = arrangement.precedence(disc, lines.is_coating[circle]) == disc + 1
-    centres = in_cell(noded.scale * arrangement.centres[disc], np.array([regions.width, regions.height]))
-    radii = regions.ellipses.circles[circle, 2]
-    ends = noded.scale * lines.points[arc_edges(lines.curves)[0]]
-    nothing = np.full((1, 2), np.nan)
-    return CellSummary(
-        width=regions.width,
-        height=regions.height,
-        phases=regions.phases,
-        bodies=len(regions.phase),
-        subdomains=subdomains,
-        coarse_triangles=triangles,
-        interface_edge=float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max(initial=0.0)),
-        numbers=np.append(0, disc + 1),
-        is_fibre=np.append(False, is_fibre),
-        constituent_phase=regions.phase,
-        centres=np.concatenate([nothing, centres]),
-        radii=np.append(np.nan, radii),
-        frames=np.concatenate([np.full((1, 2, 2), np.nan), regions.ellipses.frames[circle]]),
-        moved_tips=({},) * len(case.interfaces),
-        snapped=0.0,
-        voids=arrangement.voids,
-        match_distance=match_distance(case, regions.width, regions.height, centres[is_fibre], radii[is_fibre]),
-        remarks=(
-            *arrangement.remarks,
-            *table_remarks(case),
-            *subdomain_remarks(case, len(regions.phase), subdomains, triangles),
-        ),
-    )
