@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from feti_homog.analysis.constants import energy_error, note_accuracy, state_error, unit_errors
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.analysis.mesh_errors import energy_error, note_accuracy, state_error, unit_errors
 from feti_homog.analysis.result_records import AnglePoint
 from feti_homog.analysis.tip_records import tip_rates
 from feti_homog.case.loads import Angle

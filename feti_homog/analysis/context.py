@@ -149,12 +149,7 @@ class AnalysisContext:
     @property
     def recovers_again(self) -> bool:
         """True if displacements inside bodies are found more than once, so that interior factors pay."""
-        return self.states.has_place or self.needs_sensitivities or self.case.analysis.type == "angle"
-
-    @property
-    def needs_sensitivities(self) -> bool:
-        """True if the case asks for derivatives."""
-        return self.case.output.sensitivities
+        return self.states.has_place or self.case.output.sensitivities or self.case.analysis.type == "angle"
 
     def bonds(self, opening: float | None) -> BondState:
         """Interface state before any load: prescribed debonded nodes are open."""

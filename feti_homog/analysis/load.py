@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from feti_homog.analysis.constants import note_accuracy, state_error
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.analysis.mesh_errors import note_accuracy, state_error
 from feti_homog.analysis.result_records import LoadPoint
 from feti_homog.analysis.sensitivities import load_sensitivities
 from feti_homog.analysis.tip_records import IN_PLANE_LOADS, tip_rates
@@ -33,6 +33,6 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     if context.case.interface is not None and only_in_plane:
         point["tips"] = tip_rates(context, responses[:1], ["strain"])
     document: dict[str, Any] = {"load": LoadPoint(**point)}
-    if context.needs_sensitivities:
+    if context.case.output.sensitivities:
         document |= load_sensitivities(context, context.loads.load(target), responses)
     return document

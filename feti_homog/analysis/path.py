@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from feti_homog.analysis.constants import check_accuracy, state_error
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.analysis.mesh_errors import check_accuracy, state_error
 from feti_homog.analysis.path_events import (
     BARS,
     EventProgress,
@@ -32,7 +32,7 @@ from feti_homog.interface.friction.sliding_cell import SlidingCell
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.path.coulomb_leg import CoulombLeg
 from feti_homog.interface.path.frictionless_leg import FrictionlessLeg
-from feti_homog.interface.path.path_following import events, increments
+from feti_homog.interface.path.path_following import Engine, events, increments
 from feti_homog.interface.path.path_points import Energies, Point, unloaded
 from feti_homog.materials.voigt import voigt_names
 from feti_homog.results.checkpoint import has_multipliers
@@ -151,7 +151,10 @@ def _points(
             point = found_again(point, cell, law)
         begin, responses = point.after, averages(event, point, context.loads)
         yield point, energies, responses
-    engine = partial(CoulombLeg, sliding=_sliding_cell(context)) if context.case.has_friction else FrictionlessLeg
+    engine: Engine = FrictionlessLeg
+    if context.case.has_friction:
+        friction, of_damage = np.array([interface.rubbing for interface in context.case.interfaces])[cell.nodes.pair].T
+        engine = partial(CoulombLeg, sliding=SlidingCell(cell, friction, of_damage))
     if path.method == "events":
         points = events(cell, law, waypoints, begin, engine)
     else:
@@ -181,13 +184,6 @@ def _with_advice(error: NotCarriedError, place: str, path: LoadPath) -> NotCarri
         more = "" if path.method == "events" else " or more increments"
         return StuckError(f"[path]: {error}{place}; a smaller friction{more} may lead further")
     return NotCarriedError(f"[path]: {error}{place}; prescribe strains there") if place else error
-
-
-def _sliding_cell(context: AnalysisContext) -> SlidingCell:
-    """Return the case's faces with their interface friction.  Collective; raises as `SlidingCell`."""
-    cell, pair = context.loads.interfaces, context.loads.interfaces.nodes.pair
-    friction, of_damage = np.array([interface.rubbing for interface in context.case.interfaces]).T
-    return SlidingCell(cell, friction[pair], of_damage[pair])
 
 
 def _label(path: LoadPath, number: int) -> str:

@@ -237,17 +237,9 @@ class Result:
         """
         from feti_homog.analysis import path_scaling  # of paths by energy alone
 
-        s = path_scaling.ratio(self.document, toughness)
-        return replace(
-            self,
-            case=path_scaling.case(self.case, s),
-            digest="",
-            path=tuple(path_scaling.point(point, s) for point in self.path or ()),
-            peak=None if self.peak is None else path_scaling.peak(self.peak, s),
-            states=None,
-            result_h5=None,
-            fields=None,
-        )
+        case, path, peak = path_scaling.scaled(self.document, self.path or (), self.peak, toughness)
+        changed = replace(self, case=case, digest="", path=path, peak=peak)
+        return replace(changed, states=None, result_h5=None, fields=None)
 
     def first_drop(self) -> tuple[Float, int]:
         """Return the stress (3,) or (6,) after a one-leg path's first break, under the breaking load.

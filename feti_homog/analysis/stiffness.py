@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from feti_homog.analysis.constants import constants
+from feti_homog.analysis.constants import constants, mesh_error, unit_errors
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.analysis.mesh_errors import mesh_error, unit_errors
 from feti_homog.homogenization.averaging import asymmetry
 
 if TYPE_CHECKING:
@@ -43,7 +42,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 
         document["tips"] = tip_rates(context, under, loads)
     document |= constants(context.cell, document)
-    if context.needs_sensitivities:
+    if context.case.output.sensitivities:
         from feti_homog.analysis.sensitivities import sensitivities  # few runs ask for them
 
         document |= sensitivities(context, document, first, one_sided)

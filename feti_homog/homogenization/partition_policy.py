@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from math import ceil
 
 import numpy as np
@@ -125,8 +126,9 @@ def can_be_cut_across(case: Case) -> bool:
         return False
     ratios = (isotropic_ratio(material) or 0.0 for material in case.materials.values())
     # Contrast: the largest ratio of the largest entries of two phases' stiffnesses, in any problem.
-    law_kinds = (phase_laws.plane_law, phase_laws.axial_law)[: len(phase_laws.problems(case))]
-    sizes = np.array([[np.abs(law(case, phase)[:4, :4]).max() for phase in case.materials] for law in law_kinds])
+    pairs = product(phase_laws.problems(case), case.materials)
+    sizes = np.array([np.abs(phase_laws.law(case, phase, problem)[:4, :4]).max() for problem, phase in pairs])
+    sizes = sizes.reshape(-1, len(case.materials))
     return max(ratios) <= MOST_POISSON and float((sizes.max(axis=1) / sizes.min(axis=1)).max()) <= MOST_CONTRAST
 
 

@@ -44,18 +44,15 @@ def problems(case: Case) -> tuple[Problem, ...]:
     return GENERALIZED, AXIAL
 
 
-def plane_problem(case: Case) -> Problem:
-    """Return the problem for displacements in the plane."""
-    return problems(case)[0]
-
-
-def plane_law(case: Case, phase: str) -> Float:
-    """(v, v) phase stiffness A in the plane problem."""
-    material, problem = case.material_of(phase), plane_problem(case)
+def law(case: Case, phase: str, problem: Problem) -> Float:
+    """(v, v) phase stiffness A in a problem."""
+    material = case.material_of(phase)
     if problem == PLANE:
         return plane_stiffness(material, case.analysis.plane)
-    C = spatial_stiffness(material)[np.ix_(IN_PLANE, IN_PLANE)]
-    alpha = expansion(material)
+    C = spatial_stiffness(material)
+    if problem == AXIAL:
+        return C[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)]
+    C, alpha = C[np.ix_(IN_PLANE, IN_PLANE)], expansion(material)
     if problem != GENERALIZED or alpha is None:
         return C
     N = np.column_stack([np.eye(4), -alpha[IN_PLANE]])
@@ -67,14 +64,9 @@ def is_mixed(case: Case, phase: str) -> bool:
     return cell_sizes.is_mixed(case.cell.order, case.material_of(phase), case.analysis.plane)
 
 
-def axial_law(case: Case, phase: str) -> Float:
-    """(2, 2) phase stiffness in the axial problem."""
-    return spatial_stiffness(case.material_of(phase))[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)]
-
-
 def law_derivatives(case: Case, phase: str, change: LawChange) -> tuple[Float, ...]:
-    """Differentiate `plane_law` and, if there is an axial problem, `axial_law`."""
-    problem, dC = plane_problem(case), change.stiffness
+    """Differentiate `law` in the plane problem and, if there is one, in the axial problem."""
+    problem, dC = problems(case)[0], change.stiffness
     if problem == PLANE:
         return (dC,)
     axial, dC = dC[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)], dC[np.ix_(IN_PLANE, IN_PLANE)]
@@ -117,16 +109,14 @@ def spatial_vector(plane: Float | None, axial: Float | None) -> Float:
     return vector
 
 
-def springs(case: Case) -> InterfaceSprings:
-    """Return normal and tangential springs for the plane problem."""
-    stiffness = ((bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf) for bond in case.interfaces)
-    return InterfaceSprings(tuple(stiffness), has_softening(case))
+def springs(case: Case, problem: Problem = PLANE) -> InterfaceSprings:
+    """Return normal and tangential springs; in the axial problem springs along the fibres.
 
-
-def axial_springs(case: Case) -> InterfaceSprings:
-    """Return the springs along the fibres; without their own stiffness, as around the fibre."""
-    stiffness = ((bond.axial_stiffness or bond.tangential_stiffness or math.inf,) for bond in case.interfaces)
-    return InterfaceSprings(tuple(stiffness), has_softening(case))
+    Without their own stiffness these are as around the fibre.
+    """
+    along = [(bond.axial_stiffness or bond.tangential_stiffness or math.inf,) for bond in case.interfaces]
+    around = [(bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf) for bond in case.interfaces]
+    return InterfaceSprings(tuple(along if problem == AXIAL else around), has_softening(case))
 
 
 def has_softening(case: Case) -> bool:
@@ -136,7 +126,7 @@ def has_softening(case: Case) -> bool:
 
 def has_springs(case: Case) -> bool:
     """Return whether any bond gives way."""
-    stiffnesses = (*springs(case).stiffness, *axial_springs(case).stiffness)
+    stiffnesses = (*springs(case).stiffness, *springs(case, AXIAL).stiffness)
     return any(math.isfinite(stiffness) for row in stiffnesses for stiffness in row)
 
 

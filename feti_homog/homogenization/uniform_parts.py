@@ -27,7 +27,7 @@ from feti_homog.typing import Float, Int
 
 # Subdomains of so many elements at once: few enough for the processor's cache, many enough for NumPy.
 ELEMENTS_AT_ONCE = 1 << 13
-# Halvings from which on the mesh that is refined twice less serves.
+# Halvings from which on the mesh that is refined twice less serves, but across materials and where a phase locks.
 REFINED_OFTEN = 3
 # Largest lambda / mu on that mesh, of a Poisson's ratio of 0.4: beyond, errors of coarse elements are no guide.
 LOCKING = 4.0
@@ -190,19 +190,6 @@ def locks(subdomains: Sequence[Subdomain | UniformPart], comm: MPI.Intracomm) ->
     """Return whether linear elements in a phase on any rank hardly change volume.  Collective."""
     locking = any(s.problem.components == 2 and s.L[0, 1] > LOCKING * s.L[2, 2] for s in subdomains)
     return bool(comm.allreduce(locking, MPI.LOR))
-
-
-def nested_lattice(
-    lattice: ReferenceLattice, subdomains: Sequence[Subdomain], comm: MPI.Intracomm, across: bool
-) -> ReferenceLattice:
-    """Return the coarser mesh's lattice.
-
-    It is refined once less, or twice after many halvings if no phase locks.
-
-    Not twice if subdomains reach across materials.  Collective.
-    """
-    often = not locks(subdomains, comm) and lattice.halvings >= REFINED_OFTEN and not across
-    return lattice.coarser(2 if often else 1)
 
 
 def nested_interiors(

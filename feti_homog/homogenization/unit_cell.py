@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from mpi4py import MPI
 
 from feti_homog.case.case import Case
-from feti_homog.fem.problem import AXIAL
+from feti_homog.fem.problem import AXIAL, Problem
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.shared_entities import SharedEntities, share_entities
 from feti_homog.feti.decomposition.subdomain import Subdomain
@@ -22,7 +22,7 @@ from feti_homog.homogenization import cell_remarks, partition_policy, phase_laws
 from feti_homog.homogenization.domain_partition import CellSummary, RankShare
 from feti_homog.homogenization.partition_policy import DEFAULT_POLICY, PartitionPolicy
 from feti_homog.homogenization.tile_tearing import cut
-from feti_homog.homogenization.uniform_parts import UniformPart
+from feti_homog.homogenization.uniform_parts import UniformPart, locks
 from feti_homog.interface import debonded_arcs
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.mesh.refinement import ReferenceLattice
@@ -155,8 +155,9 @@ class TornCell:
 
     @cached_property
     def nested_lattice(self) -> ReferenceLattice:
-        """The lattice for the mesh that is refined less.  Collective when first read."""
-        return uniform_parts.nested_lattice(self.lattice, self.subdomains, self.comm, self.summary.across)
+        """Lattice refined once less, or twice if nothing is against it.  Collective when first read."""
+        often = not locks(self.subdomains, self.comm) and self.lattice.halvings >= uniform_parts.REFINED_OFTEN
+        return self.lattice.coarser(2 if often and not self.summary.across else 1)
 
     @cached_property
     def nested_interiors(self) -> list[uniform_parts.NestedInterior]:
@@ -213,36 +214,33 @@ def tear(
         CaseError, MeshError: on every rank.
     """
     share, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
-    summary, table = share.summary, share.table
-    problem, recovers = phase_laws.plane_problem(case), case.output.mesh_error or case.output.fields
+    summary, recovers = share.summary, case.output.mesh_error or case.output.fields
+
+    def solver_of(problem: Problem, subdomains: list[Subdomain]) -> FetiSolver:
+        applications = partition_policy.applications(case, problem, summary.across)
+        springs = phase_laws.springs(case, problem)
+        return FetiSolver(comm, shared, subdomains, lattice, applications, thresholds, springs, problem, recovers)
+
     with progress.stage("factor") as line:
-        applications, springs = partition_policy.applications(case, problem, summary.across), phase_laws.springs(case)
-        solver = FetiSolver(comm, shared, subdomains, lattice, applications, thresholds, springs, problem, recovers)
+        solver = solver_of(phase_laws.problems(case)[0], subdomains)
         multipliers, dimension = solver.jump_operator.global_rows, solver.coarse_dimension
         line.append(f"{multipliers} multipliers, coarse dimension {dimension}")
-    cell = TornCell(comm, case, summary, lattice, table, subdomains, solver)
+    cell = TornCell(comm, case, summary, lattice, share.table, subdomains, solver)
     if len(phase_laws.problems(case)) == 1:
         return cell
     with progress.stage("assemble") as line:
         axial = agree(comm, assemble_axial, case, summary, subdomains)
         line.append(f"{comm.allreduce(sum(s.n_dofs for s in axial))} degrees of freedom along the fibres")
     with progress.stage("axial"):
-        applications, springs = (
-            partition_policy.applications(case, AXIAL, summary.across),
-            phase_laws.axial_springs(case),
-        )
-        solver = FetiSolver(comm, shared, axial, lattice, applications, thresholds, springs, AXIAL, recovers)
-    return replace(cell, axial=TornCell(comm, case, summary, lattice, table, axial, solver))
+        return replace(cell, axial=replace(cell, subdomains=axial, solver=solver_of(AXIAL, axial)))
 
 
 def assemble_axial(case: Case, summary: CellSummary, subdomains: Sequence[Subdomain]) -> list[Subdomain]:
     """Assemble this rank's subdomains for the displacement along the fibres, on their meshes."""
-    law = partial(phase_laws.axial_law, case)
+    laws = [_laws(case, summary, s.submesh, AXIAL) for s in subdomains]
     return [
-        Subdomain.on(
-            s.submesh, s.mesh, _laws(summary, s.submesh, law), AXIAL, s.material, is_thin=s.is_thin, is_outer=s.is_outer
-        )
-        for s in subdomains
+        Subdomain.on(s.submesh, s.mesh, L, AXIAL, s.material, is_thin=s.is_thin, is_outer=s.is_outer)
+        for s, L in zip(subdomains, laws, strict=True)
     ]
 
 
@@ -276,19 +274,20 @@ def _assemble(
     case: Case, summary: CellSummary, submeshes: SubmeshesOfRank, lattice: ReferenceLattice
 ) -> list[Subdomain]:
     """Refine and assemble this rank's subdomains."""
-    problem, law, subdomains = phase_laws.plane_problem(case), partial(phase_laws.plane_law, case), list[Subdomain]()
+    problem, subdomains = phase_laws.problems(case)[0], list[Subdomain]()
     for s in submeshes.cut():
         phase_of = summary.constituent_phase[s.constituent]
         material = None if s.phase else np.unique(phase_of, return_inverse=True)[1]
         mixed = tuple(phase_laws.is_mixed(case, name) for name in _phases(summary, s))
         flags = {"is_thin": s.phase == COATING, "is_outer": s.phase == MATRIX}
-        subdomains.append(Subdomain.build(s, lattice, _laws(summary, s, law), problem, material, mixed, **flags))
+        laws = _laws(case, summary, s, problem)
+        subdomains.append(Subdomain.build(s, lattice, laws, problem, material, mixed, **flags))
     return subdomains
 
 
-def _laws(summary: CellSummary, submesh: Submesh, law: Callable[[str], Float]) -> Float:
-    """Return a subdomain's stiffnesses by each phase's `law`, as `assemble` takes them."""
-    laws = np.stack([law(phase) for phase in _phases(summary, submesh)])
+def _laws(case: Case, summary: CellSummary, submesh: Submesh, problem: Problem) -> Float:
+    """Return a subdomain's phase stiffnesses in a problem, as `assemble` takes them."""
+    laws = np.stack([phase_laws.law(case, phase, problem) for phase in _phases(summary, submesh)])
     return np.asarray(laws[0] if submesh.phase else laws)
 
 
