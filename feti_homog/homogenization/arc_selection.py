@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 
 from feti_homog.case.case import Case
-from feti_homog.case.interface_section import Arc, InterfaceSection, interface_label
+from feti_homog.case.interface_section import InterfaceSection, interface_label
 from feti_homog.interface import debonded_arcs
 from feti_homog.interface.debonded_arcs import MovedTips
 from feti_homog.mesh.outline.outline import MERGED
@@ -113,16 +113,6 @@ class EstimatedNodes:
             moved.append(debonded_arcs.moved_tips(tips, self.fibre[at], self.direction[at], distance))
         return tuple(moved)
 
-    def within(self, pair: int) -> EstimatedNodes:
-        """Return the nodes on one interface section."""
-        at = self.pair == pair
-        return EstimatedNodes(self.fibre[at], self.pair[at], self.direction[at], self.is_vertex[at])
-
-    def selects(self, arc: Arc, opening: float | None, fibre: int | None, moved: MovedTips) -> bool:
-        """Return whether any node, on the fibre if one is given, is within the arc."""
-        inside = debonded_arcs.debonded([arc], opening, self.fibre, self.direction, moved)
-        return bool((inside if fibre is None else inside[self.fibre == fibre]).any())
-
 
 def fibre_faults(case: Case, centres: Float) -> list[str]:
     """List faults in fibres with arcs, for fibre centres (fibres, 2), NaN without a centre."""
@@ -138,17 +128,19 @@ def faults(case: Case, nodes: EstimatedNodes, moved: Sequence[MovedTips]) -> lis
     openings: Sequence[float | None] = case.section.openings or [None]
     lines = []
     for pair, interface in enumerate(case.interfaces):
-        of_pair, label = nodes.within(pair), interface_label(pair, len(case.interfaces))
+        fibres, directions = nodes.fibre[nodes.pair == pair], nodes.direction[nodes.pair == pair]
+        label = interface_label(pair, len(case.interfaces))
         for (place, arc), opening in product(enumerate(interface.debonded), openings):
             angle, line = opening if arc.angle is None else arc.angle, f"[{label}] debonded[{place}]"
+            inside = debonded_arcs.debonded([arc], opening, fibres, directions, moved[pair])
             for fibre in [None] if isinstance(arc.fibre, str) else arc.fibre:
-                if angle and not of_pair.selects(arc, opening, fibre, moved[pair]):
-                    lines.append(line + _fault(angle, fibre, of_pair, interface.between))
+                if angle and not (inside if fibre is None else inside[fibres == fibre]).any():
+                    lines.append(line + _fault(angle, fibre, fibres, interface.between))
     return list(dict.fromkeys(lines))
 
 
-def _fault(angle: float, fibre: int | None, nodes: EstimatedNodes, between: Sequence[str] | None) -> str:
-    if fibre is not None and fibre not in nodes.fibre:
+def _fault(angle: float, fibre: int | None, fibres: Int, between: Sequence[str] | None) -> str:
+    if fibre is not None and fibre not in fibres:
         which = "that can debond" if between is None else f"between {' and '.join(between)}"
         return f".fibre: fibre {fibre} has no interface {which}"
     whose = "any fibre" if fibre is None else f"fibre {fibre}"

@@ -11,11 +11,10 @@ from feti_homog.case.interface_section import interface_label
 from feti_homog.homogenization import phase_laws
 from feti_homog.materials.constants import engineering_moduli
 from feti_homog.materials.laws import plane_stiffness
-from feti_homog.mesh.coarse_mesh import CoarseMesh, interface_edges
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.submesh import pinned_class
 from feti_homog.schema.wording import toml_value
-from feti_homog.typing import AnyInt, Int
+from feti_homog.typing import AnyInt, Float, Int
 
 SAME_FRACTION = 0.01  # of a matched table and its cell, relative
 # Largest element on an interface / length of the process zone. With 0.54 of it the stresses of the square cell of
@@ -122,9 +121,8 @@ def table_remarks(case: Case) -> tuple[str, ...]:
     )
 
 
-def longest_edge(mesh: CoarseMesh) -> float:
-    """Return the longest edge between phases; 0 if there is none."""
-    ends = mesh.points[interface_edges(mesh)]
+def longest(ends: Float) -> float:
+    """Return the longest edge between `ends` (e, 2, 2); 0 without edges."""
     return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max(initial=0.0))
 
 
@@ -153,7 +151,7 @@ def warnings(case: Case, width: float, edge: float) -> list[str]:
 
     Args:
         width: cell width.
-        edge: `longest_edge` in the coarse mesh, which `refine` halves.
+        edge: longest coarse edge between phases, which `refine` halves.
     """
     length, softens, lines = process_zone(case), phase_laws.has_softening(case), _law_warnings(case)
     resolved = RESOLVED_SOFTENING if softens else RESOLVED

@@ -11,7 +11,7 @@ from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import Partition, decompose, halves
 from feti_homog.homogenization import arc_selection, cell_remarks
 from feti_homog.homogenization.arc_selection import EstimatedNodes
-from feti_homog.homogenization.cell_remarks import mesh_remarks, subdomain_remarks, table_remarks
+from feti_homog.homogenization.cell_remarks import longest, mesh_remarks, subdomain_remarks, table_remarks
 from feti_homog.homogenization.partition_policy import (
     DEFAULT_POLICY,
     PartitionPolicy,
@@ -20,7 +20,7 @@ from feti_homog.homogenization.partition_policy import (
 )
 from feti_homog.interface import debonded_arcs
 from feti_homog.interface.debonded_arcs import MovedTips
-from feti_homog.mesh.coarse_mesh import CoarseMesh, voids
+from feti_homog.mesh.coarse_mesh import CoarseMesh, interface_edges, voids
 from feti_homog.mesh.fill.gmsh_mesher import NodedCell
 from feti_homog.mesh.mesh_fibres import coating_thickness, fibre_circles, fibre_frames, fibre_numbers
 from feti_homog.mesh.periodic_topology import Torus
@@ -172,7 +172,7 @@ def distribute(
         bodies=bodies,
         subdomains=len(cut.rank),
         coarse_triangles=triangles,
-        interface_edge=cell_remarks.longest_edge(mesh),
+        interface_edge=longest(mesh.points[interface_edges(mesh)]),
         numbers=numbers,
         is_fibre=is_fibre,
         constituent_phase=torus.constituent_phase,
@@ -205,7 +205,6 @@ def summary_of(case: Case, noded: NodedCell, subdomains: int, triangles: int) ->
     is_fibre = arrangement.precedence(disc, lines.is_coating[circle]) == disc + 1
     centres = in_cell(noded.scale * arrangement.centres[disc], np.array([regions.width, regions.height]))
     radii = regions.ellipses.circles[circle, 2]
-    ends = noded.scale * lines.points[arc_edges(lines.curves)[0]]
     nothing = np.full((1, 2), np.nan)
     return CellSummary(
         width=regions.width,
@@ -214,7 +213,7 @@ def summary_of(case: Case, noded: NodedCell, subdomains: int, triangles: int) ->
         bodies=len(regions.phase),
         subdomains=subdomains,
         coarse_triangles=triangles,
-        interface_edge=float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max(initial=0.0)),
+        interface_edge=longest(noded.scale * lines.points[arc_edges(lines.curves)[0]]),
         numbers=np.append(0, disc + 1),
         is_fibre=np.append(False, is_fibre),
         constituent_phase=regions.phase,

@@ -162,10 +162,22 @@ def tear_by_tiles(
     pieces = wanted_pieces(case, load, edges, lattice, comm.size, policy)
     longest = comm.allreduce(float(torus.edge_lengths.max(initial=0.0)), MPI.MAX)
     local = agree(comm, _cut, torus, tile, pieces / load, longest)
-    subdomain, body, loads = _numbered(torus, tile, local, comm)
+    # Subdomains of all ranks are numbered by body and tile.
+    first = np.unique(local, return_index=True)[1]
+    parts = comm.allgather((torus.constituent[first], tile[first], np.bincount(local)))
+    body, tiles, loads = (np.concatenate(rows) for rows in zip(*parts, strict=True))
+    order = np.lexsort((np.arange(len(body)), tiles, body))
+    before = sum(len(bodies) for bodies, *_ in parts[: comm.rank])
+    subdomain, body, loads = np.argsort(order)[before + local], body[order], loads[order]
     neighbours = comm.gather(agree(comm, _neighbours, torus, subdomain))
     rank = on_root(comm, _assigned, loads, neighbours or [], comm.size)
-    table, pinned = SubdomainTable(body, rank, nesting, regions.phase), _pinned(torus, comm)
+    table = SubdomainTable(body, rank, nesting, regions.phase)
+    # One class on all ranks is pinned, see `submesh.pinned_class`.
+    at_interface, in_matrix = np.zeros((2, len(torus.class_keys)), bool)
+    at_interface[torus.node_class[torus.mesh.arc_edges]] = True
+    in_matrix[torus.node_class[torus.mesh.triangles[torus.constituent == 0]]] = True
+    candidates = comm.allgather(pinning(torus, np.select([at_interface, in_matrix], [2, 0], 1)))
+    pinned: int = min(chain.from_iterable(candidates))[-1]
     shares = agree(comm, lambda: list(cut_for_ranks(torus, subdomain, table, comm.size, pinned)))
     summary = on_root(comm, summary_of, case, noded, len(body), int(load.sum()))
     return RankShare(summary, table, phase_pairs, joined(alltoall(comm, shares)))
@@ -199,19 +211,6 @@ def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) ->
     return cut_into_pieces(torus, parts, np.clip(pieces, 1, size), longest)
 
 
-def _numbered(torus: Torus, tile: Int, local: Int, comm: MPI.Intracomm) -> tuple[Int, Int, Int]:
-    """Count subdomains by body and tile over all ranks.  Collective.
-
-    Returns the subdomain (m,) of each triangle on this rank, then each subdomain's body (s,) and triangle count (s,).
-    """
-    first = np.unique(local, return_index=True)[1]
-    parts = comm.allgather((torus.constituent[first], tile[first], np.bincount(local)))
-    body, tiles, load = (np.concatenate(rows) for rows in zip(*parts, strict=True))
-    order = np.lexsort((np.arange(len(body)), tiles, body))
-    before = sum(len(bodies) for bodies, *_ in parts[: comm.rank])
-    return np.argsort(order)[before + local], body[order], load[order]
-
-
 def _neighbours(torus: Torus, subdomain: Int) -> tuple[Int, Int, Int, Int]:
     """Return subdomain pairs (n,) and (n,) that meet at this rank's edges.
 
@@ -230,16 +229,6 @@ def _assigned(load: Int, neighbours: list[tuple[Int, Int, Int, Int]], n_ranks: i
     a, b, edge, side = (np.concatenate(rows) for rows in zip(*neighbours, strict=True))
     side = side[np.argsort(edge, kind="stable")]
     return assign_ranks(load, np.append(a, side[::2]), np.append(b, side[1::2]), n_ranks)
-
-
-def _pinned(torus: Torus, comm: MPI.Intracomm) -> int:
-    """Find the key of the one class on all ranks that is pinned, see `submesh.pinned_class`.  Collective."""
-    at_interface, in_matrix = np.zeros((2, len(torus.class_keys)), bool)
-    at_interface[torus.node_class[torus.mesh.arc_edges]] = True
-    in_matrix[torus.node_class[torus.mesh.triangles[torus.constituent == 0]]] = True
-    candidates = comm.allgather(pinning(torus, np.select([at_interface, in_matrix], [2, 0], 1)))
-    best: tuple[int, float, int] = min(chain.from_iterable(candidates))
-    return best[-1]
 
 
 def tiled_cell(case: Case, noded: NodedCell) -> tuple[Int, Int, Int]:
