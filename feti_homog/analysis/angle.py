@@ -17,9 +17,8 @@ from feti_homog.homogenization.averaging import Response, asymmetry
 def run(context: AnalysisContext) -> dict[str, Any]:
     """Return `angle`, a point an angle.
 
-    A point is the stress under the case's strain, else the stiffness by unit loads.
-
-    Each angle begins with the previous angle's multipliers.
+    A point is the stress under the case's strain, else the stiffness by unit loads.  Each angle begins with the
+    previous angle's multipliers.
     """
     section = context.case.section
     assert isinstance(section, Angle)

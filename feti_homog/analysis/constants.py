@@ -1,4 +1,4 @@
-"""Constants that follow from a linear cell's stiffness, with bounds, closed-form estimates and mesh errors."""
+"""Constants from a linear cell's stiffness: bounds, estimates, mesh errors."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def constants(cell: TornCell, secants: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def stiffness_constants(stiffness: Float, thermal: Float | None) -> dict[str, Any]:
-    """Return constants from a stiffness (3, 3) or (6, 6), with the thermal stress (6,), as `Result` entries."""
+    """Return `Result` constants from stiffness (3, 3), (6, 6), thermal stress (6,)."""
     if len(stiffness) == 3:
         return {"moduli": named_constants.engineering_moduli(stiffness)}
     compliance = np.linalg.inv(stiffness)
@@ -75,7 +75,7 @@ def stiffness_constants(stiffness: Float, thermal: Float | None) -> dict[str, An
 
 
 def _comparisons(cell: TornCell, fractions: Mapping[str, float]) -> dict[str, Any]:
-    """Return closed-form estimates for round fibres, and bounds for any rigidly bonded fibres.
+    """Return closed-form estimates for round fibres, bounds for rigidly bonded ones.
 
     Estimates exist for fibres without coatings, held in the matrix by the same bonds, with springs of one radius;
     bounds for transversely isotropic phases.
@@ -108,14 +108,14 @@ def _comparisons(cell: TornCell, fractions: Mapping[str, float]) -> dict[str, An
 
 
 def _has_estimates(case: Case, phases: Sequence[str], radii: Sequence[Float], has_springs: bool) -> bool:
-    """Return whether estimates exist for fibre `radii` in each phase, NaN if not round."""
+    """Return whether estimates exist for fibre `radii`, NaN if not round."""
     if COATING in phases or any(interface.between is not None for interface in case.interfaces):
         return False
     return not any(np.isnan(r).any() or (has_springs and np.ptp(r) > SAME_RADIUS * r.max()) for r in radii)
 
 
 def unit_errors(context: AnalysisContext, responses: list[Response]) -> tuple[list[EnergyErrors], list[Response]]:
-    """Estimate errors in all unit load responses, by problem; return the responses with element shares.
+    """Estimate unit load errors by problem; return responses with element shares.
 
     Without `mesh_error` no errors; without a use for shares the responses as they are.  Collective.
     """
@@ -165,7 +165,7 @@ def mesh_error(
 
 
 def note_accuracy(context: AnalysisContext, energy: float) -> None:
-    """Note a sufficient mesh if the relative energy error exceeds the case's accuracy.  Collective."""
+    """Note a sufficient mesh if the energy error exceeds `accuracy`.  Collective."""
     cell = context.case.cell
     if cell.accuracy is None or (energy := context.cell.comm.bcast(energy)) <= cell.accuracy:
         return
@@ -208,7 +208,7 @@ def _note_bounds(
 
 
 def state_error(context: AnalysisContext, responses: Sequence[Response]) -> tuple[dict[str, float], list[Response]]:
-    """Return `mesh_error`, one state's relative energy error, and its responses with element shares.
+    """Return `mesh_error`, the relative energy error, and responses with shares.
 
     Without `mesh_error` no error; without a use for shares the responses as they are.  Collective.
     """
@@ -226,10 +226,7 @@ def state_error(context: AnalysisContext, responses: Sequence[Response]) -> tupl
 
 
 def check_accuracy(context: AnalysisContext) -> None:
-    """Note the mesh error under the first load if the case asks for accuracy.
-
-    Collective.
-    """
+    """Note the first load's mesh error if accuracy is asked.  Collective."""
     if context.case.cell.accuracy is None or not context.case.output.mesh_error:
         return
     cell, target = context.loads.interfaces, next(target for target in context.case.targets if any(target.values()))

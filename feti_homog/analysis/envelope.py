@@ -1,4 +1,4 @@
-"""`analysis.type = "envelope"`: debonding onset in a plane of macroscopic stresses or strains.
+"""`analysis.type = "envelope"`: debonding onset in a macroscopic stress or strain plane.
 
 The cell is linear, so tractions under all loads are superposed from unit loads: no direction costs a solve.
 """
@@ -33,7 +33,7 @@ COSINE_ROUNDING = 1e-15
 
 @dataclass(frozen=True)
 class Rays:
-    """Macroscopic states on n rays, each a start plus f times a direction, f >= 0.
+    """Macroscopic states on n rays: start plus f >= 0 times direction.
 
     Attributes:
         strain, stress: (n, m) directions.
@@ -87,10 +87,9 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 def rays_of(
     plane: Sequence[str], angles: Float, stiffness: Float, thermal_stress: Float | None, temperature: float
 ) -> Rays:
-    """Return the rays in directions (n,), degrees, in a plane with the axes `plane`.
+    """Return the rays in directions (n,), degrees, between axes `plane`.
 
-    Stress rays have E = C^-1 S and begin at zero stress after a temperature change, strain rays begin at zero
-    strain.
+    Stress rays have E = C^-1 S and begin at zero stress after a temperature change, strain rays begin at zero strain.
     """
     strains, stresses = voigt_names(len(stiffness))
     by_stress = plane[0] in stresses
@@ -147,13 +146,13 @@ class _Finder:
                 yield rays.at(ray, float(factor)) | place | dict(zip(self._break_names, shares, strict=True))
 
     def _unit_loads(self, strain: Float, temperature: float, names: Sequence[str]) -> Float:
-        """(n, l) each unit load's share in strains (n, m) with these names and a temperature change."""
+        """(n, l) unit load shares in named strains (n, m) and temperature."""
         column = {name: strain[:, number] for number, name in enumerate(names)}
         column["temperature"] = np.full(len(strain), temperature)
         return np.stack([column[load] for load in self._loads], axis=1)
 
     def _error_utilisation(self, loads: Float) -> Float:
-        """(n, k) utilisations by the bond stresses in all problems under unit loads (n, l).  Collective."""
+        """(n, k) utilisations by bond stresses under unit loads (n, l).  Collective."""
         first, total = 0, np.zeros((len(loads), len(self._fibre)))
         for problem, part in zip(self._problems, ((0, 1), (2,))[: len(self._problems)], strict=True):
             end = first + len(problem.solver.problem.loads)
@@ -166,9 +165,8 @@ class _Finder:
     def _first(self, factors: Float, before: Float, directions: Float) -> list[list[float]]:
         """Return each ray's least factor, its bond and break shares.
 
-        In a row: factor, then fibre, interface and direction of the bond, then shares of the break.
-
-        Bonds that break together: lowest fibre, then interface, then angle.  Collective.
+        In a row: factor, then fibre, interface and direction of the bond, then shares of the break.  Bonds that break
+        together: lowest fibre, then interface, then angle.  Collective.
         """
         n = len(factors)
         smallest = factors.min(axis=1, initial=np.inf)
@@ -188,7 +186,7 @@ class _Finder:
 
 
 def _unit_tractions(context: AnalysisContext, responses: Sequence[Response]) -> Float:
-    """(l, k, c) tractions at this rank's nodes under each unit load: normal, tangential, and axial in space."""
+    """(l, k, c) normal, tangential, axial tractions at nodes by unit load."""
     components = [problem.cell.solver.problem.components for problem in context.loads.problems]
     tractions, column = list[Float](), 0
     groups = context.loads.by_problem(responses)

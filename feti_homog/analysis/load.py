@@ -1,4 +1,4 @@
-"""`analysis.type = "load"`: one equilibrium under given strains, stresses and temperature; nothing breaks."""
+"""`analysis.type = "load"`: equilibrium under given strains, stresses, temperature; nothing breaks."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ from feti_homog.analysis.tip_records import IN_PLANE_LOADS, tip_rates
 def run(context: AnalysisContext) -> dict[str, Any]:
     """Return `load`, the state with faces debonded from the start.
 
-    Under the load they are open or in contact.
-
-    Adds `tips` on its arcs if only plane strains are there; `sensitivities` if the case asks.
+    Under the load they are open or in contact.  Adds `tips` on its arcs if only plane strains are there;
+    `sensitivities` if the case asks.
     """
     cell, (target,) = context.loads.interfaces, context.case.targets
     bonds = context.bonds(None)

@@ -1,4 +1,4 @@
-"""`analysis.type = "path"`: load-induced debonding along a macroscopic strain path, Section III.F and Fig. 5."""
+"""`analysis.type = "path"`: debonding along a strain path, Section III.F, Fig. 5."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 
 
 def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, Any]:
-    """Return `path`, a point an event (or increment), each written to the checkpoint at once.
+    """Return `path`, a point an event (or increment), checkpointed at once.
 
     `states` numbers the points with recorded fields, chosen when all points are found.
     """
@@ -97,7 +97,7 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
 
 
 def _remark_loose_fibres(context: AnalysisContext, last: Point) -> None:
-    """Remark the first fibres that no bond holds in the end, if faces have friction.  Collective."""
+    """Remark fibres that no bond holds at last, with friction.  Collective."""
     if context.case.has_friction and (loose := context.fibre_interfaces.loose(last.after.bonds.status)):
         names = ", ".join(map(str, loose[:NAMED_FIBRES])) + (", ..." if len(loose) > NAMED_FIBRES else "")
         fibres = f"{len(loose)} fibres ({names})" if len(loose) > 1 else f"fibre {names}"
@@ -134,7 +134,7 @@ def _events_in_checkpoint(context: AnalysisContext, law: BondLaw) -> int:
 def _points(
     context: AnalysisContext, path: LoadPath, law: BondLaw, stored_events: int
 ) -> Iterator[tuple[Point, tuple[Energies, float] | None, list[Response]]]:
-    """Yield points with responses: first from the checkpoint, with energies up to each, then new ones.
+    """Yield points with responses: first from the checkpoint, with energies, then new ones.
 
     Where nothing carries the stresses any more, or faces with friction cannot go on, the path ends with a fault.
 
@@ -171,7 +171,7 @@ def _points(
 
 
 def _end_of(context: AnalysisContext, responses: list[Response]) -> str:
-    """Return where a path ends: beyond its last point, with the stresses there."""
+    """Return where a path ends: beyond its last point, with stresses."""
     stress = np.asarray(context.loads.means(responses)["stress"])
     pairs = zip(voigt_names(len(stress))[1], stress, strict=True)
     large = [f", {name} {value:.6g}" for name, value in pairs if abs(value) > LEAST_STRESS * np.abs(stress).max()]
@@ -179,7 +179,7 @@ def _end_of(context: AnalysisContext, responses: list[Response]) -> str:
 
 
 def _with_advice(error: NotCarriedError, place: str, path: LoadPath) -> NotCarriedError:
-    """Return the error that ends a path, with its place, empty before the first point, and a remedy."""
+    """Return a path's last error with place, initially empty, and remedy."""
     if isinstance(error, StuckError):
         more = "" if path.method == "events" else " or more increments"
         return StuckError(f"[path]: {error}{place}; a smaller friction{more} may lead further")
@@ -230,7 +230,7 @@ def _goes_on(context: AnalysisContext, path: LoadPath, point: Point, count: int)
 def _recorded(
     context: AnalysisContext, path: LoadPath, law: BondLaw, entries: Sequence[dict[str, Any]], last: Point
 ) -> dict[str, Any]:
-    """Record tips and fields at kept points, read from the checkpoint; it may lack the last.  Collective.
+    """Record tips and fields at kept checkpoint points and the last.  Collective.
 
     Returns `states`, the point numbers with recorded fields.
     """
@@ -251,7 +251,7 @@ def _recorded(
 
 
 def _checked(context: AnalysisContext, point: Point, name: str) -> tuple[Point, Sequence[Response]]:
-    """Return a point completed by F lambda and its responses, and record their checks.  Collective."""
+    """Return a point completed by F lambda; record its checks.  Collective."""
     point = replace(point, state=context.loads.interfaces.completed(point.state))
     responses = context.loads.responses(point.state, point.scale)
     for response in responses:

@@ -28,7 +28,7 @@ Record = TypeVar("Record", PathPoint, Peak, Tips)
 def scaled(
     document: Mapping[str, Any], points: Sequence[PathPoint], old_peak: Peak | None, toughness: float
 ) -> tuple[dict[str, Any], tuple[PathPoint, ...], Peak | None]:
-    """Return a path's case, points and peak for another first interface toughness, s^2 times the case's.
+    """Return case, points and peak at toughness s^2 times the case's.
 
     The case has s times its loads; s = sqrt(toughness / case toughness), alike for all interfaces.
 
@@ -59,7 +59,7 @@ def _scaled(old: Record, names: tuple[str, ...], factor: float) -> Record:
 
 
 def _times(value: Any, factor: float) -> Any:
-    """Return a number, an array, or the numbers in lists and tables multiplied."""
+    """Return numbers multiplied, also in arrays, lists and tables."""
     if isinstance(value, Mapping):
         return {name: _times(item, factor) for name, item in value.items()}
     if isinstance(value, list | tuple):

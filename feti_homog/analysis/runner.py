@@ -47,8 +47,7 @@ def run(
 ) -> Result:
     """Run the case, write its results to `directory`, and return them.  Collective.
 
-    `resume` goes on from a path's checkpoint, or reads the finished result; `keep_fields` returns a run's fields
-    too.
+    `resume` goes on from a path's checkpoint, or reads the finished result; `keep_fields` returns a run's fields too.
 
     Raises:
         CaseError, MeshError: before any result is written; also for another run's checkpoint, and for a folder
@@ -93,7 +92,7 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
 
 
 def _begun(case: Case, comm: MPI.Intracomm, quiet: bool) -> Progress:
-    """Print the warnings and remarks about a case, and return its run's progress."""
+    """Print warnings and remarks about a case; return its run's progress."""
     progress = Progress(comm, quiet)
     for label, lines in (("warning", case.warnings()), ("remark", case.remarks())):
         for line in lines:
@@ -108,7 +107,7 @@ def _warn(context: AnalysisContext) -> None:
 
 @contextmanager
 def _torn(case: Case, comm: MPI.Intracomm, progress: Progress) -> Iterator[TornCell]:
-    """Provide the torn cell with the case's options set, while the block lasts."""
+    """Provide the torn cell with the case's options in a block."""
     PETSc.garbage_cleanup(comm)  # parallel objects of earlier cases, which all ranks free together
     process_memory.forget_peak(kept=SPARE_BYTES)
     with case_options(case.petsc):
@@ -171,7 +170,7 @@ def _analyse(context: AnalysisContext) -> dict[str, Any]:
 
 
 def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields | None) -> Result:
-    """Build the result with an analysis's entries: counts over all ranks, timings, lines.  Collective."""
+    """Build the result with an analysis's entries, counts and timings.  Collective."""
     cell, progress, checks = context.cell, context.progress, context.checks
     fractions = cell.fractions()
     # Straight edges cut off a part of the fibres.
@@ -263,7 +262,7 @@ def _solver_info(context: AnalysisContext) -> SolverInfo:
 
 
 def _write(result: Result, directory: Path, cell: TornCell) -> None:
-    """Write result.json, then files made from it; remove an earlier result's other files."""
+    """Write result.json, then dependent files; remove an earlier result's files."""
     on_root_only(cell.comm, result_json.write, directory, result.document)
     written = {result_json.NAME}
     if result.result_h5 is not None:
@@ -284,7 +283,7 @@ def _draw(directory: Path) -> list[Path]:
 
 
 def _print_summary(result: Result, progress: Progress) -> None:
-    """Print the summary on rank 0; only a rank that prints it loads its tables.  Collective."""
+    """Print the summary on rank 0, which alone loads tables.  Collective."""
     timings = progress.timings()
     if progress.prints:
         from feti_homog.report.text.summary import summary

@@ -31,7 +31,7 @@ LEAST_SIZE = 1e-5  # at tips / width of the cell, by default
 
 
 def on_interface(case: Case, interface: InterfaceSection, fibres: int) -> dict[int, list[float]]:
-    """Return tip directions in [0, 360) for arcs at all openings, by fibre number from 0."""
+    """Return tip directions in [0, 360), all openings, by fibre from 0."""
     return debonded_arcs.tips(interface.debonded, case.section.openings, fibres)
 
 
@@ -46,7 +46,7 @@ def marks(case: Case, fibres: int) -> dict[int, list[float]]:
 
 
 def size(case: Case, estimate: ElementEstimate) -> float | None:
-    """Return element size at tips / cell width, None for the interface size.
+    """Return element size at tips / cell width, or None: interface size.
 
     Without `tip_size` in the case it is, with the mean radius / width R,
 
@@ -70,7 +70,7 @@ def size(case: Case, estimate: ElementEstimate) -> float | None:
 
 @dataclass(frozen=True)
 class EstimatedNodes:
-    """(k,) interface nodes on rank 0, before refinement: fibres from 1, interfaces, directions in degrees."""
+    """(k,) unrefined interface nodes: fibres from 1, interfaces, degrees; on rank 0."""
 
     fibre: Int
     pair: Int
@@ -115,7 +115,7 @@ class EstimatedNodes:
 
 
 def fibre_faults(case: Case, centres: Float) -> list[str]:
-    """List faults in fibres with arcs, for fibre centres (fibres, 2), NaN without a centre."""
+    """List faulty fibres with arcs; centres (fibres, 2), NaN without one."""
     return [
         fault
         for pair, interface in enumerate(case.interfaces)
@@ -124,7 +124,7 @@ def fibre_faults(case: Case, centres: Float) -> list[str]:
 
 
 def faults(case: Case, nodes: EstimatedNodes, moved: Sequence[MovedTips]) -> list[str]:
-    """List faulty arcs, and [angle] openings other than 0 that select no fibre node."""
+    """List faulty arcs, and nonzero [angle] openings that select no node."""
     openings: Sequence[float | None] = case.section.openings or [None]
     lines = []
     for pair, interface in enumerate(case.interfaces):

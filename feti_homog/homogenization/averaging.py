@@ -1,4 +1,4 @@
-"""Macroscopic response of the torn cell, the laws it must obey, and debonded fibre lengths.
+"""Macroscopic cell response, laws that it obeys, and debonded fibre lengths.
 
 Strains E are [E11, E22, gamma12] in the plane, then the problem's other loads; stresses are alike.
 """
@@ -158,7 +158,7 @@ class Homogenization:
         return self._scaled(state, scale, stress, energy, u, checks)
 
     def _stretched(self, state: Equilibrium) -> float:
-        """Return lam C lam per area, twice the spring energy, rubbing bonds included.  Collective."""
+        """Return twice the spring energy per area, rubbing bonds included.  Collective."""
         springs = state.solution.compliance * state.solution.lam
         twice = float(state.solution.lam @ springs) + energy_beside_springs(self.interface, state)
         return float(self.cell.comm.allreduce(twice)) / self.cell.summary.area
@@ -166,7 +166,7 @@ class Homogenization:
     def _scaled(
         self, state: Equilibrium, scale: float, stress: Float, energy: float, u: Float, checks: dict[str, float]
     ) -> Response:
-        """Return the response that is `scale` times a state with <sigma:eps> = `energy`.  Collective."""
+        """Return `scale` times a state with <sigma:eps> = `energy`.  Collective."""
         means = scale * state.solution.strain, scale * stress
         energies = scale**2 * energy / 2, scale**2 * self._stretched(state) / 2
         errors, damage = checks | state.certificate, self.damage(state.bonds)
@@ -178,14 +178,14 @@ class Homogenization:
         return (bonds.status != BONDED).astype(float) if damage is None else damage
 
     def _rubbing(self, state: Equilibrium) -> float:
-        """Sum force times slip on faces with friction, per area, which is not stored.  Collective."""
+        """Sum friction work on faces per area, not stored.  Collective."""
         if state.bonds.gap_and_slip is None:
             return 0.0
         work = float(state.solution.lam @ state.solution.jump) - energy_beside_springs(self.interface, state)
         return float(self.cell.comm.allreduce(work)) / self.cell.summary.area
 
     def _unmet_stress(self, state: Equilibrium, stress: Float) -> float:
-        """Return the prescribed stress error, relative to the load and to the stresses.  Collective."""
+        """Return the prescribed stress error, relative to load and stresses.  Collective."""
         load, scales = state.load, self.interface.scales
         # Scaled by the roots of their stiffnesses, so that none is small next to another.
         root, imposed = scales.roots, scales.imposed_strain(state.asked)
@@ -203,7 +203,7 @@ class Homogenization:
 
     @cached_property
     def _strain_of_jumps(self) -> Float:
-        """(owned rows, m) nu with int eps* = nu^T B u for every displacement u: nu = (B B^T)^-1 B int B_e."""
+        """(owned rows, m) nu = (B B^T)^-1 B int B_e: int eps* = nu^T B u."""
         solver = self.cell.solver
         B = solver.interface_operators.B
         integrals = solver.jump_operator.sum(B @ self._strain_of_displacements)
@@ -212,14 +212,14 @@ class Homogenization:
 
     @cached_property
     def _strain_of_displacements(self) -> Float:
-        """(boundary dofs, m) matrix whose transpose times u is int eps* over bodies and voids."""
+        """(boundary dofs, m) N: N^T u = int eps* over bodies and voids."""
         m, dofs = self.cell.solver.problem.strains, self.cell.solver.interface_operators.dofs
         pairs = zip(self.cell.subdomains, dofs, strict=True)
         return np.concatenate([np.zeros((0, m)), *(s.mean_strain(boundary) for s, boundary in pairs)])
 
     @cached_property
     def _strain_inside(self) -> float:
-        """The largest inner node share in int eps*, relative: 0 for closed meshes and voids.  Collective."""
+        """Largest relative inner share in int eps*; 0 for closed meshes.  Collective."""
         inner, size = 0.0, 0.0
         for s, boundary in zip(self.cell.subdomains, self.cell.solver.interface_operators.dofs, strict=True):
             size = max(size, float(np.sqrt(s.area)))
@@ -238,7 +238,7 @@ class Homogenization:
 
 
 class FibreInterfaces:
-    """Interfaces of a cell's f fibres, by number; a coated fibre may have two.
+    """Interfaces by fibre number, f fibres; a coated fibre may have two.
 
     A node has its tributary length, debonded or not.
     """
@@ -255,11 +255,11 @@ class FibreInterfaces:
         self._degrees = np.where(np.isnan(radius), 360.0 / np.where(self._length > 0, self._length, 1.0), round_fibre)
 
     def debonded_length(self, status: Status) -> Float:
-        """(f,) debonded length on each fibre's interface; `status` (k,) at this rank's nodes.  Collective."""
+        """(f,) debonded interface lengths; `status` (k,) at this rank's nodes.  Collective."""
         return self._sums(self._nodes.length * (status != BONDED))
 
     def damaged_length(self, damage: Float) -> Float:
-        """(f,) length on each fibre's interface with damage (k,) between 0 and 1, which still holds.  Collective."""
+        """(f,) interface lengths that hold with damage (k,) above 0.  Collective."""
         return self._sums(self._nodes.length * ((damage > 0.0) & (damage < 1.0)))
 
     def loose(self, status: Status) -> list[int]:
@@ -268,7 +268,7 @@ class FibreInterfaces:
         return [int(number) for number in np.flatnonzero((bonded == 0.0) & (self._length > 0.0)) + 1]
 
     def angle(self, length: Float) -> Float:
-        """(f,) arc degrees for lengths (f,): 360 times their share if not round, or coated with an interface."""
+        """(f,) degrees by radius, else (not round, coating interface) 360 times share."""
         return np.asarray(length * self._degrees)
 
     def share(self, length: Float) -> float:

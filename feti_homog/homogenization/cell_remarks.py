@@ -28,7 +28,7 @@ LARGEST_REFINE, SMALLEST_SIZE = 8, 1e-5
 
 
 def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
-    """(phases, phases) the case's interface number between two phases; -1 where they never part.
+    """(phases, phases) interface numbers between phases; -1 where they never part.
 
     An interface without `between` lies between the matrix, the first phase, and all other phases; perfect bonding too.
     """
@@ -43,7 +43,7 @@ def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
 
 
 def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -> list[str]:
-    """List interfaces between phases that the cell lacks, or that touch nowhere in it.
+    """List interfaces between phases that the cell lacks, or that never touch.
 
     Phases `first` (n,) touch phases `second` (n,).
     """
@@ -63,7 +63,7 @@ def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -
 
 
 def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
-    """List remarks on the mesh: its own, an [interface] without an effect, and nodes that never part.
+    """List mesh remarks, an [interface] without effect, and nodes that never part.
 
     `pairs` as in `share_entities`.
     """
@@ -83,7 +83,7 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
 
 
 def _pinned_bond(torus: Torus) -> list[str]:
-    """Remark a bond at the node that is pinned against translation, Eq. (15): it never parts."""
+    """Remark a bond at the pinned node, Eq. (15): it never parts."""
     at = np.searchsorted(torus.class_keys, pinned_class(torus))
     if torus.never_part[at] or torus.meeting[at] < 2:
         return []
@@ -95,7 +95,7 @@ def _pinned_bond(torus: Torus) -> list[str]:
 
 
 def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles: int) -> tuple[str, ...]:
-    """Remark more or fewer subdomains than the case asks for, with the reason."""
+    """Remark more or fewer subdomains than asked for, with the reason."""
     asked = case.decomposition.subdomains
     if asked is None or asked == subdomains:
         return ()
@@ -129,10 +129,9 @@ def longest(ends: Float) -> float:
 def process_zone(case: Case) -> float | None:
     """Return the least process zone length E' G_Ic / sigma_c^2.
 
-    It is given for bonds that break by energy; None for others.
-
-    sigma_c = sqrt(2 k_n G_Ic), or a cohesive law's strength, in its shorter pure mode.  E' is Young's
-    modulus in the plane state, E / (1 - nu^2) in plane strain, along the most compliant axis in all phases.
+    None unless bonds break by energy.  sigma_c = sqrt(2 k_n G_Ic), or a cohesive law's strength, in its shorter pure
+    mode.  E' is Young's modulus in the plane state, E / (1 - nu^2) in plane strain, along the most compliant axis in
+    all phases.
     """
     lengths = [1 / (2 * bond.normal_stiffness) for bond in case.interfaces if bond.toughness and bond.normal_stiffness]
     for bond in case.interfaces:
@@ -145,9 +144,7 @@ def process_zone(case: Case) -> float | None:
 
 
 def warnings(case: Case, width: float, edge: float) -> list[str]:
-    """Warn about unresolved process zones and about cohesive laws.
-
-    Zones are unresolved where elements on the interface are too long for them.
+    """Warn about cohesive laws, and process zones shorter than interface elements resolve.
 
     Args:
         width: cell width.
@@ -173,7 +170,7 @@ def warnings(case: Case, width: float, edge: float) -> list[str]:
 
 
 def _law_warnings(case: Case) -> list[str]:
-    """Warn if a cohesive law's energy depends on mode order, and if its teeth overshoot."""
+    """Warn if cohesive energy depends on mode order, and if teeth overshoot."""
     if not phase_laws.has_softening(case):
         return []
     lines, law = [], phase_laws.bond_law(case.interfaces, np.zeros(0, np.int64))

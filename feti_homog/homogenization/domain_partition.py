@@ -1,4 +1,4 @@
-"""The cut cell, on rank 0: from its coarse mesh to each rank's submeshes."""
+"""The cut cell on rank 0: from coarse mesh to ranks' submeshes."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class CellSummary:
 
     @property
     def is_cut(self) -> bool:
-        """True if there are subdomains that are not whole bodies, and more than one."""
+        """True for several subdomains that are not whole bodies."""
         return self.subdomains > (1 if self.across else self.bodies)
 
     @property
@@ -94,7 +94,7 @@ class CellSummary:
 
     @property
     def coatings(self) -> Float:
-        """(fibres,) coating thickness, 0 without one; NaN for fibres that are not round."""
+        """(fibres,) coating thickness, 0 without one; NaN if not round."""
         return coating_thickness(self.numbers, self.is_fibre, Ellipses(self.centres, self.frames).semi_axes)
 
     def fibre_number(self, constituent: Int) -> Int:
@@ -261,13 +261,13 @@ def match_distance(case: Case, width: float, height: float, centres: Float, radi
 
 
 def in_cell(points: Float, period: Float) -> Float:
-    """Shift points (k, 2) into [0, period); points at its end by rounding go to 0."""
+    """Shift points (k, 2) into [0, period); rounded ends go to 0."""
     inside = np.mod(points, period)
     return np.where(inside > (1 - ROUNDING) * period, 0.0, inside)
 
 
 def _interface_nodes(torus: Torus, pairs: Int, lattice: ReferenceLattice) -> int:
-    """Count the nodes at which two bodies could part if they had an interface."""
+    """Count nodes where two bodies could part if they had an interface."""
     first, second, edge = torus.sides
     between = edge[pairs[torus.mesh.phase[first], torus.mesh.phase[second]] >= 0]
     plane = np.unique(torus.torus_edge, return_index=True)[1][between]

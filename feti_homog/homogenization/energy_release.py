@@ -1,4 +1,4 @@
-"""Energy release rate G = -d(energy) / d(debonded length), at constant strain, at debonded arc tips.
+"""Energy release rate G = -d(energy) / d(debonded length) at tips, constant strain.
 
 For rigid bonds G follows from a virtual crack extension, and errs like the energy, on any mesh.  The nodes around the
 tip turn about the fibre centre by s q, and their displacements with them; q is 1 near the tip and falls to 0 farther
@@ -46,7 +46,7 @@ VOID = -1
 
 
 class CrackExtension:
-    """Subdomain elements, found around points, from which a crack extension's energy is summed."""
+    """Subdomain elements around points, which sum a crack extension's energy."""
 
     def __init__(self, subdomain: Subdomain, period: Float) -> None:
         """Find the elements around points; the cell has `period` (2,)."""
@@ -58,7 +58,7 @@ class CrackExtension:
         self._elements_of = csr_matrix(entries, shape=(len(mesh.points), len(mesh.triangles)))
 
     def energy_change(self, tip: Float, spoke: Float, reach: float, u: Float, E: Float) -> float:
-        """Return the energy change when a tip's crack turns by a unit angle.
+        """Return the energy change when a crack turns by a unit angle.
 
         Args:
             tip, spoke: (2,) place, and place relative to the circle centre.
@@ -84,7 +84,7 @@ class CrackExtension:
 
 @dataclass(frozen=True)
 class EnergyRelease:
-    """Energy release at t tips under one load, ordered by fibre, interface and direction.
+    """Energy release at t tips, ordered by fibre, interface and direction.
 
     Attributes:
         fibre: (t,) numbers from 1.
@@ -107,7 +107,7 @@ class EnergyRelease:
 
     @property
     def mode_angle(self) -> Float:
-        """(t,) degrees psi, tan^2 psi = G_II / G_I; 0 is opening, 90 shear."""
+        """(t,) psi, tan^2 psi = G_II / G_I: 0 degrees opens, 90 shears."""
         roots = np.sqrt(np.maximum(self.modes, 0.0))
         return np.asarray(np.degrees(np.arctan2(roots[:, 1], roots[:, 0])))
 
@@ -219,9 +219,10 @@ class EnergyReleaseRates:
         return work, length
 
     def _body_boundaries(self) -> tuple[Float, Int]:
-        """(k, 2) nodes on body boundaries, from all ranks, and (k,) their bodies; VOID at voids.  Collective.
+        """(k, 2) body boundary nodes and (k,) their bodies; VOID at voids.  Collective.
 
-        Each body has its own nodes where two bodies meet.  Cuts between a body's pieces are no boundaries.
+        From all ranks.  Each body has its own nodes where two bodies meet.  Cuts between a body's pieces are no
+        boundaries.
         """
         subdomains = self.cell.subdomains
         borders = [np.bincount(s.submesh.edge_class[s.submesh.triangle_edges].ravel()) == 1 for s in subdomains]

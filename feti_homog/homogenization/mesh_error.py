@@ -45,9 +45,7 @@ INSIDE = -1  # place of a class that is not on a boundary
 
 @dataclass(frozen=True)
 class EnergyErrors:
-    """Errors in E_i . Sigma_j, (k, k), for k responses.
-
-    The responses have the strains E_i in a cell with area |UC|.
+    """Errors (k, k) in E_i . Sigma_j for k responses with strains E_i.
 
     Attributes:
         elements: 1/|UC| int ds_i : S : ds_j of recovered less element stresses, and spring energy beyond tips; the
@@ -88,7 +86,7 @@ def energy_errors(
     keep: bool = True,
     nested: bool | None = None,
 ) -> EnergyErrors:
-    """Estimate response errors in one problem, a few subdomains at a time.  Collective.
+    """Estimate response errors in one problem, by groups of subdomains.  Collective.
 
     Args:
         contact: whether faces touch.
@@ -117,7 +115,7 @@ def energy_errors(
 
 
 def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
-    """Return ratios of element and arc errors to errors with `fewer` halvings.  Collective."""
+    """Return ratios of element and arc errors after `fewer` halvings.  Collective."""
     order = cell.lattice.order
     if cell.summary.across and fewer:
         return SAMPLED[any(s.is_mixed for s in cell.subdomains)]
@@ -129,11 +127,9 @@ def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
 def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
     """Return whether a mesh refined less has the error.
 
-    Not where errors fall more slowly, at corners and tips.
-
-    False for cells with fibres other than circles and ellipses or with voids bounded by straight sides; for debonded
-    arcs with quadratic elements or with tips to which the mesh is not graded: `tip_size` is given, or bonds break.
-    Collective.
+    Not where errors fall more slowly, at corners and tips: false for cells with fibres other than circles and ellipses
+    or with voids bounded by straight sides; for debonded arcs with quadratic elements or with tips to which the mesh is
+    not graded: `tip_size` is given, or bonds break. Collective.
     """
     lattice = cell.lattice
     submeshes = (s.submesh for s in cell.subdomains)
@@ -154,9 +150,9 @@ def _has_corners(cell: TornCell) -> bool:
 def _recovered(
     cell: TornCell, responses: Sequence[Response], keep: bool, lattice: ReferenceLattice
 ) -> Iterator[tuple[RecoveredStress, ArcSides]]:
-    """Yield recovered stresses and arcs in this rank's subdomains, refined by the lattice, group by group.
+    """Yield recovered stresses and arcs in this rank's subdomains, group by group.
 
-    Collective before the first.
+    They are refined by the lattice.  Collective before the first.
     """
     u = np.stack([response.u for response in responses], axis=1)
     loads = np.stack([response.strain for response in responses], axis=1)
@@ -198,10 +194,9 @@ def _nested_displacements(
 def _displacements(
     cell: TornCell, u: Float, loads: Float, keep: bool, lattice: ReferenceLattice
 ) -> Iterator[tuple[Members, FineMesh, Float, Int]]:
-    """Yield groups of subdomains with one phase: mesh, displacements (classes, c, k), and their places.
+    """Yield subdomain groups with one phase: mesh, displacements (classes, c, k), places.
 
     Places (c classes,) count displacements on all boundaries or, across materials, in all parts; INSIDE elsewhere.
-
     Across materials a coarser lattice takes the mesh displacements at its nodes: their error is hardly less than
     in equilibrium on its own mesh.
     """
@@ -222,7 +217,7 @@ def _displacements(
 
 
 class Group(NamedTuple):
-    """Recovered stresses and arcs in a group of subdomains, with (classes,) places among boundary displacements."""
+    """Recovered stresses, arcs and (classes,) boundary displacement places in a group."""
 
     stress: RecoveredStress
     sides: ArcSides
@@ -232,10 +227,10 @@ class Group(NamedTuple):
 def boundary_tractions(
     cell: TornCell, responses: Sequence[Response], groups: Sequence[Group], shared: SharedVertices | None, nested: bool
 ) -> dict[int, KnownTractions]:
-    """Return, by the group, tractions where two sides on arcs meet, and zero ones at voids.  Collective.
+    """Return tractions by group, where arc sides meet and at voids.  Collective.
 
-    Tractions are forces over node lengths; on the mesh that has the forces, which is not `nested`, over side
-    lengths, so that uniform stresses give exact tractions.
+    They vanish at voids, else are forces over node lengths; on the mesh that has the forces, which is not `nested`,
+    over side lengths, so that uniform stresses give exact tractions.
     """
     forces, lengths = _forces(cell, responses, groups)
     sums, of_node = list[Float](), np.append(lengths, 0.0)  # at INSIDE
@@ -264,7 +259,7 @@ def boundary_tractions(
 
 
 def _forces(cell: TornCell, responses: Sequence[Response], groups: Sequence[Group]) -> tuple[Float, Float]:
-    """(boundary dofs, k) interface forces -B^T lam on body nodes, and (boundary dofs,) lengths.
+    """(boundary dofs, k) forces -B^T lam on bodies, and (boundary dofs,) lengths.
 
     Lengths are 0 where no tractions follow: if a phase locks, or rigid bonds end at debonded faces.  Subdomains across
     materials have all dofs in their parts instead.  Collective.

@@ -1,4 +1,4 @@
-"""Response fields: displacements at nodes, strains and stresses in elements, tractions and jumps."""
+"""Response fields: nodal displacements, element strains and stresses, tractions, jumps."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def _sizes(cell: TornCell) -> list[tuple[int, int]]:
 
 
 def out_of_plane_stress(cell: TornCell, stress: Float) -> Float:
-    """(m,) stresses 33 for the stresses (m, 3) in plane strain or stress."""
+    """(m,) stresses 33 for stresses (m, 3) in the plane."""
     plane = cell.case.analysis.plane
     rules = [laws.out_of_plane(cell.case.material_of(s.submesh.phase), plane)[0] for s in cell.parts]
     sizes = [elements for _, elements in _sizes(cell)]

@@ -1,4 +1,4 @@
-"""Errors that springs at nodes make in each response pair's energy, besides element and arc errors."""
+"""Energy errors by springs at nodes, besides element and arc errors."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ POINTS, WEIGHTS = roots_legendre(6)
 
 
 class SpringSides:
-    """Element sides along springs, and all ranks' interface nodes: everything that no state changes."""
+    """Element sides along springs, and all interface nodes; states change neither."""
 
     def __init__(
         self,
@@ -33,7 +33,7 @@ class SpringSides:
         lattice: ReferenceLattice,
         period: Float,
     ) -> None:
-        """Find fibre sides in the `parts`, refined by the lattice; `period` (2,) is the cell's.  Collective."""
+        """Find fibre sides in the `parts`; the cell has `period` (2,).  Collective."""
         self._comm, self._jumps, self._order, self._period = neighbours.comm, jumps, lattice.order, period
         self._chains = InterfaceChains(neighbours.adjacency)
         nodes = jumps.nodes
@@ -66,7 +66,7 @@ class SpringSides:
         self._share = np.where(turn > 0, length, 0.0) / {1: 12, 2: 60}[lattice.order]
 
     def errors(self, status: Status, compliance: Float, lam: Float) -> tuple[Float, Float]:
-        """(k, k) energies beyond tips, and on sides without the part that `arc_energy` has.  Collective.
+        """(k, k) energies beyond tips, and on sides less `arc_energy`.  Collective.
 
         Args:
             status: (n,) states at this rank's interface nodes.
@@ -90,7 +90,7 @@ class SpringSides:
         return np.asarray(beyond), allreduce_sum(self._comm, self._of_sides(holds, stiffness, jump))
 
     def _of_sides(self, holds: Bool, stiffness: Float, jump: Float) -> Float:
-        """(k, k) spring energy at nodes less springs along this rank's sides, less the part known on arcs.
+        """(k, k) nodal spring energy less springs along sides, less arc part.
 
         Both energies are of the functions that nodes define on sides; the exact jump d adds to the energy of springs,
         and to the energy of t on the distance from d to these functions, as much as these lack.
@@ -110,7 +110,7 @@ class SpringSides:
         return np.asarray(lumped - on_sides - on_arcs - on_arcs.T)
 
     def _in_space(self, components: Float) -> Float:
-        """(n, 2, k) plane vectors from components (n, 2, k) along normal and tangent; (n, 1, k) stay."""
+        """(n, 2, k) plane vectors from normal and tangent; (n, 1, k) stay."""
         if components.shape[1] == 1:
             return components
         normal = self._normal
@@ -119,9 +119,9 @@ class SpringSides:
 
 
 def _sides(part: UniformPart, number: Int, fibre: Int, lattice: ReferenceLattice) -> tuple[Int, Float, Float]:
-    """Return a fibre part's sides: interface nodes (f, order + 1), normals (f, q, 2), turns (f,).
+    """Return a fibre part's sides: nodes (f, order + 1), normals, turns (f,).
 
-    Normals at Gauss points are as long as the arc per unit place.  `number` (classes,) are interface nodes on
+    Normals (f, q, 2) at Gauss points are as long as the arc per unit place.  `number` (classes,) are interface nodes on
     all ranks, -1 elsewhere, `fibre` (n,) each one's inner body.
     """
     triangle, k, line = border_lines(part.submesh, part.mesh, part.mesh.node_class[part.mesh.nodes])

@@ -1,4 +1,4 @@
-"""Cells meshed by all ranks, and cut on rank 0, or large ones where they are meshed.
+"""Cells meshed by all ranks, cut on rank 0 or in their tiles.
 
 Rank 0 begins the coarse mesh; all ranks make nodes on lines, and the tiles of large cells.  There each rank cuts its
 tiles, and no rank has all tiles.  Matrix pieces lie within tiles, and a fibre lies in one tile, so subdomains depend on
@@ -51,9 +51,9 @@ def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: Part
 
 
 def place_nodes(case: Case, comm: MPI.Intracomm, policy: TilePolicy) -> NodedCell | CoarseMesh | None:
-    """Return a user's mesh, or the cell with nodes on lines, placed by all ranks, and empty tiles.  Collective.
+    """Return a user's mesh, or the cell with noded lines and empty tiles.  Collective.
 
-    None but on rank 0.
+    All ranks place nodes; None but on rank 0.
 
     Raises:
         CaseError, MeshError: on every rank, as `begin_mesh`.
@@ -74,7 +74,7 @@ def place_nodes(case: Case, comm: MPI.Intracomm, policy: TilePolicy) -> NodedCel
 
 
 def begin_mesh(case: Case, policy: TilePolicy) -> UnmeshedCell | NodedCell | CoarseMesh:
-    """Return a user's mesh, or the cell as far as rank 0 makes it alone.
+    """Return a user's mesh, or the cell that rank 0 makes alone.
 
     Raises:
         CaseError: a phase has no material, or a material no phase.
@@ -95,7 +95,7 @@ def begin_mesh(case: Case, policy: TilePolicy) -> UnmeshedCell | NodedCell | Coa
 
 
 def fill_tiles(cell: NodedCell | CoarseMesh | None, comm: MPI.Intracomm) -> CoarseMesh | None:
-    """Return the mesh on rank 0, whose tiles from `place_nodes` all ranks fill.  Collective.
+    """Return the mesh on rank 0; all ranks fill its tiles.  Collective.
 
     Raises:
         MeshError: on every rank, if one cannot fill a tile.
@@ -149,7 +149,7 @@ def can_be_torn_by_tiles(
 def tear_by_tiles(
     case: Case, noded: NodedCell | None, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy
 ) -> RankShare:
-    """Return this rank's share in the cell with noded lines on rank 0.  Collective.
+    """Return this rank's share in a cell noded on rank 0.  Collective.
 
     Raises:
         CaseError, MeshError: on every rank, as `tiled_cell` and `filling.fill`.
@@ -184,7 +184,7 @@ def tear_by_tiles(
 
 
 def _filled(noded: NodedCell | None, regions: Regions, comm: MPI.Intracomm) -> tuple[Torus, Int]:
-    """Return the torus that this rank's tiles fill, and each triangle's tile (m,).  Collective."""
+    """Return the torus that this rank's tiles fill, and tiles (m,).  Collective."""
     tiles = on_root_only(comm, tiles_to_fill, noded) or []
     dealt = deal_tiles(tiles, [len(tile.nodes) for tile in tiles], comm)
     fillings = agree(comm, fill_own, [(k, tile.tile) for k, tile in dealt])

@@ -1,4 +1,4 @@
-"""The torn cell: from a case to subdomains on their ranks and a solver that is set up for them."""
+"""The torn cell: from a case to subdomains with their solver."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TornCell:
-    """The cell on all ranks; `lattice` refines each coarse triangle of this rank's `subdomains`.
+    """The cell on all ranks; `lattice` refines `subdomains` on each rank.
 
     `axial` is the cell with the displacement along the fibres, on the same meshes and interface nodes; None unless the
     plane state is generalized plane strain.
@@ -66,7 +66,7 @@ class TornCell:
 
     @cached_property
     def parts(self) -> list[UniformPart]:
-        """This rank's subdomain parts in one body each, numbered over all ranks.  Collective when first read."""
+        """This rank's parts in one body each, numbered over ranks.  Collective when first read."""
         phases = [self.summary.phases[k] for k in self.summary.constituent_phase.tolist()]
         parts = list(uniform_parts.parts_of(self.subdomains, phases))
         if not self.summary.across:
@@ -76,7 +76,7 @@ class TornCell:
 
     @cached_property
     def jumps(self) -> JumpOperator:
-        """B between all parts, within a subdomain too, without multipliers.  Collective when first read."""
+        """B between all parts, also within subdomains.  Collective when first read."""
         if not self.summary.across:
             return self.solver.jump_operator
         pairs = cell_remarks.pairs_of(self.case, self.summary.phases)
@@ -93,9 +93,9 @@ class TornCell:
         return np.concatenate([np.zeros(0), *(part for _, part in self.displacements(u, solution.strain))])
 
     def displacements(self, u: Float, loads: Float, keep: bool = True) -> Iterator[tuple[UniformPart, Float]]:
-        """Yield each part with its u* (dofs, k) for u (boundary dofs, k) on all boundaries and the loads (v, k).
+        """Yield each part with its u* (dofs, k) from boundary displacements.
 
-        `keep` stores the interior factors.
+        u (boundary dofs, k) on all boundaries, under the loads (v, k); `keep` stores the interior factors.
         """
         place, extended = -1, np.zeros(0)
         for part in self.parts:
@@ -104,7 +104,7 @@ class TornCell:
             yield part, extended[part.dofs]
 
     def across_bonds(self, solution: DualSolution, u: Float) -> tuple[Float, Float]:
-        """(owned rows of `jumps`,) lam and openings for the part displacements u.  Collective."""
+        """(owned rows of `jumps`,) lam and openings for displacements u.  Collective."""
         if not self.summary.across or not self.jumps.global_rows:  # without jumps there is a single part
             return solution.lam, solution.opening
         return self._forces.multipliers(u, solution.strain), self.jumps.sum(self.jumps.B @ u)
@@ -126,7 +126,7 @@ class TornCell:
 
     @cached_property
     def class_nodes(self) -> Int:
-        """(c,) a plane node for each class in this rank's parts, one part after the other."""
+        """(c,) a plane node for each class, part after part."""
         nodes, first = [np.zeros(0, np.int64)], 0
         for mesh in (part.mesh for part in self.parts):
             nodes.append(np.empty(mesh.n_classes, np.int64))
@@ -186,7 +186,7 @@ class TornCell:
         return {phase: self.comm.allreduce(area) for phase, area in local.items()}
 
     def fractions(self) -> dict[str, float]:
-        """Each phase's share in the cell area; without voids in the mesh area.  Collective."""
+        """Each phase's cell area share; without voids, of meshed area.  Collective."""
         areas = self.areas()
         total = self.summary.area if self.summary.voids else sum(areas.values())
         return {phase: area / total for phase, area in areas.items()}
@@ -236,7 +236,7 @@ def tear(
 
 
 def assemble_axial(case: Case, summary: CellSummary, subdomains: Sequence[Subdomain]) -> list[Subdomain]:
-    """Assemble this rank's subdomains for the displacement along the fibres, on their meshes."""
+    """Assemble this rank's subdomains for displacements along the fibres."""
     laws = [_laws(case, summary, s.submesh, AXIAL) for s in subdomains]
     return [
         Subdomain.on(s.submesh, s.mesh, L, AXIAL, s.material, is_thin=s.is_thin, is_outer=s.is_outer)
@@ -247,7 +247,7 @@ def assemble_axial(case: Case, summary: CellSummary, subdomains: Sequence[Subdom
 def assemble_subdomains(
     case: Case, comm: MPI.Intracomm, progress: Progress, policy: PartitionPolicy = DEFAULT_POLICY
 ) -> tuple[RankShare, SharedEntities, ReferenceLattice, list[Subdomain]]:
-    """Mesh the cell, cut it on rank 0; refine and assemble the subdomains on their ranks.  Collective.
+    """Mesh and cut the cell; refine and assemble subdomains on their ranks.  Collective.
 
     Returns this rank's share, its entities shared with other ranks, the refinement lattice, and the subdomains.
     Raises as `tear`.
