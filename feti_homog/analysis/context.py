@@ -16,7 +16,7 @@ from feti_homog.homogenization.averaging import FibreInterfaces, Homogenization,
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.load_scales import ABSURD
-from feti_homog.interface.contact.states import OPEN, BondState, Equilibrium
+from feti_homog.interface.contact.states import BONDED, OPEN, BondState, Equilibrium
 from feti_homog.interface.loads import Load
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS
 from feti_homog.results.checkpoint import NoCheckpoint
@@ -194,7 +194,7 @@ class AnalysisContext:
     def point(self, responses: Sequence[Response]) -> dict[str, Any]:
         """Return a point's debonding under the last plane strain, all iterations.  Collective."""
         last = responses[: len(STRAINS)][-1]
-        length = self.fibre_interfaces.debonded_length(last.state.status)
+        length = self.fibre_interfaces.length(last.state.status != BONDED)
         debonding = {
             "debonded_share": self.fibre_interfaces.share(length),
             "debonded_length": length,

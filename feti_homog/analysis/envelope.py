@@ -112,7 +112,14 @@ class _Finder:
         cell = context.cell
         self._comm, self._law, self._onset, self._loads = cell.comm, law, onset, context.loads.names
         self._problems, self._noise = context.loads.interfaces.problems, context.plane.interface.scales.sign_noise
-        self._unit = _unit_tractions(context, responses)
+        # (l, k, c) tractions at this rank's nodes by unit load: normal, tangential, and axial in space.
+        components = [problem.cell.solver.problem.components for problem in context.loads.problems]
+        tractions, column, groups = list[Float](), 0, context.loads.by_problem(responses)
+        for problem, c, group in zip(context.loads.problems, components, groups, strict=True):
+            padding = [(0, 0), (column, sum(components) - column - c)]
+            tractions += [np.pad(problem.interface.traction(r.state.solution), padding) for r in group]
+            column += c
+        self._unit = np.stack(tractions)
         # Keys of a break under a traction with this number of components.
         self._break_names = tuple(law.break_names)[: self._unit.shape[2]]
         self._chunk = max(1, CHUNK // max(1, self._comm.allreduce(self._unit.shape[1], MPI.MAX)))
@@ -183,15 +190,3 @@ class _Finder:
         first = np.lexsort((np.round(table[:, :, 3], DIRECTION_DIGITS), table[:, :, 2], table[:, :, 1]), axis=0)[0]
         bonds: list[list[float]] = table[first, np.arange(n)].tolist()
         return bonds
-
-
-def _unit_tractions(context: AnalysisContext, responses: Sequence[Response]) -> Float:
-    """(l, k, c) normal, tangential, axial tractions at nodes by unit load."""
-    components = [problem.cell.solver.problem.components for problem in context.loads.problems]
-    tractions, column = list[Float](), 0
-    groups = context.loads.by_problem(responses)
-    for problem, c, group in zip(context.loads.problems, components, groups, strict=True):
-        padding = [(0, 0), (column, sum(components) - column - c)]
-        tractions += [np.pad(problem.interface.traction(response.state.solution), padding) for response in group]
-        column += c
-    return np.stack(tractions)

@@ -84,12 +84,12 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
     if last is None:
         return {"path": (), "resumed": count}
     states: dict[str, Any] = {}
+    document = {"case": context.case.resolved(), "path": entries}  # by which points are marked
     if law.has_tips or context.states.has_place:
-        states = _recorded(context, path, law, entries, last)
+        states = _recorded(context, path, law, document, last)
     else:
         _checked(context, last, _label(path, len(entries) - 1))
     _remark_loose_fibres(context, last)
-    document = _document(context, entries)
     for number, mark in marks(document).items():
         entries[number]["mark"] = mark
     points = tuple(PathPoint(**entry) for entry in entries)
@@ -105,11 +105,6 @@ def _remark_loose_fibres(context: AnalysisContext, last: Point) -> None:
             f"[path] no bond of {fibres} holds: with friction such a fibre may have several equilibria under one load, "
             "and the path has one of them, by the order of nodes"
         )
-
-
-def _document(context: AnalysisContext, entries: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return the result.json parts by which points are marked."""
-    return {"case": context.case.resolved(), "path": entries}
 
 
 def _events_in_checkpoint(context: AnalysisContext, law: BondLaw) -> int:
@@ -134,7 +129,7 @@ def _events_in_checkpoint(context: AnalysisContext, law: BondLaw) -> int:
 def _points(
     context: AnalysisContext, path: LoadPath, law: BondLaw, stored_events: int
 ) -> Iterator[tuple[Point, tuple[Energies, float] | None, list[Response]]]:
-    """Yield points with responses: first from the checkpoint, with energies, then new ones.
+    """Yield points with responses: first checkpointed ones, with energies, then new ones.
 
     Where nothing carries the stresses any more, or faces with friction cannot go on, the path ends with a fault.
 
@@ -204,7 +199,7 @@ def _entry(
         "dissipated_strain_controlled": work.load_controlled,
     }
     if damage is not None:
-        length = context.fibre_interfaces.damaged_length(damage)
+        length = context.fibre_interfaces.length((damage > 0.0) & (damage < 1.0))
         entry |= {"softened": point.softened, "damaged_length": length}
     if context.case.has_friction:
         entry["friction_heat"] = energies.friction
@@ -228,14 +223,15 @@ def _goes_on(context: AnalysisContext, path: LoadPath, point: Point, count: int)
 
 
 def _recorded(
-    context: AnalysisContext, path: LoadPath, law: BondLaw, entries: Sequence[dict[str, Any]], last: Point
+    context: AnalysisContext, path: LoadPath, law: BondLaw, document: dict[str, Any], last: Point
 ) -> dict[str, Any]:
     """Record tips and fields at kept checkpoint points and the last.  Collective.
 
     Returns `states`, the point numbers with recorded fields.
     """
     legs = len(context.case.targets) if path.method == "events" else 0
-    numbers = kept(entries, context.case.output.states, legs, marks(_document(context, entries)))
+    entries = document["path"]
+    numbers = kept(entries, context.case.output.states, legs, marks(document))
     with context.progress.stage("states") as line:
         for number in context.progress.bar(numbers, "states"):
             point = last if number == len(entries) - 1 else read(context, law, number)[1]

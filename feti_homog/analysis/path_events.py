@@ -40,7 +40,7 @@ SUFFIXES = ("", "_axial")
 
 @dataclass
 class Work:
-    """Energies per cell area up to a point; breaks lose work not stored.
+    """Energies per cell area to a point; breaks lose unstored work.
 
     Attributes:
         all_equilibria: every bond breaks at its own load, the first leg with its snap-back.

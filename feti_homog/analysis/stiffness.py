@@ -1,4 +1,4 @@
-"""`analysis.type = "stiffness"`: L^ef, with contact secants to plus and minus unit loads."""
+"""`analysis.type = "stiffness"`: L^ef, with contact secants under plus, minus unit loads."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 
 from feti_homog.case.case import Case
-from feti_homog.case.interface_section import InterfaceSection, interface_label
+from feti_homog.case.interface_section import interface_label
 from feti_homog.interface import debonded_arcs
 from feti_homog.interface.debonded_arcs import MovedTips
 from feti_homog.mesh.outline.outline import MERGED
@@ -30,17 +30,12 @@ TIP_TRIANGLES = 2.0
 LEAST_SIZE = 1e-5  # at tips / width of the cell, by default
 
 
-def on_interface(case: Case, interface: InterfaceSection, fibres: int) -> dict[int, list[float]]:
-    """Return tip directions in [0, 360), all openings, by fibre from 0."""
-    return debonded_arcs.tips(interface.debonded, case.section.openings, fibres)
-
-
 def marks(case: Case, fibres: int) -> dict[int, list[float]]:
     """Return all tip directions by their curve's number (`BareOutline.of`)."""
     by_curve: dict[int, set[float]] = {}
     for interface in case.interfaces:
         is_within = interface.between is not None and {COATING, MATRIX} & set(interface.between) == {COATING}
-        for fibre, directions in on_interface(case, interface, fibres).items():
+        for fibre, directions in debonded_arcs.tips(interface.debonded, case.section.openings, fibres).items():
             by_curve.setdefault(~fibre if is_within else fibre, set()).update(directions)
     return {curve: sorted(by_curve[curve]) for curve in sorted(by_curve)}
 
@@ -109,7 +104,7 @@ class EstimatedNodes:
         distance, moved = float(np.degrees(MERGED)), []
         for pair, interface in enumerate(case.interfaces):
             at = self.is_vertex & (self.pair == pair)
-            tips = on_interface(case, interface, fibres)
+            tips = debonded_arcs.tips(interface.debonded, case.section.openings, fibres)
             moved.append(debonded_arcs.moved_tips(tips, self.fibre[at], self.direction[at], distance))
         return tuple(moved)
 

@@ -21,7 +21,7 @@ from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState,
 from feti_homog.interface.loads import Load
 from feti_homog.materials.voigt import STRAINS, STRESSES
 from feti_homog.system.parallel.distributed_arrays import allreduce_sum
-from feti_homog.typing import Float
+from feti_homog.typing import Bool, Float
 
 
 @dataclass(frozen=True)
@@ -143,10 +143,10 @@ class Homogenization:
         opening = allreduce_sum(self.cell.comm, self._strain_of_jumps.T @ opened)
         energy = float(energy) + self._stretched(state)
         rubbing = self._rubbing(state)
-        acting = self.interface.acting(state.bonds, strain, state.asked)
-        largest = (self._largest(u) + self.interface.scales.imposed(acting)) or 1.0
-        imposed = float(self.interface.scales.imposed_strain(acting).max()) or 1.0
-        reuss = self.interface.scales.stress_scale(acting) * imposed
+        acting, scales = self.interface.acting(state.bonds, strain, state.asked), self.interface.scales
+        largest = (self._largest(u) + scales.imposed(acting)) or 1.0
+        imposed = float(scales.imposed_strain(acting).max()) or 1.0
+        reuss = scales.stress_scale(acting) * imposed
         checks = {
             "strain": float(np.abs(star - opening / self.cell.summary.area).max() / imposed) + self._strain_inside,
             "hill": float(abs(energy + rubbing - stress @ strain) / (max(abs(energy), reuss) or 1.0)),
@@ -248,24 +248,21 @@ class FibreInterfaces:
         self._comm, self._nodes = cell.comm, cell.solver.jump_operator.nodes
         self._fibres, self._pairs = cell.summary.fibres, len(cell.case.interfaces)
         self._fibre = cell.summary.fibre_number(self._nodes.fibre) - 1
-        self._length = self._sums(self._nodes.length)
-        of_coating = self._sums(self._nodes.length * ~cell.summary.is_fibre[self._nodes.fibre])
+        self._length = self.length(np.ones(len(self._fibre), bool))
+        of_coating = self.length(~cell.summary.is_fibre[self._nodes.fibre])
         radius = np.where(of_coating > 0, np.nan, cell.summary.radii[cell.summary.fibre_bodies])
         round_fibre = np.degrees(1.0 / np.where(np.isnan(radius), 1.0, radius))
         self._degrees = np.where(np.isnan(radius), 360.0 / np.where(self._length > 0, self._length, 1.0), round_fibre)
 
-    def debonded_length(self, status: Status) -> Float:
-        """(f,) debonded interface lengths; `status` (k,) at this rank's nodes.  Collective."""
-        return self._sums(self._nodes.length * (status != BONDED))
-
-    def damaged_length(self, damage: Float) -> Float:
-        """(f,) interface lengths that hold with damage (k,) above 0.  Collective."""
-        return self._sums(self._nodes.length * ((damage > 0.0) & (damage < 1.0)))
+    def length(self, which: Bool) -> Float:
+        """(f,) interface length at the nodes `which` (k,) on all ranks.  Collective."""
+        sums: Float = np.bincount(self._fibre, self._nodes.length * which, self._fibres).astype(float)
+        return allreduce_sum(self._comm, sums)
 
     def loose(self, status: Status) -> list[int]:
         """Return fibre numbers, from 1, without a bond that holds.  Collective."""
-        bonded = self._sums(self._nodes.length * (status == BONDED))
-        return [int(number) for number in np.flatnonzero((bonded == 0.0) & (self._length > 0.0)) + 1]
+        is_loose = (self.length(status == BONDED) == 0.0) & (self._length > 0.0)
+        return [int(number) for number in np.flatnonzero(is_loose) + 1]
 
     def angle(self, length: Float) -> Float:
         """(f,) degrees by radius, else (not round, coating interface) 360 times share."""
@@ -283,10 +280,6 @@ class FibreInterfaces:
         )
         length = allreduce_sum(self._comm, length)
         return np.asarray(allreduce_sum(self._comm, debonded) / np.where(length > 0, length, 1.0))
-
-    def _sums(self, values: Float) -> Float:
-        sums: Float = np.bincount(self._fibre, values, self._fibres).astype(float)
-        return allreduce_sum(self._comm, sums)
 
 
 def asymmetry(L: Float) -> float:

@@ -127,7 +127,6 @@ class EnergyReleaseRates:
         self.cell, self.interface, self._period = cell, interface, cell.summary.period
         self._chains = InterfaceChains(cell.neighbours.adjacency)
         self._extensions = [CrackExtension(s, self._period) for s in cell.subdomains]
-        self._boundaries = self._body_boundaries()
         self.points, self.bodies = self._gathered(nodes.points), self._gathered(nodes.bodies)
         self.pair = self._gathered(nodes.pair)
         # Rounded, lest rounding decide their order.
@@ -136,6 +135,21 @@ class EnergyReleaseRates:
         # (interfaces, 2) normal and tangential stiffnesses of the bonds, infinite where they are rigid.
         self._stiffness = np.array(phase_laws.springs(cell.case).stiffness or ((np.inf, np.inf),))
         self._tree = cKDTree(wrap(self.points, self._period), boxsize=self._period)
+        # (k, 2) body boundary nodes on all ranks, and (k,) their bodies, VOID at voids. Each body has its own nodes
+        # where two bodies meet; cuts between a body's pieces are no boundaries.
+        borders = [np.bincount(s.submesh.edge_class[s.submesh.triangle_edges].ravel()) == 1 for s in cell.subdomains]
+        rows, points, body = [np.zeros((0, 2), np.int64)], [np.zeros((0, 2))], [np.zeros(0, np.int64)]
+        for s, border in zip(cell.subdomains, borders, strict=True):
+            key = s.submesh.edge_keys[border]
+            rows.append(np.column_stack([key, np.full(len(key), s.submesh.body)]))
+        edges, pieces = np.unique(self._gathered(np.concatenate(rows)), axis=0, return_counts=True)
+        cuts = edges[pieces > 1]
+        for s, border in zip(cell.subdomains, borders, strict=True):
+            cut = np.isin(s.submesh.edge_keys, cuts[cuts[:, 1] == s.submesh.body, 0])
+            for edge, name in ((border & ~cut & ~s.submesh.at_void, s.submesh.body), (s.submesh.at_void, VOID)):
+                points.append(s.mesh.points[np.unique(nodes_along(s.submesh, s.mesh, edge))])
+                body.append(np.full(len(points[-1]), name))
+        self._boundaries = self._gathered(np.concatenate(points)), self._gathered(np.concatenate(body))
 
     def of(self, response: Response) -> EnergyRelease:
         """Return G and its modes at all tips in a response.  Collective."""
@@ -180,7 +194,18 @@ class EnergyReleaseRates:
             return np.zeros(0)
         solution, bodies, place = response.state.solution, self.bodies[tips.node], self.points[tips.node]
         spokes = nearest_image(place - self.cell.summary.centres[bodies[:, 1]], self._period)
-        reach = self._reach(place, spokes, bodies)
+        # Cracks may be extended within `reach`, which has no other tip, and no boundary but the tip's circle.
+        radius, (points, body), period = np.linalg.norm(spokes, axis=1), self._boundaries, self._period
+        reach, places = np.minimum(radius, REACH_OF_A_PERIOD / REACH * period.min()), wrap(place, period)
+        if len(place) > 1:
+            nearest, _ = cKDTree(places, boxsize=period).query(places, 2)
+            reach = np.minimum(reach, nearest[:, 1])
+        inside = cKDTree(wrap(points, period), boxsize=period).query_ball_point(places, reach)
+        for t, nodes in enumerate(inside):
+            away = nearest_image(points[nodes] - place[t], period)
+            off_circle = np.abs(np.linalg.norm(away + spokes[t], axis=1) / radius[t] - 1) > OFF_CIRCLE
+            limits = off_circle | ~np.isin(body[nodes], bodies[t])
+            reach[t] = REACH * min(reach[t], np.linalg.norm(away[limits], axis=1).min(initial=np.inf))
         u, E = self.cell.solver.displacement(solution), strain_tensor(solution.strain[:3])
         change, first = np.zeros(len(bodies)), 0
         for extension in self._extensions:
@@ -217,50 +242,6 @@ class EnergyReleaseRates:
             length[t] = max(smallest[t], to_behind[min(order, len(behind) - 1)])
             work[t] = closing_work(length[t], to_front, force[front], to_behind, jump[behind])
         return work, length
-
-    def _body_boundaries(self) -> tuple[Float, Int]:
-        """(k, 2) body boundary nodes and (k,) their bodies; VOID at voids.  Collective.
-
-        From all ranks.  Each body has its own nodes where two bodies meet.  Cuts between a body's pieces are no
-        boundaries.
-        """
-        subdomains = self.cell.subdomains
-        borders = [np.bincount(s.submesh.edge_class[s.submesh.triangle_edges].ravel()) == 1 for s in subdomains]
-        rows, points, body = [np.zeros((0, 2), np.int64)], [np.zeros((0, 2))], [np.zeros(0, np.int64)]
-        for s, border in zip(subdomains, borders, strict=True):
-            key = s.submesh.edge_keys[border]
-            rows.append(np.column_stack([key, np.full(len(key), s.submesh.body)]))
-        edges, pieces = np.unique(self._gathered(np.concatenate(rows)), axis=0, return_counts=True)
-        cuts = edges[pieces > 1]
-        for s, border in zip(subdomains, borders, strict=True):
-            cut = np.isin(s.submesh.edge_keys, cuts[cuts[:, 1] == s.submesh.body, 0])
-            for edge, name in ((border & ~cut & ~s.submesh.at_void, s.submesh.body), (s.submesh.at_void, VOID)):
-                points.append(s.mesh.points[np.unique(nodes_along(s.submesh, s.mesh, edge))])
-                body.append(np.full(len(points[-1]), name))
-        return self._gathered(np.concatenate(points)), self._gathered(np.concatenate(body))
-
-    def _reach(self, tips: Float, spokes: Float, bodies: Int) -> Float:
-        """(t,) radius around each tip in which its crack may be extended.
-
-        No other tip lies within it, and no boundary but the tip's circle.
-
-        Args:
-            tips, spokes: (t, 2) places, and places relative to their circle centres.
-            bodies: (t, 2) constituents on both sides at each tip.
-        """
-        radius, (points, body), period = np.linalg.norm(spokes, axis=1), self._boundaries, self._period
-        reach = np.minimum(radius, REACH_OF_A_PERIOD / REACH * period.min())
-        places = wrap(tips, period)
-        if len(tips) > 1:
-            nearest, _ = cKDTree(places, boxsize=period).query(places, 2)
-            reach = np.minimum(reach, nearest[:, 1])
-        inside = cKDTree(wrap(points, period), boxsize=period).query_ball_point(places, reach)
-        for t, nodes in enumerate(inside):
-            away = nearest_image(points[nodes] - tips[t], period)
-            off_circle = np.abs(np.linalg.norm(away + spokes[t], axis=1) / radius[t] - 1) > OFF_CIRCLE
-            limits = off_circle | ~np.isin(body[nodes], bodies[t])
-            reach[t] = min(reach[t], np.linalg.norm(away[limits], axis=1).min(initial=np.inf))
-        return np.asarray(REACH * reach)
 
     def _gathered(self, values: Array) -> Array:
         """Gather the interface node values, or other rows, from all ranks.  Collective."""

@@ -45,7 +45,7 @@ INSIDE = -1  # place of a class that is not on a boundary
 
 @dataclass(frozen=True)
 class EnergyErrors:
-    """Errors (k, k) in E_i . Sigma_j for k responses with strains E_i.
+    """Errors (k, k) in E_i . Sigma_j; k responses have strains E_i.
 
     Attributes:
         elements: 1/|UC| int ds_i : S : ds_j of recovered less element stresses, and spring energy beyond tips; the

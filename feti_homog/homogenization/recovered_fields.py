@@ -38,7 +38,7 @@ def recover(cell: TornCell, response: Response | None) -> RecoveredFields:
     nodes, problem = cell.jumps.nodes, cell.solver.problem
     m, (c, v) = problem.strains, (problem.components, len(problem.loads))
     if response is None:
-        n, e = (sum(sizes) for sizes in zip(*_sizes(cell), strict=True)) if cell.parts else (0, 0)
+        n, e = sum(len(s.mesh.points) for s in cell.parts), sum(len(s.mesh.triangles) for s in cell.parts)
         points, elements, pairs = np.zeros((n, c)), np.zeros((e, v)), np.zeros((len(nodes.row), c))
         return RecoveredFields(points, points, elements, elements, pairs, pairs, np.zeros(e))
     solution, loads, shares = response.state.solution, response.strain, response.shares
@@ -64,14 +64,9 @@ def recover(cell: TornCell, response: Response | None) -> RecoveredFields:
     return RecoveredFields(total, fluctuation, strain, stress, traction, opening[pair], shares)
 
 
-def _sizes(cell: TornCell) -> list[tuple[int, int]]:
-    """Count nodes and elements in this rank's parts."""
-    return [(len(s.mesh.points), len(s.mesh.triangles)) for s in cell.parts]
-
-
 def out_of_plane_stress(cell: TornCell, stress: Float) -> Float:
     """(m,) stresses 33 for stresses (m, 3) in the plane."""
     plane = cell.case.analysis.plane
     rules = [laws.out_of_plane(cell.case.material_of(s.submesh.phase), plane)[0] for s in cell.parts]
-    sizes = [elements for _, elements in _sizes(cell)]
+    sizes = [len(s.mesh.triangles) for s in cell.parts]
     return np.asarray(np.einsum("ev,ev->e", stress, np.repeat(np.reshape(rules, (-1, 3)), sizes, axis=0)))

@@ -1,4 +1,4 @@
-"""Cells meshed by all ranks, cut on rank 0 or in their tiles.
+"""Cells meshed by all ranks, cut on rank 0 or by tiles.
 
 Rank 0 begins the coarse mesh; all ranks make nodes on lines, and the tiles of large cells.  There each rank cuts its
 tiles, and no rank has all tiles.  Matrix pieces lie within tiles, and a fibre lies in one tile, so subdomains depend on
@@ -51,7 +51,7 @@ def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: Part
 
 
 def place_nodes(case: Case, comm: MPI.Intracomm, policy: TilePolicy) -> NodedCell | CoarseMesh | None:
-    """Return a user's mesh, or the cell with noded lines and empty tiles.  Collective.
+    """Return a user's mesh, or noded lines with empty tiles.  Collective.
 
     All ranks place nodes; None but on rank 0.
 
