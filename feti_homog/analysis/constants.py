@@ -15,7 +15,6 @@ from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import MeshErrors
 from feti_homog.case.case import Case
 from feti_homog.errors import NotCarriedError
-from feti_homog.fem.problem import AXIAL
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.unit_cell import TornCell
@@ -98,7 +97,7 @@ def _comparisons(cell: TornCell, fractions: Mapping[str, float]) -> dict[str, An
             springs = None
             if has_springs:
                 ((normal, tangential),) = phase_laws.springs(case).stiffness
-                ((axial,),) = phase_laws.springs(case, AXIAL).stiffness
+                ((axial,),) = phase_laws.springs(case, cell.problems[1].solver.problem).stiffness
                 springs = Springs(normal, tangential, axial, float(radii[phase][0]))
             fibres.append(Fibres(fractions[phase], phases[phase], springs))
         entries["estimates"] = estimates(phases[matrix], fibres)

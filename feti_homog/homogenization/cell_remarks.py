@@ -7,8 +7,10 @@ import math
 import numpy as np
 
 from feti_homog.case.case import Case
+from feti_homog.case.cell_sizes import MOST_REFINED
 from feti_homog.case.interface_section import interface_label
 from feti_homog.homogenization import phase_laws
+from feti_homog.homogenization.arc_selection import LEAST_SIZE
 from feti_homog.materials.constants import engineering_moduli
 from feti_homog.materials.laws import plane_stiffness
 from feti_homog.mesh.periodic_topology import Torus
@@ -24,7 +26,6 @@ RESOLVED = 0.5
 RESOLVED_SOFTENING = 1 / 3
 # Relative difference of stiffness ratios, or of teeth, that is none.
 SAME_RATIO = 1e-3
-LARGEST_REFINE, SMALLEST_SIZE = 8, 1e-5
 
 
 def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
@@ -202,9 +203,9 @@ def _remedies(case: Case, width: float, edge: float, length: float) -> str:
     size = length * 2**case.cell.refine / width
     digit = 10.0 ** (math.floor(math.log10(size)) - 1)
     size = math.floor(size / digit + 1e-9) * digit
-    finer = [f"refine = {refine}"] if refine <= LARGEST_REFINE else []
+    finer = [f"refine = {refine}"] if refine <= MOST_REFINED else []
     if case.cell.has_own_mesh:
         return " or ".join([*finer, "a finer mesh"])
-    if size >= SMALLEST_SIZE:
+    if size >= LEAST_SIZE:
         finer.insert(0, f"interface_size = {size:.2g} (or mesh_size, of all elements)")
     return ", or ".join(finer) or "interface_size and refine"
