@@ -32,7 +32,7 @@ from feti_homog.interface.friction.sliding_cell import SlidingCell
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.path.coulomb_leg import CoulombLeg
 from feti_homog.interface.path.frictionless_leg import FrictionlessLeg
-from feti_homog.interface.path.path_following import Engine, events, increments
+from feti_homog.interface.path.path_following import events, increments
 from feti_homog.interface.path.path_points import Energies, Point, unloaded
 from feti_homog.materials.voigt import voigt_names
 from feti_homog.results.checkpoint import has_multipliers
@@ -146,7 +146,7 @@ def _points(
             point = found_again(point, cell, law)
         begin, responses = point.after, averages(event, point, context.loads)
         yield point, energies, responses
-    engine: Engine = FrictionlessLeg
+    engine: type[FrictionlessLeg] | partial[CoulombLeg] = FrictionlessLeg
     if context.case.has_friction:
         friction, of_damage = np.array([interface.rubbing for interface in context.case.interfaces])[cell.nodes.pair].T
         engine = partial(CoulombLeg, sliding=SlidingCell(cell, friction, of_damage))

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from feti_homog.case import cell_sizes
 from feti_homog.case.case import Case
-from feti_homog.case.cell_sizes import MOST_REFINED
 from feti_homog.case.interface_section import interface_label
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.arc_selection import LEAST_SIZE
@@ -203,7 +203,7 @@ def _remedies(case: Case, width: float, edge: float, length: float) -> str:
     size = length * 2**case.cell.refine / width
     digit = 10.0 ** (math.floor(math.log10(size)) - 1)
     size = math.floor(size / digit + 1e-9) * digit
-    finer = [f"refine = {refine}"] if refine <= MOST_REFINED else []
+    finer = [f"refine = {refine}"] if refine <= cell_sizes.MOST_REFINED else []
     if case.cell.has_own_mesh:
         return " or ".join([*finer, "a finer mesh"])
     if size >= LEAST_SIZE:

@@ -24,12 +24,12 @@ from feti_homog.fem.point_fields import energy_change
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
+from feti_homog.homogenization.domain_partition import in_cell
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.states import BONDED, Status
 from feti_homog.interface.debonded_arcs import CrackTips, InterfaceChains, closing_work
 from feti_homog.materials.voigt import strain_tensor
-from feti_homog.mesh.sizes.from_sources import wrap
 from feti_homog.system.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Array, Float, Int
 
@@ -52,7 +52,7 @@ class CrackExtension:
         """Find the elements around points; the cell has `period` (2,)."""
         mesh = subdomain.mesh
         self.subdomain, self._period = subdomain, period
-        self._tree = cKDTree(wrap(mesh.points, period), boxsize=period)
+        self._tree = cKDTree(in_cell(mesh.points, period), boxsize=period)
         elements = np.repeat(np.arange(len(mesh.triangles)), mesh.triangles.shape[1])
         entries = np.ones(len(elements), np.int8), (mesh.triangles.ravel(), elements)
         self._elements_of = csr_matrix(entries, shape=(len(mesh.points), len(mesh.triangles)))
@@ -66,7 +66,7 @@ class CrackExtension:
             u: (dofs,) u*.
             E: (2, 2) macroscopic strain.
         """
-        inside = self._tree.query_ball_point(wrap(tip, self._period), reach)
+        inside = self._tree.query_ball_point(in_cell(tip, self._period), reach)
         if not inside:
             return 0.0
         mesh = self.subdomain.mesh
@@ -134,7 +134,7 @@ class EnergyReleaseRates:
         self.direction, self.length = np.where(direction <= -180.0, 180.0, direction), self._gathered(nodes.length)
         # (interfaces, 2) normal and tangential stiffnesses of the bonds, infinite where they are rigid.
         self._stiffness = np.array(phase_laws.springs(cell.case).stiffness or ((np.inf, np.inf),))
-        self._tree = cKDTree(wrap(self.points, self._period), boxsize=self._period)
+        self._tree = cKDTree(in_cell(self.points, self._period), boxsize=self._period)
         # (k, 2) body boundary nodes on all ranks, and (k,) their bodies, VOID at voids. Each body has its own nodes
         # where two bodies meet; cuts between a body's pieces are no boundaries.
         borders = [np.bincount(s.submesh.edge_class[s.submesh.triangle_edges].ravel()) == 1 for s in cell.subdomains]
@@ -196,11 +196,11 @@ class EnergyReleaseRates:
         spokes = nearest_image(place - self.cell.summary.centres[bodies[:, 1]], self._period)
         # Cracks may be extended within `reach`, which has no other tip, and no boundary but the tip's circle.
         radius, (points, body), period = np.linalg.norm(spokes, axis=1), self._boundaries, self._period
-        reach, places = np.minimum(radius, REACH_OF_A_PERIOD / REACH * period.min()), wrap(place, period)
+        reach, places = np.minimum(radius, REACH_OF_A_PERIOD / REACH * period.min()), in_cell(place, period)
         if len(place) > 1:
             nearest, _ = cKDTree(places, boxsize=period).query(places, 2)
             reach = np.minimum(reach, nearest[:, 1])
-        inside = cKDTree(wrap(points, period), boxsize=period).query_ball_point(places, reach)
+        inside = cKDTree(in_cell(points, period), boxsize=period).query_ball_point(places, reach)
         for t, nodes in enumerate(inside):
             away = nearest_image(points[nodes] - place[t], period)
             off_circle = np.abs(np.linalg.norm(away + spokes[t], axis=1) / radius[t] - 1) > OFF_CIRCLE
@@ -225,7 +225,9 @@ class EnergyReleaseRates:
         smallest, order = MODE_LENGTH * self._radius(tips), self.cell.case.cell.order
         work, length = np.zeros((len(smallest), 2)), np.zeros(len(smallest))
         # Nodes of a chain within these lengths at most, and one element more.
-        counts = self._tree.query_ball_point(wrap(self.points[tips.node], self._period), smallest, return_length=True)
+        counts = self._tree.query_ball_point(
+            in_cell(self.points[tips.node], self._period), smallest, return_length=True
+        )
         steps = order + int(counts.max(initial=1))
         chains = [self._chains.onward(tips.node, start, steps) for start in (tips.behind, tips.ahead)]
         for t, (behind, front) in enumerate(zip(*chains, strict=True)):

@@ -15,7 +15,8 @@ from typing import TypeVar
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.case.case import Case, check_phases
+from feti_homog.case import case as cases
+from feti_homog.case.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import assign_ranks, cut_into_pieces
 from feti_homog.homogenization import arc_selection, cell_remarks
@@ -90,7 +91,7 @@ def begin_mesh(case: Case, policy: TilePolicy) -> UnmeshedCell | NodedCell | Coa
         estimate = ElementEstimate.of(case.cell, listed)
         section = replace(case.cell, tip_size=arc_selection.size(case, estimate))
         cell = begin(section, listed, arc_selection.marks(case, estimate.fibres), policy)
-    check_phases(case, cell.phases)
+    cases.check_phases(case, cell.phases)
     return cell
 
 
