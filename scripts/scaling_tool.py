@@ -30,9 +30,9 @@ from feti_homog.case.case import Case  # noqa: E402
 from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace  # noqa: E402
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace  # noqa: E402
 from feti_homog.feti.decomposition.jump_operator import JumpOperator  # noqa: E402
-from feti_homog.homogenization import coarse_meshes  # noqa: E402
+from feti_homog.homogenization.domain_partition import summary_of  # noqa: E402
 from feti_homog.homogenization.partition_policy import DEFAULT_POLICY  # noqa: E402
-from feti_homog.homogenization.tile_tearing import summary_of, tiled_cell, tiles_to_fill  # noqa: E402
+from feti_homog.homogenization.tile_tearing import begin_mesh, tiled_cell, tiles_to_fill  # noqa: E402
 from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
 from feti_homog.mesh.fill.gmsh_mesher import UnmeshedCell  # noqa: E402
 from feti_homog.mesh.tiles.tiles import TilePolicy  # noqa: E402
@@ -159,7 +159,7 @@ def measure(case: Case, progress: StagePeaks, way: str | None) -> dict[str, Any]
 def seconds_alone(case: Case, policy: TilePolicy) -> float:
     """In which rank 0 meshes a cell, but for the nodes that all place, and fills one that is not cut into tiles."""
     start = time.perf_counter()
-    unmeshed = coarse_meshes.begin_mesh(case, policy)
+    unmeshed = begin_mesh(case, policy)
     assert isinstance(unmeshed, UnmeshedCell)
     begun = time.perf_counter()
     stations = unmeshed.bare.stations()

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from feti_homog.analysis.constants import energy_error, note_accuracy, state_error, unit_errors
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.analysis.mesh_errors import energy_error, note_accuracy, state_error, unit_errors
 from feti_homog.analysis.result_records import AnglePoint
 from feti_homog.analysis.tip_records import tip_rates
 from feti_homog.case.loads import Angle
@@ -17,9 +17,8 @@ from feti_homog.homogenization.averaging import Response, asymmetry
 def run(context: AnalysisContext) -> dict[str, Any]:
     """Return `angle`, a point an angle.
 
-    A point is the stress under the case's strain, else the stiffness by unit loads.
-
-    Each angle begins with the previous angle's multipliers.
+    A point is the stress under the case's strain, else the stiffness by unit loads.  Each angle begins with the
+    previous angle's multipliers.
     """
     section = context.case.section
     assert isinstance(section, Angle)

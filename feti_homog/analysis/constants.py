@@ -1,21 +1,36 @@
-"""Constants that follow from a linear cell's stiffness, with bounds and closed-form estimates."""
+"""Constants from a linear cell's stiffness: bounds, estimates, mesh errors."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.linalg import eigh
 
 from feti_homog.analysis.cell_records import StiffnessBounds
+from feti_homog.analysis.context import AnalysisContext
+from feti_homog.analysis.result_records import MeshErrors
 from feti_homog.case.case import Case
+from feti_homog.errors import NotCarriedError
 from feti_homog.homogenization import phase_laws
+from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.materials import bounds, laws
 from feti_homog.materials import constants as named_constants
 from feti_homog.microstructure.phase_names import COATING
+from feti_homog.system.runtime.records import plain
 from feti_homog.typing import Float
 
+if TYPE_CHECKING:
+    from feti_homog.homogenization.mesh_error import EnergyErrors
+
+Named = Mapping[str, Float]
+PARTS = ("absolute", "signed", "least")
+OFF = 3.0  # largest ratio of true errors of the energy to estimated ones
+ROUNDING = 1e-9  # of bounds, relative
 # Relative difference of equal radii: fibres of users' meshes are fitted to nodes.
 SAME_RADIUS = 1e-6
 
@@ -44,7 +59,7 @@ def constants(cell: TornCell, secants: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def stiffness_constants(stiffness: Float, thermal: Float | None) -> dict[str, Any]:
-    """Return constants from a stiffness (3, 3) or (6, 6), with the thermal stress (6,), as `Result` entries."""
+    """Return `Result` constants from stiffness (3, 3), (6, 6), thermal stress (6,)."""
     if len(stiffness) == 3:
         return {"moduli": named_constants.engineering_moduli(stiffness)}
     compliance = np.linalg.inv(stiffness)
@@ -59,7 +74,7 @@ def stiffness_constants(stiffness: Float, thermal: Float | None) -> dict[str, An
 
 
 def _comparisons(cell: TornCell, fractions: Mapping[str, float]) -> dict[str, Any]:
-    """Return closed-form estimates for round fibres, and bounds for any rigidly bonded fibres.
+    """Return closed-form estimates for round fibres, bounds for rigidly bonded ones.
 
     Estimates exist for fibres without coatings, held in the matrix by the same bonds, with springs of one radius;
     bounds for transversely isotropic phases.
@@ -82,7 +97,7 @@ def _comparisons(cell: TornCell, fractions: Mapping[str, float]) -> dict[str, An
             springs = None
             if has_springs:
                 ((normal, tangential),) = phase_laws.springs(case).stiffness
-                ((axial,),) = phase_laws.axial_springs(case).stiffness
+                ((axial,),) = phase_laws.springs(case, cell.problems[1].solver.problem).stiffness
                 springs = Springs(normal, tangential, axial, float(radii[phase][0]))
             fibres.append(Fibres(fractions[phase], phases[phase], springs))
         entries["estimates"] = estimates(phases[matrix], fibres)
@@ -92,7 +107,168 @@ def _comparisons(cell: TornCell, fractions: Mapping[str, float]) -> dict[str, An
 
 
 def _has_estimates(case: Case, phases: Sequence[str], radii: Sequence[Float], has_springs: bool) -> bool:
-    """Return whether estimates exist for fibre `radii` in each phase, NaN if not round."""
+    """Return whether estimates exist for fibre `radii`, NaN if not round."""
     if COATING in phases or any(interface.between is not None for interface in case.interfaces):
         return False
     return not any(np.isnan(r).any() or (has_springs and np.ptp(r) > SAME_RADIUS * r.max()) for r in radii)
+
+
+def unit_errors(context: AnalysisContext, responses: list[Response]) -> tuple[list[EnergyErrors], list[Response]]:
+    """Estimate unit load errors by problem; return responses with element shares.
+
+    Without `mesh_error` no errors; without a use for shares the responses as they are.  Collective.
+    """
+    if not context.case.output.mesh_error:
+        return [], responses
+    from feti_homog.homogenization.mesh_error import energy_errors  # with the recovery of stresses
+
+    errors: list[EnergyErrors] = []
+    shared, keep = list[Response](), context.recovers_again
+    for problem, group in zip(context.loads.problems, context.loads.by_problem(responses), strict=True):
+        touches = problem.interface.contact and any(response.debonded for response in group)
+        errors.append(energy_errors(problem.cell, group, touches, keep))
+        shared += [replace(response, shares=part) for response, part in zip(group, errors[-1].shares.T, strict=True)]
+    return errors, shared if keep else responses
+
+
+def mesh_error(
+    context: AnalysisContext, secants: Mapping[str, Any], of_plus: list[EnergyErrors], of_minus: list[EnergyErrors]
+) -> dict[str, Any]:
+    """Return the `Result` entry `mesh_error`, empty without errors.
+
+    A constant f(C) errs by max(|f(C - signed) - f(C)|, |f(C - least) - f(C)|).  Notes errors above the accuracy of the
+    case, and values outside their bounds, which are faults beyond any mesh error.
+
+    Args:
+        secants: `effective_stiffness` and entries that follow from it, as in `Result`.
+        of_plus, of_minus: errors under plus and, where faces touch, minus the unit loads.
+    """
+    if not of_plus:
+        return {}
+    parts = {name: _secants(of_plus, name) for name in PARTS}
+    entries = parts["absolute"]
+    entries |= {f"{name}_compression": entry for name, entry in _secants(of_minus, "absolute").items()}
+    stiffness, heat = secants["effective_stiffness"], secants.get("thermal_stress")
+    constants, energy = dict[str, float](), _energy(stiffness, parts)
+    if "moduli" in secants or "constants" in secants:
+        values, errors = _constants(stiffness, heat), dict[str, Any]()
+        for changes in (parts["signed"], parts["least"]):
+            changed_heat = None if heat is None else heat - changes["thermal_stress"]
+            changed = _constants(stiffness - changes["effective_stiffness"], changed_heat)
+            errors = {name: np.maximum(errors.get(name, 0.0), np.abs(changed[name] - values[name])) for name in values}
+        _note_bounds(context, secants, values, errors, energy)
+        entries |= {name: errors.pop(name) for name in ("thermal_expansion",) if name in errors}
+        constants = {name: float(value) for name, value in errors.items()}
+    note_accuracy(context, energy)
+    return {"mesh_error": MeshErrors(**entries, energy=energy, constants=constants)}
+
+
+def note_accuracy(context: AnalysisContext, energy: float) -> None:
+    """Note a sufficient mesh if the energy error exceeds `accuracy`.  Collective."""
+    cell = context.case.cell
+    if cell.accuracy is None or (energy := context.cell.comm.bcast(energy)) <= cell.accuracy:
+        return
+    finer = cell.refine + math.ceil(math.log(energy / cell.accuracy, 4**cell.order))
+    line = f"[cell] accuracy = {cell.accuracy:g}: the estimated error of the strain energy is {energy:.1e}"
+    context.notes.append(
+        f"{line}; mesh_size = {cell.mesh_size:g}, refine = {finer} and order = {cell.order} in its place would do"
+    )
+
+
+def _note_bounds(
+    context: AnalysisContext, secants: Mapping[str, Any], values: Named, errors: Named, energy: float
+) -> None:
+    """Note constants outside their bounds; report faults beyond any possible mesh error.
+
+    No constant errs relatively by more than `energy`, the largest relative strain energy error, of which the
+    estimate counts OFF times.  Bounds apply to cells with their symmetry, and follow from the meshed phase shares.
+    """
+    limits: dict[str, Sequence[float]] = {}
+    plane = secants.get("bounds")
+    if plane is not None and plane.hashin_shtrikman is not None:
+        C = secants["effective_stiffness"]
+        is_square = max(abs(C[0, 0] - C[1, 1]), *np.abs(C[:2, 2])) <= errors["bulk"]
+        is_isotropic = values["anisotropy"] <= errors["anisotropy"]
+        limits |= {"bulk": plane.hashin_shtrikman.bulk} if is_square else {}
+        limits |= {"shear": plane.hashin_shtrikman.shear} if is_isotropic else {}
+    if secants.get("fibre_bounds") is not None and values["deviation"] <= errors["deviation"]:
+        limits |= {name: pair for name, pair in plain(secants["fibre_bounds"]).items() if pair is not None}
+    for name, (lower, upper) in limits.items():
+        value, error = float(values[name]), float(errors[name])
+        outside = max(lower - value, value - upper)
+        if outside <= ROUNDING * abs(upper):
+            continue
+        line = f"{name} = {value:.6g} is outside its bounds, {lower:.6g} and {upper:.6g}, by {outside:.1e}"
+        possible = OFF * max(error, energy * abs(value))
+        if outside > possible:
+            context.checks.faults.append(f"{line}, more than any error of the mesh, {possible:.1e}; result marked")
+        else:
+            context.notes.append(f"{line}; the estimated error of the mesh is {error:.1e}: refine")
+
+
+def state_error(context: AnalysisContext, responses: Sequence[Response]) -> tuple[dict[str, float], list[Response]]:
+    """Return `mesh_error`, the relative energy error, and responses with shares.
+
+    Without `mesh_error` no error; without a use for shares the responses as they are.  Collective.
+    """
+    if not context.case.output.mesh_error:
+        return {}, list(responses)
+    from feti_homog.homogenization.mesh_error import energy_errors  # with the recovery of stresses
+
+    keep, pairs = context.recovers_again, zip(context.loads.problems, responses, strict=False)
+    errors = [energy_errors(problem.cell, [response], keep=keep) for problem, response in pairs]
+    energy = sum(2 * response.stored for response in responses)
+    size = max(abs(sum(getattr(error, part).item() for error in errors)) for part in ("signed", "least"))
+    shares = [error.shares[:, 0] if keep else None for error in errors]
+    shared = [replace(response, shares=part) for response, part in zip(responses, shares, strict=True)]
+    return {"mesh_error": size / energy if energy > 0 else 0.0}, shared
+
+
+def check_accuracy(context: AnalysisContext) -> None:
+    """Note the first load's mesh error if accuracy is asked.  Collective."""
+    if context.case.cell.accuracy is None or not context.case.output.mesh_error:
+        return
+    cell, target = context.loads.interfaces, next(target for target in context.case.targets if any(target.values()))
+    try:
+        state = cell.equilibrium(context.loads.load(target), context.bonds(None), cell.no_multipliers())
+    except NotCarriedError:
+        return  # the path will meet it, unless friction carries its loads
+    error, _ = state_error(context, context.loads.responses(state, 1.0))
+    note_accuracy(context, error["mesh_error"])
+
+
+def energy_error(stiffness: Float, errors: list[EnergyErrors]) -> dict[str, float]:
+    """Return `mesh_error` for a secant stiffness, the largest relative strain energy error."""
+    return {"mesh_error": _energy(stiffness, {name: _secants(errors, name) for name in PARTS})} if errors else {}
+
+
+def _secants(errors: Sequence[EnergyErrors], name: str) -> dict[str, Float]:
+    """Return one kind of errors in `effective_stiffness` and `thermal_stress`."""
+    if not errors:
+        return {}
+    entries = phase_laws.secants(*(getattr(error, name) for error in errors))
+    return {"effective_stiffness": entries.pop("stiffness")} | entries
+
+
+def _constants(stiffness: Float, heat: Float | None) -> dict[str, Float]:
+    """Return a stiffness's constants by name, and the `thermal_expansion`."""
+    entries = stiffness_constants(stiffness, heat)
+    compliance = entries.pop("compliance", None)
+    named: dict[str, Any] = {}
+    for key, record in entries.items():
+        named |= {key: record} if key == "thermal_expansion" else plain(record)
+    if compliance is not None:  # nu12 and nu13 of the material
+        named |= {f"nu3{k + 1}": -compliance[2, k] / compliance[2, 2] for k in range(2)}
+    return {name: np.asarray(value) for name, value in named.items() if value is not None}
+
+
+def _energy(stiffness: Float, parts: Mapping[str, Mapping[str, Float]]) -> float:
+    """Return the largest relative strain energy error under any strain.
+
+    If the stiffness is not positive definite, the largest under unit strains.
+    """
+    symmetric = (stiffness + stiffness.T) / 2
+    if np.linalg.eigvalsh(symmetric)[0] <= 0:
+        return float((np.diag(parts["absolute"]["effective_stiffness"]) / np.abs(np.diag(stiffness))).max())
+    errors = (parts[name]["effective_stiffness"] for name in ("signed", "least"))
+    return max(float(np.abs(eigh((error + error.T) / 2, symmetric, eigvals_only=True)).max()) for error in errors)

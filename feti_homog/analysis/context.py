@@ -1,4 +1,4 @@
-"""One analysis run: the cell under its loads, checks, recorded states and points, progress."""
+"""One analysis run: the cell under loads, checks, states, points, progress."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from feti_homog.homogenization.averaging import FibreInterfaces, Homogenization,
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.load_scales import ABSURD
-from feti_homog.interface.contact.states import OPEN, BondState, Equilibrium
+from feti_homog.interface.contact.states import BONDED, OPEN, BondState, Equilibrium
 from feti_homog.interface.loads import Load
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS
 from feti_homog.results.checkpoint import NoCheckpoint
@@ -76,20 +76,20 @@ class CellLoads:
         return [name for name, is_free in zip(self.names, masks, strict=True) if is_free]
 
     def excess(self, responses: Sequence[Response]) -> float:
-        """Return the ratio of strains under a load to strains in the bonded cell.  Collective."""
+        """Return the ratio of strains to the bonded cell's.  Collective."""
         pairs = zip((problem.interface.scales for problem in self.problems), (r.state for r in responses), strict=True)
         return max(scales.excess(state.solution.strain, state.asked) for scales, state in pairs)
 
     def secants(self, responses: Sequence[Response], sign: float) -> dict[str, Float]:
-        """Return `stiffness`, (39), (3, 3) or (6, 6), and `thermal_stress` (6,) if a temperature is a load.
+        """Return `stiffness`, Eq. (39), and `thermal_stress` (6,) under a temperature.
 
-        `responses` are to plus or minus each unit load, by their `sign`.
+        Stiffness is (3, 3) or (6, 6); `responses` are to plus or minus each unit load, by their `sign`.
         """
         groups = self.by_problem(responses)
         return phase_laws.secants(*(np.stack([sign * r.stress for r in group], axis=1) for group in groups))
 
     def means(self, responses: Sequence[Response]) -> dict[str, Float | float]:
-        """Return macroscopic `strain` and `stress` in all problems, and `temperature` if it is a load."""
+        """Return macroscopic `strain`, `stress` and, if a load, `temperature`."""
         strain = phase_laws.components(*(response.strain for response in responses))
         stress = phase_laws.components(*(response.stress for response in responses))
         heat = {"temperature": float(responses[0].strain[-1])} if "temperature" in self.names else {}
@@ -125,7 +125,7 @@ class AnalysisContext:
 
     @classmethod
     def of(cls, cell: TornCell, progress: Progress, states: StateRecorder | None = None) -> AnalysisContext:
-        """Make a cell's context without a checkpoint; by default it records no states."""
+        """Make a cell's context, without checkpoint; by default without states."""
         contact = cell.case.interface is not None and cell.case.interface.contact
         recorder = StateRecorder(cell, None, False, progress.say) if states is None else states
         checks, checkpoint = CheckRecorder(cell.solver.rtol), NoCheckpoint(cell.comm)
@@ -148,13 +148,8 @@ class AnalysisContext:
 
     @property
     def recovers_again(self) -> bool:
-        """True if displacements inside bodies are found more than once, so that interior factors pay."""
-        return self.states.has_place or self.needs_sensitivities or self.case.analysis.type == "angle"
-
-    @property
-    def needs_sensitivities(self) -> bool:
-        """True if the case asks for derivatives."""
-        return self.case.output.sensitivities
+        """True if interior factors pay, for several recoveries inside bodies."""
+        return self.states.has_place or self.case.output.sensitivities or self.case.analysis.type == "angle"
 
     def bonds(self, opening: float | None) -> BondState:
         """Interface state before any load: prescribed debonded nodes are open."""
@@ -163,7 +158,7 @@ class AnalysisContext:
     def unit_responses(
         self, label: str, bonds: BondState, starts: Sequence[Float], sign: float
     ) -> tuple[dict[str, Float], list[Response]]:
-        """Return `CellLoads.secants` and the responses to plus or minus each unit load.  Collective."""
+        """Return `CellLoads.secants` and responses to plus or minus unit loads.  Collective."""
         responses = list[Response]()
         for problem in self.loads.problems:
             first, count = len(responses), len(problem.loads)
@@ -197,12 +192,9 @@ class AnalysisContext:
         return FibreInterfaces(self.cell)
 
     def point(self, responses: Sequence[Response]) -> dict[str, Any]:
-        """Return debonding at a result.json point, under its last plane strain, and all iterations.
-
-        Collective.
-        """
+        """Return a point's debonding under the last plane strain, all iterations.  Collective."""
         last = responses[: len(STRAINS)][-1]
-        length = self.fibre_interfaces.debonded_length(last.state.status)
+        length = self.fibre_interfaces.length(last.state.status != BONDED)
         debonding = {
             "debonded_share": self.fibre_interfaces.share(length),
             "debonded_length": length,
@@ -213,7 +205,7 @@ class AnalysisContext:
         return debonding | last.counts | {"iterations": sum(r.state.iterations for r in responses)}
 
     def loaded_point(self, responses: Sequence[Response]) -> dict[str, Any]:
-        """Return means, energies and debonding at a result.json point under one load.  Collective."""
+        """Return a loaded point's means, energies and debonding.  Collective."""
         self.undetermined.append(self.loads.undetermined(responses))
         self.excess = max(self.excess, self.loads.excess(responses))
         energies = {
@@ -224,7 +216,7 @@ class AnalysisContext:
         return self.loads.means(responses) | energies | self.point(responses[:1]) | {"iterations": iterations}
 
     def remarks(self) -> list[str]:
-        """List the notes, and a line each on undetermined and on absurd strains."""
+        """List notes, and lines on undetermined and on absurd strains."""
         lines, points, label = [*self.notes], sum(map(bool, self.undetermined)), f"[{self.case.analysis.type}]"
         if names := [name for name in SPATIAL_STRAINS if any(name in free for free in self.undetermined)]:
             where = f" at {points} of {len(self.undetermined)} points" if self.case.section.is_followed else ""

@@ -1,4 +1,4 @@
-"""`analysis.type = "envelope"`: debonding onset in a plane of macroscopic stresses or strains.
+"""`analysis.type = "envelope"`: debonding onset in a macroscopic stress or strain plane.
 
 The cell is linear, so tractions under all loads are superposed from unit loads: no direction costs a solve.
 """
@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.analysis.constants import constants
+from feti_homog.analysis.constants import constants, mesh_error, unit_errors
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.analysis.mesh_errors import mesh_error, unit_errors
 from feti_homog.analysis.result_records import EnvelopePoint
 from feti_homog.analysis.tip_records import DIRECTION_DIGITS, bond_directions, criterion_of
 from feti_homog.case.loads import Envelope
@@ -34,7 +33,7 @@ COSINE_ROUNDING = 1e-15
 
 @dataclass(frozen=True)
 class Rays:
-    """Macroscopic states on n rays, each a start plus f times a direction, f >= 0.
+    """Macroscopic states on n rays: start plus f >= 0 times direction.
 
     Attributes:
         strain, stress: (n, m) directions.
@@ -88,10 +87,9 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 def rays_of(
     plane: Sequence[str], angles: Float, stiffness: Float, thermal_stress: Float | None, temperature: float
 ) -> Rays:
-    """Return the rays in directions (n,), degrees, in a plane with the axes `plane`.
+    """Return the rays in directions (n,), degrees, between axes `plane`.
 
-    Stress rays have E = C^-1 S and begin at zero stress after a temperature change, strain rays begin at zero
-    strain.
+    Stress rays have E = C^-1 S and begin at zero stress after a temperature change, strain rays begin at zero strain.
     """
     strains, stresses = voigt_names(len(stiffness))
     by_stress = plane[0] in stresses
@@ -114,7 +112,14 @@ class _Finder:
         cell = context.cell
         self._comm, self._law, self._onset, self._loads = cell.comm, law, onset, context.loads.names
         self._problems, self._noise = context.loads.interfaces.problems, context.plane.interface.scales.sign_noise
-        self._unit = _unit_tractions(context, responses)
+        # (l, k, c) tractions at this rank's nodes by unit load: normal, tangential, and axial in space.
+        components = [problem.cell.solver.problem.components for problem in context.loads.problems]
+        tractions, column, groups = list[Float](), 0, context.loads.by_problem(responses)
+        for problem, c, group in zip(context.loads.problems, components, groups, strict=True):
+            padding = [(0, 0), (column, sum(components) - column - c)]
+            tractions += [np.pad(problem.interface.traction(r.state.solution), padding) for r in group]
+            column += c
+        self._unit = np.stack(tractions)
         # Keys of a break under a traction with this number of components.
         self._break_names = tuple(law.break_names)[: self._unit.shape[2]]
         self._chunk = max(1, CHUNK // max(1, self._comm.allreduce(self._unit.shape[1], MPI.MAX)))
@@ -148,13 +153,13 @@ class _Finder:
                 yield rays.at(ray, float(factor)) | place | dict(zip(self._break_names, shares, strict=True))
 
     def _unit_loads(self, strain: Float, temperature: float, names: Sequence[str]) -> Float:
-        """(n, l) each unit load's share in strains (n, m) with these names and a temperature change."""
+        """(n, l) unit load shares in named strains (n, m) and temperature."""
         column = {name: strain[:, number] for number, name in enumerate(names)}
         column["temperature"] = np.full(len(strain), temperature)
         return np.stack([column[load] for load in self._loads], axis=1)
 
     def _error_utilisation(self, loads: Float) -> Float:
-        """(n, k) utilisations by the bond stresses in all problems under unit loads (n, l).  Collective."""
+        """(n, k) utilisations by bond stresses under unit loads (n, l).  Collective."""
         first, total = 0, np.zeros((len(loads), len(self._fibre)))
         for problem, part in zip(self._problems, ((0, 1), (2,))[: len(self._problems)], strict=True):
             end = first + len(problem.solver.problem.loads)
@@ -167,9 +172,8 @@ class _Finder:
     def _first(self, factors: Float, before: Float, directions: Float) -> list[list[float]]:
         """Return each ray's least factor, its bond and break shares.
 
-        In a row: factor, then fibre, interface and direction of the bond, then shares of the break.
-
-        Bonds that break together: lowest fibre, then interface, then angle.  Collective.
+        In a row: factor, then fibre, interface and direction of the bond, then shares of the break.  Bonds that break
+        together: lowest fibre, then interface, then angle.  Collective.
         """
         n = len(factors)
         smallest = factors.min(axis=1, initial=np.inf)
@@ -186,15 +190,3 @@ class _Finder:
         first = np.lexsort((np.round(table[:, :, 3], DIRECTION_DIGITS), table[:, :, 2], table[:, :, 1]), axis=0)[0]
         bonds: list[list[float]] = table[first, np.arange(n)].tolist()
         return bonds
-
-
-def _unit_tractions(context: AnalysisContext, responses: Sequence[Response]) -> Float:
-    """(l, k, c) tractions at this rank's nodes under each unit load: normal, tangential, and axial in space."""
-    components = [problem.cell.solver.problem.components for problem in context.loads.problems]
-    tractions, column = list[Float](), 0
-    groups = context.loads.by_problem(responses)
-    for problem, c, group in zip(context.loads.problems, components, groups, strict=True):
-        padding = [(0, 0), (column, sum(components) - column - c)]
-        tractions += [np.pad(problem.interface.traction(response.state.solution), padding) for response in group]
-        column += c
-    return np.stack(tractions)

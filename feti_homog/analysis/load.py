@@ -1,11 +1,11 @@
-"""`analysis.type = "load"`: one equilibrium under given strains, stresses and temperature; nothing breaks."""
+"""`analysis.type = "load"`: equilibrium under given strains, stresses, temperature; nothing breaks."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from feti_homog.analysis.constants import note_accuracy, state_error
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.analysis.mesh_errors import note_accuracy, state_error
 from feti_homog.analysis.result_records import LoadPoint
 from feti_homog.analysis.sensitivities import load_sensitivities
 from feti_homog.analysis.tip_records import IN_PLANE_LOADS, tip_rates
@@ -14,9 +14,8 @@ from feti_homog.analysis.tip_records import IN_PLANE_LOADS, tip_rates
 def run(context: AnalysisContext) -> dict[str, Any]:
     """Return `load`, the state with faces debonded from the start.
 
-    Under the load they are open or in contact.
-
-    Adds `tips` on its arcs if only plane strains are there; `sensitivities` if the case asks.
+    Under the load they are open or in contact.  Adds `tips` on its arcs if only plane strains are there;
+    `sensitivities` if the case asks.
     """
     cell, (target,) = context.loads.interfaces, context.case.targets
     bonds = context.bonds(None)
@@ -33,6 +32,6 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     if context.case.interface is not None and only_in_plane:
         point["tips"] = tip_rates(context, responses[:1], ["strain"])
     document: dict[str, Any] = {"load": LoadPoint(**point)}
-    if context.needs_sensitivities:
+    if context.case.output.sensitivities:
         document |= load_sensitivities(context, context.loads.load(target), responses)
     return document

@@ -1,4 +1,4 @@
-"""`analysis.type = "path"`: load-induced debonding along a macroscopic strain path, Section III.F and Fig. 5."""
+"""`analysis.type = "path"`: debonding along a strain path, Section III.F, Fig. 5."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from feti_homog.analysis.constants import check_accuracy, state_error
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.analysis.mesh_errors import check_accuracy, state_error
 from feti_homog.analysis.path_events import (
     BARS,
     EventProgress,
@@ -50,7 +50,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 
 
 def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, Any]:
-    """Return `path`, a point an event (or increment), each written to the checkpoint at once.
+    """Return `path`, a point an event (or increment), checkpointed at once.
 
     `states` numbers the points with recorded fields, chosen when all points are found.
     """
@@ -84,12 +84,12 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
     if last is None:
         return {"path": (), "resumed": count}
     states: dict[str, Any] = {}
+    document = {"case": context.case.resolved(), "path": entries}  # by which points are marked
     if law.has_tips or context.states.has_place:
-        states = _recorded(context, path, law, entries, last)
+        states = _recorded(context, path, law, document, last)
     else:
         _checked(context, last, _label(path, len(entries) - 1))
     _remark_loose_fibres(context, last)
-    document = _document(context, entries)
     for number, mark in marks(document).items():
         entries[number]["mark"] = mark
     points = tuple(PathPoint(**entry) for entry in entries)
@@ -97,7 +97,7 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
 
 
 def _remark_loose_fibres(context: AnalysisContext, last: Point) -> None:
-    """Remark the first fibres that no bond holds in the end, if faces have friction.  Collective."""
+    """Remark fibres that no bond holds at last, with friction.  Collective."""
     if context.case.has_friction and (loose := context.fibre_interfaces.loose(last.after.bonds.status)):
         names = ", ".join(map(str, loose[:NAMED_FIBRES])) + (", ..." if len(loose) > NAMED_FIBRES else "")
         fibres = f"{len(loose)} fibres ({names})" if len(loose) > 1 else f"fibre {names}"
@@ -105,11 +105,6 @@ def _remark_loose_fibres(context: AnalysisContext, last: Point) -> None:
             f"[path] no bond of {fibres} holds: with friction such a fibre may have several equilibria under one load, "
             "and the path has one of them, by the order of nodes"
         )
-
-
-def _document(context: AnalysisContext, entries: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return the result.json parts by which points are marked."""
-    return {"case": context.case.resolved(), "path": entries}
 
 
 def _events_in_checkpoint(context: AnalysisContext, law: BondLaw) -> int:
@@ -134,7 +129,7 @@ def _events_in_checkpoint(context: AnalysisContext, law: BondLaw) -> int:
 def _points(
     context: AnalysisContext, path: LoadPath, law: BondLaw, stored_events: int
 ) -> Iterator[tuple[Point, tuple[Energies, float] | None, list[Response]]]:
-    """Yield points with responses: first from the checkpoint, with energies up to each, then new ones.
+    """Yield points with responses: first checkpointed ones, with energies, then new ones.
 
     Where nothing carries the stresses any more, or faces with friction cannot go on, the path ends with a fault.
 
@@ -151,7 +146,11 @@ def _points(
             point = found_again(point, cell, law)
         begin, responses = point.after, averages(event, point, context.loads)
         yield point, energies, responses
-    engine = partial(CoulombLeg, sliding=_sliding_cell(context)) if context.case.has_friction else FrictionlessLeg
+    engine: type[FrictionlessLeg] | partial[CoulombLeg] = FrictionlessLeg
+    if context.case.has_friction:
+        pairs = np.array([(each.friction, each.friction_on_damage) for each in context.case.interfaces])
+        friction, on_damage = pairs[cell.nodes.pair].T
+        engine = partial(CoulombLeg, sliding=SlidingCell(cell, friction, friction * on_damage))
     if path.method == "events":
         points = events(cell, law, waypoints, begin, engine)
     else:
@@ -168,7 +167,7 @@ def _points(
 
 
 def _end_of(context: AnalysisContext, responses: list[Response]) -> str:
-    """Return where a path ends: beyond its last point, with the stresses there."""
+    """Return where a path ends: beyond its last point, with stresses."""
     stress = np.asarray(context.loads.means(responses)["stress"])
     pairs = zip(voigt_names(len(stress))[1], stress, strict=True)
     large = [f", {name} {value:.6g}" for name, value in pairs if abs(value) > LEAST_STRESS * np.abs(stress).max()]
@@ -176,18 +175,11 @@ def _end_of(context: AnalysisContext, responses: list[Response]) -> str:
 
 
 def _with_advice(error: NotCarriedError, place: str, path: LoadPath) -> NotCarriedError:
-    """Return the error that ends a path, with its place, empty before the first point, and a remedy."""
+    """Return a path's last error with place, initially empty, and remedy."""
     if isinstance(error, StuckError):
         more = "" if path.method == "events" else " or more increments"
         return StuckError(f"[path]: {error}{place}; a smaller friction{more} may lead further")
     return NotCarriedError(f"[path]: {error}{place}; prescribe strains there") if place else error
-
-
-def _sliding_cell(context: AnalysisContext) -> SlidingCell:
-    """Return the case's faces with their interface friction.  Collective; raises as `SlidingCell`."""
-    cell, pair = context.loads.interfaces, context.loads.interfaces.nodes.pair
-    friction, on_damage = np.array([(each.friction, each.friction_on_damage) for each in context.case.interfaces]).T
-    return SlidingCell(cell, friction[pair], (friction * on_damage)[pair])
 
 
 def _label(path: LoadPath, number: int) -> str:
@@ -208,7 +200,7 @@ def _entry(
         "dissipated_strain_controlled": work.load_controlled,
     }
     if damage is not None:
-        length = context.fibre_interfaces.damaged_length(damage)
+        length = context.fibre_interfaces.length((damage > 0.0) & (damage < 1.0))
         entry |= {"softened": point.softened, "damaged_length": length}
     if context.case.has_friction:
         entry["friction_heat"] = energies.friction
@@ -232,14 +224,15 @@ def _goes_on(context: AnalysisContext, path: LoadPath, point: Point, count: int)
 
 
 def _recorded(
-    context: AnalysisContext, path: LoadPath, law: BondLaw, entries: Sequence[dict[str, Any]], last: Point
+    context: AnalysisContext, path: LoadPath, law: BondLaw, document: dict[str, Any], last: Point
 ) -> dict[str, Any]:
-    """Record tips and fields at kept points, read from the checkpoint; it may lack the last.  Collective.
+    """Record tips and fields at kept checkpoint points and the last.  Collective.
 
     Returns `states`, the point numbers with recorded fields.
     """
     legs = len(context.case.targets) if path.method == "events" else 0
-    numbers = kept(entries, context.case.output.states, legs, marks(_document(context, entries)))
+    entries = document["path"]
+    numbers = kept(entries, context.case.output.states, legs, marks(document))
     with context.progress.stage("states") as line:
         for number in context.progress.bar(numbers, "states"):
             point = last if number == len(entries) - 1 else read(context, law, number)[1]
@@ -255,7 +248,7 @@ def _recorded(
 
 
 def _checked(context: AnalysisContext, point: Point, name: str) -> tuple[Point, Sequence[Response]]:
-    """Return a point completed by F lambda and its responses, and record their checks.  Collective."""
+    """Return a point completed by F lambda; record its checks.  Collective."""
     point = replace(point, state=context.loads.interfaces.completed(point.state))
     responses = context.loads.responses(point.state, point.scale)
     for response in responses:

@@ -1,4 +1,4 @@
-"""Path events: energies up to each, their form in the checkpoint, and lines about them."""
+"""Path events: energies, form in the checkpoint, and printed lines."""
 
 from __future__ import annotations
 
@@ -40,9 +40,7 @@ SUFFIXES = ("", "_axial")
 
 @dataclass
 class Work:
-    """Energies per cell area up to a point.
-
-    Breaks lose the loads' work less the stored energy.
+    """Energies per cell area to a point; breaks lose unstored work.
 
     Attributes:
         all_equilibria: every bond breaks at its own load, the first leg with its snap-back.
@@ -56,7 +54,7 @@ class Work:
     _largest_load: float = 0.0
 
     def arrive(self, point: Point) -> None:
-        """Add the energies on the way from the last point to this one."""
+        """Add the energies on the way from the last point."""
         # Beyond the first leg loads do not fall.
         rise = self._largest_load / self._load if self._load else 1.0
         controlled = self.load_controlled + rise**2 * point.energies.released
@@ -71,7 +69,7 @@ class Work:
 def stored(
     point: Point, responses: Sequence[Response], work: Work, cell: CoupledInterfaces
 ) -> tuple[dict[str, Any], Arrays]:
-    """Take a point with its responses apart, into plain numbers and distributed arrays for the checkpoint.
+    """Take point and responses apart: checkpoint numbers and distributed arrays.
 
     A path goes on from its last state's multipliers.
     """
@@ -98,7 +96,7 @@ def stored(
 
 
 def restored(event: Arrays, cell: CoupledInterfaces) -> tuple[Point, tuple[Energies, float]]:
-    """Put an event together that `stored` took apart: the point, and the energies up to it.
+    """Rebuild the event that `stored` took apart: point, and energies before.
 
     A lean event has empty arrays, which `found_again` fills.
     """
@@ -140,7 +138,7 @@ def averages(event: Arrays, point: Point, loads: CellLoads) -> list[Response]:
 
 
 def found_again(point: Point, cell: CoupledInterfaces, law: BondLaw) -> Point:
-    """Return a lean event's point with the equilibrium under its load and bonds.  Collective."""
+    """Return a lean event's point with its equilibrium.  Collective."""
     loads = ((problem.load.values, problem.load.by_stress) for problem in point.state.problems)
     values, by_stress = zip(*loads, strict=True)
     load = Load(np.concatenate(values), np.concatenate(by_stress))
@@ -151,7 +149,7 @@ def found_again(point: Point, cell: CoupledInterfaces, law: BondLaw) -> Point:
 
 
 def read(context: AnalysisContext, law: BondLaw, number: int) -> tuple[Arrays, Point]:
-    """Read a checkpoint event and its point, whose multipliers are found again if missing.  Collective."""
+    """Read a checkpoint event and point; find missing multipliers again.  Collective."""
     event, cell = context.checkpoint.read(number), context.loads.interfaces
     point, _ = restored(event, cell)
     return event, point if has_multipliers(event) else found_again(point, cell, law)
@@ -225,13 +223,13 @@ def _bonds_together(event: Arrays, suffix: str) -> BondState:
 
 
 class EventProgress:
-    """Lines about path events, and a bar for the path's progress, while a context lasts.
+    """Lines about path events, and a progress bar, in a context.
 
     The first, the last and urgent lines are printed, other lines once a second at most; the bar on terminals alone.
     """
 
     def __init__(self, progress: Progress, layout: str, file: str, clock: Callable[[], float] = time.monotonic) -> None:
-        """Take the bar layout, STEPS_BAR or EVENTS_BAR, and the file for all lines."""
+        """Take the bar layout, STEPS_BAR or EVENTS_BAR, and the lines' file."""
         self._progress, self._layout, self._file, self._clock = progress, layout, file, clock
         self._next_line, self._held_back, self._left_out = float("-inf"), "", 0
         self._bar: Any = None
@@ -255,7 +253,7 @@ class EventProgress:
             self._held_back = line
 
     def advance(self, share: float, text: str) -> None:
-        """Move the bar to the share of the path at an event, with a text."""
+        """Move the bar to a path share, with a text."""
         if self._bar is not None:
             self._bar.set_postfix_str(text, refresh=False)
             self._bar.update(max(share - self._bar.n, 0.0))

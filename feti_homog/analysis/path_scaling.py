@@ -8,7 +8,7 @@ loads, has the same events at s times the strains and stresses, and s^2 times th
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -19,39 +19,36 @@ from feti_homog.results.path_curves import interface_sections, scales_with_tough
 
 LOADS = ("strain", "to", "waypoints")
 ENERGIES = ("stored", "stored_in_springs", "work", "dissipated", "dissipated_strain_controlled", "fracture_energy")
+POINT_MEANS = ("strain", "stress", "temperature")
+PEAK_MEANS = ("stress", "strain", "first_break_stress", "first_break_strain", "stress_left")
 
 Record = TypeVar("Record", PathPoint, Peak, Tips)
 
 
-def ratio(document: Mapping[str, Any], toughness: float) -> float:
-    """Return s = sqrt(toughness / case toughness), with several interfaces by the first.
+def scaled(
+    document: Mapping[str, Any], points: Sequence[PathPoint], old_peak: Peak | None, toughness: float
+) -> tuple[dict[str, Any], tuple[PathPoint, ...], Peak | None]:
+    """Return case, points and peak at toughness s^2 times the case's.
 
-    Raises ValueError for a result that does not scale.
+    The case has s times its loads; s = sqrt(toughness / case toughness), alike for all interfaces.
+
+    Raises ValueError for a result that does not scale, and for a toughness that is not positive.
     """
     if not scales_with_toughness(document):
         raise ValueError("only a path whose bonds break by energy on springs scales with the toughness")
     if not toughness > 0:
         raise ValueError(f"toughness = {toughness}: expected an energy per area above 0")
-    return math.sqrt(toughness / interface_sections(document)[0]["toughness"])
-
-
-def case(old: Mapping[str, Any], s: float) -> dict[str, Any]:
-    """Return the case with s^2 times its toughness and s times its loads."""
-    sections = [{**section, "toughness": section["toughness"] * s**2} for section in interface_sections({"case": old})]
+    old, sections = document["case"], interface_sections(document)
+    s = math.sqrt(toughness / sections[0]["toughness"])
+    tougher = [{**section, "toughness": section["toughness"] * s**2} for section in sections]
     path = {name: _times(value, s) if name in LOADS else value for name, value in old["path"].items()}
-    return {**old, "path": path, "interface": sections if isinstance(old["interface"], list) else sections[0]}
-
-
-def point(old: PathPoint, s: float) -> PathPoint:
-    """Return a point with s times its strain, stress and temperature, and s^2 times its energies."""
-    tips = None if old.tips is None else _scaled(old.tips, ("G_I", "G_II"), s**2)
-    return replace(_scaled(_scaled(old, ("strain", "stress", "temperature"), s), ENERGIES, s**2), tips=tips)
-
-
-def peak(old: Peak, s: float) -> Peak:
-    """Scale a peak as the points are scaled."""
-    names = ("stress", "strain", "first_break_stress", "first_break_strain", "stress_left")
-    return _scaled(_scaled(old, names, s), ("dissipated",), s**2)
+    case = {**old, "path": path, "interface": tougher if isinstance(old["interface"], list) else tougher[0]}
+    changed = []
+    for point in points:
+        tips = None if point.tips is None else _scaled(point.tips, ("G_I", "G_II"), s**2)
+        changed.append(replace(_scaled(_scaled(point, POINT_MEANS, s), ENERGIES, s**2), tips=tips))
+    peak = None if old_peak is None else _scaled(_scaled(old_peak, PEAK_MEANS, s), ("dissipated",), s**2)
+    return case, tuple(changed), peak
 
 
 def _scaled(old: Record, names: tuple[str, ...], factor: float) -> Record:
@@ -62,7 +59,7 @@ def _scaled(old: Record, names: tuple[str, ...], factor: float) -> Record:
 
 
 def _times(value: Any, factor: float) -> Any:
-    """Return a number, an array, or the numbers in lists and tables multiplied."""
+    """Return numbers multiplied, also in arrays, lists and tables."""
     if isinstance(value, Mapping):
         return {name: _times(item, factor) for name, item in value.items()}
     if isinstance(value, list | tuple):

@@ -1,4 +1,4 @@
-"""Run recorders: convergence and errors in the laws that responses obey, and states with their fields."""
+"""Run recorders: convergence, errors in response laws, states with fields."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class CheckRecorder:
         return f"  {name}: {line}"
 
     def require(self, name: str, errors: Mapping[str, float]) -> None:
-        """Record the largest errors; a fault for each error that is NaN or above its tolerance."""
+        """Record largest errors; a fault for each NaN or exceeded tolerance."""
         for law, error in errors.items():
             self.errors[law] = max(error, self.errors.get(law, 0.0))
             if not error <= (tolerance := self.tolerance(law)):
@@ -89,7 +89,7 @@ class CheckRecorder:
 
 
 class StateRecorder:
-    """State recorder for a run, to a file and to memory, or neither.
+    """State recorder for a run, to file and memory, or neither.
 
     Attributes:
         has_place: whether states go anywhere.
@@ -105,7 +105,7 @@ class StateRecorder:
     def record(
         self, plane: Response | None, axial: Response | None, load_factor: float, label: str, point: int
     ) -> None:
-        """Record the next state, with the response in the plane, along the fibres, or both.  Collective."""
+        """Record the next state, in the plane, along fibres, or both.  Collective."""
         if self._file is None and not self._keep:
             return
         state: StatePart
@@ -123,7 +123,7 @@ class StateRecorder:
         return None if self._file is None else on_root(self._cell.comm, seals.seal, self._file.path)
 
     def _write(self, write: Callable[[FieldFile], object]) -> None:
-        """Write to the file if there is one; give it up on all ranks if that fails."""
+        """Write to the file, if any; failure ends it on all ranks."""
         if self._file is not None:
             try:
                 write(self._file)

@@ -1,4 +1,4 @@
-"""A case's result: an object for Python programs, the result.json content, and fields in memory."""
+"""A case's result: Python object, result.json content, and fields in memory."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Fields:
         return f"Fields({len(self.mesh.points)} nodes, {len(self.mesh.triangles)} elements, {len(self.states)} states)"
 
     def gathered(self) -> Fields | None:
-        """Gather all ranks' fields as one part, on rank 0; None elsewhere.  Collective."""
+        """Gather all fields as one part on rank 0, else None.  Collective."""
         first = self.comm.exscan(len(self.mesh.points)) or 0
         mesh = _gathered(self.comm, replace(self.mesh, triangles=self.mesh.triangles + np.int64(first)))
         fibres, interface = _gathered(self.comm, self.fibres), _gathered(self.comm, self.interface)
@@ -90,7 +90,7 @@ def _gathered(comm: Intracomm, part: Part) -> Part | None:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)  # arrays have no single answer to "equal"
 class Result:
-    """Result of a case.  All ranks have the same one, except for `fields`.
+    """Result of a case, alike on all ranks except for `fields`.
 
     Printed, it is a short summary; in a notebook, tables.  `schema_keys` lists all written keys.
 
@@ -188,7 +188,7 @@ class Result:
 
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> Result:
-        """Build the result from result.json content.  Raises KeyError if a key is missing."""
+        """Build the result from result.json content; KeyError for missing keys."""
         return restored(cls, document)
 
     @property
@@ -199,7 +199,7 @@ class Result:
 
     @property
     def points(self) -> dict[str, NDArray[Any]]:
-        """Return arrays over n angle or path points by name, empty for other analyses.
+        """Return named arrays over n angle or path points, else empty.
 
         `angle` or `load_factor` (n,), `strain` and `stress` (n, 3) or (n, 6), `stiffness` (n, 3, 3) or (n, 6, 6),
         `debonded_length` (n, f), `bonded`, `open`, `closed`, ... (n,); NaN where a point has no such number; no tips.
@@ -209,7 +209,7 @@ class Result:
         return {name: np.array([point.get(name, np.nan) for point in documents]) for name in names}
 
     def rising_strain(self) -> dict[str, Float]:
-        """Return corners (v,) for the leading strain, first, and all stresses, by name, on a one-leg path.
+        """Return named corners (v,) on a one-leg path: leading strain, all stresses.
 
         In a test with rising load the stress drops where bonds break, or under a given stress the strain jumps, to the
         next branch that holds.
@@ -227,7 +227,7 @@ class Result:
         return {self.peak.strain_name: columns.pop(self.peak.strain_name)} | columns
 
     def path_scaled(self, *, toughness: float) -> Result:
-        """Scale a path's result to another first interface toughness and s times the loads.
+        """Scale a path to another first interface toughness, s times loads.
 
         s = sqrt(toughness / case toughness), alike for all interfaces.  Strains and stresses are s times,
         energies s^2 times as large, at equal events and load factors: bonds break by energy on springs with given
@@ -237,22 +237,14 @@ class Result:
         """
         from feti_homog.analysis import path_scaling  # of paths by energy alone
 
-        s = path_scaling.ratio(self.document, toughness)
-        return replace(
-            self,
-            case=path_scaling.case(self.case, s),
-            digest="",
-            path=tuple(path_scaling.point(point, s) for point in self.path or ()),
-            peak=None if self.peak is None else path_scaling.peak(self.peak, s),
-            states=None,
-            result_h5=None,
-            fields=None,
-        )
+        case, path, peak = path_scaling.scaled(self.document, self.path or (), self.peak, toughness)
+        changed = replace(self, case=case, digest="", path=path, peak=peak)
+        return replace(changed, states=None, result_h5=None, fields=None)
 
     def first_drop(self) -> tuple[Float, int]:
-        """Return the stress (3,) or (6,) after a one-leg path's first break, under the breaking load.
+        """Return stress (3,) or (6,) after the first break, one leg.
 
-        Also returns the point's number on its branch.  Raises ValueError for any other result.
+        Under the breaking load; also returns the point's number on its branch.  Raises ValueError for any other result.
         """
         from feti_homog.results import path_curves
 

@@ -56,10 +56,8 @@ class MeshErrors:
 class Tips:
     """The t debonding tips at a point, by fibre, interface and direction.
 
-    Tips are bonds that hold next to broken ones.
-
-    An energy per area drives them, compared with G_c(psi): the energy of their spring or, where `growth` is "released",
-    the energy that their break would release.
+    Tips are bonds that hold next to broken ones.  An energy per area drives them, compared with G_c(psi): the energy of
+    their spring or, where `growth` is "released", the energy that their break would release.
     """
 
     fibre: tuple[int, ...] = described("number of the fibre of each tip")
@@ -74,7 +72,7 @@ class Tips:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TipRates:
-    """Energy release rates at debonded arc tips on round fibres, at constant macroscopic strain.
+    """Energy release rates at arc tips, round fibres, constant strain.
 
     Has t pairs, each a load and a tip, by load, fibre, interface and direction.
     """
@@ -133,7 +131,7 @@ class AnglePoint:
 
 @dataclass(frozen=True, kw_only=True)
 class PathPoint:
-    """A path point: a break, a contact change, or the end of a leg or increment."""
+    """A path point: break, contact change, end of leg or increment."""
 
     load_factor: float = described("position on the whole path, 0 to 1, every leg taking the same share")
     strain: Float = described("macroscopic strain", "", EITHER, STRAINS, spatial_components=SPATIAL_STRAINS)
@@ -252,7 +250,7 @@ class LoadPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class EnvelopePoint:
-    """Debonding onset along one direction in a plane of macroscopic stresses or strains.
+    """Debonding onset along one direction in a stress or strain plane.
 
     All but the direction is absent where no load along it breaks a bond.
     """

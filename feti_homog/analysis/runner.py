@@ -5,24 +5,27 @@ Tear, solve, homogenize, check, and write if there is a folder.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from feti_homog.analysis import result_builder
+from feti_homog.analysis.cell_records import CellInfo, Checks, FibreInfo, SolverInfo
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.analysis.recorders import StateRecorder
-from feti_homog.analysis.result import Result
+from feti_homog.analysis.recorders import CONTACT_TOLERANCE, StateRecorder
+from feti_homog.analysis.result import Fields, Result
 from feti_homog.case.case import Case
 from feti_homog.errors import ConvergenceError
 from feti_homog.homogenization.partition_policy import BY_COST
+from feti_homog.homogenization.uniform_parts import nodes_of_parts
 from feti_homog.homogenization.unit_cell import TornCell, tear
+from feti_homog.microstructure.shapes.ellipses import Ellipses
 from feti_homog.results import field_file, field_parts, output_folder, result_json, xdmf
 from feti_homog.results.checkpoint import Checkpoint, EventsInMemory, room_of
 from feti_homog.results.field_file import FieldFile
@@ -31,9 +34,12 @@ from feti_homog.system.parallel.mpi_errors import all_raise, on_root, on_root_on
 from feti_homog.system.petsc.options import case_options, refuse_unused, without_iterations
 from feti_homog.system.runtime import process_memory
 from feti_homog.system.runtime.progress import Progress
+from feti_homog.version import __version__
 
 # Bytes kept between cases of a process; releasing them costs a small case 10 % of its time.
 SPARE_BYTES = 256 << 20
+AROUND_FIBRES = ("matrix", "coating")
+REMARKABLE_LOSS = 0.005  # of the fibres' area, by polygons
 
 
 def run(
@@ -41,8 +47,7 @@ def run(
 ) -> Result:
     """Run the case, write its results to `directory`, and return them.  Collective.
 
-    `resume` goes on from a path's checkpoint, or reads the finished result; `keep_fields` returns a run's fields
-    too.
+    `resume` goes on from a path's checkpoint, or reads the finished result; `keep_fields` returns a run's fields too.
 
     Raises:
         CaseError, MeshError: before any result is written; also for another run's checkpoint, and for a folder
@@ -79,7 +84,7 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
         if keep_fields or context.plane.law.has_toughness:
             context = replace(context, checkpoint=EventsInMemory(comm, room_of(case)))
         _warn(context)
-        result = result_builder.result(context, _analyse(context), states.fields())
+        result = _result(context, _analyse(context), states.fields())
     _print_summary(result, progress)
     if result.faults:
         raise ConvergenceError(*result.faults)
@@ -87,7 +92,7 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
 
 
 def _begun(case: Case, comm: MPI.Intracomm, quiet: bool) -> Progress:
-    """Print the warnings and remarks about a case, and return its run's progress."""
+    """Print warnings and remarks about a case; return its run's progress."""
     progress = Progress(comm, quiet)
     for label, lines in (("warning", case.warnings()), ("remark", case.remarks())):
         for line in lines:
@@ -102,7 +107,7 @@ def _warn(context: AnalysisContext) -> None:
 
 @contextmanager
 def _torn(case: Case, comm: MPI.Intracomm, progress: Progress) -> Iterator[TornCell]:
-    """Provide the torn cell with the case's options set, while the block lasts."""
+    """Provide the torn cell with the case's options in a block."""
     PETSc.garbage_cleanup(comm)  # parallel objects of earlier cases, which all ranks free together
     process_memory.forget_peak(kept=SPARE_BYTES)
     with case_options(case.petsc):
@@ -138,7 +143,7 @@ def _run_and_write(cell: TornCell, directory: Path, progress: Progress, resume: 
         seal = states.seal()
         if states.error is not None and not keep_fields:
             analysis.pop("states", None)
-    result = replace(result_builder.result(context, analysis, states.fields()), result_h5=seal)
+    result = replace(_result(context, analysis, states.fields()), result_h5=seal)
     _write(result, directory, cell)
     if states.error is not None:
         raise states.error
@@ -164,8 +169,100 @@ def _analyse(context: AnalysisContext) -> dict[str, Any]:
     return analysis
 
 
+def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields | None) -> Result:
+    """Build the result with an analysis's entries, counts and timings.  Collective."""
+    cell, progress, checks = context.cell, context.progress, context.checks
+    fractions = cell.fractions()
+    # Straight edges cut off a part of the fibres.
+    area = sum(cell.case.cell.fractions.values())
+    meshed = sum(share for phase, share in fractions.items() if phase not in AROUND_FIBRES)
+    lost = 1.0 - meshed / area if area and cell.case.cell.order == 1 else 0.0
+    polygons = f"[cell] order = 1: polygons have {lost:.1%} less area than the fibres asked for; refine, or order = 2"
+    cell_info = CellInfo(
+        width=cell.summary.width,
+        height=cell.summary.height,
+        area=cell.summary.area,
+        fibre_fraction=meshed,
+        fractions=fractions,
+        porosity=1.0 - sum(fractions.values()) if cell.summary.voids else 0.0,
+        elements=cell.sum_over_ranks(sum(len(s.mesh.triangles) for s in cell.subdomains)),
+        nodes=cell.sum_over_ranks(sum(map(nodes_of_parts, cell.subdomains))),
+        mesh_size=None if cell.case.cell.has_own_mesh else cell.case.cell.mesh_size,
+        refine=cell.case.cell.refine,
+        match_distance=cell.summary.match_distance,
+    )
+    return Result(
+        version=__version__,
+        case=cell.case.resolved(),
+        digest=on_root(cell.comm, cell.case.digest),
+        cell=cell_info,
+        fibres=_fibres(cell),
+        solver=_solver_info(context),
+        checks=Checks(**checks.errors),
+        check_tolerance=checks.tolerance("jump"),
+        kkt_tolerance=CONTACT_TOLERANCE,
+        warnings=(*cell.case.warnings(), *cell.summary.warnings(), *context.warnings()),
+        remarks=(
+            *cell.case.remarks(),
+            *cell.summary.remarks,
+            *([polygons] if lost > REMARKABLE_LOSS else []),
+            *context.remarks(),
+        ),
+        faults=tuple(checks.faults),
+        status="not converged" if checks.faults else "done",
+        timings=progress.timings(),
+        memory=progress.memory(),
+        fields=fields,
+        **analysis,
+    )
+
+
+def _fibres(cell: TornCell) -> tuple[FibreInfo, ...]:
+    """Return the cell's fibre records."""
+    summary, factors = cell.summary, cell.strength_factors
+    bodies, varies = summary.fibre_bodies, not (factors == 1.0).all()
+    ellipses = Ellipses(summary.centres, summary.frames)
+    is_ellipse = np.isnan(summary.radii) & ~np.isnan(ellipses.angles)
+    return tuple(
+        FibreInfo(
+            number=number,
+            phase=summary.phases[summary.constituent_phase[body]],
+            centre=None if np.isnan(summary.centres[body, 0]) else summary.centres[body],
+            radius=None if np.isnan(summary.radii[body]) else float(summary.radii[body]),
+            semi_axes=ellipses.semi_axes[body] if is_ellipse[body] else None,
+            angle=float(ellipses.angles[body]) if is_ellipse[body] else None,
+            coating=float(thickness) if thickness > 0 else None,
+            strength=float(factor) if varies else None,
+        )
+        for number, (body, thickness, factor) in enumerate(zip(bodies, summary.coatings, factors, strict=True), start=1)
+    )
+
+
+def _solver_info(context: AnalysisContext) -> SolverInfo:
+    """Return one record for the solvers in all problems.  Collective."""
+    cell = context.cell
+    plan, solver = cell.summary, cell.solver
+    solvers = [problem.solver for problem in cell.problems]
+    return SolverInfo(
+        ranks=cell.comm.size,
+        bodies=plan.bodies,
+        subdomains=plan.subdomains,
+        dofs=cell.sum_over_ranks(sum(len(s.Q) for s in solvers)),
+        multipliers=sum(s.jump_operator.global_rows for s in solvers),
+        interface_nodes=plan.interface_nodes or cell.sum_over_ranks(len(solver.jump_operator.nodes.row)),
+        kernel_dim=sum(s.natural.kernel_dimension for s in solvers),
+        coarse_dim=sum(s.coarse_dimension for s in solvers),
+        factorizations=cell.sum_over_ranks(sum(len(s.interface_operators.operators) for s in solvers)),
+        coarse_factorizations=sum(s.natural.factorizations for s in solvers),
+        rtol=solver.rtol,
+        solves=sum(s.solves for s in solvers),
+        iterations=tuple(context.checks.iterations),
+        converged_reason=tuple(context.checks.reasons),
+    )
+
+
 def _write(result: Result, directory: Path, cell: TornCell) -> None:
-    """Write result.json, then files made from it; remove an earlier result's other files."""
+    """Write result.json, then dependent files; remove an earlier result's files."""
     on_root_only(cell.comm, result_json.write, directory, result.document)
     written = {result_json.NAME}
     if result.result_h5 is not None:
@@ -186,7 +283,7 @@ def _draw(directory: Path) -> list[Path]:
 
 
 def _print_summary(result: Result, progress: Progress) -> None:
-    """Print the summary on rank 0; only a rank that prints it loads its tables.  Collective."""
+    """Print the summary on rank 0, which alone loads tables.  Collective."""
     timings = progress.timings()
     if progress.prints:
         from feti_homog.report.text.summary import summary

@@ -1,4 +1,4 @@
-"""Derivatives of a stiffness with its constants, and of a state; their scatter with uncertain phases."""
+"""Derivatives of a stiffness with its constants, and of a state."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def _secants(energies: Sequence[Float]) -> tuple[Float, Float | None]:
 
 
 def _entries(C: Float, thermal: Float | None) -> dict[str, float]:
-    """Return all entries of a secant stiffness, which is not symmetric, and thermal stress by name."""
+    """Return named entries of an unsymmetric secant stiffness and thermal stress."""
     entries = {f"C{i + 1}{j + 1}": float(value) for (i, j), value in np.ndenumerate(C)}
     return entries | dict(zip(THERMAL_STRESSES[:3], map(float, [] if thermal is None else thermal), strict=False))
 
@@ -116,7 +116,7 @@ def _entries(C: Float, thermal: Float | None) -> dict[str, float]:
 def _at_status(
     context: AnalysisContext, name: str, states: Sequence[Response], problems: Sequence[int]
 ) -> list[list[Response]]:
-    """Return unit load responses in some problems at one state's fixed status.  Collective."""
+    """Return unit load responses at one state's fixed status, by problem.  Collective."""
     groups, bonds = list[list[Response]](), states[0].state.bonds
     for problem in (context.loads.problems[k] for k in problems):
         count, zero = len(problem.loads), np.zeros(problem.cell.solver.rows)

@@ -1,12 +1,11 @@
-"""`analysis.type = "stiffness"`: L^ef, with debonding and contact the secants to plus and minus each unit load."""
+"""`analysis.type = "stiffness"`: L^ef, with contact secants under plus, minus unit loads."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from feti_homog.analysis.constants import constants
+from feti_homog.analysis.constants import constants, mesh_error, unit_errors
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.analysis.mesh_errors import mesh_error, unit_errors
 from feti_homog.homogenization.averaging import asymmetry
 
 if TYPE_CHECKING:
@@ -14,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Return `effective_stiffness`, with stresses under the unit strains as columns, and entries that follow from it.
+    """Return `effective_stiffness`, columns stresses under unit strains, and dependent entries.
 
     With contact between debonded faces also `effective_stiffness_compression`, columns -Sigma(-E); `tips` on debonded
     arcs under each load; `mesh_error`; `sensitivities` if the case asks for them.  If a temperature
@@ -43,7 +42,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 
         document["tips"] = tip_rates(context, under, loads)
     document |= constants(context.cell, document)
-    if context.needs_sensitivities:
+    if context.case.output.sensitivities:
         from feti_homog.analysis.sensitivities import sensitivities  # few runs ask for them
 
         document |= sensitivities(context, document, first, one_sided)

@@ -1,4 +1,4 @@
-"""The result in a folder, checked to be complete and from one run."""
+"""The result in a folder, complete and from one run."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from feti_homog.results import checkpoint_file, field_file, result_json, seals
 
 
 def read(directory: Path) -> dict[str, Any]:
-    """Read the result in a folder: result.json, and result.h5 if the case keeps fields.  Call on one rank.
+    """Read result.json, and check result.h5 if fields are kept.  Call on one rank.
 
     Raises:
         CaseError: a file is missing, damaged, or from another program or run.
@@ -41,7 +41,7 @@ def check_to_draw(directory: Path) -> None:
 
 
 def finished(directory: Path, case: Case) -> bool:
-    """Return whether `directory` has a case's complete result and no checkpoint.  Call on one rank.
+    """Return whether a case's complete result, without checkpoint, exists.  Call on one rank.
 
     Raises:
         CaseError: the result is damaged, or belongs to another case.

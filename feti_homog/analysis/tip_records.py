@@ -1,7 +1,4 @@
-"""Debonding tips in result.json.
-
-The law that moves them, energies that drive them on, release rates, modes.
-"""
+"""Debonding tips in result.json: law, driving energies, release rates, modes."""
 
 from __future__ import annotations
 
@@ -28,7 +25,7 @@ DIRECTION_DIGITS = 9
 
 
 def criterion_of(cell: TornCell, grows: bool = False) -> BondLaw:
-    """Return a cell's bond law; debonding that `grows` makes its own tips.  Collective.
+    """Return a cell's bond law; growing debonding makes tips.  Collective.
 
     Raises:
         CaseError: tips need the inverse dual operator, which the solver does not have.
@@ -46,7 +43,7 @@ def criterion_of(cell: TornCell, grows: bool = False) -> BondLaw:
 
 
 def tip_rates(context: AnalysisContext, responses: Sequence[Response], loads: Sequence[str]) -> TipRates:
-    """Return rates at all tips under each load in the plane; none while all is bonded.  Collective."""
+    """Return rates at all tips by plane load; none if bonded.  Collective."""
     rates = [
         (context.release_rates.of(response), load)
         for response, load in zip(responses, loads, strict=True)
@@ -69,7 +66,7 @@ def tip_rates(context: AnalysisContext, responses: Sequence[Response], loads: Se
 
 
 def tips(context: AnalysisContext, law: BondLaw, point: Point) -> Tips:
-    """Return a point's tips on every rank, by fibre, interface and direction.  Collective.
+    """Return a point's tips, by fibre, interface and direction.  Collective.
 
     Tips are bonds that hold next to broken ones.  G_I and G_II are energies per area with the sum used^2 G_c(psi),
     where used = sqrt(G / G_c(psi)), parted by tan^2 psi = G_II / G_I.
@@ -97,7 +94,7 @@ def _sections(cell: TornCell, pair: Float | Int) -> tuple[int, ...] | None:
 
 
 def bond_directions(cell: TornCell) -> Float:
-    """(k,) directions in degrees, above -180, from fibre centres to this rank's interface nodes.
+    """(k,) degrees, above -180, from fibre centres to rank's interface nodes.
 
     A fibre without centre has its normals' directions.
     """

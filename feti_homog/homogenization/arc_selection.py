@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 
 from feti_homog.case.case import Case
-from feti_homog.case.interface_section import Arc, InterfaceSection, interface_label
+from feti_homog.case.interface_section import interface_label
 from feti_homog.interface import debonded_arcs
 from feti_homog.interface.debonded_arcs import MovedTips
 from feti_homog.mesh.outline.outline import MERGED
@@ -30,23 +30,18 @@ TIP_TRIANGLES = 2.0
 LEAST_SIZE = 1e-5  # at tips / width of the cell, by default
 
 
-def on_interface(case: Case, interface: InterfaceSection, fibres: int) -> dict[int, list[float]]:
-    """Return tip directions in [0, 360) for arcs at all openings, by fibre number from 0."""
-    return debonded_arcs.tips(interface.debonded, case.section.openings, fibres)
-
-
 def marks(case: Case, fibres: int) -> dict[int, list[float]]:
     """Return all tip directions by their curve's number (`BareOutline.of`)."""
     by_curve: dict[int, set[float]] = {}
     for interface in case.interfaces:
         is_within = interface.between is not None and {COATING, MATRIX} & set(interface.between) == {COATING}
-        for fibre, directions in on_interface(case, interface, fibres).items():
+        for fibre, directions in debonded_arcs.tips(interface.debonded, case.section.openings, fibres).items():
             by_curve.setdefault(~fibre if is_within else fibre, set()).update(directions)
     return {curve: sorted(by_curve[curve]) for curve in sorted(by_curve)}
 
 
 def size(case: Case, estimate: ElementEstimate) -> float | None:
-    """Return element size at tips / cell width, None for the interface size.
+    """Return element size at tips / cell width, or None: interface size.
 
     Without `tip_size` in the case it is, with the mean radius / width R,
 
@@ -70,7 +65,7 @@ def size(case: Case, estimate: ElementEstimate) -> float | None:
 
 @dataclass(frozen=True)
 class EstimatedNodes:
-    """(k,) interface nodes on rank 0, before refinement: fibres from 1, interfaces, directions in degrees."""
+    """(k,) unrefined interface nodes: fibres from 1, interfaces, degrees; on rank 0."""
 
     fibre: Int
     pair: Int
@@ -109,23 +104,13 @@ class EstimatedNodes:
         distance, moved = float(np.degrees(MERGED)), []
         for pair, interface in enumerate(case.interfaces):
             at = self.is_vertex & (self.pair == pair)
-            tips = on_interface(case, interface, fibres)
+            tips = debonded_arcs.tips(interface.debonded, case.section.openings, fibres)
             moved.append(debonded_arcs.moved_tips(tips, self.fibre[at], self.direction[at], distance))
         return tuple(moved)
 
-    def within(self, pair: int) -> EstimatedNodes:
-        """Return the nodes on one interface section."""
-        at = self.pair == pair
-        return EstimatedNodes(self.fibre[at], self.pair[at], self.direction[at], self.is_vertex[at])
-
-    def selects(self, arc: Arc, opening: float | None, fibre: int | None, moved: MovedTips) -> bool:
-        """Return whether any node, on the fibre if one is given, is within the arc."""
-        inside = debonded_arcs.debonded([arc], opening, self.fibre, self.direction, moved)
-        return bool((inside if fibre is None else inside[self.fibre == fibre]).any())
-
 
 def fibre_faults(case: Case, centres: Float) -> list[str]:
-    """List faults in fibres with arcs, for fibre centres (fibres, 2), NaN without a centre."""
+    """List faulty fibres with arcs; centres (fibres, 2), NaN without one."""
     return [
         fault
         for pair, interface in enumerate(case.interfaces)
@@ -134,21 +119,23 @@ def fibre_faults(case: Case, centres: Float) -> list[str]:
 
 
 def faults(case: Case, nodes: EstimatedNodes, moved: Sequence[MovedTips]) -> list[str]:
-    """List faulty arcs, and [angle] openings other than 0 that select no fibre node."""
+    """List faulty arcs, and nonzero [angle] openings that select no node."""
     openings: Sequence[float | None] = case.section.openings or [None]
     lines = []
     for pair, interface in enumerate(case.interfaces):
-        of_pair, label = nodes.within(pair), interface_label(pair, len(case.interfaces))
+        fibres, directions = nodes.fibre[nodes.pair == pair], nodes.direction[nodes.pair == pair]
+        label = interface_label(pair, len(case.interfaces))
         for (place, arc), opening in product(enumerate(interface.debonded), openings):
             angle, line = opening if arc.angle is None else arc.angle, f"[{label}] debonded[{place}]"
+            inside = debonded_arcs.debonded([arc], opening, fibres, directions, moved[pair])
             for fibre in [None] if isinstance(arc.fibre, str) else arc.fibre:
-                if angle and not of_pair.selects(arc, opening, fibre, moved[pair]):
-                    lines.append(line + _fault(angle, fibre, of_pair, interface.between))
+                if angle and not (inside if fibre is None else inside[fibres == fibre]).any():
+                    lines.append(line + _fault(angle, fibre, fibres, interface.between))
     return list(dict.fromkeys(lines))
 
 
-def _fault(angle: float, fibre: int | None, nodes: EstimatedNodes, between: Sequence[str] | None) -> str:
-    if fibre is not None and fibre not in nodes.fibre:
+def _fault(angle: float, fibre: int | None, fibres: Int, between: Sequence[str] | None) -> str:
+    if fibre is not None and fibre not in fibres:
         which = "that can debond" if between is None else f"between {' and '.join(between)}"
         return f".fibre: fibre {fibre} has no interface {which}"
     whose = "any fibre" if fibre is None else f"fibre {fibre}"

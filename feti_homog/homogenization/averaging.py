@@ -1,4 +1,4 @@
-"""Macroscopic response of the torn cell, the laws it must obey, and debonded fibre lengths.
+"""Macroscopic cell response, laws that it obeys, and debonded fibre lengths.
 
 Strains E are [E11, E22, gamma12] in the plane, then the problem's other loads; stresses are alike.
 """
@@ -21,7 +21,7 @@ from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState,
 from feti_homog.interface.loads import Load
 from feti_homog.materials.voigt import STRAINS, STRESSES
 from feti_homog.system.parallel.distributed_arrays import allreduce_sum
-from feti_homog.typing import Float
+from feti_homog.typing import Bool, Float
 
 
 @dataclass(frozen=True)
@@ -129,19 +129,24 @@ class Homogenization:
             strain, stress = state.solution.strain, self.interface.stress(state.solution)
             energy = float(stress @ strain) - self._rubbing(state)
             return self._scaled(state, scale, stress, energy, np.zeros(0), {})
-        solver, state = self.cell.solver, self.interface.completed(state)
+        cell, solver, state = self.cell, self.cell.solver, self.interface.completed(state)
         strain, u = state.solution.strain, solver.boundary_displacement(state.solution)
-        stress, star, energy = self._averages(strain, u)
+        # <sigma>, <eps*> over bodies and voids, and <sigma:eps>.
+        without_u, from_u = solver.condensed.stiffness @ strain, solver.loads.T @ u
+        work = strain @ solver.condensed.energy @ strain + 2 * strain @ from_u
+        work += u @ solver.interface_operators.apply_schur(u)
+        sums = np.concatenate([without_u + from_u, self._strain_of_displacements.T @ u, [work]])
+        stress, star, (energy,) = np.split(allreduce_sum(cell.comm, sums) / cell.summary.area, [len(strain), -1])
         springs = state.solution.compliance * state.solution.lam
         active = self.interface.active(state.status) * (slipped(self.interface, state) == 0.0)
         opened = state.solution.jump * (1 - active) + springs
         opening = allreduce_sum(self.cell.comm, self._strain_of_jumps.T @ opened)
-        energy += self._stretched(state)
+        energy = float(energy) + self._stretched(state)
         rubbing = self._rubbing(state)
-        acting = self.interface.acting(state.bonds, strain, state.asked)
-        largest = (self._largest(u) + self.interface.scales.imposed(acting)) or 1.0
-        imposed = float(self.interface.scales.imposed_strain(acting).max()) or 1.0
-        reuss = self.interface.scales.stress_scale(acting) * imposed
+        acting, scales = self.interface.acting(state.bonds, strain, state.asked), self.interface.scales
+        largest = (self._largest(u) + scales.imposed(acting)) or 1.0
+        imposed = float(scales.imposed_strain(acting).max()) or 1.0
+        reuss = scales.stress_scale(acting) * imposed
         checks = {
             "strain": float(np.abs(star - opening / self.cell.summary.area).max() / imposed) + self._strain_inside,
             "hill": float(abs(energy + rubbing - stress @ strain) / (max(abs(energy), reuss) or 1.0)),
@@ -153,7 +158,7 @@ class Homogenization:
         return self._scaled(state, scale, stress, energy, u, checks)
 
     def _stretched(self, state: Equilibrium) -> float:
-        """Return lam C lam per area, twice the spring energy, rubbing bonds included.  Collective."""
+        """Return twice the spring energy per area, rubbing bonds included.  Collective."""
         springs = state.solution.compliance * state.solution.lam
         twice = float(state.solution.lam @ springs) + energy_beside_springs(self.interface, state)
         return float(self.cell.comm.allreduce(twice)) / self.cell.summary.area
@@ -161,7 +166,7 @@ class Homogenization:
     def _scaled(
         self, state: Equilibrium, scale: float, stress: Float, energy: float, u: Float, checks: dict[str, float]
     ) -> Response:
-        """Return the response that is `scale` times a state with <sigma:eps> = `energy`.  Collective."""
+        """Return `scale` times a state with <sigma:eps> = `energy`.  Collective."""
         means = scale * state.solution.strain, scale * stress
         energies = scale**2 * energy / 2, scale**2 * self._stretched(state) / 2
         errors, damage = checks | state.certificate, self.damage(state.bonds)
@@ -173,14 +178,14 @@ class Homogenization:
         return (bonds.status != BONDED).astype(float) if damage is None else damage
 
     def _rubbing(self, state: Equilibrium) -> float:
-        """Sum force times slip on faces with friction, per area, which is not stored.  Collective."""
+        """Sum friction work on faces per area, not stored.  Collective."""
         if state.bonds.gap_and_slip is None:
             return 0.0
         work = float(state.solution.lam @ state.solution.jump) - energy_beside_springs(self.interface, state)
         return float(self.cell.comm.allreduce(work)) / self.cell.summary.area
 
     def _unmet_stress(self, state: Equilibrium, stress: Float) -> float:
-        """Return the prescribed stress error, relative to the load and to the stresses.  Collective."""
+        """Return the prescribed stress error, relative to load and stresses.  Collective."""
         load, scales = state.load, self.interface.scales
         # Scaled by the roots of their stiffnesses, so that none is small next to another.
         root, imposed = scales.roots, scales.imposed_strain(state.asked)
@@ -198,7 +203,7 @@ class Homogenization:
 
     @cached_property
     def _strain_of_jumps(self) -> Float:
-        """(owned rows, m) nu with int eps* = nu^T B u for every displacement u: nu = (B B^T)^-1 B int B_e."""
+        """(owned rows, m) nu = (B B^T)^-1 B int B_e: int eps* = nu^T B u."""
         solver = self.cell.solver
         B = solver.interface_operators.B
         integrals = solver.jump_operator.sum(B @ self._strain_of_displacements)
@@ -207,14 +212,14 @@ class Homogenization:
 
     @cached_property
     def _strain_of_displacements(self) -> Float:
-        """(boundary dofs, m) matrix whose transpose times u is int eps* over bodies and voids."""
+        """(boundary dofs, m) N: N^T u = int eps* over bodies and voids."""
         m, dofs = self.cell.solver.problem.strains, self.cell.solver.interface_operators.dofs
         pairs = zip(self.cell.subdomains, dofs, strict=True)
         return np.concatenate([np.zeros((0, m)), *(s.mean_strain(boundary) for s, boundary in pairs)])
 
     @cached_property
     def _strain_inside(self) -> float:
-        """The largest inner node share in int eps*, relative: 0 for closed meshes and voids.  Collective."""
+        """Largest relative inner share in int eps*; 0 for closed meshes.  Collective."""
         inner, size = 0.0, 0.0
         for s, boundary in zip(self.cell.subdomains, self.cell.solver.interface_operators.dofs, strict=True):
             size = max(size, float(np.sqrt(s.area)))
@@ -227,24 +232,13 @@ class Homogenization:
             inner = max(inner, float(np.abs(s.mean_strain(np.flatnonzero(inside))).max(initial=0.0)))
         return float(self.cell.comm.allreduce(inner, MPI.MAX) / self.cell.comm.allreduce(size, MPI.MAX))
 
-    def _averages(self, E: Float, u: Float) -> tuple[Float, Float, float]:
-        """<sigma>, <eps*> over bodies and voids, and <sigma:eps>; collective."""
-        cell, v = self.cell, len(E)
-        without_u, from_u = cell.solver.condensed.stiffness @ E, cell.solver.loads.T @ u
-        energy = (
-            E @ cell.solver.condensed.energy @ E + 2 * E @ from_u + u @ cell.solver.interface_operators.apply_schur(u)
-        )
-        sums = np.concatenate([without_u + from_u, self._strain_of_displacements.T @ u, [energy]])
-        sums = allreduce_sum(cell.comm, sums) / cell.summary.area
-        return sums[:v], sums[v:-1], float(sums[-1])
-
     def _largest(self, values: Float) -> float:
         """max |values| over all ranks."""
         return float(self.cell.comm.allreduce(np.abs(values).max(initial=0.0), MPI.MAX))
 
 
 class FibreInterfaces:
-    """Interfaces of a cell's f fibres, by number; a coated fibre may have two.
+    """Interfaces by fibre number, f fibres; a coated fibre may have two.
 
     A node has its tributary length, debonded or not.
     """
@@ -254,27 +248,24 @@ class FibreInterfaces:
         self._comm, self._nodes = cell.comm, cell.solver.jump_operator.nodes
         self._fibres, self._pairs = cell.summary.fibres, len(cell.case.interfaces)
         self._fibre = cell.summary.fibre_number(self._nodes.fibre) - 1
-        self._length = self._sums(self._nodes.length)
-        of_coating = self._sums(self._nodes.length * ~cell.summary.is_fibre[self._nodes.fibre])
+        self._length = self.length(np.ones(len(self._fibre), bool))
+        of_coating = self.length(~cell.summary.is_fibre[self._nodes.fibre])
         radius = np.where(of_coating > 0, np.nan, cell.summary.radii[cell.summary.fibre_bodies])
         round_fibre = np.degrees(1.0 / np.where(np.isnan(radius), 1.0, radius))
         self._degrees = np.where(np.isnan(radius), 360.0 / np.where(self._length > 0, self._length, 1.0), round_fibre)
 
-    def debonded_length(self, status: Status) -> Float:
-        """(f,) debonded length on each fibre's interface; `status` (k,) at this rank's nodes.  Collective."""
-        return self._sums(self._nodes.length * (status != BONDED))
-
-    def damaged_length(self, damage: Float) -> Float:
-        """(f,) length on each fibre's interface with damage (k,) between 0 and 1, which still holds.  Collective."""
-        return self._sums(self._nodes.length * ((damage > 0.0) & (damage < 1.0)))
+    def length(self, which: Bool) -> Float:
+        """(f,) interface length at the nodes `which` (k,) on all ranks.  Collective."""
+        sums: Float = np.bincount(self._fibre, self._nodes.length * which, self._fibres).astype(float)
+        return allreduce_sum(self._comm, sums)
 
     def loose(self, status: Status) -> list[int]:
         """Return fibre numbers, from 1, without a bond that holds.  Collective."""
-        bonded = self._sums(self._nodes.length * (status == BONDED))
-        return [int(number) for number in np.flatnonzero((bonded == 0.0) & (self._length > 0.0)) + 1]
+        is_loose = (self.length(status == BONDED) == 0.0) & (self._length > 0.0)
+        return [int(number) for number in np.flatnonzero(is_loose) + 1]
 
     def angle(self, length: Float) -> Float:
-        """(f,) arc degrees for lengths (f,): 360 times their share if not round, or coated with an interface."""
+        """(f,) degrees by radius, else (not round, coating interface) 360 times share."""
         return np.asarray(length * self._degrees)
 
     def share(self, length: Float) -> float:
@@ -289,10 +280,6 @@ class FibreInterfaces:
         )
         length = allreduce_sum(self._comm, length)
         return np.asarray(allreduce_sum(self._comm, debonded) / np.where(length > 0, length, 1.0))
-
-    def _sums(self, values: Float) -> Float:
-        sums: Float = np.bincount(self._fibre, values, self._fibres).astype(float)
-        return allreduce_sum(self._comm, sums)
 
 
 def asymmetry(L: Float) -> float:

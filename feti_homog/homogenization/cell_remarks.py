@@ -6,16 +6,17 @@ import math
 
 import numpy as np
 
+from feti_homog.case import cell_sizes
 from feti_homog.case.case import Case
 from feti_homog.case.interface_section import interface_label
 from feti_homog.homogenization import phase_laws
+from feti_homog.homogenization.arc_selection import LEAST_SIZE
 from feti_homog.materials.constants import engineering_moduli
 from feti_homog.materials.laws import plane_stiffness
-from feti_homog.mesh.coarse_mesh import CoarseMesh, interface_edges
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.submesh import pinned_class
 from feti_homog.schema.wording import toml_value
-from feti_homog.typing import AnyInt, Int
+from feti_homog.typing import AnyInt, Float, Int
 
 SAME_FRACTION = 0.01  # of a matched table and its cell, relative
 # Largest element on an interface / length of the process zone. With 0.54 of it the stresses of the square cell of
@@ -25,11 +26,10 @@ RESOLVED = 0.5
 RESOLVED_SOFTENING = 1 / 3
 # Relative difference of stiffness ratios, or of teeth, that is none.
 SAME_RATIO = 1e-3
-LARGEST_REFINE, SMALLEST_SIZE = 8, 1e-5
 
 
 def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
-    """(phases, phases) the case's interface number between two phases; -1 where they never part.
+    """(phases, phases) interface numbers between phases; -1 where they never part.
 
     An interface without `between` lies between the matrix, the first phase, and all other phases; perfect bonding too.
     """
@@ -44,7 +44,7 @@ def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
 
 
 def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -> list[str]:
-    """List interfaces between phases that the cell lacks, or that touch nowhere in it.
+    """List interfaces between phases that the cell lacks, or that never touch.
 
     Phases `first` (n,) touch phases `second` (n,).
     """
@@ -64,7 +64,7 @@ def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -
 
 
 def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
-    """List remarks on the mesh: its own, an [interface] without an effect, and nodes that never part.
+    """List mesh remarks, an [interface] without effect, and nodes that never part.
 
     `pairs` as in `share_entities`.
     """
@@ -84,7 +84,7 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
 
 
 def _pinned_bond(torus: Torus) -> list[str]:
-    """Remark a bond at the node that is pinned against translation, Eq. (15): it never parts."""
+    """Remark a bond at the pinned node, Eq. (15): it never parts."""
     at = np.searchsorted(torus.class_keys, pinned_class(torus))
     if torus.never_part[at] or torus.meeting[at] < 2:
         return []
@@ -96,7 +96,7 @@ def _pinned_bond(torus: Torus) -> list[str]:
 
 
 def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles: int) -> tuple[str, ...]:
-    """Remark more or fewer subdomains than the case asks for, with the reason."""
+    """Remark more or fewer subdomains than asked for, with the reason."""
     asked = case.decomposition.subdomains
     if asked is None or asked == subdomains:
         return ()
@@ -122,19 +122,17 @@ def table_remarks(case: Case) -> tuple[str, ...]:
     )
 
 
-def longest_edge(mesh: CoarseMesh) -> float:
-    """Return the longest edge between phases; 0 if there is none."""
-    ends = mesh.points[interface_edges(mesh)]
+def longest(ends: Float) -> float:
+    """Return the longest edge between `ends` (e, 2, 2); 0 without edges."""
     return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max(initial=0.0))
 
 
 def process_zone(case: Case) -> float | None:
     """Return the least process zone length E' G_Ic / sigma_c^2.
 
-    It is given for bonds that break by energy; None for others.
-
-    sigma_c = sqrt(2 k_n G_Ic), or a cohesive law's strength, in its shorter pure mode.  E' is Young's
-    modulus in the plane state, E / (1 - nu^2) in plane strain, along the most compliant axis in all phases.
+    None unless bonds break by energy.  sigma_c = sqrt(2 k_n G_Ic), or a cohesive law's strength, in its shorter pure
+    mode.  E' is Young's modulus in the plane state, E / (1 - nu^2) in plane strain, along the most compliant axis in
+    all phases.
     """
     lengths = [1 / (2 * bond.normal_stiffness) for bond in case.interfaces if bond.toughness and bond.normal_stiffness]
     for bond in case.interfaces:
@@ -147,13 +145,11 @@ def process_zone(case: Case) -> float | None:
 
 
 def warnings(case: Case, width: float, edge: float) -> list[str]:
-    """Warn about unresolved process zones and about cohesive laws.
-
-    Zones are unresolved where elements on the interface are too long for them.
+    """Warn about cohesive laws, and process zones shorter than interface elements resolve.
 
     Args:
         width: cell width.
-        edge: `longest_edge` in the coarse mesh, which `refine` halves.
+        edge: longest coarse edge between phases, which `refine` halves.
     """
     length, softens, lines = process_zone(case), phase_laws.has_softening(case), _law_warnings(case)
     resolved = RESOLVED_SOFTENING if softens else RESOLVED
@@ -175,7 +171,7 @@ def warnings(case: Case, width: float, edge: float) -> list[str]:
 
 
 def _law_warnings(case: Case) -> list[str]:
-    """Warn if a cohesive law's energy depends on mode order, and if its teeth overshoot."""
+    """Warn if cohesive energy depends on mode order, and if teeth overshoot."""
     if not phase_laws.has_softening(case):
         return []
     lines, law = [], phase_laws.bond_law(case.interfaces, np.zeros(0, np.int64))
@@ -207,9 +203,9 @@ def _remedies(case: Case, width: float, edge: float, length: float) -> str:
     size = length * 2**case.cell.refine / width
     digit = 10.0 ** (math.floor(math.log10(size)) - 1)
     size = math.floor(size / digit + 1e-9) * digit
-    finer = [f"refine = {refine}"] if refine <= LARGEST_REFINE else []
+    finer = [f"refine = {refine}"] if refine <= cell_sizes.MOST_REFINED else []
     if case.cell.has_own_mesh:
         return " or ".join([*finer, "a finer mesh"])
-    if size >= SMALLEST_SIZE:
+    if size >= LEAST_SIZE:
         finer.insert(0, f"interface_size = {size:.2g} (or mesh_size, of all elements)")
     return ", or ".join(finer) or "interface_size and refine"

@@ -1,4 +1,4 @@
-"""The cut cell, on rank 0: from its coarse mesh to each rank's submeshes."""
+"""The cut cell on rank 0: from coarse mesh to ranks' submeshes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import Partition, decompose, halves
 from feti_homog.homogenization import arc_selection, cell_remarks
 from feti_homog.homogenization.arc_selection import EstimatedNodes
-from feti_homog.homogenization.cell_remarks import mesh_remarks, subdomain_remarks, table_remarks
+from feti_homog.homogenization.cell_remarks import longest, mesh_remarks, subdomain_remarks, table_remarks
 from feti_homog.homogenization.partition_policy import (
     DEFAULT_POLICY,
     PartitionPolicy,
@@ -20,11 +20,13 @@ from feti_homog.homogenization.partition_policy import (
 )
 from feti_homog.interface import debonded_arcs
 from feti_homog.interface.debonded_arcs import MovedTips
-from feti_homog.mesh.coarse_mesh import CoarseMesh, voids
+from feti_homog.mesh.coarse_mesh import CoarseMesh, interface_edges, voids
+from feti_homog.mesh.fill.gmsh_mesher import NodedCell
 from feti_homog.mesh.mesh_fibres import coating_thickness, fibre_circles, fibre_frames, fibre_numbers
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks, pinned_class
+from feti_homog.mesh.tiles.filling import arc_edges
 from feti_homog.microstructure.shapes.ellipses import Ellipses
 from feti_homog.typing import Bool, Float, Int
 
@@ -77,7 +79,7 @@ class CellSummary:
 
     @property
     def is_cut(self) -> bool:
-        """True if there are subdomains that are not whole bodies, and more than one."""
+        """True for several subdomains that are not whole bodies."""
         return self.subdomains > (1 if self.across else self.bodies)
 
     @property
@@ -92,7 +94,7 @@ class CellSummary:
 
     @property
     def coatings(self) -> Float:
-        """(fibres,) coating thickness, 0 without one; NaN for fibres that are not round."""
+        """(fibres,) coating thickness, 0 without one; NaN if not round."""
         return coating_thickness(self.numbers, self.is_fibre, Ellipses(self.centres, self.frames).semi_axes)
 
     def fibre_number(self, constituent: Int) -> Int:
@@ -170,7 +172,7 @@ def distribute(
         bodies=bodies,
         subdomains=len(cut.rank),
         coarse_triangles=triangles,
-        interface_edge=cell_remarks.longest_edge(mesh),
+        interface_edge=longest(mesh.points[interface_edges(mesh)]),
         numbers=numbers,
         is_fibre=is_fibre,
         constituent_phase=torus.constituent_phase,
@@ -191,6 +193,43 @@ def distribute(
     )
     submeshes = cut_for_ranks(torus, cut.subdomain, table, n_ranks, pinned_class(torus))
     return [RankShare(summary, table, pairs, share) for share in submeshes]
+
+
+def summary_of(case: Case, noded: NodedCell, subdomains: int, triangles: int) -> CellSummary:
+    """Summarize the cell with so many subdomains and coarse triangles."""
+    regions, lines, arrangement = noded.regions, noded.lines, noded.arrangement
+    inside = regions.constituent[:-1]
+    solid = np.flatnonzero(inside >= 0)
+    circle = solid[np.unique(inside[solid], return_index=True)[1]]
+    disc = lines.disc[circle]
+    is_fibre = arrangement.precedence(disc, lines.is_coating[circle]) == disc + 1
+    centres = in_cell(noded.scale * arrangement.centres[disc], np.array([regions.width, regions.height]))
+    radii = regions.ellipses.circles[circle, 2]
+    nothing = np.full((1, 2), np.nan)
+    return CellSummary(
+        width=regions.width,
+        height=regions.height,
+        phases=regions.phases,
+        bodies=len(regions.phase),
+        subdomains=subdomains,
+        coarse_triangles=triangles,
+        interface_edge=longest(noded.scale * lines.points[arc_edges(lines.curves)[0]]),
+        numbers=np.append(0, disc + 1),
+        is_fibre=np.append(False, is_fibre),
+        constituent_phase=regions.phase,
+        centres=np.concatenate([nothing, centres]),
+        radii=np.append(np.nan, radii),
+        frames=np.concatenate([np.full((1, 2, 2), np.nan), regions.ellipses.frames[circle]]),
+        moved_tips=({},) * len(case.interfaces),
+        snapped=0.0,
+        voids=arrangement.voids,
+        match_distance=match_distance(case, regions.width, regions.height, centres[is_fibre], radii[is_fibre]),
+        remarks=(
+            *arrangement.remarks,
+            *table_remarks(case),
+            *subdomain_remarks(case, len(regions.phase), subdomains, triangles),
+        ),
+    )
 
 
 def _cut_across(
@@ -222,13 +261,13 @@ def match_distance(case: Case, width: float, height: float, centres: Float, radi
 
 
 def in_cell(points: Float, period: Float) -> Float:
-    """Shift points (k, 2) into [0, period); points at its end by rounding go to 0."""
+    """Shift points (k, 2) into [0, period); rounded ends go to 0."""
     inside = np.mod(points, period)
     return np.where(inside > (1 - ROUNDING) * period, 0.0, inside)
 
 
 def _interface_nodes(torus: Torus, pairs: Int, lattice: ReferenceLattice) -> int:
-    """Count the nodes at which two bodies could part if they had an interface."""
+    """Count nodes where two bodies could part if they had an interface."""
     first, second, edge = torus.sides
     between = edge[pairs[torus.mesh.phase[first], torus.mesh.phase[second]] >= 0]
     plane = np.unique(torus.torus_edge, return_index=True)[1][between]

@@ -1,8 +1,12 @@
-"""Energy release rate G = -d(energy) / d(debonded length), at constant strain, at debonded arc tips.
+"""Energy release rate G = -d(energy) / d(debonded length) at tips, constant strain.
 
-For rigid bonds G follows from a virtual crack extension, and errs like the energy, on any mesh.  Its modes have
-their shares in the work that closes the crack's last part (virtual crack closure).  Shares depend on the length of
-this part, because between two materials the stress oscillates towards the tip.
+For rigid bonds G follows from a virtual crack extension, and errs like the energy, on any mesh.  The nodes around the
+tip turn about the fibre centre by s q, and their displacements with them; q is 1 near the tip and falls to 0 farther
+away.  The tip moves along the interface by s R, bonded nodes stay bonded, and gaps stay as they are: an admissible
+variation of the equilibrium, whose energy changes with the element energies.
+
+Its modes have their shares in the work that closes the crack's last part (virtual crack closure).  Shares depend on
+the length of this part, because between two materials the stress oscillates towards the tip.
 
 For elastic bonds G = <t_n>^2 / (2 k_n) + t_t^2 / (2 k_t) is the spring energy at the tip.
 """
@@ -10,38 +14,77 @@ For elastic bonds G = <t_n>^2 / (2 k_n) + t_t^2 / (2 k_t) is the spring energy a
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
+from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
+from feti_homog.fem.assembly import nodes_along
+from feti_homog.fem.point_fields import energy_change
+from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
-from feti_homog.homogenization.crack_extension import (
-    CrackExtension,
-    body_boundaries,
-    nearest_image,
-    reach_of_tips,
-    wrapped,
-)
+from feti_homog.homogenization.domain_partition import in_cell
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.states import BONDED, Status
 from feti_homog.interface.debonded_arcs import CrackTips, InterfaceChains, closing_work
 from feti_homog.materials.voigt import strain_tensor
 from feti_homog.system.parallel.distributed_arrays import allreduce_sum
-from feti_homog.typing import Float, Int
-
-Array = TypeVar("Array", Float, Int, Status)
+from feti_homog.typing import Array, Float, Int
 
 DIRECTION_DIGITS = 9
 # Length at which the modes are separated, at least one element / radius of the fibre.
 MODE_LENGTH = 1e-3
+QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
+# Radius around a tip beyond which nothing turns / distance to boundaries, and at most / a period of the cell; radius
+# within which all turns alike / this radius.
+REACH, REACH_OF_A_PERIOD, CORE = 0.8, 0.32, 0.5
+# Relative distance from a circle beyond which a node of the same bodies is on another boundary or image of them.
+OFF_CIRCLE = 1e-4
+VOID = -1
+
+
+class CrackExtension:
+    """Subdomain elements around points, which sum a crack extension's energy."""
+
+    def __init__(self, subdomain: Subdomain, period: Float) -> None:
+        """Find the elements around points; the cell has `period` (2,)."""
+        mesh = subdomain.mesh
+        self.subdomain, self._period = subdomain, period
+        self._tree = cKDTree(in_cell(mesh.points, period), boxsize=period)
+        elements = np.repeat(np.arange(len(mesh.triangles)), mesh.triangles.shape[1])
+        entries = np.ones(len(elements), np.int8), (mesh.triangles.ravel(), elements)
+        self._elements_of = csr_matrix(entries, shape=(len(mesh.points), len(mesh.triangles)))
+
+    def energy_change(self, tip: Float, spoke: Float, reach: float, u: Float, E: Float) -> float:
+        """Return the energy change when a crack turns by a unit angle.
+
+        Args:
+            tip, spoke: (2,) place, and place relative to the circle centre.
+            reach: distance beyond which nothing turns.
+            u: (dofs,) u*.
+            E: (2, 2) macroscopic strain.
+        """
+        inside = self._tree.query_ball_point(in_cell(tip, self._period), reach)
+        if not inside:
+            return 0.0
+        mesh = self.subdomain.mesh
+        nodes = mesh.triangles[np.unique(self._elements_of[inside].indices)]
+        points = mesh.points[nodes]
+        away = nearest_image(points - tip, self._period)
+        # An element moves as one to the image of its node that is nearest to the tip.
+        nearest = np.argmin((away**2).sum(axis=2), axis=1)[:, None, None]
+        away = points + np.take_along_axis(away - points, nearest, axis=1)
+        share = np.clip((reach - np.linalg.norm(away, axis=2)) / (reach * (1 - CORE)), 0.0, 1.0)[..., None]
+        total = u.reshape(-1, 2)[mesh.node_class[nodes]] + away @ E
+        moved, changed = share * ((away + spoke) @ QUARTER_TURN.T), share * (total @ QUARTER_TURN.T)
+        return energy_change(points, total, self.subdomain.L[:3, :3], moved, changed, self.subdomain.is_mixed)
 
 
 @dataclass(frozen=True)
 class EnergyRelease:
-    """Energy release at t tips under one load, ordered by fibre, interface and direction.
+    """Energy release at t tips, ordered by fibre, interface and direction.
 
     Attributes:
         fibre: (t,) numbers from 1.
@@ -64,7 +107,7 @@ class EnergyRelease:
 
     @property
     def mode_angle(self) -> Float:
-        """(t,) degrees psi, tan^2 psi = G_II / G_I; 0 is opening, 90 shear."""
+        """(t,) psi, tan^2 psi = G_II / G_I: 0 degrees opens, 90 shears."""
         roots = np.sqrt(np.maximum(self.modes, 0.0))
         return np.asarray(np.degrees(np.arctan2(roots[:, 1], roots[:, 0])))
 
@@ -84,7 +127,6 @@ class EnergyReleaseRates:
         self.cell, self.interface, self._period = cell, interface, cell.summary.period
         self._chains = InterfaceChains(cell.neighbours.adjacency)
         self._extensions = [CrackExtension(s, self._period) for s in cell.subdomains]
-        self._boundaries = body_boundaries(cell.comm, cell.subdomains)
         self.points, self.bodies = self._gathered(nodes.points), self._gathered(nodes.bodies)
         self.pair = self._gathered(nodes.pair)
         # Rounded, lest rounding decide their order.
@@ -92,7 +134,22 @@ class EnergyReleaseRates:
         self.direction, self.length = np.where(direction <= -180.0, 180.0, direction), self._gathered(nodes.length)
         # (interfaces, 2) normal and tangential stiffnesses of the bonds, infinite where they are rigid.
         self._stiffness = np.array(phase_laws.springs(cell.case).stiffness or ((np.inf, np.inf),))
-        self._tree = cKDTree(wrapped(self.points, self._period), boxsize=self._period)
+        self._tree = cKDTree(in_cell(self.points, self._period), boxsize=self._period)
+        # (k, 2) body boundary nodes on all ranks, and (k,) their bodies, VOID at voids. Each body has its own nodes
+        # where two bodies meet; cuts between a body's pieces are no boundaries.
+        borders = [np.bincount(s.submesh.edge_class[s.submesh.triangle_edges].ravel()) == 1 for s in cell.subdomains]
+        rows, points, body = [np.zeros((0, 2), np.int64)], [np.zeros((0, 2))], [np.zeros(0, np.int64)]
+        for s, border in zip(cell.subdomains, borders, strict=True):
+            key = s.submesh.edge_keys[border]
+            rows.append(np.column_stack([key, np.full(len(key), s.submesh.body)]))
+        edges, pieces = np.unique(self._gathered(np.concatenate(rows)), axis=0, return_counts=True)
+        cuts = edges[pieces > 1]
+        for s, border in zip(cell.subdomains, borders, strict=True):
+            cut = np.isin(s.submesh.edge_keys, cuts[cuts[:, 1] == s.submesh.body, 0])
+            for edge, name in ((border & ~cut & ~s.submesh.at_void, s.submesh.body), (s.submesh.at_void, VOID)):
+                points.append(s.mesh.points[np.unique(nodes_along(s.submesh, s.mesh, edge))])
+                body.append(np.full(len(points[-1]), name))
+        self._boundaries = self._gathered(np.concatenate(points)), self._gathered(np.concatenate(body))
 
     def of(self, response: Response) -> EnergyRelease:
         """Return G and its modes at all tips in a response.  Collective."""
@@ -106,7 +163,15 @@ class EnergyReleaseRates:
         jump[np.abs(jump) < self.interface.scales.gap_noise(solution.strain)] = 0.0
         force[np.abs(force) < self._gathered(self.interface.scales.force_noise(solution))[:, None]] = 0.0
         closing, length = self._closing(tips, status, force, jump)
-        modes = self._modes(tips, response, force, closing)
+        stiffness = self._stiffness[self.pair[tips.node]]
+        is_rigid = np.isinf(stiffness)
+        traction = force[tips.node] / self.length[tips.node, None]
+        traction[:, 0] = np.maximum(traction[:, 0], 0.0)  # pressed faces do not part
+        modes = np.where(is_rigid, closing, traction**2 / (2 * stiffness))
+        rigid = np.flatnonzero(is_rigid.all(axis=1))
+        work = closing[rigid].sum(axis=1, keepdims=True)
+        share = np.divide(closing[rigid], work, out=np.zeros_like(closing[rigid]), where=work > 0)
+        modes[rigid] = share * np.maximum(0.0, self._released(tips.chosen(rigid), response))[:, None]
         return EnergyRelease(
             fibre=self._numbers(tips),
             pair=self.pair[tips.node],
@@ -123,26 +188,24 @@ class EnergyReleaseRates:
         """(t,) circle radii at tips; NaN without a circle."""
         return np.asarray(self.cell.summary.radii[self.bodies[tips.node, 1]])
 
-    def _modes(self, tips: CrackTips, response: Response, force: Float, closing: Float) -> Float:
-        """(t, 2) G_I and G_II for forces (n, 2) and closing work (t, 2), at scale 1.  Collective."""
-        stiffness = self._stiffness[self.pair[tips.node]]
-        is_rigid = np.isinf(stiffness)
-        traction = force[tips.node] / self.length[tips.node, None]
-        traction[:, 0] = np.maximum(traction[:, 0], 0.0)  # pressed faces do not part
-        modes = np.where(is_rigid, closing, traction**2 / (2 * stiffness))
-        rigid = np.flatnonzero(is_rigid.all(axis=1))
-        work = closing[rigid].sum(axis=1, keepdims=True)
-        share = np.divide(closing[rigid], work, out=np.zeros_like(closing[rigid]), where=work > 0)
-        modes[rigid] = share * np.maximum(0.0, self._released(tips.chosen(rigid), response))[:, None]
-        return modes
-
     def _released(self, tips: CrackTips, response: Response) -> Float:
         """(t,) G from a virtual crack extension at each tip.  Collective."""
         if not len(tips.node):
             return np.zeros(0)
         solution, bodies, place = response.state.solution, self.bodies[tips.node], self.points[tips.node]
         spokes = nearest_image(place - self.cell.summary.centres[bodies[:, 1]], self._period)
-        reach = reach_of_tips(place, spokes, bodies, self._boundaries, self._period)
+        # Cracks may be extended within `reach`, which has no other tip, and no boundary but the tip's circle.
+        radius, (points, body), period = np.linalg.norm(spokes, axis=1), self._boundaries, self._period
+        reach, places = np.minimum(radius, REACH_OF_A_PERIOD / REACH * period.min()), in_cell(place, period)
+        if len(place) > 1:
+            nearest, _ = cKDTree(places, boxsize=period).query(places, 2)
+            reach = np.minimum(reach, nearest[:, 1])
+        inside = cKDTree(in_cell(points, period), boxsize=period).query_ball_point(places, reach)
+        for t, nodes in enumerate(inside):
+            away = nearest_image(points[nodes] - place[t], period)
+            off_circle = np.abs(np.linalg.norm(away + spokes[t], axis=1) / radius[t] - 1) > OFF_CIRCLE
+            limits = off_circle | ~np.isin(body[nodes], bodies[t])
+            reach[t] = REACH * min(reach[t], np.linalg.norm(away[limits], axis=1).min(initial=np.inf))
         u, E = self.cell.solver.displacement(solution), strain_tensor(solution.strain[:3])
         change, first = np.zeros(len(bodies)), 0
         for extension in self._extensions:
@@ -154,11 +217,6 @@ class EnergyReleaseRates:
         outward = np.sign((turn + 180.0) % 360.0 - 180.0)
         return np.asarray(-outward * allreduce_sum(self.cell.comm, change) / self._radius(tips))
 
-    def _distance(self, nodes: Int, origin: int) -> Float:
-        """(k,) node distances from the node `origin`."""
-        away = nearest_image(self.points[nodes] - self.points[origin], self._period)
-        return np.asarray(np.linalg.norm(away, axis=1))
-
     def _closing(self, tips: CrackTips, status: Status, force: Float, jump: Float) -> tuple[Float, Float]:
         """(t, 2) `closing_work` in opening and in shear, and (t,) closed lengths.
 
@@ -168,7 +226,7 @@ class EnergyReleaseRates:
         work, length = np.zeros((len(smallest), 2)), np.zeros(len(smallest))
         # Nodes of a chain within these lengths at most, and one element more.
         counts = self._tree.query_ball_point(
-            wrapped(self.points[tips.node], self._period), smallest, return_length=True
+            in_cell(self.points[tips.node], self._period), smallest, return_length=True
         )
         steps = order + int(counts.max(initial=1))
         chains = [self._chains.onward(tips.node, start, steps) for start in (tips.behind, tips.ahead)]
@@ -179,12 +237,19 @@ class EnergyReleaseRates:
             behind, front = (
                 chain[: np.argmin(np.append(mask, False))] for chain, mask in ((behind, debonded), (front, bonded))
             )
-            to_behind, to_front = (self._distance(chain, tips.node[t]) for chain in (behind, front))
+            to_behind, to_front = (
+                np.linalg.norm(nearest_image(self.points[chain] - self.points[tips.node[t]], self._period), axis=1)
+                for chain in (behind, front)
+            )
             length[t] = max(smallest[t], to_behind[min(order, len(behind) - 1)])
             work[t] = closing_work(length[t], to_front, force[front], to_behind, jump[behind])
         return work, length
 
     def _gathered(self, values: Array) -> Array:
-        """Gather the interface node values from all ranks.  Collective."""
-        gathered: Array = np.concatenate(self.cell.comm.allgather(values))
-        return gathered
+        """Gather the interface node values, or other rows, from all ranks.  Collective."""
+        return np.concatenate(self.cell.comm.allgather(values))
+
+
+def nearest_image(offset: Float, period: Float) -> Float:
+    """Shift offsets (..., 2) to their shortest images."""
+    return np.asarray(offset - np.round(offset / period) * period)

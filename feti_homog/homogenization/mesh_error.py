@@ -1,9 +1,13 @@
-"""Mesh error in each response pair's energy, estimated by recovered stresses."""
+"""Mesh error in each response pair's energy, estimated by recovered stresses.
+
+Recovered body stresses obey the tractions on interfaces and voids: multiplier forces over lengths.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -13,13 +17,16 @@ from feti_homog.fem.local_fits import KnownTractions
 from feti_homog.fem.stress_recovery import RecoveredStress
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.homogenization.averaging import Response
-from feti_homog.homogenization.boundary_tractions import INSIDE, Group, boundary_tractions
 from feti_homog.homogenization.uniform_parts import UniformPart, groups, locks, nested_interiors
 from feti_homog.homogenization.unit_cell import TornCell
+from feti_homog.interface.contact.states import BONDED
 from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, joined
 from feti_homog.mesh.submesh import Submesh
 from feti_homog.system.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float, Int
+
+if TYPE_CHECKING:
+    from feti_homog.homogenization.cut_bodies import SharedVertices
 
 Members = list[Subdomain] | list[UniformPart]
 # Ratios of errors of elements and of arcs to errors on meshes refined once and twice less, by the order of elements,
@@ -33,13 +40,12 @@ SAMPLED = {False: (0.066, 0.065), True: (0.052, 0.065)}
 # of the error; and where faces touch at different places, for which the energy is not bilinear.
 LEAST_SHARE, LEAST_OF_TWO = 0.05, {1: 0.01, 2: 0.005}
 LEAST_OF_TWO_UNEVEN, LEAST_OF_TWO_TOUCHING = 0.05, 1.0
+INSIDE = -1  # place of a class that is not on a boundary
 
 
 @dataclass(frozen=True)
 class EnergyErrors:
-    """Errors in E_i . Sigma_j, (k, k), for k responses.
-
-    The responses have the strains E_i in a cell with area |UC|.
+    """Errors (k, k) in E_i . Sigma_j; k responses have strains E_i.
 
     Attributes:
         elements: 1/|UC| int ds_i : S : ds_j of recovered less element stresses, and spring energy beyond tips; the
@@ -80,7 +86,7 @@ def energy_errors(
     keep: bool = True,
     nested: bool | None = None,
 ) -> EnergyErrors:
-    """Estimate response errors in one problem, a few subdomains at a time.  Collective.
+    """Estimate response errors in one problem, by groups of subdomains.  Collective.
 
     Args:
         contact: whether faces touch.
@@ -109,7 +115,7 @@ def energy_errors(
 
 
 def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
-    """Return ratios of element and arc errors to errors with `fewer` halvings.  Collective."""
+    """Return ratios of element and arc errors after `fewer` halvings.  Collective."""
     order = cell.lattice.order
     if cell.summary.across and fewer:
         return SAMPLED[any(s.is_mixed for s in cell.subdomains)]
@@ -121,11 +127,9 @@ def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
 def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
     """Return whether a mesh refined less has the error.
 
-    Not where errors fall more slowly, at corners and tips.
-
-    False for cells with fibres other than circles and ellipses or with voids bounded by straight sides; for debonded
-    arcs with quadratic elements or with tips to which the mesh is not graded: `tip_size` is given, or bonds break.
-    Collective.
+    Not where errors fall more slowly, at corners and tips: false for cells with fibres other than circles and ellipses
+    or with voids bounded by straight sides; for debonded arcs with quadratic elements or with tips to which the mesh is
+    not graded: `tip_size` is given, or bonds break. Collective.
     """
     lattice = cell.lattice
     submeshes = (s.submesh for s in cell.subdomains)
@@ -146,9 +150,9 @@ def _has_corners(cell: TornCell) -> bool:
 def _recovered(
     cell: TornCell, responses: Sequence[Response], keep: bool, lattice: ReferenceLattice
 ) -> Iterator[tuple[RecoveredStress, ArcSides]]:
-    """Yield recovered stresses and arcs in this rank's subdomains, refined by the lattice, group by group.
+    """Yield recovered stresses and arcs in this rank's subdomains, group by group.
 
-    Collective before the first.
+    They are refined by the lattice.  Collective before the first.
     """
     u = np.stack([response.u for response in responses], axis=1)
     loads = np.stack([response.strain for response in responses], axis=1)
@@ -190,10 +194,9 @@ def _nested_displacements(
 def _displacements(
     cell: TornCell, u: Float, loads: Float, keep: bool, lattice: ReferenceLattice
 ) -> Iterator[tuple[Members, FineMesh, Float, Int]]:
-    """Yield groups of subdomains with one phase: mesh, displacements (classes, c, k), and their places.
+    """Yield subdomain groups with one phase: mesh, displacements (classes, c, k), places.
 
     Places (c classes,) count displacements on all boundaries or, across materials, in all parts; INSIDE elsewhere.
-
     Across materials a coarser lattice takes the mesh displacements at its nodes: their error is hardly less than
     in equilibrium on its own mesh.
     """
@@ -211,3 +214,75 @@ def _displacements(
         displacement = np.concatenate([next(displacements)[1] for _ in group])
         shape = -1, members[0].problem.components, u.shape[1]
         yield members, mesh, displacement.reshape(shape), np.concatenate(places)
+
+
+class Group(NamedTuple):
+    """Recovered stresses, arcs and (classes,) boundary displacement places in a group."""
+
+    stress: RecoveredStress
+    sides: ArcSides
+    place: Int
+
+
+def boundary_tractions(
+    cell: TornCell, responses: Sequence[Response], groups: Sequence[Group], shared: SharedVertices | None, nested: bool
+) -> dict[int, KnownTractions]:
+    """Return tractions by group, where arc sides meet and at voids.  Collective.
+
+    They vanish at voids, else are forces over node lengths; on the mesh that has the forces, which is not `nested`,
+    over side lengths, so that uniform stresses give exact tractions.
+    """
+    forces, lengths = _forces(cell, responses, groups)
+    sums, of_node = list[Float](), np.append(lengths, 0.0)  # at INSIDE
+    for stress, sides, place in groups:
+        ends = stress.node_class[stress.triangles[sides.element[:, None], sides.ends]].ravel()
+        half = np.repeat(sides.points[:, -1] - sides.points[:, 0], 2, axis=0) / 2
+        free = np.repeat(sides.at_void, 2)
+        rows = np.column_stack([half[:, 1], -half[:, 0], np.hypot(*half.T), np.ones(len(ends)), free])
+        loaded = np.flatnonzero(free | (of_node[place[ends]] > 0))
+        sums.append(np.stack([np.bincount(ends[loaded], row, len(place)) for row in rows[loaded].T], axis=1))
+    if shared is not None:
+        parts = [sums[number][classes] for number, classes in zip(shared.meshes, shared.classes, strict=True)]
+        for number, classes, total in zip(shared.meshes, shared.classes, shared.sum(parts), strict=True):
+            sums[number][classes] = total
+    by_group = dict[int, KnownTractions]()
+    for number, ((stress, _, place), table) in enumerate(zip(groups, sums, strict=True)):
+        at = np.flatnonzero((table[:, 3] == 2) | (table[:, 4] > 0))
+        if len(at):
+            areas, size, is_free = table[at, :2], table[at, 2], table[at, 4] > 0
+            traction = forces[np.maximum(place[at], 0)[:, None] + np.arange(stress.problem.components)]
+            traction[is_free] = 0.0
+            length = of_node[place[at]] if nested else np.hypot(*areas.T)
+            traction /= np.where(is_free, 1.0, np.maximum(length, 1e-300))[:, None, None]
+            by_group[number] = KnownTractions.at(at, areas / size[:, None], traction)
+    return by_group
+
+
+def _forces(cell: TornCell, responses: Sequence[Response], groups: Sequence[Group]) -> tuple[Float, Float]:
+    """(boundary dofs, k) forces -B^T lam on bodies, and (boundary dofs,) lengths.
+
+    Lengths are 0 where no tractions follow: if a phase locks, or rigid bonds end at debonded faces.  Subdomains across
+    materials have all dofs in their parts instead.  Collective.
+    """
+    k, state, nodes = len(responses), responses[0].state, cell.solver.jump_operator.nodes
+    if cell.summary.across:
+        jumps = cell.jumps
+        BT = jumps.B.T.tocsr()
+        u = np.concatenate([np.zeros((0, k)), *(group.stress.u.reshape(-1, k) for group in groups)])
+        solutions = [replace(response.state.solution, strain=response.strain) for response in responses]
+        lam = np.stack([cell.across_bonds(solution, x)[0] for solution, x in zip(solutions, u.T, strict=True)], axis=1)
+    else:
+        jumps, BT = cell.solver.jump_operator, cell.solver.interface_operators.BT
+        lam = np.stack([response.scale * response.state.solution.lam for response in responses], axis=1)
+    rows = nodes.row[:, None] + np.arange(jumps.components)
+    rigid = bool(((state.solution.compliance[rows] == 0.0).all(axis=1) & (state.status == BONDED)).any())
+    has_tips = cell.comm.allreduce(rigid, MPI.LOR) and any(response.debonded for response in responses)
+    pairs = jumps.nodes.row[:, None] + np.arange(jumps.components)
+    of_bonds, weights = np.zeros(lam.shape), np.zeros((len(lam), 2))
+    of_bonds[pairs] = lam[pairs]
+    if not (locks(cell.parts, cell.comm) or has_tips):
+        weights[pairs] = np.stack([np.ones(len(pairs)), jumps.nodes.length], axis=1)[:, None]
+    # Entries of B are 1 / n where a body has n pieces at a node, each of which takes 1 / n of the force.
+    squares, lengths = (BT.power(2) @ jumps.gather(weights)).T
+    shares = np.sqrt(np.where(squares > 0, squares, 1.0))
+    return -(BT @ jumps.gather(of_bonds)) / shares[:, None], lengths / shares**2

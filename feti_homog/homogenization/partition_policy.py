@@ -1,15 +1,14 @@
 """Pieces that a cell is cut into, and their cost.
 
-The memory it needs, the ranks it can use, and how often its dual operator is applied.
-
-Memory is linear in the degrees of freedom, because bodies are cut into equally large pieces.  `scripts/measure_cost.py`
-measures its constants.
+The memory it needs, the ranks it can use, and how often its dual operator is applied.  Memory is linear in the degrees
+of freedom, because bodies are cut into equally large pieces.  `scripts/measure_cost.py` measures its constants.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from math import ceil
 
 import numpy as np
@@ -54,7 +53,7 @@ ITERATIONS_OF_A_SOLVE, ITERATIONS_WITH_COATINGS, SOLVES_OF_A_CONTACT, SOLVES_OF_
 
 @dataclass(frozen=True)
 class PartitionPolicy:
-    """Default piece counts for the mesh and bodies; sizes in degrees of freedom after refinement.
+    """Default piece counts; sizes in degrees of freedom after refinement.
 
     Attributes:
         piece_dofs: piece size; smaller pieces make the coarse problem slower, larger ones the factors and the
@@ -112,10 +111,8 @@ BY_COST = PartitionPolicy(across_dofs=400_000)
 def can_be_cut_across(case: Case) -> bool:
     """Return whether subdomains may reach across materials.
 
-    They may if nothing parts, and the case leaves the cut to the program.
-
-    Jumps at nearly incompressible phases and between very different stiffnesses are scaled body by body; dual
-    solver options are meant for bodies.
+    They may if nothing parts, and the case leaves the cut to the program.  Jumps at nearly incompressible phases and
+    between very different stiffnesses are scaled body by body; dual solver options are meant for bodies.
     """
     asked, free = case.decomposition, ("auto", None, None, "torus")
     if case.interfaces or (asked.cut, asked.subdomains, asked.max_dofs, case.cell.bodies) != free:
@@ -125,8 +122,9 @@ def can_be_cut_across(case: Case) -> bool:
         return False
     ratios = (isotropic_ratio(material) or 0.0 for material in case.materials.values())
     # Contrast: the largest ratio of the largest entries of two phases' stiffnesses, in any problem.
-    law_kinds = (phase_laws.plane_law, phase_laws.axial_law)[: len(phase_laws.problems(case))]
-    sizes = np.array([[np.abs(law(case, phase)[:4, :4]).max() for phase in case.materials] for law in law_kinds])
+    pairs = product(phase_laws.problems(case), case.materials)
+    sizes = np.array([np.abs(phase_laws.law(case, phase, problem)[:4, :4]).max() for problem, phase in pairs])
+    sizes = sizes.reshape(-1, len(case.materials))
     return max(ratios) <= MOST_POISSON and float((sizes.max(axis=1) / sizes.min(axis=1)).max()) <= MOST_CONTRAST
 
 
@@ -138,9 +136,7 @@ def wanted_pieces(
     n_ranks: int,
     policy: PartitionPolicy = DEFAULT_POLICY,
 ) -> Int:
-    """(b,) pieces in each body, from the case, else from the policy.
-
-    There is at least one piece for each rank.
+    """(b,) pieces by body, at least one a rank: case, else policy.
 
     Args:
         load: (b,) coarse triangles in each body.
@@ -181,7 +177,7 @@ def applications(case: Case, problem: Problem, across: bool = False) -> int:
 
 
 def _asks_for_tips(case: Case) -> bool:
-    """Return whether an envelope with arcs needs the inverse dual operator, for its many solves."""
+    """Return whether envelopes with arcs need the inverse, for many solves."""
     bond = case.interface
     by_energy = bond is not None and bond.criterion in laws_with("growth") and bond.growth == "released"
     return case.section.breaks and by_energy
@@ -212,9 +208,8 @@ def memory_to_the_end(case: Case, few: float, multipliers: int, columns: int, ra
 def recommended_ranks(dofs: int, bodies: int) -> int:
     """Return how many ranks a cell can use.
 
-    No more than its bodies, because more ranks would cut them.
-
-    Cut bodies cost iterations; in cells that are cut across materials coarse triangles stand for bodies.
+    No more than its bodies, because more ranks would cut them.  Cut bodies cost iterations; in cells that are cut
+    across materials coarse triangles stand for bodies.
     """
     return max(1, min(bodies, ceil(dofs / DOFS_OF_A_RANK)))
 

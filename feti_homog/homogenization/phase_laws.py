@@ -1,4 +1,4 @@
-"""A case's problems on the plane mesh, with their phase stiffness, springs and bond laws.
+"""Problems on the plane mesh: phase stiffness, springs and bond laws.
 
 In generalized plane strain the plane problem's loads are e = [E11, E22, gamma12, E33, T], T a temperature
 change, and A = N^T C N with N e = [E11, E22, gamma12, E33] - alpha T.  So A e is [S11, S22, S12, S33] and the
@@ -33,7 +33,7 @@ POWERS = {"strength": 1, "toughness": 2}
 
 
 def problems(case: Case) -> tuple[Problem, ...]:
-    """Return the plane problem and, if strains along the fibres are loads, the axial one.
+    """Return the plane problem and, if space strains load, the axial one.
 
     A temperature is a load if the phases have thermal expansions.
     """
@@ -44,18 +44,15 @@ def problems(case: Case) -> tuple[Problem, ...]:
     return GENERALIZED, AXIAL
 
 
-def plane_problem(case: Case) -> Problem:
-    """Return the problem for displacements in the plane."""
-    return problems(case)[0]
-
-
-def plane_law(case: Case, phase: str) -> Float:
-    """(v, v) phase stiffness A in the plane problem."""
-    material, problem = case.material_of(phase), plane_problem(case)
+def law(case: Case, phase: str, problem: Problem) -> Float:
+    """(v, v) phase stiffness A in a problem."""
+    material = case.material_of(phase)
     if problem == PLANE:
         return plane_stiffness(material, case.analysis.plane)
-    C = spatial_stiffness(material)[np.ix_(IN_PLANE, IN_PLANE)]
-    alpha = expansion(material)
+    C = spatial_stiffness(material)
+    if problem == AXIAL:
+        return C[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)]
+    C, alpha = C[np.ix_(IN_PLANE, IN_PLANE)], expansion(material)
     if problem != GENERALIZED or alpha is None:
         return C
     N = np.column_stack([np.eye(4), -alpha[IN_PLANE]])
@@ -63,18 +60,13 @@ def plane_law(case: Case, phase: str) -> Float:
 
 
 def is_mixed(case: Case, phase: str) -> bool:
-    """Return whether a phase's elements have their own bubble and pressure in the plane problem."""
+    """Return whether a phase's plane elements have bubble and pressure."""
     return cell_sizes.is_mixed(case.cell.order, case.material_of(phase), case.analysis.plane)
 
 
-def axial_law(case: Case, phase: str) -> Float:
-    """(2, 2) phase stiffness in the axial problem."""
-    return spatial_stiffness(case.material_of(phase))[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)]
-
-
 def law_derivatives(case: Case, phase: str, change: LawChange) -> tuple[Float, ...]:
-    """Differentiate `plane_law` and, if there is an axial problem, `axial_law`."""
-    problem, dC = plane_problem(case), change.stiffness
+    """Differentiate `law` in the plane and, if any, the axial problem."""
+    problem, dC = problems(case)[0], change.stiffness
     if problem == PLANE:
         return (dC,)
     axial, dC = dC[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)], dC[np.ix_(IN_PLANE, IN_PLANE)]
@@ -90,10 +82,10 @@ def law_derivatives(case: Case, phase: str, change: LawChange) -> tuple[Float, .
 
 
 def secants(plane: Float, *axial: Float) -> dict[str, Float]:
-    """Return `stiffness`, (3, 3) or with an axial problem (6, 6), and if a temperature is a load `thermal_stress` (6,).
+    """Return `stiffness` and, if a temperature is a load, `thermal_stress` (6,).
 
-    They follow from stresses under unit loads, (v, v) in the plane problem and (2, 2) in the axial one; the thermal
-    stress is the one under a unit temperature.
+    Stiffness is (3, 3) or, with an axial problem, (6, 6), from stresses under unit loads, (v, v) in the plane problem
+    and (2, 2) in the axial one; the thermal stress is the one under a unit temperature.
     """
     if not axial:
         return {"stiffness": plane}
@@ -103,12 +95,12 @@ def secants(plane: Float, *axial: Float) -> dict[str, Float]:
 
 
 def components(plane: Float, *axial: Float) -> Float:
-    """(3,) or, with an axial problem, (6,) strain or stress components from their parts in each problem."""
+    """(3,) or in space (6,) strains or stresses, joined from all problems."""
     return spatial_vector(plane, *axial) if axial else plane
 
 
 def spatial_vector(plane: Float | None, axial: Float | None) -> Float:
-    """(6,) from numbers [11, 22, 12, 33, ...] in the plane problem and [13, 23] in the axial one; None is zero."""
+    """(6,) from plane [11, 22, 12, 33] and axial [13, 23]; None: zero."""
     vector = np.zeros(6)
     if plane is not None:
         vector[IN_PLANE] = plane[:4]
@@ -117,16 +109,14 @@ def spatial_vector(plane: Float | None, axial: Float | None) -> Float:
     return vector
 
 
-def springs(case: Case) -> InterfaceSprings:
-    """Return normal and tangential springs for the plane problem."""
-    stiffness = ((bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf) for bond in case.interfaces)
-    return InterfaceSprings(tuple(stiffness), has_softening(case))
+def springs(case: Case, problem: Problem = PLANE) -> InterfaceSprings:
+    """Return normal and tangential springs, or axial ones along the fibres.
 
-
-def axial_springs(case: Case) -> InterfaceSprings:
-    """Return the springs along the fibres; without their own stiffness, as around the fibre."""
-    stiffness = ((bond.axial_stiffness or bond.tangential_stiffness or math.inf,) for bond in case.interfaces)
-    return InterfaceSprings(tuple(stiffness), has_softening(case))
+    Axial springs without their own stiffness are as around the fibre.
+    """
+    along = [(bond.axial_stiffness or bond.tangential_stiffness or math.inf,) for bond in case.interfaces]
+    around = [(bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf) for bond in case.interfaces]
+    return InterfaceSprings(tuple(along if problem == AXIAL else around), has_softening(case))
 
 
 def has_softening(case: Case) -> bool:
@@ -136,7 +126,7 @@ def has_softening(case: Case) -> bool:
 
 def has_springs(case: Case) -> bool:
     """Return whether any bond gives way."""
-    stiffnesses = (*springs(case).stiffness, *axial_springs(case).stiffness)
+    stiffnesses = (*springs(case).stiffness, *springs(case, AXIAL).stiffness)
     return any(math.isfinite(stiffness) for row in stiffnesses for stiffness in row)
 
 
@@ -161,7 +151,7 @@ def strength_factors(case: Case, fibres: int) -> Float:
 
 @dataclass(frozen=True)
 class SectionValues:
-    """Values that [interface] sections give their keys, at nodes (k,) on the sections `pair` (k,).
+    """Key values from [interface] sections `pair` (k,) at nodes (k,).
 
     `factor` (k,), by each node's fibre, multiplies strengths, and squared toughnesses.
     """
@@ -171,7 +161,7 @@ class SectionValues:
     factor: float | Float
 
     def __call__(self, key: str, *more: str) -> float | Float:
-        """Return the first value among the keys, for all nodes or (k,) at each; else inf."""
+        """Return the first key's value, for all nodes or (k,); else inf."""
         sections = self.everywhere(key, *more)
         values = float(sections[0]) if len(sections) == 1 else sections[self.pair]
         power = POWERS.get(key.rpartition("_")[2], 0)
@@ -189,7 +179,7 @@ class SectionValues:
 
 
 def bond_law(bonds: Sequence[InterfaceSection], pair: Int, factor: float | Float = 1.0) -> BondLaw:
-    """Return the bond law at nodes (k,), arguments as in `SectionValues`; without sections no bond breaks."""
+    """Return bond law at nodes (k,), see `SectionValues`; unbreakable without sections."""
     name = bonds[0].criterion if bonds else bond_laws.DEFAULT
     return law_class(name).of_keys(SectionValues(bonds, pair, factor))
 

@@ -1,4 +1,4 @@
-"""Response fields: displacements at nodes, strains and stresses in elements, tractions and jumps."""
+"""Response fields: nodal displacements, element strains and stresses, tractions, jumps."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class RecoveredFields:
     """This rank's response fields, with c displacements and v loads.
 
     Attributes:
-        displacement, fluctuation: (n, c).
+        displacement, fluctuation: (n, c) total H y + u*, Eq. (14), and u* at the parts' plane nodes.
         strain, stress: (m, v) means over the elements: loads in each, and stresses that do work on them.
         traction, jump: (k, c).
         shares: (m,) element shares in the estimated error of E . Sigma; NaN without estimate.
@@ -36,61 +36,37 @@ class RecoveredFields:
 def recover(cell: TornCell, response: Response | None) -> RecoveredFields:
     """Recover a response's fields; zero without one.  Collective."""
     nodes, problem = cell.jumps.nodes, cell.solver.problem
+    m, (c, v) = problem.strains, (problem.components, len(problem.loads))
     if response is None:
-        c, v = problem.components, len(problem.loads)
-        n, m = (sum(sizes) for sizes in zip(*_sizes(cell), strict=True)) if cell.parts else (0, 0)
-        points, elements, pairs = np.zeros((n, c)), np.zeros((m, v)), np.zeros((len(nodes.row), c))
-        return RecoveredFields(points, points, elements, elements, pairs, pairs, np.zeros(m))
-    solution = response.state.solution
+        n, e = sum(len(s.mesh.points) for s in cell.parts), sum(len(s.mesh.triangles) for s in cell.parts)
+        points, elements, pairs = np.zeros((n, c)), np.zeros((e, v)), np.zeros((len(nodes.row), c))
+        return RecoveredFields(points, points, elements, elements, pairs, pairs, np.zeros(e))
+    solution, loads, shares = response.state.solution, response.strain, response.shares
     u = cell.displacement(solution)
     lam, opening = (response.scale * rows for rows in cell.across_bonds(solution, u))
-    pair = nodes.row[:, None] + np.arange(problem.components)
-    traction = lam[pair] / nodes.length[:, None]
-    fields = _part_fields(cell, response.strain, response.scale * u)
-    return RecoveredFields(*fields, traction, opening[pair], _shares(cell, response))
-
-
-def _part_fields(cell: TornCell, loads: Float, u: Float) -> tuple[Float, Float, Float, Float]:
-    """Return nodal and element fields in this rank's parts.
-
-    Total displacements H y + u*, Eq. (14), and u* (n, c) at their plane nodes.
-
-    Then means over their elements under the loads (v,): strains with the other loads, and stresses on them, (m, v).
-    """
-    problem = cell.solver.problem
-    m, c = problem.strains, problem.components
-    H = problem.gradient(loads[:m])
+    pair, u, H = nodes.row[:, None] + np.arange(c), response.scale * u, problem.gradient(loads[:m])
     totals, fluctuations = [np.zeros((0, c))], [np.zeros((0, c))]
-    strains, stresses = [np.zeros((0, len(loads)))], [np.zeros((0, len(loads)))]
+    strains, stresses = [np.zeros((0, v))], [np.zeros((0, v))]
     for s, offset in zip(cell.parts, cell.offsets, strict=False):
         of_part = u[offset : offset + len(s.dofs)].reshape(-1, c)
         fluctuations.append(of_part[s.mesh.node_class])
         totals.append(s.mesh.points @ H.T + fluctuations[-1])
-        strain = element_strain(s.mesh.points, s.mesh.triangles, s.mesh.node_class, of_part, problem)[0]
-        strains.append(np.column_stack([loads[:m] + strain, np.tile(loads[m:], (len(strain), 1))]))
+        plane = element_strain(s.mesh.points, s.mesh.triangles, s.mesh.node_class, of_part, problem)[0]
+        strains.append(np.column_stack([loads[:m] + plane, np.tile(loads[m:], (len(plane), 1))]))
         stresses.append(strains[-1] @ s.L)
     total, fluctuation, strain, stress = (np.concatenate(rows) for rows in (totals, fluctuations, strains, stresses))
-    return total, fluctuation, strain, stress
+    if shares is None and cell.case.output.mesh_error:
+        from feti_homog.homogenization.mesh_error import energy_errors  # cases may forgo it
 
-
-def _shares(cell: TornCell, response: Response) -> Float:
-    if response.shares is not None:
-        return response.shares
-    if not cell.case.output.mesh_error:
-        return np.full(sum(len(s.mesh.triangles) for s in cell.parts), np.nan)
-    from feti_homog.homogenization.mesh_error import energy_errors  # cases may forgo it
-
-    return energy_errors(cell, [response]).shares[:, 0]
-
-
-def _sizes(cell: TornCell) -> list[tuple[int, int]]:
-    """Count nodes and elements in this rank's parts."""
-    return [(len(s.mesh.points), len(s.mesh.triangles)) for s in cell.parts]
+        shares = energy_errors(cell, [response]).shares[:, 0]
+    shares = np.full(len(strain), np.nan) if shares is None else shares
+    traction = lam[pair] / nodes.length[:, None]
+    return RecoveredFields(total, fluctuation, strain, stress, traction, opening[pair], shares)
 
 
 def out_of_plane_stress(cell: TornCell, stress: Float) -> Float:
-    """(m,) stresses 33 for the stresses (m, 3) in plane strain or stress."""
+    """(m,) stresses 33 for stresses (m, 3) in the plane."""
     plane = cell.case.analysis.plane
     rules = [laws.out_of_plane(cell.case.material_of(s.submesh.phase), plane)[0] for s in cell.parts]
-    sizes = [elements for _, elements in _sizes(cell)]
+    sizes = [len(s.mesh.triangles) for s in cell.parts]
     return np.asarray(np.einsum("ev,ev->e", stress, np.repeat(np.reshape(rules, (-1, 3)), sizes, axis=0)))

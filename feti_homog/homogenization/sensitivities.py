@@ -1,4 +1,4 @@
-"""Derivatives of a stiffness by phase and elastic interface constants, without further solves.
+"""Stiffness derivatives by phase and elastic interface constants, without further solves.
 
 With e_i the strains under the unit load i, its other uniform loads behind, a linear cell's stiffness is
 
@@ -54,7 +54,7 @@ class Derivative:
 
 
 def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response]]) -> list[Derivative]:
-    """Differentiate by all constants, from each problem's responses to its unit loads.  Collective."""
+    """Differentiate by all constants, from unit load responses by problem.  Collective."""
     case, area = cells[0].case, cells[0].summary.area
     integrals = [_integrals(cell, group) for cell, group in zip(cells, responses, strict=True)]
     changes = [*_by_phases(cells[0], [grams for grams, _ in integrals])]
@@ -84,9 +84,10 @@ def _by_phases(cell: TornCell, grams: Sequence[Mapping[str, Float]]) -> Iterator
 
 
 def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str, Float], Float]:
-    """(v, k, v, k) int e_i (x) e_j over each material's bodies under k unit loads; (k, k) changes by growth.
+    """Integrals (v, k, v, k) int e_i (x) e_j by material; changes by growth.  Collective.
 
-    Changes are energy derivatives by ln R of all fibres, 0 unless the case has such fibres.  Collective.
+    There are k unit loads.  Changes (k, k) are energy derivatives by ln R of all fibres, 0 unless the case has such
+    fibres.
     """
     problem, loads = cell.solver.problem, np.stack([response.strain for response in responses], axis=1)
     boundary = np.stack([response.u for response in responses], axis=1)
@@ -132,7 +133,7 @@ class _Fields:
 
     @classmethod
     def of(cls, s: UniformPart, nodes: Int32, u: Float, loads: Float) -> _Fields:
-        """Find the fields in elements with nodes (e, a), displacements u (e, a, c, k) and loads (m, k)."""
+        """Find element fields: nodes (e, a), u (e, a, c, k), loads (m, k)."""
         points, (_, a, c, k) = s.mesh.points[nodes], u.shape
         elements = bubble.Elements.of(points, s.L) if s.is_mixed else None
         g, w = gradients(points) if elements is None else (elements.gradients, elements.weights)
@@ -144,19 +145,20 @@ class _Fields:
         return cls(g[:, :, :a], w, slopes, strain + loads, rest)
 
     def products(self) -> Float:
-        """(mk + 1, mk + 1) int f f^T for the strains and 1; 11 and 22 products have -d lambda r^2 from isotropic dA."""
+        """(mk + 1, mk + 1) int f f^T for f = [strains, 1]."""
         *points, _, k = self.strain.shape
         gram = _gram(np.concatenate([self.strain.reshape(*points, -1), np.ones((*points, 1))], axis=2), self.weights)
-        if self.rest is not None:
+        if self.rest is not None:  # 11 and 22 products have -d lambda r^2 from isotropic dA
             change = _gram(self.rest, self.weights) / 2
             gram[:k, k : 2 * k] -= change
             gram[k : 2 * k, :k] -= change
         return gram
 
     def change(self, problem: Problem, A: Float, V: Float, more: Float) -> Float:
-        """(k, k) derivative of int e_i A e_j where the nodes (e, a, 2) move by s V, at fixed displacements.
+        """(k, k) derivative of int e_i A e_j where nodes move by s V.
 
-        int (de_i + div V e_i / 2) A e_j and its transpose, d grad u = -grad V grad u; `more` (v - m, k) other loads.
+        At fixed displacements, V (e, a, 2): int (de_i + div V e_i / 2) A e_j and its transpose, d grad u = -grad V grad
+        u; `more` (v - m, k) other loads.
         """
         (e, q, _, c, k), m = self.slopes.shape, problem.strains
         grad_V = self.gradients.transpose(0, 1, 3, 2) @ V[:, None]
@@ -175,7 +177,7 @@ class _Fields:
 
 
 def _strains(slopes: Float, problem: Problem) -> Float:
-    """(e, q, m, k) strains from the slopes (e, q, 2, c, k)."""
+    """(e, q, m, k) strains from slopes (e, q, 2, c, k)."""
     strain = np.zeros((*slopes.shape[:2], problem.strains, slopes.shape[4]))
     for (i, d), number in np.ndenumerate(problem.voigt):
         strain[:, :, number] += slopes[:, :, d, i]
@@ -189,7 +191,7 @@ def _gram(fields: Float, weights: Float) -> Float:
 
 
 def _stretched_springs(cell: TornCell, responses: Sequence[Response]) -> Float:
-    """(sections, components, k, k) sums of [u]_i k [u]_j = lam_i C lam_j over bond rows.  Collective."""
+    """(sections, components, k, k) sums lam_i C lam_j over bonds.  Collective."""
     nodes, c, k = cell.solver.jump_operator.nodes, cell.solver.problem.components, len(responses)
     work = np.zeros((len(cell.case.interfaces), c, k, k))
     lam = np.stack([response.scale * response.state.solution.lam for response in responses], axis=1)
@@ -201,7 +203,7 @@ def _stretched_springs(cell: TornCell, responses: Sequence[Response]) -> Float:
 
 
 def _spring_constants(case: Case) -> Iterator[tuple[str, float, tuple[list[tuple[int, int]], list[tuple[int, int]]]]]:
-    """Yield each finite interface stiffness, with its sections and components in each problem."""
+    """Yield finite interface stiffnesses with sections and components by problem."""
     several = len(case.interfaces) > 1
     for number, bond in enumerate(case.interfaces):
         section = f"interface.{number + 1}" if several else "interface"
@@ -219,14 +221,14 @@ def _spring_constants(case: Case) -> Iterator[tuple[str, float, tuple[list[tuple
 
 
 def _fractions(case: Case) -> Iterator[float]:
-    """Yield the fibre fraction in a pattern of equal, uncoated, bonded fibres; else nothing."""
+    """Yield the fibre fraction in patterns of equal, uncoated, bonded fibres."""
     cell = case.cell
     if cell.geometry in PATTERNS and cell.coating is None and not case.interfaces and cell.fibre_fraction is not None:
         yield cell.fibre_fraction
 
 
 def _velocity(points: Float, cell: CellSummary) -> Float:
-    """(n, 2) V = dx / d ln R at points (n, 2) where all fibres in a pattern grow.
+    """(n, 2) V = dx / d ln R at points (n, 2) while fibres grow.
 
     x - c in a fibre with centre c and radius R, falling to 0 halfway to the next fibre.
     """

@@ -1,4 +1,4 @@
-"""Errors that springs at nodes make in each response pair's energy, besides element and arc errors."""
+"""Energy errors by springs at nodes, besides element and arc errors."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from feti_homog.interface.contact.states import BONDED, Status
 from feti_homog.interface.debonded_arcs import InterfaceChains
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.system.parallel.distributed_arrays import allreduce_sum
-from feti_homog.typing import Bool, Float, Int
+from feti_homog.typing import Float, Int
 
 # Gauss points of a side, by which ellipses and products of quadratic functions are exact to rounding or nearly so.
 POINTS, WEIGHTS = roots_legendre(6)
 
 
 class SpringSides:
-    """Element sides along springs, and all ranks' interface nodes: everything that no state changes."""
+    """Element sides along springs, and all interface nodes; states change neither."""
 
     def __init__(
         self,
@@ -33,7 +33,7 @@ class SpringSides:
         lattice: ReferenceLattice,
         period: Float,
     ) -> None:
-        """Find fibre sides in the `parts`, refined by the lattice; `period` (2,) is the cell's.  Collective."""
+        """Find fibre sides in the `parts`; the cell has `period` (2,).  Collective."""
         self._comm, self._jumps, self._order, self._period = neighbours.comm, jumps, lattice.order, period
         self._chains = InterfaceChains(neighbours.adjacency)
         nodes = jumps.nodes
@@ -66,7 +66,7 @@ class SpringSides:
         self._share = np.where(turn > 0, length, 0.0) / {1: 12, 2: 60}[lattice.order]
 
     def errors(self, status: Status, compliance: Float, lam: Float) -> tuple[Float, Float]:
-        """(k, k) energies beyond tips, and on sides without the part that `arc_energy` has.  Collective.
+        """(k, k) energies beyond tips, and on sides less `arc_energy`.  Collective.
 
         Args:
             status: (n,) states at this rank's interface nodes.
@@ -87,30 +87,24 @@ class SpringSides:
         ends = self._points[np.stack([tips.behind, tips.ahead])] - self._points[tips.node]
         behind, front = np.linalg.norm(ends - np.round(ends / self._period) * self._period, axis=2)
         beyond = np.einsum("t,tci,tcj->ij", behind / (behind + front), force[tips.node], jump[tips.node])
-        return np.asarray(beyond), allreduce_sum(self._comm, self._of_sides(holds, stiffness, jump))
-
-    def _of_sides(self, holds: Bool, stiffness: Float, jump: Float) -> Float:
-        """(k, k) spring energy at nodes less springs along this rank's sides, less the part known on arcs.
-
-        Both energies are of the functions that nodes define on sides; the exact jump d adds to the energy of springs,
-        and to the energy of t on the distance from d to these functions, as much as these lack.
-        """
+        # Nodal spring energy less springs along this rank's sides, less the part known on arcs. Both energies are of
+        # the functions that nodes define on sides; the exact jump d adds to the energy of springs, and to the energy of
+        # t on the distance from d to these functions, as much as these lack.
         side = np.flatnonzero(holds[self._nodes].all(axis=1))
-        nodes, ds, shape = self._nodes[side], self._ds[side], self._shape[:, side]
-        k, at_nodes = stiffness[nodes], jump[nodes]
-        moved, traction = self._in_space(jump)[nodes], self._in_space(stiffness[:, :, None] * jump)[nodes]
+        at, ds, shape = self._nodes[side], self._ds[side], self._shape[:, side]
+        k, moved, traction = stiffness[at], self._in_space(jump)[at], self._in_space(stiffness[:, :, None] * jump)[at]
         blended = np.einsum("afq,fadi->fqdi", shape, moved)
         if moved.shape[2] == 2:
             blended = np.einsum("fqcd,fqdi->fqci", self._frame[side], blended)
-        lumped = np.einsum("fa,fac,faci,facj->ij", self._weights[side], k, at_nodes, at_nodes, optimize=True)
+        lumped = np.einsum("fa,fac,faci,facj->ij", self._weights[side], k, jump[at], jump[at], optimize=True)
         between = np.einsum("afq,fac->fqc", shape, k)
         on_sides = np.einsum("fq,fqc,fqci,fqcj->ij", ds, between, blended, blended, optimize=True)
         differences = (np.diff(values, n=self._order, axis=1)[:, 0] for values in (traction, moved))
         on_arcs = np.einsum("f,fdi,fdj->ij", self._share[side], *differences, optimize=True)
-        return np.asarray(lumped - on_sides - on_arcs - on_arcs.T)
+        return np.asarray(beyond), allreduce_sum(self._comm, lumped - on_sides - on_arcs - on_arcs.T)
 
     def _in_space(self, components: Float) -> Float:
-        """(n, 2, k) plane vectors from components (n, 2, k) along normal and tangent; (n, 1, k) stay."""
+        """(n, 2, k) plane vectors from normal and tangent; (n, 1, k) stay."""
         if components.shape[1] == 1:
             return components
         normal = self._normal
@@ -119,9 +113,9 @@ class SpringSides:
 
 
 def _sides(part: UniformPart, number: Int, fibre: Int, lattice: ReferenceLattice) -> tuple[Int, Float, Float]:
-    """Return a fibre part's sides: interface nodes (f, order + 1), normals (f, q, 2), turns (f,).
+    """Return a fibre part's sides: nodes (f, order + 1), normals, turns (f,).
 
-    Normals at Gauss points are as long as the arc per unit place.  `number` (classes,) are interface nodes on
+    Normals (f, q, 2) at Gauss points are as long as the arc per unit place.  `number` (classes,) are interface nodes on
     all ranks, -1 elsewhere, `fibre` (n,) each one's inner body.
     """
     triangle, k, line = border_lines(part.submesh, part.mesh, part.mesh.node_class[part.mesh.nodes])

@@ -1,38 +1,44 @@
-"""Cells cut on rank 0, or large ones where they are meshed.
+"""Cells meshed by all ranks, cut on rank 0 or by tiles.
 
-For large cells each rank cuts its tiles, and no rank has all tiles.
-
-Matrix pieces lie within tiles, and a fibre lies in one tile, so subdomains depend on the case and the number of
-ranks, not on the rank that filled a tile.
+Rank 0 begins the coarse mesh; all ranks make nodes on lines, and the tiles of large cells.  There each rank cuts its
+tiles, and no rank has all tiles.  Matrix pieces lie within tiles, and a fibre lies in one tile, so subdomains depend on
+the case and the number of ranks, not on the rank that filled a tile.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import chain
+from operator import itemgetter
+from typing import TypeVar
 
 import numpy as np
 from mpi4py import MPI
 
+from feti_homog.case import case as cases
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import assign_ranks, cut_into_pieces
-from feti_homog.homogenization import cell_remarks
-from feti_homog.homogenization.cell_remarks import subdomain_remarks, table_remarks
-from feti_homog.homogenization.coarse_meshes import deal_tiles, fill_own, fill_tiles, place_nodes
-from feti_homog.homogenization.domain_partition import CellSummary, RankShare, distribute, in_cell, match_distance
+from feti_homog.homogenization import arc_selection, cell_remarks
+from feti_homog.homogenization.domain_partition import RankShare, distribute, summary_of
 from feti_homog.homogenization.partition_policy import PartitionPolicy, can_be_cut_across, wanted_pieces
+from feti_homog.mesh.arrange import listed_arrangement
 from feti_homog.mesh.coarse_mesh import CoarseMesh, representatives
-from feti_homog.mesh.fill.gmsh_mesher import NodedCell
+from feti_homog.mesh.fill.gmsh_mesher import NodedCell, UnmeshedCell, begin
 from feti_homog.mesh.outline.lines import MATRIX
 from feti_homog.mesh.periodic_topology import Torus, components, places_by_depth
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.sizes.element_estimate import ElementEstimate
+from feti_homog.mesh.sizes.graded_size import SizeField
 from feti_homog.mesh.submesh import SubdomainTable, cut_for_ranks, joined, pinning
-from feti_homog.mesh.tiles.filling import arc_edges
-from feti_homog.mesh.tiles.tiles import FilledTile, NumberedTile, Regions, tile_torus
-from feti_homog.system.parallel.distributed_arrays import alltoall, scatter
+from feti_homog.mesh.tiles.filling import Filling, Tile, fill
+from feti_homog.mesh.tiles.tiles import FilledTile, NumberedTile, Regions, TilePolicy, tile_torus
+from feti_homog.system.parallel.distributed_arrays import alltoall, gather, scatter
+from feti_homog.system.parallel.dividing import balanced
 from feti_homog.system.parallel.mpi_errors import agree, on_root, on_root_only
 from feti_homog.typing import Float, Int
+
+T = TypeVar("T")
 
 
 def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy) -> RankShare:
@@ -43,6 +49,86 @@ def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: Part
         return tear_by_tiles(case, noded, lattice, comm, policy)
     mesh = fill_tiles(noded, comm)
     return scatter(comm, on_root_only(comm, distribute, case, mesh, lattice, comm.size, policy) or [])
+
+
+def place_nodes(case: Case, comm: MPI.Intracomm, policy: TilePolicy) -> NodedCell | CoarseMesh | None:
+    """Return a user's mesh, or noded lines with empty tiles.  Collective.
+
+    All ranks place nodes; None but on rank 0.
+
+    Raises:
+        CaseError, MeshError: on every rank, as `begin_mesh`.
+    """
+    cell = on_root_only(comm, begin_mesh, case, policy)
+    unmeshed = cell if isinstance(cell, UnmeshedCell) else None
+    if not comm.bcast(unmeshed is not None):
+        assert not isinstance(cell, UnmeshedCell)
+        return cell
+    field: SizeField = comm.bcast(None if unmeshed is None else unmeshed.bare.field)
+    lines = scatter(comm, [] if unmeshed is None else unmeshed.bare.lines.parts(comm.size))
+    stations = gather(comm, agree(comm, lines.stations, field))
+
+    def with_nodes(unmeshed: UnmeshedCell) -> NodedCell:
+        return unmeshed.with_nodes(unmeshed.bare.lines.joined(stations))
+
+    return on_root_only(comm, with_nodes, unmeshed)
+
+
+def begin_mesh(case: Case, policy: TilePolicy) -> UnmeshedCell | NodedCell | CoarseMesh:
+    """Return a user's mesh, or the cell that rank 0 makes alone.
+
+    Raises:
+        CaseError: a phase has no material, or a material no phase.
+        MeshError: the cell cannot be meshed, or its mesh file is faulty.
+    """
+    cell: UnmeshedCell | NodedCell | CoarseMesh
+    if case.cell.has_own_mesh:
+        from feti_homog.mesh.readers.msh_reader import read_cell  # with the readers of all formats
+
+        cell = read_cell(case.cell)
+    else:
+        listed = listed_arrangement(case.cell)
+        estimate = ElementEstimate.of(case.cell, listed)
+        section = replace(case.cell, tip_size=arc_selection.size(case, estimate))
+        cell = begin(section, listed, arc_selection.marks(case, estimate.fibres), policy)
+    cases.check_phases(case, cell.phases)
+    return cell
+
+
+def fill_tiles(cell: NodedCell | CoarseMesh | None, comm: MPI.Intracomm) -> CoarseMesh | None:
+    """Return the mesh on rank 0; all ranks fill its tiles.  Collective.
+
+    Raises:
+        MeshError: on every rank, if one cannot fill a tile.
+    """
+    tiles = [] if cell is None or isinstance(cell, CoarseMesh) else [tile for _, tile in cell.parts]
+    gathered = gather(comm, agree(comm, fill_own, deal_tiles(tiles, [len(tile.points) for tile in tiles], comm)))
+    fillings = [filling for _, filling in sorted(chain.from_iterable(gathered), key=itemgetter(0))]
+
+    def joined(cell: NodedCell | CoarseMesh) -> CoarseMesh:
+        return cell if isinstance(cell, CoarseMesh) else cell.mesh(fillings)
+
+    return on_root_only(comm, joined, cell)
+
+
+def deal_tiles(tiles: list[T], loads: list[int], comm: MPI.Intracomm) -> list[tuple[int, T]]:
+    """Deal tiles from rank 0 to all ranks.  Collective.
+
+    The tiles have sizes `loads`; returns the numbers and tiles that this rank fills.
+    """
+    parts: list[list[tuple[int, T]]] = [[] for _ in range(comm.size)]
+    for k, rank in enumerate(balanced(np.array(loads, np.int64), comm.size).tolist()):
+        parts[rank].append((k, tiles[k]))
+    return scatter(comm, parts)
+
+
+def fill_own(tiles: list[tuple[int, Tile]]) -> list[tuple[int, Filling]]:
+    """Fill numbered tiles.
+
+    Raises:
+        MeshError: gmsh cannot fill one.
+    """
+    return [(k, fill(tile)) for k, tile in tiles]
 
 
 def can_be_torn_by_tiles(
@@ -64,7 +150,7 @@ def can_be_torn_by_tiles(
 def tear_by_tiles(
     case: Case, noded: NodedCell | None, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy
 ) -> RankShare:
-    """Return this rank's share in the cell with noded lines on rank 0.  Collective.
+    """Return this rank's share in a cell noded on rank 0.  Collective.
 
     Raises:
         CaseError, MeshError: on every rank, as `tiled_cell` and `filling.fill`.
@@ -77,17 +163,29 @@ def tear_by_tiles(
     pieces = wanted_pieces(case, load, edges, lattice, comm.size, policy)
     longest = comm.allreduce(float(torus.edge_lengths.max(initial=0.0)), MPI.MAX)
     local = agree(comm, _cut, torus, tile, pieces / load, longest)
-    subdomain, body, loads = _numbered(torus, tile, local, comm)
+    # Subdomains of all ranks are numbered by body and tile.
+    first = np.unique(local, return_index=True)[1]
+    parts = comm.allgather((torus.constituent[first], tile[first], np.bincount(local)))
+    body, tiles, loads = (np.concatenate(rows) for rows in zip(*parts, strict=True))
+    order = np.lexsort((np.arange(len(body)), tiles, body))
+    before = sum(len(bodies) for bodies, *_ in parts[: comm.rank])
+    subdomain, body, loads = np.argsort(order)[before + local], body[order], loads[order]
     neighbours = comm.gather(agree(comm, _neighbours, torus, subdomain))
     rank = on_root(comm, _assigned, loads, neighbours or [], comm.size)
-    table, pinned = SubdomainTable(body, rank, nesting, regions.phase), _pinned(torus, comm)
+    table = SubdomainTable(body, rank, nesting, regions.phase)
+    # One class on all ranks is pinned, see `submesh.pinned_class`.
+    at_interface, in_matrix = np.zeros((2, len(torus.class_keys)), bool)
+    at_interface[torus.node_class[torus.mesh.arc_edges]] = True
+    in_matrix[torus.node_class[torus.mesh.triangles[torus.constituent == 0]]] = True
+    candidates = comm.allgather(pinning(torus, np.select([at_interface, in_matrix], [2, 0], 1)))
+    pinned: int = min(chain.from_iterable(candidates))[-1]
     shares = agree(comm, lambda: list(cut_for_ranks(torus, subdomain, table, comm.size, pinned)))
     summary = on_root(comm, summary_of, case, noded, len(body), int(load.sum()))
     return RankShare(summary, table, phase_pairs, joined(alltoall(comm, shares)))
 
 
 def _filled(noded: NodedCell | None, regions: Regions, comm: MPI.Intracomm) -> tuple[Torus, Int]:
-    """Return the torus that this rank's tiles fill, and each triangle's tile (m,).  Collective."""
+    """Return the torus that this rank's tiles fill, and tiles (m,).  Collective."""
     tiles = on_root_only(comm, tiles_to_fill, noded) or []
     dealt = deal_tiles(tiles, [len(tile.nodes) for tile in tiles], comm)
     fillings = agree(comm, fill_own, [(k, tile.tile) for k, tile in dealt])
@@ -114,19 +212,6 @@ def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) ->
     return cut_into_pieces(torus, parts, np.clip(pieces, 1, size), longest)
 
 
-def _numbered(torus: Torus, tile: Int, local: Int, comm: MPI.Intracomm) -> tuple[Int, Int, Int]:
-    """Count subdomains by body and tile over all ranks.  Collective.
-
-    Returns the subdomain (m,) of each triangle on this rank, then each subdomain's body (s,) and triangle count (s,).
-    """
-    first = np.unique(local, return_index=True)[1]
-    parts = comm.allgather((torus.constituent[first], tile[first], np.bincount(local)))
-    body, tiles, load = (np.concatenate(rows) for rows in zip(*parts, strict=True))
-    order = np.lexsort((np.arange(len(body)), tiles, body))
-    before = sum(len(bodies) for bodies, *_ in parts[: comm.rank])
-    return np.argsort(order)[before + local], body[order], load[order]
-
-
 def _neighbours(torus: Torus, subdomain: Int) -> tuple[Int, Int, Int, Int]:
     """Return subdomain pairs (n,) and (n,) that meet at this rank's edges.
 
@@ -145,16 +230,6 @@ def _assigned(load: Int, neighbours: list[tuple[Int, Int, Int, Int]], n_ranks: i
     a, b, edge, side = (np.concatenate(rows) for rows in zip(*neighbours, strict=True))
     side = side[np.argsort(edge, kind="stable")]
     return assign_ranks(load, np.append(a, side[::2]), np.append(b, side[1::2]), n_ranks)
-
-
-def _pinned(torus: Torus, comm: MPI.Intracomm) -> int:
-    """Find the key of the one class on all ranks that is pinned, see `submesh.pinned_class`.  Collective."""
-    at_interface, in_matrix = np.zeros((2, len(torus.class_keys)), bool)
-    at_interface[torus.node_class[torus.mesh.arc_edges]] = True
-    in_matrix[torus.node_class[torus.mesh.triangles[torus.constituent == 0]]] = True
-    candidates = comm.allgather(pinning(torus, np.select([at_interface, in_matrix], [2, 0], 1)))
-    best: tuple[int, float, int] = min(chain.from_iterable(candidates))
-    return best[-1]
 
 
 def tiled_cell(case: Case, noded: NodedCell) -> tuple[Int, Int, Int]:
@@ -187,41 +262,3 @@ def tiles_to_fill(noded: NodedCell) -> list[NumberedTile]:
     lines, arrangement = noded.lines, noded.arrangement
     stands_for = representatives(lines.points, arrangement.width, arrangement.height).astype(np.int64)
     return [NumberedTile(nodes, stands_for[nodes], tile) for nodes, tile in noded.parts]
-
-
-def summary_of(case: Case, noded: NodedCell, subdomains: int, triangles: int) -> CellSummary:
-    """Summarize the cell with so many subdomains and coarse triangles."""
-    regions, lines, arrangement = noded.regions, noded.lines, noded.arrangement
-    inside = regions.constituent[:-1]
-    solid = np.flatnonzero(inside >= 0)
-    circle = solid[np.unique(inside[solid], return_index=True)[1]]
-    disc = lines.disc[circle]
-    is_fibre = arrangement.precedence(disc, lines.is_coating[circle]) == disc + 1
-    centres = in_cell(noded.scale * arrangement.centres[disc], np.array([regions.width, regions.height]))
-    radii = regions.ellipses.circles[circle, 2]
-    ends = noded.scale * lines.points[arc_edges(lines.curves)[0]]
-    nothing = np.full((1, 2), np.nan)
-    return CellSummary(
-        width=regions.width,
-        height=regions.height,
-        phases=regions.phases,
-        bodies=len(regions.phase),
-        subdomains=subdomains,
-        coarse_triangles=triangles,
-        interface_edge=float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max(initial=0.0)),
-        numbers=np.append(0, disc + 1),
-        is_fibre=np.append(False, is_fibre),
-        constituent_phase=regions.phase,
-        centres=np.concatenate([nothing, centres]),
-        radii=np.append(np.nan, radii),
-        frames=np.concatenate([np.full((1, 2, 2), np.nan), regions.ellipses.frames[circle]]),
-        moved_tips=({},) * len(case.interfaces),
-        snapped=0.0,
-        voids=arrangement.voids,
-        match_distance=match_distance(case, regions.width, regions.height, centres[is_fibre], radii[is_fibre]),
-        remarks=(
-            *arrangement.remarks,
-            *table_remarks(case),
-            *subdomain_remarks(case, len(regions.phase), subdomains, triangles),
-        ),
-    )

@@ -1,4 +1,4 @@
-"""Subdomain parts in one body each, and displacements inside bodies on a mesh that is refined less.
+"""Subdomain parts in one body each, and displacements on coarser meshes.
 
 A subdomain in one material is a part itself; one across materials has a part for each body that it reaches.  The mesh
 that is refined less has a quarter or a sixteenth of the elements; its nodes are among the finer mesh's nodes.
@@ -27,7 +27,7 @@ from feti_homog.typing import Float, Int
 
 # Subdomains of so many elements at once: few enough for the processor's cache, many enough for NumPy.
 ELEMENTS_AT_ONCE = 1 << 13
-# Halvings from which on the mesh that is refined twice less serves.
+# Halvings from which on the mesh that is refined twice less serves, but across materials and where a phase locks.
 REFINED_OFTEN = 3
 # Largest lambda / mu on that mesh, of a Poisson's ratio of 0.4: beyond, errors of coarse elements are no guide.
 LOCKING = 4.0
@@ -57,7 +57,7 @@ class UniformPart:
 
 
 def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterator[UniformPart]:
-    """Yield all subdomains' parts, in each by phase and body; `phase_of` (constituents,) names phases."""
+    """Yield parts by subdomain, phase and body; `phase_of` (constituents,) names phases."""
     for place, s in enumerate(subdomains):
         if s.material is None:
             yield UniformPart(place, s.submesh, s.mesh, np.arange(s.n_dofs), s.L, s.problem, s.is_mixed)
@@ -73,7 +73,7 @@ def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterat
 
 
 def nodes_of_parts(s: Subdomain) -> int:
-    """Count plane nodes in a subdomain's parts; a node in several parts counts for each."""
+    """Count plane nodes in all parts; shared nodes count for each."""
     body, nodes = np.repeat(s.submesh.constituent, s.mesh.nodes.shape[1]), s.mesh.nodes.ravel()
     last = np.empty(len(s.mesh.points), np.int64)
     last[nodes] = body
@@ -107,7 +107,7 @@ def share_parts(
 
 
 class ForcesBetweenParts:
-    """Constraint multipliers between parts, which keep each part in equilibrium with its displacements."""
+    """Multipliers that keep each part in equilibrium with its displacements."""
 
     def __init__(self, comm: MPI.Intracomm, parts: Sequence[UniformPart], jumps: JumpOperator) -> None:
         """Assemble the coarse triangles at constraints.  Collective."""
@@ -126,7 +126,7 @@ class ForcesBetweenParts:
         self._inverse = blocks.inverse(np.ones(jumps.owned[1] - jumps.owned[0]))
 
     def multipliers(self, u: Float, loads: Float) -> Float:
-        """(owned rows,) lam = (B B^T)^-1 B f, f = -K u - Q E, for displacements u (dofs,) and loads E.  Collective."""
+        """(owned rows,) lam = (B B^T)^-1 B (-K u - Q E); u (dofs,).  Collective."""
         forces = np.zeros(len(u))
         forces[self._dofs] = -self._K @ u[self._dofs] - self._Q @ loads
         return np.asarray(self._inverse @ self._jumps.sum(self._jumps.B @ forces))
@@ -134,7 +134,7 @@ class ForcesBetweenParts:
 
 @dataclass(frozen=True)
 class NestedInterior:
-    """Coarser mesh of a group of subdomains with one phase, with c displacements per node.
+    """Coarser mesh for subdomains with one phase; c displacements a node.
 
     Attributes:
         members: the subdomains.
@@ -156,7 +156,7 @@ class NestedInterior:
     def of(
         cls, places: Sequence[int], boundary: InterfaceOperators, lattice: ReferenceLattice, nested: Int
     ) -> NestedInterior:
-        """Refine, assemble and factor; `nested` numbers the lattice nodes among the finer lattice's nodes."""
+        """Refine, assemble and factor; `nested` numbers lattice nodes among finer ones."""
         members = [boundary.subdomains[place] for place in places]
         first, meshes, numbers = members[0], [refine(s.submesh, lattice) for s in members], list[Int]()
         for k, s, mesh in zip(places, members, meshes, strict=True):
@@ -176,7 +176,7 @@ class NestedInterior:
         return cls(members, mesh, fixed, place[fixed], interior, loads)
 
     def displacement(self, u: Float, loads: Float) -> Float:
-        """(classes, c, k) u* from u (boundary dofs, k) on all boundaries under the loads (v, k)."""
+        """(classes, c, k) u* from u (boundary dofs, k), loads (v, k)."""
         problem = self.members[0].problem
         on_boundary = np.vstack([u, np.zeros((1, u.shape[1]))])[self.place]  # PINNED is the last row
         all_dofs = np.empty((len(self.fixed) + len(self.interior.dofs), u.shape[1]))
@@ -187,35 +187,22 @@ class NestedInterior:
 
 
 def locks(subdomains: Sequence[Subdomain | UniformPart], comm: MPI.Intracomm) -> bool:
-    """Return whether linear elements in a phase on any rank hardly change volume.  Collective."""
+    """Return whether elements in any phase hardly change volume.  Collective."""
     locking = any(s.problem.components == 2 and s.L[0, 1] > LOCKING * s.L[2, 2] for s in subdomains)
     return bool(comm.allreduce(locking, MPI.LOR))
-
-
-def nested_lattice(
-    lattice: ReferenceLattice, subdomains: Sequence[Subdomain], comm: MPI.Intracomm, across: bool
-) -> ReferenceLattice:
-    """Return the coarser mesh's lattice.
-
-    It is refined once less, or twice after many halvings if no phase locks.
-
-    Not twice if subdomains reach across materials.  Collective.
-    """
-    often = not locks(subdomains, comm) and lattice.halvings >= REFINED_OFTEN and not across
-    return lattice.coarser(2 if often else 1)
 
 
 def nested_interiors(
     boundary: InterfaceOperators, lattice: ReferenceLattice, coarser: ReferenceLattice
 ) -> Iterator[NestedInterior]:
-    """Yield this rank's subdomain interiors, refined by the lattice, on the coarser one, group by group."""
+    """Yield this rank's subdomain interiors on the coarser lattice, in groups."""
     nested = coarser.within(lattice)
     for group in groups(boundary.subdomains, coarser):
         yield NestedInterior.of(group, boundary, coarser, nested)
 
 
 def groups(subdomains: Sequence[Subdomain | UniformPart], lattice: ReferenceLattice) -> Iterator[list[int]]:
-    """Yield the places of consecutive subdomains in one phase, with ELEMENTS_AT_ONCE elements at most."""
+    """Yield consecutive subdomains in one phase, up to ELEMENTS_AT_ONCE elements."""
     group, elements = list[int](), 0
     for place, s in enumerate(subdomains):
         count = len(s.mesh.nodes) * len(lattice.triangles)

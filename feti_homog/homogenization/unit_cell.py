@@ -1,17 +1,17 @@
-"""The torn cell: from a case to subdomains on their ranks and a solver that is set up for them."""
+"""The torn cell: from a case to subdomains with their solver."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from mpi4py import MPI
 
 from feti_homog.case.case import Case
-from feti_homog.fem.problem import AXIAL
+from feti_homog.fem.problem import AXIAL, Problem
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.shared_entities import SharedEntities, share_entities
 from feti_homog.feti.decomposition.subdomain import Subdomain
@@ -22,7 +22,7 @@ from feti_homog.homogenization import cell_remarks, partition_policy, phase_laws
 from feti_homog.homogenization.domain_partition import CellSummary, RankShare
 from feti_homog.homogenization.partition_policy import DEFAULT_POLICY, PartitionPolicy
 from feti_homog.homogenization.tile_tearing import cut
-from feti_homog.homogenization.uniform_parts import UniformPart
+from feti_homog.homogenization.uniform_parts import UniformPart, locks
 from feti_homog.interface import debonded_arcs
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.mesh.refinement import ReferenceLattice
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TornCell:
-    """The cell on all ranks; `lattice` refines each coarse triangle of this rank's `subdomains`.
+    """The cell on all ranks; `lattice` refines `subdomains` on each rank.
 
     `axial` is the cell with the displacement along the fibres, on the same meshes and interface nodes; None unless the
     plane state is generalized plane strain.
@@ -66,7 +66,7 @@ class TornCell:
 
     @cached_property
     def parts(self) -> list[UniformPart]:
-        """This rank's subdomain parts in one body each, numbered over all ranks.  Collective when first read."""
+        """This rank's parts in one body each, numbered over ranks.  Collective when first read."""
         phases = [self.summary.phases[k] for k in self.summary.constituent_phase.tolist()]
         parts = list(uniform_parts.parts_of(self.subdomains, phases))
         if not self.summary.across:
@@ -76,7 +76,7 @@ class TornCell:
 
     @cached_property
     def jumps(self) -> JumpOperator:
-        """B between all parts, within a subdomain too, without multipliers.  Collective when first read."""
+        """B between all parts, also within subdomains.  Collective when first read."""
         if not self.summary.across:
             return self.solver.jump_operator
         pairs = cell_remarks.pairs_of(self.case, self.summary.phases)
@@ -93,9 +93,9 @@ class TornCell:
         return np.concatenate([np.zeros(0), *(part for _, part in self.displacements(u, solution.strain))])
 
     def displacements(self, u: Float, loads: Float, keep: bool = True) -> Iterator[tuple[UniformPart, Float]]:
-        """Yield each part with its u* (dofs, k) for u (boundary dofs, k) on all boundaries and the loads (v, k).
+        """Yield each part with its u* (dofs, k) from boundary displacements.
 
-        `keep` stores the interior factors.
+        u (boundary dofs, k) on all boundaries, under the loads (v, k); `keep` stores the interior factors.
         """
         place, extended = -1, np.zeros(0)
         for part in self.parts:
@@ -104,7 +104,7 @@ class TornCell:
             yield part, extended[part.dofs]
 
     def across_bonds(self, solution: DualSolution, u: Float) -> tuple[Float, Float]:
-        """(owned rows of `jumps`,) lam and openings for the part displacements u.  Collective."""
+        """(owned rows of `jumps`,) lam and openings for displacements u.  Collective."""
         if not self.summary.across or not self.jumps.global_rows:  # without jumps there is a single part
             return solution.lam, solution.opening
         return self._forces.multipliers(u, solution.strain), self.jumps.sum(self.jumps.B @ u)
@@ -126,7 +126,7 @@ class TornCell:
 
     @cached_property
     def class_nodes(self) -> Int:
-        """(c,) a plane node for each class in this rank's parts, one part after the other."""
+        """(c,) a plane node for each class, part after part."""
         nodes, first = [np.zeros(0, np.int64)], 0
         for mesh in (part.mesh for part in self.parts):
             nodes.append(np.empty(mesh.n_classes, np.int64))
@@ -155,8 +155,9 @@ class TornCell:
 
     @cached_property
     def nested_lattice(self) -> ReferenceLattice:
-        """The lattice for the mesh that is refined less.  Collective when first read."""
-        return uniform_parts.nested_lattice(self.lattice, self.subdomains, self.comm, self.summary.across)
+        """Lattice refined once less, or twice if nothing is against it.  Collective when first read."""
+        often = not locks(self.subdomains, self.comm) and self.lattice.halvings >= uniform_parts.REFINED_OFTEN
+        return self.lattice.coarser(2 if often and not self.summary.across else 1)
 
     @cached_property
     def nested_interiors(self) -> list[uniform_parts.NestedInterior]:
@@ -185,7 +186,7 @@ class TornCell:
         return {phase: self.comm.allreduce(area) for phase, area in local.items()}
 
     def fractions(self) -> dict[str, float]:
-        """Each phase's share in the cell area; without voids in the mesh area.  Collective."""
+        """Each phase's cell area share; without voids, of meshed area.  Collective."""
         areas = self.areas()
         total = self.summary.area if self.summary.voids else sum(areas.values())
         return {phase: area / total for phase, area in areas.items()}
@@ -213,43 +214,40 @@ def tear(
         CaseError, MeshError: on every rank.
     """
     share, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
-    summary, table = share.summary, share.table
-    problem, recovers = phase_laws.plane_problem(case), case.output.mesh_error or case.output.fields
+    summary, recovers = share.summary, case.output.mesh_error or case.output.fields
+
+    def solver_of(problem: Problem, subdomains: list[Subdomain]) -> FetiSolver:
+        applications = partition_policy.applications(case, problem, summary.across)
+        springs = phase_laws.springs(case, problem)
+        return FetiSolver(comm, shared, subdomains, lattice, applications, thresholds, springs, problem, recovers)
+
     with progress.stage("factor") as line:
-        applications, springs = partition_policy.applications(case, problem, summary.across), phase_laws.springs(case)
-        solver = FetiSolver(comm, shared, subdomains, lattice, applications, thresholds, springs, problem, recovers)
+        solver = solver_of(phase_laws.problems(case)[0], subdomains)
         multipliers, dimension = solver.jump_operator.global_rows, solver.coarse_dimension
         line.append(f"{multipliers} multipliers, coarse dimension {dimension}")
-    cell = TornCell(comm, case, summary, lattice, table, subdomains, solver)
+    cell = TornCell(comm, case, summary, lattice, share.table, subdomains, solver)
     if len(phase_laws.problems(case)) == 1:
         return cell
     with progress.stage("assemble") as line:
         axial = agree(comm, assemble_axial, case, summary, subdomains)
         line.append(f"{comm.allreduce(sum(s.n_dofs for s in axial))} degrees of freedom along the fibres")
     with progress.stage("axial"):
-        applications, springs = (
-            partition_policy.applications(case, AXIAL, summary.across),
-            phase_laws.axial_springs(case),
-        )
-        solver = FetiSolver(comm, shared, axial, lattice, applications, thresholds, springs, AXIAL, recovers)
-    return replace(cell, axial=TornCell(comm, case, summary, lattice, table, axial, solver))
+        return replace(cell, axial=replace(cell, subdomains=axial, solver=solver_of(AXIAL, axial)))
 
 
 def assemble_axial(case: Case, summary: CellSummary, subdomains: Sequence[Subdomain]) -> list[Subdomain]:
-    """Assemble this rank's subdomains for the displacement along the fibres, on their meshes."""
-    law = partial(phase_laws.axial_law, case)
+    """Assemble this rank's subdomains for displacements along the fibres."""
+    laws = [_laws(case, summary, s.submesh, AXIAL) for s in subdomains]
     return [
-        Subdomain.on(
-            s.submesh, s.mesh, _laws(summary, s.submesh, law), AXIAL, s.material, is_thin=s.is_thin, is_outer=s.is_outer
-        )
-        for s in subdomains
+        Subdomain.on(s.submesh, s.mesh, L, AXIAL, s.material, is_thin=s.is_thin, is_outer=s.is_outer)
+        for s, L in zip(subdomains, laws, strict=True)
     ]
 
 
 def assemble_subdomains(
     case: Case, comm: MPI.Intracomm, progress: Progress, policy: PartitionPolicy = DEFAULT_POLICY
 ) -> tuple[RankShare, SharedEntities, ReferenceLattice, list[Subdomain]]:
-    """Mesh the cell, cut it on rank 0; refine and assemble the subdomains on their ranks.  Collective.
+    """Mesh and cut the cell; refine and assemble subdomains on their ranks.  Collective.
 
     Returns this rank's share, its entities shared with other ranks, the refinement lattice, and the subdomains.
     Raises as `tear`.
@@ -276,19 +274,20 @@ def _assemble(
     case: Case, summary: CellSummary, submeshes: SubmeshesOfRank, lattice: ReferenceLattice
 ) -> list[Subdomain]:
     """Refine and assemble this rank's subdomains."""
-    problem, law, subdomains = phase_laws.plane_problem(case), partial(phase_laws.plane_law, case), list[Subdomain]()
+    problem, subdomains = phase_laws.problems(case)[0], list[Subdomain]()
     for s in submeshes.cut():
         phase_of = summary.constituent_phase[s.constituent]
         material = None if s.phase else np.unique(phase_of, return_inverse=True)[1]
         mixed = tuple(phase_laws.is_mixed(case, name) for name in _phases(summary, s))
         flags = {"is_thin": s.phase == COATING, "is_outer": s.phase == MATRIX}
-        subdomains.append(Subdomain.build(s, lattice, _laws(summary, s, law), problem, material, mixed, **flags))
+        laws = _laws(case, summary, s, problem)
+        subdomains.append(Subdomain.build(s, lattice, laws, problem, material, mixed, **flags))
     return subdomains
 
 
-def _laws(summary: CellSummary, submesh: Submesh, law: Callable[[str], Float]) -> Float:
-    """Return a subdomain's stiffnesses by each phase's `law`, as `assemble` takes them."""
-    laws = np.stack([law(phase) for phase in _phases(summary, submesh)])
+def _laws(case: Case, summary: CellSummary, submesh: Submesh, problem: Problem) -> Float:
+    """Return a subdomain's phase stiffnesses in a problem, as `assemble` takes them."""
+    laws = np.stack([phase_laws.law(case, phase, problem) for phase in _phases(summary, submesh)])
     return np.asarray(laws[0] if submesh.phase else laws)
 
 

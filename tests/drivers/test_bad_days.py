@@ -17,7 +17,7 @@ from support.jobs import PATIENCE, ROOT, environment
 from support.sweep_files import BY_BODIES
 
 # A rank waits where a mesher would keep it for long.
-MESHING = "feti_homog.homogenization.coarse_meshes:begin_mesh"
+MESHING = "feti_homog.homogenization.tile_tearing:begin_mesh"
 
 
 @pytest.fixture(autouse=True)

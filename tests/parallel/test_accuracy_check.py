@@ -10,7 +10,7 @@ from support.cases import FIBRE, MATRIX
 from support.pixel_images import pixel_mesh
 
 from feti_homog import Case, run
-from feti_homog.analysis.mesh_errors import note_accuracy
+from feti_homog.analysis.constants import note_accuracy
 from feti_homog.system.parallel.mpi_errors import on_root
 
 pytestmark = pytest.mark.parallel

@@ -10,7 +10,7 @@ from reference.closed_forms import cubic
 from support.cases import FIBRE, MATRIX
 
 from feti_homog import Case, run
-from feti_homog.analysis.mesh_errors import mesh_error
+from feti_homog.analysis.constants import mesh_error
 from feti_homog.homogenization.mesh_error import EnergyErrors
 
 pytestmark = pytest.mark.parallel

@@ -16,7 +16,7 @@ from support.whole_meshes import coarse_mesh
 
 from feti_homog.case import case as cases
 from feti_homog.errors import MeshError
-from feti_homog.homogenization import coarse_meshes
+from feti_homog.homogenization import tile_tearing
 from feti_homog.homogenization.domain_partition import distribute
 from feti_homog.homogenization.partition_policy import PartitionPolicy
 from feti_homog.homogenization.tile_tearing import can_be_torn_by_tiles, tear_by_tiles
@@ -67,7 +67,7 @@ def test_the_mesh_is_that_of_one_rank(comm, keys):
 
 def share_of(case, comm):
     """Tear this rank's share of the cell by tiles."""
-    noded = coarse_meshes.place_nodes(case, comm, SMALL)
+    noded = tile_tearing.place_nodes(case, comm, SMALL)
     assert noded is None or can_be_torn_by_tiles(case, noded, LATTICE, TILED)
     return tear_by_tiles(case, noded, LATTICE, comm, TILED)
 
@@ -135,7 +135,7 @@ def test_what_needs_the_whole_mesh_is_torn_on_rank_0(comm):
     contact = {"debonded": [{"fibre": 1, "centre": 0.0, "angle": 90.0}], "contact": True}
     for more in ({"interface": contact}, {"decomposition": {"subdomains": 17}}, {"bodies": "plane"}):
         case = case_of(**more)
-        noded = coarse_meshes.place_nodes(case, comm, SMALL)
+        noded = tile_tearing.place_nodes(case, comm, SMALL)
         assert noded is None or not can_be_torn_by_tiles(case, noded, LATTICE, TILED)
     cell, *_ = solve(case_of(decomposition={"subdomains": 17}), comm, policy=TILED)
     assert cell.summary.subdomains == 17
@@ -154,7 +154,7 @@ def test_a_tile_that_one_rank_cannot_fill_ends_the_job_on_all(comm, monkeypatch)
         raise MeshError("[cell] gmsh cannot fill it")
 
     if comm.rank == comm.size - 1:
-        monkeypatch.setattr(coarse_meshes, "fill", broken)
+        monkeypatch.setattr(tile_tearing, "fill", broken)
     for mesh in (share_of, lambda case, comm: coarse_mesh(case, comm, SMALL)):
         with pytest.raises(MeshError, match="gmsh cannot fill it"):
             mesh(case_of(), comm)

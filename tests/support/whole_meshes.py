@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from feti_homog.homogenization.coarse_meshes import fill_tiles, place_nodes
+from feti_homog.homogenization.tile_tearing import fill_tiles, place_nodes
 from feti_homog.mesh.tiles.tiles import DEFAULT_TILES
 
 
