@@ -101,9 +101,8 @@ class InfluenceSolutions:
         Collective; raises as `record`.
         """
         lam, opening = (np.stack(x, axis=1) for x in zip(*((s.lam, s.jump) for s in solutions), strict=True))
-        lam_error, drift = self._errors(lam, opening)
         # Multipliers that F lambda confirms are off by no less than their residuals.
-        lam_error = float(np.max([lam_error, *(solution.residual for solution in solutions)]))
+        lam_error, drift = self._errors(lam, opening, np.array([solution.residual for solution in solutions]))
         if not lam_error <= MOST_UNCONFIRMED_ERROR:
             raise ConvergenceError(
                 f"influence columns: multipliers of the last {self._granted} solves: {lam_error:.1e} off"
@@ -117,18 +116,19 @@ class InfluenceSolutions:
         is_same = again is not None and float(np.max(self._errors(*again))) <= MOST_FOLLOWED_ERROR
         self._rounding = min(error, MOST_CONFIRMED_ROUNDING) if is_same else 0.0
 
-    def _errors(self, lam: Float, opening: Float) -> tuple[float, float]:
+    def _errors(self, lam: Float, opening: Float, residuals: Float | float = 0.0) -> tuple[float, float]:
         """Return how far the expected multipliers and jumps on inactive rows are off these, (owned rows, k) each.
 
         They are relative to the largest of each load; jumps count where no body is free, which may be anywhere.
         Multipliers of a load may cancel, as where bonds come to be pressed: then a share of the multipliers of single
-        strains measures them.  Collective.
+        strains measures them.  `residuals` (k,) are errors of lam, relative to its own size.  Collective.
         """
         assert self._expected is not None
         expected, jumps, terms = self._expected
         is_open = (jumps != 0.0) * (self._natural.unconstrained_modes.shape[1] == 0)
         sizes = np.maximum(np.abs(lam), LEAST_UNCONFIRMED_JUMP * terms)
-        parts = np.abs([expected - lam, sizes, is_open * (jumps - opening), opening]).max(axis=1, initial=0.0)
+        errors = np.maximum(np.abs(expected - lam), residuals * np.abs(lam))
+        parts = np.abs([errors, sizes, is_open * (jumps - opening), opening]).max(axis=1, initial=0.0)
         parts = np.max(self._comm.allgather(parts), axis=0)  # keeps NaN, which MPI.MAX may lose
         lam_error, drift = (parts[::2] / np.where(parts[1::2] > 0.0, parts[1::2], 1.0)).max(axis=1)
         return float(lam_error), float(drift)

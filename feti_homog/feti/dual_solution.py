@@ -6,9 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
+from scipy.sparse.linalg import splu
 
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.krylov import ActiveRows
+from feti_homog.feti.linalg.sparse_matrices import allreduce_sparse
 from feti_homog.feti.operators.interface_operators import DualOperator
 from feti_homog.feti.thresholds import CANCELLED, ROUNDING_MARGIN, SMALL_JUMP, ZERO_JUMP
 from feti_homog.system.parallel.distributed_arrays import allreduce_sum
@@ -99,6 +101,12 @@ class ActiveJumps:
         if self._natural.kernel_dimension:
             alpha -= self._natural.amplitudes(self._active.restrict(jump))
             jump = jump + self._natural.G @ alpha
+        # Free bodies lie where faces part least, however they are cut.
+        if (Z := self._natural.unconstrained_modes).shape[1]:
+            M = self._natural.G @ Z
+            squares, sums = allreduce_sparse(self._comm, (M.T @ M).tocsr()), allreduce_sum(self._comm, M.T @ jump)
+            least = Z @ splu(squares.tocsc()).solve(sums)
+            alpha, jump = alpha - least, jump - self._natural.G @ least
         residual = self.norms(self._active.restrict(jump)) / np.where(scale > 0, scale, 1.0)
         C, parts = self._operator.compliance, (strains, lam.T.copy(), jump.T.copy(), alpha.T.copy(), residual)
         rows = zip(*parts, strict=True)

@@ -129,19 +129,10 @@ def build(
     soft = options.want_soft_modes(_are_cut(comm, subdomains))
     one_each = _has_one_each(comm, subdomains)
     springs = jump_operator.gather(compliance) if comm.allreduce(bool(compliance.any()), MPI.LOR) else None
+    operator = "explicit" if one_each and options.operator == "auto" else options.operator
+    how = operator, applications, soft, thresholds, springs, recovers and one_each
     with PETSc.Log.Event("FETISubdomains"):
-        operators = agree(
-            comm,
-            InterfaceOperators,
-            jump_operator,
-            subdomains,
-            "explicit" if one_each and options.operator == "auto" else options.operator,
-            applications,
-            soft,
-            thresholds,
-            springs,
-            recovers and one_each,
-        )
+        operators = agree(comm, InterfaceOperators, jump_operator, subdomains, *how)
     plan = choose(_sizes(operators, applications, one_each), options, thresholds)
     preconditioner = CLASSES[plan.preconditioner](operators)
     with PETSc.Log.Event("FETINatural"):

@@ -26,7 +26,7 @@ from differential.transforms import sections
 IN_PLANE = [0, 1, 5]
 NEAR = 1e-7  # of places / size of the cell
 LEAST = 1e-3  # share of the stress of a uniform strain
-FREE = 1e-9  # a stiffness, relative to the largest, of motions that nothing resists
+FREE = 1e-11  # a stiffness, relative to the largest, of motions that nothing resists; bodies hang by more
 REFINEMENTS = 12
 OPEN, CLOSED, BONDED = 2, 1, 0
 

@@ -213,6 +213,21 @@ def test_free_motions_of_debonded_fibres_are_counted(comm, bodies, subdomains):
         assert response(cell, contact, strain, status)[1].free_motions == expected
 
 
+def test_a_fibre_that_turns_about_its_last_bond_has_one_place(comm):
+    """Faces that touch without a force may hold it anywhere in its room, by the statuses from which they began."""
+    cell = torn_cells.tear(comm, geometry="square", mesh_size=0.2)
+    angle, start = directions(cell), np.zeros(cell.solver.rows)
+    angles = np.concatenate(comm.allgather(angle))
+    for last in np.sort(angles)[::3]:
+        places = []
+        for touching in (angle > 400, angle > 0, angle < 0):
+            status = np.where(angle == last, BONDED, np.where(touching, CLOSED, OPEN)).astype(np.int8)
+            load = Load.strain(np.array([1.0, 0.5, 0.3]))
+            state = torn_cells.interface(cell, True).equilibrium(load, torn_cells.bonds(status), start)
+            places.append(np.concatenate(comm.allgather(state.solution.jump)))
+        assert np.abs(np.array(places) - places[0]).max() < 1e-9 * np.abs(places[0]).max()
+
+
 def test_a_fibre_that_comes_free_opens_no_other_fibres_faces(comm):
     cell = torn_cells.tear(comm, geometry="hexagonal", mesh_size=0.2)
     fibre = cell.solver.jump_operator.nodes.fibre

@@ -73,3 +73,21 @@ def test_cuts_hardly_matter_on_the_mesh_refined_less(comm, order):
     cell = {"mesh_size": 0.05 * order, "refine": 1, "order": order}
     whole, cut = (estimate(comm, n, cell=cell, interface=SPRINGS)[:2, :2] for n in (3, 12))
     np.testing.assert_allclose(cut, whole, rtol=0.01 if order == 1 else 0.1)
+
+
+def test_no_cut_moves_a_free_fibre(comm):
+    """It may lie anywhere in its hole, turned by any angle."""
+    free = {"contact": True, "debonded": [{"fibre": 1, "centre": 0.0, "angle": 360.0}]}
+    document = {
+        "cell": {"geometry": "hexagonal", "fibre_fraction": 0.3, "mesh_size": 0.25},
+        "material": {"matrix": MATRIX, "fibre": FIBRE},
+        "analysis": {"type": "load", "plane": "strain"},
+        "load": {"to": {"E11": 0.01, "E22": -0.01}},
+        "interface": free,
+        "petsc": {"feti_ksp_rtol": 1e-10},
+    }
+    whole, cut = (
+        run(Case.parse(document | {"decomposition": {"subdomains": n}}), on).load.mesh_error
+        for on, n in ((MPI.COMM_SELF, 3), (comm, 9))
+    )
+    assert abs(cut - whole) < 1e-8 * whole

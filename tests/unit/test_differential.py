@@ -17,8 +17,9 @@ from differential.paths import document_of, keyed, paths_apart
 from differential.random_cases import draw, stream
 from differential.random_loads import STEPS
 from differential.random_softening import SOFTENING
-from differential.twin import SolvedAnew
+from differential.twin import SolvedAnew, _solved
 from mpi4py import MPI
+from scipy.sparse import csr_matrix
 from support import dimensions
 from support.dimensions import Units
 
@@ -176,6 +177,15 @@ def test_results_go_to_other_units_and_back(solved, wanted):
     assert max(off for off, _ in apart(document, back)) < 1e-14
     assert max(off for off, _ in apart(document, there)) > 0.9
     assert there["cell"]["area"] == pytest.approx(1e-6 * document["cell"]["area"])
+
+
+def test_the_solve_by_scipy_finds_where_a_body_lies_that_hangs_by_little():
+    """A chain of springs 1 whose first end a spring of 1e-8 holds, and whose last end a force 1 pulls."""
+    n, soft = 200, 1e-8
+    chain = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    chain[0, 0], chain[-1, -1] = 1.0 + soft, 1.0
+    u, _ = _solved(csr_matrix(chain), csr_matrix((0, n)), np.eye(n)[-1], np.zeros(0))
+    assert np.abs(soft * (u - np.arange(n)) - 1.0).max() < 1e-6
 
 
 def test_the_solve_by_scipy_notices_a_wrong_stress_and_energy(solved):

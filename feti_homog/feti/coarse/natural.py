@@ -93,10 +93,6 @@ class NaturalCoarseSpace:
         self.solver.factor(self.unknowns, gram)
         self.factorizations += 1
 
-    def _factor_if_wanted(self) -> None:
-        if not self._is_factored:
-            self.factor()
-
     @cached_property
     def _gram(self) -> GramMatrix:
         """Made when rows first leave: it takes 36 numbers a row.  Collective."""
@@ -146,7 +142,8 @@ class NaturalCoarseSpace:
 
     def amplitudes(self, x: Float) -> Float:
         """(G^T G)^-1 G^T x on every rank, for the owned rows x (rows,) or (rows, k).  Collective."""
-        self._factor_if_wanted()
+        if not self._is_factored:
+            self.factor()
         place = np.searchsorted(self.unknowns, np.arange(self.kernel_dimension)[self.owned_modes])
         amplitudes = np.zeros((self.kernel_dimension, *x.shape[1:]))
         amplitudes[self.owned_modes] = self.solve(self._GT @ x)[place]
@@ -160,7 +157,8 @@ class NaturalCoarseSpace:
         """P x for the owned rows x, whose inactive ones are 0: no rigid-body motion works on it.  Collective."""
         if not self.kernel_dimension:
             return x.copy()
-        self._factor_if_wanted()
+        if not self._is_factored:
+            self.factor()
         projected: Float = x - self._G @ self.solve(self._GT @ x)
         return projected
 

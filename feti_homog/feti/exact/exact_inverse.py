@@ -229,7 +229,8 @@ class ExactInverse(Preconditioner):
             if not self._is_fresh:
                 self._restart()
             return None
-        U = (self._followed.answer if self._followed.answer.shape[1] else self.renew_answer(d)) @ E
+        is_exact = self._followed.answer.shape[1] and not self._followed.had_pins
+        U = (self._followed.answer if is_exact else self.renew_answer(d)) @ E
         lam = scale_rows(self._active, U)
         return lam, U - lam
 

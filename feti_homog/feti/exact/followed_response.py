@@ -44,6 +44,7 @@ class FollowedResponse:
     Attributes:
         answer: (owned rows, v) U.
         pins: (p,) global rows that left and hold bodies that nothing else does.
+        had_pins: whether bodies have been free: then U loses digits with every change of their few faces.
     """
 
     def __init__(self, comm: MPI.Intracomm, first: int, stiffness: Float, answer: Float, capacity: int) -> None:
@@ -52,7 +53,7 @@ class FollowedResponse:
         `stiffness` (all rows,) bounds the diagonal of Gamma on active rows; from `capacity` columns on, unused ones go.
         """
         self._comm, self._first, self._stiffness = comm, first, stiffness
-        self.answer, self.pins = answer, np.zeros(0, np.int64)
+        self.answer, self.pins, self.had_pins = answer, np.zeros(0, np.int64), False
         self._slot = np.full(len(stiffness), -1)
         self._rows: Int = np.zeros(0, np.int64)
         # When each column was last used, counted in changes.
@@ -199,7 +200,7 @@ class FollowedResponse:
             loose = np.setdiff1d(np.arange(k), which)
             self.pins, self.answer = np.union1d(np.setdiff1d(self.pins, moved), rows[loose]), self.answer.copy()
             places = self.pins - self._first
-            self.answer[places[(places >= 0) & (places < len(self.answer))]] = 0.0
+            self.answer[places[(places >= 0) & (places < len(self.answer))]], self.had_pins = 0.0, True
             # Springs of pins have C_0, as of all rows that are not active.
             if len(loose := loose[gained[loose] != 0.0]):
                 return self.soften(rows[loose], gained[loose], pivot)

@@ -233,10 +233,10 @@ class ContactProblem:
         """Return the final state with its certificate and free rigid motions.  Collective.
 
         Bonds and faces under compression resist motions.  Nodes of a fibre that touch its hole without a force count as
-        open if the fibre moves without them, for they do not fix it; otherwise they stay closed.
+        open if the fibre moves without them, for they do not fix it; otherwise they stay closed.  The fibre then lies
+        where its faces part least, if it has room there.
         """
         asked, status, coarse = self.scales.asked(load), bonds.status, self.solver.natural
-        certificate = self.certificate(bonds, solution, asked)
         motions, idle = coarse.unconstrained_modes, np.zeros(len(status), bool)
         if self.contact and self._any(status == CLOSED):
             idle = (status == CLOSED) & (solution.lam[self.nodes.row] >= -self.scales.force_noise(solution))
@@ -248,8 +248,13 @@ class ContactProblem:
             freed = np.isin(coarse.body, coarse.body[shares - without > LEAST_SHARE_OF_MOTION])
             idle &= (abs(coarse.G[self.nodes.row]) + abs(coarse.G[self.nodes.row + 1])) @ freed > 0
             bonds = bonds.with_status(np.where(idle, OPEN, status).astype(np.int8))
-        free = motions.shape[1]
-        return Equilibrium(load, bonds, solution, iterations, solves, free, certificate, asked)
+        if self._any(idle):
+            # The search found any of many places.
+            self.prepare(bonds)
+            moved, wrong = self._placed(bonds, self.solver.completed(replace(solution, alpha=None)))
+            solution = solution if self._any(wrong) else moved
+        certificate = self.certificate(bonds, solution, asked)
+        return Equilibrium(load, bonds, solution, iterations, solves, motions.shape[1], certificate, asked)
 
     def certificate(self, bonds: BondState, solution: DualSolution, asked: Float) -> dict[str, float]:
         """Return errors by `kkt_errors`; `asked` as in `Equilibrium`.  Collective."""

@@ -124,8 +124,9 @@ class StatusSearch:
         for choice in choices[np.argsort((choices != status[several]).sum(axis=1), kind="stable")]:
             tried = status.copy()
             tried[several] = choice
-            if (result := self._checked(tried)) is not None:
-                yield result
+            x, balanced = self.faces.linear(tried, self.load, self.start)
+            if balanced and self.faces.is_balanced(tried, self.load, x) and (self._improved(tried, x) == tried).all():
+                yield tried, x
 
     def by_continuation(self, status: Status) -> Found:
         """Raise the share of mu to 1, and pivot from the last statuses at each step."""
@@ -141,12 +142,6 @@ class StatusSearch:
             else:
                 share, status = share + step, result[0]
         return None
-
-    def _checked(self, status: Status) -> Found:
-        """Return the statuses with x if they are admissible."""
-        x, balanced = self.faces.linear(status, self.load, self.start)
-        balanced = balanced and self.faces.is_balanced(status, self.load, x)
-        return (status, x) if balanced and (self._improved(status, x) == status).all() else None
 
     def _improved(self, status: Status, x: Float) -> Status:
         """(n,) statuses that the signs of forces and jumps call for."""
