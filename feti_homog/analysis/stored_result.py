@@ -10,7 +10,7 @@ from typing import Any
 from feti_homog.analysis.result import Result
 from feti_homog.case.case import Case, check_stored
 from feti_homog.errors import CaseError
-from feti_homog.results import checkpoint_file, field_file, result_json, seals
+from feti_homog.results import checkpoint_file, field_file, result_json
 
 
 def read(directory: Path) -> dict[str, Any]:
@@ -81,4 +81,4 @@ def _check_fields(directory: Path, result: Result) -> None:
     if not path.is_file():
         raise CaseError(f"{path}: it is missing; run the case again")
     if result.result_h5 is not None:
-        seals.check(path, result.result_h5)
+        result_json.check(path, result.result_h5)
