@@ -40,8 +40,8 @@ def write(directory: Path, document: Mapping[str, Any]) -> Path:
             file cannot be written.
         TypeError: a value has no form in JSON.
     """
-    content = _json_value(document, "")
-    faults = [f"{NAME}: {place} is {value}, not a finite number" for place, value in _not_finite(content, "")]
+    faults = list[str]()
+    content = _json_value(document, "", faults)
     if faults:
         raise FetiHomogError(*faults)
 
@@ -71,35 +71,24 @@ def read(directory: Path) -> dict[str, Any]:
     return document
 
 
-def _json_value(value: Any, place: str) -> Any:
-    """Return the value in JSON's own types. Raises TypeError with the place of one that has none."""
+def _json_value(value: Any, place: str, faults: list[str]) -> Any:
+    """Return the value in JSON's own types; numbers that are not finite add their faults.
+
+    Raises TypeError with the place of a value that has none.
+    """
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, Mapping):
-        return {key: _json_value(item, _inside(place, key)) for key, item in value.items()}
+        return {key: _json_value(item, f"{place}.{key}".lstrip("."), faults) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_json_value(item, f"{place}[{i}]") for i, item in enumerate(value)]
+        return [_json_value(item, f"{place}[{i}]", faults) for i, item in enumerate(value)]
     if isinstance(value, os.PathLike):
         return os.fspath(value)
     if value is None or isinstance(value, bool | int | float | str):
+        if isinstance(value, float) and not math.isfinite(value):
+            faults.append(f"{NAME}: {place} is {value}, not a finite number")
         return value
     raise TypeError(f"{NAME}: {place} is a {type(value).__name__}, which JSON cannot hold")
-
-
-def _not_finite(value: Any, place: str) -> Iterator[tuple[str, float]]:
-    """Yield the numbers that are not finite, and their places."""
-    if isinstance(value, dict):
-        for key, item in value.items():
-            yield from _not_finite(item, _inside(place, key))
-    elif isinstance(value, list):
-        for i, item in enumerate(value):
-            yield from _not_finite(item, f"{place}[{i}]")
-    elif isinstance(value, float) and not math.isfinite(value):
-        yield place, value
-
-
-def _inside(place: str, key: str) -> str:
-    return f"{place}.{key}" if place else key
 
 
 class DescribedColumn(NamedTuple):
@@ -128,7 +117,16 @@ def write_csv(path: Path, points: Sequence[Any]) -> Path:
         FetiHomogError: the table cannot be written.
     """
     fields = _in_columns(type(points[0])) if points else {}
-    rows = [_row(point, fields) for point in points]
+    rows = []
+    for point in points:
+        row: dict[str, Any] = {}
+        for name, value in plain(point).items():
+            if name in fields:
+                values, components = np.ravel(value).tolist(), _names(name, fields[name])
+                if len(values) > len(components):
+                    components = fields[name].spatial_components
+                row |= dict(zip(components, values, strict=True))
+        rows.append(row)
     present = {name for row in rows for name in row}
     names = [column.name for column in columns(type(points[0])) if column.name in present] if rows else []
 
@@ -144,17 +142,6 @@ def write_csv(path: Path, points: Sequence[Any]) -> Path:
 def _names(name: str, description: Description) -> tuple[str, ...]:
     """Return the columns of a field: its name, or its components in the plane."""
     return description.components or (name,)
-
-
-def _row(point: Any, fields: Mapping[str, Description]) -> dict[str, Any]:
-    row: dict[str, Any] = {}
-    for name, value in plain(point).items():
-        if name in fields:
-            values, components = np.ravel(value).tolist(), _names(name, fields[name])
-            if len(values) > len(components):
-                components = fields[name].spatial_components
-            row |= dict(zip(components, values, strict=True))
-    return row
 
 
 def _in_columns(kind: type) -> dict[str, Description]:

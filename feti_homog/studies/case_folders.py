@@ -22,7 +22,7 @@ import tomli_w
 
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError, FetiHomogError
-from feti_homog.results import atomic, checkpoint_file, output_folder, result_json
+from feti_homog.results import atomic, checkpoint, output_folder, result_json
 from feti_homog.schema.values import INF
 from feti_homog.studies.sweep_cases import Sweep, SweepCase, identity_of
 from feti_homog.system.runtime import input_files
@@ -214,7 +214,7 @@ def reset(directory: Path, entry: SweepCase, status: Status) -> None:
     folder = directory / entry.folder
     with atomic.write_errors(folder):
         (folder / ERROR_FILE).unlink(missing_ok=True)
-    checkpoint_file.remove(folder)
+    checkpoint.remove(folder)
     set_aside(directory, entry, status)
 
 
