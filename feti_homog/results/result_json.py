@@ -7,6 +7,7 @@ large file is checked before it is opened.
 from __future__ import annotations
 
 import csv
+import io
 import json
 import math
 import os
@@ -44,12 +45,10 @@ def write(directory: Path, document: Mapping[str, Any]) -> Path:
     content = _json_value(document, "", faults)
     if faults:
         raise FetiHomogError(*faults)
-
-    def write_text(part: Path) -> None:
-        part.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(dumps(content), encoding="utf-8")
-
-    return atomic.replace(Path(directory) / NAME, write_text)
+    path = Path(directory) / NAME
+    with atomic.write_errors(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    return atomic.replace_text(path, dumps(content))
 
 
 def read(directory: Path) -> dict[str, Any]:
@@ -129,14 +128,11 @@ def write_csv(path: Path, points: Sequence[Any]) -> Path:
         rows.append(row)
     present = {name for row in rows for name in row}
     names = [column.name for column in columns(type(points[0])) if column.name in present] if rows else []
-
-    def write_rows(part: Path) -> None:
-        with part.open("w", newline="", encoding="utf-8") as stream:
-            writer = csv.DictWriter(stream, names)
-            writer.writeheader()
-            writer.writerows(rows)
-
-    return atomic.replace(path, write_rows)
+    stream = io.StringIO(newline="")
+    writer = csv.DictWriter(stream, names)
+    writer.writeheader()
+    writer.writerows(rows)
+    return atomic.replace_text(path, stream.getvalue())
 
 
 def _names(name: str, description: Description) -> tuple[str, ...]:

@@ -96,7 +96,7 @@ def cell_state(file: Any, state: int) -> ViewedState:
     elements["von_mises"] = voigt.spatial_von_mises(in_plane, S33, shears)
     principal = voigt.spatial_principal(in_plane, S33, shears) if more else voigt.principal(in_plane, S33)
     elements |= {f"principal_{k + 1}": column for k, column in enumerate(principal.T)}
-    return ViewedState(_in_space(points), triangles, nodes, elements, str(group.attrs["label"]))
+    return ViewedState(np.pad(points, IN_SPACE), triangles, nodes, elements, str(group.attrs["label"]))
 
 
 def interface_state(file: Any, state: int) -> ViewedState:
@@ -105,7 +105,7 @@ def interface_state(file: Any, state: int) -> ViewedState:
     more = xdmf.SPATIAL_POINTS if AXIAL_DISPLACEMENT in group else {}
     nodes = _tables(file, state, xdmf.INTERFACE_POINTS | more)
     label = str(group.attrs["label"])
-    return ViewedState(_in_space(file["interface/points"][()]), file["interface/vertex"][()], nodes, {}, label)
+    return ViewedState(np.pad(file["interface/points"][()], IN_SPACE), file["interface/vertex"][()], nodes, {}, label)
 
 
 def _tables(file: Any, state: int, places: Mapping[str, str]) -> dict[str, Array]:
@@ -114,10 +114,7 @@ def _tables(file: Any, state: int, places: Mapping[str, str]) -> dict[str, Array
     return {name: file[place][()] for name, place in existing.items() if place in file}
 
 
-def _in_space(points: Float) -> Float:
-    return np.pad(points, [(0, 0), (0, 1)])
-
-
+IN_SPACE = ((0, 0), (0, 1))  # of points (n, 2)
 FORMATS = ("vtu", "vtkhdf")
 KINDS = {1: 1, 3: 5, 6: 22}  # VTK's numbers of a vertex and of triangles, by their nodes
 TYPES = {"f4": "Float32", "f8": "Float64", "i1": "Int8", "i4": "Int32", "i8": "Int64", "u1": "UInt8"}

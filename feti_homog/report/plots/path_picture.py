@@ -19,7 +19,8 @@ from feti_homog.typing import Array, Document
 ARROWS = 6  # at most, along a path
 LEGIBLE = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5}  # numbers on curves
 STATES = {drawn_cell.BONDED: "bonded", drawn_cell.OPEN: "open", drawn_cell.CLOSED: "closed"}
-# Of the parts in the order of `path_curves.energies`.
+UNLOADED = np.linspace(0.0, 1.0, 16, endpoint=False)  # shares of the first load, drawn before it
+# Of the parts of the energy.
 AREAS = {
     "stored in the bodies": "#9db8de",
     "stored in springs": "#5d86c4",
@@ -151,24 +152,49 @@ def _number_points(upper: Axes, below: Sequence[Axes], curve: Array, numbers: Se
 
 
 def energies(document: Document) -> Figure | None:
-    """Draw energies per area, stacked over the path position; None for results without energies."""
-    stack = path_curves.energies(document)
-    if stack is None:
+    """Draw energies per area, stacked over the path position; None for results without energies.
+
+    The position is the number of earlier legs plus the load share on the leg; where the load falls, the point number,
+    below 0 before the first point.
+    """
+    points = document.get("path") or [{}]
+    if "work" not in points[0]:
         return None
-    case = document["case"]
+    case, legs = document["case"], path_curves.legs(document)
+    work, parts = _column(points, "work"), _energy_parts(points)
+    place, words = _column(points, "load_factor", 1) * legs, "leg of the path" if legs > 1 else "share of the load"
+    if (np.diff(place) < 0.0).any():
+        place, legs = np.append(UNLOADED - 1.0, np.arange(float(len(points)))), 0
+        words = "number of the point, in the order of the path"
     picture = Figure(figsize=(7.2, 4.2), layout="constrained")
     axes = picture.subplots()
-    colours = [AREAS[name] for name in stack.parts]
-    axes.stackplot(stack.place, *stack.parts.values(), labels=[*stack.parts], colors=colours)
-    axes.plot(stack.place, stack.work, color="0.15", linewidth=1.2, label="work of the loads")
-    for leg in range(1, path_curves.legs(document)) if stack.by_legs else ():
+    axes.stackplot(place, *parts.values(), labels=[*parts], colors=[AREAS[name] for name in parts])
+    axes.plot(place, work, color="0.15", linewidth=1.2, label="work of the loads")
+    for leg in range(1, legs):
         axes.axvline(leg, color="0.6", linewidth=0.6, linestyle=":")
-    axes.set_xlim(stack.place[0], stack.place[-1])
-    axes.set_ylim(bottom=min(0.0, float(stack.work.min())))
-    axes.set_xlabel(stack.words)
+    axes.set_xlim(place[0], place[-1])
+    axes.set_ylim(bottom=min(0.0, float(work.min())))
+    axes.set_xlabel(words)
     axes.set_ylabel(f"energy per area {plot_helpers.stress_unit(case)}")
     axes.set_title(plot_helpers.title_of(case, "energies along the path"))
     axes.spines[["top", "right"]].set_visible(False)
     handles, names = axes.get_legend_handles_labels()
     axes.legend(handles[::-1], names[::-1], frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return picture
+
+
+def _energy_parts(points: Sequence[Mapping[str, Any]]) -> dict[str, Array]:
+    """Return visible parts of the work by name, in stacking order; their sum is the work, but for rounding."""
+    stored, springs, lost = (_column(points, name) for name in ("stored", "stored_in_springs", "dissipated"))
+    fracture = np.minimum(_column(points, "fracture_energy"), lost)
+    rest = "lost in breaks" + (" beyond it" if fracture.any() else "")
+    parts = {"stored in the bodies": stored - springs, "stored in springs": springs, "fracture energy": fracture}
+    parts |= {rest: lost - fracture, "heat of friction": _column(points, "friction_heat")}
+    least = path_curves.ZERO * np.abs(stored).max()
+    return {name: values for name, values in parts.items() if np.abs(values).max() > least}
+
+
+def _column(points: Sequence[Mapping[str, Any]], name: str, power: int = 2) -> Array:
+    """Return a number along the path, from the unloaded cell on; up to the first point all is linear."""
+    values = [float(point.get(name) or 0.0) for point in points]
+    return np.append(values[0] * UNLOADED**power, values)
