@@ -134,8 +134,8 @@ def _number_points(upper: Axes, below: Sequence[Axes], curve: Array, numbers: Se
     span, level = max(len(curve) - 1, 1), 0
     for number, rise in zip(numbers, np.diff(curve[numbers, 1], prepend=0.0), strict=True):
         offset = (-6, 16) if rise >= 0.0 else (16, -12)  # off the curve at peaks and at feet of drops
-        beside = style | {"textcoords": "offset points", "arrowprops": pointer, "bbox": LEGIBLE}
-        upper.annotate(str(number), curve[number], offset, **beside)
+        frame = style | {"textcoords": "offset points", "arrowprops": pointer, "bbox": LEGIBLE}
+        upper.annotate(str(number), curve[number], offset, **frame)
     for place, number in enumerate(numbers):
         for axes in below:
             axes.axvline(number, color="0.7", linewidth=0.7, linestyle=":", zorder=0)
@@ -190,8 +190,8 @@ def _energy_parts(points: Sequence[Mapping[str, Any]]) -> dict[str, Array]:
     rest = "lost in breaks" + (" beyond it" if fracture.any() else "")
     parts = {"stored in the bodies": stored - springs, "stored in springs": springs, "fracture energy": fracture}
     parts |= {rest: lost - fracture, "heat of friction": _column(points, "friction_heat")}
-    least = path_curves.ZERO * np.abs(stored).max()
-    return {name: values for name, values in parts.items() if np.abs(values).max() > least}
+    threshold = path_curves.ZERO * np.abs(stored).max()
+    return {name: values for name, values in parts.items() if np.abs(values).max() > threshold}
 
 
 def _column(points: Sequence[Mapping[str, Any]], name: str, power: int = 2) -> Array:
