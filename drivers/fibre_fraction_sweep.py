@@ -13,7 +13,6 @@ import argparse
 import sys
 from typing import Any
 
-import moduli_picture
 import numpy as np
 import sweeping
 from mpi4py.MPI import Intracomm
@@ -25,7 +24,7 @@ HEADS = f"{'cell':<11}{'fraction':>8}{'C11':>11}{'C12':>11}{'C33':>11}{'isotropy
 
 def main(given: argparse.Namespace, comm: Intracomm) -> None:
     """Run the sweep, print its points and draw them."""
-    sweeping.swept(given, comm, document(given), report, moduli_picture.draw)
+    sweeping.swept(given, comm, document(given), report)
 
 
 def document(given: argparse.Namespace) -> dict[str, Any]:

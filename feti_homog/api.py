@@ -98,8 +98,8 @@ def run_sweep(
     return on_root(comm, collect.read, Path(out))
 
 
-def collect_sweep(out: str | Path, comm: Intracomm | None = None) -> list[str]:
-    """Write cases.csv and statistics.csv of a sweep; returns lines to print.
+def collect_sweep(out: str | Path, comm: Intracomm | None = None, *, pictures: bool = True) -> list[str]:
+    """Write cases.csv, statistics.csv and the picture of a sweep; returns lines to print.
 
     Collective; the sweep may still be running.
 
@@ -109,7 +109,7 @@ def collect_sweep(out: str | Path, comm: Intracomm | None = None) -> list[str]:
     comm = _started(comm)
     from feti_homog.studies import collect
 
-    return on_root(comm, collect.collect, Path(out))
+    return on_root(comm, collect.collect, Path(out), pictures)
 
 
 def run_fit(

@@ -22,8 +22,8 @@ SWEEP_HELP = (
     "skipped: the same command resumes. Failed cases are kept and reported at the end, with exit code 3."
 )
 COLLECT_HELP = (
-    "Write cases.csv, the inputs and outputs of all cases, and statistics.csv, those over realisations. "
-    "The sweep may still be running: finished cases are collected."
+    "Write cases.csv, the inputs and outputs of all cases, statistics.csv, those over realisations, and a "
+    "picture of moduli over the fibre fraction. The sweep may still be running: finished cases are collected."
 )
 
 FIT_HELP = (
@@ -49,9 +49,10 @@ def add(actions: argparse._SubParsersAction[Any]) -> None:
     one.add_argument("--list", action="store_true", help="print the cases, with --out also their status; run none")
     one.add_argument("--index", type=integer, metavar="K", help="run case K alone, counted from 1, as a job array does")
     _add_case_options(sweep, _sweep)
-    words = "make tables of the cases of a sweep's folder"
+    words = "make one table and a picture of the cases of a sweep's folder"
     collect = actions.add_parser("collect", help=words, description=COLLECT_HELP)
     collect.add_argument("directory", type=folder, metavar="DIR", help="--out of the sweep")
+    collect.add_argument("--no-pictures", action="store_true", help="make the tables alone")
     collect.set_defaults(action=_collect)
     fit = actions.add_parser("fit", help="fit constants of cases to measured values", description=FIT_HELP)
     fit.add_argument("case", type=Path, metavar="FIT.toml", help="a case file with unknown and measured constants")
@@ -110,7 +111,7 @@ def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
 def _collect(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.studies import collect
 
-    for line in on_root_only(comm, collect.collect, arguments.directory) or []:
+    for line in on_root_only(comm, collect.collect, arguments.directory, not arguments.no_pictures) or []:
         say(line)
 
 

@@ -1,4 +1,4 @@
-"""`feti-homog collect DIR`: tables of a sweep, finished or not."""
+"""`feti-homog collect DIR`: tables of a sweep, finished or not, and its picture."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ def read(directory: Path) -> SweepTable:
     return _table(*_index_and_states(directory))
 
 
-def collect(directory: Path) -> list[str]:
-    """Write cases.csv and statistics.csv; returns the lines to print.  On one rank.
+def collect(directory: Path, pictures: bool) -> list[str]:
+    """Write cases.csv, statistics.csv and the picture; returns the lines to print.  On one rank.
 
     Raises:
         CaseError: as `read`.
@@ -45,8 +45,12 @@ def collect(directory: Path) -> list[str]:
     """
     index, states = _index_and_states(directory)
     table = _table(index, states)
-    atomic.remove_unfinished(directory, re.compile(r"(cases|statistics)\.csv"), alone=False)
+    atomic.remove_unfinished(directory, re.compile(r"(cases|statistics)\.csv|moduli\.png"), alone=False)
     paths = write(directory, table)
+    if pictures:
+        from feti_homog.studies.pictures import draw_moduli  # only a rank that draws loads Matplotlib
+
+        paths += draw_moduli(directory, table)
     counts = ", ".join(f"{count} {status}" for status, count in Counter(table.status).items())
     failed = [
         (entry, state)

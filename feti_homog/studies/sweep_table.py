@@ -131,3 +131,39 @@ class Statistics:
         mean = np.where(is_known, samples, 0.0).sum(axis=0) / np.where(count > 0, count, np.nan)
         std = np.sqrt(np.where(is_known, (samples - mean) ** 2, 0.0).sum(axis=0) / (several - 1))
         return cls(count.astype(float), mean, std, student.ppf(0.5 + CONFIDENCE / 2, several - 1) * std / several**0.5)
+
+
+@dataclass(frozen=True)
+class Series:
+    """Points that differ by one key only: their numbers, and that key's values `x`, rising."""
+
+    label: str
+    points: list[int]
+    x: Float
+
+
+def series_over(table: SweepTable, key: str) -> list[Series]:
+    """Return the series over a key, of the points with finished cases.
+
+    A key that varies along with it, one value to one, makes no other series.
+    """
+    points = [p for p in table.points if table.results_of(p) and table.input_of(p, key) is not None]
+    along = [name for name in table.inputs if _follows(table, points, name, key)]
+    labels = {point: table.label(point, along) for point in points}
+    series = []
+    for label in dict.fromkeys(labels.values()):
+        rising = sorted((float(table.input_of(point, key)), point) for point in points if labels[point] == label)
+        series.append(Series(label, [point for _, point in rising], np.array([x for x, _ in rising])))
+    return series
+
+
+def _follows(table: SweepTable, points: Sequence[int], name: str, key: str) -> bool:
+    """Return whether an input has one value for each value of the key."""
+    pairs = {(repr(table.input_of(point, key)), repr(table.input_of(point, name))) for point in points}
+    return len(pairs) == len({value for value, _ in pairs})
+
+
+def varies(table: SweepTable, key: str) -> bool:
+    """Return whether a key has more than one value among finished cases."""
+    values = table.inputs.get(key, ())
+    return len({v for v, d in zip(values, table.documents, strict=False) if v is not None and d is not None}) > 1

@@ -152,7 +152,7 @@ def test_a_sweep_is_an_array_of_its_cases(elsewhere, scheduler, kind, submit):
     assert ("--array=1-3%50" if kind == "slurm" else "-J 1-3") in array
     assert ("--dependency=afterany:77 " if kind == "slurm" else "depend=afterany:77[].server") in collect
     assert [row["status"] for row in rows(out)][:3] == ["done", "failed", "done"]
-    assert (out / "cases.csv").exists() and sorted(path.name for path in elsewhere.iterdir()) == ["out", "sweep.toml"]
+    assert (out / "moduli.png").exists() and sorted(path.name for path in elsewhere.iterdir()) == ["out", "sweep.toml"]
     Path(scheduler["NOTES"]).unlink()
     quick = scheduler | {"NOTES_ONLY": "1"}
     job, notes = submitted(quick, script, "sweep.toml", "out", cwd=elsewhere)

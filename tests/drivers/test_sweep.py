@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 from support.command_line import command_line
 from support.hooks import WAIT, Hook, HookedJob
 from support.jobs import PATIENCE, ROOT, launched
@@ -215,11 +216,12 @@ def test_collect_needs_the_folder_of_a_sweep(tmp_path):
     assert job.returncode == 2 and "expected the folder of a sweep" in job.stderr
 
 
-def test_collect_writes_tables(tmp_path):
+def test_collect_writes_tables_and_pictures(tmp_path):
     out = tmp_path / "out"
     swept(out, sweep_file(tmp_path, "realisations = 3\ncell.fibre_fraction = [0.2, 0.3]\n", RANDOM))
-    names = ("cases.csv", "statistics.csv")
+    names = ("cases.csv", "statistics.csv", "moduli.png")
     assert collected(out).stdout.splitlines() == ["6 cases: 6 done", *(str(out / name) for name in names)]
+    assert imread(out / "moduli.png")[..., :3].std() > 0.02
     assert [row["status"] for row in rows(out)] == ["done"] * 6
     found = means(out, "bulk")
     bulk, point = (np.array([float(row[name]) for row in rows(out)]) for name in ("bulk", "point"))

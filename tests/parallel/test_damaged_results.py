@@ -223,7 +223,7 @@ def test_damaged_lists_of_cases_are_refused(comm, swept, capsys, name):
     damage, message = LISTS[name]
     out = damaged_sweep(comm, swept, lambda out: damage(out / "sweep.json"))
     capsys.readouterr()
-    parallel_assert(comm, cli.main(["collect", str(out)]) == 2)
+    parallel_assert(comm, cli.main(["collect", str(out), "--no-pictures"]) == 2)
     told_once(comm, capsys, message)
 
 
@@ -244,7 +244,7 @@ def test_damaged_lists_of_cases_are_refused(comm, swept, capsys, name):
 def test_damaged_cases_of_a_sweep_are_counted(comm, swept, capsys, damage, words):
     out = damaged_sweep(comm, swept, lambda out: damage(out / "case-0002"))
     capsys.readouterr()
-    parallel_assert(comm, cli.main(["collect", str(out)]) == 0)
+    parallel_assert(comm, cli.main(["collect", str(out), "--no-pictures"]) == 0)
     output, errors = capsys.readouterr()
     counts = output.splitlines()[0] if output else ""
     parallel_assert(

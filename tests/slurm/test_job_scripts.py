@@ -108,7 +108,7 @@ def test_an_array_goes_on_past_a_failed_case_and_is_collected(slurm, elsewhere):
     sweep, out = ("submit_sweep", "sweep.toml", "out"), elsewhere / "out"
     array, collect = submitted(slurm, elsewhere, *sweep)
     assert slurm.ended(collect) == [DONE] and slurm.jobs(array) == [DONE, FAILED, DONE]
-    assert [row["status"] for row in rows(out)][:3] == ["done", "failed", "done"] and (out / "statistics.csv").exists()
+    assert [row["status"] for row in rows(out)][:3] == ["done", "failed", "done"] and (out / "moduli.png").exists()
     assert "case-0001 of 3: done" in log(out, f"{array}_1", "feti_homog_sweep")
     assert "MeshError" in (out / "case-0002/error.txt").read_text()
     assert "2 done, 1 failed" in log(out, collect, "feti_homog_collect")

@@ -200,7 +200,7 @@ def sweep_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("sweep")
     (folder / "sweep.toml").write_text(tomli_w.dumps(BASE | CASES["path"] | SWEEP))
     case_runs.run_all(sweep_cases.load(folder / "sweep.toml"), folder / "cases", MPI.COMM_SELF, 1, False, True)
-    collect.collect(folder / "cases")
+    collect.collect(folder / "cases", pictures=False)
     return folder / "cases"
 
 

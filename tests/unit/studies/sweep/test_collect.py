@@ -1,4 +1,4 @@
-"""Statistics over realisations, and the tables of a sweep."""
+"""Statistics over realisations, and the tables and pictures of a sweep."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ import math
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 from scipy import stats
-from support.sweep_tables import collected, document, fractions, spatial_document
 
 from feti_homog.materials.voigt import SPATIAL_STRESSES
 from feti_homog.report.text.table import unit, with_unit
-from feti_homog.studies import collect
+from feti_homog.studies import collect, pictures
 from feti_homog.studies.outputs import numbers, outputs
-from feti_homog.studies.sweep_table import Statistics
+from feti_homog.studies.sweep_table import Statistics, SweepTable, series_over
+
+MATERIAL = {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}}
 
 
 def test_statistics_are_scipys():
@@ -32,6 +34,19 @@ def test_statistics_of_too_few_values_are_nan():
     assert found.mean[:2].tolist() == [1.0, 3.0] and math.isnan(found.mean[2])
     assert np.isnan(found.std[[0, 2]]).all() and found.std[1] == pytest.approx(2**0.5)
     assert found.ci95[1] == pytest.approx(12.706, rel=1e-4)
+
+
+def document(fraction, fibres, shift):
+    """Write the files of a run with a stiffness slightly above that of Reuss."""
+    C = np.array([[120.0 + 80 * fraction, 50.0, 0.0], [50.0, 120.0 + 80 * fraction, 0.0], [0.0, 0.0, 35.0]]) + shift
+    cell = {"geometry": "random", "fibre_fraction": fraction, "fibres": fibres}
+    return {
+        "case": {"cell": cell, "material": MATERIAL, "analysis": {"type": "stiffness", "plane": "strain"}},
+        "cell": {"fibre_fraction": fraction, "elements": 10, "nodes": 9},
+        "solver": {"ranks": 1, "subdomains": 2, "dofs": 18, "multipliers": 4, "iterations": [3, 4, 5]},
+        "effective_stiffness": C, "moduli": {"bulk": 85.0 + 60 * fraction + shift, "shear": 35.0 + shift},
+        "checks": {"hill": 1e-12}, "timings": {"solve": 0.1}, "memory": 1000,
+    }  # fmt: skip
 
 
 def path_document(fibres, shift):
@@ -58,6 +73,17 @@ def sheared(fibres, compliance):
     case["analysis"] = case["analysis"] | {"type": "path", "plane": "generalized"}
     del base["effective_stiffness"], base["moduli"]
     return base | {"case": case, "path": points}
+
+
+def collected(inputs, documents, point, realisation):
+    found = [outputs(d) if d else {} for d in documents]
+    names = dict.fromkeys(name for row in found for name in row)
+    return SweepTable(
+        name="test", stress_unit="GPa", folder=[f"case-{k + 1:04d}" for k in range(len(documents))],
+        point=point, realisation=realisation, status=["done" if d else "waiting" for d in documents],
+        reason=[""] * len(documents), inputs=inputs, documents=documents,
+        outputs={name: np.array([row.get(name, np.nan) for row in found]) for name in names},
+    )  # fmt: skip
 
 
 @pytest.mark.slow
@@ -95,6 +121,14 @@ def test_columns_of_bounds_are_the_lower_and_the_upper():
     found = outputs(document(0.4, 2, 0.0) | {"bounds": sides | {"hashin_shtrikman": {"bulk": [7.0, 8.0]}}})
     assert [found[f"C{i}{i}_{side}"] for side in sides for i in (1, 2, 3)] == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
     assert (found["bulk_lower"], found["bulk_upper"]) == (7.0, 8.0)
+
+
+def fractions():
+    """Two fractions with three realisations each, of which one still waits."""
+    documents = [document(c, 8, shift) for shift in (0.0, 0.5, 1.0) for c in (0.2, 0.4)]
+    documents[-1] = None
+    inputs = {"cell.fibre_fraction": [0.2, 0.4] * 3, "cell.seed": [0, 0, 1, 1, 2, 2]}
+    return collected(inputs, documents, [1, 2] * 3, [1, 1, 2, 2, 3, 3])
 
 
 def test_tables_hold_cases_and_statistics_of_points(tmp_path):
@@ -152,7 +186,48 @@ def test_mean_curves_keep_the_bonded_branch(tmp_path):
     assert found.ci95[-1] == pytest.approx(stats.t.ppf(0.975, 1) * 0.5**0.5 / 2**0.5)
 
 
-def test_stiffnesses_in_space_fill_columns():
+@pytest.mark.slow
+def test_moduli_are_drawn(tmp_path):
+    assert_drawn(tmp_path, fractions(), ["moduli.png"])
+    assert not pictures.draw_moduli(tmp_path, collected({"cell.order": [1]}, [document(0.4, 8, 0)], [1], [1]))
+    waiting = collected({"cell.fibre_fraction": [0.1, 0.2]}, [None] * 2, [1, 2], [1] * 2)
+    assert not pictures.draw_moduli(tmp_path, waiting)
+
+
+def test_bars_are_the_mean_errors_of_the_mesh():
+    errors = ({"constants": {"bulk": error, "nu31": 1.0}, "energy": 0.01} for error in (2.0, 4.0, 1.0, 3.0))
+    documents = [document(c, 8, shift) for shift in (0.0, 1.0) for c in (0.2, 0.4)]
+    documents = [each | {"mesh_error": error} for each, error in zip(documents, errors, strict=True)]
+    table = collected({"cell.fibre_fraction": [0.2, 0.4] * 2}, documents, [1, 2] * 2, [1, 1, 2, 2])
+    assert "nu31_mesh_error" not in table.outputs  # of a constant that has no column
+    panel = (figure := pictures.moduli_figure(table)).axes[pictures.PANELS.index("bulk")]
+    assert {"realisations", "95 % confidence of the mean"} <= {each.get_text() for each in figure.legends[0].texts}
+    (bars,) = (each for each in panel.containers if each.get_label() == "estimated error of the mesh")
+    (ends,) = (lines.get_segments() for lines in bars.lines[2])
+    assert [end[:, 1].tolist() for end in ends] == [pytest.approx([96.0, 99.0]), pytest.approx([106.0, 113.0])]
+
+
+def assert_drawn(folder, table, names):
+    paths = pictures.draw_moduli(folder, table)
+    assert [path.name for path in paths] == names
+    for path in paths:
+        picture = imread(path)
+        assert min(picture.shape[:2]) > 500 and picture[..., :3].std() > 0.03
+
+
+def spatial_document(fraction, shift):
+    """Write the files of a run in generalized plane strain."""
+    found = document(fraction, 1, 0.0)
+    C = np.diag([150.0 + shift, 150.0, 210.0, 50.0, 50.0, 45.0]) + 1e-3 * np.arange(36).reshape(6, 6)
+    thermal = {"thermal_stress": [-1.0] * 6, "thermal_expansion": [1e-5] * 6}
+    case = found["case"] | {"analysis": {"type": "stiffness", "plane": "generalized"}}
+    about_fibres = {"E_axial": 200.0, "E_transverse": 120.0, "G_axial": 50.0, "G_transverse": 46.0}
+    constants = {"constants": {"E3": 200.0}, "transversely_isotropic": about_fibres | {"expansion_axial": None}}
+    del found["moduli"]
+    return found | {"case": case, "effective_stiffness": C} | thermal | constants
+
+
+def test_stiffnesses_in_space_fill_columns_and_are_drawn(tmp_path):
     documents = [spatial_document(c, shift) for shift in (0.0, 1.0) for c in (0.2, 0.4)]
     table = collected({"cell.fibre_fraction": [0.2, 0.4] * 2, "cell.seed": [0, 0, 1, 1]}, documents, [1, 2] * 2, [1, 2])
     stiffness = documents[0]["effective_stiffness"]
@@ -161,6 +236,31 @@ def test_stiffnesses_in_space_fill_columns():
     assert table.outputs["thermal_S33"].tolist() == [-1.0] * 4 and table.outputs["expansion_gamma12"][0] == 1e-5
     assert (table.outputs["E3"][0], table.outputs["G_axial"][0]) == (200.0, 50.0)
     assert "bulk" not in table.outputs
+    assert pictures.panels_of(table) == ("E_axial", "E_transverse", "G_axial", "G_transverse")
+    assert_drawn(tmp_path, table, ["moduli.png"])
+
+
+def test_bounds_in_space_enclose_each_other_and_what_is_between():
+    """At any fraction the tighter ones lie between Reuss and Voigt; all meet where there is one phase."""
+    documents = [spatial_document(c, 0.0) for c in (0.2, 0.6)]
+    bounds = pictures.moduli_bounds(collected({"cell.fibre_fraction": [0.2, 0.6]}, documents, [1, 2], [1, 1]))
+    assert bounds.tight == "Hill, Hashin" and bounds.fractions[0] == 0.0
+    for rows in bounds.rows.values():
+        assert (rows[1] >= rows[0] * (1 - 1e-12)).all() and np.ptp(rows[:, 0]) < 1e-9 * rows[0, 0]
+        if len(rows) == 4:
+            assert (rows[0] <= rows[2] * (1 + 1e-12)).all() and (rows[2] <= rows[3] * (1 + 1e-12)).all()
+            assert (rows[3] <= rows[1] * (1 + 1e-12)).all()
+    assert [len(rows) for rows in bounds.rows.values()] == [4, 2, 4, 4]
+
+
+def test_secants_in_space_are_drawn_without_bounds(tmp_path):
+    documents = [spatial_document(c, 0.0) for c in (0.2, 0.4)]
+    for each in documents:
+        del each["constants"], each["transversely_isotropic"]
+    table = collected({"cell.fibre_fraction": [0.2, 0.4]}, documents, [1, 2], [1, 1])
+    assert pictures.panels_of(table) == ("C11", "C33", "C44", "C66")
+    assert pictures.moduli_figure(table).get_suptitle().endswith("plane generalized; no bounds, for faces may touch")
+    assert_drawn(tmp_path, table, ["moduli.png"])
 
 
 def test_angles_in_space_have_all_entries():
@@ -168,6 +268,15 @@ def test_angles_in_space_have_all_entries():
     base = {name: part for name, part in document(0.4, 8, 0).items() if name != "effective_stiffness"}
     found = outputs(base | {"angle": [point]})
     assert (found["angle_60_C11"], found["angle_60_C33"], found["angle_60_C66"]) == (0.0, 14.0, 35.0)
+
+
+def test_what_varies_along_is_no_other_series():
+    documents = [document(0.4, fibres, 0.0) for fibres in (4, 8, 4, 8)]
+    inputs = {"cell.fibres": [4, 8, 4, 8], "cell.mesh_size": [0.3, 0.2, 0.3, 0.2], "material.fibre.young": [1, 1, 2, 2]}
+    found = series_over(collected(inputs, documents, [1, 2, 3, 4], [1] * 4), "cell.fibres")
+    assert [(one.label, one.points, one.x.tolist()) for one in found] == [
+        ("fibre young 1 GPa", [1, 2], [4.0, 8.0]), ("fibre young 2 GPa", [3, 4], [4.0, 8.0]),
+    ]  # fmt: skip
 
 
 def test_outputs_have_their_units():
