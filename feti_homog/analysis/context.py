@@ -19,7 +19,7 @@ from feti_homog.interface.contact.load_scales import ABSURD
 from feti_homog.interface.contact.states import BONDED, OPEN, BondState, Equilibrium
 from feti_homog.interface.loads import Load
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS
-from feti_homog.results.checkpoint import NoCheckpoint
+from feti_homog.results.checkpoint import EventsInMemory
 from feti_homog.system.runtime.progress import Progress
 from feti_homog.typing import Float
 
@@ -115,7 +115,7 @@ class AnalysisContext:
     checks: CheckRecorder
     states: StateRecorder
     progress: Progress
-    checkpoint: NoCheckpoint
+    checkpoint: EventsInMemory
     resume: bool = False
     log: Callable[[str], object] = lambda line: None
     events: str = "result.path"
@@ -128,7 +128,7 @@ class AnalysisContext:
         """Make a cell's context, without checkpoint; by default without states."""
         contact = cell.case.interface is not None and cell.case.interface.contact
         recorder = StateRecorder(cell, None, False, progress.say) if states is None else states
-        checks, checkpoint = CheckRecorder(cell.solver.rtol), NoCheckpoint(cell.comm)
+        checks, checkpoint = CheckRecorder(cell.solver.rtol), EventsInMemory(cell.comm, 0)
         return cls(CellLoads(cell, contact), checks, recorder, progress, checkpoint)
 
     @property

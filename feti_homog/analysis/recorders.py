@@ -10,10 +10,10 @@ from feti_homog.analysis.result import Fields
 from feti_homog.errors import FetiHomogError
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.results import field_parts, seals
+from feti_homog.results import field_parts, result_json
 from feti_homog.results.field_file import FieldFile
 from feti_homog.results.field_layout import StatePart
-from feti_homog.results.seals import FileSeal
+from feti_homog.results.result_json import FileSeal
 from feti_homog.system.parallel.mpi_errors import on_root
 
 # Largest relative error of a check that passes, in relative tolerances of the Krylov method: sums over the cell and
@@ -120,7 +120,7 @@ class StateRecorder:
     def seal(self) -> FileSeal | None:
         """Complete the file; returns its seal, None without a file.  Collective."""
         self._write(FieldFile.close)
-        return None if self._file is None else on_root(self._cell.comm, seals.seal, self._file.path)
+        return None if self._file is None else on_root(self._cell.comm, result_json.seal, self._file.path)
 
     def _write(self, write: Callable[[FieldFile], object]) -> None:
         """Write to the file, if any; failure ends it on all ranks."""

@@ -31,8 +31,7 @@ from feti_homog.materials.bounds import Estimates, FibreBounds
 from feti_homog.materials.constants import EngineeringConstants, Moduli, TransverseIsotropy, TransverseModuli
 from feti_homog.materials.voigt import voigt_names
 from feti_homog.results.field_layout import FibrePart, Header, InterfacePart, MeshPart, StatePart, tables
-from feti_homog.results.result_json import SCHEMA
-from feti_homog.results.seals import FileSeal
+from feti_homog.results.result_json import SCHEMA, FileSeal
 from feti_homog.system.runtime.records import BYTES, SECONDS, STRESS, ResultKey, described, keys, plain, restored
 from feti_homog.typing import Float
 

@@ -27,7 +27,7 @@ from feti_homog.homogenization.uniform_parts import nodes_of_parts
 from feti_homog.homogenization.unit_cell import TornCell, tear
 from feti_homog.microstructure.shapes.ellipses import Ellipses
 from feti_homog.results import field_file, field_parts, output_folder, result_json, xdmf
-from feti_homog.results.checkpoint import Checkpoint, EventsInMemory, room_of
+from feti_homog.results.checkpoint import WHOLE_BYTES, Checkpoint, EventsInMemory
 from feti_homog.results.field_file import FieldFile
 from feti_homog.results.output_folder import EventLog
 from feti_homog.system.parallel.mpi_errors import all_raise, on_root, on_root_only
@@ -120,6 +120,14 @@ def _torn(case: Case, comm: MPI.Intracomm, progress: Progress) -> Iterator[TornC
                 cell.destroy()
             raise
         cell.destroy()
+
+
+def room_of(case: Case) -> int | None:
+    """Return the bytes up to which a path keeps multipliers; None with friction, or if all fields are kept.
+
+    With friction many equilibria exist under one load.
+    """
+    return None if case.has_friction or case.output.states == "all" else WHOLE_BYTES
 
 
 def _run_and_write(cell: TornCell, directory: Path, progress: Progress, resume: bool, keep_fields: bool) -> Result:

@@ -10,7 +10,7 @@ from typing import Any
 from feti_homog.analysis.result import Result
 from feti_homog.case.case import Case, check_stored
 from feti_homog.errors import CaseError
-from feti_homog.results import checkpoint_file, field_file, result_json, seals
+from feti_homog.results import checkpoint, field_file, result_json
 
 
 def read(directory: Path) -> dict[str, Any]:
@@ -46,7 +46,7 @@ def finished(directory: Path, case: Case) -> bool:
     Raises:
         CaseError: the result is damaged, or belongs to another case.
     """
-    if (directory / checkpoint_file.FOLDER).is_dir() or not (directory / result_json.NAME).is_file():
+    if (directory / checkpoint.FOLDER).is_dir() or not (directory / result_json.NAME).is_file():
         return False
     document = result_json.read(directory)
     result = _restored(directory, document)
@@ -81,4 +81,4 @@ def _check_fields(directory: Path, result: Result) -> None:
     if not path.is_file():
         raise CaseError(f"{path}: it is missing; run the case again")
     if result.result_h5 is not None:
-        seals.check(path, result.result_h5)
+        result_json.check(path, result.result_h5)

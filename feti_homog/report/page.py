@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable
 from html import escape
 from importlib import resources
 from pathlib import Path
 
 from feti_homog.errors import CaseError
 from feti_homog.materials.voigt import SPATIAL_STRAINS, STRAINS
-from feti_homog.report.text.summary import answers, checks, summary, title_of
+from feti_homog.report.text.summary import REMARKS, answers, checks, summary, title_of
 from feti_homog.results import atomic, output_folder, result_json
 from feti_homog.typing import Document
 
@@ -65,14 +64,14 @@ def page(document: Document, directory: Path) -> str:
     style = resources.files("feti_homog.report").joinpath("page.css").read_text(encoding="utf-8")
     remarks = [
         f'<p class="{label.lower()}"><strong>{label}</strong> {escape(remark)}</p>'
-        for label in ("Remark", "Warning", "Fault")
+        for label in REMARKS
         for remark in document.get(f"{label.lower()}s", ())
     ]
     sections = {
         "Results": "\n".join(f'<div class="scroll">{answer.html}</div>' for answer in answers(document, MOST_ROWS)),
         "Remarks": "\n".join(remarks),
         "Checks": f'<div class="scroll">{checks(document).html}</div>',
-        "Pictures": "\n".join(_pictures(directory)) or "<p>None: <code>feti-homog plot</code> draws them.</p>",
+        "Pictures": "\n".join(_figures(directory)) or "<p>None: <code>feti-homog plot</code> draws them.</p>",
         "Summary": f"<pre>{escape(summary(document))}</pre>",
     }
     filled = {name: body for name, body in sections.items() if body}
@@ -107,12 +106,13 @@ def page(document: Document, directory: Path) -> str:
 """
 
 
-def _pictures(directory: Path) -> Iterable[str]:
-    """Yield the pictures of the folder as figures with captions."""
-    paths = {directory / f"{name}.png": caption for name, caption in PICTURES.items()}
-    paths |= {path: f"Deformed cell, {path.stem.replace('_', ' ')}" for path in sorted(directory.glob("state_*.png"))}
-    for path, caption in paths.items():
-        if path.is_file():
-            data = base64.b64encode(path.read_bytes()).decode()
-            image = f'<img src="data:image/png;base64,{data}" alt="{caption}">'
-            yield f"<figure>{image}<figcaption>{caption}</figcaption></figure>"
+def _figures(directory: Path) -> list[str]:
+    """Return the pictures of the folder with their captions."""
+    captions = {directory / f"{name}.png": caption for name, caption in PICTURES.items()}
+    captions |= {at: f"Deformed cell, {at.stem.replace('_', ' ')}" for at in sorted(directory.glob("state_*.png"))}
+    return [
+        f'<figure><img src="data:image/png;base64,{base64.b64encode(path.read_bytes()).decode()}" alt="{caption}">'
+        f"<figcaption>{caption}</figcaption></figure>"
+        for path, caption in captions.items()
+        if path.is_file()
+    ]

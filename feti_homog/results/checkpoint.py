@@ -2,12 +2,22 @@
 
 An event holds load, bond states and scalars.  As long as there is room it also holds multipliers and jumps; afterwards
 an equilibrium under its load, with its bonds, finds them again.
+
+The file is `checkpoint/events` in the result folder, one record per event: a prefix, content length and CRC-32
+checksums of content and prefix, then the content.  The first content is the run's signature, every other an event
+packed by zlib: a JSON line with names, types and shapes of its arrays, then their bytes.  A killed run may leave a last
+record shorter than its length, which does not count.
 """
 
 from __future__ import annotations
 
+import contextlib
+import json
 import re
-from collections.abc import Mapping
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -15,20 +25,26 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from feti_homog.case.case import Case
 from feti_homog.errors import CaseError
-from feti_homog.results import atomic, checkpoint_file
-from feti_homog.results.checkpoint_file import FOLDER, NAME, Arrays, packed, records, unpacked
+from feti_homog.results import atomic
 from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
 
+FOLDER, DROPPED, NAME = "checkpoint", "checkpoint.dropped", "events"  # the second folder while it is removed
+FORMAT = 11  # to be raised when the content of an event changes
+HEAD = re.compile(rb"feti-homog checkpoint, format (\d+)\n")
+# Also files that formats up to 10 had, one an event, and unfinished ones among them.
+EVENT_FILE = re.compile(rf"{NAME}|\d{{6,}}\.h5(\..+\.\d+\.part)?")
+PREFIX = struct.Struct("<QII")
 # Bytes of events up to which they have their multipliers.
 WHOLE_BYTES = 64 * 2**20
 # Arrays that an equilibrium with the bonds of the event has again.
 FOUND_AGAIN = re.compile(r"(lam|jump|used|alpha)(_axial)?(_ends)?")
 
+Arrays = dict[str, NDArray[Any]]
 
-class NoCheckpoint:
-    """Drop all events, for runs that leave no files; every method is collective.
+
+class EventsInMemory:
+    """Keep the events in memory, each rank its part, for runs that leave no files; every method is collective.
 
     Attributes:
         room: bytes up to which events have their multipliers; None without a limit.
@@ -36,10 +52,12 @@ class NoCheckpoint:
 
     def __init__(self, comm: MPI.Intracomm, room: int | None = WHOLE_BYTES) -> None:
         self.comm, self.room = comm, room
+        self._events: list[bytes] = []
 
     def clear(self) -> int:
         """Forget all events; returns their number."""
-        return 0
+        number, self._events = len(self._events), []
+        return number
 
     def count(self) -> int:
         """Return the number of events, after a check of each.
@@ -47,7 +65,7 @@ class NoCheckpoint:
         Raises:
             CaseError: an event is unreadable or of another run.
         """
-        return 0
+        return len(self._events)
 
     def read(self, number: int) -> Arrays:
         """Return an event: this rank's part of distributed arrays, other arrays in full.
@@ -55,7 +73,7 @@ class NoCheckpoint:
         Raises:
             CaseError: it is unreadable.
         """
-        raise NotImplementedError
+        return unpacked(self._events[number])
 
     def write(self, number: int, shared: Mapping[str, Any], distributed: Arrays, light: bool = False) -> None:
         """Add event `number`, in place of all events from this number on.
@@ -68,6 +86,9 @@ class NoCheckpoint:
         Raises:
             FetiHomogError: the file cannot be written.
         """
+        event = {name: np.asarray(value) for name, value in {**shared, **distributed}.items()}
+        del self._events[number:]
+        self._events.append(packed(self._kept(event, self.comm.allreduce(sum(map(len, self._events))))))
 
     def _kept(self, event: Arrays, size: int) -> Arrays:
         """Return the arrays to keep of an event behind `size` bytes of events."""
@@ -75,28 +96,7 @@ class NoCheckpoint:
         return event if has_room else {name: v for name, v in event.items() if not FOUND_AGAIN.fullmatch(name)}
 
 
-class EventsInMemory(NoCheckpoint):
-    """Keep the events in memory, each rank its part, for runs that leave no files."""
-
-    def __init__(self, comm: MPI.Intracomm, room: int | None = WHOLE_BYTES) -> None:
-        super().__init__(comm, room)
-        self._events: list[bytes] = []
-        self._bytes = 0
-
-    def count(self) -> int:
-        return len(self._events)
-
-    def read(self, number: int) -> Arrays:
-        return unpacked(self._events[number])
-
-    def write(self, number: int, shared: Mapping[str, Any], distributed: Arrays, light: bool = False) -> None:
-        event = {name: np.asarray(value) for name, value in {**shared, **distributed}.items()}
-        del self._events[number:]
-        self._events.append(packed(self._kept(event, self.comm.allreduce(self._bytes))))
-        self._bytes += len(self._events[-1])
-
-
-class Checkpoint(NoCheckpoint):
+class Checkpoint(EventsInMemory):
     """Keep the events in `directory`/checkpoint/events, which rank 0 writes.
 
     Attributes:
@@ -128,24 +128,25 @@ class Checkpoint(NoCheckpoint):
 
     def _clear(self) -> int:
         try:
-            count = self._count_records()
+            number = self._count_records()
         except CaseError:  # whatever another run left there
-            count = 1
-        checkpoint_file.remove(self.path.parents[1])
+            number = 1
+        remove(self.path.parents[1])
         self._ends = []
-        return count
+        return number
 
     def _count_records(self) -> int:
-        checkpoint_file.refuse_former(self.path.parent)
+        if former := sorted(path.name for path in self.path.parent.glob("[0-9]*.h5")):
+            raise _other_format(self.path.parent / former[0], "10 or less")
         self._ends = [end for end, _ in records(self.path)] if self.path.is_file() else []
         return max(len(self._ends) - 1, 0)
 
     def _count(self) -> int:
-        if count := self._count_records():
+        if number := self._count_records():
             written = next(records(self.path))[1].decode()
             if written != self.signature:
                 raise CaseError(f"{self.path} is of another run: expected {self.signature}; found {written}")
-        return count
+        return number
 
     def _write(
         self, number: int, shared: Mapping[str, Any], gathered: Mapping[str, list[NDArray[Any]]], light: bool
@@ -154,11 +155,11 @@ class Checkpoint(NoCheckpoint):
         event |= {name: np.concatenate(parts) for name, parts in gathered.items()}
         event |= {f"{name}_ends": np.cumsum([len(p) for p in parts]) for name, parts in gathered.items()}
         if not self._ends:
-            first = checkpoint_file.begin(self.signature)
+            first = begin(self.signature)
             atomic.append(self.path, 0, first, False)
             self._ends = [len(first)]
         del self._ends[number + 1 :]
-        content = checkpoint_file.record(packed(self._kept(event, self._ends[-1])))
+        content = record(packed(self._kept(event, self._ends[-1])))
         atomic.append(self.path, self._ends[-1], content, not light)
         self._ends.append(self._ends[-1] + len(content))
 
@@ -168,22 +169,127 @@ def has_multipliers(event: Arrays) -> bool:
     return "lam" in event
 
 
-def room_of(case: Case) -> int | None:
-    """Return the bytes up to which a path keeps multipliers; None with friction, or if all fields are kept.
-
-    With friction many equilibria exist under one load.
-    """
-    return None if case.has_friction or case.output.states == "all" else WHOLE_BYTES
-
-
 def _part(event: Arrays, rank: int) -> Arrays:
     """Return an event with the distributed arrays cut to the part of `rank`."""
-    part = {}
-    for name, table in event.items():
-        if name.endswith("_ends"):
-            continue
-        ends = event.get(f"{name}_ends")
-        if ends is not None:
-            table = table[ends[rank - 1] if rank else 0 : ends[rank]]
-        part[name] = table
-    return part
+    ends = {name: event.get(f"{name}_ends") for name in event if not name.endswith("_ends")}
+    return {name: event[name] if at is None else np.split(event[name], at[:-1])[rank] for name, at in ends.items()}
+
+
+def begin(signature: str) -> bytes:
+    """Return the first bytes of an event file: its format, and the record of the signature."""
+    return b"feti-homog checkpoint, format %d\n" % FORMAT + record(signature.encode())
+
+
+def record(content: bytes) -> bytes:
+    """Return a content behind its prefix."""
+    numbers = len(content), zlib.crc32(content)
+    return PREFIX.pack(*numbers, zlib.crc32(b"%d %d" % numbers)) + content
+
+
+def records(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
+    """Yield end and content of each record, from the file's beginning or from the end `start` of a record.
+
+    Raises:
+        CaseError: the file has another format or is damaged.
+    """
+    try:
+        with path.open("rb") as stream:
+            place = stream.seek(start) or len(_head(stream.readline(), path))
+            for number in count():
+                prefix = stream.read(PREFIX.size)
+                if place == 0 or len(prefix) < PREFIX.size:
+                    return
+                size, checksum, of_both = PREFIX.unpack(prefix)
+                is_sound = of_both == zlib.crc32(b"%d %d" % (size, checksum))
+                content = stream.read(size) if is_sound else b""
+                if is_sound and len(content) < size:
+                    return
+                if not is_sound or zlib.crc32(content) != checksum:
+                    raise CaseError(f"{path} is damaged: the checksum of record {number} is wrong")
+                place += PREFIX.size + size
+                yield place, content
+    except OSError as error:
+        raise CaseError(f"{path} is no readable event file: {error.strerror}") from error
+
+
+def _head(line: bytes, path: Path) -> bytes:
+    """Check the first line of an event file; empty if its run was killed while writing it."""
+    expected = begin("").partition(b"\n")[0] + b"\n"
+    if line != expected and expected.startswith(line):
+        return b""
+    if (match := HEAD.fullmatch(line)) is None:
+        raise CaseError(f"{path} is damaged: it does not begin as an event file")
+    if int(match[1]) != FORMAT:
+        raise _other_format(path, int(match[1]))
+    return line
+
+
+def _other_format(path: Path, number: int | str) -> CaseError:
+    return CaseError(
+        f"{path} has the checkpoints' format {number}, this program reads format {FORMAT}; "
+        "go on with the program that wrote it, or start again without --resume"
+    )
+
+
+def packed(event: Arrays) -> bytes:
+    """Return an event as the content of a record."""
+    layout = [(name, value.dtype.str, value.shape) for name, value in event.items()]
+    return zlib.compress(b"\n".join([json.dumps(layout).encode(), b"".join(v.tobytes() for v in event.values())]), 1)
+
+
+def unpacked(content: bytes) -> Arrays:
+    """Return the event of a record."""
+    layout, _, data = zlib.decompress(content).partition(b"\n")
+    event, start = Arrays(), 0
+    for name, kind, shape in json.loads(layout):
+        event[name] = np.frombuffer(data, kind, int(np.prod(shape)), start).reshape(shape).copy()
+        start += event[name].nbytes
+    return event
+
+
+def refuse_others(directory: Path) -> None:
+    """Check that a run may write its events to `directory`/checkpoint, and remove them.  Call on one rank.
+
+    Raises:
+        CaseError: it is no folder, or has other files than events.
+        OSError: it cannot be read.
+    """
+    for folder in (directory / FOLDER, directory / DROPPED):
+        if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+            kind = "link" if folder.is_symlink() else "file"
+            raise CaseError(
+                f"--out {directory}: {folder.name} is a {kind} there, and a run makes a folder of that name"
+            )
+        foreign = [path.name for path in folder.iterdir() if not _is_event(path)] if folder.is_dir() else []
+        if foreign:
+            raise CaseError(
+                f"--out {directory}: no run of this program wrote {folder.name}/{min(foreign)}, and a run removes "
+                f"{folder.name}; move it away or choose another folder"
+            )
+
+
+def remove(directory: Path) -> None:
+    """Remove the events in `directory`; their folder exists complete or not at all.  Call on one rank.
+
+    Raises:
+        FetiHomogError: the folder cannot be renamed.
+    """
+    folder, dropped = directory / FOLDER, directory / DROPPED
+    _remove_events(dropped)
+    if folder.is_dir():
+        with atomic.file_errors("remove", folder):
+            atomic.rename(folder, dropped)
+        _remove_events(dropped)
+
+
+def _remove_events(folder: Path) -> None:
+    """Remove the events of a folder as far as possible: the next run removes the rest."""
+    with contextlib.suppress(OSError):
+        for path in folder.iterdir():
+            if _is_event(path):
+                path.unlink()
+        folder.rmdir()
+
+
+def _is_event(path: Path) -> bool:
+    return EVENT_FILE.fullmatch(path.name) is not None and path.is_file()

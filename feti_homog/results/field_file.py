@@ -93,8 +93,13 @@ class FieldFile:
         on_root(comm, _with_write_errors, self.path, _create, self.part, size)
         self._is_open = True
         self._opened = contextlib.ExitStack()
-        path = self._agreed(agree, _path_for_mpi, self.part, self._opened)
-        self._file = self._agreed(agree_after, _open, path, comm, self._opened)
+        # By a descriptor of its folder: MPI-IO has short name buffers.
+        folder = self._agreed(agree, os.open, self.part.parent, os.O_RDONLY)
+        self._opened.callback(os.close, folder)
+        path = f"/proc/self/fd/{folder}/{self.part.name}"
+        self._file = self._agreed(
+            agree_after, lambda: self._opened.enter_context(h5py.File(path, "r+", driver="mpio", comm=comm))
+        )
         self._agreed(agree_after, _set_attributes, self._file, "/", attributes(header) | {"created_by": PROGRAM})
         self._write_part("mesh", replace(mesh, triangles=mesh.triangles + np.int64(self._rows["n"].start)))
         self._write_part("fibre", fibres)
@@ -198,18 +203,6 @@ def _create(part: Path, size: int) -> None:
     except OSError:
         part.unlink(missing_ok=True)
         raise
-
-
-def _path_for_mpi(part: Path, opened: contextlib.ExitStack) -> str:
-    """Name the file by a descriptor of its folder, until `opened` closes: MPI-IO has short name buffers."""
-    folder = os.open(part.parent, os.O_RDONLY)
-    opened.callback(os.close, folder)
-    return f"/proc/self/fd/{folder}/{part.name}"
-
-
-def _open(path: str, comm: Comm, opened: contextlib.ExitStack) -> Any:
-    """Open the file on all ranks, until `opened` closes."""
-    return opened.enter_context(h5py.File(path, "r+", driver="mpio", comm=comm))
 
 
 def _complete(part: Path, path: Path) -> None:

@@ -122,11 +122,11 @@ class StatePart:
     jump: Float = described(
         "gap and slip: displacement of the matrix minus that of the fibre, normal and tangential", LENGTH, "(k, 2)"
     )
-    traction_vector: Float = described("`traction` as (x, y, 0)", STRESS, "(k, 3)")
-    jump_vector: Float = described("`jump` as (x, y, 0)", LENGTH, "(k, 3)")
-    displacement_fibre: Float = described("displacement (x, y, 0) of the fibre's face", LENGTH, "(k, 3)")
+    traction_vector: Float = described("`traction` as (x, y, z), along x3 `axial_traction` or 0", STRESS, "(k, 3)")
+    jump_vector: Float = described("`jump` as (x, y, z), along x3 `axial_jump` or 0", LENGTH, "(k, 3)")
+    displacement_fibre: Float = described("displacement (x, y, z) of the fibre's face", LENGTH, "(k, 3)")
     displacement_matrix: Float = described(
-        "displacement (x, y, 0) of the matrix's face, at the same place: `displacement_fibre` plus `jump_vector`",
+        "displacement (x, y, z) of the matrix's face, at the same place: `displacement_fibre` plus `jump_vector`",
         LENGTH,
         "(k, 3)",
     )
@@ -214,14 +214,6 @@ class SpatialStatePart(StatePart):
     axial_stress: Float = described(f"means over the elements, {', '.join(AXIAL_STRESSES)}", STRESS, "(m, 2)")
     axial_traction: Float = described("sigma n along x3", STRESS, "(k,)")
     axial_jump: Float = described("slip along x3: displacement of the matrix minus that of the fibre", LENGTH, "(k,)")
-    traction_vector: Float = described("`traction` and `axial_traction` as (x, y, z)", STRESS, "(k, 3)")
-    jump_vector: Float = described("`jump` and `axial_jump` as (x, y, z)", LENGTH, "(k, 3)")
-    displacement_fibre: Float = described("displacement (x, y, z) of the fibre's face", LENGTH, "(k, 3)")
-    displacement_matrix: Float = described(
-        "displacement (x, y, z) of the matrix's face, at the same place: `displacement_fibre` plus `jump_vector`",
-        LENGTH,
-        "(k, 3)",
-    )
 
 
 def spatial_items() -> Iterator[Item]:

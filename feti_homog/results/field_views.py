@@ -66,11 +66,9 @@ def _column(name: str, source: str, column: int) -> View:
 
 PLACES = ((0, 0), (1, 1), (0, 1), (2, 2))  # of 11, 22, 12, 33
 STRESS_TENSOR = dict(zip(PLACES, (("stress", 0), ("stress", 1), ("stress", 2), ("stress_33", WHOLE)), strict=True))
-PAIRS = [(f"{source}_{name}", source, column) for source in ("traction", "jump") for column, name in enumerate("nt")]
-
 COLUMNS = (
     *(_column(name, "stress", column) for column, name in enumerate(STRESSES)),
-    *(_column(*pair) for pair in PAIRS),
+    *(_column(f"{table}_{name}", table, k) for table in ("traction", "jump") for k, name in enumerate("nt")),
 )
 AXIAL = "axial_displacement"  # that states of generalized plane strain have, and only they
 AXIAL_PLACES = ((1, 2), (0, 2))  # of 23, 13

@@ -154,6 +154,16 @@ def kept(points: Sequence[Point], states: int | str, legs: int, marked: Collecti
     return _filled(sorted(chosen), states)
 
 
+def _filled(numbers: list[int], count: int) -> list[int]:
+    """Return `numbers` and points between them, `count` in all: the widest gap is divided next."""
+    gaps: list[tuple[float, int, int, int]] = [(a - b, 1, a, b) for a, b in pairwise(numbers)]
+    heapify(gaps)
+    for _ in range(count - len(numbers)):
+        _, parts, a, b = gaps[0]
+        heapreplace(gaps, ((a - b) / (parts + 1), parts + 1, a, b))
+    return sorted({a + (b - a) * k // parts for _, parts, a, b in gaps for k in range(parts)} | {numbers[-1]})
+
+
 def drops(points: Sequence[Point], legs: int) -> list[Drop]:
     """Return the stress drops, and the strain jumps at constant load.
 
@@ -170,8 +180,18 @@ def drops(points: Sequence[Point], legs: int) -> list[Drop]:
     per_strain = largest / (float(length.max()) or 1.0)
     load = np.array([point["load_factor"] for point in points])
     of_first_leg = int((load * legs <= 1.0 + SAME_LOAD).sum()) if legs else 0
-    entries += _of_rising_load(load[:of_first_leg], size, per_strain * strain, threshold)
-    return entries + _jumps(load, of_first_leg, per_strain * strain, threshold)
+    # A rising load goes along rays through zero: stress and strain after a drop are scaled to the load before it.
+    rising, scaled, later = load[:of_first_leg], per_strain * strain, list[Drop]()
+    for a, b in pairwise(np.flatnonzero(rising >= np.maximum.accumulate(rising)).tolist()):
+        scale = load[a] / load[b]
+        jump = _norm((scaled[b] * scale - scaled[a])[None], 0.5)[0]
+        later += [(max(float(size[a] - size[b] * scale), float(jump)), a, b)] * (b > a + 1)
+    # Later, strain jumps over the points at one load, between which bonds break.
+    starts = of_first_leg + np.flatnonzero(np.abs(np.diff(load[of_first_leg:], prepend=-1.0)) > SAME_LOAD)
+    for a, b in pairwise([*starts.tolist(), len(load)]):
+        jump = float(_norm((scaled[b - 1] - scaled[a])[None], 0.5)[0])
+        later.append((jump, a, min(b, len(load) - 1)))
+    return entries + [drop for drop in later if drop[0] > threshold]
 
 
 def _norm(values: Float, shear: float) -> Float:
@@ -179,37 +199,6 @@ def _norm(values: Float, shear: float) -> Float:
     tensions = 2 if values.shape[1] == len(STRAINS) else 3
     square = np.square(values)
     return np.asarray(np.sqrt(square[:, :tensions].sum(axis=1) + shear * square[:, tensions:].sum(axis=1)))
-
-
-def _of_rising_load(load: Float, size: Float, strain: Float, threshold: float) -> list[Drop]:
-    """Return drops along rays through zero: stress and strain after a drop are scaled to the load before it."""
-    records = np.flatnonzero(load >= np.maximum.accumulate(load)).tolist() if len(load) else []
-    entries = []
-    for a, b in pairwise(records):
-        scale = load[a] / load[b]
-        jump = _norm((strain[b] * scale - strain[a])[None], 0.5)[0]
-        entries.append((max(float(size[a] - size[b] * scale), float(jump)), a, b))
-    return [drop for drop in entries if drop[0] > threshold and drop[2] > drop[1] + 1]
-
-
-def _jumps(load: Float, first: int, strain: Float, threshold: float) -> list[Drop]:
-    """Return jumps from point `first` on: over the points at one load, between which bonds break."""
-    starts = first + np.flatnonzero(np.abs(np.diff(load[first:], prepend=-1.0)) > SAME_LOAD)
-    entries = []
-    for a, b in pairwise([*starts.tolist(), len(load)]):
-        jump = float(_norm((strain[b - 1] - strain[a])[None], 0.5)[0])
-        entries.append((jump, a, min(b, len(load) - 1)))
-    return [drop for drop in entries if drop[0] > threshold]
-
-
-def _filled(numbers: list[int], count: int) -> list[int]:
-    """Return `numbers` and points between them, `count` in all: the widest gap is divided next."""
-    gaps: list[tuple[float, int, int, int]] = [(a - b, 1, a, b) for a, b in pairwise(numbers)]
-    heapify(gaps)
-    for _ in range(count - len(numbers)):
-        _, parts, a, b = gaps[0]
-        heapreplace(gaps, ((a - b) / (parts + 1), parts + 1, a, b))
-    return sorted({a + (b - a) * k // parts for _, parts, a, b in gaps for k in range(parts)} | {numbers[-1]})
 
 
 def chosen(document: Document, rows: int, among: Sequence[int] | None = None) -> list[int]:

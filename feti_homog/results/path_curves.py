@@ -1,4 +1,4 @@
-"""Curves of stress-strain paths: the response to a rising load, first leg, energies, components to show.
+"""Curves of stress-strain paths: the response to a rising load, first leg, components to show.
 
 Points are entries of `path` in result.json: mappings with `load_factor`, `strain` and `stress`, c components in Voigt
 order: [11, 22, 12], or [11, 22, 33, 23, 13, 12] in generalized plane strain; stresses in the moduli's unit.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -125,51 +125,6 @@ def scales_with_toughness(document: Document) -> bool:
     laws = [LAWS.get(section.get("criterion", DEFAULT)) for section in interface_sections(document)]
     by_energy = [law is not None and "toughness" in law.keys and not law.softens for law in laws]
     return bool(document.get("path")) and bool(laws) and all(by_energy)
-
-
-class EnergyStack(NamedTuple):
-    """Work of the loads per area along a path and its parts, at r places from the unloaded cell on.
-
-    Attributes:
-        place: (r,) if `by_legs`, number of earlier legs plus load share on the leg; else, where the load falls, point
-            numbers, below 0 before the first point.
-        words: axis label for `place`.
-        parts: nonzero parts by name, (r,) each, in stacking order.
-        work: (r,) sum of the parts, but for rounding.
-    """
-
-    place: Float
-    by_legs: bool
-    words: str
-    parts: dict[str, Float]
-    work: Float
-
-
-def energies(document: Document) -> EnergyStack | None:
-    """Return the energies of a path; None for other results, and from older versions without energies."""
-    points = document.get("path") or [{}]
-    if "work" not in points[0]:
-        return None
-
-    # Up to the first point all is linear.
-    before = np.linspace(0.0, 1.0, 16, endpoint=False)
-
-    def column(name: str, power: int = 2) -> Float:
-        values = [float(point.get(name) or 0.0) for point in points]
-        return np.append(values[0] * before**power, values)
-
-    stored, springs, lost = (column(name) for name in ("stored", "stored_in_springs", "dissipated"))
-    fracture = np.minimum(column("fracture_energy"), lost)
-    rest = "lost in breaks" + (" beyond it" if fracture.any() else "")
-    parts = {"stored in the bodies": stored - springs, "stored in springs": springs, "fracture energy": fracture}
-    parts |= {rest: lost - fracture, "heat of friction": column("friction_heat")}
-    visible = {name: values for name, values in parts.items() if np.abs(values).max() > ZERO * np.abs(stored).max()}
-    place, by_legs = column("load_factor", 1) * legs(document), True
-    words = "leg of the path" if legs(document) > 1 else "share of the load"
-    if (np.diff(place) < 0.0).any():
-        place, by_legs = np.append(before - 1.0, np.arange(float(len(points)))), False
-        words = "number of the point, in the order of the path"
-    return EnergyStack(place, by_legs, words, visible, column("work"))
 
 
 def load_controlled(points: Sequence[Point]) -> Float:

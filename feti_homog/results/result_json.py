@@ -1,22 +1,32 @@
-"""result.json, the document of a run, and its points as CSV tables, each written whole or not at all."""
+"""result.json, the document of a run, and its points as CSV tables, each written whole or not at all.
+
+Checksums tell damaged or edited files: in a JSON document, and of a large file.  HDF5 may crash on wrong bytes, so a
+large file is checked before it is opened.
+"""
 
 from __future__ import annotations
 
 import csv
+import io
+import json
 import math
 import os
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 
 from feti_homog.errors import CaseError, FetiHomogError
-from feti_homog.results import atomic, seals
+from feti_homog.results import atomic
 from feti_homog.system.runtime import input_files
-from feti_homog.system.runtime.records import Description, descriptions, is_record, plain
+from feti_homog.system.runtime.records import BYTES, Description, described, descriptions, is_record, plain
 
 NAME = "result.json"
+KEY = "checksum"
+BLOCK = 1 << 26  # bytes of a file that are read at once
 SCHEMA = 1  # version of the layout: to be raised when a key is renamed, removed or changes its meaning
 
 
@@ -31,16 +41,14 @@ def write(directory: Path, document: Mapping[str, Any]) -> Path:
             file cannot be written.
         TypeError: a value has no form in JSON.
     """
-    content = _json_value(document, "")
-    faults = [f"{NAME}: {place} is {value}, not a finite number" for place, value in _not_finite(content, "")]
+    faults = list[str]()
+    content = _json_value(document, "", faults)
     if faults:
         raise FetiHomogError(*faults)
-
-    def write_text(part: Path) -> None:
-        part.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(seals.dumps(content), encoding="utf-8")
-
-    return atomic.replace(Path(directory) / NAME, write_text)
+    path = Path(directory) / NAME
+    with atomic.write_errors(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    return atomic.replace_text(path, dumps(content))
 
 
 def read(directory: Path) -> dict[str, Any]:
@@ -51,7 +59,7 @@ def read(directory: Path) -> dict[str, Any]:
     """
     path = Path(directory) / NAME
     try:
-        document = seals.loads(input_files.read(path).decode("utf-8"))
+        document = loads(input_files.read(path).decode("utf-8"))
     except OSError as error:
         raise input_files.unreadable(path, error) from error
     except ValueError as error:
@@ -62,35 +70,24 @@ def read(directory: Path) -> dict[str, Any]:
     return document
 
 
-def _json_value(value: Any, place: str) -> Any:
-    """Return the value in JSON's own types. Raises TypeError with the place of one that has none."""
+def _json_value(value: Any, place: str, faults: list[str]) -> Any:
+    """Return the value in JSON's own types; numbers that are not finite add their faults.
+
+    Raises TypeError with the place of a value that has none.
+    """
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, Mapping):
-        return {key: _json_value(item, _inside(place, key)) for key, item in value.items()}
+        return {key: _json_value(item, f"{place}.{key}".lstrip("."), faults) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_json_value(item, f"{place}[{i}]") for i, item in enumerate(value)]
+        return [_json_value(item, f"{place}[{i}]", faults) for i, item in enumerate(value)]
     if isinstance(value, os.PathLike):
         return os.fspath(value)
     if value is None or isinstance(value, bool | int | float | str):
+        if isinstance(value, float) and not math.isfinite(value):
+            faults.append(f"{NAME}: {place} is {value}, not a finite number")
         return value
     raise TypeError(f"{NAME}: {place} is a {type(value).__name__}, which JSON cannot hold")
-
-
-def _not_finite(value: Any, place: str) -> Iterator[tuple[str, float]]:
-    """Yield the numbers that are not finite, and their places."""
-    if isinstance(value, dict):
-        for key, item in value.items():
-            yield from _not_finite(item, _inside(place, key))
-    elif isinstance(value, list):
-        for i, item in enumerate(value):
-            yield from _not_finite(item, f"{place}[{i}]")
-    elif isinstance(value, float) and not math.isfinite(value):
-        yield place, value
-
-
-def _inside(place: str, key: str) -> str:
-    return f"{place}.{key}" if place else key
 
 
 class DescribedColumn(NamedTuple):
@@ -118,18 +115,24 @@ def write_csv(path: Path, points: Sequence[Any]) -> Path:
     Raises:
         FetiHomogError: the table cannot be written.
     """
-    described = _in_columns(type(points[0])) if points else {}
-    rows = [_row(point, described) for point in points]
+    fields = _in_columns(type(points[0])) if points else {}
+    rows = []
+    for point in points:
+        row: dict[str, Any] = {}
+        for name, value in plain(point).items():
+            if name in fields:
+                values, components = np.ravel(value).tolist(), _names(name, fields[name])
+                if len(values) > len(components):
+                    components = fields[name].spatial_components
+                row |= dict(zip(components, values, strict=True))
+        rows.append(row)
     present = {name for row in rows for name in row}
     names = [column.name for column in columns(type(points[0])) if column.name in present] if rows else []
-
-    def write_rows(part: Path) -> None:
-        with part.open("w", newline="", encoding="utf-8") as stream:
-            writer = csv.DictWriter(stream, names)
-            writer.writeheader()
-            writer.writerows(rows)
-
-    return atomic.replace(path, write_rows)
+    stream = io.StringIO(newline="")
+    writer = csv.DictWriter(stream, names)
+    writer.writeheader()
+    writer.writerows(rows)
+    return atomic.replace_text(path, stream.getvalue())
 
 
 def _names(name: str, description: Description) -> tuple[str, ...]:
@@ -137,19 +140,89 @@ def _names(name: str, description: Description) -> tuple[str, ...]:
     return description.components or (name,)
 
 
-def _row(point: Any, described: Mapping[str, Description]) -> dict[str, Any]:
-    row: dict[str, Any] = {}
-    for name, value in plain(point).items():
-        if name in described:
-            values, components = np.ravel(value).tolist(), _names(name, described[name])
-            if len(values) > len(components):
-                components = described[name].spatial_components
-            row |= dict(zip(components, values, strict=True))
-    return row
-
-
 def _in_columns(kind: type) -> dict[str, Description]:
     """Return the record fields that fill columns: numbers, and arrays with named components."""
     hints = get_type_hints(kind)
     entry = {name: d for name, d in descriptions(kind).items() if d.components or not d.shape}
     return {name: d for name, d in entry.items() if not is_record(hints[name])}
+
+
+def dumps(document: Mapping[str, Any]) -> str:
+    """Return the text of a document with its checksum as last key.  Raises ValueError for NaN."""
+    text = _text({key: value for key, value in document.items() if key != KEY})
+    return _sealed(text, _checksum(text))
+
+
+def loads(text: str) -> dict[str, Any]:
+    """Return the document of a text, without its checksum; a text without one is read unchecked.
+
+    Raises:
+        ValueError: it is not JSON, no table, or changed since it was written.
+    """
+    try:
+        document = json.loads(text)
+    except RecursionError as error:
+        raise ValueError("it is nested too deeply") from error
+    if not isinstance(document, dict):
+        raise ValueError("it is damaged: no table of keys and values")
+    if KEY not in document:
+        *rest, (_, last) = document.items() if document else [("", None)]
+        if isinstance(last, str) and len(last) == 8 and last == _checksum(_text(dict(rest))):
+            raise ValueError("it is damaged: the key of its checksum has another name")
+        return document
+    stored = document.pop(KEY)
+    end = _sealed("{\n}", stored)[1:]
+    if text.endswith(end) and _checksum(text[: -len(end)] + "\n}") == stored:  # as it was written
+        return document
+    if stored != _checksum(_text(document)):
+        raise ValueError("it is damaged: its checksum is wrong")
+    return document
+
+
+@dataclass(frozen=True)
+class FileSeal:
+    """Size and checksum of a file."""
+
+    bytes: int = described("size", BYTES)
+    checksum: str = described("CRC-32, in hexadecimal, of the CRC-32s (32 bits, little-endian) of its blocks of 64 MiB")
+
+
+def seal(path: Path, block: int = BLOCK) -> FileSeal:
+    """Seal a file.  Call on the rank that completed it: others may still see an earlier file of its name.
+
+    Raises:
+        FetiHomogError: it cannot be read.
+    """
+    with atomic.file_errors("read", path), path.open("rb", buffering=0) as stream:
+        size = os.fstat(stream.fileno()).st_size
+        checksums = [zlib.crc32(os.pread(stream.fileno(), block, start)) for start in range(0, size, block)]
+    return FileSeal(size, f"{zlib.crc32(np.array(checksums, '<u4').tobytes()):08x}")
+
+
+def check(path: Path, expected: FileSeal, block: int = BLOCK) -> None:
+    """Check that a file is the one of this seal.  Call on one rank.
+
+    Raises:
+        CaseError: it is not.
+        FetiHomogError: it cannot be read.
+    """
+    with atomic.file_errors("read", path):
+        size = os.stat(path).st_size
+    if size != expected.bytes:
+        raise CaseError(f"{path}: it is damaged, or of another run: it has {size} bytes, not {expected.bytes}")
+    if seal(path, block).checksum != expected.checksum:
+        raise CaseError(f"{path}: it is damaged, or of another run: its checksum is wrong")
+
+
+def _checksum(text: str) -> str:
+    return f"{zlib.crc32(text.encode('utf-8', 'surrogatepass')):08x}"
+
+
+def _sealed(text: str, checksum: Any) -> str:
+    """Return the text of a document with a last key, as `_text` would write it."""
+    begin = "{" if text == "{}" else text.removesuffix("\n}") + ","
+    return f'{begin}\n "{KEY}": {json.dumps(checksum)}\n}}\n'
+
+
+def _text(content: Mapping[str, Any]) -> str:
+    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)

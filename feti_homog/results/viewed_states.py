@@ -9,6 +9,7 @@ import base64
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -85,13 +86,17 @@ def cell_state(file: Any, state: int) -> ViewedState:
     else:  # as the materials make it, in plane strain and stress
         rules = out_of_plane(json.loads(file.attrs["case"]), tuple(map(str, file.attrs["phases"])))
         E33 = np.einsum("ei,ei->e", rules[file["mesh/phase"][()], 1], in_plane)
-    elements["strain"] = _strains(points, triangles, nodes["displacement"], E33)
+    every, displacement = np.arange(len(points), dtype=np.int32), nodes["displacement"]
+    E11, E22, gamma12 = element_strain(points, triangles, every, displacement[:, :2], PLANE)[0].T
+    gamma13, gamma23 = element_strain(points, triangles, every, displacement[:, 2:], AXIAL)[0].T
+    E12, E13, E23 = gamma12 / 2, gamma13 / 2, gamma23 / 2
+    elements["strain"] = np.stack([E11, E12, E13, E12, E22, E23, E13, E23, E33], axis=1)
     shears = group["axial_stress"][()] if more else np.zeros((len(triangles), 2))
     S33 = elements["S33"]
     elements["von_mises"] = voigt.spatial_von_mises(in_plane, S33, shears)
     principal = voigt.spatial_principal(in_plane, S33, shears) if more else voigt.principal(in_plane, S33)
     elements |= {f"principal_{k + 1}": column for k, column in enumerate(principal.T)}
-    return ViewedState(_in_space(points), triangles, nodes, elements, str(group.attrs["label"]))
+    return ViewedState(np.pad(points, IN_SPACE), triangles, nodes, elements, str(group.attrs["label"]))
 
 
 def interface_state(file: Any, state: int) -> ViewedState:
@@ -100,7 +105,7 @@ def interface_state(file: Any, state: int) -> ViewedState:
     more = xdmf.SPATIAL_POINTS if AXIAL_DISPLACEMENT in group else {}
     nodes = _tables(file, state, xdmf.INTERFACE_POINTS | more)
     label = str(group.attrs["label"])
-    return ViewedState(_in_space(file["interface/points"][()]), file["interface/vertex"][()], nodes, {}, label)
+    return ViewedState(np.pad(file["interface/points"][()], IN_SPACE), file["interface/vertex"][()], nodes, {}, label)
 
 
 def _tables(file: Any, state: int, places: Mapping[str, str]) -> dict[str, Array]:
@@ -109,19 +114,7 @@ def _tables(file: Any, state: int, places: Mapping[str, str]) -> dict[str, Array
     return {name: file[place][()] for name, place in existing.items() if place in file}
 
 
-def _in_space(points: Float) -> Float:
-    return np.pad(points, [(0, 0), (0, 1)])
-
-
-def _strains(points: Float, triangles: Array, displacement: Float, E33: Float) -> Float:
-    """(m, 9) strain tensors of displacements (n, 3), averaged over elements."""
-    every = np.arange(len(points), dtype=np.int32)
-    E11, E22, gamma12 = element_strain(points, triangles, every, displacement[:, :2], PLANE)[0].T
-    gamma13, gamma23 = element_strain(points, triangles, every, displacement[:, 2:], AXIAL)[0].T
-    E12, E13, E23 = gamma12 / 2, gamma13 / 2, gamma23 / 2
-    return np.stack([E11, E12, E13, E12, E22, E23, E13, E23, E33], axis=1)
-
-
+IN_SPACE = ((0, 0), (0, 1))  # of points (n, 2)
 FORMATS = ("vtu", "vtkhdf")
 KINDS = {1: 1, 3: 5, 6: 22}  # VTK's numbers of a vertex and of triangles, by their nodes
 TYPES = {"f4": "Float32", "f8": "Float64", "i1": "Int8", "i4": "Int32", "i8": "Int64", "u1": "UInt8"}
@@ -143,19 +136,19 @@ def write_vtk(directory: Path, kind: str) -> list[Path]:
         raise CaseError(f"{path}: it is missing; a run writes it with `fields = true` in [output]")
     with atomic.file_errors("read", path), h5py.File(path, "r", locking=False) as file:
         parts = {name: read for name, read in PARTS.items() if name == "cell" or len(file["interface/points"])}
-        writer = _write_vtu if kind == "vtu" else _write_vtkhdf
-        return [path for name, read in parts.items() for path in writer(directory, name, read, file)]
-
-
-def _write_vtu(directory: Path, name: str, read: Any, file: Any) -> list[Path]:
-    collection = ET.Element("VTKFile", type="Collection", version="0.1")
-    listed, paths = ET.SubElement(collection, "Collection"), list[Path]()
-    for number in range(len(file["state"])):
-        path = directory / f"{name}_{number:04d}.vtu"
-        paths.append(atomic.replace(path, ET.ElementTree(_grid(read(file, number))).write))
-        ET.SubElement(listed, "DataSet", timestep=str(number), file=path.name)
-    paths.append(atomic.replace(directory / f"{name}.pvd", ET.ElementTree(collection).write))
-    return paths
+        paths = list[Path]()
+        for name, read in parts.items():
+            if kind == "vtkhdf":
+                paths.append(atomic.replace(directory / f"{name}.vtkhdf", partial(_write_vtkhdf, read, file)))
+                continue
+            collection = ET.Element("VTKFile", type="Collection", version="0.1")
+            listed = ET.SubElement(collection, "Collection")
+            for number in range(len(file["state"])):
+                path = directory / f"{name}_{number:04d}.vtu"
+                paths.append(atomic.replace(path, ET.ElementTree(_grid(read(file, number))).write))
+                ET.SubElement(listed, "DataSet", timestep=str(number), file=path.name)
+            paths.append(atomic.replace(directory / f"{name}.pvd", ET.ElementTree(collection).write))
+        return paths
 
 
 def _grid(state: ViewedState) -> ET.Element:
@@ -182,42 +175,35 @@ def _grid(state: ViewedState) -> ET.Element:
     return root
 
 
-def _write_vtkhdf(directory: Path, name: str, read: Any, file: Any) -> list[Path]:
-    def fill(part: Path) -> None:
-        with h5py.File(part, "w") as out:
-            root = out.create_group("VTKHDF")
-            root.attrs["Version"] = np.array([2, 0])
-            root.attrs.create("Type", b"UnstructuredGrid", dtype="S16")
-            _fill_vtkhdf(root, read, file)
-
-    return [atomic.replace(directory / f"{name}.vtkhdf", fill)]
-
-
-def _fill_vtkhdf(root: Any, read: Any, file: Any) -> None:
-    """Put the mesh, which all states share, and the fields, one state after the other, into the group of a file."""
+def _write_vtkhdf(read: Any, file: Any, path: Path) -> None:
+    """Write the mesh, which all states share, and the fields, one state after the other."""
     count = len(file["state"])
-    steps = root.create_group("Steps")
-    steps.attrs["NSteps"] = count
-    steps["Values"] = np.arange(count, dtype=float)
-    steps["NumberOfParts"] = np.ones(count, np.int64)
-    for name in ("PartOffsets", "PointOffsets"):
-        steps[name] = np.zeros(count, np.int64)
-    for name in ("CellOffsets", "ConnectivityIdOffsets"):
-        steps[name] = np.zeros((count, 1), np.int64)
-    for number in range(count):
-        state: ViewedState = read(file, number)
-        if number == 0:
-            m, columns = state.cells.shape
-            root["NumberOfPoints"], root["NumberOfCells"] = [len(state.points)], [m]
-            root["NumberOfConnectivityIds"] = [m * columns]
-            root["Points"], root["Connectivity"] = state.points, state.cells.ravel().astype(np.int64)
-            root["Offsets"] = columns * np.arange(m + 1)
-            root["Types"] = np.full(m, KINDS[columns], np.uint8)
-        for group, arrays in (("PointData", state.nodes), ("CellData", state.elements)):
-            tables, offsets = root.require_group(group), steps.require_group(f"{group}Offsets")
-            for name, array in arrays.items():
-                rows = len(array)
-                if number == 0:
-                    tables.create_dataset(name, (rows * count, *array.shape[1:]), array.dtype)
-                    offsets[name] = rows * np.arange(count)
-                tables[name][number * rows : (number + 1) * rows] = array
+    with h5py.File(path, "w") as out:
+        root = out.create_group("VTKHDF")
+        root.attrs["Version"] = np.array([2, 0])
+        root.attrs.create("Type", b"UnstructuredGrid", dtype="S16")
+        steps = root.create_group("Steps")
+        steps.attrs["NSteps"] = count
+        steps["Values"] = np.arange(count, dtype=float)
+        steps["NumberOfParts"] = np.ones(count, np.int64)
+        for name in ("PartOffsets", "PointOffsets"):
+            steps[name] = np.zeros(count, np.int64)
+        for name in ("CellOffsets", "ConnectivityIdOffsets"):
+            steps[name] = np.zeros((count, 1), np.int64)
+        for number in range(count):
+            state: ViewedState = read(file, number)
+            if number == 0:
+                m, columns = state.cells.shape
+                root["NumberOfPoints"], root["NumberOfCells"] = [len(state.points)], [m]
+                root["NumberOfConnectivityIds"] = [m * columns]
+                root["Points"], root["Connectivity"] = state.points, state.cells.ravel().astype(np.int64)
+                root["Offsets"] = columns * np.arange(m + 1)
+                root["Types"] = np.full(m, KINDS[columns], np.uint8)
+            for group, arrays in (("PointData", state.nodes), ("CellData", state.elements)):
+                tables, offsets = root.require_group(group), steps.require_group(f"{group}Offsets")
+                for name, array in arrays.items():
+                    rows = len(array)
+                    if number == 0:
+                        tables.create_dataset(name, (rows * count, *array.shape[1:]), array.dtype)
+                        offsets[name] = rows * np.arange(count)
+                    tables[name][number * rows : (number + 1) * rows] = array

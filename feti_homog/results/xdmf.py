@@ -90,7 +90,15 @@ def _write(path: Path, file: h5py.File) -> Path:
         ET.SubElement(block, "Time", Value=state)
         grid = ET.SubElement(block, "Grid", Name=label, GridType="Uniform")
         _numbers(grid, "label", "Scalar", list(label.encode().ljust(longest)))
-        _means(grid, file[f"state/{state}"].attrs)
+        means = file[f"state/{state}"].attrs
+        _numbers(grid, "load_factor", "Scalar", [float(means["load_factor"])])
+        strain, stress, kind_of_means = means["strain"], means["stress"], "Vector"
+        if "temperature" in means:
+            _numbers(grid, "temperature", "Scalar", [float(means["temperature"])])
+            kind_of_means, stress = "Tensor", stress[TENSOR]
+            strain = strain[TENSOR] * np.where(TENSOR < 3, 1.0, 0.5)
+        _numbers(grid, "mean_strain", kind_of_means, strain.tolist())
+        _numbers(grid, "mean_stress", kind_of_means, stress.tolist())
         is_spatial = AXIAL in file[f"state/{state}"]
         if path.name == CELL:
             triangles = "Triangle_6" if file["mesh/triangles"].shape[1] == 6 else "Triangle"
@@ -103,19 +111,6 @@ def _write(path: Path, file: h5py.File) -> Path:
             _attributes(grid, file, state, INTERFACE_POINTS | (SPATIAL_POINTS if is_spatial else {}), "Node")
     ET.indent(root)
     return atomic.replace(path, lambda part: ET.ElementTree(root).write(part, encoding="utf-8", xml_declaration=True))
-
-
-def _means(grid: ET.Element, attributes: Mapping[str, Any]) -> None:
-    """Add the cell's own numbers to a state."""
-    _numbers(grid, "load_factor", "Scalar", [float(attributes["load_factor"])])
-    strain, stress = attributes["strain"], attributes["stress"]
-    if "temperature" not in attributes:
-        _numbers(grid, "mean_strain", "Vector", strain.tolist())
-        _numbers(grid, "mean_stress", "Vector", stress.tolist())
-        return
-    _numbers(grid, "temperature", "Scalar", [float(attributes["temperature"])])
-    _numbers(grid, "mean_strain", "Tensor", (strain[TENSOR] * np.where(TENSOR < 3, 1.0, 0.5)).tolist())
-    _numbers(grid, "mean_stress", "Tensor", stress[TENSOR].tolist())
 
 
 def _numbers(grid: ET.Element, name: str, kind: str, values: Sequence[float]) -> None:

@@ -22,7 +22,7 @@ import tomli_w
 
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError, FetiHomogError
-from feti_homog.results import atomic, checkpoint_file, output_folder, result_json, seals
+from feti_homog.results import atomic, checkpoint, output_folder, result_json
 from feti_homog.schema.values import INF
 from feti_homog.studies.sweep_cases import Sweep, SweepCase, identity_of
 from feti_homog.system.runtime import input_files
@@ -110,7 +110,7 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
             if stored != sweep.entries:
                 document = {"version": __version__, "name": sweep.name, "stress_unit": sweep.stress_unit}
                 entries = [_replaced(asdict(entry), math.inf, INF) for entry in sweep.entries]
-                atomic.replace_text(directory / INDEX_FILE, seals.dumps(document | {"cases": entries}))
+                atomic.replace_text(directory / INDEX_FILE, result_json.dumps(document | {"cases": entries}))
             atomic.replace_text(directory / TABLE_FILE, _table(sweep.entries))
     except LockHeld as error:
         raise CaseError(f"--out {directory}: {error} has been writing its list of cases for long") from error
@@ -149,7 +149,7 @@ def read_index(directory: Path) -> SweepIndex:
     """Return the cases in a sweep's folder.  Raises CaseError without a readable case list."""
     path = directory / INDEX_FILE
     try:
-        document = seals.loads(input_files.read(path).decode("utf-8"))
+        document = result_json.loads(input_files.read(path).decode("utf-8"))
         entries = tuple(SweepCase(**_replaced(entry, INF, math.inf)) for entry in document["cases"])
         if not all(isinstance(e.number, int) and isinstance(e.inputs, dict) for e in entries):
             raise TypeError("a case has no number or no inputs")
@@ -214,7 +214,7 @@ def reset(directory: Path, entry: SweepCase, status: Status) -> None:
     folder = directory / entry.folder
     with atomic.write_errors(folder):
         (folder / ERROR_FILE).unlink(missing_ok=True)
-    checkpoint_file.remove(folder)
+    checkpoint.remove(folder)
     set_aside(directory, entry, status)
 
 

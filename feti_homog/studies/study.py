@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from feti_homog.case.document import short_digest
 from feti_homog.errors import CaseError, ConvergenceError
-from feti_homog.results import atomic, output_folder, seals
+from feti_homog.results import atomic, output_folder, result_json
 from feti_homog.studies import case_folders, case_runs, description
 from feti_homog.studies.sweep_cases import Sweep
 from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
@@ -122,7 +122,7 @@ class Study(ABC):
         with output_folder.held(directory, comm, lambda line: complain(line) if comm.rank == 0 else None):
             on_root(comm, self._begin, directory, head)
             document = head | self.answer(Evaluator(directory, comm, ranks_per_case, retry, quiet))
-            on_root_only(comm, atomic.replace_text, directory / self.FILE, seals.dumps(document))
+            on_root_only(comm, atomic.replace_text, directory / self.FILE, result_json.dumps(document))
         if comm.rank == 0 and not quiet:
             say(self.text(document))
         if document.get("faults"):
@@ -142,11 +142,11 @@ class Study(ABC):
                 case_folders.refuse_files_of_others(directory, self.ENTRIES, self.KIND)
         else:
             try:
-                stored = seals.loads(input_files.read(path).decode("utf-8"))
+                stored = result_json.loads(input_files.read(path).decode("utf-8"))
             except (OSError, ValueError) as error:
                 raise CaseError(f"{path} is no readable {self.KIND}: {error}; move it away") from error
             if stored.get("digest") != head["digest"]:
                 raise CaseError(f"--out {directory} holds another {self.KIND}; choose another folder")
         atomic.remove_unfinished(directory, self.ENTRIES)
         if is_new:
-            atomic.replace_text(path, seals.dumps({**head, "status": "running"}))
+            atomic.replace_text(path, result_json.dumps({**head, "status": "running"}))

@@ -124,7 +124,7 @@ WRITE = "feti_homog.results.checkpoint:Checkpoint._write"
 APPEND = "feti_homog.results.atomic:append"
 COUNT = (
     "os.path.exists('{0}') and "
-    "len([*__import__('feti_homog.results.checkpoint_file', fromlist=['records'])"
+    "len([*__import__('feti_homog.results.checkpoint', fromlist=['records'])"
     ".records(__import__('pathlib').Path('{0}'))]) - 1"
 )
 # When a path is killed: the last of so many events has just been kept, or the next is written or computed, or so many

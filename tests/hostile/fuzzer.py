@@ -22,7 +22,7 @@ from feti_homog.errors import FetiHomogError
 from feti_homog.microstructure.fibre_pattern import read_window
 from feti_homog.report.cards import export
 from feti_homog.report.text.summary import summary
-from feti_homog.results import seals
+from feti_homog.results import result_json
 from feti_homog.studies import case_folders, sweep_cases
 from feti_homog.verify.certificate import verify
 from hostile.attempts import LIMIT_S, PATIENCE_S
@@ -116,7 +116,7 @@ def _change(original: Path, path: Path, rng: np.random.Generator) -> None:
             break
         place = inner
     place[key] = VALUES[rng.integers(len(VALUES))]
-    path.write_bytes(seals.dumps(document).encode("utf-8", "surrogatepass"))
+    path.write_bytes(result_json.dumps(document).encode("utf-8", "surrogatepass"))
 
 
 KINDS = (_table, _result, _case, _sweep)

@@ -11,7 +11,7 @@ from typing import Any
 from support.base_case import changed
 from support.small_path import PATH
 
-from feti_homog.results import seals
+from feti_homog.results import result_json
 from hostile.attempts import Attempt, Content, copy_of
 
 SMALL = changed(
@@ -61,7 +61,7 @@ def sealed(change: Callable[[dict[str, Any]], object]) -> Callable[[Path], None]
     def make(path: Path) -> None:
         document = json.loads(path.read_text())
         change(document)
-        path.write_text(seals.dumps(document))
+        path.write_text(result_json.dumps(document))
 
     return make
 

@@ -6,7 +6,7 @@ import shutil
 
 import numpy as np
 
-from feti_homog.results import seals
+from feti_homog.results import result_json
 from feti_homog.verify.certificate import verify
 from feti_homog.verify.findings import NO_REASON, THINNED
 
@@ -33,7 +33,7 @@ def check_what_is_left(kind, certificate):
 def resealed(folder, copy, content):
     """Return a copy of a result with another document, under the checksum that belongs to it."""
     shutil.copytree(folder, copy, ignore=shutil.ignore_patterns("*.csv"))
-    (copy / "result.json").write_text(seals.dumps(content))
+    (copy / "result.json").write_text(result_json.dumps(content))
     return copy
 
 

@@ -143,18 +143,13 @@ def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
         symmetry=symmetry,
         compliance=compliance,
         expansion=expansion,
-        errors=_on_card(errors),
+        errors={
+            name: float(errors[constant])
+            for constant, about in ABOUT_FIBRES.items()
+            if constant in errors
+            for name in about.card
+        },
     )
-
-
-def _on_card(numbers: Mapping[str, float]) -> dict[str, float]:
-    """Return numbers of constants about the fibres, by card name."""
-    return {
-        name: float(numbers[constant])
-        for constant, about in ABOUT_FIBRES.items()
-        if constant in numbers
-        for name in about.card
-    }
 
 
 def _origin(document: Document) -> dict[str, Any]:
@@ -206,13 +201,10 @@ def comments(material: EffectiveMaterial, mark: str) -> list[str]:
     if material.expansion is None:
         paragraphs.append("No thermal expansion: not every phase of the case gives one.")
     if material.errors:
-        paragraphs.append(f"Estimated errors by the mesh: {_listed(material.errors)}.")
+        errors = ", ".join(f"{name} {value:.1e}" for name, value in material.errors.items())
+        paragraphs.append(f"Estimated errors by the mesh: {errors}.")
     lines = (line for text in paragraphs for line in wrap(text.encode("ascii", "backslashreplace").decode(), 100))
     return [f"{mark} {line}" for line in lines]
-
-
-def _listed(values: Mapping[str, float]) -> str:
-    return ", ".join(f"{name} {value:.1e}" for name, value in values.items())
 
 
 def number(value: float, width: int = 24) -> str:

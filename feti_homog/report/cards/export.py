@@ -21,7 +21,6 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from itertools import combinations_with_replacement
 from pathlib import Path
 from typing import Any
 
@@ -176,34 +175,24 @@ def _quoted(values: Iterable[float]) -> str:
 
 def csv_table(material: EffectiveMaterial) -> str:
     """Return the table: engineering constants, expansions, and the stiffness in the order [11, 22, 33, 23, 13, 12]."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(CSV_COLUMNS)
-    writer.writerows((name, number(value), unit, meaning) for name, value, unit, meaning in _rows(material))
-    return stream.getvalue().removesuffix("\n")
-
-
-def _rows(material: EffectiveMaterial) -> Iterator[tuple[str, float, str, str]]:
+    rows, unit = [CSV_COLUMNS], material.stress_unit
     for name, value in material.constants.items():
         axes = [int(digit) for digit in name if digit.isdigit()]
-        yield name, value, "" if name.startswith("nu") else material.stress_unit, _meaning(name, axes)
+        where = " and ".join(f"axis {axis}, {FIBRE_AXES[axis - 1]}" for axis in axes)
+        meanings = {"E": f"Young's modulus along {where}", "G": f"shear modulus between {where}"}
+        ratio = f"-eps_{axes[-1]}/eps_{axes[0]} under stress along axis {axes[0]}: {where}"
+        rows.append((name, number(value), "" if name[0] == "n" else unit, meanings.get(name[0], ratio)))
     if material.expansion is not None:
         for name, component, value in zip(MATERIAL_EXPANSIONS, COMPONENTS, material.expansion, strict=True):
-            yield name, float(value), "1 / temperature", f"thermal strain {component} per unit of temperature"
+            rows.append((name, number(value), "1 / temperature", f"thermal strain {component} per unit of temperature"))
     C = material.stiffness
-    for i, j in combinations_with_replacement(range(6), 2):
+    for i, j in SYMMETRIC21:
         digits = "".join(str(axis + 1) for axis in PAIRS[i])
-        text = f"stress {digits} under the unit strain {COMPONENTS[j]}"
-        yield f"C{i + 1}{j + 1}", float(C[i, j]), material.stress_unit, f"stiffness: {text}"
-
-
-def _meaning(name: str, axes: list[int]) -> str:
-    where = " and ".join(f"axis {axis}, {FIBRE_AXES[axis - 1]}" for axis in axes)
-    if name.startswith("E"):
-        return f"Young's modulus along {where}"
-    if name.startswith("G"):
-        return f"shear modulus between {where}"
-    return f"-eps_{axes[1]}/eps_{axes[0]} under stress along axis {axes[0]}: {where}"
+        meaning = f"stiffness: stress {digits} under the unit strain {COMPONENTS[j]}"
+        rows.append((f"C{i + 1}{j + 1}", number(C[i, j]), unit, meaning))
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerows(rows)
+    return stream.getvalue().removesuffix("\n")
 
 
 FORMATS: dict[str, Callable[[EffectiveMaterial], str]] = {

@@ -18,7 +18,7 @@ from matplotlib.patches import Patch
 from scipy.spatial import cKDTree
 
 from feti_homog.report.plots import drawn_cell, plot_helpers
-from feti_homog.report.plots.decimation import DrawnMesh, outline_edges, triangle_means
+from feti_homog.report.plots.decimation import outline_edges, triangle_means
 from feti_homog.typing import Array
 
 IN_LEGEND = 12  # phases of the legend, which would cover the cell
@@ -125,32 +125,20 @@ def write_fibre_numbers(axes: Axes, cell: drawn_cell.DrawnCell, inches: float, f
         return
     period, low = np.array([cell.file.attrs[name] for name in ("width", "height")]), drawn.points.min(axis=0)
     outline = cKDTree(drawn.points[np.unique(cell.borders)])
+    shifts = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2)
     tables = (fibres[name][:] for name in ("number", "body", "centre", "radius"))
     for k, (number, body, centre, radius) in enumerate(zip(*tables, strict=True)):
-        if np.isfinite(radius):
-            places, room = _on_images(centre, radius, low, period), radius
-        else:
-            places, room = _inside(drawn, body, outline)
+        if np.isfinite(radius):  # image centres near the cell, moved into it
+            images, margin = centre + shifts * period, np.minimum(0.4 * radius, 0.4 * period)
+            moved = np.clip(images, low + margin, low + period - margin)
+            places, room = moved[np.linalg.norm(moved - images, axis=1) <= 0.85 * radius], radius
+        else:  # the place in the body farthest from the outlines
+            middles = drawn.points[drawn.triangles[drawn.body == body]].mean(axis=1)
+            distance = outline.query(middles)[0]
+            places, room = middles[[distance.argmax()]], distance.max()
         size = float(np.clip(room * inches * 72 / 2.2, LEAST_SIZE, 11.0))  # points, 2.2 characters in the room
         text = str(number)
         if factors is not None:
             text, size = f"{number}\n{factors[k]:.2f}", max(0.75 * size, LEAST_SIZE)
         for x, y in places:
             axes.text(x, y, text, fontsize=size, ha="center", va="center", clip_on=True)
-
-
-def _on_images(centre: Array, radius: float, low: Array, period: Array) -> Array:
-    """(p, 2) image centres of a circle near the cell, moved into it."""
-    shifts = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2)
-    images = centre + shifts * period
-    margin = np.minimum(0.4 * radius, 0.4 * period)
-    moved = np.clip(images, low + margin, low + period - margin)
-    return np.asarray(moved[np.linalg.norm(moved - images, axis=1) <= 0.85 * radius])
-
-
-def _inside(drawn: DrawnMesh, body: int, outline: cKDTree) -> tuple[Array, float]:
-    """(1, 2) the place in a body farthest from the outlines, and its distance."""
-    middles = drawn.points[drawn.triangles[drawn.body == body]].mean(axis=1)
-    distance = outline.query(middles)[0]
-    best = int(np.argmax(distance))
-    return middles[best : best + 1], float(distance[best])

@@ -1,12 +1,11 @@
 """A coarse mesh of result.h5 for pictures, with fields on it.
 
-At most about TRIANGLE_LIMIT triangles, read in blocks; outlines, values, displacements and their largest scale; the
-free expansion as a sum of states.
+At most about TRIANGLE_LIMIT triangles, read in blocks; outlines, values, displacements and their largest scale.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -14,13 +13,12 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.materials.voigt import SPATIAL_STRAINS, voigt_names
-from feti_homog.typing import Array, Document
+from feti_homog.materials.voigt import voigt_names
+from feti_homog.typing import Array
 
 LEAST_AREA = 0.5  # area of a triangle in a picture / its own: at zero it would be turned over
 TRIANGLE_LIMIT = 100_000  # triangles in a picture
 SAME_PLACE = 1e-6  # of the size of the cell
-LOADS = (*SPATIAL_STRAINS, "temperature")
 QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # of a six-node triangle
 
 
@@ -68,7 +66,14 @@ def drawn_mesh(file: Any, limit: int = TRIANGLE_LIMIT, block: int = 1 << 18) -> 
     level = next((j for j in range(refine) if len(table) <= limit * 4**j), refine)
     group = 4**level
     pieces = 4 if curved and level == 0 and 4 * len(table) <= limit else 1
-    corners = _blocks(table, group, block, lambda rows: _corners(rows, pieces))
+
+    def corners_of(rows: Array) -> Array:
+        if pieces > 1:
+            return np.asarray(rows[:, 0][:, QUARTERS].reshape(-1, 3))
+        # Corner i is vertex i of one triangle in the group.
+        return np.asarray(rows[:, np.arange(3) * ((group - 1) // 3), np.arange(3)])
+
+    corners = _blocks(table, group, block, corners_of)
     nodes, triangles = np.unique(corners, return_inverse=True)
     labels = {
         name: np.repeat(_blocks(file[f"mesh/{name}"], group, block, lambda rows: rows[:, 0]), pieces)
@@ -114,14 +119,6 @@ def outline_edges(drawn: DrawnMesh, label: Array) -> Array:
     is_border = np.ones(len(border), dtype=bool)
     is_border[twins[owner[twins[:, 0]] == owner[twins[:, 1]]].ravel()] = False
     return np.asarray(border[is_border])
-
-
-def _corners(rows: Array, pieces: int) -> Array:
-    """Return triangles (q, 3) from rows (g, group, 3 or 6): corner i is vertex i of one triangle in the group."""
-    if pieces > 1:
-        return np.asarray(rows[:, 0][:, QUARTERS].reshape(-1, 3))
-    members = np.arange(3) * ((rows.shape[1] - 1) // 3)
-    return np.asarray(rows[:, members, np.arange(3)])
 
 
 def _blocks(table: Any, group: int, block: int, function: Callable[[Array], Array]) -> Array:
@@ -181,55 +178,3 @@ def _sides(values: Array, drawn: DrawnMesh) -> Array:
 def _determinant(rows: Array) -> Array:
     """(q,) determinants of (q, 2, 2)."""
     return np.asarray(rows[:, 0, 0] * rows[:, 1, 1] - rows[:, 0, 1] * rows[:, 1, 0])
-
-
-@dataclass(frozen=True)
-class SummedTable:
-    """Sum of tables times factors, formed as rows are read."""
-
-    tables: Sequence[Any]
-    factors: Sequence[float]
-
-    def __len__(self) -> int:
-        return len(self.tables[0])
-
-    def __getitem__(self, rows: Any) -> Array:
-        parts = (factor * table[rows] for factor, table in zip(self.factors, self.tables, strict=True))
-        return np.asarray(sum(parts))
-
-
-@dataclass(frozen=True)
-class FreeExpansion:
-    """The state u = u_T + sum_j alpha_j u_j, a sum of unit load states, read as a state of result.h5.
-
-    Where no face touches, states superpose; the interface has the status of the last one, under temperature.
-    """
-
-    file: Any
-    states: Sequence[Any]
-    factors: Sequence[float]
-    attrs: Mapping[str, Any]
-
-    @classmethod
-    def of(cls, state: Any, document: Document) -> FreeExpansion | None:
-        """Return the free expansion if `state` is under a unit temperature and its expansion is known, else None."""
-        strain, temperature = state.attrs["strain"], state.attrs.get("temperature", 0.0)
-        expansion = document.get("thermal_expansion")
-        if expansion is None or len(strain) != len(expansion) or np.any(strain) or temperature != 1.0:
-            return None
-        result = {}
-        for other in state.file["state"].values():
-            loads = np.append(other.attrs["strain"], other.attrs["temperature"])
-            if np.count_nonzero(loads) == 1 and loads.max() == 1.0:
-                result[LOADS[int(loads.argmax())]] = other
-        if len(result) < len(LOADS):
-            return None
-        attributes = dict(state.attrs) | {"strain": np.array(expansion), "stress": np.zeros(len(expansion))}
-        return cls(state.file, [result[load] for load in LOADS], [*expansion, 1.0], attributes)
-
-    def __contains__(self, name: str) -> bool:
-        return name in self.states[-1]
-
-    def __getitem__(self, name: str) -> Any:
-        tables = [state[name] for state in self.states]
-        return SummedTable(tables, self.factors) if np.issubdtype(tables[0].dtype, np.floating) else tables[-1]

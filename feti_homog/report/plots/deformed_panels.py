@@ -138,29 +138,21 @@ def draw_state(
 
 def plot(directory: Path, file: Any, document: Document) -> list[Path]:
     """`angle_states.png`, or `path_states.png` and `path.gif`."""
-    count = len(file.get("state", ()))
+    count, analysis = len(file.get("state", ())), reported(document)
     if not count:
         return []
-    return PANELS[reported(document).name](directory, file, document, count)
-
-
-def _angle(directory: Path, file: Any, document: Document, count: int) -> list[Path]:
-    # The first of the unit cases, if there are three an angle.
-    every = range(0, count, count // len(document["angle"]) or 1)
-    numbers = [every[round(k)] for k in np.linspace(0, len(every) - 1, min(MAX_PANELS, len(every)))]
-    panels = _side_by_side(file, numbers, document, shown_scale(file, document))
-    return [plot_helpers.save(panels, directory / "angle_states.png")]
-
-
-def _path(directory: Path, file: Any, document: Document, count: int) -> list[Path]:
     scale = shown_scale(file, document)
-    panels = _side_by_side(file, landmarks.landmark_states(document, MAX_PANELS, count), document, scale)
-    paths = [plot_helpers.save(panels, directory / "path_states.png")]
-    frames = landmarks.chosen_states(document, MAX_FRAMES, count)
-    return [*paths, _animation(file, frames, document, scale, directory / "path.gif")]
-
-
-PANELS = {"angle": _angle, "path": _path}
+    if analysis.is_followed:
+        numbers = landmarks.landmark_states(document, MAX_PANELS, count)
+    else:  # the first of the unit cases, if there are three an angle
+        every = range(0, count, count // len(document[analysis.name]) or 1)
+        numbers = [every[k] for k in analysis.states(document, MAX_PANELS, len(every))]
+    panels = _side_by_side(file, numbers, document, scale)
+    paths = [plot_helpers.save(panels, directory / f"{analysis.name}_states.png")]
+    if analysis.is_followed:
+        frames = landmarks.chosen_states(document, MAX_FRAMES, count)
+        paths.append(_animation(file, frames, document, scale, directory / "path.gif"))
+    return paths
 
 
 def shown_scale(file: Any, document: Document) -> float:

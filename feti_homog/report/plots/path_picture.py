@@ -1,7 +1,4 @@
-"""path.png and energy.png: stresses, interface states and energies along a path.
-
-Point numbers stand in free places beside the curves.
-"""
+"""path.png and energy.png: stresses, interface states and energies along a path."""
 
 from __future__ import annotations
 
@@ -20,11 +17,10 @@ from feti_homog.results.landmarks import name_of, peak_of
 from feti_homog.typing import Array, Document
 
 ARROWS = 6  # at most, along a path
+LEGIBLE = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5}  # numbers on curves
 STATES = {drawn_cell.BONDED: "bonded", drawn_cell.OPEN: "open", drawn_cell.CLOSED: "closed"}
-# Offsets of a number from its point, in points of print, the best first, and half of the room that it takes.
-OFFSETS = ((-6, 16), (-6, 25), (12, 16), (22, 3), (-22, 3), (16, -12), (-16, -12), (0, -20), (28, -22), (-28, 26))
-ROOM = np.array([12.0, 5.0])
-# Of the parts in the order of `path_curves.energies`.
+UNLOADED = np.linspace(0.0, 1.0, 16, endpoint=False)  # shares of the first load, drawn before it
+# Of the parts of the energy.
 AREAS = {
     "stored in the bodies": "#9db8de",
     "stored in springs": "#5d86c4",
@@ -63,7 +59,6 @@ def figure(document: Document) -> Figure:
     middle.set_ylabel(f"stress {plot_helpers.stress_unit(case)}")
     middle.tick_params(labelbottom=False)
     _count_curves(lower, points, style)
-    lower.set_xlabel("number of the point, in the order of the path")
     # The panels of path_states.png show the same points.
     by_state = landmarks.kept_points(document)
     numbers = [by_state[state] for state in landmarks.landmark_states(document, 6, len(by_state))]
@@ -75,8 +70,12 @@ def figure(document: Document) -> Figure:
     for axes in (upper, middle, lower):
         axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
         plot_helpers.finish_curves(axes)
+    upper.margins(y=0.12)  # room for numbers
     _number_points(upper, (middle, lower), curve, numbers, plot_helpers.INK[component])
-    _damaged_length(lower, document, style)
+    if "damaged_length" in points[0]:  # of damaged bonds that hold, by softening laws
+        label = f"damaged length {plot_helpers.unit_label(case.get('output', {}).get('length_unit', ''))}".rstrip()
+        _beside(lower, [sum(point["damaged_length"]) for point in points], label, style)
+        lower.legend(frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.12, 1.0))
     return picture
 
 
@@ -107,15 +106,6 @@ def _stress_curves(
     axes.xaxis.set_major_locator(MaxNLocator(7))
 
 
-def _damaged_length(axes: Axes, document: Document, style: Mapping[str, Any]) -> None:
-    """Draw the length of damaged bonds that hold, by softening laws, on an axis of its own."""
-    if "damaged_length" in document["path"][0]:
-        unit = plot_helpers.unit_label(document["case"].get("output", {}).get("length_unit", ""))
-        lengths = [sum(point["damaged_length"]) for point in document["path"]]
-        _beside(axes, lengths, f"damaged length {unit}".rstrip(), style)
-        axes.legend(frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.12, 1.0))
-
-
 def _beside(axes: Axes, values: Sequence[float], label: str, style: Mapping[str, Any]) -> None:
     """Draw values along a path, on an axis at the right."""
     right = axes.twinx()
@@ -134,6 +124,7 @@ def _count_curves(axes: Axes, points: Sequence[Mapping[str, Any]], style: Mappin
         axes.plot([point[key] for point in points], color=ink, linewidth=1.4, label=label, **style)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_ylabel("interface nodes")
+    axes.set_xlabel("number of the point, in the order of the path")
 
 
 def _number_points(upper: Axes, below: Sequence[Axes], curve: Array, numbers: Sequence[int], ink: str) -> None:
@@ -141,8 +132,10 @@ def _number_points(upper: Axes, below: Sequence[Axes], curve: Array, numbers: Se
     style: dict[str, Any] = {"color": "0.3", "fontsize": 7, "ha": "center", "va": "center"}
     pointer: dict[str, Any] = {"arrowstyle": "-", "color": "0.3", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
     span, level = max(len(curve) - 1, 1), 0
-    for number, offset in zip(numbers, free_offsets(upper, curve[numbers]), strict=True):
-        upper.annotate(str(number), curve[number], offset, textcoords="offset points", arrowprops=pointer, **style)
+    for number, rise in zip(numbers, np.diff(curve[numbers, 1], prepend=0.0), strict=True):
+        offset = (-6, 16) if rise >= 0.0 else (16, -12)  # off the curve at peaks and at feet of drops
+        frame = style | {"textcoords": "offset points", "arrowprops": pointer, "bbox": LEGIBLE}
+        upper.annotate(str(number), curve[number], offset, **frame)
     for place, number in enumerate(numbers):
         for axes in below:
             axes.axvline(number, color="0.7", linewidth=0.7, linestyle=":", zorder=0)
@@ -150,77 +143,58 @@ def _number_points(upper: Axes, below: Sequence[Axes], curve: Array, numbers: Se
         above = (number, 1.05 + 0.1 * level)
         below[0].annotate(str(number), above, xycoords=below[0].get_xaxis_transform(), annotation_clip=False, **style)
     pointer = {"arrowstyle": "-|>", "color": ink, "linewidth": 0, "shrinkB": 0, "mutation_scale": 15}
-    for (x0, y0), (x1, y1) in _direction_marks(curve):
-        upper.annotate("", (x1, y1), (x0, y0), arrowprops=pointer)
-
-
-def _direction_marks(curve: Array) -> list[tuple[Array, Array]]:
-    """Return starts and ends of at most ARROWS arrows, in the middle of the longest curve steps."""
-    steps = np.diff(np.vstack([np.zeros(2), curve]), axis=0)
-    extent = np.ptp(np.vstack([np.zeros(2), curve]), axis=0)
+    corners = np.vstack([np.zeros(2), curve])
+    steps, extent = np.diff(corners, axis=0), np.ptp(corners, axis=0)
     length = np.linalg.norm(steps / np.where(extent > 0.0, extent, 1.0), axis=1)
-    longest = np.argsort(-length, kind="stable")[:ARROWS]
-    starts = np.vstack([np.zeros(2), curve[:-1]])
-    middles = starts + 0.5 * steps
-    return [(starts[k], middles[k] + 0.02 * steps[k]) for k in sorted(longest) if length[k] > 0.06]
-
-
-def free_offsets(axes: Axes, points: Array) -> list[tuple[int, int]]:
-    """Return an offset for each point number (k, 2), if possible clear of curves and other numbers.
-
-    The limits of the axes are final afterwards.
-    """
-    axes.set_ylim(axes.get_ylim())
-    to_print = 72.0 / axes.figure.dpi
-    occupied = (
-        np.vstack([_samples(line.get_transform().transform(line.get_xydata())) for line in axes.lines]) * to_print
-    )
-    corners = axes.get_window_extent().get_points() * to_print
-    chosen = []
-    for place in axes.transData.transform(points) * to_print:
-        crowds = [_crowd(place + offset, occupied, corners) for offset in OFFSETS]
-        chosen.append(OFFSETS[int(np.argmin(crowds))])
-        number = place + chosen[-1]
-        occupied = np.vstack([occupied, number + ROOM * np.array([[-1, 0], [0, 0], [1, 0]])])
-    return chosen
-
-
-def _crowd(centre: Array, occupied: Array, corners: Array) -> float:
-    """Count occupied places (n, 2) in the room around a centre; inf outside the axes."""
-    if (centre - ROOM < corners[0]).any() or (centre + ROOM > corners[1]).any():
-        return np.inf
-    return float((np.abs(occupied - centre) <= ROOM).all(axis=1).sum())
-
-
-def _samples(line: Array) -> Array:
-    """Return evenly spaced points along a line (n, 2)."""
-    line = line[np.isfinite(line).all(axis=1)]
-    if len(line) < 2:
-        return line
-    length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
-    at = np.linspace(0.0, length[-1], 4000)
-    return np.column_stack([np.interp(at, length, column) for column in line.T])
+    for k in np.argsort(-length, kind="stable")[:ARROWS]:
+        if length[k] > 0.06:
+            upper.annotate("", corners[k] + 0.52 * steps[k], corners[k], arrowprops=pointer)
 
 
 def energies(document: Document) -> Figure | None:
-    """Draw energies per area, stacked over the path position; None for results without energies."""
-    stack = path_curves.energies(document)
-    if stack is None:
+    """Draw energies per area, stacked over the path position; None for results without energies.
+
+    The position is the number of earlier legs plus the load share on the leg; where the load falls, the point number,
+    below 0 before the first point.
+    """
+    points = document.get("path") or [{}]
+    if "work" not in points[0]:
         return None
-    case = document["case"]
+    case, legs = document["case"], path_curves.legs(document)
+    work, parts = _column(points, "work"), _energy_parts(points)
+    place, words = _column(points, "load_factor", 1) * legs, "leg of the path" if legs > 1 else "share of the load"
+    if (np.diff(place) < 0.0).any():
+        place, legs = np.append(UNLOADED - 1.0, np.arange(float(len(points)))), 0
+        words = "number of the point, in the order of the path"
     picture = Figure(figsize=(7.2, 4.2), layout="constrained")
     axes = picture.subplots()
-    colours = [AREAS[name] for name in stack.parts]
-    axes.stackplot(stack.place, *stack.parts.values(), labels=[*stack.parts], colors=colours)
-    axes.plot(stack.place, stack.work, color="0.15", linewidth=1.2, label="work of the loads")
-    for leg in range(1, path_curves.legs(document)) if stack.by_legs else ():
+    axes.stackplot(place, *parts.values(), labels=[*parts], colors=[AREAS[name] for name in parts])
+    axes.plot(place, work, color="0.15", linewidth=1.2, label="work of the loads")
+    for leg in range(1, legs):
         axes.axvline(leg, color="0.6", linewidth=0.6, linestyle=":")
-    axes.set_xlim(stack.place[0], stack.place[-1])
-    axes.set_ylim(bottom=min(0.0, float(stack.work.min())))
-    axes.set_xlabel(stack.words)
+    axes.set_xlim(place[0], place[-1])
+    axes.set_ylim(bottom=min(0.0, float(work.min())))
+    axes.set_xlabel(words)
     axes.set_ylabel(f"energy per area {plot_helpers.stress_unit(case)}")
     axes.set_title(plot_helpers.title_of(case, "energies along the path"))
     axes.spines[["top", "right"]].set_visible(False)
     handles, names = axes.get_legend_handles_labels()
     axes.legend(handles[::-1], names[::-1], frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return picture
+
+
+def _energy_parts(points: Sequence[Mapping[str, Any]]) -> dict[str, Array]:
+    """Return visible parts of the work by name, in stacking order; their sum is the work, but for rounding."""
+    stored, springs, lost = (_column(points, name) for name in ("stored", "stored_in_springs", "dissipated"))
+    fracture = np.minimum(_column(points, "fracture_energy"), lost)
+    rest = "lost in breaks" + (" beyond it" if fracture.any() else "")
+    parts = {"stored in the bodies": stored - springs, "stored in springs": springs, "fracture energy": fracture}
+    parts |= {rest: lost - fracture, "heat of friction": _column(points, "friction_heat")}
+    threshold = path_curves.ZERO * np.abs(stored).max()
+    return {name: values for name, values in parts.items() if np.abs(values).max() > threshold}
+
+
+def _column(points: Sequence[Mapping[str, Any]], name: str, power: int = 2) -> Array:
+    """Return a number along the path, from the unloaded cell on; up to the first point all is linear."""
+    values = [float(point.get(name) or 0.0) for point in points]
+    return np.append(values[0] * UNLOADED**power, values)

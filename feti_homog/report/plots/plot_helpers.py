@@ -60,7 +60,12 @@ def save(figure: Figure, path: Path) -> Path:
         with BytesIO() as stream:
             figure.savefig(stream, format="png", dpi=DPI, bbox_inches=drawn.padded(PADDING))
             pixels = np.asarray(Image.open(stream).convert("RGB"))
-    picture = Image.fromarray(np.ascontiguousarray(_trimmed(pixels, round(PADDING * DPI))))
+    is_inked, padding, places = (pixels != 255).any(axis=2), round(PADDING * DPI), list[slice]()
+    for axis in (1, 0):
+        inked = np.flatnonzero(is_inked.any(axis=axis))
+        first, last = (inked[0], inked[-1] + 1) if len(inked) else (0, is_inked.shape[1 - axis])
+        places.append(slice(max(first - padding, 0), last + padding))
+    picture = Image.fromarray(np.ascontiguousarray(pixels[tuple(places)]))
     return atomic.replace(path, lambda part: picture.save(part, format="PNG"))
 
 
@@ -71,17 +76,6 @@ def pixels_of(figure: Figure) -> Array:
         warnings.filterwarnings("ignore", r"Glyph \d+")
         canvas.draw()
     return np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3])
-
-
-def _trimmed(pixels: Array, padding: int) -> Array:
-    """Return an image (rows, columns, 3) cut to its content and `padding` white pixels around."""
-    drawn = (pixels != 255).any(axis=2)
-    places = []
-    for axis in (1, 0):
-        inked = np.flatnonzero(drawn.any(axis=axis))
-        low, high = (inked[0], inked[-1] + 1) if len(inked) else (0, drawn.shape[1 - axis])
-        places.append(slice(max(low - padding, 0), high + padding))
-    return np.asarray(pixels[tuple(places)])
 
 
 def finish_curves(axes: Axes) -> None:

@@ -78,8 +78,18 @@ def envelope(document: Document) -> Figure:
     notes = [] if temperature is None else [f"$\\Delta T = {{{temperature:g}}}$ first"]
     notes += [f"no onset in {rest} directions"] if (rest := len(points) - len(broken)) else []
     if broken:
-        drawn = _curve(axes, places, modes(points))
-        bar = picture.colorbar(drawn, ax=axes, location="bottom", shrink=0.6, aspect=30)
+        # The closed curve through the loads, open where directions have no onset.
+        ends, mode = np.roll(places, -1, axis=0), modes(points)
+        joined = ~np.isnan(places[:, 0]) & ~np.isnan(ends[:, 0])
+        if joined.all():
+            axes.fill(places[:, 0], places[:, 1], color="0.96", zorder=0)
+        lines = LineCollection(list(np.stack([places, ends], axis=1)[joined]), linewidths=2.2, cmap="viridis")
+        lines.set_array((mode + np.roll(mode, -1))[joined] / 2)
+        lines.set_clim(0.0, 90.0)
+        axes.add_collection(lines)
+        if len(places) <= 180:
+            axes.scatter(places[:, 0], places[:, 1], c=mode, cmap="viridis", vmin=0.0, vmax=90.0, s=14, zorder=3)
+        bar = picture.colorbar(lines, ax=axes, location="bottom", shrink=0.6, aspect=30)
         bar.set_ticks([0, 30, 60, 90], labels=["0, opens", "30", "60", "90, shears"])
         bar.set_label("mode of the first break (degrees)")
         notes += _limit(axes, places[~np.isnan(places[:, 0])])
@@ -113,21 +123,6 @@ def modes(points: Sequence[Document]) -> Array:
         for name in ("normal", "tangential", "axial")
     )
     return np.asarray(np.degrees(np.arctan2(np.hypot(tangential, axial), normal)))
-
-
-def _curve(axes: Axes, places: Array, mode: Array) -> LineCollection:
-    """Draw the closed curve through the loads (n, 2), open where directions have no onset."""
-    ends = np.roll(places, -1, axis=0)
-    joined = ~np.isnan(places[:, 0]) & ~np.isnan(ends[:, 0])
-    if joined.all():
-        axes.fill(places[:, 0], places[:, 1], color="0.96", zorder=0)
-    lines = LineCollection(list(np.stack([places, ends], axis=1)[joined]), linewidths=2.2, cmap="viridis")
-    lines.set_array((mode + np.roll(mode, -1))[joined] / 2)
-    lines.set_clim(0.0, 90.0)
-    axes.add_collection(lines)
-    if len(places) <= 180:
-        axes.scatter(places[:, 0], places[:, 1], c=mode, cmap="viridis", vmin=0.0, vmax=90.0, s=14, zorder=3)
-    return lines
 
 
 def _limit(axes: Axes, places: Array) -> list[str]:

@@ -23,6 +23,7 @@ from feti_homog.typing import Array, Document
 DEGREES = (-180.0, 180.0)
 LOADS_IN_LINE = 7
 SPIKES = 2.0  # per cent of the nodes, at either end
+SHADE: dict[str, Any] = {"alpha": 0.18, "linewidth": 0}
 INK = ("#1f4e9c", "#2a7f3f", "#c44e00")
 NAMES = {"traction": (r"$t_\mathrm{n}$", r"$t_\mathrm{t}$", r"$t_\mathrm{a}$"), "jump": ("gap", "slip", "axial slip")}
 
@@ -45,23 +46,14 @@ def plot(directory: Path, cell: drawn_cell.DrawnCell, document: Document) -> lis
     # After all bonds are gone there is not much left to see, unless the faces touch.
     last = next((n for n in reversed(names) if 0 < debonded[n] < total or touches(n)), names[-1])
     partly = [name for name in names if 0 < debonded[name] < total]
-    names_drawn = (
-        _around_the_peak(file, names, last, document)
-        if reported(document).is_followed
-        else [(partly or [last])[len(partly) // 2]]
-    )
-    return [
-        plot_helpers.save(_figure(cell, names_drawn, drawn_cell.LoadLabels.of(document)), directory / "interface.png")
-    ]
-
-
-def _around_the_peak(file: Any, names: list[str], last: str, document: Document) -> list[str]:
-    """Return the states at the peak, or the first, and in the valley after it, or the `last`."""
-    of_point = {int(file[f"state/{name}"].attrs["point"]): name for name in names}
-    peak = peak_of(document)
-    before, after = of_point.get(peak["event"], names[0]), of_point.get(peak.get("event_left", -1), last)
-    debonded = (file[f"state/{after}/status"][:] != drawn_cell.BONDED).any()
-    return list(dict.fromkeys([before, after if debonded else last]))
+    drawn = [(partly or [last])[len(partly) // 2]]
+    if reported(document).is_followed:
+        of_point = {int(file[f"state/{name}"].attrs["point"]): name for name in names}
+        peak = peak_of(document)
+        before, after = of_point.get(peak["event"], names[0]), of_point.get(peak.get("event_left", -1), last)
+        drawn = list(dict.fromkeys([before, after if debonded[after] else last]))
+    figure = _figure(cell, drawn, drawn_cell.LoadLabels.of(document))
+    return [plot_helpers.save(figure, directory / "interface.png")]
 
 
 def _figure(cell: drawn_cell.DrawnCell, names: list[str], labels: drawn_cell.LoadLabels) -> Figure:
@@ -75,10 +67,13 @@ def _figure(cell: drawn_cell.DrawnCell, names: list[str], labels: drawn_cell.Loa
     for row, body in zip(grid, chosen, strict=True):
         place = coordinate(cell, body)
         for axes, quantity in zip(row, NAMES, strict=True):
-            _shade(axes, place, status[place.nodes])
+            # Each debonded node of the last state stands for half the distance to its neighbours.
+            bounds = np.r_[place.ends[0], (place.values[1:] + place.values[:-1]) / 2, place.ends[1]]
+            for at, kind in enumerate(status[place.nodes]):
+                if kind != drawn_cell.BONDED:
+                    axes.axvspan(bounds[at], bounds[at + 1], **SHADE, color=drawn_cell.STATE_COLOURS[kind])
             for name in names:
-                values = _values(file[f"state/{name}"], quantity)[place.nodes]
-                _curves(axes, quantity, place, values, name == names[-1])
+                _curves(axes, file[f"state/{name}"], quantity, place, name == names[-1])
             axes.axhline(0.0, color="0.6", linewidth=0.6)
             axes.set(xlim=place.ends, xlabel=place.label)
             if place.ends == DEGREES:
@@ -88,37 +83,33 @@ def _figure(cell: drawn_cell.DrawnCell, names: list[str], labels: drawn_cell.Loa
         is_fibre = body in file["fibre/body"][:]
         row[0].set_title(fibre_name if is_fibre else f"coating of {fibre_name}", fontsize=10, loc="left")
     for column in grid.T:
-        _clip_spikes(column[0], [line.get_ydata() for axes in column for line in axes.lines])
+        _clip_spikes(column)
     _labels(file, figure, grid, status[np.isin(fibre, chosen)])
-    which = (
-        f"\nthe {len(chosen)} of {len(bodies)} debonded interfaces that are so most"
-        if len(bodies) > len(chosen)
-        else ""
-    )
-    figure.suptitle(_title(file, names, labels) + which, fontsize=10)
+    first, last = (file[f"state/{name}"].attrs for name in (names[0], names[-1]))
+    title = f"{last['label']}: {labels.label(last, LOADS_IN_LINE)}"
+    if len(names) > 1:
+        title += f"   (dashed: {first['label']}: {labels.label(first, LOADS_IN_LINE)})"
+    if len(bodies) > len(chosen):
+        title += f"\nthe {len(chosen)} of {len(bodies)} debonded interfaces that are so most"
+    figure.suptitle(title, fontsize=10)
     return figure
 
 
-def _clip_spikes(axes: Axes, curves: list[Any]) -> None:
-    """Limit the shared range where a few nodes at singular tips exceed all others."""
-    values = np.concatenate([np.asarray(curve, float) for curve in curves])
+def _clip_spikes(column: Any) -> None:
+    """Limit the shared range of axes where a few nodes at singular tips exceed all others."""
+    values = np.concatenate([np.asarray(line.get_ydata(), float) for axes in column for line in axes.lines])
     low, high = np.percentile(values, (SPIKES, 100.0 - SPIKES))
     room = high - low
     if values.min() < low - room or values.max() > high + room:
-        axes.set_ylim(max(values.min(), low - room), min(values.max(), high + room))
+        column[0].set_ylim(max(values.min(), low - room), min(values.max(), high + room))
 
 
-def _values(state: Any, quantity: str) -> Array:
-    """(k, 2) tractions or jumps; (k, 3) with components along the fibres."""
+def _curves(axes: Axes, state: Any, quantity: str, place: Coordinate, last: bool) -> None:
+    """Draw a state's tractions or jumps around a fibre, as a closed curve if nodes surround it."""
     values: Array = state[quantity][:]
-    if f"axial_{quantity}" not in state or not (axial := state[f"axial_{quantity}"][:]).any():
-        return values
-    return np.column_stack([values, axial])
-
-
-def _curves(axes: Axes, quantity: str, place: Coordinate, values: Array, last: bool) -> None:
-    """Draw nodal values (k, 2 or 3) around a fibre, as a closed curve if nodes surround it."""
-    at, turn = place.values, place.ends[1] - place.ends[0]
+    if f"axial_{quantity}" in state and (axial := state[f"axial_{quantity}"][:]).any():
+        values = np.column_stack([values, axial])
+    values, at, turn = values[place.nodes], place.values, place.ends[1] - place.ends[0]
     # Nodes are all around if the gap between last and first is less than twice the others.
     if place.ends == DEGREES and len(at) > 1 and at[0] + turn - at[-1] < 2.0 * np.diff(at).max():
         at, values = (
@@ -130,15 +121,6 @@ def _curves(axes: Axes, quantity: str, place: Coordinate, values: Array, last: b
         axes.plot(at, column, style, color=ink, linewidth=width, label=label if last else None)
 
 
-def _shade(axes: Axes, place: Coordinate, status: Array) -> None:
-    """Shade debonded parts in the last state; each node stands for half the distance to its neighbours."""
-    middle = (place.values[1:] + place.values[:-1]) / 2
-    edges = np.concatenate([[place.ends[0]], middle, [place.ends[1]]])
-    for kind in (drawn_cell.OPEN, drawn_cell.CLOSED):
-        for at in np.flatnonzero(status == kind):
-            axes.axvspan(edges[at], edges[at + 1], color=drawn_cell.STATE_COLOURS[kind], alpha=0.18, linewidth=0)
-
-
 def _labels(file: Any, figure: Figure, grid: Any, shaded: Array) -> None:
     stress = plot_helpers.stress_label(file.attrs["stress_unit"])
     length = plot_helpers.unit_label(file.attrs["length_unit"]) or "(cell units)"
@@ -148,20 +130,11 @@ def _labels(file: Any, figure: Figure, grid: Any, shaded: Array) -> None:
     for axes in grid[0]:
         axes.legend(frameon=False, fontsize=9, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=3)
     patches = [
-        Patch(color=drawn_cell.STATE_COLOURS[kind], alpha=0.18, linewidth=0, label=drawn_cell.STATE_NAMES[kind])
+        Patch(color=drawn_cell.STATE_COLOURS[kind], label=drawn_cell.STATE_NAMES[kind], **SHADE)
         for kind in (drawn_cell.OPEN, drawn_cell.CLOSED)
         if kind in shaded
     ]
     figure.legend(handles=patches, loc="outside lower center", ncols=2, frameon=False)
-
-
-def _title(file: Any, names: list[str], labels: drawn_cell.LoadLabels) -> str:
-    """Describe the last state and, if different, the first."""
-    first, last = (file[f"state/{name}"].attrs for name in (names[0], names[-1]))
-    title = f"{last['label']}: {labels.label(last, LOADS_IN_LINE)}"
-    if len(names) > 1:
-        title += f"   (dashed: {first['label']}: {labels.label(first, LOADS_IN_LINE)})"
-    return title
 
 
 @dataclass(frozen=True)

@@ -94,25 +94,15 @@ def _afterwards(document: Document, peak: Mapping[str, Any], largest: str) -> st
     return text
 
 
-def _closed_cycle(document: Document) -> str:
-    """Describe the last loop area: the work since a waypoint with the same strains."""
-    points, legs = document["path"], path_curves.legs(document)
-    ends = [p for p in points if abs(p["load_factor"] * legs - round(p["load_factor"] * legs)) < path_curves.SAME_LOAD]
-    for point in reversed(ends[:-1]):
-        pair = np.array([point["strain"], ends[-1]["strain"]])
-        if np.ptp(pair, axis=0).max() <= 1e-6 * np.abs(pair).max():
-            return f", area of the last closed loop {ends[-1]['work'] - point['work']:.6g}"
-    return ""
-
-
 def _path_energies(document: Document, label: str) -> list[str]:
     """Return lines about energies along a path.
 
     Work of the loads, energy stored at the end, energy lost by breaks along all equilibria and under a rising load,
     and the debonded share.
     """
-    last = document["path"][-1]
-    where = " on the first leg" if path_curves.legs(document) > 1 else ""
+    points, legs = document["path"], path_curves.legs(document)
+    last = points[-1]
+    where = " on the first leg" if legs > 1 else ""
     rising = f"{last['dissipated_strain_controlled']:.6g} if the {path_curves.what_rises(document)} only rises{where}"
     lines = [
         f"Work per area{label}: {last['work']:.6g}",
@@ -120,7 +110,14 @@ def _path_energies(document: Document, label: str) -> list[str]:
         f"Dissipated per area{label}: {last['dissipated']:.6g} along all equilibria, {rising}",
     ]
     if "friction_heat" in last:
-        lines.append(f"Heat of friction per area{label}: {last['friction_heat']:.6g}{_closed_cycle(document)}")
+        lines.append(f"Heat of friction per area{label}: {last['friction_heat']:.6g}")
+        places = [point["load_factor"] * legs for point in points]
+        ends = [p for p, at in zip(points, places, strict=True) if abs(at - round(at)) < path_curves.SAME_LOAD]
+        for point in reversed(ends[:-1]):
+            pair = np.array([point["strain"], ends[-1]["strain"]])
+            if np.ptp(pair, axis=0).max() <= 1e-6 * np.abs(pair).max():  # a closed loop
+                lines[-1] += f", area of the last closed loop {ends[-1]['work'] - point['work']:.6g}"
+                break
     if "dissipation_ratio" in last:
         ratio = f"{last['dissipation_ratio']:.4f} times it was dissipated"
         bonds = "bonds that broke or softened" if "softened" in last else "broken bonds"

@@ -119,8 +119,10 @@ def envelope_table(document: Document, limit: int = ENVELOPE_ROWS) -> Table:
     used = "traction / strength" if "normal" in names else "psi of its traction"
     above.append(f"  first bond: its fibre, its direction there (degrees), {used}")
     columns = [Column("angle", 8), *(Column(axis, 12, ".6g") for axis in axes), *map(ONSET.__getitem__, names)]
-    rows = [_onset(point, names) for point in _evenly(points, limit)]
-    return Table(title, columns, rows, above)
+    step = max(1, -(-len(points) // limit))
+    while len(points) % step:  # directions are evenly spaced
+        step += 1
+    return Table(title, columns, [_onset(point, names) for point in points[::step]], above)
 
 
 def _envelope_title(document: Document) -> str:
@@ -131,12 +133,6 @@ def _envelope_title(document: Document) -> str:
     return f"Onset of debonding in the plane {', '.join(section['plane'])}{unit}: {count} directions{after}"
 
 
-def components(point: Point) -> tuple[float, float]:
-    """Return both components of the onset load."""
-    angle, load = radians(point["angle"]), _load(point)
-    return without_noise(load * cos(angle), load), without_noise(load * sin(angle), load)
-
-
 def _onset(point: Point, names: Sequence[str]) -> list[Any]:
     """Return angle, both load components and `names` of a direction."""
     if "factor" not in point:
@@ -144,16 +140,14 @@ def _onset(point: Point, names: Sequence[str]) -> list[Any]:
     return [point["angle"], *components(point), *(without_noise(point[name]) for name in names)]
 
 
+def components(point: Point) -> tuple[float, float]:
+    """Return both components of the onset load."""
+    angle, load = radians(point["angle"]), _load(point)
+    return without_noise(load * cos(angle), load), without_noise(load * sin(angle), load)
+
+
 def _load(point: Point) -> float:
     return float(point["factor"])
-
-
-def _evenly(points: Sequence[Point], limit: int) -> list[Point]:
-    """Return evenly spaced directions from the first on, at most about `limit`."""
-    step = max(1, -(-len(points) // limit))
-    while len(points) % step:
-        step += 1
-    return list(points[::step])
 
 
 def tip_table(document: Document, tips: Document | None) -> list[Table]:

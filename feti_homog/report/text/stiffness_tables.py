@@ -13,7 +13,7 @@ from feti_homog.materials.constants import ABOUT_FIBRES, CELL_AXES
 from feti_homog.materials.voigt import SPATIAL_STRESSES, STRAINS, voigt_names
 from feti_homog.microstructure.phase_names import COATING
 from feti_homog.report.text.table import UNKNOWN, Column, Table, number, stress_label
-from feti_homog.typing import Document, Float
+from feti_homog.typing import Document
 
 NAMES = Column("", -28)
 STIFF = ("C11", "C22", "C33")
@@ -90,17 +90,13 @@ def thermal(document: Document) -> list[Table]:
     present = {key: title for key, title in THERMAL.items() if document.get(key) is not None}
     names = [stress[1:] for stress in SPATIAL_STRESSES]
     errors = {key: _errors(document)[key] for key in present if _errors(document).get(key) is not None}
-    values = (_rounded(np.array(document[key], float)) for key in present)
-    rows = list(zip(names, *values, *errors.values(), strict=True))
+    values = [np.array(document[key], float) for key in present]
+    rounded = [np.where(np.abs(v) > 10.0**-7 * np.abs(v).max(), v, 0.0).tolist() for v in values]
+    rows = list(zip(names, *rounded, *errors.values(), strict=True))
     columns = [Column("", -6), *(Column(title, 22, ".7g") for title in present.values())]
     columns += [Column(f"{key.rpartition('_')[2]}: error", 18, ".1e") for key in errors]
     title = f"Per unit of temperature, {CELL_AXES}{stress_label(document)}"
     return [Table(title, columns, rows)] if present else []
-
-
-def _rounded(values: Float) -> list[float]:
-    is_seen = np.abs(values) > 10.0**-7 * np.abs(values).max()
-    return [float(value) for value in np.where(is_seen, values, 0.0)]
 
 
 def moduli(document: Document) -> Table:

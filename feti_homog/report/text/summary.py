@@ -1,6 +1,6 @@
 """The printed summary of a result.json, tables for notebooks, and the registry of reported analyses.
 
-Modules of pictures find an analysis by its name: `response_curves.CURVES`, `deformed_panels.PANELS`.
+Modules of pictures find an analysis by its name: `response_curves.CURVES`.
 """
 
 from __future__ import annotations
@@ -26,10 +26,7 @@ from feti_homog.typing import Document
 LABEL = 12  # columns of the labels at the left
 NAME = 28  # columns of the names of checks
 GLUE = "\N{NO-BREAK SPACE}"  # at which no line is broken
-
-
-def _evenly(document: Document, limit: int, count: int) -> list[int]:
-    return sorted({round(k) for k in np.linspace(0, count - 1, min(limit, count))})
+REMARKS = ("Remark", "Warning", "Fault")
 
 
 def _stiffness_tables(document: Document) -> list[Table]:
@@ -64,7 +61,9 @@ class ReportedAnalysis:
     is_followed: bool = False
     picture: str = ""
     is_load_given: Callable[[Document], bool] = lambda document: False
-    states: Callable[[Document, int, int], list[int]] = _evenly
+    states: Callable[[Document, int, int], list[int]] = lambda document, limit, count: sorted(
+        {round(k) for k in np.linspace(0, count - 1, min(limit, count))}
+    )
 
 
 STIFFNESS = ReportedAnalysis("stiffness", "effective stiffness", lambda document, limit: _stiffness_tables(document))
@@ -119,6 +118,9 @@ def summary(document: Document) -> str:
     Raises:
         KeyError: a key of these is missing.
     """
+    size = document["memory"]
+    memory = f"{size / 2**20:.0f} MiB" if size < 2**30 else f"{size / 2**30:.2f} GiB"
+    remarks = [(label, str(text)) for label in REMARKS for text in document.get(f"{label.lower()}s", ())]
     blocks = [
         _heading(document),
         [*_cell(document), *_solver(document["solver"])],
@@ -126,13 +128,9 @@ def summary(document: Document) -> str:
         checks(document).lines,
         [
             *_field("Time", [f"{stage}{GLUE}{took:.2f}{GLUE}s" for stage, took in document["timings"].items()]),
-            *_field("Memory", [f"{_memory(document['memory'])} per rank at most"]),
+            *_field("Memory", [f"{memory} per rank at most"]),
         ],
-        [
-            *_remarks("Remark", document.get("remarks", ())),
-            *_remarks("Warning", document.get("warnings", ())),
-            *_remarks("Fault", document.get("faults", ())),
-        ],
+        [line for label, text in remarks for line in _field(label, [text])],
         _field("Status", [str(document["status"])]),
     ]
     return _joined(blocks)
@@ -185,60 +183,41 @@ def _cell(document: Document) -> list[str]:
     shape, fractions = case["cell"], cell.get("fractions", {})
     shares = ", ".join(f"{phase} {share:.6f}" for phase, share in fractions.items())
     mesh = [_number(cell["elements"], "element"), _number(cell["nodes"], "node")]
-    mesh += [f"order {shape['order']}"] * ("order" in shape) + _sizes(shape, cell)
-    match = list[str]()
+    mesh += [f"order {shape['order']}"] * ("order" in shape)
+    if "refine" in shape:
+        mesh.append(f"refine {shape['refine']}")
+    elif "accuracy" in shape:  # by which the program chose the mesh
+        chosen = f"refine {cell['refine']} of mesh_size {cell['mesh_size']:g}"
+        mesh.append(f"{chosen} for accuracy = {shape['accuracy']:g}")
+    shares += f", voids {cell['porosity']:.6f}" if cell.get("porosity") else ""
+    lines = _field("Cell", [str(shape["geometry"]), size])
+    lines += _field("Meshed", [f"fibre fraction {cell['fibre_fraction']:.6f}", *([f"({shares})"] if shares else [])])
     if (distance := cell.get("match_distance")) is not None:
         phrases = f"distances of neighbours differ by {distance:.4f} mean diameters"
-        match = _field("Match", [Path(shape["match"]).name, phrases])
-    shares += f", voids {cell['porosity']:.6f}" if cell.get("porosity") else ""
-    return [
-        *_field("Cell", [str(shape["geometry"]), size]),
-        *_field("Meshed", [f"fibre fraction {cell['fibre_fraction']:.6f}", *([f"({shares})"] if shares else [])]),
-        *match,
-        *_scatter(document.get("fibres", ())),
-        *_field("Mesh", mesh),
-    ]
-
-
-def _sizes(shape: Document, cell: Document) -> list[str]:
-    """Return the refinement, and the coarse mesh size where the program chose it."""
-    if "refine" in shape:
-        return [f"refine {shape['refine']}"]
-    size = f"refine {cell['refine']} of mesh_size {cell['mesh_size']:g}"
-    return [f"{size} for accuracy = {shape['accuracy']:g}"] if "accuracy" in shape else []
-
-
-def _scatter(fibres: Sequence[Document]) -> list[str]:
-    """Return the strength range of the fibres, if strengths differ."""
-    factors = [fibre["strength"] for fibre in fibres if "strength" in fibre]
-    if not factors:
-        return []
-    low, high = min(factors), max(factors)
-    ends = [f"{end:.4f} (fibre {factors.index(end) + 1})" for end in (low, high)]
-    mean = f"{sum(factors) / len(factors):.4f} in the mean"
-    return _field("Strengths", [f"{ends[0]} to {ends[1]} times those of [interface]", mean])
+        lines += _field("Match", [Path(shape["match"]).name, phrases])
+    if factors := [fibre["strength"] for fibre in document.get("fibres", ()) if "strength" in fibre]:
+        low, high = (f"{end:.4f} (fibre {factors.index(end) + 1})" for end in (min(factors), max(factors)))
+        mean = f"{sum(factors) / len(factors):.4f} in the mean"
+        lines += _field("Strengths", [f"{low} to {high} times those of [interface]", mean])
+    return lines + _field("Mesh", mesh)
 
 
 def _solver(solver: Document) -> list[str]:
-    parts = [_number(solver["ranks"], "rank"), _number(solver["subdomains"], "subdomain")]
-    dual, factorized = [_number(solver["multipliers"], "multiplier"), f"kernel {solver['kernel_dim']}"], list[str]()
+    names = {"ranks": "rank", "subdomains": "subdomain", "dofs": "dof"}
+    lines = _field("Solver", [_number(solver[key], name) for key, name in names.items()])
+    dual = [_number(solver["multipliers"], "multiplier"), f"kernel {solver['kernel_dim']}"]
+    lines += _field("Dual", [*dual, f"coarse problem {solver['coarse_dim']}"])
     if (count := solver.get("factorizations")) is not None:  # of the axial problem too
         coarse = f"coarse problem {_number(solver.get('coarse_factorizations', 0), 'time')}"
-        factorized = [f"{count} {'matrix' if count == 1 else 'matrices'} of subdomains", coarse]
-    return [
-        *_field("Solver", [*parts, _number(solver["dofs"], "dof")]),
-        *_field("Dual", [*dual, f"coarse problem {solver['coarse_dim']}"]),
-        *(_field("Factorized", factorized) if factorized else []),
-        *_field("Iterations", _iterations(solver["iterations"])),
-    ]
-
-
-def _iterations(counts: Sequence[int]) -> list[str]:
+        lines += _field("Factorized", [f"{count} {'matrix' if count == 1 else 'matrices'} of subdomains", coarse])
+    counts = solver["iterations"]
     if not any(counts):
-        return [f"none in {_number(len(counts), 'state')}"]
-    if len(counts) <= 12:
-        return [str(count) for count in counts]
-    return [f"{min(counts)} to {max(counts)} a state", f"{sum(counts)} for {len(counts)} states"]
+        iterations = [f"none in {_number(len(counts), 'state')}"]
+    elif len(counts) <= 12:
+        iterations = [str(count) for count in counts]
+    else:
+        iterations = [f"{min(counts)} to {max(counts)} a state", f"{sum(counts)} for {len(counts)} states"]
+    return lines + _field("Iterations", iterations)
 
 
 def checks(document: Document) -> Table:
@@ -258,10 +237,6 @@ def checks(document: Document) -> Table:
     return Table(title, columns, rows, abreast=1)
 
 
-def _remarks(label: str, remarks: Iterable[str]) -> list[str]:
-    return [line for remark in remarks for line in _field(label, [str(remark)])]
-
-
 def _field(label: str, phrases: Sequence[str]) -> list[str]:
     """Return a label and its words, joined by commas and wrapped to WIDTH columns."""
     text = ", ".join(phrases).replace(", (", " (")
@@ -276,7 +251,3 @@ def _field(label: str, phrases: Sequence[str]) -> list[str]:
 
 def _number(count: int, name: str) -> str:
     return f"{count:,} {name}{'' if count == 1 else 's'}".replace(",", " ")
-
-
-def _memory(size: float) -> str:
-    return f"{size / 2**20:.0f} MiB" if size < 2**30 else f"{size / 2**30:.2f} GiB"

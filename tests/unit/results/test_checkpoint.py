@@ -10,8 +10,15 @@ import pytest
 from mpi4py import MPI
 
 from feti_homog.errors import CaseError
-from feti_homog.results.checkpoint import Checkpoint, EventsInMemory, has_multipliers
-from feti_homog.results.checkpoint_file import FORMAT, PREFIX, records, refuse_others
+from feti_homog.results.checkpoint import (
+    FORMAT,
+    PREFIX,
+    Checkpoint,
+    EventsInMemory,
+    has_multipliers,
+    records,
+    refuse_others,
+)
 
 EVENTS = 4
 

@@ -8,6 +8,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 from PIL import Image
 from support.sample_output import Sample, in_space, sample
@@ -186,9 +187,12 @@ def test_loads_in_space_have_their_pictures(tmp_path: Path) -> None:
     assert before[:3] == after[:3] and all(a != b for a, b in zip(before[3:6], after[3:6], strict=True))
 
 
-@pytest.mark.parametrize(("wanted", "step"), [(0.083, 0.1), (0.1, 0.1), (0.11, 0.2), (3.0, 5.0), (6e4, 1e5), (0, 1)])
-def test_lines_of_displacement_are_at_round_steps(wanted: float, step: float) -> None:
-    assert figures.round_step(wanted) == pytest.approx(step)
+@pytest.mark.parametrize(("extent", "step"), [(1.0, 0.1), (1.2, 0.1), (1.32, 0.2), (36.0, 5.0), (7.2e5, 1e5)])
+def test_lines_of_displacement_are_at_round_steps(extent: float, step: float) -> None:
+    label, corners = np.zeros(1, int), np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    drawn = decimation.DrawnMesh(8, 1, 1, np.arange(3), corners, np.arange(3)[None], label, label, label)
+    state = {"axial_displacement": extent * np.array([0.0, 1.0, 0.5])}
+    assert figures.draw_levels(Figure().subplots(), state, drawn) == pytest.approx(step)
 
 
 @pytest.mark.slow

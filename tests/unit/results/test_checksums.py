@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from feti_homog.errors import CaseError, FetiHomogError
-from feti_homog.results import seals
+from feti_homog.results import result_json
 
 BLOCK = 1000
 SIZES = [0, 1, 999, 1000, 1001, 5003]
@@ -23,25 +23,25 @@ DOCUMENT = {
 
 
 def test_what_was_written_is_read():
-    text = seals.dumps(DOCUMENT)
-    assert seals.loads(text) == DOCUMENT and list(json.loads(text))[-1] == "checksum"
-    assert seals.dumps(seals.loads(text)) == text
+    text = result_json.dumps(DOCUMENT)
+    assert result_json.loads(text) == DOCUMENT and list(json.loads(text))[-1] == "checksum"
+    assert result_json.dumps(result_json.loads(text)) == text
 
 
 def test_every_changed_number_or_letter_is_reported():
-    text = seals.dumps(DOCUMENT)
+    text = result_json.dumps(DOCUMENT)
     for place, letter in enumerate(text):
         if letter.isalnum():
             with pytest.raises(ValueError):
-                seals.loads(text[:place] + ("7" if letter != "7" else "8") + text[place + 1 :])
+                result_json.loads(text[:place] + ("7" if letter != "7" else "8") + text[place + 1 :])
 
 
 def test_a_document_without_a_checksum_is_taken_as_it_is():
-    assert seals.loads(json.dumps(DOCUMENT)) == DOCUMENT and seals.loads("{}") == {}
+    assert result_json.loads(json.dumps(DOCUMENT)) == DOCUMENT and result_json.loads("{}") == {}
 
 
 def test_another_layout_of_the_same_content_is_right():
-    assert seals.loads(json.dumps(json.loads(seals.dumps(DOCUMENT)))) == DOCUMENT
+    assert result_json.loads(json.dumps(json.loads(result_json.dumps(DOCUMENT)))) == DOCUMENT
 
 
 @pytest.mark.parametrize(
@@ -49,18 +49,18 @@ def test_another_layout_of_the_same_content_is_right():
 )
 def test_other_texts_are_refused(text):
     with pytest.raises(ValueError):
-        seals.loads(text)
+        result_json.loads(text)
 
 
 @pytest.mark.parametrize("size", SIZES)
 def test_the_checksum_is_that_of_the_blocks(tmp_path, size):
     content = np.random.default_rng(size).bytes(size)
     (tmp_path / "file").write_bytes(content)
-    found = seals.seal(tmp_path / "file", BLOCK)
+    found = result_json.seal(tmp_path / "file", BLOCK)
     blocks = [zlib.crc32(content[k : k + BLOCK]) for k in range(0, size, BLOCK)]
     expected = zlib.crc32(b"".join(block.to_bytes(4, "little") for block in blocks))
-    assert found == seals.FileSeal(size, f"{expected:08x}")
-    seals.check(tmp_path / "file", found, BLOCK)
+    assert found == result_json.FileSeal(size, f"{expected:08x}")
+    result_json.check(tmp_path / "file", found, BLOCK)
 
 
 @pytest.mark.parametrize("size", SIZES[1:])
@@ -68,18 +68,18 @@ def test_another_file_is_reported(tmp_path, size):
     path = tmp_path / "file"
     content = bytearray(np.random.default_rng(size).bytes(size))
     path.write_bytes(content)
-    found = seals.seal(path, BLOCK)
+    found = result_json.seal(path, BLOCK)
     for bit in (0, 4 * size, 8 * size - 1):
         content[bit // 8] ^= 1 << bit % 8
         path.write_bytes(content)
         with pytest.raises(CaseError, match="damaged, or of another run: its checksum is wrong"):
-            seals.check(path, found, BLOCK)
+            result_json.check(path, found, BLOCK)
         content[bit // 8] ^= 1 << bit % 8
     path.write_bytes(content[:-1])
     with pytest.raises(CaseError, match=f"it has {size - 1} bytes, not {size}"):
-        seals.check(path, found, BLOCK)
+        result_json.check(path, found, BLOCK)
 
 
 def test_a_file_that_is_gone_is_reported(tmp_path):
     with pytest.raises(FetiHomogError, match=r"cannot read .*none: No such file"):
-        seals.check(tmp_path / "none", seals.FileSeal(1, ""))
+        result_json.check(tmp_path / "none", result_json.FileSeal(1, ""))
