@@ -109,7 +109,7 @@ class Subdomain:
         if submesh.pinned >= 0:
             Q[problem.dofs(np.array([submesh.pinned]))], slopes[submesh.pinned] = 0.0, 0.0
         laws = laws.reshape(-1, *laws.shape[-2:])
-        L = np.einsum("k,kij->ij", body.areas / body.area, laws) if len(laws) > 1 else laws[0]
+        L = np.einsum("k,kij->ij", body.areas / body.areas.sum(), laws) if len(laws) > 1 else laws[0]
         return cls(
             submesh, mesh, problem, L, laws, material, Q, slopes, body.areas, R, positions, K, mixed=mixed, **flags
         )
