@@ -19,7 +19,7 @@ from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.submesh import SubdomainTable, Submesh, SubmeshesOfRank
 from feti_homog.system.parallel.distributed_arrays import exchange
 from feti_homog.system.parallel.mpi_errors import agree
-from feti_homog.typing import Array, Bool, Float, Int
+from feti_homog.typing import Bool, Float, Int
 
 # Gauss points of one side of an element, on arcs that the mesh follows well.
 POINTS, WEIGHTS = roots_legendre(6)
@@ -186,16 +186,12 @@ def edge_normals(mesh: Submesh, triangle: Int, k: Int) -> tuple[Float, Float]:
 
 
 @dataclass(frozen=True)
-class SharedEntities:
+class SharedEntities(Sharers):
     """The n entities that one rank's subdomains take part in, in the order of their constraints.
 
     Attributes:
-        key: (n,) class or torus edge.
-        is_edge: (n,) bool.
         nodes: (n,) fine nodes on the entity: 1, or the inner lattice nodes of an edge.
         first: (n,) number of its first vector constraint.
-        pointer, sharer: the subdomains that share entity i are sharer[pointer[i]:pointer[i + 1]], sorted by body, from
-            the outermost to the innermost.
         body: constituent of each sharer.
         fibre: (n,) the body that may debond here from the one around it, the inner one; or -1 where nothing can break.
         pair: (n,) the interface of the case that these two bodies have, -1 where nothing can break.
@@ -208,12 +204,8 @@ class SharedEntities:
         constraints: number of vector constraints on all ranks.
     """
 
-    key: Int
-    is_edge: Bool
     nodes: Int
     first: Int
-    pointer: Int
-    sharer: Int
     body: Int
     fibre: Int
     pair: Int
@@ -222,11 +214,6 @@ class SharedEntities:
     precracked: Bool
     owned: tuple[int, int]
     constraints: int
-
-    @property
-    def copies(self) -> Int:
-        """(n,) number of subdomains k that share each entity."""
-        return np.diff(self.pointer)
 
 
 def share_entities(
@@ -248,9 +235,16 @@ def share_entities(
     constraints = np.where(owner == comm.rank, nodes * (sharers.copies - 1), 0)
     begin, own_constraints = comm.exscan(int(constraints.sum())) or 0, int(constraints.sum())
     numbers = begin + np.cumsum(constraints) - constraints
-    first, normal, turn, precracked = _sent_by_owners(
-        comm, sharers, table, numbers, geometry.normal, geometry.turn, geometry.precracked
-    )
+    # Owners of entities send numbers and geometry to the other sharers.
+    rank, entity = table.rank[sharers.sharer], np.repeat(np.arange(len(owner)), sharers.copies)
+    mine = (owner == comm.rank)[entity]
+    to = np.unique(entity[mine] * comm.size + rank[mine])
+    entity, to = to // comm.size, to % comm.size
+    columns = numbers, geometry.normal, geometry.turn, geometry.precracked
+    code, *received = exchange(comm, to, sharers.code[entity], *(column[entity] for column in columns))
+    place = np.argsort(code)
+    place = place[np.searchsorted(code[place], sharers.code)]
+    first, normal, turn, precracked = (column[place] for column in received)
     order = np.argsort(first)
     sharers = sharers.chosen(order)
     pair = breakable_pairs(submeshes, table, pairs, sharers)
@@ -270,16 +264,3 @@ def share_entities(
         owned=(begin, begin + own_constraints),
         constraints=comm.allreduce(own_constraints),
     )
-
-
-def _sent_by_owners(comm: MPI.Intracomm, sharers: Sharers, table: SubdomainTable, *columns: Array) -> list[Array]:
-    """Return the columns (n,) or (n, ...) as owners of entities have them.  Collective."""
-    rank = table.rank[sharers.sharer]
-    mine = np.repeat(table.rank[sharers.innermost] == comm.rank, sharers.copies)
-    entity = np.repeat(np.arange(len(sharers.key)), sharers.copies)
-    pairs = np.unique(entity[mine] * comm.size + rank[mine])
-    entity, to = pairs // comm.size, pairs % comm.size
-    code, *received = exchange(comm, to, sharers.code[entity], *(column[entity] for column in columns))
-    order = np.argsort(code)
-    place = order[np.searchsorted(code[order], sharers.code)]
-    return [column[place] for column in received]
