@@ -115,8 +115,7 @@ def _exchange_jumps(
 
     received: list[list[_Jumps]] = [[] for _ in blocks]
     neighbours.exchange(
-        messages(),
-        lambda i, sender, message: received[i].append(_Jumps(neighbours.common[i][sender], *message)),
+        messages(), lambda i, sender, message: received[i].append(_Jumps(neighbours.common[i][sender], *message))
     )
     return received, ends
 
@@ -150,10 +149,7 @@ def scaled_constraints(scaling: StiffnessScaled) -> csc_matrix:
 
 
 def kernels_and_soft_modes(
-    blocks: Sequence[SubdomainBlocks],
-    neighbours: Neighbours,
-    threshold: float,
-    thresholds: Thresholds = DEFAULTS,
+    blocks: Sequence[SubdomainBlocks], neighbours: Neighbours, threshold: float, thresholds: Thresholds = DEFAULTS
 ) -> list[Float]:
     """V: for each subdomain of this rank (n, k + m) its kernel and its m modes below the threshold.  Collective.
 
