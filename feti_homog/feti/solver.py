@@ -209,7 +209,8 @@ class FetiSolver:
         forces = self.preconditioner.closing_forces
         closing = forces(right) if columns is None else columns.closing(self.d, E, is_seen / scale)
         closing = self.natural.project(closing)
-        krylov.test.set_scales(float(np.sqrt(is_seen.sum())), float(np.linalg.norm(self._jumps.norms(closing))))
+        krylov.test.jump_scale = float(np.sqrt(is_seen.sum()))
+        krylov.test.force_scale = float(np.linalg.norm(self._jumps.norms(closing)))
         starts = np.where(is_seen, self.natural.project(self.active.restrict(starts)), 0.0) / scale
         lam = closing if self.preconditioner.is_exact else starts
         last = Iterate(lam, np.zeros_like(lam), right)
