@@ -230,7 +230,7 @@ class Homogenization:
     def _averages(self, E: Float, u: Float) -> tuple[Float, Float, float]:
         """<sigma>, <eps*> over bodies and voids, and <sigma:eps>; collective."""
         cell, v = self.cell, len(E)
-        without_u, from_u = cell.solver.condensed.stiffness @ E, cell.solver.loads.T @ u
+        without_u, from_u = cell.solver.condensed.stiffness @ E, cell.solver.condensed.boundary.T @ u
         energy = (
             E @ cell.solver.condensed.energy @ E + 2 * E @ from_u + u @ cell.solver.interface_operators.apply_schur(u)
         )

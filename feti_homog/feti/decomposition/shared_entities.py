@@ -19,7 +19,7 @@ from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.submesh import SubdomainTable, Submesh, SubmeshesOfRank
 from feti_homog.system.parallel.distributed_arrays import exchange
 from feti_homog.system.parallel.mpi_errors import agree
-from feti_homog.typing import Bool, Float, Int
+from feti_homog.typing import Array, Bool, Float, Int
 
 # Gauss points of one side of an element, on arcs that the mesh follows well.
 POINTS, WEIGHTS = roots_legendre(6)
@@ -48,22 +48,6 @@ def side_lengths(ends: Float, turn: Float, low: Float, order: int, side: float) 
     return np.asarray(np.stack(speeds, axis=1) * WEIGHTS @ SHARES[order].T * (side / 2))
 
 
-@dataclass(frozen=True)
-class InterfaceGeometry:
-    """Geometry of the n shared entities that this rank owns.
-
-    Attributes as of `SharedEntities`, 0 of other entities and where no bond may break.
-    """
-
-    normal: Float
-    turn: Float
-    precracked: Bool
-
-    def chosen(self, which: Int) -> InterfaceGeometry:
-        """Return the geometry of entities `which` (k,)."""
-        return InterfaceGeometry(self.normal[which], self.turn[which], self.precracked[which])
-
-
 def breakable_pairs(submeshes: SubmeshesOfRank, table: SubdomainTable, pairs: Int, sharers: Sharers) -> Int:
     """(n,) the interface of the two bodies that meet there.
 
@@ -86,10 +70,10 @@ def interface_geometry(
     pairs: Int,
     sharers: Sharers,
     lattice: ReferenceLattice,
-) -> InterfaceGeometry:
-    """Return normals, turns and precracks of shared entities.  Collective.
+) -> tuple[Float, Float, Bool]:
+    """Return normal, turn and precracked as in `SharedEntities`, of entities that this rank owns.  Collective.
 
-    `pairs` and `lattice` as in `share_entities`.
+    0 of other entities and where no bond may break; `pairs` and `lattice` as in `share_entities`.
     """
     n, owner = len(sharers.key), table.rank[sharers.innermost]
     can_part = (owner == comm.rank) & (breakable_pairs(submeshes, table, pairs, sharers) >= 0)
@@ -113,13 +97,13 @@ def interface_geometry(
     scaled = sums[:, :2] * (sums[:, 2] / np.maximum(np.hypot(*sums[:, :2].T), 1e-300))[:, None]
     normals[vertices], precracked[vertices] = scaled[vertices, None], sums[vertices, 3] == 0
     agree(comm, _check, submeshes, sharers.chosen(np.flatnonzero(can_part)), normals[can_part], sums[can_part])
-    return InterfaceGeometry(normals, turns, precracked)
+    return normals, turns, precracked
 
 
 def _check(submeshes: SubmeshesOfRank, sharers: Sharers, normals: Float, sums: Float) -> None:
     """Raise MeshError where a normal is not finite or zero, or its sides are folded onto each other.
 
-    The directions of folded sides cancel; `normals` (n, 2, 2) and `sums` (n, 4) as in `InterfaceGeometry`.
+    The directions of folded sides cancel; `normals` (n, 2, 2) and `sums` (n, 4) as in `interface_geometry`.
     """
     length = np.linalg.norm(normals, axis=2)
     folded = ~sharers.is_edge & ~(np.hypot(*sums[:, :2].T) > FOLDED * sums[:, 2])
@@ -226,10 +210,10 @@ def share_entities(
         lattice: of the coarse triangles.
     """
     sharers = find_sharers(comm, submeshes, table)
-    geometry = interface_geometry(comm, submeshes, table, pairs, sharers, lattice)
+    geometry = list[Array](interface_geometry(comm, submeshes, table, pairs, sharers, lattice))
     if lattice.intervals == 1:
         vertices = np.flatnonzero(~sharers.is_edge)
-        sharers, geometry = sharers.chosen(vertices), geometry.chosen(vertices)
+        sharers, geometry = sharers.chosen(vertices), [column[vertices] for column in geometry]
     nodes = np.where(sharers.is_edge, lattice.intervals - 1, 1)
     owner = table.rank[sharers.innermost]
     constraints = np.where(owner == comm.rank, nodes * (sharers.copies - 1), 0)
@@ -240,8 +224,7 @@ def share_entities(
     mine = (owner == comm.rank)[entity]
     to = np.unique(entity[mine] * comm.size + rank[mine])
     entity, to = to // comm.size, to % comm.size
-    columns = numbers, geometry.normal, geometry.turn, geometry.precracked
-    code, *received = exchange(comm, to, sharers.code[entity], *(column[entity] for column in columns))
+    code, *received = exchange(comm, to, sharers.code[entity], *(column[entity] for column in (numbers, *geometry)))
     place = np.argsort(code)
     place = place[np.searchsorted(code[place], sharers.code)]
     first, normal, turn, precracked = (column[place] for column in received)
