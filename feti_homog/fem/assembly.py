@@ -7,7 +7,6 @@ share its integrals.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -46,11 +45,6 @@ class Assembly:
     slopes: Float
     areas: Float
 
-    @property
-    def area(self) -> float:
-        """|Omega|."""
-        return float(self.areas.sum())
-
 
 def assemble(
     mesh: FineMesh, laws: Float, problem: Problem = PLANE, mixed: Mixed = False, material: Int | None = None
@@ -82,7 +76,19 @@ def assemble(
         # sum_k int dN/dx_k L[(i,k), :]
         Q += (slope @ np.concatenate(L[problem.voigt], axis=1)).reshape(Q.shape)
         slopes += slope
-    return Assembly(_sparse(couples, classes[:, macro.rows], classes[:, macro.columns], n), Q, slopes, areas)
+    # K sums the couples (t, p, c^2) between the classes `rows` and `columns` (t, p).
+    rows, columns = classes[:, macro.rows], classes[:, macro.columns]
+    by_row = csc_matrix((columns.ravel(), rows.ravel(), np.arange(rows.size + 1)), shape=(n, rows.size)).tocsr()
+    places = csr_matrix((by_row.indices, by_row.data, by_row.indptr), shape=(n, n))
+    places.sort_indices()
+    is_first = np.diff(places.indices, prepend=-1) != 0
+    is_first[places.indptr[:-1]] = True  # each class has couples
+    first = np.flatnonzero(is_first)
+    sums = csr_matrix((np.ones(rows.size), places.data, np.append(first, rows.size)), shape=(len(first), rows.size))
+    blocks = (sums @ couples.reshape(rows.size, c * c)).reshape(-1, c, c)
+    begin = np.searchsorted(first, places.indptr)
+    K = bsr_matrix((blocks, places.indices[first], begin), shape=(c * n,) * 2).tocsr()
+    return Assembly(K, Q, slopes, areas)
 
 
 def element_strain(
@@ -135,21 +141,6 @@ def _curved(
     else:
         couples = macro.couples(bubble.Elements.of(points, mixed).couples())
     return couples, macro.nodes(integrals(g, w)), float(w.sum())
-
-
-def _sparse(couples: Float, rows: Int32, columns: Int32, n_classes: int) -> csr_matrix:
-    """(c n, c n) sum over the couples (t, p, c^2) between classes `rows` and `columns` (t, p)."""
-    c, size = math.isqrt(couples.shape[-1]), rows.size
-    by_row = csc_matrix((columns.ravel(), rows.ravel(), np.arange(size + 1)), shape=(n_classes, size)).tocsr()
-    places = csr_matrix((by_row.indices, by_row.data, by_row.indptr), shape=(n_classes, n_classes))
-    places.sort_indices()
-    is_first = np.diff(places.indices, prepend=-1) != 0
-    is_first[places.indptr[:-1]] = True  # each class has couples
-    first = np.flatnonzero(is_first)
-    sums = csr_matrix((np.ones(size), places.data, np.append(first, size)), shape=(len(first), size))
-    blocks = (sums @ couples.reshape(size, c * c)).reshape(-1, c, c)
-    begin = np.searchsorted(first, places.indptr)
-    return bsr_matrix((blocks, places.indices[first], begin), shape=(c * n_classes,) * 2).tocsr()
 
 
 @dataclass(frozen=True)

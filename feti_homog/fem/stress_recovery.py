@@ -88,11 +88,6 @@ class RecoveredStress:
         return self.points.T.copy()
 
     @cached_property
-    def _by_node(self) -> Float:
-        """(c k, classes) fluctuating displacements."""
-        return self.u.reshape(len(self.u), -1).T.copy()
-
-    @cached_property
     def vertices(self) -> Int:
         """(e, 3) element vertices, numbered from 0; periodic images are one."""
         return np.asarray(np.take(self.numbers, np.take(self.node_class, self._rows)).T)
@@ -139,7 +134,8 @@ class RecoveredStress:
         """Return the stresses in linear elements; NumPy loops run over the elements."""
         (c, k), m, triangles = self.u.shape[1:], self.problem.strains, self._rows[:, part]
         (x, y), at = (np.take(row, triangles) for row in self._coordinates), np.take(self.node_class, triangles)
-        zero, first, second = (np.take(self._by_node, row, axis=1) for row in at)
+        by_node = self.u.reshape(len(self.u), -1).T.copy()
+        zero, first, second = (np.take(by_node, row, axis=1) for row in at)
         first -= zero
         second -= zero
         (x1, x2), (y1, y2) = x[1:] - x[0], y[1:] - y[0]
@@ -212,23 +208,20 @@ class RecoveredStress:
         m, k = self.problem.strains, self.loads.shape[1]
         total, shares = np.zeros((m * k, m * k)), [np.zeros((0, k))]
         for chunk in self.elements:
-            difference = self._off(chunk)
+            # (q, e, m, k) at places in the elements, times the root of their weights.
+            if self.order == 2:
+                difference = self.recovered(chunk.part, barycentric(6)) - chunk.stress
+                difference = (difference * np.sqrt(chunk.weights)[..., None, None]).swapaxes(0, 1)
+            else:
+                # Linear less uniform stresses d, of which d_i at the vertices have the sum s:
+                # int d d = w/12 (sum_i d_i d_i + s s) = w/12 sum_i (d_i + s/3)^2.
+                e = len(chunk.stress)
+                corners, difference = self.vertices[chunk.part].T, np.empty((3, e, m * k))
+                np.take(self.fits[:, 0], corners, axis=0, out=difference, mode="clip")  # which needs no buffer
+                difference += (difference[0] + difference[1] + difference[2]) / 3 - 2 * chunk.stress.reshape(e, m * k)
+                difference = (difference * np.sqrt(chunk.weights / 12)).reshape(3, e, m, k)
             flat = difference.reshape(-1, m * k)
             total += flat.T @ flat
             if with_shares:
                 shares.append((self.flexibility @ difference * difference).sum(axis=(0, 2)))
         return np.einsum("ab,akbl->kl", self.flexibility, total.reshape(m, k, m, k)), np.concatenate(shares)
-
-    def _off(self, chunk: ElementStresses) -> Float:
-        """(q, e, m, k) recovered less own stress at places in the elements, times the root of their weights."""
-        if self.order == 2:
-            off = self.recovered(chunk.part, barycentric(6)) - chunk.stress
-            return np.asarray((off * np.sqrt(chunk.weights)[..., None, None]).swapaxes(0, 1))
-        # Linear less uniform stresses d, of which d_i at the vertices have the sum s:
-        # int d d = w/12 (sum_i d_i d_i + s s) = w/12 sum_i (d_i + s/3)^2.
-        e, _, m, k = chunk.stress.shape
-        off = np.empty((3, e, m * k))
-        np.take(self.fits[:, 0], self.vertices[chunk.part].T, axis=0, out=off, mode="clip")  # which needs no buffer
-        off += (off[0] + off[1] + off[2]) / 3 - 2 * chunk.stress.reshape(e, m * k)
-        off *= np.sqrt(chunk.weights / 12)
-        return off.reshape(3, e, m, k)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, cast
 
@@ -25,26 +25,20 @@ if TYPE_CHECKING:
     from feti_homog.feti.exact.exact_inverse import ExactInverse
 
 
-def _influence(operators: InterfaceOperators) -> Preconditioner:
-    from feti_homog.feti.exact.exact_inverse import ExactInverse  # four modules that no other one needs
+def construct(name: str, operators: InterfaceOperators) -> Preconditioner:
+    """Construct a preconditioner that `choose` may choose.  Collective.
 
-    return ExactInverse(operators)
+    Modules of exact inverses are loaded where they are needed.
+    """
+    if name == "influence":
+        from feti_homog.feti.exact.exact_inverse import ExactInverse
 
+        return ExactInverse(operators)
+    if name == BONDED:
+        from feti_homog.feti.exact.reference_cell import BondedInverse
 
-def _bonded(operators: InterfaceOperators) -> Preconditioner:
-    from feti_homog.feti.exact.reference_cell import BondedInverse  # with two of these modules
-
-    return BondedInverse(operators)
-
-
-CLASSES: dict[str, Callable[[InterfaceOperators], Preconditioner]] = {
-    "none": lambda *_: Identity(),
-    "lumped": Lumped,
-    "dirichlet": Dirichlet,
-    "influence": _influence,
-    BONDED: _bonded,
-}
-"""Constructor of each preconditioner that `choose` may choose."""
+        return BondedInverse(operators)
+    return {"none": lambda _: Identity(), "lumped": Lumped, "dirichlet": Dirichlet}[name](operators)
 
 
 @dataclass(frozen=True)
@@ -134,7 +128,7 @@ def build(
     with PETSc.Log.Event("FETISubdomains"):
         operators = agree(comm, InterfaceOperators, jump_operator, subdomains, *how)
     plan = choose(_sizes(operators, applications, one_each), options, thresholds)
-    preconditioner = CLASSES[plan.preconditioner](operators)
+    preconditioner = construct(plan.preconditioner, operators)
     with PETSc.Log.Event("FETINatural"):
         natural = NaturalCoarseSpace(operators)
     adaptive = None

@@ -8,6 +8,8 @@ Errors that the contexts raise are kept until PETSc has returned (`CallbackError
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -59,19 +61,18 @@ class ProjectedProblem:
         """y = P F x.  Collective."""
         with self._events[0]:
             values = x.getArray(readonly=True).reshape(-1, self._residual.shape[1])
-            y.setArray(self._errors.call(lambda: self._product(values), np.full(values.shape, np.nan)).ravel())
+            y.setArray(self._projected(lambda: self._active.restrict(self._operator.apply(values))))
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, z: PETSc.Vec) -> None:
         """z = P H r.  Collective."""
         with self._events[1]:
             self._residual = r.getArray(readonly=True).reshape(-1, self._residual.shape[1])
-            z.setArray(self._errors.call(self._preconditioned, np.full(self._residual.shape, np.nan)).ravel())
+            z.setArray(self._projected(lambda: self._preconditioner.apply(self._residual)))
 
-    def _product(self, x: Float) -> Float:
-        return self._natural.project(self._active.restrict(self._operator.apply(x)))
-
-    def _preconditioned(self) -> Float:
-        return self._natural.project(self._preconditioner.apply(self._residual))
+    def _projected(self, vectors: Callable[[], Float]) -> Float:
+        """P of `vectors`, flat; NaN where they raise."""
+        nothing = np.full((len(self._active.mask), self._residual.shape[1]), np.nan)
+        return self._errors.call(lambda: self._natural.project(vectors()), nothing).ravel()
 
     def jump_norm(self) -> float:
         """|P r| of the last r: the jump that the best rigid-body motions leave.  Collective."""
@@ -104,20 +105,17 @@ class PrimalTest:
 
     Attributes:
         ends_on_stall: whether norms that do not fall any more are a breakdown.
+        jump_scale, force_scale: norms of the torn cell's jump and of the forces that close it, for the next solve.
     """
 
     def __init__(self, errors: CallbackErrors, problem: ProjectedProblem) -> None:
         self._errors, self._problem, self.ends_on_stall = errors, problem, False
-        self._jump_scale, self._force_scale = 1.0, 1.0
+        self.jump_scale, self.force_scale = 1.0, 1.0
         self._jump_stall, self._force_stall = Stall(STALL_ITERATIONS), Stall(FORCE_STALL_ITERATIONS)
-
-    def set_scales(self, jump: float, forces: float) -> None:
-        """Set the norms of the torn cell's jump and of the forces that close it, for the next solve."""
-        self._jump_scale, self._force_scale = jump, forces
 
     def is_met(self, rtol: float, jump: float, forces: float) -> bool:
         """Return whether norms of the jump and of the forces are both below rtol, or there is no jump."""
-        return jump <= rtol * self._jump_scale and (forces <= rtol * self._force_scale or jump == 0.0)
+        return jump <= rtol * self.jump_scale and (forces <= rtol * self.force_scale or jump == 0.0)
 
     def __call__(self, ksp: PETSc.KSP, iteration: int, residual: float) -> PETSc.KSP.ConvergedReason:
         """Return whether to go on; `residual` is the norm of the preconditioned one, |P H r|.  Collective."""
@@ -131,16 +129,16 @@ class PrimalTest:
             self._force_stall.reset()
         if not np.isfinite(residual):
             return PETSc.KSP.ConvergedReason.DIVERGED_NANORINF
-        if residual > divtol * self._force_scale:
+        if residual > divtol * self.force_scale:
             return PETSc.KSP.ConvergedReason.DIVERGED_DTOL
         if residual <= atol:
             return PETSc.KSP.ConvergedReason.CONVERGED_ATOL
-        if residual > rtol * self._force_scale:
+        if residual > rtol * self.force_scale:
             return self._go_on(self._force_stall.is_reached(iteration, residual))
         if ksp.getType() not in PRECONDITION_TRUE_RESIDUAL:
             return PETSc.KSP.ConvergedReason.CONVERGED_RTOL
         jump = self._problem.jump_norm()
-        if jump <= rtol * self._jump_scale:
+        if jump <= rtol * self.jump_scale:
             return PETSc.KSP.ConvergedReason.CONVERGED_RTOL
         return self._go_on(self._jump_stall.is_reached(iteration, jump))
 

@@ -135,15 +135,10 @@ class FetiSolver:
         """The unit loads on the boundaries, with the answer of the interiors to loads inside."""
         return self.interface_operators.condensed
 
-    @property
-    def loads(self) -> Float:
-        """(boundary dofs, v) unit loads on the boundaries, Q there where no void is near."""
-        return self.condensed.boundary
-
     @cached_property
     def _torn_displacement(self) -> Float:
         """(boundary dofs, v) K+ (-Q), of the torn cell under the unit loads."""
-        operators, u = self.interface_operators, self.interface_operators.apply_flexibility(-self.loads)
+        operators, u = self.interface_operators, self.interface_operators.apply_flexibility(-self.condensed.boundary)
         parts = zip(self.subdomains, operators.dofs, operators.slices, strict=True)
         return np.concatenate([u[:0], *(s.without_rounding(u[span], dofs) for s, dofs, span in parts)])
 
@@ -155,7 +150,7 @@ class FetiSolver:
     @cached_property
     def torn_stiffness(self) -> Float:
         """(v, v) sum |Omega_s| L_s - Q^T K+ Q: the stress integral of the torn cell under the unit loads."""
-        local = self.condensed.stiffness + self.loads.T @ self._torn_displacement
+        local = self.condensed.stiffness + self.condensed.boundary.T @ self._torn_displacement
         return np.asarray(self.comm.allreduce(local))
 
     def stress_integral(self, solution: DualSolution) -> Float:
@@ -209,7 +204,8 @@ class FetiSolver:
         forces = self.preconditioner.closing_forces
         closing = forces(right) if columns is None else columns.closing(self.d, E, is_seen / scale)
         closing = self.natural.project(closing)
-        krylov.test.set_scales(float(np.sqrt(is_seen.sum())), float(np.linalg.norm(self._jumps.norms(closing))))
+        krylov.test.jump_scale = float(np.sqrt(is_seen.sum()))
+        krylov.test.force_scale = float(np.linalg.norm(self._jumps.norms(closing)))
         starts = np.where(is_seen, self.natural.project(self.active.restrict(starts)), 0.0) / scale
         lam = closing if self.preconditioner.is_exact else starts
         last = Iterate(lam, np.zeros_like(lam), right)

@@ -38,10 +38,7 @@ class SolverOptions:
 
     @classmethod
     def read(
-        cls,
-        text: Callable[[str, str], str],
-        number: Callable[[str, float], float],
-        thresholds: Thresholds = DEFAULTS,
+        cls, text: Callable[[str, str], str], number: Callable[[str, float], float], thresholds: Thresholds = DEFAULTS
     ) -> SolverOptions:
         """Return the options that text(name, default) and number(name, default) find, names without `feti_`.
 

@@ -19,7 +19,7 @@ class Thresholds:
 
     Attributes:
         dense_boundary_dofs: boundary dofs of a subdomain up to which `-feti_dual_operator auto` ever
-            makes dense matrices, of 8 n^2 bytes.
+            makes dense matrices, of 8 n^2 bytes; rows of the largest dense assembled Schur complement.
         soft_mode: tau, no unit; displacements p with S p = theta N p, theta < tau, are soft.  The default of
             `-feti_coarse_threshold`; the condition number is about 1 / tau.  Measured [0.1, 0.24, 0.35, 0.5]:
             30, 20, 17, 14 iterations, 4.4, 5.4, 6.3, 7.3 vectors a subdomain.
@@ -73,8 +73,8 @@ CHOLMOD_COLUMNS_ONE_BY_ONE, MUMPS_COLUMNS_ONE_BY_ONE = 2, 1
 # milliseconds; one factor of all ranks waits for messages. With 1 812 unknowns on two ranks both cost alike
 # (`scripts/benchmark scripts/cases/benchmark_1m.toml`, with and without `-feti_coarse_pc_type cholesky`).
 REPLICATED_UNKNOWNS = 2000
-# Share of the entries of an assembled Schur complement from which on it is factored as a dense matrix, and most rows.
-DENSE_SHARE, MOST_DENSE_ROWS = 0.5, 6000
+# Share of the entries of an assembled Schur complement from which on it is factored as a dense matrix.
+DENSE_SHARE = 0.5
 # Rows up to which LAPACK's dtrtri inverts a triangle faster than halving it.
 TRIANGLE_INVERSE_ROWS = 48
 # Rows of the blocks in which a triangle is mirrored, so that they fit the cache.
@@ -153,15 +153,13 @@ LEAST_UNCONFIRMED_JUMP = 1e-6
 
 # exact
 
-# Influence columns that a rank finds at once, and ranks up to which all are found together: bounds the memory of their
-# right-hand sides, (boundary dofs, both).  A column takes CHOLMOD the less, the more are found at once.
-INFLUENCE_CHUNK, CHUNK_RANKS = 64, 4
 # Changed rows after which the cell as it stands is factored in place of them: the default of `-feti_influence_columns`;
 # and rows of cells in which that never pays (`scripts/benchmark_path --to-the-end`).
 INFLUENCE_COLUMNS, NEVER_REFACTORED_ROWS = 1000, 2500
 # Influence columns that each rank finds together at least, with those of bonds near the one that breaks: fewer and
-# larger batches, but columns that may not be needed (`scripts/benchmark_path --to-the-end`).
-INFLUENCE_BATCH = 64
+# larger batches, but columns that may not be needed (`scripts/benchmark_path --to-the-end`).  Ranks up to which all are
+# found together: both bound the memory of right-hand sides (boundary dofs, both).
+INFLUENCE_BATCH, CHUNK_RANKS = 64, 4
 # Columns from which on unused ones are no longer followed, or twice as many as `-feti_influence_columns`, 8 bytes an
 # owned row each; changes that wait before all of these follow (`scripts/benchmark_path --to-the-end`).
 FOLLOWED_COLUMNS, WAITING_COLUMNS = 2400, 32
@@ -190,9 +188,10 @@ SINGULAR_PIVOT = 1e-10
 
 # coarse
 
-# Eigenvalues of G^T G, relative to the largest diagonal entry of the bodies that are coupled, of motions that no active
-# row resists: rounding leaves about 1e-15, and one resisting row of n about 1 / n.
-UNCONSTRAINED_EIGENVALUE = 1e-10
+# Eigenvalues of G^T G, relative to the largest diagonal entry of the bodies that are coupled, and energies of averaged
+# modes, relative to the energy with all rows active, of motions that no active row resists: rounding leaves about
+# 1e-15, and one resisting row of n about 1 / n.
+UNCONSTRAINED = 1e-10
 # Nodes of a face below which its neighbourhood has no eigenproblem of its own: a single node can only translate.
 MIN_FACE_NODES = 2
 # Eigenvalues of a matrix in single precision, relative to its largest, that are rounding.
@@ -201,7 +200,6 @@ SINGLE_PRECISION_NULL = 1e-6
 # factored: averaged modes may depend on each other.  In the lists of `scripts/robustness`, with contrasts to 1e6, the
 # first was enough.
 COARSE_REGULARISATIONS = (1e-12, 1e-10, 1e-8)
-# Energy of an averaged mode, relative to that with all rows active, below which it is a free motion.
-FREE_MODE_ENERGY = 1e-10
-# The same with all rows active, relative to the largest, that is rounding of displacements: the square of their 1e-14.
+# Energy of an averaged mode with all rows active, relative to the largest, that is rounding of displacements: the
+# square of their 1e-14.
 ROUNDED_MODE_ENERGY = 1e-28

@@ -132,7 +132,7 @@ class Homogenization:
         cell, solver, state = self.cell, self.cell.solver, self.interface.completed(state)
         strain, u = state.solution.strain, solver.boundary_displacement(state.solution)
         # <sigma>, <eps*> over bodies and voids, and <sigma:eps>.
-        without_u, from_u = solver.condensed.stiffness @ strain, solver.loads.T @ u
+        without_u, from_u = solver.condensed.stiffness @ strain, solver.condensed.boundary.T @ u
         work = strain @ solver.condensed.energy @ strain + 2 * strain @ from_u
         work += u @ solver.interface_operators.apply_schur(u)
         sums = np.concatenate([without_u + from_u, self._strain_of_displacements.T @ u, [work]])

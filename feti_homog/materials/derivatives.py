@@ -71,18 +71,13 @@ def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, fl
     turn = turn if len(C) == 6 else turn[IN_PLANE_BLOCK]
     for name, value in values.items():
         moved = {other: complex(known, STEP * (other == name)) for other, known in values.items()}
-        changed = _of_plane_state(_compliance(replace(material, **moved)), plane, condensed="strain")
+        varied = replace(material, **moved)
+        if isinstance(varied, Isotropic):
+            named = {entry: getattr(varied, key) for entry, key in ISOTROPIC_COMPLIANCE.items()}
+            varied = TransverselyIsotropic(**named, G_axial=varied.young / (2 * (1 + varied.poisson)))
+        with np.errstate(invalid="ignore"):  # NaN where the constants leave the compliance open
+            changed = _of_plane_state(known_compliance(varied), plane, condensed="strain")
         yield name, value, -C @ turn @ changed @ turn.T @ C
-
-
-def _compliance(material: Any) -> NDArray[Any]:
-    """(6, 6) complex compliance in the material axes; NaN where the constants leave it open."""
-    if isinstance(material, Isotropic):
-        shear = material.young / (2 * (1 + material.poisson))
-        named = {name: getattr(material, key) for name, key in ISOTROPIC_COMPLIANCE.items()}
-        material = TransverselyIsotropic(**named, G_axial=shear)
-    with np.errstate(invalid="ignore"):
-        return known_compliance(material)
 
 
 def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:

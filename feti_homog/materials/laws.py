@@ -11,14 +11,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from feti_homog.materials.forms import (
-    EXPANSION_PAIR,
-    General,
-    Isotropic,
-    Material,
-    Orthotropic,
-    TransverselyIsotropic,
-)
+from feti_homog.materials.forms import EXPANSION_PAIR, General, Isotropic, Material, Orthotropic, TransverselyIsotropic
 from feti_homog.materials.voigt import (
     GENERALIZED,
     IN_PLANE,
@@ -35,10 +28,7 @@ from feti_homog.typing import Float
 COUPLINGS = ((0, 3), (0, 4), (1, 3), (1, 4), (2, 3), (2, 4), (3, 5), (4, 5))
 """Entries of a spatial stiffness that vanish where x3 is normal to a plane of symmetry."""
 NEEDED: dict[type[Orthotropic] | type[TransverselyIsotropic], dict[str, tuple[str, ...]]] = {
-    Orthotropic: {
-        PLANE_STRAIN.name: ("E3", "nu13", "nu23"),
-        GENERALIZED.name: ("E3", "nu13", "nu23", "G13", "G23"),
-    },
+    Orthotropic: {PLANE_STRAIN.name: ("E3", "nu13", "nu23"), GENERALIZED.name: ("E3", "nu13", "nu23", "G13", "G23")},
     TransverselyIsotropic: {
         PLANE_STRAIN.name: ("E_axial", "nu_axial"),
         GENERALIZED.name: ("E_axial", "nu_axial", "G_axial"),

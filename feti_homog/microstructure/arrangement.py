@@ -164,7 +164,14 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
     """
     size, outlines = arrangement.size, arrangement.shells[0]
     for narrowest in (NARROWEST, 0.0):
-        corners = _clear_corners(arrangement, narrowest)
+        lines = []
+        for touching, period in zip(_tangents(arrangement).transpose(1, 0, 2), size, strict=True):
+            places = np.sort(touching.ravel() % period)
+            gaps = np.diff(places, append=places[0] + period)
+            wide = np.argsort(-gaps.round(DECIMALS), kind="stable")[:MOST_GAPS]
+            wide = wide[gaps[wide] > narrowest * gaps[wide[0]]]
+            lines.append(places[wide] + gaps[wide] / 2)
+        corners = np.array(list(product(*lines)))
         inside = in_voids(arrangement, corners)
         if not inside.all():
             corners = corners[~inside]
@@ -192,18 +199,6 @@ def _away(outlines: Outlines, places: Float, size: Float) -> Float:
     return np.asarray((outlines.centres - places[:, None] + size / 2) % size - size / 2)
 
 
-def _clear_corners(arrangement: Arrangement, narrowest: float) -> Float:
-    """(n, 2) corners whose sides are in the middle of the widest gaps between tangents."""
-    lines = []
-    for touching, period in zip(_tangents(arrangement).transpose(1, 0, 2), arrangement.size, strict=True):
-        places = np.sort(touching.ravel() % period)
-        gaps = np.diff(places, append=places[0] + period)
-        wide = np.argsort(-gaps.round(DECIMALS), kind="stable")[:MOST_GAPS]
-        wide = wide[gaps[wide] > narrowest * gaps[wide[0]]]
-        lines.append(places[wide] + gaps[wide] / 2)
-    return np.array(list(product(*lines)))
-
-
 def _tangents(arrangement: Arrangement) -> Float:
     """(k, 2, 2) where lines across each axis touch each outline, on either side."""
     outlines, _ = arrangement.shells
@@ -223,38 +218,23 @@ def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Flo
     is_near = ((images > -reach) & (images < size + reach)) | (STEPS[:, None] == 0)
     step, near = np.nonzero(is_near.all(axis=2))
     place, who = np.concatenate([inside, images[step, near]]), np.concatenate([np.arange(len(centres)), near])
-    _refuse_many(place, reach)
-    first, second = _pairs(place, len(centres), reach)
+    if len(place) ** 2 >= 2 * MOST_PAIRS and reach > 0:
+        # A place has about 2 pi times as many neighbours as are in its square with diagonal `reach`.
+        column, row = np.floor(place * (np.sqrt(2) / reach)).astype(np.int64).T
+        _, crowd = np.unique(column * 2**32 + row, return_counts=True)
+        if (count := np.pi * float((crowd.astype(float) ** 2).sum())) > MOST_PAIRS:
+            raise MeshError(
+                f"[cell] about {count:.2g} pairs of fibres are nearer to each other than {reach:.2g}; expected at most "
+                f"{MOST_PAIRS}: they lie on top of each other, or one is much larger than the others"
+            )
+    if len(centres) * len(place) <= FEW:
+        away = place - inside[:, None]
+        first, second = np.nonzero(np.triu((away * away).sum(axis=2) <= reach * reach, 1))
+    else:
+        # A tree that is used once is not worth being balanced.
+        tree = cKDTree(place, balanced_tree=False, compact_nodes=False)
+        first, second = tree.query_pairs(reach, output_type="ndarray").T
     keep = np.flatnonzero((first < len(centres)) & (who[first] <= who[second]))
     keep = keep[np.argsort(first[keep] * len(place) + second[keep])]
     first, second = first[keep], second[keep]
     return who[first], who[second], place[second] - place[first]
-
-
-def _pairs(place: Float, count: int, reach: float) -> tuple[Int, Int]:
-    """Pairs i < j of places (n, 2) nearer than `reach`; among few places the first is one of `count`."""
-    if count * len(place) <= FEW:
-        away = place - place[:count, None]
-        first, second = np.nonzero((away * away).sum(axis=2) <= reach * reach)
-        ascending = first < second
-        return first[ascending], second[ascending]
-    # A tree that is used once is not worth being balanced.
-    pairs = cKDTree(place, balanced_tree=False, compact_nodes=False).query_pairs(reach, output_type="ndarray")
-    return pairs[:, 0], pairs[:, 1]
-
-
-def _refuse_many(points: Float, reach: float) -> None:
-    """Raise MeshError where points (n, 2) make too many pairs.
-
-    A point has about 2 pi times as many neighbours as are in its square with diagonal `reach`.
-    """
-    if len(points) ** 2 < 2 * MOST_PAIRS or reach <= 0:
-        return
-    column, row = np.floor(points * (np.sqrt(2) / reach)).astype(np.int64).T
-    _, own = np.unique(column * 2**32 + row, return_counts=True)
-    count = np.pi * float((own.astype(float) ** 2).sum())
-    if count > MOST_PAIRS:
-        raise MeshError(
-            f"[cell] about {count:.2g} pairs of fibres are nearer to each other than {reach:.2g}; expected at most "
-            f"{MOST_PAIRS}: they lie on top of each other, or one is much larger than the others"
-        )

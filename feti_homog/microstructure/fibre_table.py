@@ -140,7 +140,13 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
     read, others = understood(words, COLUMNS)
     _check_names(words, read, others, lines[0][0], faults)
     faults.throw()
-    rows = dict(_split(_below_names(lines, columns is None, delimiter), read, len(words), delimiter, faults))
+    rows: dict[int, dict[str, Any]] = {}
+    for number, line in _below_names(lines, columns is None, delimiter):
+        cells = cells_of(line, delimiter)
+        if fault := row_fault(line, cells, len(words)):
+            faults.add(number, fault)
+        else:
+            rows[number] = {c.name: c.read(cells[c.place], delimiter) for c in read if cells[c.place]}
     remarks = (f"[cell] {name}: not read: {', '.join(map(toml_value, others))}",) if others else ()
     return replace(_table(name, rows, {column.name for column in read}, sizes, faults), remarks=remarks)
 
@@ -217,18 +223,6 @@ def _missing(names: set[str]) -> list[str]:
     """Columns that a table with these lacks: x, y, and the radius or a shape's sizes, which stand in its place."""
     sizes = next((sizes for sizes in (("radius",), *REPLACING) if names & set(sizes)), ("radius",))
     return [name for name in ("x", "y", *sizes) if name not in names]
-
-
-def _split(
-    lines: list[tuple[int, str]], columns: Sequence[SourceColumn], count: int, delimiter: str | None, faults: _Faults
-) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Each row's number, and its cells by column: numbers, texts, and nothing for cells that are empty."""
-    for row, line in lines:
-        words = cells_of(line, delimiter)
-        if fault := row_fault(line, words, count):
-            faults.add(row, fault)
-        else:
-            yield row, {c.name: c.read(words[c.place], delimiter) for c in columns if words[c.place]}
 
 
 def _table(

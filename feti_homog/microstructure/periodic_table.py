@@ -176,8 +176,10 @@ def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> li
 
     Discs reach into a periodic cell; in a cut window the centres are within.
     """
-    radius, called = _largest_sizes(table)
-    faults = []
+    # The largest of the lengths that each row gives, and its column.
+    names = ["radius", *(name for shape in SHAPES for name in shape.sizes if name != "radius")]
+    sizes = np.nan_to_num(np.stack([table.columns[name] for name in names]))
+    radius, column, faults = sizes.max(axis=0), sizes.argmax(axis=0), []
     for axis, (name, width) in enumerate(zip(("width", "height"), size.tolist(), strict=True)):
         over = np.maximum(-centres[:, axis], centres[:, axis] - width)
         reach = radius if (table.left, table.bottom)[axis] is not None else np.full_like(radius, 2 * radius.max())
@@ -186,18 +188,11 @@ def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> li
             faults.append(f"row {table.row[k]}: {'xy'[axis]} = {value:g}: lies outside the cell, of {name} {width:g}")
     for k in np.flatnonzero((2 * radius >= size.min()) | (radius < SMALLEST_RADIUS * size[0])).tolist():
         limits = f"from {SMALLEST_RADIUS * size[0]:g} to below {size.min() / 2:g} in this cell"
-        faults.append(f"row {table.row[k]}: {called[k]} = {radius[k]:g}: expected {limits}")
+        faults.append(f"row {table.row[k]}: {names[column[k]]} = {radius[k]:g}: expected {limits}")
     least, most = COATINGS
     bad = np.flatnonzero((table.coating > 0) & ((table.coating < least) | (table.coating > most)))
     expected = f"expected 0, or from {least:g} to {most:g}"
     return faults + [f"row {table.row[k]}: coating = {table.coating[k]:g}: {expected}" for k in bad.tolist()]
-
-
-def _largest_sizes(table: FibreTable) -> tuple[Float, list[str]]:
-    """Return the largest of the lengths (N,) that rows give, and their columns."""
-    names = ["radius", *(name for shape in SHAPES for name in shape.sizes if name != "radius")]
-    given = np.nan_to_num(np.stack([table.columns[name] for name in names]))
-    return given.max(axis=0), [names[k] for k in given.argmax(axis=0).tolist()]
 
 
 def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> tuple[Bool, list[str]]:

@@ -74,7 +74,12 @@ class NearestNeighbours:
 
 def nearest_neighbours(pattern: FibrePattern, count: int = 3) -> NearestNeighbours:
     """Return each fibre's neighbours; in a periodic cell images count, also its own."""
-    candidates, _ = pattern.images(_reach(pattern, count))
+    # Within `reach` each fibre in a periodic cell has so many neighbours.
+    reach = (count + 1) // 2 * pattern.size.min()
+    if pattern.periodic and pattern.count > count:
+        away, _ = cKDTree(pattern.wrapped, boxsize=pattern.size).query(pattern.wrapped, count + 1)
+        reach = min(reach, away.max()) * (1 + 1e-9)
+    candidates, _ = pattern.images(float(reach))
     known = min(count, len(candidates) - 1)
     distances, directions = np.full((pattern.count, count), np.inf), np.full((pattern.count, count), np.nan)
     if known:
@@ -83,15 +88,6 @@ def nearest_neighbours(pattern: FibrePattern, count: int = 3) -> NearestNeighbou
         vectors = candidates[which[:, 1:]] - candidates[: pattern.count, None]
         directions[:, :known] = np.degrees(np.arctan2(vectors[..., 1], vectors[..., 0])) % 360
     return NearestNeighbours(distances, directions, _weights(pattern, distances))
-
-
-def _reach(pattern: FibrePattern, count: int) -> float:
-    """Return a distance within which each fibre in a periodic cell has so many neighbours."""
-    own_images = (count + 1) // 2 * pattern.size.min()
-    if not pattern.periodic or pattern.count <= count:
-        return float(own_images)
-    others, _ = cKDTree(pattern.wrapped, boxsize=pattern.size).query(pattern.wrapped, count + 1)
-    return float(min(own_images, others.max()) * (1 + 1e-9))
 
 
 def _weights(pattern: FibrePattern, distances: Float) -> Float:

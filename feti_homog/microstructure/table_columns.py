@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import operator
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -110,11 +111,6 @@ def _half(value: float) -> float:
     return value / 2
 
 
-def _turned(value: float) -> float:
-    """Return an angle that is measured as a picture is seen, for coordinates whose y points down."""
-    return -value
-
-
 # Other names of columns, those before first, and what makes the column of their values. Major and Minor are ImageJ's
 # axes of ellipses, whose areas are of no more use; MATLAB's Centroid_1 is x, centroid-0 of scikit-image its row, y.
 OTHERS: tuple[tuple[tuple[str, ...], str, Callable[[float], float]], ...] = (
@@ -161,7 +157,8 @@ def _bare_names(words: Sequence[str]) -> list[str]:
 def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceColumn], list[str]]:
     """Return the columns in a name line that are `known`, in any case, and the other words."""
     bare = _bare_names(words)
-    values = {"angle": _turned} if AXES_OF_PICTURES & set(bare) else {}
+    # An angle is measured as a picture is seen, for coordinates whose y points down.
+    values: dict[str, Callable[[float], float]] = {"angle": operator.neg} if AXES_OF_PICTURES & set(bare) else {}
     columns = [SourceColumn(place, name, values.get(name, _same)) for place, name in enumerate(bare) if name in known]
     for others, name, value in OTHERS:
         given = {column.name for column in columns}

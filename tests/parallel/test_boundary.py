@@ -13,8 +13,10 @@ from support.cases import make_case, relative_error, solve
 
 from feti_homog.case import sections
 from feti_homog.errors import CaseError
+from feti_homog.feti.factory import construct
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.one_subdomain import ExplicitInterfaceOperator, ImplicitInterfaceOperator
+from feti_homog.feti.solver_plan import BONDED, PRECONDITIONERS
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.homogenization import unit_cell
 from feti_homog.homogenization.partition_policy import PartitionPolicy, wanted_pieces
@@ -213,3 +215,9 @@ def test_default_pieces_of_a_debonding_cell_are_bodies_unless_wide(comm):
     cell, bodies, narrowed = torn_by_default(comm, sections.InterfaceSection())
     assert len(bodies) > 4
     assert narrowed < min(largest, 1.5 * 100)
+
+
+def test_every_preconditioner_is_constructed(torn):
+    operators = torn(petsc={"feti_dual_operator": "explicit"}, geometry="hexagonal").solver.interface_operators
+    names = sorted({*PRECONDITIONERS, BONDED} - {"auto"})
+    assert len({type(construct(name, operators)) for name in names}) == len(names)

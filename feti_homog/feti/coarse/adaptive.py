@@ -31,13 +31,7 @@ from feti_homog.feti.linalg.distributed_solver import DistributedSolver
 from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, scaled
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.preconditioners import Dirichlet, Preconditioner, StiffnessScaled, never_softens
-from feti_homog.feti.thresholds import (
-    COARSE_REGULARISATIONS,
-    DEFAULTS,
-    FREE_MODE_ENERGY,
-    ROUNDED_MODE_ENERGY,
-    Thresholds,
-)
+from feti_homog.feti.thresholds import COARSE_REGULARISATIONS, DEFAULTS, ROUNDED_MODE_ENERGY, UNCONSTRAINED, Thresholds
 from feti_homog.system.parallel.distributed_arrays import allreduce_sum, scale_rows
 from feti_homog.system.runtime import process_memory
 from feti_homog.typing import Float, Int
@@ -147,7 +141,7 @@ class AdaptiveCoarseSpace:
         energy = allreduce_sum(self.comm, energies)[self._modes.reaching]
         if self._free_energy is None:
             largest = self.comm.allreduce(energy.max(initial=0.0), MPI.MAX)
-            self._free_energy = FREE_MODE_ENERGY * np.where(energy > ROUNDED_MODE_ENERGY * largest, energy, largest)
+            self._free_energy = UNCONSTRAINED * np.where(energy > ROUNDED_MODE_ENERGY * largest, energy, largest)
         # What a free motion has of energy is rounding, which would be scaled up to more than what is added.
         is_held = energy > self._free_energy
         root = np.sqrt(np.where(is_held, energy, 0.0))

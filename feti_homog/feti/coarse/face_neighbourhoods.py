@@ -32,11 +32,7 @@ from feti_homog.typing import Bool, Float, Int
 
 
 def trace_space(
-    submesh: Submesh,
-    lattice: ReferenceLattice,
-    problem: Problem,
-    nodes: Int,
-    min_dofs: int = DEFAULTS.min_trace_dofs,
+    submesh: Submesh, lattice: ReferenceLattice, problem: Problem, nodes: Int, min_dofs: int = DEFAULTS.min_trace_dofs
 ) -> csr_matrix:
     """(cn, cm) P for n boundary nodes, sorted classes of the refined piece, with at least `min_dofs` columns if cn is.
 
@@ -107,7 +103,13 @@ def face_neighbourhoods(
     on_face[nodes[face]] = True
     on_others = np.zeros_like(on_face)
     on_others[nodes] = ~on_face[nodes]
-    triangles = _near(body, on_face, thresholds.face_layers)
+    classes = body.mesh.node_class[body.mesh.nodes]
+    is_near = on_face[classes].any(axis=1)
+    for _ in range(thresholds.face_layers - 1):
+        corners = np.zeros(len(on_face), bool)
+        corners[classes[is_near, :3]] = True
+        is_near |= corners[classes[:, :3]].any(axis=1)
+    triangles = np.flatnonzero(is_near)
     edges = body.submesh.edge_class[body.submesh.triangle_edges[triangles]]
     label = components(len(triangles), *edge_pairs(edges))
     neighbourhoods = (
@@ -137,14 +139,3 @@ def _neighbourhood(
     S_fixed = schur_complement(K[movable][:, movable].tocsr(), np.searchsorted(movable, face))
     P = trace_space(subdomain.submesh, subdomain.mesh.lattice, subdomain.problem, nodes, min_trace_dofs)
     return FaceNeighbourhood(at, ExplicitInterfaceOperator(subdomain, K, face), subdomain.R[face], P, S_fixed)
-
-
-def _near(body: Subdomain, on_face: Bool, layers: int) -> Int:
-    """Coarse triangles within so many layers of the marked nodes."""
-    classes = body.mesh.node_class[body.mesh.nodes]
-    is_near = on_face[classes].any(axis=1)
-    for _ in range(layers - 1):
-        corners = np.zeros(len(on_face), bool)
-        corners[classes[is_near, :3]] = True
-        is_near |= corners[classes[:, :3]].any(axis=1)
-    return np.flatnonzero(is_near)

@@ -12,7 +12,6 @@ reaches the subdomains that share nodes with it, and no further.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -28,16 +27,9 @@ from feti_homog.system.parallel.distributed_arrays import allreduce_sum
 from feti_homog.system.parallel.mpi_errors import agree
 from feti_homog.typing import Float, Float32, Int
 
-
-class _Jumps(NamedTuple):
-    """Jumps B V that the modes of a subdomain, itself or a neighbour, open on subdomain rows.
-
-    `rows` (r,) are positions among the subdomain's rows, `columns` (c,) numbers of coarse modes, `values` (r, c).
-    """
-
-    rows: Int
-    columns: Int
-    values: Float
+# Jumps B V that the modes of a subdomain, itself or a neighbour, open on subdomain rows: positions (r,) among the rows
+# of the subdomain, numbers (c,) of coarse modes, and values (r, c).
+Jumps = tuple[Int, Int, Float]
 
 
 class AveragedModes:
@@ -59,7 +51,7 @@ class AveragedModes:
         self.total = int(ends[-1]) if len(ends) else 0
         self._first = [int(ends[s]) - v.shape[1] for s, v in zip(neighbours.index, V, strict=True)]
         none = np.zeros(0, np.int64)
-        self.columns = [np.unique(np.concatenate([none, *(jumps.columns for jumps in of)])) for of in self._jumps]
+        self.columns = [np.unique(np.concatenate([none, *(columns for _, columns, _ in of)])) for of in self._jumps]
         self.reaching = np.unique(np.concatenate([none, *self.columns]))
         numbers = [first + np.arange(v.shape[1]) for first, v in zip(self._first, V, strict=True)]
         self.is_own = np.isin(self.reaching, np.concatenate([none, *numbers]))
@@ -94,7 +86,7 @@ class AveragedModes:
 
 def _exchange_jumps(
     comm: MPI.Intracomm, blocks: Sequence[SubdomainBlocks], neighbours: Neighbours, V: Sequence[Float]
-) -> tuple[list[list[_Jumps]], Int]:
+) -> tuple[list[list[Jumps]], Int]:
     """Return the jumps on the rows of each local subdomain, and where coarse modes end.  Collective.
 
     The ends are the last coarse mode + 1 for each subdomain in the cell.
@@ -113,10 +105,9 @@ def _exchange_jumps(
                 some = np.arange(v.shape[1]) if t == s else np.flatnonzero(Z[common].any(axis=0))
                 yield i, t, (first + some, Z[np.ix_(common, some)])
 
-    received: list[list[_Jumps]] = [[] for _ in blocks]
+    received: list[list[Jumps]] = [[] for _ in blocks]
     neighbours.exchange(
-        messages(),
-        lambda i, sender, message: received[i].append(_Jumps(neighbours.common[i][sender], *message)),
+        messages(), lambda i, sender, message: received[i].append((neighbours.common[i][sender], *message))
     )
     return received, ends
 
@@ -150,10 +141,7 @@ def scaled_constraints(scaling: StiffnessScaled) -> csc_matrix:
 
 
 def kernels_and_soft_modes(
-    blocks: Sequence[SubdomainBlocks],
-    neighbours: Neighbours,
-    threshold: float,
-    thresholds: Thresholds = DEFAULTS,
+    blocks: Sequence[SubdomainBlocks], neighbours: Neighbours, threshold: float, thresholds: Thresholds = DEFAULTS
 ) -> list[Float]:
     """V: for each subdomain of this rank (n, k + m) its kernel and its m modes below the threshold.  Collective.
 

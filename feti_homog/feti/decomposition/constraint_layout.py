@@ -106,15 +106,8 @@ class ConstraintLayout:
 
     def matrix(self) -> csr_matrix:
         """B (local rows, local dofs)."""
-        entries = [self._entries(*group) for group in self._signatures()]
-        rows, columns, values = (np.concatenate([e[i] for e in entries] or [np.zeros(0)]) for i in range(3))
-        shape = (len(self.rows), self.dofs[-1])
-        return coo_matrix((values, (rows.astype(np.int64), columns.astype(np.int64))), shape=shape).tocsr()
-
-    def _signatures(self) -> list[tuple[Int, Int, bool]]:
-        """Entities grouped by how many copies each body has and whether they can break."""
-        shared = self.shared
-        groups: list[tuple[Int, Int, bool]] = []
+        shared, entries = self.shared, []
+        # Entities grouped by how many copies each body has and whether they can break.
         for k in np.unique(shared.copies):
             some = np.flatnonzero(shared.copies == k)
             body = shared.body[shared.pointer[some][:, None] + np.arange(k)]
@@ -122,13 +115,19 @@ class ConstraintLayout:
             codes, which = np.unique(np.column_stack([starts, shared.fibre[some] >= 0]), axis=0, return_inverse=True)
             for i, code in enumerate(codes):
                 sizes = np.diff(np.r_[np.flatnonzero(code[:-1]), k])
-                groups.append((some[which.ravel() == i], sizes, bool(code[-1])))
-        return groups
+                entries.append(self._entries(some[which.ravel() == i], sizes, bool(code[-1])))
+        rows, columns, values = (np.concatenate([e[i] for e in entries] or [np.zeros(0)]) for i in range(3))
+        shape = (len(self.rows), self.dofs[-1])
+        return coo_matrix((values, (rows.astype(np.int64), columns.astype(np.int64))), shape=shape).tocsr()
 
     def _entries(self, entities: Int, sizes: Int, breakable: bool) -> tuple[Int, Int, Float]:
         """Rows, columns and values of B on some entities whose bodies have `sizes` copies each."""
-        shared = self.shared
-        contrasts, c = _contrasts(sizes), self.components
+        shared, c = self.shared, self.components
+        # (k - 1, k) orthonormal contrasts between the copies in each of two bodies, and between their means; bodies of
+        # another number never part, and count as one.
+        contrasts = helmert(int(sizes.sum()))
+        if len(sizes) == 2:
+            contrasts = np.vstack([block_diag(*map(helmert, sizes)), np.repeat([1.0, -1.0] / sizes, sizes)])
         k, component = len(contrasts) + 1, np.arange(c)
         entity, p = expand(entities, shared.nodes[entities])
         first = self.first[entity] + p * c * (k - 1)
@@ -241,13 +240,3 @@ def expand(entities: Int, nodes: Int) -> tuple[Int, Int]:
     ends = np.cumsum(nodes)
     p = np.arange(ends[-1] if len(ends) else 0) - np.repeat(ends - nodes, nodes)
     return np.repeat(entities, nodes), p
-
-
-def _contrasts(sizes: Int) -> Float:
-    """(k - 1, k) orthonormal contrasts (Helmert) between copies in each of two bodies, and between their means.
-
-    Bodies of another number never part, and count as one.
-    """
-    if len(sizes) != 2:
-        return np.asarray(helmert(int(sizes.sum())))
-    return np.vstack([block_diag(*map(helmert, sizes)), np.repeat([1.0, -1.0] / sizes, sizes)])

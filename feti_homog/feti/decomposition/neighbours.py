@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -36,9 +36,20 @@ class Neighbours:
         self.index = [s.submesh.index for s in subdomains]
         self.local = {s: i for i, s in enumerate(self.index)}
         self.rank = {s: r for r, indices in enumerate(comm.allgather(self.index)) for s in indices}
+        shared, parts = jump_operator.shared, [np.zeros((3, 0), np.int64)]
+        # Pairs (t, s) of subdomains that share an entity, t one of this rank's: t, s, entity in ascending order.
+        for k in np.unique(shared.copies):
+            entity = np.flatnonzero(shared.copies == k)
+            among, shape = shared.sharer[shared.pointer[entity][:, None] + np.arange(k)], (len(entity), k, k)
+            columns = among[:, :, None], among[:, None, :], entity[:, None, None]
+            parts.append(np.stack([np.broadcast_to(column, shape).ravel() for column in columns]))
+        pairs = np.concatenate(parts, axis=1)
+        pairs = pairs[:, np.isin(pairs[0], self.index)]
+        first, second, entity = pairs[:, np.lexsort(pairs[::-1])]
+        starts = np.flatnonzero((np.diff(first, prepend=-1) != 0) | (np.diff(second, prepend=-1) != 0))
         shared_rows: list[dict[int, Int]] = [{} for _ in self.index]
-        for t, s, entities in _pairs(jump_operator.shared.pointer, jump_operator.shared.sharer, self.index):
-            shared_rows[self.local[t]][s] = jump_operator.rows_of(entities)
+        for a, entities in zip(starts.tolist(), np.split(entity, starts)[1:], strict=True):
+            shared_rows[self.local[int(first[a])]][int(second[a])] = jump_operator.rows_of(entities)
         none = np.zeros(0, np.int64)
         self.rows = [of.get(t, none) for t, of in zip(self.index, shared_rows, strict=True)]
         self.common = [
@@ -65,26 +76,6 @@ class Neighbours:
             for part in self.comm.alltoall(outgoing):
                 for sender, to, message in part:
                     deliver(self.local[to], sender, message)
-
-
-def _pairs(pointer: Int, sharer: Int, subdomains: Sequence[int]) -> Iterator[tuple[int, int, Int]]:
-    """Pairs (t, s) of subdomains that share entities, t one of `subdomains`: t, s and these; all in ascending order."""
-    copies = np.diff(pointer)
-    parts = []
-    for k in np.unique(copies):
-        entity = np.flatnonzero(copies == k)
-        among = sharer[pointer[entity][:, None] + np.arange(k)]
-        shape = (len(entity), k, k)
-        columns = among[:, :, None], among[:, None, :], entity[:, None, None]
-        parts.append(np.stack([np.broadcast_to(column, shape).ravel() for column in columns]))
-    pairs = np.concatenate(parts or [np.zeros((3, 0), np.int64)], axis=1)
-    pairs = pairs[:, np.isin(pairs[0], subdomains)]
-    first, second, entity = pairs[:, np.lexsort(pairs[::-1])]
-    new = np.ones(len(first), bool)
-    new[1:] = (np.diff(first) != 0) | (np.diff(second) != 0)
-    starts = np.flatnonzero(new)
-    for a, entities in zip(starts.tolist(), np.split(entity, starts)[1:], strict=True):
-        yield int(first[a]), int(second[a]), entities
 
 
 class InterfaceNeighbours:

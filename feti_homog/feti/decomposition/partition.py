@@ -12,7 +12,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from feti_homog.feti.thresholds import LENGTH_CLASSES, MAX_IMBALANCE, STRIP_SLACK, STRIP_WIDTHS
 from feti_homog.mesh.periodic_topology import Torus, components, renumber
 from feti_homog.system.parallel.dividing import balanced
-from feti_homog.typing import Bool, Int
+from feti_homog.typing import Int
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,19 @@ def halves(torus: Torus) -> Partition | None:
     """
     tail, head, _ = torus.sides
     centres = torus.mesh.points[torus.mesh.triangles].mean(axis=1) / torus.mesh.period % 1.0
-    strips = [_strip(np.argsort(x, kind="stable"), tail, head) for x in centres.T]
+    strips, m = [], len(centres)
+    for x in centres.T:
+        place = np.empty(m, np.int64)
+        place[np.argsort(x, kind="stable")] = np.arange(m)
+        low, high = np.sort([place[tail], place[head]], axis=0)
+        low, high = np.where(high - low > m / 2, (high, low + m), (low, high))
+        # Sides that cross each place in the cyclic order, and both ends of each strip.
+        crossed = np.bincount(low + 1, minlength=2 * m) - np.bincount(high + 1, minlength=2 * m)
+        crossed = np.cumsum(crossed).reshape(2, m).sum(axis=0)
+        ends = m // 2 + np.unique((STRIP_SLACK * m * np.linspace(-1.0, 1.0, STRIP_WIDTHS)).astype(np.int64))
+        sums = np.stack([crossed + np.roll(crossed, -end) for end in ends])
+        end, first = np.unravel_index(sums.argmin(), sums.shape)
+        strips.append((place - first) % m < ends[end])
     piece = min(strips, key=lambda strip: int((strip[tail] != strip[head]).sum())).astype(np.int64)
     together = piece[tail] == piece[head]
     connected = components(len(piece), tail[together], head[together])
@@ -53,21 +65,6 @@ def halves(torus: Torus) -> Partition | None:
     together = piece[tail] == piece[head]
     is_whole = components(len(piece), tail[together], head[together]).max() == 1
     return Partition(piece, np.arange(2)) if is_whole else None
-
-
-def _strip(order: Int, left: Int, right: Int) -> Bool:
-    """(m,) which triangles are in a strip of the cyclic `order`; fewest sides (left, right) cross its ends."""
-    m = len(order)
-    place = np.empty(m, np.int64)
-    place[order] = np.arange(m)
-    low, high = np.sort([place[left], place[right]], axis=0)
-    low, high = np.where(high - low > m / 2, (high, low + m), (low, high))
-    crossed = np.bincount(low + 1, minlength=2 * m) - np.bincount(high + 1, minlength=2 * m)
-    crossed = np.cumsum(crossed).reshape(2, m).sum(axis=0)
-    ends = m // 2 + np.unique((STRIP_SLACK * m * np.linspace(-1.0, 1.0, STRIP_WIDTHS)).astype(np.int64))
-    sums = np.stack([crossed + np.roll(crossed, -end) for end in ends])
-    end, first = np.unravel_index(sums.argmin(), sums.shape)
-    return np.asarray((place - first) % m < ends[end])
 
 
 def cut_into_pieces(torus: Torus, parts: Int, pieces: Int, longest: float, length_classes: int = LENGTH_CLASSES) -> Int:
@@ -83,7 +80,16 @@ def cut_into_pieces(torus: Torus, parts: Int, pieces: Int, longest: float, lengt
     tail, head, edge = torus.sides
     inside = parts[tail] == parts[head]
     weight = np.ceil(length_classes * torus.edge_lengths[edge] / longest).astype(np.int64)
-    piece = _cut(parts, pieces, tail[inside], head[inside], weight[inside])
+    left, right, weight = tail[inside], head[inside], weight[inside]
+    members, sides = np.argsort(parts, kind="stable"), np.argsort(parts[left], kind="stable")
+    load, edges = np.bincount(parts, minlength=len(pieces)), np.bincount(parts[left], minlength=len(pieces))
+    first, first_edge = np.cumsum(load) - load, np.cumsum(edges) - edges
+    number, piece = np.empty(len(parts), np.int64), np.zeros(len(parts), np.int64)
+    number[members] = np.arange(len(parts)) - np.repeat(first, load)
+    for body in np.flatnonzero(pieces > 1):
+        some = sides[first_edge[body] : first_edge[body] + edges[body]]
+        graph = _graph(load[body], number[left[some]], number[right[some]], weight[some])
+        piece[members[first[body] : first[body] + load[body]]] = _metis(graph, int(pieces[body]))
     key = parts * (piece.max(initial=0) + 1) + piece
     together = key[tail] == key[head]
     connected = components(len(parts), tail[together], head[together])
@@ -110,21 +116,6 @@ def pieces_for_size(load: Int, dofs_per_load: float, max_dofs: int) -> Int:
     return np.minimum(np.ceil(load * dofs_per_load / max_dofs).astype(np.int64), load)
 
 
-def _cut(parts: Int, pieces: Int, left: Int, right: Int, weight: Int) -> Int:
-    """(m,) number of each triangle's piece in its body; parting neighbours (left, right) costs `weight`."""
-    members, sides = np.argsort(parts, kind="stable"), np.argsort(parts[left], kind="stable")
-    load, edges = np.bincount(parts, minlength=len(pieces)), np.bincount(parts[left], minlength=len(pieces))
-    first, first_edge = np.cumsum(load) - load, np.cumsum(edges) - edges
-    number = np.empty(len(parts), np.int64)
-    number[members] = np.arange(len(parts)) - np.repeat(first, load)
-    piece = np.zeros(len(parts), np.int64)
-    for body in np.flatnonzero(pieces > 1):
-        some = sides[first_edge[body] : first_edge[body] + edges[body]]
-        graph = _graph(load[body], number[left[some]], number[right[some]], weight[some])
-        piece[members[first[body] : first[body] + load[body]]] = _metis(graph, int(pieces[body]))
-    return piece
-
-
 def _graph(n: int, left: Int, right: Int, weight: Int) -> csr_matrix:
     """(n, n) symmetric: summed weights of pairs (left, right)."""
     both = (np.r_[left, right], np.r_[right, left])
@@ -135,11 +126,7 @@ def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
     """Part of each vertex; parts of about equal `load`, or number of vertices, with edges of small weight between."""
     options = pymetis.Options(contig=int(load is None), seed=0)
     _, part = pymetis.part_graph(
-        count,
-        pymetis.CSRAdjacency(graph.indptr, graph.indices),
-        eweights=graph.data,
-        vweights=load,
-        options=options,
+        count, pymetis.CSRAdjacency(graph.indptr, graph.indices), eweights=graph.data, vweights=load, options=options
     )
     return np.asarray(part, np.int64)
 

@@ -48,22 +48,6 @@ def side_lengths(ends: Float, turn: Float, low: Float, order: int, side: float) 
     return np.asarray(np.stack(speeds, axis=1) * WEIGHTS @ SHARES[order].T * (side / 2))
 
 
-@dataclass(frozen=True)
-class InterfaceGeometry:
-    """Geometry of the n shared entities that this rank owns.
-
-    Attributes as of `SharedEntities`, 0 of other entities and where no bond may break.
-    """
-
-    normal: Float
-    turn: Float
-    precracked: Bool
-
-    def chosen(self, which: Int) -> InterfaceGeometry:
-        """Return the geometry of entities `which` (k,)."""
-        return InterfaceGeometry(self.normal[which], self.turn[which], self.precracked[which])
-
-
 def breakable_pairs(submeshes: SubmeshesOfRank, table: SubdomainTable, pairs: Int, sharers: Sharers) -> Int:
     """(n,) the interface of the two bodies that meet there.
 
@@ -86,10 +70,10 @@ def interface_geometry(
     pairs: Int,
     sharers: Sharers,
     lattice: ReferenceLattice,
-) -> InterfaceGeometry:
-    """Return normals, turns and precracks of shared entities.  Collective.
+) -> tuple[Float, Float, Bool]:
+    """Return normal, turn and precracked as in `SharedEntities`, of entities that this rank owns.  Collective.
 
-    `pairs` and `lattice` as in `share_entities`.
+    0 of other entities and where no bond may break; `pairs` and `lattice` as in `share_entities`.
     """
     n, owner = len(sharers.key), table.rank[sharers.innermost]
     can_part = (owner == comm.rank) & (breakable_pairs(submeshes, table, pairs, sharers) >= 0)
@@ -113,13 +97,13 @@ def interface_geometry(
     scaled = sums[:, :2] * (sums[:, 2] / np.maximum(np.hypot(*sums[:, :2].T), 1e-300))[:, None]
     normals[vertices], precracked[vertices] = scaled[vertices, None], sums[vertices, 3] == 0
     agree(comm, _check, submeshes, sharers.chosen(np.flatnonzero(can_part)), normals[can_part], sums[can_part])
-    return InterfaceGeometry(normals, turns, precracked)
+    return normals, turns, precracked
 
 
 def _check(submeshes: SubmeshesOfRank, sharers: Sharers, normals: Float, sums: Float) -> None:
     """Raise MeshError where a normal is not finite or zero, or its sides are folded onto each other.
 
-    The directions of folded sides cancel; `normals` (n, 2, 2) and `sums` (n, 4) as in `InterfaceGeometry`.
+    The directions of folded sides cancel; `normals` (n, 2, 2) and `sums` (n, 4) as in `interface_geometry`.
     """
     length = np.linalg.norm(normals, axis=2)
     folded = ~sharers.is_edge & ~(np.hypot(*sums[:, :2].T) > FOLDED * sums[:, 2])
@@ -186,16 +170,12 @@ def edge_normals(mesh: Submesh, triangle: Int, k: Int) -> tuple[Float, Float]:
 
 
 @dataclass(frozen=True)
-class SharedEntities:
+class SharedEntities(Sharers):
     """The n entities that one rank's subdomains take part in, in the order of their constraints.
 
     Attributes:
-        key: (n,) class or torus edge.
-        is_edge: (n,) bool.
         nodes: (n,) fine nodes on the entity: 1, or the inner lattice nodes of an edge.
         first: (n,) number of its first vector constraint.
-        pointer, sharer: the subdomains that share entity i are sharer[pointer[i]:pointer[i + 1]], sorted by body, from
-            the outermost to the innermost.
         body: constituent of each sharer.
         fibre: (n,) the body that may debond here from the one around it, the inner one; or -1 where nothing can break.
         pair: (n,) the interface of the case that these two bodies have, -1 where nothing can break.
@@ -208,12 +188,8 @@ class SharedEntities:
         constraints: number of vector constraints on all ranks.
     """
 
-    key: Int
-    is_edge: Bool
     nodes: Int
     first: Int
-    pointer: Int
-    sharer: Int
     body: Int
     fibre: Int
     pair: Int
@@ -222,11 +198,6 @@ class SharedEntities:
     precracked: Bool
     owned: tuple[int, int]
     constraints: int
-
-    @property
-    def copies(self) -> Int:
-        """(n,) number of subdomains k that share each entity."""
-        return np.diff(self.pointer)
 
 
 def share_entities(
@@ -239,18 +210,24 @@ def share_entities(
         lattice: of the coarse triangles.
     """
     sharers = find_sharers(comm, submeshes, table)
-    geometry = interface_geometry(comm, submeshes, table, pairs, sharers, lattice)
+    geometry = list[Array](interface_geometry(comm, submeshes, table, pairs, sharers, lattice))
     if lattice.intervals == 1:
         vertices = np.flatnonzero(~sharers.is_edge)
-        sharers, geometry = sharers.chosen(vertices), geometry.chosen(vertices)
+        sharers, geometry = sharers.chosen(vertices), [column[vertices] for column in geometry]
     nodes = np.where(sharers.is_edge, lattice.intervals - 1, 1)
     owner = table.rank[sharers.innermost]
     constraints = np.where(owner == comm.rank, nodes * (sharers.copies - 1), 0)
     begin, own_constraints = comm.exscan(int(constraints.sum())) or 0, int(constraints.sum())
     numbers = begin + np.cumsum(constraints) - constraints
-    first, normal, turn, precracked = _sent_by_owners(
-        comm, sharers, table, numbers, geometry.normal, geometry.turn, geometry.precracked
-    )
+    # Owners of entities send numbers and geometry to the other sharers.
+    rank, entity = table.rank[sharers.sharer], np.repeat(np.arange(len(owner)), sharers.copies)
+    mine = (owner == comm.rank)[entity]
+    to = np.unique(entity[mine] * comm.size + rank[mine])
+    entity, to = to // comm.size, to % comm.size
+    code, *received = exchange(comm, to, sharers.code[entity], *(column[entity] for column in (numbers, *geometry)))
+    place = np.argsort(code)
+    place = place[np.searchsorted(code[place], sharers.code)]
+    first, normal, turn, precracked = (column[place] for column in received)
     order = np.argsort(first)
     sharers = sharers.chosen(order)
     pair = breakable_pairs(submeshes, table, pairs, sharers)
@@ -270,16 +247,3 @@ def share_entities(
         owned=(begin, begin + own_constraints),
         constraints=comm.allreduce(own_constraints),
     )
-
-
-def _sent_by_owners(comm: MPI.Intracomm, sharers: Sharers, table: SubdomainTable, *columns: Array) -> list[Array]:
-    """Return the columns (n,) or (n, ...) as owners of entities have them.  Collective."""
-    rank = table.rank[sharers.sharer]
-    mine = np.repeat(table.rank[sharers.innermost] == comm.rank, sharers.copies)
-    entity = np.repeat(np.arange(len(sharers.key)), sharers.copies)
-    pairs = np.unique(entity[mine] * comm.size + rank[mine])
-    entity, to = pairs // comm.size, pairs % comm.size
-    code, *received = exchange(comm, to, sharers.code[entity], *(column[entity] for column in columns))
-    order = np.argsort(code)
-    place = order[np.searchsorted(code[order], sharers.code)]
-    return [column[place] for column in received]

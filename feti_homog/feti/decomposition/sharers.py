@@ -22,7 +22,10 @@ class Sharers:
     """n entities that several subdomains share, some of them this rank's: vertices, then edges, each by key.
 
     Attributes:
-        key, is_edge, pointer, sharer: as in `SharedEntities`.
+        key: (n,) class or torus edge.
+        is_edge: (n,) bool.
+        pointer, sharer: the subdomains that share entity i are sharer[pointer[i]:pointer[i + 1]], sorted by body, from
+            the outermost to the innermost.
     """
 
     key: Int

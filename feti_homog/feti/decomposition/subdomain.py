@@ -77,7 +77,18 @@ class Subdomain:
             MeshError: an element is inverted, or the rigid-body modes are not in the kernel of K.
         """
         mesh = refine(submesh, lattice)
-        _check_corners(submesh, mesh)
+        # Bending towards the circles may turn triangles over.
+        triangles = mesh.nodes[mesh.curved][:, mesh.lattice.triangles[:, :3]].reshape(-1, 3)
+        a, b, c = (mesh.points[triangles[:, k]] for k in range(3))
+        doubled = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+        inverted = np.flatnonzero(~(doubled > 0))
+        if len(inverted):
+            x, y = mesh.points[triangles[inverted[0]]].mean(axis=0)
+            kind = f" of {submesh.phase}" if submesh.phase else ""
+            raise MeshError(
+                f"[cell] refine, order: {len(inverted)} refined elements{kind} are inverted, the first "
+                f"near ({x:.6g}, {y:.6g}); expected a mesh fine enough for its curved interfaces"
+            )
         return cls.on(submesh, mesh, laws, problem, material, mixed, **flags)
 
     @classmethod
@@ -109,7 +120,7 @@ class Subdomain:
         if submesh.pinned >= 0:
             Q[problem.dofs(np.array([submesh.pinned]))], slopes[submesh.pinned] = 0.0, 0.0
         laws = laws.reshape(-1, *laws.shape[-2:])
-        L = np.einsum("k,kij->ij", body.areas / body.area, laws) if len(laws) > 1 else laws[0]
+        L = np.einsum("k,kij->ij", body.areas / body.areas.sum(), laws) if len(laws) > 1 else laws[0]
         return cls(
             submesh, mesh, problem, L, laws, material, Q, slopes, body.areas, R, positions, K, mixed=mixed, **flags
         )
@@ -249,18 +260,3 @@ def _pinned(K: csr_matrix, problem: Problem, pinned: int) -> csr_matrix:
         K.data[row] = np.where(K.indices[row] == dof, largest, 0.0)
     K.eliminate_zeros()
     return K
-
-
-def _check_corners(submesh: Submesh, mesh: FineMesh) -> None:
-    """Refuse triangles that bending towards the circles has turned over."""
-    triangles = mesh.nodes[mesh.curved][:, mesh.lattice.triangles[:, :3]].reshape(-1, 3)
-    a, b, c = (mesh.points[triangles[:, k]] for k in range(3))
-    doubled = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    inverted = np.flatnonzero(~(doubled > 0))
-    if len(inverted):
-        x, y = mesh.points[triangles[inverted[0]]].mean(axis=0)
-        kind = f" of {submesh.phase}" if submesh.phase else ""
-        raise MeshError(
-            f"[cell] refine, order: {len(inverted)} refined elements{kind} are inverted, the first "
-            f"near ({x:.6g}, {y:.6g}); expected a mesh fine enough for its curved interfaces"
-        )

@@ -11,7 +11,7 @@ from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, allreduce_sparse
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.with_springs import is_dense
-from feti_homog.feti.thresholds import DENSE_SHARE, MOST_DENSE_ROWS
+from feti_homog.feti.thresholds import DEFAULTS, DENSE_SHARE
 from feti_homog.system.parallel.distributed_arrays import share_columns
 from feti_homog.system.petsc.options import choices
 from feti_homog.typing import Float
@@ -65,10 +65,10 @@ def assembled_stiffness(operators: InterfaceOperators, active: Float) -> tuple[c
     Raises:
         TypeError: a boundary operator is not dense.
     """
-    comm, Z = operators.comm, _released(operators, _copies_together(operators), active)
+    comm, Z = operators.comm, _released(operators, active)
     size, columns = Z.shape[1], [np.unique(Z[span].indices) for span in operators.slices]
     entries = comm.allreduce(sum(len(of) ** 2 for of in columns))
-    is_full = entries >= DENSE_SHARE * size**2 and size <= MOST_DENSE_ROWS and not choices("feti_bonded_")
+    is_full = entries >= DENSE_SHARE * size**2 and size <= DEFAULTS.dense_boundary_dofs and not choices("feti_bonded_")
     dense, blocks = np.zeros((size, size) if is_full else (0, 0)), DenseBlockSum((size, size))
     for operator, span, of in zip(operators.with_springs, operators.slices, columns, strict=True):
         if not is_dense(operator):
@@ -85,27 +85,21 @@ def assembled_stiffness(operators: InterfaceOperators, active: Float) -> tuple[c
     return Z, dense.T
 
 
-def _copies_together(operators: InterfaceOperators) -> csr_matrix:
-    """(n, shared dofs) Z with all rows active.  Collective."""
-    jump_operator = operators.jump_operator
-    starts, sizes = jump_operator.node_rows
-    order = np.argsort(starts)
-    first = operators.comm.exscan(len(starts)) or 0
-    node = jump_operator.gather(np.repeat(first + np.arange(len(starts)), sizes[order]).astype(float))
-    # Each copy of a node takes part in some row of it, and its dofs are neighbours.
-    row = operators.BT.indices[operators.BT.indptr[:-1]]
-    n, c = len(row), jump_operator.components
-    shared = c * node[row].astype(np.int64) + np.arange(n) % c
-    return csr_matrix((np.ones(n), (np.arange(n), shared)), shape=(n, jump_operator.shared_dofs))
-
-
-def _released(operators: InterfaceOperators, together: csr_matrix, active: Float) -> csr_matrix:
-    """(n, columns) Z, for the one with all rows active.
+def _released(operators: InterfaceOperators, active: Float) -> csr_matrix:
+    """(n, columns) Z, from the one with all rows active.
 
     u_f = y - e (e . y) + e w along the direction e of each row that is not active, with an extra column for w.
     Collective.
     """
     released, comm, jump_operator = active == 0, operators.comm, operators.jump_operator
+    starts, sizes = jump_operator.node_rows
+    first = comm.exscan(len(starts)) or 0
+    node = jump_operator.gather(np.repeat(first + np.arange(len(starts)), sizes[np.argsort(starts)]).astype(float))
+    # Each copy of a node takes part in some row of it, and its dofs are neighbours.
+    row = operators.BT.indices[operators.BT.indptr[:-1]]
+    n, c = len(row), jump_operator.components
+    shared = c * node[row].astype(np.int64) + np.arange(n) % c
+    together = csr_matrix((np.ones(n), (np.arange(n), shared)), shape=(n, jump_operator.shared_dofs))
     counts = comm.allgather(int(released.sum()))
     number = np.where(released, sum(counts[: comm.rank]) + np.cumsum(released), 0)
     number = jump_operator.gather(number.astype(float)).astype(np.int64) - 1

@@ -20,7 +20,7 @@ from feti_homog.feti.exact.assembled_schur import AssembledSchur, assembled_stif
 from feti_homog.feti.exact.spring_update import SpringUpdate
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.preconditioners import Preconditioner, never_softens
-from feti_homog.feti.thresholds import CHUNK_RANKS, INFLUENCE_CHUNK, NORM_ITERATIONS, STIFF_FIBRES
+from feti_homog.feti.thresholds import CHUNK_RANKS, INFLUENCE_BATCH, NORM_ITERATIONS, STIFF_FIBRES
 from feti_homog.system.parallel.distributed_arrays import allreduce_sum, scale_rows
 from feti_homog.typing import Float, Int
 
@@ -88,7 +88,7 @@ class ReferenceCell:
     def columns(self, rows: Int) -> Float:
         """(owned rows, k) Gamma[:, rows] of global rows (k,), equal on all ranks.  Collective."""
         # A few columns too many are cheaper with others than by themselves.
-        chunk = INFLUENCE_CHUNK * min(self._comm.size, CHUNK_RANKS)
+        chunk = INFLUENCE_BATCH * min(self._comm.size, CHUNK_RANKS)
         columns = [np.zeros((len(self.active), 0))]
         for some in np.array_split(rows, max(round(len(rows) / chunk), 1)) if len(rows) else []:
             unit, place = np.zeros((len(self.active), len(some))), some - self._first

@@ -143,7 +143,19 @@ def _by_mumps(matrix: csr_matrix, rows: Int) -> Float:
     some = PETSc.IS().createGeneral(rows.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
     try:
         for workspace in MORE_WORKSPACE:
-            pc = _factored(A, some, workspace)
+            pc = PETSc.PC().create(PETSc.COMM_SELF)
+            pc.setOptionsPrefix("feti_schur_")
+            pc.setOperators(A)
+            pc.setType(PETSc.PC.Type.CHOLESKY)
+            pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
+            pc.setFromOptions()
+            pc.setFactorSetUpSolverType()
+            # MUMPS' own scaling loses digits of coarse matrices, which are scaled.
+            pc.getFactorMatrix().setMumpsIcntl(8, 0)
+            if workspace is not None:
+                pc.getFactorMatrix().setMumpsIcntl(14, workspace)
+            c_functions.set_schur(pc.getFactorMatrix(), some)
+            pc.setUp()
             if mumps_error(pc.getFactorMatrix())[0] not in TOO_SMALL or workspace == MORE_WORKSPACE[-1]:
                 break
             pc.destroy()
@@ -154,24 +166,6 @@ def _by_mumps(matrix: csr_matrix, rows: Int) -> Float:
             pc.destroy()
     finally:
         A.destroy()
-
-
-def _factored(A: PETSc.Mat, rows: PETSc.IS, workspace: int | None) -> PETSc.PC:
-    """Return the partial factorization, as far as it came."""
-    pc = PETSc.PC().create(PETSc.COMM_SELF)
-    pc.setOptionsPrefix("feti_schur_")
-    pc.setOperators(A)
-    pc.setType(PETSc.PC.Type.CHOLESKY)
-    pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
-    pc.setFromOptions()
-    pc.setFactorSetUpSolverType()
-    # MUMPS' own scaling loses digits of coarse matrices, which are scaled.
-    pc.getFactorMatrix().setMumpsIcntl(8, 0)
-    if workspace is not None:
-        pc.getFactorMatrix().setMumpsIcntl(14, workspace)
-    c_functions.set_schur(pc.getFactorMatrix(), rows)
-    pc.setUp()
-    return pc
 
 
 def cholesky(A: Float, lower: bool = True, clean: bool = True) -> Float:

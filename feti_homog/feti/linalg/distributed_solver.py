@@ -9,11 +9,7 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.feti.linalg.sparse_direct import factored, is_direct, power_of_two, sequential, solve_columns
 from feti_homog.feti.linalg.sparse_matrices import assemble_distributed, gathered_sum
-from feti_homog.feti.thresholds import (
-    CHOLMOD_COLUMNS_ONE_BY_ONE,
-    MUMPS_COLUMNS_ONE_BY_ONE,
-    REPLICATED_UNKNOWNS,
-)
+from feti_homog.feti.thresholds import CHOLMOD_COLUMNS_ONE_BY_ONE, MUMPS_COLUMNS_ONE_BY_ONE, REPLICATED_UNKNOWNS
 from feti_homog.system.parallel.distributed_arrays import allgather_rows, allreduce_sum
 from feti_homog.typing import Float, Int
 
@@ -49,31 +45,28 @@ class DistributedSolver:
         """
         self.destroy()
         error = None
+        self._unknowns = unknowns
         try:
-            self._factor(unknowns, part, near_kernel)
+            if self.is_distributed:
+                matrix = assemble_distributed(self.comm, part, unknowns, self.total)
+            else:
+                matrix = sequential(gathered_sum(self.comm, part, unknowns, self.total))
+            self._scale = power_of_two(matrix.getDiagonal().getArray(readonly=True), self.comm)
+            matrix.scale(self._scale)
+            library = PETSc.Mat.SolverType.MUMPS if self.is_distributed else PETSc.Mat.SolverType.CHOLMOD
+            if near_kernel is not None:
+                # A basis (n, m), without zeros, that ranks with the same unknown agree on.
+                mean = self._sum(near_kernel) / np.maximum(self._sum(np.ones((len(near_kernel), 1))), 1.0)
+                near_kernel = np.linalg.qr(mean[:, mean.any(axis=0)])[0]
+            # Before a factor that may fail on one rank alone.
+            self._x, self._b = matrix.createVecs()
+            self._ksp = factored(matrix, self._prefix, library, near_kernel)
         except np.linalg.LinAlgError as caught:
             error = caught
         if self.comm.allreduce(error is not None, MPI.LOR):
             # Left to PETSc's garbage collection: a rank that failed alone could not take part in `destroy`.
             self._ksp = None
             raise np.linalg.LinAlgError(f"a coarse matrix is singular: {error or 'on another rank'}") from error
-
-    def _factor(self, unknowns: Int, part: csr_matrix, near_kernel: Float | None) -> None:
-        self._unknowns = unknowns
-        if self.is_distributed:
-            matrix = assemble_distributed(self.comm, part, unknowns, self.total)
-        else:
-            matrix = sequential(gathered_sum(self.comm, part, unknowns, self.total))
-        self._scale = power_of_two(matrix.getDiagonal().getArray(readonly=True), self.comm)
-        matrix.scale(self._scale)
-        library = PETSc.Mat.SolverType.MUMPS if self.is_distributed else PETSc.Mat.SolverType.CHOLMOD
-        if near_kernel is not None:
-            # A basis (n, m), without zeros, that ranks with the same unknown agree on.
-            mean = self._sum(near_kernel) / np.maximum(self._sum(np.ones((len(near_kernel), 1))), 1.0)
-            near_kernel = np.linalg.qr(mean[:, mean.any(axis=0)])[0]
-        # Before a factor that may fail on one rank alone.
-        self._x, self._b = matrix.createVecs()
-        self._ksp = factored(matrix, self._prefix, library, near_kernel)
 
     def solve(self, B: Float) -> Float:
         """A^-1 times right-hand sides summed over ranks, on the local unknowns.  Collective.

@@ -7,6 +7,7 @@ So each matrix is factored with its largest diagonal entry between 1 and 2.  A p
 from __future__ import annotations
 
 import math
+import sys
 import weakref
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -24,7 +25,6 @@ from feti_homog.typing import Float
 Options = Mapping[str, bool | int | str]
 # INFOG(1) of MUMPS where a pivot is zero.
 SINGULAR = -10
-LEAST_EXPONENT = -1000
 # PETSc's error code for a factorization that the chosen library does not have (PETSC_ERR_MISSING_FACTOR).
 MISSING_FACTOR = 92
 # How PETSc's words for it end.
@@ -49,7 +49,7 @@ def power_of_two(diagonal: Float, comm: MPI.Intracomm | None = None) -> float:
         largest = comm.allreduce(largest, MPI.MAX)
     if math.isinf(largest):
         raise np.linalg.LinAlgError("a matrix has entries that are not finite")
-    return math.ldexp(1.0, 1 - max(math.frexp(largest)[1], LEAST_EXPONENT)) if largest > 0.0 else 1.0
+    return math.ldexp(1.0, 1 - max(math.frexp(largest)[1], sys.float_info.min_exp)) if largest > 0.0 else 1.0
 
 
 def check_factor(pc: PETSc.PC) -> None:
@@ -158,14 +158,23 @@ def factored(
     the matrix is.
 
     Rows and columns should have similar size: MUMPS does not scale here, for its own scaling loses all digits of coarse
-    problems with contrasts of 1e6.  Multigrid learns of the `near_kernel` (n, k), orthonormal vectors of little energy.
+    problems with contrasts of 1e6.  Multigrid learns of the `near_kernel` (n, k), orthonormal vectors of little energy,
+    equal on all ranks.
 
     Raises:
         LinAlgError: the matrix is not positive definite, or too near to one that is singular.
         MemoryError: MUMPS could not factor, or CHOLMOD had no memory left.
         CaseError: the library that the options name has no such factorization.
     """
-    _set_near_kernel(A, near_kernel)
+    if near_kernel is not None and near_kernel.shape[1]:
+        vectors = [A.createVecLeft() for _ in near_kernel.T]
+        for vector, values in zip(vectors, near_kernel.T, strict=True):
+            vector.setArray(values[slice(*vector.getOwnershipRange())])
+        space = PETSc.NullSpace().create(vectors=vectors, comm=A.comm)
+        A.setNearNullSpace(space)
+        # The matrix keeps them, and frees them with itself.
+        for petsc_object in (space, *vectors):
+            petsc_object.destroy()
     A.setOption(PETSc.Mat.Option.SPD, True)
     with _unless_given({**DEFINITE, **(ORDERED if is_ordered else {})}, prefix):
         ksp = _direct_ksp(A, prefix, library)
@@ -196,20 +205,6 @@ def _unless_given(options: Options, prefix: str) -> Iterator[None]:
     finally:
         for name in added:
             database.delValue(name)
-
-
-def _set_near_kernel(A: PETSc.Mat, near_kernel: Float | None) -> None:
-    """Attach the near-kernel (n, k), equal on all ranks, to the matrix."""
-    if near_kernel is None or not near_kernel.shape[1]:
-        return
-    vectors = [A.createVecLeft() for _ in near_kernel.T]
-    for vector, values in zip(vectors, near_kernel.T, strict=True):
-        vector.setArray(values[slice(*vector.getOwnershipRange())])
-    space = PETSc.NullSpace().create(vectors=vectors, comm=A.comm)
-    A.setNearNullSpace(space)
-    # The matrix keeps them, and frees them with itself.
-    for petsc_object in (space, *vectors):
-        petsc_object.destroy()
 
 
 def _direct_ksp(A: PETSc.Mat, prefix: str, library: str) -> PETSc.KSP:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -97,7 +96,6 @@ class InterfaceOperators:
         self.local_dofs = np.concatenate([np.zeros(0, np.int64), *numbers])
         self.B = jump_operator.B[:, self.local_dofs].tocsr()
         self.BT = self.B.T.tocsr()
-        sizes = _sizes(jump_operator.shared, subdomains, self.dofs)
         can_condense = bool(PETSc.Sys.hasExternalPackage("mumps"))
         first_row, last_row = jump_operator.owned
         at = int(np.searchsorted(jump_operator.rows, first_row))
@@ -107,7 +105,7 @@ class InterfaceOperators:
         self.of_inner = self._inner_dofs(jump_operator)
         roots = self._compliance_roots(jump_operator.copies, compliance)
         springs = [not s.is_outer and root is not None for s, root in zip(subdomains, roots, strict=True)]
-        sizes = [replace(size, has_springs=has) for size, has in zip(sizes, springs, strict=True)]
+        sizes = _sizes(jump_operator.shared, subdomains, self.dofs, springs)
         chosen = choose(sizes, kind, applications, soft_modes, can_condense, thresholds)
         self.facewise = [choice.facewise for choice in chosen]
         self.operators: list[InterfaceOperator] = []
@@ -247,13 +245,15 @@ def _constrained_dofs(B: csr_matrix, subdomains: Sequence[Subdomain]) -> list[In
     return [s.problem.dofs(np.unique(s.problem.nodes(np.flatnonzero(is_constrained)))) for s, is_constrained in pairs]
 
 
-def _sizes(shared: SharedEntities, subdomains: Sequence[Subdomain], dofs: Sequence[Int]) -> list[SubdomainSize]:
+def _sizes(
+    shared: SharedEntities, subdomains: Sequence[Subdomain], dofs: Sequence[Int], springs: Sequence[bool]
+) -> list[SubdomainSize]:
     """Return the subdomain sizes on which the choice of operators depends."""
     entity = np.repeat(np.arange(len(shared.key)), shared.copies)
     first, last = shared.pointer[:-1], shared.pointer[1:] - 1
     between_two_bodies = (shared.copies == 2) & (shared.body[first] != shared.body[last])
     cut = set(shared.sharer[~between_two_bodies[entity]].tolist())
     return [
-        SubdomainSize(s.n_dofs, len(d), is_whole_body=s.submesh.index not in cut)
-        for s, d in zip(subdomains, dofs, strict=True)
+        SubdomainSize(s.n_dofs, len(d), s.submesh.index not in cut, has_springs)
+        for s, d, has_springs in zip(subdomains, dofs, springs, strict=True)
     ]

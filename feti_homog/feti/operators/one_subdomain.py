@@ -16,12 +16,7 @@ from scipy.linalg.blas import dsymm, dsymv
 from scipy.sparse import csr_matrix
 
 from feti_homog.feti.decomposition.subdomain import Subdomain
-from feti_homog.feti.linalg.dense_matrices import (
-    condensed_with_loads,
-    full_from_lower,
-    invert_upper,
-    schur_complement,
-)
+from feti_homog.feti.linalg.dense_matrices import condensed_with_loads, full_from_lower, invert_upper, schur_complement
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.thresholds import (
     DENSE_COLUMNS_ONE_BY_ONE,

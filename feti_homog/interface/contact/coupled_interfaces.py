@@ -94,8 +94,9 @@ class CoupledInterfaces:
         """
         parts = np.split(origin.strain, [len(self.plane.solver.problem.loads)])
         pairs = zip(parts, self.problems, strict=False)
-        noise = [np.full(len(strain), problem.scales.stress_noise(strain)) for strain, problem in pairs]
-        stress = np.where(np.abs(origin.stress) > np.concatenate(noise), origin.stress, 0.0)
+        scales = [np.full(len(strain), problem.scales.stress_scale(strain)) for strain, problem in pairs]
+        noise = self.plane.scales.sign_noise * np.concatenate(scales)
+        stress = np.where(np.abs(origin.stress) > noise, origin.stress, 0.0)
         values = np.where(end.by_stress, stress, origin.strain)
         if before is not None:
             values = np.where(before.by_stress == end.by_stress, before.values, values)

@@ -136,10 +136,6 @@ class LoadScales:
         """Return the gap below which a sign may be the solver's error.  Collective."""
         return self.sign_noise * self.imposed(strain)
 
-    def stress_noise(self, strain: Float) -> float:
-        """Return the macroscopic stress that may be the solver's error.  Collective."""
-        return self.sign_noise * self.stress_scale(strain)
-
     def force_noise(self, solution: DualSolution) -> Float:
         """(k,) nodal force at this rank's nodes that may be the solver's error.  Collective.
 

@@ -46,27 +46,20 @@ def solve(scales: LoadScales, load: Load, start: Float) -> DualSolution:
     if strains[0].any():
         missing = missing - stresses[0]
     imposed = scales.imposed_strain(strains[0])
-    largest = scales.sign_noise * float((scales.roots[: len(imposed)] * imposed).max())
+    noise = scales.sign_noise * float((scales.roots[: len(imposed)] * imposed).max())
+    # Roots of their own stiffnesses scale the strains, so that none is small beside another.  Scaled stiffnesses below
+    # the solver's error, and scaled stresses below `noise`, are zero.
+    stiffness, roots = stresses[-len(unknown) :], scales.roots[unknown]
+    eigenvalues, vectors = np.linalg.eigh((stiffness + stiffness.T) / (2 * np.outer(roots, roots)))
+    along, resists = vectors.T @ (missing / roots), eigenvalues > scales.sign_noise
+    largest = max(UNCARRIED_SHARE * np.abs(missing / roots).max(), noise)
+    is_carried = not np.abs(along[~resists]).max(initial=0.0) > largest
+    answer = vectors[:, resists] @ (along[resists] / eigenvalues[resists]) / roots if is_carried else None
     # Rank 0 decides: rounding on other processors may part the ranks where a stiffness is nearly none.
-    answer = _strains(stresses[-len(unknown) :], missing, scales.roots[unknown], scales.sign_noise, largest)
     factors = solver.comm.bcast(answer)
     if factors is None:
         raise NotCarriedError("nothing in the cell carries the stresses of the load")
     return superposed(solver, solutions, np.concatenate([np.ones(len(solutions) - len(unknown)), factors]))
-
-
-def _strains(stiffness: Float, stress: Float, roots: Float, share: float, noise: float) -> Float | None:
-    """(u,) strains that make the stresses (u,) by a stiffness (u, u), perhaps singular; None if it cannot carry them.
-
-    Roots (u,) of their own stiffnesses scale the strains, so that none is small beside another.  Scaled stiffnesses
-    below `share` and scaled stresses below `noise` are the solver's error.
-    """
-    eigenvalues, vectors = np.linalg.eigh((stiffness + stiffness.T) / (2 * np.outer(roots, roots)))
-    along, resists = vectors.T @ (stress / roots), eigenvalues > share
-    largest = max(UNCARRIED_SHARE * np.abs(stress / roots).max(), noise)
-    if np.abs(along[~resists]).max(initial=0.0) > largest:
-        return None
-    return np.asarray(vectors[:, resists] @ (along[resists] / eigenvalues[resists]) / roots)
 
 
 def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:

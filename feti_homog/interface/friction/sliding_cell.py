@@ -176,16 +176,12 @@ class SlidingCell:
         b = np.pad(b, [(0, 0), (0, len(S) - self._loads)])
         self.faces = CoulombFaces(np.block([[K, -b], [-b.T, S]]), table[:, 1])
         if len(before) and np.isin(before, self.rows).all():
-            self._follow(faces, before, old)
-
-    def _follow(self, faces: CoulombFaces, rows: Int, springs: Float) -> None:
-        """Go on from faces with rows (n',), all among the present ones, and springs (2n',)."""
-        pairs = (2 * np.searchsorted(self.rows, rows)[:, None] + np.arange(2)).ravel()
-        loads = np.arange(self.faces.loads.start, self.faces.loads.stop)
-        # Entries on other springs, and loads whose stiffness all jumps change.
-        differs = np.repeat((self.springs[pairs] != springs).reshape(-1, 2).any(axis=1), 2)
-        other = np.concatenate([pairs[differs], loads[self._loads :]])
-        self.faces.follow(faces, np.concatenate([pairs, loads]), other)
+            pairs = (2 * np.searchsorted(self.rows, before)[:, None] + np.arange(2)).ravel()
+            loads = np.arange(self.faces.loads.start, self.faces.loads.stop)
+            # Entries on other springs, and loads whose stiffness all jumps change.
+            differs = np.repeat((self.springs[pairs] != old).reshape(-1, 2).any(axis=1), 2)
+            other = np.concatenate([pairs[differs], loads[self._loads :]])
+            self.faces.follow(faces, np.concatenate([pairs, loads]), other)
 
     def begin(self, bonds: BondState, strain: Float) -> tuple[Status, Float]:
         """Return statuses (n,) and scaled x (m,) from bonds and a strain (v,).  Collective.

@@ -233,9 +233,18 @@ class FollowedStatuses:
         Present entries get other `units` (m,), and those at the places `other` another S between them.  False if a
         pivot on the way is too small; then R is worthless.
         """
-        if not self._replace(np.flatnonzero(np.isin(old, other)), S[other[:, None], other], units):
+        # Prescribed entries have rows of the identity in M^-1, so that only their block of S M^-1 changes.
+        entries, free, slope = np.flatnonzero(np.isin(old, other)), self.free.copy(), self.slope.copy()
+        free[entries], slope[entries] = False, 0.0
+        if len(entries) and not self.turn(free, slope):
             return False
         self._flush()
+        some, at = np.flatnonzero(units != 1.0), self._place[entries]
+        places, unit = self._place[some], units[some]
+        self._R[:, : self._size, places] *= np.where(self.free[some], 1.0 / unit, unit)
+        self._R[:, places, : self._size] *= np.stack([1.0 / unit, unit])[:, :, None]
+        before = self.S[entries[:, None], entries] * np.outer(units[entries], units[entries])
+        self._R[1, at[:, None], at] += S[other[:, None], other] - before
         size, m = self._size, len(S)
         new = np.setdiff1d(np.arange(m), old)
         free, slope, place = np.zeros(m, bool), np.zeros(m), np.empty(m, np.int64)
@@ -262,22 +271,4 @@ class FollowedStatuses:
         inverse[size:m, :size] = 0.0
         inverse[size:m, size:m] = np.eye(m - size)
         self._size = m
-        return True
-
-    def _replace(self, entries: Int, block: Float, units: Float) -> bool:
-        """Replace the block of S between rising entries, and the units (m,) of all entries; False as `grow`.
-
-        Prescribed entries have rows of the identity in M^-1, so that only their block of S M^-1 changes.
-        """
-        free, slope, at = self.free.copy(), self.slope.copy(), self._place[entries]
-        free[entries], slope[entries] = False, 0.0
-        if len(entries) and not self.turn(free, slope):
-            return False
-        self._flush()
-        some = np.flatnonzero(units != 1.0)
-        places, unit = self._place[some], units[some]
-        self._R[:, : self._size, places] *= np.where(self.free[some], 1.0 / unit, unit)
-        self._R[:, places, : self._size] *= np.stack([1.0 / unit, unit])[:, :, None]
-        before = self.S[entries[:, None], entries] * np.outer(units[entries], units[entries])
-        self._R[1, at[:, None], at] += block - before
         return True

@@ -93,14 +93,12 @@ class TipEnergies:
     """The bonds of this rank beside broken ones.
 
     Attributes:
-        node: (t,) node numbers.
         H: (t, 2, 2) diagonal blocks of the inverse dual operator.
         length: (t,) tributary lengths.
         stiffness: (t, c) upper bound of H, as `ExactInverse.stiffness`.
         axial: (t,) H for slip along the fibres; empty without this problem.
     """
 
-    node: Int
     H: Float
     length: Float
     stiffness: Float
@@ -127,15 +125,7 @@ class ReleasedEnergy(SpringEnergy):
         return cls(**vars(springs), influence=influence, axial=axial)
 
     def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> SpringsAndTips:
-        """Return the law at this rank's nodes with these bonds.  Collective; its methods are not."""
-        tips = self.tips(cell, bonds)
-        number = np.full(len(bonds.status), -1)
-        number[tips.node] = np.arange(len(tips.node))
-        springs = {field.name: getattr(self, field.name) for field in fields(SpringEnergy)}
-        return SpringsAndTips(**springs, tips=tips, number=number, contact=cell.plane.contact)
-
-    def tips(self, cell: CoupledInterfaces, bonds: BondState) -> TipEnergies:
-        """Return this rank's tips.  Collective.
+        """Return the law at this rank's nodes with these bonds.  Collective; its methods are not.
 
         Raises:
             ConvergenceError: rounding hides the released energy.
@@ -143,22 +133,25 @@ class ReleasedEnergy(SpringEnergy):
         self._activate(self.influence, cell.plane, bonds)
         neighbours, first = self.influence.neighbours, self.influence.neighbours.first
         everywhere = np.concatenate(neighbours.comm.allgather(bonds.status))
-        numbers = np.flatnonzero((everywhere == BONDED) & (neighbours.adjacency @ (everywhere != BONDED) > 0))
-        mine = (numbers >= first) & (numbers < first + len(bonds.status))
-        rows = neighbours.rows[numbers][:, None] + np.arange(2)
+        beside = np.flatnonzero((everywhere == BONDED) & (neighbours.adjacency @ (everywhere != BONDED) > 0))
+        mine = (beside >= first) & (beside < first + len(bonds.status))
+        rows = neighbours.rows[beside][:, None] + np.arange(2)
         H, axial = self.influence.inverse_blocks(rows)[mine], np.zeros(0)
         stiffness = self.influence.stiffness[rows[mine]]
-        node = numbers[mine] - first
+        node, number = beside[mine] - first, np.full(len(bonds.status), -1)
         if self.axial is not None:
             self._activate(self.axial, cell.problems[1], bonds)
-            rows = self.axial.neighbours.rows[numbers]
+            rows = self.axial.neighbours.rows[beside]
             axial = self.axial.inverse_blocks(np.stack([rows, rows], axis=1))[mine, 0, 0]
             stiffness = np.column_stack([stiffness, self.axial.stiffness[rows[mine]]])
-        return TipEnergies(node, H, cell.nodes.length[node], stiffness, axial)
+        number[node] = np.arange(len(node))
+        tips = TipEnergies(H, cell.nodes.length[node], stiffness, axial)
+        springs = {field.name: getattr(self, field.name) for field in fields(SpringEnergy)}
+        return SpringsAndTips(**springs, tips=tips, number=number, contact=cell.plane.contact)
 
     @staticmethod
     def _activate(influence: ExactInverse, interface: ContactProblem, bonds: BondState) -> None:
-        """Update the inverse to these bonds.  Collective; raises as `tips`."""
+        """Update the inverse to these bonds.  Collective; raises as `in_state`."""
         interface.prepare(bonds)
         if not influence.rounding <= MOST_ROUNDING:
             raise ConvergenceError(

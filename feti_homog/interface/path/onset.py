@@ -64,25 +64,18 @@ class Onset:
             factors[loaded] = 1.0 / used[loaded]
         else:
             at, along = node[loaded], direction.reshape(-1, c)[loaded]
-            exact = self.bonds.at(at).first_factor(before[at], along)
+            bonds, start, ray, used = self.bonds.at(at), before[at], ray[loaded], used[loaded]
+            exact = bonds.first_factor(start, along)
             if exact is None:
-                exact = self._searched(before[at], along, at, ray[loaded], used[loaded], n)
+                # Bisection, without bonds that break after another one of their ray.
+                lower, upper = (1.0 - bonds.share(start)) / used, (1.0 + bonds.share(-start)) / used
+                first, is_convex = np.full(n, np.inf), bonds.convex(len(used))
+                np.minimum.at(first, ray[is_convex], upper[is_convex])
+                some = np.flatnonzero((lower <= first[ray] * (1.0 + UTILISATION_TIE)) | ~is_convex)
+                exact = np.full(len(used), np.inf)
+                exact[some] = bonds.at(some).crossing(start[some], along[some], upper[some])
             factors[loaded] = exact
         return factors.reshape(n, k)
-
-    def _searched(self, before: Float, direction: Float, node: Int, ray: Int, used: Float, n: int) -> Float:
-        """(p,) factors of bonds by bisection, inf for bonds that break after another one of their ray.
-
-        Tractions are `before` + f `direction` (p, c) at the nodes (p,) on the rays (p,) of n.
-        """
-        bonds = self.bonds.at(node)
-        lower, upper = (1.0 - bonds.share(before)) / used, (1.0 + bonds.share(-before)) / used
-        first, is_convex = np.full(n, np.inf), bonds.convex(len(used))
-        np.minimum.at(first, ray[is_convex], upper[is_convex])
-        some = np.flatnonzero((lower <= first[ray] * (1.0 + UTILISATION_TIE)) | ~is_convex)
-        factors = np.full(len(used), np.inf)
-        factors[some] = bonds.at(some).crossing(before[some], direction[some], upper[some])
-        return factors
 
 
 def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, before: Float, after: Float) -> float:
