@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 LAUNCHER_HELP = "Switches of Open MPI go to mpirun: --allow-run-as-root, --oversubscribe (more ranks than cores)."
 GONE = {"statistics": "is drivers/fibre_statistics.py now", "schema": "is gone: `feti-homog keys` has all keys"}
 """Removed commands, each with its replacement."""
-COMMANDS = (run.add, products.add, products.add_fibres, studies.add, run.add_reference)
 
 
 class Parser(argparse.ArgumentParser):
@@ -44,24 +43,17 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _command(words: Sequence[str], comm: Intracomm) -> int:
     if words and words[0] in GONE:
         raise CaseError(f"command line: feti-homog {words[0]} {GONE[words[0]]}")
+    from petsc4py import PETSc
+
     parser = command_parser()
-    _refuse_single_dashes(parser)
+    # PETSc would take our own options with a single dash without a word.
+    actions = next(action.choices for action in parser._actions if isinstance(action, argparse._SubParsersAction))
+    ours = {name[2:] for action in actions.values() for name in action._option_string_actions if name.startswith("--")}
+    if misplaced := sorted(ours & PETSc.Options().getAll().keys() - {"help"}):
+        raise CaseError(*(f"command line: -{name} is no option of PETSc; did you mean --{name}?" for name in misplaced))
     arguments = parsed(parser, words or ["--help"], comm)
     arguments.action(arguments, comm)
     return EXIT_DONE
-
-
-def _refuse_single_dashes(parser: Parser) -> None:
-    """Refuse our own options among PETSc's, which would take them without a word."""
-    from petsc4py import PETSc
-
-    commands = next(action.choices for action in parser._actions if isinstance(action, argparse._SubParsersAction))
-    ours = {
-        word[2:] for command in commands.values() for word in command._option_string_actions if word.startswith("--")
-    }
-    misplaced = sorted(ours & PETSc.Options().getAll().keys() - {"help"})
-    if misplaced:
-        raise CaseError(*(f"command line: -{name} is no option of PETSc; did you mean --{name}?" for name in misplaced))
 
 
 def command_parser() -> Parser:
@@ -74,6 +66,6 @@ def command_parser() -> Parser:
     )
     parser.add_argument("--version", action="version", version=f"feti-homog {__version__}")
     actions = parser.add_subparsers(dest="command", required=True, parser_class=Parser)
-    for add in COMMANDS:
+    for add in (run.add, products.add, products.add_fibres, studies.add, run.add_reference):
         add(actions)
     return parser

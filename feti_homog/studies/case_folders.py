@@ -12,7 +12,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -136,12 +136,17 @@ def _refuse_another(directory: Path, stored: Sequence[SweepCase], entries: Seque
 def _table(entries: Sequence[SweepCase]) -> str:
     """Return cases.csv before any result."""
     names = list(dict.fromkeys(name for entry in entries for name in entry.inputs))
+    rows = (
+        [entry.number, entry.folder, entry.point, entry.realisation, *(entry.inputs.get(name, "") for name in names)]
+        for entry in entries
+    )
+    return csv_text([["case", "folder", "point", "realisation", *names], *rows])
+
+
+def csv_text(rows: Iterable[Iterable[Any]]) -> str:
+    """Return a table as CSV."""
     stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(["case", "folder", "point", "realisation", *names])
-    for entry in entries:
-        inputs = [entry.inputs.get(name, "") for name in names]
-        writer.writerow([entry.number, entry.folder, entry.point, entry.realisation, *inputs])
+    csv.writer(stream, lineterminator="\n").writerows(rows)
     return stream.getvalue()
 
 

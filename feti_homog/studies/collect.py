@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -68,15 +67,8 @@ def write(directory: Path, table: SweepTable) -> list[Path]:
         FetiHomogError: a file cannot be written.
     """
     rows = {"cases.csv": _case_rows(table), "statistics.csv": _statistics_rows(table)}
-    return [_write_csv(directory / name, table_rows) for name, table_rows in rows.items()]
-
-
-def _write_csv(path: Path, rows: Iterable[list[Any]]) -> Path:
-    def write_rows(part: Path) -> None:
-        with part.open("w", newline="", encoding="utf-8") as stream:
-            csv.writer(stream, lineterminator="\n").writerows(map(_cell, row) for row in rows)
-
-    return atomic.replace(path, write_rows)
+    texts = {name: case_folders.csv_text(map(_cell, row) for row in table_rows) for name, table_rows in rows.items()}
+    return [atomic.replace_text(directory / name, text) for name, text in texts.items()]
 
 
 def _cell(value: Any) -> Any:

@@ -120,16 +120,13 @@ def _set_output(document: dict[str, Any]) -> None:
     analysis, output = document.get("analysis"), document.get("output", {})
     if isinstance(output, dict):
         is_stiffness = isinstance(analysis, dict) and analysis.get("type") == "stiffness"
-        has_derivatives = is_stiffness and not _may_touch(document)
+        # Faces in contact may be debonded from the start: arcs, or lines of a user's mesh.
+        cell, sections = document.get("cell"), document.get("interface", [])
+        is_mesh = isinstance(cell, dict) and cell.get("geometry") == "mesh"
+        tables = [each for each in (sections if isinstance(sections, list) else [sections]) if isinstance(each, dict)]
+        may_touch = any(table.get("contact") is not False for table in tables if is_mesh or table.get("debonded"))
+        has_derivatives = is_stiffness and not may_touch
         document["output"] = {"mesh_error": False} | output | SILENT | {"sensitivities": has_derivatives}
-
-
-def _may_touch(document: Mapping[str, Any]) -> bool:
-    """Return whether faces in contact may be debonded from the start: arcs, or lines of a user's mesh."""
-    cell, sections = document.get("cell"), document.get("interface", [])
-    is_mesh = isinstance(cell, dict) and cell.get("geometry") == "mesh"
-    tables = [table for table in (sections if isinstance(sections, list) else [sections]) if isinstance(table, dict)]
-    return any(table.get("contact") is not False for table in tables if is_mesh or table.get("debonded"))
 
 
 def _rounded(x: Sequence[float] | Float) -> Point:
@@ -194,19 +191,17 @@ class Evaluations:
             else:
                 J[self.fit.rows_of(test), k] = column
         if missing:
-            places = [(test, side) for test, k in missing for side in self._sides(key, k)]
+            places = list[tuple[int, Point]]()
+            for test, k in missing:  # its k-th value less and more, within its bounds
+                unknown = [*self.fit.unknowns.values()][k]
+                step = DIFFERENCE * (abs(key[k]) or unknown.upper - unknown.lower)
+                ends = max(key[k] - step, unknown.lower), min(key[k] + step, unknown.upper)
+                places += [(test, _rounded([*key[:k], end, *key[k + 1 :]])) for end in ends]
             answers = self._ask(f"differences-{[*self.answers].index(key) + 1:04d}", places)
             for n, (test, k) in enumerate(missing):
                 (below, above), ((_, low), (_, high)) = answers[2 * n : 2 * n + 2], places[2 * n : 2 * n + 2]
                 J[self.fit.rows_of(test), k] = (above.values - below.values) / (high[k] - low[k])
         return J
-
-    def _sides(self, key: Point, k: int) -> list[Point]:
-        """Return x with its k-th value less and more, within its bounds."""
-        unknown = [*self.fit.unknowns.values()][k]
-        step = DIFFERENCE * (abs(key[k]) or unknown.upper - unknown.lower)
-        ends = max(key[k] - step, unknown.lower), min(key[k] + step, unknown.upper)
-        return [_rounded([*key[:k], end, *key[k + 1 :]]) for end in ends]
 
     def _ask(self, name: str, places: Sequence[tuple[int, Point]]) -> list[Answer]:
         self.evaluator.comm.bcast((name, places))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -11,6 +9,7 @@ import numpy as np
 
 from feti_homog.case.sections import Unknown
 from feti_homog.report.text.table import Column, Table
+from feti_homog.studies.case_folders import csv_text
 from feti_homog.studies.estimation import CONFIDENCE, ParameterEstimates, names_of
 from feti_homog.studies.predictions import Datum
 
@@ -69,11 +68,7 @@ def _finite(value: float) -> float | None:
 
 def measured_csv(document: Mapping[str, Any]) -> str:
     """Return the table of measured values."""
-    stream = io.StringIO()
-    writer = csv.DictWriter(stream, HEAD, extrasaction="ignore", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(document["measured"])
-    return stream.getvalue()
+    return csv_text([HEAD, *([datum[name] for name in HEAD] for datum in document["measured"])])
 
 
 def text(document: Mapping[str, Any]) -> str:

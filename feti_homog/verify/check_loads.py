@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.typing import Bool, Float
+from feti_homog.typing import Bool, Document, Float
 from feti_homog.verify.bonds import cohesive_traction, energy_of_springs, law_at
 from feti_homog.verify.discrete_cell import BONDED, CLOSED, OPEN, DiscreteCell
 from feti_homog.verify.elements import ElementFields
@@ -31,7 +31,6 @@ OF_ARCS = "debonded_length", "damaged_length", "debonded_shares"  # of an angle,
 LAST_OF_PLANE = 2  # place of gamma12 in the unit loads, whose state has the counts of an angle
 SPATIAL_ORDER = [0, 1, 5, 2, 4, 3]  # of unit strains in generalized plane strain; the fifth unit load is a temperature
 FIELDS = ("displacement", "fluctuation", "stress", "mesh_error", "stress_33")  # of a state on its mesh
-Document = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -200,6 +199,8 @@ def _check_states(findings: Findings, cell: DiscreteCell, pairs: Sequence[Any], 
     for number, point in enumerate(cell.files.points):
         count, place = sum(point[name] for name in COUNTS), f"point {number}, {', '.join(COUNTS)}"
         findings.compare("tables", count, len(rows.length), 1.0, place)
+        missing = sorted({"debonded_length", *["debonded_shares"] * (sections > 1)}.difference(point))
+        findings.require("tables", not missing, f"point {number}, {', '.join(missing)}")
 
 
 def _scales(cell: DiscreteCell, states: States, loads: Sequence[Prescribed]) -> tuple[float, float, float]:

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.special import roots_legendre
 
-from feti_homog.typing import AnyInt, Bool, Float, Int
+from feti_homog.typing import Bool, Float
 from feti_homog.verify.check_loads import NAMES, States
 from feti_homog.verify.discrete_cell import BONDED, DiscreteCell
 from feti_homog.verify.elements import PLACES
@@ -56,7 +56,16 @@ def check_interface(findings: Findings, cell: DiscreteCell) -> None:
     first = [int(cell.nodes.node[np.argmax(cell.nodes.place == place)]) for place in wrong[:1]]
     text = f"{len(wrong)} places with another number of interface nodes than one, the first at mesh node {first}"
     findings.require("interface", not len(wrong), text)
-    findings.record("interface", _strangers(cell), at)
+    # Nodes on a node's body by the mesh or by body label and fibre number, but not by both.
+    nodes, on_fibre = cell.nodes, (faces.row >= 0) & faces.is_fibre
+    fibre = rows.fibre + (int(rows.fibre.max(initial=0)) + 1) * rows.body.astype(np.int64)
+    part = np.full(len(fibre), -1)
+    part[faces.row[on_fibre]] = cell.constituent[nodes.subdomain[on_fibre]]
+    alike = []
+    for labels in (part, fibre, part * (int(fibre.max(initial=0)) + 1) + fibre):
+        _, inverse, count = np.unique(labels, return_inverse=True, return_counts=True)
+        alike.append(count[inverse.ravel()])
+    findings.record("interface", np.maximum(alike[0], alike[1]) - alike[2], at)
     misplaced = (faces.place >= 0) & (rows.pair != faces.pair[faces.place])
     findings.record("interface", np.where(misplaced, np.inf, 0.0), at)
     if (faces.place >= 0).all():
@@ -65,22 +74,6 @@ def check_interface(findings: Findings, cell: DiscreteCell) -> None:
         for error, limit in zip(errors, (LENGTH_ERROR, NORMAL_ERROR), strict=True):
             findings.record("interface", np.where(is_known | (error > limit), error, 0.0), at)
         findings.record("interface", np.abs(np.hypot(*rows.normal.T) - 1.0), at)
-
-
-def _strangers(cell: DiscreteCell) -> Float:
-    """(k,) number of nodes on a node's body by the mesh or by body label and fibre number, but not by both."""
-    nodes, faces, rows = cell.nodes, cell.faces, cell.files.interface
-    fibre = rows.fibre + (int(rows.fibre.max(initial=0)) + 1) * rows.body.astype(np.int64)
-    on_fibre = (faces.row >= 0) & faces.is_fibre
-    part = np.full(len(fibre), -1)
-    part[faces.row[on_fibre]] = cell.constituent[nodes.subdomain[on_fibre]]
-
-    def alike(labels: AnyInt) -> Int:
-        _, inverse, count = np.unique(labels, return_inverse=True, return_counts=True)
-        return np.asarray(count[inverse.ravel()])
-
-    both = alike(part * (int(fibre.max(initial=0)) + 1) + fibre)
-    return np.asarray(np.maximum(alike(part), alike(fibre)) - both, float)
 
 
 def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:

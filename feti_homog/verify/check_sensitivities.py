@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.typing import Float
-from feti_homog.verify.check_constants import constants_of
+from feti_homog.verify.check_constants import NOISE, constants_of
 from feti_homog.verify.check_loads import NAMES, SPATIAL_ORDER
 from feti_homog.verify.constitutive_law import laws, mixed_phases
 from feti_homog.verify.discrete_cell import BONDED, CLOSED, DiscreteCell
@@ -19,7 +19,6 @@ from feti_homog.verify.findings import STEP, Findings, relative
 from feti_homog.verify.reading import Mesh, State
 
 STIFFNESS_STEP = 1e-5  # relative
-NOISE = 1e-3  # share of the largest constant of a kind below which constants are noise
 SAME_RADIUS = 1e-8  # of a radius
 TINY = 1e-300
 WEIGHTS = (1.0, -0.7, 0.5, 0.9, -0.8)

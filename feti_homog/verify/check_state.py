@@ -28,7 +28,23 @@ def check_state(findings: Findings, cell: DiscreteCell, state: State, fields: El
         means = np.stack([(np.bincount(copy, column) / count)[copy] for column in values.T], axis=1)
         findings.compare(law, values, means, scale, lambda i: f"{state.name}, mesh node {nodes.node[i]}")
     _check_equilibrium(findings, cell, state, fields)
-    _check_averages(findings, cell, state, fields)
+    # <sigma> = Sigma, <eps> = E with face openings and void strains, and Hill's condition.
+    area, weights, v, scales = cell.area, cell.elements.area[:, None], len(state.strain), cell.scales_of(state)
+    mean = (weights * fields.stress).sum(axis=0) / area
+    size = float(((weights * np.abs(fields.stress)).sum(axis=0) / area).max())
+    size += ROUNDED_TERMS * float((weights[:, 0] * stiffest * fields.strain_size).sum() / area)
+    findings.compare("mean stress", mean, state.mean_stress, max(size, scales.stress), state.name)
+    jump = cell.in_axes(state.jump)
+    opening = np.einsum("ki,kj->ij", jump, cell.faces.sums(cell.node_integrals[cell.nodes.node], of_fibre=False))
+    opened = np.bincount(PLACES[v].ravel(), opening.ravel(), v) / area
+    # Voids have their share of E, and int sym(u* (x) n) ds along them; this closes where the boundary cuts one.
+    slope = np.einsum("ni,nd->id", state.fluctuation, cell.void_integrals)
+    of_voids = np.bincount(PLACES[v].ravel(), slope.ravel(), v) / area + cell.porosity * state.strain
+    strain = (weights * fields.strain).sum(axis=0) / area + of_voids - opened
+    findings.compare("mean strain", strain, state.strain, scales.strain, state.name)
+    work = area * float(state.mean_stress @ state.strain) - float((interface_forces(cell, state) * jump).sum())
+    least = area * scales.stress * scales.strain
+    findings.compare("Hill", fields.energy, work, max(abs(fields.energy), least), state.name)
     if not cell.files.is_spatial:
         rules = out_of_plane(cell.files.case, cell.files.phases)[cell.files.mesh.phase, 0]
         S33, terms = (np.einsum("ei,ei->e", *pair) for pair in ((rules, state.stress), np.abs((rules, state.stress))))
@@ -78,27 +94,6 @@ def _check_equilibrium(findings: Findings, cell: DiscreteCell, state: State, fie
     has_fixed = np.bincount(inverse, is_fixed[nodes.node], len(side)) > 0
     scales = scale + np.where(has_fixed, rounding_of_all, rounding)
     findings.record("equilibrium", relative(sums, scales[:, None]), name)
-
-
-def _check_averages(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
-    """Check <sigma> = Sigma, <eps> = E with face openings and void strains, and Hill's condition."""
-    area, weights, v, scales = cell.area, cell.elements.area[:, None], len(state.strain), cell.scales_of(state)
-    mean = (weights * fields.stress).sum(axis=0) / area
-    size = float(((weights * np.abs(fields.stress)).sum(axis=0) / area).max())
-    stiffest = np.abs(cell.stiffnesses).max(axis=(1, 2))[cell.files.mesh.phase]
-    size += ROUNDED_TERMS * float((weights[:, 0] * stiffest * fields.strain_size).sum() / area)
-    findings.compare("mean stress", mean, state.mean_stress, max(size, scales.stress), state.name)
-    jump = cell.in_axes(state.jump)
-    opening = np.einsum("ki,kj->ij", jump, cell.faces.sums(cell.node_integrals[cell.nodes.node], of_fibre=False))
-    opened = np.bincount(PLACES[v].ravel(), opening.ravel(), v) / area
-    # Voids have their share of E, and int sym(u* (x) n) ds along them; this closes where the boundary cuts one.
-    slope = np.einsum("ni,nd->id", state.fluctuation, cell.void_integrals)
-    of_voids = np.bincount(PLACES[v].ravel(), slope.ravel(), v) / area + cell.porosity * state.strain
-    strain = (weights * fields.strain).sum(axis=0) / area + of_voids - opened
-    findings.compare("mean strain", strain, state.strain, scales.strain, state.name)
-    work = area * float(state.mean_stress @ state.strain) - float((interface_forces(cell, state) * jump).sum())
-    scale = max(abs(fields.energy), area * scales.stress * scales.strain)
-    findings.compare("Hill", fields.energy, work, scale, state.name)
 
 
 def _check_bonds(findings: Findings, cell: DiscreteCell, state: State) -> None:

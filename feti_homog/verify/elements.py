@@ -15,7 +15,7 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from feti_homog.typing import AnyInt, Bool, Float, Int
+from feti_homog.typing import Bool, Float, Int
 from feti_homog.verify.reading import Mesh
 
 ELEMENTS_AT_ONCE = 1 << 15
@@ -127,25 +127,19 @@ class Elements:
             phase = self._mesh.phase[part]
             slope = np.einsum("eqad,eai->eqid", gradients, displacement[self._mesh.triangles[part]])
             local, own_free = _strains(slope, v, along), (none if free is None else free)[phase]
-            excess = self._add_bubbles(phase, gradients, weights, local, own_free)
+            excess, mixed = np.zeros(local.shape[:2]), np.flatnonzero(self.mixed[phase])
+            if len(mixed):  # their pressure less lambda tr eps; bubbles add to the strains
+                lame = np.stack([self._stiffnesses[phase[mixed], 0, 1], self._stiffnesses[phase[mixed], -1, -1]], 1)
+                elastic = local[mixed] - own_free[mixed, None]
+                inner, pressure = inner_fields(_places(), gradients[mixed], weights[mixed], elastic, lame)
+                if v == 6:
+                    inner = np.concatenate([inner, np.zeros((*inner.shape[:2], 1, 2))], axis=2)
+                bubble = _strains(inner, v, 0.0)
+                local[mixed] += bubble
+                excess[mixed] = pressure - lame[:, :1] * (elastic + bubble)[..., NORMAL[v]].sum(axis=2)
             answer = np.einsum("eij,eqj->eqi", self._stiffnesses[phase], local - own_free[:, None])
             answer[..., NORMAL[v]] += excess[..., None]
             yield part, gradients, weights, slope, local, answer
-
-    def _add_bubbles(self, phase: AnyInt, gradients: Float, weights: Float, local: Float, free: Float) -> Float:
-        """(e, q) pressure of mixed elements less lambda tr eps, 0 in others; adds the bubbles' strains to `local`."""
-        excess, mixed, v = np.zeros(local.shape[:2]), np.flatnonzero(self.mixed[phase]), local.shape[2]
-        if not len(mixed):
-            return excess
-        lame = np.stack([self._stiffnesses[phase[mixed], 0, 1], self._stiffnesses[phase[mixed], -1, -1]], 1)
-        elastic = local[mixed] - free[mixed, None]
-        slope, pressure = inner_fields(_places(), gradients[mixed], weights[mixed], elastic, lame)
-        if v == 6:
-            slope = np.concatenate([slope, np.zeros((*slope.shape[:2], 1, 2))], axis=2)
-        bubble = _strains(slope, v, 0.0)
-        local[mixed] += bubble
-        excess[mixed] = pressure - lame[:, :1] * (elastic + bubble)[..., NORMAL[v]].sum(axis=2)
-        return excess
 
     def _parts(self) -> Iterator[tuple[slice, Float, Float]]:
         """Yield elements in portions, with gradients (e, q, a, 2) and weights (e, q) at their quadrature points."""

@@ -66,7 +66,16 @@ def check_path_energies(findings: Findings, cell: DiscreteCell, states: States, 
     """Check work, stored and dissipated energy at all points."""
     _check_stored(findings, cell, states, points)
     by_events = cell.files.case["path"]["method"] == "events"
-    _check_rising(findings, points, 1.0 / len(targets(cell.files.case)) if by_events else 0.0)
+    # Under a load that only rises on the first leg of events, breaks at a load below the largest so far lose as much
+    # more as energies grow up to it.
+    names = "dissipated", "dissipated_strain_controlled", "load_factor"
+    lost, rising, factor = np.array([[point[name] for name in names] for point in points]).T
+    first_leg = 1.0 / len(targets(cell.files.case)) if by_events else 0.0
+    falls = (factor > 0.0) & (factor < first_leg - SAME_SHARE)
+    rise = np.where(falls, np.maximum.accumulate(factor) / np.where(falls, factor, 1.0), 1.0)
+    expected = lost[0] + np.cumsum(np.r_[0.0, rise[:-1] ** 2 * np.diff(lost)])
+    scale = max(float(np.abs(expected).max()), *(abs(point["stored"]) for point in points))
+    findings.compare("energy", rising, expected, scale, "path[{}].dissipated_strain_controlled".format)
     if "friction_heat" in points[0]:
         _check_heat(findings, states, points, by_events)
         return
@@ -91,20 +100,6 @@ def _check_stored(findings: Findings, cell: DiscreteCell, states: States, points
         if not point.get(TEMPERATURE) and "friction_heat" not in point:
             work = float(np.dot(point["strain"], point["stress"])) / 2
             findings.compare("energy", point["stored"], work, scale, f"path[{number}].stored")
-
-
-def _check_rising(findings: Findings, points: Points, first_leg: float) -> None:
-    """Check the loss under a load that only rises on the first leg of events, up to the load factor `first_leg`.
-
-    Breaks at a load below the largest so far lose as much more as energies grow up to it.
-    """
-    names = "dissipated", "dissipated_strain_controlled", "load_factor"
-    lost, rising, load = np.array([[point[name] for name in names] for point in points]).T
-    falls = (load > 0.0) & (load < first_leg - SAME_SHARE)
-    rise = np.where(falls, np.maximum.accumulate(load) / np.where(falls, load, 1.0), 1.0)
-    expected = lost[0] + np.cumsum(np.r_[0.0, rise[:-1] ** 2 * np.diff(lost)])
-    scale = max(float(np.abs(expected).max()), *(abs(point["stored"]) for point in points))
-    findings.compare("energy", rising, expected, scale, "path[{}].dissipated_strain_controlled".format)
 
 
 def _check_heat(findings: Findings, states: States, points: Points, by_events: bool) -> None:
