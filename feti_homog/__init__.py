@@ -31,7 +31,7 @@ from feti_homog.version import __version__
 if TYPE_CHECKING:
     from feti_homog.analysis.result import Result
     from feti_homog.api import collect_sweep, launch, run, run_fit, run_sweep
-    from feti_homog.case.case import Case
+    from feti_homog.case.cases import Case
     from feti_homog.report.plots.deformed_panels import draw_state
     from feti_homog.results.viewed_states import read_state
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from feti_homog.case.case import Case
+from feti_homog.case.cases import Case
 from feti_homog.errors import EXIT_DONE, CaseError, LibraryError
 from feti_homog.system.parallel.mpi_errors import on_root, on_root_only, run_main
 from feti_homog.system.petsc import libraries

@@ -22,7 +22,7 @@ import benchmark_small
 from benchmark_report import Row, compare, notes, plot, table, write
 from peers import PEERS
 
-from feti_homog.case import case as cases
+from feti_homog.case import cases
 
 HERE = Path(__file__).parent
 TOOLS = "feti,cholmod,mumps@1,mumps,gamg,hypre,hypre_rigid,fetidp,bddc"

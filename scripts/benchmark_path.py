@@ -23,7 +23,7 @@ from composite import MATERIAL  # noqa: E402
 from monolithic import factor_and_solve, glued  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 
-from feti_homog.case import case as cases  # noqa: E402
+from feti_homog.case import cases  # noqa: E402
 from feti_homog.homogenization.averaging import Homogenization  # noqa: E402
 from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces  # noqa: E402
@@ -32,9 +32,9 @@ from feti_homog.interface.laws.strength import MaxStrength  # noqa: E402
 from feti_homog.interface.loads import Load  # noqa: E402
 from feti_homog.interface.path.path_following import events  # noqa: E402
 from feti_homog.interface.path.path_points import unloaded  # noqa: E402
-from feti_homog.system.petsc.options import case_options  # noqa: E402
+from feti_homog.system.petsc.options_database import case_options  # noqa: E402
 from feti_homog.system.runtime import process_memory  # noqa: E402
-from feti_homog.system.runtime.progress import Progress  # noqa: E402
+from feti_homog.system.runtime.progress_bar import Progress  # noqa: E402
 
 STRAIN = [0.2, 0.0, 0.0]
 STRENGTH = 10.0

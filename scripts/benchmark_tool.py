@@ -26,14 +26,14 @@ from peers import PEERS, Peer  # noqa: E402
 from petsc4py import PETSc  # noqa: E402
 
 from feti_homog.analysis.context import AnalysisContext  # noqa: E402
-from feti_homog.case import case as cases  # noqa: E402
-from feti_homog.case.case import Case  # noqa: E402
+from feti_homog.case import cases  # noqa: E402
+from feti_homog.case.cases import Case  # noqa: E402
 from feti_homog.homogenization import phase_laws, unit_cell  # noqa: E402
 from feti_homog.homogenization.partition_policy import BY_COST  # noqa: E402
 from feti_homog.system.parallel.mpi_errors import agree, run_main  # noqa: E402
-from feti_homog.system.petsc.options import case_options  # noqa: E402
+from feti_homog.system.petsc.options_database import case_options  # noqa: E402
 from feti_homog.system.runtime import process_memory  # noqa: E402
-from feti_homog.system.runtime.progress import Progress  # noqa: E402
+from feti_homog.system.runtime.progress_bar import Progress  # noqa: E402
 from feti_homog.typing import Float  # noqa: E402
 
 PREFIX = "peer_"

@@ -8,7 +8,7 @@ the stiffness that are above 1e-3 of its largest and whose estimate is above the
 all cells how many lie between 0.5 and 2.  Exact values are spectral (tests/reference/references.py) or of quadratic
 elements refined twice more.
 
-`--factors` prints what `NESTED`, `LOCKED` and `SAMPLED` of feti_homog/homogenization/mesh_error.py hold: errors of
+`--factors` prints what `NESTED`, `LOCKED` and `SAMPLED` of feti_homog/homogenization/mesh_estimate.py hold: errors of
 elements and of arcs by the mesh itself over those by the mesh refined less, of the diagonal, cells cut by bodies and
 across materials; with quadratic elements in phases that lock also true errors, less those of arcs, over those of
 elements.
@@ -32,11 +32,11 @@ from reference.references import ARC_OF_120_DEGREES_FINE, AXIAL_SHEAR, BONDED, E
 
 from feti_homog import Case, run
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.homogenization.mesh_error import energy_errors, factors, is_nested
+from feti_homog.homogenization.mesh_estimate import energy_errors, factors, is_nested
 from feti_homog.homogenization.partition_policy import BY_COST
 from feti_homog.homogenization.uniform_parts import locks
 from feti_homog.homogenization.unit_cell import tear
-from feti_homog.system.runtime.progress import Progress
+from feti_homog.system.runtime.progress_bar import Progress
 from feti_homog.typing import Float
 
 SIZES = {1: (0.1, 0.05, 0.025), 2: (0.2, 0.1, 0.05)}

@@ -24,12 +24,12 @@ import numpy as np  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 from petsc4py import PETSc  # noqa: E402
 
-from feti_homog.case import case as cases  # noqa: E402
-from feti_homog.case.case import Case  # noqa: E402
+from feti_homog.case import cases  # noqa: E402
+from feti_homog.case.cases import Case  # noqa: E402
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds  # noqa: E402
 from feti_homog.homogenization.unit_cell import tear  # noqa: E402
-from feti_homog.system.petsc.options import case_options  # noqa: E402
-from feti_homog.system.runtime.progress import Progress  # noqa: E402
+from feti_homog.system.petsc.options_database import case_options  # noqa: E402
+from feti_homog.system.runtime.progress_bar import Progress  # noqa: E402
 
 # Columns that are no whole numbers.
 REAL = (

@@ -23,13 +23,13 @@ from petsc4py import PETSc  # noqa: E402
 from scaling_events import EventRow  # noqa: E402
 from scaling_tool import PINGS, foreign, ping  # noqa: E402
 
-from feti_homog.case import case as cases  # noqa: E402
-from feti_homog.case.case import Case  # noqa: E402
+from feti_homog.case import cases  # noqa: E402
+from feti_homog.case.cases import Case  # noqa: E402
 from feti_homog.homogenization.averaging import Homogenization  # noqa: E402
 from feti_homog.homogenization.unit_cell import tear  # noqa: E402
 from feti_homog.system.parallel.mpi_errors import run_main  # noqa: E402
-from feti_homog.system.petsc.options import case_options  # noqa: E402
-from feti_homog.system.runtime.progress import Progress  # noqa: E402
+from feti_homog.system.petsc.options_database import case_options  # noqa: E402
+from feti_homog.system.runtime.progress_bar import Progress  # noqa: E402
 
 
 def main() -> int:

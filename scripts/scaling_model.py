@@ -15,7 +15,7 @@ from typing import Any
 from scaling_fit import Shares, fit_power, fit_shares
 from scaling_report import FACTOR, GATHERS, MULTIGRID, SCALARS, SUMS, VALUE_BYTES, Row
 
-from feti_homog.mesh.tiles.tiles import DEFAULT_TILES
+from feti_homog.mesh.tiles.tiling import DEFAULT_TILES
 
 MESH, LOCAL, COARSE, MESSAGES = "mesh", "subdomains", "coarse problem", "messages"
 # Exchanges with neighbours in one cycle of multigrid: on each of about five levels six, for the products and smoothers

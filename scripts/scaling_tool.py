@@ -25,8 +25,8 @@ from mpi4py import MPI  # noqa: E402
 from petsc4py import PETSc  # noqa: E402
 from scaling_report import FACTOR, MULTIGRID  # noqa: E402
 
-from feti_homog.case import case as cases  # noqa: E402
-from feti_homog.case.case import Case  # noqa: E402
+from feti_homog.case import cases  # noqa: E402
+from feti_homog.case.cases import Case  # noqa: E402
 from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace  # noqa: E402
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace  # noqa: E402
 from feti_homog.feti.decomposition.jump_operator import JumpOperator  # noqa: E402
@@ -35,11 +35,11 @@ from feti_homog.homogenization.partition_policy import DEFAULT_POLICY  # noqa: E
 from feti_homog.homogenization.tile_tearing import begin_mesh, tiled_cell, tiles_to_fill  # noqa: E402
 from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
 from feti_homog.mesh.fill.gmsh_mesher import UnmeshedCell  # noqa: E402
-from feti_homog.mesh.tiles.tiles import TilePolicy  # noqa: E402
+from feti_homog.mesh.tiles.tiling import TilePolicy  # noqa: E402
 from feti_homog.system.parallel.mpi_errors import on_root, run_main  # noqa: E402
-from feti_homog.system.petsc.options import case_options  # noqa: E402
+from feti_homog.system.petsc.options_database import case_options  # noqa: E402
 from feti_homog.system.runtime import process_memory  # noqa: E402
-from feti_homog.system.runtime.progress import Progress  # noqa: E402
+from feti_homog.system.runtime.progress_bar import Progress  # noqa: E402
 from feti_homog.typing import Int  # noqa: E402
 
 LOADS = 3

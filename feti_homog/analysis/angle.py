@@ -10,7 +10,7 @@ from feti_homog.analysis.constants import energy_error, note_accuracy, state_err
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import AnglePoint
 from feti_homog.analysis.tip_records import tip_rates
-from feti_homog.case.loads import Angle
+from feti_homog.case.load_sections import Angle
 from feti_homog.homogenization.averaging import Response, asymmetry
 
 

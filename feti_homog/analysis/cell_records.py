@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.materials.bounds import Bounds
+from feti_homog.materials.phase_bounds import Bounds
 from feti_homog.system.runtime.records import DEGREES, LENGTH, STRESS, described, plain
 from feti_homog.typing import Float
 

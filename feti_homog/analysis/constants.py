@@ -13,19 +13,19 @@ from scipy.linalg import eigh
 from feti_homog.analysis.cell_records import StiffnessBounds
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import MeshErrors
-from feti_homog.case.case import Case
+from feti_homog.case.cases import Case
 from feti_homog.errors import NotCarriedError
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.materials import bounds, laws
-from feti_homog.materials import constants as named_constants
+from feti_homog.materials import phase_bounds, laws
+from feti_homog.materials import engineering_constants as named_constants
 from feti_homog.microstructure.phase_names import COATING
 from feti_homog.system.runtime.records import plain
 from feti_homog.typing import Float
 
 if TYPE_CHECKING:
-    from feti_homog.homogenization.mesh_error import EnergyErrors
+    from feti_homog.homogenization.mesh_estimate import EnergyErrors
 
 Named = Mapping[str, Float]
 PARTS = ("absolute", "signed", "least")
@@ -52,9 +52,9 @@ def constants(cell: TornCell, secants: Mapping[str, Any]) -> dict[str, Any]:
         is_debonded = cell.sum_over_ranks(int(cell.debonded(None).sum())) > 0
         return entries | ({} if is_debonded or len(fractions) == 1 else _comparisons(cell, fractions))
     phases = [laws.plane_stiffness(case.material_of(phase), case.analysis.plane) for phase in fractions]
-    shares, isotropic = list(fractions.values()), all(map(bounds.is_isotropic, phases))
-    hashin_shtrikman = bounds.hashin_shtrikman(shares, phases) if isotropic else None
-    limits = StiffnessBounds(bounds.voigt(shares, phases), bounds.reuss(shares, phases), hashin_shtrikman)
+    shares, isotropic = list(fractions.values()), all(map(phase_bounds.is_isotropic, phases))
+    hashin_shtrikman = phase_bounds.hashin_shtrikman(shares, phases) if isotropic else None
+    limits = StiffnessBounds(phase_bounds.voigt(shares, phases), phase_bounds.reuss(shares, phases), hashin_shtrikman)
     return entries | {"bounds": limits}
 
 
@@ -79,7 +79,7 @@ def _comparisons(cell: TornCell, fractions: Mapping[str, float]) -> dict[str, An
     Estimates exist for fibres without coatings, held in the matrix by the same bonds, with springs of one radius;
     bounds for transversely isotropic phases.
     """
-    from feti_homog.materials.bounds import Fibres, Springs, fibre_bounds
+    from feti_homog.materials.phase_bounds import Fibres, Springs, fibre_bounds
     from feti_homog.materials.estimates import estimates  # bonded cells in the plane have none
 
     summary, case, has_springs = cell.summary, cell.case, phase_laws.has_springs(cell.case)
@@ -120,7 +120,7 @@ def unit_errors(context: AnalysisContext, responses: list[Response]) -> tuple[li
     """
     if not context.case.output.mesh_error:
         return [], responses
-    from feti_homog.homogenization.mesh_error import energy_errors  # with the recovery of stresses
+    from feti_homog.homogenization.mesh_estimate import energy_errors  # with the recovery of stresses
 
     errors: list[EnergyErrors] = []
     shared, keep = list[Response](), context.recovers_again
@@ -213,7 +213,7 @@ def state_error(context: AnalysisContext, responses: Sequence[Response]) -> tupl
     """
     if not context.case.output.mesh_error:
         return {}, list(responses)
-    from feti_homog.homogenization.mesh_error import energy_errors  # with the recovery of stresses
+    from feti_homog.homogenization.mesh_estimate import energy_errors  # with the recovery of stresses
 
     keep, pairs = context.recovers_again, zip(context.loads.problems, responses, strict=False)
     errors = [energy_errors(problem.cell, [response], keep=keep) for problem, response in pairs]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from feti_homog.analysis.recorders import CheckRecorder, StateRecorder
-from feti_homog.case.case import Case
+from feti_homog.case.cases import Case
 from feti_homog.homogenization import cell_remarks, phase_laws
 from feti_homog.homogenization.averaging import FibreInterfaces, Homogenization, Response
 from feti_homog.homogenization.unit_cell import TornCell
@@ -19,8 +19,8 @@ from feti_homog.interface.contact.load_scales import ABSURD
 from feti_homog.interface.contact.states import BONDED, OPEN, BondState, Equilibrium
 from feti_homog.interface.loads import Load
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS
-from feti_homog.results.checkpoint import EventsInMemory
-from feti_homog.system.runtime.progress import Progress
+from feti_homog.results.checkpoints import EventsInMemory
+from feti_homog.system.runtime.progress_bar import Progress
 from feti_homog.typing import Float
 
 if TYPE_CHECKING:

@@ -16,11 +16,11 @@ from feti_homog.analysis.constants import constants, mesh_error, unit_errors
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import EnvelopePoint
 from feti_homog.analysis.tip_records import DIRECTION_DIGITS, bond_directions, criterion_of
-from feti_homog.case.loads import Envelope
+from feti_homog.case.load_sections import Envelope
 from feti_homog.errors import CaseError
 from feti_homog.homogenization.averaging import Response, asymmetry
 from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.interface.path.onset import Onset
+from feti_homog.interface.path.onsets import Onset
 from feti_homog.interface.path.path_points import UTILISATION_TIE
 from feti_homog.materials.voigt import voigt_names
 from feti_homog.typing import Float, Int

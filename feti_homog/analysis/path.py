@@ -24,7 +24,7 @@ from feti_homog.analysis.path_events import (
 )
 from feti_homog.analysis.result_records import PathPoint, Peak
 from feti_homog.analysis.tip_records import criterion_of, tips
-from feti_homog.case.loads import LoadPath
+from feti_homog.case.load_sections import LoadPath
 from feti_homog.errors import NotCarriedError
 from feti_homog.homogenization.averaging import Response
 from feti_homog.interface.friction.coulomb_faces import StuckError
@@ -35,7 +35,7 @@ from feti_homog.interface.path.frictionless_leg import FrictionlessLeg
 from feti_homog.interface.path.path_following import events, increments
 from feti_homog.interface.path.path_points import Energies, Point, unloaded
 from feti_homog.materials.voigt import voigt_names
-from feti_homog.results.checkpoint import has_multipliers
+from feti_homog.results.checkpoints import has_multipliers
 from feti_homog.results.landmarks import kept, marks, peak_of
 
 NAMED_FIBRES = 8  # in a remark

@@ -19,8 +19,8 @@ from feti_homog.interface.contact.states import BondState, Equilibrium
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.loads import Load, Macroscopic
 from feti_homog.interface.path.path_points import NO_ENERGIES, Energies, PathState, Point, most_utilised
-from feti_homog.results.checkpoint import Arrays, has_multipliers
-from feti_homog.system.runtime.progress import Progress
+from feti_homog.results.checkpoints import Arrays, has_multipliers
+from feti_homog.system.runtime.progress_bar import Progress
 
 SECONDS_A_LINE = 1.0
 # Equal steps tell the time left; the number of events is unknown.

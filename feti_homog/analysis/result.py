@@ -27,8 +27,13 @@ from feti_homog.analysis.result_records import (
     Peak,
     TipRates,
 )
-from feti_homog.materials.bounds import Estimates, FibreBounds
-from feti_homog.materials.constants import EngineeringConstants, Moduli, TransverseIsotropy, TransverseModuli
+from feti_homog.materials.phase_bounds import Estimates, FibreBounds
+from feti_homog.materials.engineering_constants import (
+    EngineeringConstants,
+    Moduli,
+    TransverseIsotropy,
+    TransverseModuli,
+)
 from feti_homog.materials.voigt import voigt_names
 from feti_homog.results.field_layout import FibrePart, Header, InterfacePart, MeshPart, StatePart, tables
 from feti_homog.results.result_json import SCHEMA, FileSeal

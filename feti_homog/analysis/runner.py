@@ -20,20 +20,20 @@ from feti_homog.analysis.cell_records import CellInfo, Checks, FibreInfo, Solver
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.recorders import CONTACT_TOLERANCE, StateRecorder
 from feti_homog.analysis.result import Fields, Result
-from feti_homog.case.case import Case
+from feti_homog.case.cases import Case
 from feti_homog.errors import ConvergenceError
 from feti_homog.homogenization.partition_policy import BY_COST
 from feti_homog.homogenization.uniform_parts import nodes_of_parts
 from feti_homog.homogenization.unit_cell import TornCell, tear
 from feti_homog.microstructure.shapes.ellipses import Ellipses
 from feti_homog.results import field_file, field_parts, output_folder, result_json, xdmf
-from feti_homog.results.checkpoint import WHOLE_BYTES, Checkpoint, EventsInMemory
+from feti_homog.results.checkpoints import WHOLE_BYTES, Checkpoint, EventsInMemory
 from feti_homog.results.field_file import FieldFile
 from feti_homog.results.output_folder import EventLog
 from feti_homog.system.parallel.mpi_errors import all_raise, on_root, on_root_only
-from feti_homog.system.petsc.options import case_options, refuse_unused, without_iterations
+from feti_homog.system.petsc.options_database import case_options, refuse_unused, without_iterations
 from feti_homog.system.runtime import process_memory
-from feti_homog.system.runtime.progress import Progress
+from feti_homog.system.runtime.progress_bar import Progress
 from feti_homog.version import __version__
 
 # Bytes kept between cases of a process; releasing them costs a small case 10 % of its time.

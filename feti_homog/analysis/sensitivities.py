@@ -13,11 +13,11 @@ from feti_homog.analysis.cell_records import Sensitivities
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
-from feti_homog.homogenization.sensitivities import derivatives
+from feti_homog.homogenization.stiffness_derivatives import derivatives
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.loads import Load
-from feti_homog.materials.constants import constants
-from feti_homog.materials.derivatives import constant_changes
+from feti_homog.materials.engineering_constants import constants
+from feti_homog.materials.material_derivatives import constant_changes
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, THERMAL_STRESSES
 from feti_homog.typing import Float
 

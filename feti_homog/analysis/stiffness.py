@@ -9,7 +9,7 @@ from feti_homog.analysis.context import AnalysisContext
 from feti_homog.homogenization.averaging import asymmetry
 
 if TYPE_CHECKING:
-    from feti_homog.homogenization.mesh_error import EnergyErrors
+    from feti_homog.homogenization.mesh_estimate import EnergyErrors
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:

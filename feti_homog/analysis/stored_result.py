@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from feti_homog.analysis.result import Result
-from feti_homog.case.case import Case, check_stored
+from feti_homog.case.cases import Case, check_stored
 from feti_homog.errors import CaseError
-from feti_homog.results import checkpoint, field_file, result_json
+from feti_homog.results import checkpoints, field_file, result_json
 
 
 def read(directory: Path) -> dict[str, Any]:
@@ -46,7 +46,7 @@ def finished(directory: Path, case: Case) -> bool:
     Raises:
         CaseError: the result is damaged, or belongs to another case.
     """
-    if (directory / checkpoint.FOLDER).is_dir() or not (directory / result_json.NAME).is_file():
+    if (directory / checkpoints.FOLDER).is_dir() or not (directory / result_json.NAME).is_file():
         return False
     document = result_json.read(directory)
     result = _restored(directory, document)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from feti_homog.case import section_values as kinds
 from feti_homog.microstructure.phase_names import FIBRE
 from feti_homog.schema.keys import Selector, key
-from feti_homog.schema.values import choice, integer, real
+from feti_homog.schema.types import choice, integer, real
 
 MOST_FIBRES = 100_000  # of a cell, and as many voids
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.case.cell_section import FIBRES_OF, MOST_FIBRES, Cell
-from feti_homog.materials.forms import Isotropic, Material
+from feti_homog.materials.material_forms import Isotropic, Material
 from feti_homog.materials.laws import isotropic_ratio, plane_stiffness, stiffness_of
 from feti_homog.materials.voigt import PLANE_STATES
 from feti_homog.microstructure.phase_names import COATING

@@ -10,7 +10,7 @@ from typing import Any
 from feti_homog.case import section_values as kinds
 from feti_homog.case.bond_laws import DEFAULT, LAWS, REGISTRY
 from feti_homog.schema.keys import key
-from feti_homog.schema.values import POSITIVE_OR_INF, boolean, choice, integer, list_of, real, table_of
+from feti_homog.schema.types import POSITIVE_OR_INF, boolean, choice, integer, list_of, real, table_of
 
 pair_key = partial(key, by_pair=True)
 """A key in which several sections [[interface]] may differ; they agree in all others."""

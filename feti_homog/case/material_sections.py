@@ -9,7 +9,7 @@ from typing import Any
 
 from feti_homog.case.cell_section import CIRCULAR, GEOMETRY, Cell
 from feti_homog.case.section_values import FRACTIONS
-from feti_homog.materials.forms import MATERIAL_FORMS, Material
+from feti_homog.materials.material_forms import MATERIAL_FORMS, Material
 from feti_homog.materials.laws import expansion, stiffness_of
 from feti_homog.microstructure.phase_names import COATING, FIBRE, MATRIX, PHASE
 from feti_homog.schema.keys import TableReader, keys_of

@@ -10,9 +10,9 @@ from typing import Any
 
 from feti_homog.case import sections
 from feti_homog.errors import CaseError
-from feti_homog.materials.forms import Isotropic
+from feti_homog.materials.material_forms import Isotropic
 from feti_homog.schema.keys import Key, keys_of
-from feti_homog.schema.values import text
+from feti_homog.schema.types import text
 
 ORDER = (
     *("name", "cell", "material", *[*sections.SECTIONS][1:]),

@@ -10,7 +10,7 @@ from typing import Any
 
 from feti_homog.case.bond_laws import BRANCH, COHESIVE, LAWS, STIFFNESSES
 from feti_homog.case.interface_section import InterfaceSection, Scatter, interface_label, interface_tables
-from feti_homog.case.loads import (
+from feti_homog.case.load_sections import (
     TEMPERATURE,
     AnalysisSection,
     Envelope,
@@ -24,7 +24,7 @@ from feti_homog.case.loads import (
 )
 from feti_homog.case.material_sections import coating_faults, missing_expansions
 from feti_homog.case.section_values import PAIR
-from feti_homog.materials.forms import Material, Orthotropic
+from feti_homog.materials.material_forms import Material, Orthotropic
 from feti_homog.materials.voigt import PLANE_STATES
 from feti_homog.schema.keys import TableReader, keys_of, to_table
 from feti_homog.schema.wording import toml_value
@@ -74,7 +74,7 @@ def axes_lines(kind: str, section: AnalysisSection, materials: Mapping[str, Mate
     """Return the axes of loads and of phase constants that could be a ply's, in a line; none in a plane."""
     if not PLANE_STATES[plane].is_spatial:
         return ()
-    from feti_homog.materials.constants import axes_line  # which nothing in a plane needs
+    from feti_homog.materials.engineering_constants import axes_line  # which nothing in a plane needs
 
     loaded = [name for load in section.placed.values() for name, value in named(load).items() if value]
     of_loads = axes_line(section.plane if isinstance(section, Envelope) else loaded)

@@ -16,11 +16,11 @@ from feti_homog.case.cell_files import FEWEST_MATCHED
 from feti_homog.case.cell_section import MESH, MESHED, RANDOM, TABLE, Cell
 from feti_homog.case.cell_sizes import CHOSEN
 from feti_homog.case.interface_section import ARCS, Arc, Scatter, interface_tables
-from feti_homog.case.loads import MixedLoad
+from feti_homog.case.load_sections import MixedLoad
 from feti_homog.case.sections import DIFFERENTIABLE, SECTIONS, SECTIONS_OF_AN_ANALYSIS
 from feti_homog.materials.voigt import PLANE_STATES, SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
 from feti_homog.schema.keys import Condition, Selected, Selector, keys_of
-from feti_homog.schema.values import INF, Test, is_number
+from feti_homog.schema.types import INF, Test, is_number
 from feti_homog.schema.wording import toml_value
 
 TablePath = tuple[str, ...]

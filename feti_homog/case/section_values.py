@@ -10,17 +10,7 @@ from typing import Any
 from feti_homog.case.bond_laws import laws_with
 from feti_homog.microstructure.phase_names import FIBRE_PHASE, PHASE
 from feti_homog.schema.keys import Selector
-from feti_homog.schema.values import (
-    ValueType,
-    boolean,
-    choice,
-    either,
-    file_name,
-    integer,
-    list_of,
-    real,
-    text,
-)
+from feti_homog.schema.types import ValueType, boolean, choice, either, file_name, integer, list_of, real, text
 
 STRAIN_COMPONENTS = "[E11, E22, gamma12]"
 PAIR_EXAMPLE = '["coating", "matrix"]'

@@ -13,11 +13,11 @@ from typing import Any
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.interface_section import Arc, InterfaceSection, Scatter
-from feti_homog.case.loads import Angle, Envelope, LoadPath, MixedLoad, SingleLoad
+from feti_homog.case.load_sections import Angle, Envelope, LoadPath, MixedLoad, SingleLoad
 from feti_homog.case.section_values import ANALYSIS_TYPE, PATH_ANALYSIS, SEED, STATES
-from feti_homog.materials.forms import MATERIAL_FORMS
+from feti_homog.materials.material_forms import MATERIAL_FORMS
 from feti_homog.schema.keys import Key, key, keys_of
-from feti_homog.schema.values import boolean, choice, file_name, integer, is_number, real, text
+from feti_homog.schema.types import boolean, choice, file_name, integer, is_number, real, text
 from feti_homog.schema.wording import toml_key, toml_value
 
 Scalar = str | int | float | bool

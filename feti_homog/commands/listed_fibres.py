@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.analysis import stored_result
-from feti_homog.case import case as cases
+from feti_homog.case import cases
 from feti_homog.case.cell_section import Cell
 from feti_homog.errors import CaseError
 from feti_homog.mesh.arrange import arrange

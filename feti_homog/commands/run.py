@@ -32,7 +32,7 @@ def add(actions: argparse._SubParsersAction[Any]) -> None:
 
 def _run(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.analysis.runner import run
-    from feti_homog.case import case as cases
+    from feti_homog.case import cases
     from feti_homog.results import output_folder
 
     case = on_root(comm, cases.load, arguments.case)
@@ -43,7 +43,7 @@ def _run(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.case.document import read_document
+    from feti_homog.case.toml_files import read_document
     from feti_homog.case.sections import FIT_SECTIONS
     from feti_homog.studies import description, fit_file, uncertainty
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from feti_homog.fem.stress_recovery import RecoveredStress
 from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.mesh.submesh import Submesh
+from feti_homog.mesh.submeshes import Submesh
 from feti_homog.typing import Bool, Float, Int
 
 

@@ -11,7 +11,7 @@ from itertools import product
 
 import numpy as np
 
-from feti_homog.case.case import Case
+from feti_homog.case.cases import Case
 from feti_homog.case.interface_section import interface_label
 from feti_homog.interface import debonded_arcs
 from feti_homog.interface.debonded_arcs import MovedTips

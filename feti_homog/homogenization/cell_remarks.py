@@ -7,14 +7,14 @@ import math
 import numpy as np
 
 from feti_homog.case import cell_sizes
-from feti_homog.case.case import Case
+from feti_homog.case.cases import Case
 from feti_homog.case.interface_section import interface_label
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.arc_selection import LEAST_SIZE
-from feti_homog.materials.constants import engineering_moduli
+from feti_homog.materials.engineering_constants import engineering_moduli
 from feti_homog.materials.laws import plane_stiffness
 from feti_homog.mesh.periodic_topology import Torus
-from feti_homog.mesh.submesh import pinned_class
+from feti_homog.mesh.submeshes import pinned_class
 from feti_homog.schema.wording import toml_value
 from feti_homog.typing import AnyInt, Float, Int
 

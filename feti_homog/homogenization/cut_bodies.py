@@ -17,7 +17,7 @@ from feti_homog.fem.local_fits import PatchNeighbours, fitted
 from feti_homog.fem.stress_recovery import RecoveredStress
 from feti_homog.feti.decomposition.sharers import entity_code
 from feti_homog.mesh.refinement import FineMesh
-from feti_homog.mesh.submesh import Submesh
+from feti_homog.mesh.submeshes import Submesh
 from feti_homog.system.parallel.distributed_arrays import exchange
 from feti_homog.typing import Array, Bool, Float, Int, Int32
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.case.case import Case
+from feti_homog.case.cases import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import Partition, decompose, halves
 from feti_homog.homogenization import arc_selection, cell_remarks
@@ -25,8 +25,8 @@ from feti_homog.mesh.fill.gmsh_mesher import NodedCell
 from feti_homog.mesh.mesh_fibres import coating_thickness, fibre_circles, fibre_frames, fibre_numbers
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.mesh.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks, pinned_class
-from feti_homog.mesh.tiles.filling import arc_edges
+from feti_homog.mesh.submeshes import SubdomainTable, SubmeshesOfRank, cut_for_ranks, pinned_class
+from feti_homog.mesh.tiles.tile_filling import arc_edges
 from feti_homog.microstructure.shapes.ellipses import Ellipses
 from feti_homog.typing import Bool, Float, Int
 

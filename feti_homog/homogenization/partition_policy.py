@@ -14,17 +14,17 @@ from math import ceil
 import numpy as np
 
 from feti_homog.case.bond_laws import laws_with
-from feti_homog.case.case import Case
+from feti_homog.case.cases import Case
 from feti_homog.fem.problem import AXIAL, Problem
 from feti_homog.feti.decomposition.partition import pieces_for_count, pieces_for_size
 from feti_homog.feti.thresholds import INFLUENCE_COLUMNS, NEVER_REFACTORED_ROWS
 from feti_homog.homogenization import phase_laws
 from feti_homog.materials.laws import isotropic_ratio
 from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.mesh.tiles.tiles import DEFAULT_TILES, TilePolicy
+from feti_homog.mesh.tiles.tiling import DEFAULT_TILES, TilePolicy
 from feti_homog.microstructure.phase_names import COATING
 from feti_homog.system.petsc.option_table import only_prints
-from feti_homog.system.petsc.options import given_options
+from feti_homog.system.petsc.options_database import given_options
 from feti_homog.typing import Int
 
 # Poisson's ratio up to which single nodes of mixed elements are hardly stiffer than mu makes them (`SCALED_LAME`).

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 from feti_homog.case import bond_laws, cell_sizes
-from feti_homog.case.case import Case
+from feti_homog.case.cases import Case
 from feti_homog.case.interface_section import InterfaceSection
 from feti_homog.fem.problem import AXIAL, GENERALIZED, PLANE, Problem
 from feti_homog.feti.decomposition.jump_operator import InterfaceSprings
 from feti_homog.interface.laws.bond_law import BondLaw, law_class
-from feti_homog.materials.derivatives import LawChange
+from feti_homog.materials.material_derivatives import LawChange
 from feti_homog.materials.laws import expansion, plane_stiffness, spatial_stiffness
 from feti_homog.materials.voigt import PLANE_STATES
 from feti_homog.typing import Float, Int

@@ -56,7 +56,7 @@ def recover(cell: TornCell, response: Response | None) -> RecoveredFields:
         stresses.append(strains[-1] @ s.L)
     total, fluctuation, strain, stress = (np.concatenate(rows) for rows in (totals, fluctuations, strains, stresses))
     if shares is None and cell.case.output.mesh_error:
-        from feti_homog.homogenization.mesh_error import energy_errors  # cases may forgo it
+        from feti_homog.homogenization.mesh_estimate import energy_errors  # cases may forgo it
 
         shares = energy_errors(cell, [response]).shares[:, 0]
     shares = np.full(len(strain), np.nan) if shares is None else shares

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import roots_legendre
 
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.decomposition.neighbours import InterfaceNeighbours
+from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.feti.decomposition.shared_entities import along, edge_normals
 from feti_homog.homogenization.cut_bodies import border_lines
 from feti_homog.homogenization.uniform_parts import UniformPart

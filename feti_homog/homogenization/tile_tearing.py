@@ -15,8 +15,8 @@ from typing import TypeVar
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.case import case as cases
-from feti_homog.case.case import Case
+from feti_homog.case import cases
+from feti_homog.case.cases import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import assign_ranks, cut_into_pieces
 from feti_homog.homogenization import arc_selection, cell_remarks
@@ -30,9 +30,9 @@ from feti_homog.mesh.periodic_topology import Torus, components, places_by_depth
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.sizes.element_estimate import ElementEstimate
 from feti_homog.mesh.sizes.graded_size import SizeField
-from feti_homog.mesh.submesh import SubdomainTable, cut_for_ranks, joined, pinning
-from feti_homog.mesh.tiles.filling import Filling, Tile, fill
-from feti_homog.mesh.tiles.tiles import FilledTile, NumberedTile, Regions, TilePolicy, tile_torus
+from feti_homog.mesh.submeshes import SubdomainTable, cut_for_ranks, joined, pinning
+from feti_homog.mesh.tiles.tile_filling import Filling, Tile, fill
+from feti_homog.mesh.tiles.tiling import FilledTile, NumberedTile, Regions, TilePolicy, tile_torus
 from feti_homog.system.parallel.distributed_arrays import alltoall, gather, scatter
 from feti_homog.system.parallel.dividing import balanced
 from feti_homog.system.parallel.mpi_errors import agree, on_root, on_root_only

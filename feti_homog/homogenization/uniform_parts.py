@@ -22,7 +22,7 @@ from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.one_subdomain import Interior
 from feti_homog.mesh.periodic_topology import present
 from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, joined, refine
-from feti_homog.mesh.submesh import SubdomainTable, Submesh, SubmeshesOfRank, joined_meshes, part
+from feti_homog.mesh.submeshes import SubdomainTable, Submesh, SubmeshesOfRank, joined_meshes, part
 from feti_homog.typing import Float, Int
 
 # Subdomains of so many elements at once: few enough for the processor's cache, many enough for NumPy.

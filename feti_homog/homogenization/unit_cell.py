@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.case.case import Case
+from feti_homog.case.cases import Case
 from feti_homog.fem.problem import AXIAL, Problem
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.shared_entities import SharedEntities, share_entities
@@ -26,14 +26,14 @@ from feti_homog.homogenization.uniform_parts import UniformPart, locks
 from feti_homog.interface import debonded_arcs
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.mesh.submesh import SubdomainTable, Submesh, SubmeshesOfRank
+from feti_homog.mesh.submeshes import SubdomainTable, Submesh, SubmeshesOfRank
 from feti_homog.microstructure.phase_names import COATING, MATRIX
 from feti_homog.system.parallel.mpi_errors import agree
-from feti_homog.system.runtime.progress import Progress
+from feti_homog.system.runtime.progress_bar import Progress
 from feti_homog.typing import Bool, Float, Int
 
 if TYPE_CHECKING:
-    from feti_homog.feti.decomposition.neighbours import InterfaceNeighbours
+    from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
     from feti_homog.homogenization.spring_errors import SpringSides
 
 
@@ -112,7 +112,7 @@ class TornCell:
     @cached_property
     def neighbours(self) -> InterfaceNeighbours:
         """All ranks' interface nodes.  Collective when first read."""
-        from feti_homog.feti.decomposition.neighbours import InterfaceNeighbours  # most cells have no interfaces
+        from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours  # most cells have no interfaces
 
         return InterfaceNeighbours(self.comm, self.solver.jump_operator, self.subdomains)
 

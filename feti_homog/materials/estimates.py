@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.materials.bounds import (
+from feti_homog.materials.phase_bounds import (
     NOTHING,
     Estimate,
     Estimates,
@@ -22,7 +22,11 @@ from feti_homog.materials.bounds import (
     equivalent_fibre,
     expansions,
 )
-from feti_homog.materials.constants import TransverseIsotropy, is_transversely_isotropic, transverse_constants
+from feti_homog.materials.engineering_constants import (
+    TransverseIsotropy,
+    is_transversely_isotropic,
+    transverse_constants,
+)
 
 
 def estimates(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimates:

@@ -11,7 +11,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from feti_homog.materials.forms import EXPANSION_PAIR, General, Isotropic, Material, Orthotropic, TransverselyIsotropic
+from feti_homog.materials.material_forms import (
+    EXPANSION_PAIR,
+    General,
+    Isotropic,
+    Material,
+    Orthotropic,
+    TransverselyIsotropic,
+)
 from feti_homog.materials.voigt import (
     GENERALIZED,
     IN_PLANE,

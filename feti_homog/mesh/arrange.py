@@ -9,7 +9,7 @@ import numpy as np
 from feti_homog.case.cell_section import MOST_FIBRES, Cell
 from feti_homog.case.cell_sizes import fibre_counts, fractions_in_words, void_count
 from feti_homog.errors import MeshError
-from feti_homog.microstructure.arrangement import Arrangement, clear_shift
+from feti_homog.microstructure.arrangements import Arrangement, clear_shift
 from feti_homog.microstructure.phase_names import FIBRE, VOID
 from feti_homog.typing import Float
 

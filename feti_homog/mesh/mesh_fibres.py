@@ -11,7 +11,7 @@ import numpy as np
 
 from feti_homog.mesh.coarse_mesh import areas, twins
 from feti_homog.mesh.periodic_topology import Torus, components, edge_pairs
-from feti_homog.mesh.submesh import Submesh, cut_bodies
+from feti_homog.mesh.submeshes import Submesh, cut_bodies
 from feti_homog.microstructure.phase_names import COATING
 from feti_homog.typing import Bool, Float, Int
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from feti_homog.mesh.coarse_mesh import edge_keys, edges
 from feti_homog.mesh.periodic_topology import edge_pairs
-from feti_homog.mesh.submesh import Submesh
+from feti_homog.mesh.submeshes import Submesh
 from feti_homog.typing import Bool, Float, Int, Int32
 
 # Share of the triangles of a part by which a cut may be off the middle.

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from feti_homog.errors import MeshError
-from feti_homog.microstructure.arrangement import neighbours
+from feti_homog.microstructure.arrangements import neighbours
 from feti_homog.microstructure.shapes.outlines import Outlines
 from feti_homog.typing import Float, Int
 

@@ -28,7 +28,7 @@ from feti_homog.microstructure.table_columns import (
     row_fault,
     understood,
 )
-from feti_homog.schema.values import is_number
+from feti_homog.schema.types import is_number
 from feti_homog.schema.wording import suggestion, toml_value
 from feti_homog.typing import Bool, Float, Int
 

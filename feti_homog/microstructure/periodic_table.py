@@ -8,7 +8,7 @@ import numpy as np
 
 from feti_homog.errors import MeshError
 from feti_homog.microstructure import cut_window
-from feti_homog.microstructure.arrangement import Arrangement, clear_shift, clearance, in_voids, neighbours
+from feti_homog.microstructure.arrangements import Arrangement, clear_shift, clearance, in_voids, neighbours
 from feti_homog.microstructure.fibre_table import FibreTable
 from feti_homog.microstructure.shapes.ellipses import Discs
 from feti_homog.microstructure.shapes.outlines import Outlines, directions

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.errors import MeshError
-from feti_homog.microstructure.arrangement import neighbours
+from feti_homog.microstructure.arrangements import neighbours
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 from feti_homog.typing import Float, Int
 

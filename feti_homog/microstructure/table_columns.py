@@ -16,7 +16,7 @@ from pathlib import Path
 from feti_homog.errors import CaseError
 from feti_homog.microstructure.shapes.outlines import ColumnRange
 from feti_homog.microstructure.shapes.shapes import SHAPES
-from feti_homog.schema.values import ValueType, real
+from feti_homog.schema.types import ValueType, real
 from feti_homog.system.runtime import input_files
 
 # Of an empty cell, and the bounds, of the columns that are numbers.

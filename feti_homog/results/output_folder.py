@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, TextIO
 
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.materials.voigt import SPATIAL_STRAINS
-from feti_homog.results import atomic, checkpoint, field_file, result_json
+from feti_homog.results import atomic, checkpoints, field_file, result_json
 from feti_homog.results.field_layout import PROGRAM
 from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.system.runtime import input_files
@@ -84,7 +84,7 @@ def refuse_files_of_others(directory: Path) -> None:
             kind = "a folder there" if path.is_dir() else "" if path.exists() else "a link there that leads nowhere"
             if kind:
                 raise CaseError(f"--out {directory}: {path.name} is {kind}, and a run writes a file of that name")
-        checkpoint.refuse_others(directory)
+        checkpoints.refuse_others(directory)
         others = _foreign(paths)
     except OSError as error:
         raise CaseError(f"--out {directory}: its files cannot be read: {error.strerror}") from error

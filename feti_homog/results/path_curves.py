@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.case.bond_laws import DEFAULT, LAWS
-from feti_homog.case.loads import TEMPERATURE, MixedLoad, Strain, completed, first_named
+from feti_homog.case.load_sections import TEMPERATURE, MixedLoad, Strain, completed, first_named
 from feti_homog.materials.voigt import plane_state_of
 from feti_homog.typing import Float
 

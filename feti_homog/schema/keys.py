@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from feti_homog.schema.values import INF, ValueType
+from feti_homog.schema.types import INF, ValueType
 from feti_homog.schema.wording import suggestion, toml_key, toml_value
 
 T = TypeVar("T")

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from feti_homog.case.document import TomlPath, leaves
+from feti_homog.case.toml_files import TomlPath, leaves
 from feti_homog.case.sections import AXIS_EXPECTED, MAX_CASES, RANGE_KEYS, SECTIONS, SWEEP, TOP_LEVEL, SweepSection
 from feti_homog.schema.keys import TableReader, keys_of
-from feti_homog.schema.values import is_number, magnitudes_in_words
+from feti_homog.schema.types import is_number, magnitudes_in_words
 from feti_homog.schema.wording import dotted_key, suggestion, toml_value
 
 STEP_TOLERANCE = 1e-9  # of a step: a rounding error that does not cost the last one

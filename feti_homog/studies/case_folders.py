@@ -20,10 +20,10 @@ from typing import Any
 
 import tomli_w
 
-from feti_homog.case.case import Case
+from feti_homog.case.cases import Case
 from feti_homog.errors import CaseError, FetiHomogError
-from feti_homog.results import atomic, checkpoint, output_folder, result_json
-from feti_homog.schema.values import INF
+from feti_homog.results import atomic, checkpoints, output_folder, result_json
+from feti_homog.schema.types import INF
 from feti_homog.studies.sweep_cases import Sweep, SweepCase, identity_of
 from feti_homog.system.runtime import input_files
 from feti_homog.system.runtime.file_locks import Lock, LockHeld, holder
@@ -219,7 +219,7 @@ def reset(directory: Path, entry: SweepCase, status: Status) -> None:
     folder = directory / entry.folder
     with atomic.write_errors(folder):
         (folder / ERROR_FILE).unlink(missing_ok=True)
-    checkpoint.remove(folder)
+    checkpoints.remove(folder)
     set_aside(directory, entry, status)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feti_homog.analysis.runner import run
-from feti_homog.case.case import Case
+from feti_homog.case.cases import Case
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError
 from feti_homog.studies import case_folders
 from feti_homog.studies.case_folders import LOCK_FILE, Status

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.report.text.point_tables import STATES
-from feti_homog.report.text.table import unit
+from feti_homog.report.text.tables import unit
 from feti_homog.results import atomic
 from feti_homog.studies import case_folders
 from feti_homog.studies.case_folders import CaseState, Status, SweepIndex

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.case import case as cases
-from feti_homog.case.case import Case
+from feti_homog.case import cases
+from feti_homog.case.cases import Case
 from feti_homog.case.sections import SWEEP
 from feti_homog.errors import CaseError
 from feti_homog.feti import solver_plan
@@ -27,7 +27,7 @@ from feti_homog.microstructure.phase_names import COATING
 from feti_homog.studies import sweep_cases
 from feti_homog.studies.sweep_cases import Sweep, case_names
 from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
-from feti_homog.system.petsc.options import case_options
+from feti_homog.system.petsc.options_database import case_options
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm

@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case.document import TomlPath
+from feti_homog.case.toml_files import TomlPath
 from feti_homog.case.sections import MEASURED, UNKNOWN, Unknown
-from feti_homog.materials.constants import axes_line
+from feti_homog.materials.engineering_constants import axes_line
 from feti_homog.materials.voigt import PLANE_STATES
 from feti_homog.results import atomic
 from feti_homog.studies import estimation, fit_result

@@ -7,17 +7,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from feti_homog.case.case import Case
-from feti_homog.case.document import TomlPath, leaves, read_document, to_document
-from feti_homog.case.loads import TEMPERATURE
+from feti_homog.case.cases import Case
+from feti_homog.case.toml_files import TomlPath, leaves, read_document, to_document
+from feti_homog.case.load_sections import TEMPERATURE
 from feti_homog.case.sections import CURVE, MEASURED, SWEEP, TEST, UNKNOWN, Measured, MeasuredCurve, Unknown
 from feti_homog.errors import CaseError
-from feti_homog.materials.constants import FORMER
+from feti_homog.materials.engineering_constants import FORMER
 from feti_homog.materials.voigt import PLANE_STATES, SPATIAL_STRAINS, SPATIAL_STRESSES, voigt_names
 from feti_homog.microstructure.table_columns import cells_of, delimiter_of, lines_of, number_of, row_fault
 from feti_homog.results.path_curves import SAME_LOAD
 from feti_homog.schema.keys import TableReader, keys_of
-from feti_homog.schema.values import is_number
+from feti_homog.schema.types import is_number
 from feti_homog.schema.wording import dotted_key, suggestion, toml_key, toml_value
 from feti_homog.studies.axes import Assignment
 from feti_homog.studies.fit import Fit

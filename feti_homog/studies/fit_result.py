@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.case.sections import Unknown
-from feti_homog.report.text.table import Column, Table
+from feti_homog.report.text.tables import Column, Table
 from feti_homog.studies.case_folders import csv_text
 from feti_homog.studies.estimation import CONFIDENCE, ParameterEstimates, names_of
 from feti_homog.studies.predictions import Datum

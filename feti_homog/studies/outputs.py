@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.materials.constants import EngineeringConstants, Moduli, TransverseIsotropy
+from feti_homog.materials.engineering_constants import EngineeringConstants, Moduli, TransverseIsotropy
 from feti_homog.materials.voigt import (
     EXPANSIONS,
     GENERALIZED,

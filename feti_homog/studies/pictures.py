@@ -14,9 +14,9 @@ from matplotlib.figure import Figure
 
 from feti_homog.case.cell_section import GEOMETRY
 from feti_homog.case.material_sections import read_materials
-from feti_homog.materials import bounds as mechanics
-from feti_homog.materials.bounds import fibre_bounds
-from feti_homog.materials.constants import (
+from feti_homog.materials import phase_bounds as mechanics
+from feti_homog.materials.phase_bounds import fibre_bounds
+from feti_homog.materials.engineering_constants import (
     ABOUT_FIBRES,
     is_transversely_isotropic,
     isotropic_part,

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from feti_homog.case.bond_laws import DEFAULT, LAWS
-from feti_homog.case.case import Case
+from feti_homog.case.cases import Case
 from feti_homog.errors import CaseError
-from feti_homog.materials.constants import constants
+from feti_homog.materials.engineering_constants import constants
 from feti_homog.materials.laws import expansion
 from feti_homog.materials.voigt import PLANE_STATES, voigt_names
 from feti_homog.report.text.point_tables import STATES

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from feti_homog.case.document import short_digest
+from feti_homog.case.toml_files import short_digest
 from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.results import atomic, output_folder, result_json
 from feti_homog.studies import case_folders, case_runs, description

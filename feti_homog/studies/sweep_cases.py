@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from feti_homog.case import case as cases
-from feti_homog.case.case import Case
-from feti_homog.case.document import read_document, short_digest, to_document
+from feti_homog.case import cases
+from feti_homog.case.cases import Case
+from feti_homog.case.toml_files import read_document, short_digest, to_document
 from feti_homog.case.sections import SWEEP
 from feti_homog.errors import CaseError
-from feti_homog.report.text.table import unit
+from feti_homog.report.text.tables import unit
 from feti_homog.schema.wording import dotted_key, toml_value
 from feti_homog.studies.axes import Assignment, read_points
 from feti_homog.system.petsc.option_table import only_prints

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import t as student
 
-from feti_homog.report.text.table import unit
+from feti_homog.report.text.tables import unit
 from feti_homog.results import path_curves
 from feti_homog.typing import Document, Float
 

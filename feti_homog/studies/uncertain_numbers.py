@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case.document import TomlPath, leaves
+from feti_homog.case.toml_files import TomlPath, leaves
 from feti_homog.case.sections import CORRELATION, UNCERTAINTY
-from feti_homog.schema.values import is_number, magnitudes_in_words
+from feti_homog.schema.types import is_number, magnitudes_in_words
 from feti_homog.schema.wording import dotted_key, toml_value
 from feti_homog.typing import Float
 

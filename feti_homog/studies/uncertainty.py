@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from feti_homog.case.document import TomlPath, read_document, to_document
+from feti_homog.case.toml_files import TomlPath, read_document, to_document
 from feti_homog.case.sections import DIFFERENTIABLE, SWEEP, UNCERTAINTY
 from feti_homog.errors import CaseError
 from feti_homog.report.text.constant_tables import mesh_errors, shown
-from feti_homog.report.text.table import Column, Table, with_unit, without_noise
+from feti_homog.report.text.tables import Column, Table, with_unit, without_noise
 from feti_homog.schema.wording import toml_value
 from feti_homog.studies.axes import Assignment, read_points
 from feti_homog.studies.predictions import Datum, exact_derivatives, responses

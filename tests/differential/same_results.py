@@ -14,7 +14,7 @@ from differential import comparison, transforms
 from differential.random_cases import Drawn
 from differential.setting import Compared, Setting
 from feti_homog.errors import FetiHomogError
-from feti_homog.results.checkpoint import Checkpoint
+from feti_homog.results.checkpoints import Checkpoint
 from feti_homog.system.parallel.mpi_errors import on_root
 
 # Units that a case's own are multiplied by.

@@ -120,11 +120,11 @@ def killed(ranks: int, case: Path, out: Path, at: int, *words: str, moment: str 
     return events.count(out)
 
 
-WRITE = "feti_homog.results.checkpoint:Checkpoint._write"
+WRITE = "feti_homog.results.checkpoints:Checkpoint._write"
 APPEND = "feti_homog.results.atomic:append"
 COUNT = (
     "os.path.exists('{0}') and "
-    "len([*__import__('feti_homog.results.checkpoint', fromlist=['records'])"
+    "len([*__import__('feti_homog.results.checkpoints', fromlist=['records'])"
     ".records(__import__('pathlib').Path('{0}'))]) - 1"
 )
 # When a path is killed: the last of so many events has just been kept, or the next is written or computed, or so many

@@ -16,7 +16,7 @@ from support.small_path import PATH
 from unit.case.faulty_cases import FAULTY_CASES
 
 from feti_homog.analysis import stored_result
-from feti_homog.case import case
+from feti_homog.case import cases
 from feti_homog.commands import listed_fibres
 from feti_homog.errors import FetiHomogError
 from feti_homog.microstructure.fibre_pattern import read_window
@@ -76,7 +76,7 @@ def _table(_: Path, folder: Path, rng: np.random.Generator) -> None:
 def _case(_: Path, folder: Path, rng: np.random.Generator) -> None:
     path = folder / "random.toml"
     path.write_bytes(damaged(DOCUMENTS[rng.integers(len(DOCUMENTS))].encode(), rng))
-    read = sweep_cases.load if b"[sweep]" in path.read_bytes() else case.load
+    read = sweep_cases.load if b"[sweep]" in path.read_bytes() else cases.load
     read(path)
 
 

@@ -13,11 +13,11 @@ from support.ranks import parallel_assert
 from support.whole_meshes import coarse_mesh
 from unit.mesh.faulty_meshes import ALL_SIDES, RIGHT_SIDE, grid
 
-from feti_homog.case import case as cases
+from feti_homog.case import cases
 from feti_homog.errors import CaseError
 from feti_homog.homogenization.unit_cell import tear
 from feti_homog.mesh.arrange import arrange
-from feti_homog.system.runtime.progress import Progress
+from feti_homog.system.runtime.progress_bar import Progress
 
 pytestmark = pytest.mark.parallel
 

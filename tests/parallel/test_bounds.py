@@ -11,7 +11,7 @@ from support.cases import FIBRE, MATRIX
 
 from feti_homog import Case, run
 from feti_homog.analysis.constants import mesh_error
-from feti_homog.homogenization.mesh_error import EnergyErrors
+from feti_homog.homogenization.mesh_estimate import EnergyErrors
 
 pytestmark = pytest.mark.parallel
 

@@ -13,12 +13,12 @@ from unit.mesh.faulty_meshes import grid
 
 from feti_homog.analysis import path as load_path
 from feti_homog.analysis.context import AnalysisContext, CellLoads
-from feti_homog.case.loads import LoadPath
+from feti_homog.case.load_sections import LoadPath
 from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.interface.contact.states import OPEN
 from feti_homog.interface.laws.strength import MaxStrength
-from feti_homog.system.petsc.options import case_options
-from feti_homog.system.runtime.progress import Progress
+from feti_homog.system.petsc.options_database import case_options
+from feti_homog.system.runtime.progress_bar import Progress
 
 pytestmark = pytest.mark.parallel
 

@@ -13,9 +13,9 @@ from support import torn_cells
 from support.cases import relative_error, solve
 from support.coarse_space_cells import BOUND, BREAKING, NARROW, SINGLE, Narrow, agree, masks, of_all, solve_many
 
-from feti_homog.case import case as cases
+from feti_homog.case import cases
 from feti_homog.feti.coarse.geneo import kernels_and_soft_modes, subdomain_blocks
-from feti_homog.feti.decomposition.neighbours import Neighbours
+from feti_homog.feti.decomposition.interface_neighbours import Neighbours
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.preconditioners import Dirichlet
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds

@@ -18,7 +18,7 @@ from reference.layered_cylinder import (
 from reference.spatial_forms import axial_shear_modulus, layered_contrast
 from support.spatial_cells import solved
 
-from feti_homog.materials.constants import transversely_isotropic_part
+from feti_homog.materials.engineering_constants import transversely_isotropic_part
 
 pytestmark = [pytest.mark.parallel, pytest.mark.one_rank]
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from feti_homog import Case, run
-from feti_homog.materials.constants import ABOUT_FIBRES, OF_THE_CELL, constants
+from feti_homog.materials.engineering_constants import ABOUT_FIBRES, OF_THE_CELL, constants
 from feti_homog.report.cards.effective_material import in_axes_of_the_cell
 from feti_homog.report.cards.export import csv_table
 from feti_homog.report.text import constant_tables, stiffness_tables

@@ -12,7 +12,7 @@ from feti_homog.feti.linalg import distributed_solver
 from feti_homog.feti.linalg.distributed_solver import DistributedSolver
 from feti_homog.feti.thresholds import REPLICATED_UNKNOWNS
 from feti_homog.system.petsc.c_functions import option_was_used
-from feti_homog.system.petsc.options import case_options
+from feti_homog.system.petsc.options_database import case_options
 
 pytestmark = pytest.mark.parallel
 

@@ -11,7 +11,7 @@ from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, s
 from support.ranks import parallel_assert
 
 from feti_homog import Case, run
-from feti_homog.case import case as cases
+from feti_homog.case import cases
 from feti_homog.verify.certificate import verify
 
 pytestmark = pytest.mark.parallel

@@ -21,7 +21,7 @@ from support.loads import strains
 from support.ranks import PIECES, parallel_assert
 
 from feti_homog import Case, run
-from feti_homog.feti.decomposition.neighbours import InterfaceNeighbours
+from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED
 from feti_homog.interface.laws.energy import ReleasedEnergy, SpringEnergy

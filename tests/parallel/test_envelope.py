@@ -16,7 +16,7 @@ from feti_homog.errors import CaseError
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import OPEN, BondState
-from feti_homog.interface.path.onset import Onset
+from feti_homog.interface.path.onsets import Onset
 from feti_homog.report.plots import response_curves
 from feti_homog.results import result_json
 from feti_homog.verify.certificate import verify

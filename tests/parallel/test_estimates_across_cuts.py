@@ -8,7 +8,7 @@ from mpi4py import MPI
 from support.cases import FIBRE, MATRIX, make_case, solve
 
 from feti_homog import Case, run
-from feti_homog.homogenization.mesh_error import energy_errors
+from feti_homog.homogenization.mesh_estimate import energy_errors
 from feti_homog.homogenization.partition_policy import BY_COST, DEFAULT_POLICY
 
 pytestmark = pytest.mark.parallel

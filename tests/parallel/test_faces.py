@@ -11,7 +11,7 @@ from support.cases import make_case, monolithic_stiffness, relative_error, solve
 from support.coarse_space_cells import NARROW, agree, masks, of_all, solve_many
 
 from feti_homog.feti.coarse.face_neighbourhoods import face_neighbourhoods
-from feti_homog.feti.decomposition.neighbours import Neighbours
+from feti_homog.feti.decomposition.interface_neighbours import Neighbours
 from feti_homog.feti.thresholds import MIN_FACE_NODES, Thresholds
 
 pytestmark = pytest.mark.parallel

@@ -10,7 +10,7 @@ from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, s
 from support.void_cells import write_part
 
 from feti_homog import run
-from feti_homog.case import case as cases
+from feti_homog.case import cases
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.verify.certificate import verify

@@ -17,8 +17,8 @@ from feti_homog import Case, run
 from feti_homog.analysis import runner
 from feti_homog.errors import ConvergenceError
 from feti_homog.materials.voigt import STRAINS, STRESSES
-from feti_homog.results import checkpoint, field_file
-from feti_homog.results.checkpoint import has_multipliers
+from feti_homog.results import checkpoints, field_file
+from feti_homog.results.checkpoints import has_multipliers
 from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.verify.certificate import verify
 
@@ -192,8 +192,8 @@ def test_states_without_multipliers_are_solved_again(comm, shared_path, whole, k
 
 def multipliers_of(path: Path) -> list[bool]:
     """Return which events of a file have multipliers."""
-    contents = [content for _, content in checkpoint.records(path)]
-    return [has_multipliers(checkpoint.unpacked(content)) for content in contents[1:]]
+    contents = [content for _, content in checkpoints.records(path)]
+    return [has_multipliers(checkpoints.unpacked(content)) for content in contents[1:]]
 
 
 def test_states_in_memory_are_those_of_the_files(comm, whole):

@@ -12,7 +12,7 @@ from support.cases import FIBRE, MATRIX, make_case, solve
 from feti_homog import Case, run
 from feti_homog.fem.arc_error import ArcSides, arc_energy
 from feti_homog.fem.stress_recovery import RecoveredStress
-from feti_homog.homogenization.mesh_error import energy_errors
+from feti_homog.homogenization.mesh_estimate import energy_errors
 from feti_homog.homogenization.partition_policy import BY_COST
 
 pytestmark = pytest.mark.parallel

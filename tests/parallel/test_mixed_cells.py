@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, solve
 
-from feti_homog.case import case as cases
+from feti_homog.case import cases
 from feti_homog.mesh.arrange import arrange
 
 pytestmark = pytest.mark.parallel

@@ -10,7 +10,7 @@ from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, s
 from unit.mesh.faulty_meshes import grid
 
 from feti_homog import run
-from feti_homog.case import case as cases
+from feti_homog.case import cases
 from feti_homog.verify.certificate import verify
 
 pytestmark = pytest.mark.parallel

@@ -11,7 +11,7 @@ from feti_homog.feti.decomposition.shared_entities import share_entities
 from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.mesh.submesh import SubdomainTable, cut_for_ranks, pinned_class
+from feti_homog.mesh.submeshes import SubdomainTable, cut_for_ranks, pinned_class
 
 pytestmark = [pytest.mark.parallel, pytest.mark.quick]
 PAIRS = np.array([[-1, 0], [0, -1]])

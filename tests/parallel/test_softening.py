@@ -15,7 +15,7 @@ from unit.mesh.faulty_meshes import grid
 from feti_homog import Case, run
 from feti_homog.errors import ConvergenceError
 from feti_homog.feti.exact.followed_response import FollowedResponse
-from feti_homog.results import checkpoint
+from feti_homog.results import checkpoints
 from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.verify.certificate import verify
 
@@ -106,13 +106,13 @@ def test_teeth_converge_to_the_law(comm):
 
 def falsify(path):
     """Scale multipliers of the last of the teeth, which F lambda did not confirm; returns the number of its event."""
-    signature, *contents = [content for _, content in checkpoint.records(path)]
-    events = [*map(checkpoint.unpacked, contents)]
+    signature, *contents = [content for _, content in checkpoints.records(path)]
+    events = [*map(checkpoints.unpacked, contents)]
     last = max(number for number, event in enumerate(events) if event["path"][5] > 0)
     assert np.isnan(events[last]["alpha"]).all() and not events[last]["confirmed"] and last > 0
     events[last]["lam"] *= 1.0 + 1e-3
-    records = [checkpoint.record(checkpoint.packed(event)) for event in events]
-    path.write_bytes(checkpoint.begin(signature.decode()) + b"".join(records))
+    records = [checkpoints.record(checkpoints.packed(event)) for event in events]
+    path.write_bytes(checkpoints.begin(signature.decode()) + b"".join(records))
     return last
 
 

@@ -14,7 +14,7 @@ from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, s
 from support.loads import strains
 from support.whole_meshes import coarse_mesh
 
-from feti_homog.case import case as cases
+from feti_homog.case import cases
 from feti_homog.errors import MeshError
 from feti_homog.homogenization import tile_tearing
 from feti_homog.homogenization.domain_partition import distribute
@@ -26,7 +26,7 @@ from feti_homog.interface.laws.strength import QuadraticStrength
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
 from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.mesh.tiles.tiles import TilePolicy
+from feti_homog.mesh.tiles.tiling import TilePolicy
 
 pytestmark = pytest.mark.parallel
 

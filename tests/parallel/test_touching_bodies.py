@@ -26,7 +26,7 @@ from feti_homog.materials.laws import plane_stiffness
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers.msh_reader import read
 from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.mesh.submesh import SubdomainTable, cut_for_ranks, pinned_class
+from feti_homog.mesh.submeshes import SubdomainTable, cut_for_ranks, pinned_class
 from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.verify.certificate import verify
 

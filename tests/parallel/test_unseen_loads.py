@@ -10,7 +10,7 @@ from mpi4py import MPI
 from support.dimensions import Units
 
 from feti_homog import run
-from feti_homog.case import case as cases
+from feti_homog.case import cases
 from feti_homog.feti.dual_solution import ActiveJumps
 from feti_homog.feti.solver import FetiSolver
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.materials.constants import TransverseIsotropy, transversely_isotropic_part
+from feti_homog.materials.engineering_constants import TransverseIsotropy, transversely_isotropic_part
 
 
 def compliance(E_L, E_T, nu_L, nu_T, G_L):

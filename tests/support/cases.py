@@ -11,12 +11,12 @@ from reference import monolithic
 
 from feti_homog.analysis import stiffness
 from feti_homog.analysis.context import AnalysisContext, CellLoads
-from feti_homog.case import case as cases
+from feti_homog.case import cases
 from feti_homog.feti.thresholds import DEFAULTS
 from feti_homog.homogenization.partition_policy import DEFAULT_POLICY
 from feti_homog.homogenization.unit_cell import tear
-from feti_homog.system.petsc.options import case_options
-from feti_homog.system.runtime.progress import Progress
+from feti_homog.system.petsc.options_database import case_options
+from feti_homog.system.runtime.progress_bar import Progress
 
 MATRIX, FIBRE = {"young": 88.0, "poisson": 0.299}, {"young": 200.0, "poisson": 0.222}
 

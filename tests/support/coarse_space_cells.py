@@ -8,7 +8,7 @@ from reference import dense_feti
 from scipy.linalg import eigh
 
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN
-from feti_homog.system.petsc.options import case_options
+from feti_homog.system.petsc.options_database import case_options
 from support import torn_cells
 from support.cases import relative_error
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from feti_homog.results.checkpoint import FOLDER, NAME, records
+from feti_homog.results.checkpoints import FOLDER, NAME, records
 
 
 def count(out: Path | str) -> int:

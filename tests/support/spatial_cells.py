@@ -9,11 +9,11 @@ from reference.spatial_forms import law
 from reference.spatial_programme import Part, SpatialProgramme
 
 from feti_homog.analysis.runner import compute
-from feti_homog.case.case import Case
+from feti_homog.case.cases import Case
 from feti_homog.homogenization import unit_cell
 from feti_homog.mesh.arrange import arrange
-from feti_homog.system.petsc.options import case_options
-from feti_homog.system.runtime.progress import Progress
+from feti_homog.system.petsc.options_database import case_options
+from feti_homog.system.runtime.progress_bar import Progress
 
 EPOXY = {"young": 3.45, "poisson": 0.35, "expansion": 54.0}
 GLASS = {"young": 73.0, "poisson": 0.22, "expansion": 5.0}

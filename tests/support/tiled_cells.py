@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 from feti_homog.mesh.fill.gmsh_mesher import begin
-from feti_homog.mesh.tiles.tiles import TilePolicy
+from feti_homog.mesh.tiles.tiling import TilePolicy
 from support.circular_cells import cell
 
 VOIDS = {"voids": 0.05, "void_radius": 0.7}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from feti_homog.homogenization.tile_tearing import fill_tiles, place_nodes
-from feti_homog.mesh.tiles.tiles import DEFAULT_TILES
+from feti_homog.mesh.tiles.tiling import DEFAULT_TILES
 
 
 def coarse_mesh(case, comm, policy=DEFAULT_TILES):

@@ -126,7 +126,7 @@ def modules_of(imported: set[str], names: list[str]) -> set[str]:
 
 
 def test_importing_starts_nothing():
-    program = "import sys, feti_homog, feti_homog.case.case, feti_homog.cli; print(*sys.modules)"
+    program = "import sys, feti_homog, feti_homog.case.cases, feti_homog.cli; print(*sys.modules)"
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert not {"petsc4py", "mpi4py", "gmsh", "h5py", "matplotlib"} & set(run.stdout.split())
 

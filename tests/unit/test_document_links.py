@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from feti_homog import cli
-from feti_homog.case.case import parse
+from feti_homog.case.cases import parse
 from feti_homog.case.sections import SWEEP
 from feti_homog.mesh.readers import msh_reader
-from feti_homog.mesh.tiles.filling import gmsh_session
+from feti_homog.mesh.tiles.tile_filling import gmsh_session
 from feti_homog.studies import sweep_cases
 
 ROOT = Path(__file__).parents[2]

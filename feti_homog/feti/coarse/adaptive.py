@@ -26,7 +26,7 @@ from feti_homog.feti.coarse.geneo import (
     scaled_constraints,
     subdomain_blocks,
 )
-from feti_homog.feti.decomposition.neighbours import Neighbours
+from feti_homog.feti.decomposition.interface_neighbours import Neighbours
 from feti_homog.feti.linalg.distributed_solver import DistributedSolver
 from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, scaled
 from feti_homog.feti.operators.interface_operators import InterfaceOperators

@@ -27,7 +27,7 @@ from feti_homog.feti.operators.one_subdomain import ExplicitInterfaceOperator
 from feti_homog.feti.thresholds import DEFAULTS, MIN_FACE_NODES, Thresholds
 from feti_homog.mesh.periodic_topology import components, edge_pairs
 from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.mesh.submesh import Submesh, part
+from feti_homog.mesh.submeshes import Submesh, part
 from feti_homog.typing import Bool, Float, Int
 
 

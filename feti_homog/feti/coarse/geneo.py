@@ -18,7 +18,7 @@ from mpi4py import MPI
 from scipy.sparse import csc_matrix, csr_matrix
 
 from feti_homog.feti.coarse.local_eigenproblems import SubdomainBlocks, eigenproblem
-from feti_homog.feti.decomposition.neighbours import Neighbours
+from feti_homog.feti.decomposition.interface_neighbours import Neighbours
 from feti_homog.feti.linalg.sparse_matrices import add_shared_rows
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.preconditioners import StiffnessScaled

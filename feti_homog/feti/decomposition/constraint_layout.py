@@ -12,7 +12,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 
 from feti_homog.feti.decomposition.shared_entities import SharedEntities, along, side_lengths
 from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, edge_node
-from feti_homog.mesh.submesh import Submesh
+from feti_homog.mesh.submeshes import Submesh
 from feti_homog.typing import Bool, Float, Int
 
 

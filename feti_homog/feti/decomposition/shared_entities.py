@@ -16,7 +16,7 @@ from scipy.special import roots_legendre
 from feti_homog.errors import MeshError
 from feti_homog.feti.decomposition.sharers import Sharers, entity_code, find_sharers
 from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.mesh.submesh import SubdomainTable, Submesh, SubmeshesOfRank
+from feti_homog.mesh.submeshes import SubdomainTable, Submesh, SubmeshesOfRank
 from feti_homog.system.parallel.distributed_arrays import exchange
 from feti_homog.system.parallel.mpi_errors import agree
 from feti_homog.typing import Array, Bool, Float, Int

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.mesh.submesh import SubdomainTable, SubmeshesOfRank
+from feti_homog.mesh.submeshes import SubdomainTable, SubmeshesOfRank
 from feti_homog.system.parallel.distributed_arrays import exchange
 from feti_homog.system.parallel.dividing import ranges
 from feti_homog.typing import Bool, Int

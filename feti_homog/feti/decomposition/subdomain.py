@@ -14,7 +14,7 @@ from feti_homog.fem.problem import PLANE, Problem
 from feti_homog.feti.thresholds import KERNEL_TOLERANCE, LEAST_ORDERED_DOFS, SCALED_LAME
 from feti_homog.mesh.mesh_fibres import unwrap
 from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, elimination_order, refine
-from feti_homog.mesh.submesh import Submesh
+from feti_homog.mesh.submeshes import Submesh
 from feti_homog.typing import Float, Int
 
 

@@ -13,7 +13,7 @@ from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.with_springs import is_dense
 from feti_homog.feti.thresholds import DEFAULTS, DENSE_SHARE
 from feti_homog.system.parallel.distributed_arrays import share_columns
-from feti_homog.system.petsc.options import choices
+from feti_homog.system.petsc.options_database import choices
 from feti_homog.typing import Float
 
 # Entries of Z, which are cosines of angles or their products, that rounding leaves of zero.

@@ -16,7 +16,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from feti_homog.errors import CaseError
-from feti_homog.feti.decomposition.neighbours import InterfaceNeighbours
+from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.feti.exact.followed_response import FollowedResponse
 from feti_homog.feti.exact.reference_cell import BodyTies, ReferenceCell, one_sided_jumps, stiffness_of_rows
 from feti_homog.feti.exact.reference_changes import ReferenceChanges

@@ -14,7 +14,7 @@ from scipy.sparse import bmat, csr_matrix
 from feti_homog.feti.linalg.sparse_direct import check_factor, mumps_error, power_of_two
 from feti_homog.feti.thresholds import COPIED_AT_ONCE, COPIED_COLUMNS, MIRRORED_BLOCK_ROWS, TRIANGLE_INVERSE_ROWS
 from feti_homog.system.petsc import c_functions
-from feti_homog.system.petsc.options import choices
+from feti_homog.system.petsc.options_database import choices
 from feti_homog.typing import Float, Int
 
 if TYPE_CHECKING:

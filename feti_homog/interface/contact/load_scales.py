@@ -10,7 +10,7 @@ from mpi4py import MPI
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.solver import FetiSolver
 from feti_homog.interface.loads import Load
-from feti_homog.materials.bounds import reuss, voigt
+from feti_homog.materials.phase_bounds import reuss, voigt
 from feti_homog.typing import Float
 
 # A strain so many times the bonded one is no scale for errors.

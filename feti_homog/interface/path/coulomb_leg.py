@@ -21,7 +21,7 @@ from feti_homog.interface.friction.sliding_cell import SlidingCell
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.loads import Load, Macroscopic
 from feti_homog.interface.path.leg import Leg
-from feti_homog.interface.path.onset import first_break
+from feti_homog.interface.path.onsets import first_break
 from feti_homog.interface.path.path_points import Energies, PathState, Point
 from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.typing import Float

@@ -15,7 +15,7 @@ from feti_homog.interface.contact.states import BondState, Equilibrium
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.loads import Load, Macroscopic, Multipliers
 from feti_homog.interface.path.leg import Leg
-from feti_homog.interface.path.onset import first_break, first_change
+from feti_homog.interface.path.onsets import first_break, first_change
 from feti_homog.interface.path.path_points import UTILISATION_TIE, PathState, Point, most_utilised
 from feti_homog.typing import Float
 

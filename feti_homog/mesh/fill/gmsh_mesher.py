@@ -25,9 +25,9 @@ from feti_homog.mesh.sizes.element_estimate import (
     triangles_of_a_tip,
 )
 from feti_homog.mesh.sizes.graded_size import MeshSizes
-from feti_homog.mesh.tiles.filling import Filling, Tile, arc_edges, fill
-from feti_homog.mesh.tiles.tiles import DEFAULT_TILES, Regions, TilePolicy, Tiling, cut, is_tiled, tiling
-from feti_homog.microstructure.arrangement import Arrangement
+from feti_homog.mesh.tiles.tile_filling import Filling, Tile, arc_edges, fill
+from feti_homog.mesh.tiles.tiling import DEFAULT_TILES, Regions, TilePolicy, Tiling, cut, is_tiled, tiling
+from feti_homog.microstructure.arrangements import Arrangement
 from feti_homog.microstructure.phase_names import VOID
 from feti_homog.microstructure.shapes.ellipses import Discs, Ellipses
 from feti_homog.typing import Int, Int32

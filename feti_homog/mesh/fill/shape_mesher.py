@@ -21,8 +21,8 @@ from feti_homog.mesh.readers.msh_reader import made
 from feti_homog.mesh.sizes.element_estimate import refuse_many
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, wrap
 from feti_homog.mesh.sizes.graded_size import MIN_EDGES_AROUND, PASSAGE_EDGE, MeshSizes
-from feti_homog.mesh.tiles.filling import gmsh_session
-from feti_homog.microstructure.arrangement import Arrangement
+from feti_homog.mesh.tiles.tile_filling import gmsh_session
+from feti_homog.microstructure.arrangements import Arrangement
 from feti_homog.microstructure.phase_names import MATRIX, VOID
 from feti_homog.microstructure.shapes.convex_sums import POINTS, ConvexSums
 from feti_homog.microstructure.shapes.outlines import Outlines

@@ -26,7 +26,7 @@ from feti_homog.mesh.outline.outline import (
     vertex_angles,
 )
 from feti_homog.mesh.sizes.graded_size import MeshSizes, SizeField, circle_size, size_field
-from feti_homog.microstructure.arrangement import Arrangement
+from feti_homog.microstructure.arrangements import Arrangement
 from feti_homog.microstructure.shapes.ellipses import Ellipses
 from feti_homog.microstructure.shapes.outlines import on_circle
 from feti_homog.system.parallel.dividing import even

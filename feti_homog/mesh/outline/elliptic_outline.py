@@ -33,7 +33,7 @@ from feti_homog.mesh.sizes.graded_size import (
     at_vertices,
     passage_growth,
 )
-from feti_homog.microstructure.arrangement import Arrangement, neighbours
+from feti_homog.microstructure.arrangements import Arrangement, neighbours
 from feti_homog.microstructure.shapes.ellipses import Ellipses, gaps
 from feti_homog.microstructure.shapes.outlines import directions
 from feti_homog.typing import Bool, Float, Int

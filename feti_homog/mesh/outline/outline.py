@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from feti_homog.mesh.outline.bridges import TURN, OnCircles
 from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE, Curves, EdgeSamples, Sampling, Segments
 from feti_homog.mesh.sizes.graded_size import SizeField
-from feti_homog.microstructure.arrangement import Arrangement
+from feti_homog.microstructure.arrangements import Arrangement
 from feti_homog.microstructure.shapes.ellipses import Ellipses
 from feti_homog.typing import Bool, Float, Int
 

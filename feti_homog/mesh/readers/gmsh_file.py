@@ -21,7 +21,7 @@ import numpy as np
 
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, Block, RawMesh, assembled, at, first_of
-from feti_homog.mesh.tiles.filling import gmsh_session
+from feti_homog.mesh.tiles.tile_filling import gmsh_session
 from feti_homog.schema.wording import toml_value
 from feti_homog.system.runtime import input_files
 from feti_homog.system.runtime.own_process import in_own_process

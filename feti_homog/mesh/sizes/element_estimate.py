@@ -13,7 +13,7 @@ from feti_homog.case.cell_sizes import fibre_counts
 from feti_homog.errors import MeshError
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH
 from feti_homog.mesh.sizes.graded_size import MIN_EDGES_AROUND
-from feti_homog.microstructure.arrangement import Arrangement
+from feti_homog.microstructure.arrangements import Arrangement
 from feti_homog.microstructure.shapes.ellipses import Ellipses
 from feti_homog.microstructure.shapes.shapes import elliptic
 from feti_homog.typing import Float

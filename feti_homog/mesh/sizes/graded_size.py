@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, Source, SourcedSize, wrap
-from feti_homog.microstructure.arrangement import Arrangement, neighbours
+from feti_homog.microstructure.arrangements import Arrangement, neighbours
 from feti_homog.microstructure.shapes.outlines import on_circle
 from feti_homog.typing import Bool, Float, Int
 

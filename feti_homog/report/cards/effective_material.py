@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.errors import CaseError
-from feti_homog.materials.constants import ABOUT_FIBRES, OF_THE_CELL
+from feti_homog.materials.engineering_constants import ABOUT_FIBRES, OF_THE_CELL
 from feti_homog.materials.voigt import is_positive_definite
 from feti_homog.report.text import constant_tables
 from feti_homog.typing import Document, Float

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.errors import CaseError
-from feti_homog.materials.constants import MATERIAL_EXPANSIONS
+from feti_homog.materials.engineering_constants import MATERIAL_EXPANSIONS
 from feti_homog.report.cards.effective_material import (
     PAIRS,
     EffectiveMaterial,

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.materials.constants import ABOUT_FIBRES, MATERIAL_AXES, MATERIAL_EXPANSIONS, OF_THE_CELL
+from feti_homog.materials.engineering_constants import ABOUT_FIBRES, MATERIAL_AXES, MATERIAL_EXPANSIONS, OF_THE_CELL
 from feti_homog.materials.voigt import EXPANSIONS
 from feti_homog.report.text.stiffness_tables import ENGINEERING, with_errors
-from feti_homog.report.text.table import UNKNOWN, Column, Table, stress_label, without_noise
+from feti_homog.report.text.tables import UNKNOWN, Column, Table, stress_label, without_noise
 from feti_homog.typing import Document
 
 

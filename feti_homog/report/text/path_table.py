@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case.loads import TEMPERATURE
+from feti_homog.case.load_sections import TEMPERATURE
 from feti_homog.materials.voigt import voigt_names
 from feti_homog.report.text.point_tables import COUNTS, WIDTH, columns_without_noise, counts, debonded, energies
-from feti_homog.report.text.table import Column, Table, stress_label, without_noise
+from feti_homog.report.text.tables import Column, Table, stress_label, without_noise
 from feti_homog.results import path_curves
 from feti_homog.results.landmarks import LARGEST, PEAK, chosen, fall_of, name_of, peak_of, stresses_of
 from feti_homog.typing import Document

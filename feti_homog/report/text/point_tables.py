@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.materials.voigt import STRAINS, STRESSES, voigt_names
-from feti_homog.report.text.table import Column, Table, stress_label, toughness_label, without_noise
+from feti_homog.report.text.tables import Column, Table, stress_label, toughness_label, without_noise
 from feti_homog.results import path_curves
 from feti_homog.typing import Document
 

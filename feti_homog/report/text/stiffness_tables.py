@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.materials.constants import ABOUT_FIBRES, CELL_AXES
+from feti_homog.materials.engineering_constants import ABOUT_FIBRES, CELL_AXES
 from feti_homog.materials.voigt import SPATIAL_STRESSES, STRAINS, voigt_names
 from feti_homog.microstructure.phase_names import COATING
-from feti_homog.report.text.table import UNKNOWN, Column, Table, number, stress_label
+from feti_homog.report.text.tables import UNKNOWN, Column, Table, number, stress_label
 from feti_homog.typing import Document
 
 NAMES = Column("", -28)

@@ -19,7 +19,7 @@ from feti_homog.report.text import point_tables
 from feti_homog.report.text.constant_tables import sensitivities, table
 from feti_homog.report.text.path_table import ROWS, path_table
 from feti_homog.report.text.stiffness_tables import bounds, constants, moduli, stiffnesses, thermal
-from feti_homog.report.text.table import ERROR, Column, Table
+from feti_homog.report.text.tables import ERROR, Column, Table
 from feti_homog.results.landmarks import chosen_states
 from feti_homog.typing import Document
 

@@ -6,7 +6,7 @@ import pytest
 from mpi4py import MPI
 
 from feti_homog.analysis.path_events import EVENTS_BAR, STEPS_BAR, EventProgress
-from feti_homog.system.runtime.progress import Progress
+from feti_homog.system.runtime.progress_bar import Progress
 
 
 class Words(Progress):

@@ -12,7 +12,7 @@ from support.cases import make_case
 from feti_homog.analysis import runner
 from feti_homog.errors import CaseError
 from feti_homog.results import output_folder
-from feti_homog.system.runtime.progress import Progress
+from feti_homog.system.runtime.progress_bar import Progress
 
 
 @pytest.mark.parametrize(("error", "destroyed"), [(None, 1), (CaseError("refused"), 1), (MemoryError("defect"), 0)])

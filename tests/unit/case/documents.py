@@ -11,7 +11,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from feti_homog.case.cell_section import CIRCULAR, TOUCHING
-from feti_homog.case.loads import FAMILIES
+from feti_homog.case.load_sections import FAMILIES
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES
 from feti_homog.materials.voigt import STRAINS as STRAIN_NAMES
 from feti_homog.materials.voigt import STRESSES as STRESS_NAMES

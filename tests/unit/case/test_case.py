@@ -18,11 +18,11 @@ from unit.case.faulty_sizes import FAULTY_SIZES
 from unit.case.faulty_table_cells import FAULTY_TABLE_CELLS
 from unit.case.valid_cases import MESH, VALID_CASES
 
-from feti_homog.case.case import check_phases, load, parse
+from feti_homog.case.cases import check_phases, load, parse
 from feti_homog.case.interface_section import Arc, InterfaceSection
-from feti_homog.case.loads import Angle, LoadPath
+from feti_homog.case.load_sections import Angle, LoadPath
 from feti_homog.errors import CaseError
-from feti_homog.materials.forms import General, Isotropic, Orthotropic
+from feti_homog.materials.material_forms import General, Isotropic, Orthotropic
 
 FAULTY = FAULTY_CASES | FAULTY_BONDINGS | FAULTY_ENVELOPES | FAULTY_LOADS | FAULTY_SIZES | FAULTY_TABLE_CELLS
 FAULTY |= FAULTY_COHESIVE_LAWS

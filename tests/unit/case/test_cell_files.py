@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from support.base_case import BASE, MESH_CELL
 
-from feti_homog.case.case import load
+from feti_homog.case.cases import load
 from feti_homog.errors import CaseError
 
 TABLE = "x,y,radius\n1,1,0.5\n"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from feti_homog.case.case import Case, parse
+from feti_homog.case.cases import Case, parse
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.mesh.arrange import arrange
 

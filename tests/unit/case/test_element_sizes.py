@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from feti_homog.case import case as cases
+from feti_homog.case import cases
 from feti_homog.case.cell_sizes import COARSE_ERROR, SOFT_FACTOR, coarse_error
-from feti_homog.materials.forms import Isotropic, TransverselyIsotropic
+from feti_homog.materials.material_forms import Isotropic, TransverselyIsotropic
 
 MATRIX = {"young": 3.5, "poisson": 0.35}
 GEOMETRIES = {

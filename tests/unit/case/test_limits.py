@@ -7,11 +7,11 @@ import re
 
 import pytest
 
-from feti_homog.case.loads import WAYPOINTS
+from feti_homog.case.load_sections import WAYPOINTS
 from feti_homog.case.section_values import OPENINGS, STRAIN, STRENGTH
 from feti_homog.case.sections import RANGE_KEYS, TABLES, SweepSection
 from feti_homog.schema.keys import keys_of
-from feti_homog.schema.values import LARGEST, MAGNITUDES, SMALLEST, real
+from feti_homog.schema.types import LARGEST, MAGNITUDES, SMALLEST, real
 from feti_homog.schema.wording import limit_in_words
 
 WORDS = re.compile(r"(above|at least|below|at most) (\S+)")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from feti_homog.case.case import Case, parse
+from feti_homog.case.cases import Case, parse
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.cell_sizes import fibre_counts, mixed_width
 from feti_homog.errors import CaseError

@@ -12,8 +12,8 @@ from unit.case.documents import documents, loads
 from unit.case.faulty_bonding import of_type
 from unit.case.valid_cases import VALID_CASES, in_space
 
-from feti_homog.case.case import Case, load
-from feti_homog.case.loads import MixedLoad, completed
+from feti_homog.case.cases import Case, load
+from feti_homog.case.load_sections import MixedLoad, completed
 from feti_homog.materials.voigt import STRAINS
 
 PLANE = (("E11", "S11"), ("E22", "S22"), ("gamma12", "S12"))

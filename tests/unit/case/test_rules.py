@@ -11,7 +11,7 @@ from unit.case.documents import changed_documents
 from unit.case.faulty_cases import FAULTY_CASES
 from unit.case.valid_cases import VALID_CASES
 
-from feti_homog.case.case import parse
+from feti_homog.case.cases import parse
 from feti_homog.case.rules import ITEMS, Rule, exclusive, needed
 from feti_homog.errors import CaseError
 from feti_homog.schema.keys import Selector

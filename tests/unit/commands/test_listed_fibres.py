@@ -13,11 +13,11 @@ from support.users_meshes import polar_cell
 from unit.mesh.faulty_meshes import grid
 
 from feti_homog.analysis.runner import run
-from feti_homog.case.case import load
+from feti_homog.case.cases import load
 from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.mesh.arrange import arrange
-from feti_homog.mesh.tiles.filling import gmsh_session
+from feti_homog.mesh.tiles.tile_filling import gmsh_session
 from feti_homog.microstructure.fibre_table import read_table
 
 CELL = 'geometry = "hexagonal"\nfibre_fraction = 0.4\n'

@@ -15,7 +15,7 @@ from support.base_case import BASE, RANDOM
 from support.fibre_patterns import hexagonal_lattice, poisson_points, square_lattice
 
 from feti_homog.analysis.runner import run
-from feti_homog.case import case as cases
+from feti_homog.case import cases
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.microstructure.random_fibres import nearest_neighbours
 

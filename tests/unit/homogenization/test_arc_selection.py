@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feti_homog.case import case as cases
+from feti_homog.case import cases
 from feti_homog.homogenization import arc_selection
 from feti_homog.mesh.sizes.element_estimate import ElementEstimate, triangles_of_a_tip
 

@@ -8,7 +8,7 @@ import pytest
 from support.cases import FIBRE, MATRIX, make_case
 
 from feti_homog.case.interface_section import Arc, InterfaceSection
-from feti_homog.case.loads import Angle
+from feti_homog.case.load_sections import Angle
 from feti_homog.homogenization import partition_policy
 from feti_homog.homogenization.phase_laws import problems
 

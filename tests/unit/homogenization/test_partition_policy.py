@@ -10,7 +10,7 @@ from support.whole_meshes import coarse_mesh
 from feti_homog.homogenization.domain_partition import distribute
 from feti_homog.homogenization.partition_policy import BY_COST, DEFAULT_POLICY, can_be_cut_across
 from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.system.petsc.options import case_options
+from feti_homog.system.petsc.options_database import case_options
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from support.whole_meshes import coarse_mesh
 from unit.mesh.faulty_meshes import grid
 
-from feti_homog.case import case as cases
+from feti_homog.case import cases
 from feti_homog.homogenization import cell_remarks
 from feti_homog.mesh.coarse_mesh import interface_edges
 from feti_homog.studies.description import describe

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from feti_homog.materials.constants import (
+from feti_homog.materials.engineering_constants import (
     constants,
     engineering_constants,
     engineering_moduli,
     transversely_isotropic_part,
 )
-from feti_homog.materials.derivatives import constant_changes, law_changes
-from feti_homog.materials.forms import General, Isotropic, Orthotropic, TransverselyIsotropic
+from feti_homog.materials.material_derivatives import constant_changes, law_changes
+from feti_homog.materials.material_forms import General, Isotropic, Orthotropic, TransverselyIsotropic
 from feti_homog.materials.laws import expansion, spatial_stiffness, stiffness_of
 
 TURNED = Orthotropic(

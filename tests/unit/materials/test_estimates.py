@@ -21,8 +21,8 @@ from reference.fibre_composites import (
     isotropic,
 )
 
-from feti_homog.materials.bounds import CONSTANTS, NOTHING, Fibres, Springs, fibre_bounds, hashin_shtrikman
-from feti_homog.materials.constants import transversely_isotropic_part
+from feti_homog.materials.phase_bounds import CONSTANTS, NOTHING, Fibres, Springs, fibre_bounds, hashin_shtrikman
+from feti_homog.materials.engineering_constants import transversely_isotropic_part
 from feti_homog.materials.estimates import METHODS, estimates
 from feti_homog.materials.laws import Isotropic, plane_stiffness
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from feti_homog.materials.forms import General, Isotropic, Orthotropic
+from feti_homog.materials.material_forms import General, Isotropic, Orthotropic
 from feti_homog.materials.laws import out_of_plane, plane_stiffness
 from feti_homog.materials.voigt import rotated
 

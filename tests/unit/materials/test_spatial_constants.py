@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from reference.fibre_composites import CARBON, compliance
 
-from feti_homog.materials.constants import (
+from feti_homog.materials.engineering_constants import (
     EngineeringConstants,
     engineering_constants,
     is_transversely_isotropic,

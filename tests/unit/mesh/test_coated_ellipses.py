@@ -13,7 +13,7 @@ from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice, refine
-from feti_homog.mesh.submesh import cut
+from feti_homog.mesh.submeshes import cut
 
 COATED = [ROWS[0] | {"coating": 0.1}, ROWS[1] | {"coating": 0.05}, ROWS[2], {"x": 0.5, "y": 0.85, "radius": 0.07}]
 COATED[3] |= {"coating": 0.2}

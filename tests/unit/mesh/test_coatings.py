@@ -13,8 +13,8 @@ from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice, refine
 from feti_homog.mesh.sizes.graded_size import MeshSizes
-from feti_homog.mesh.submesh import cut
-from feti_homog.microstructure.arrangement import Arrangement
+from feti_homog.mesh.submeshes import cut
+from feti_homog.microstructure.arrangements import Arrangement
 
 CELLS = {
     "square": Cell(geometry="square", fibre_fraction=0.4, coating=0.05),

@@ -9,7 +9,7 @@ from unit.mesh.test_table_ellipses import cell_of, table
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange
-from feti_homog.microstructure.arrangement import neighbours
+from feti_homog.microstructure.arrangements import neighbours
 from feti_homog.microstructure.cut_window import LEAST_GAP, MOST_GAP, moves
 from feti_homog.microstructure.shapes.ellipses import Discs, Ellipses, gaps
 

@@ -12,7 +12,7 @@ from support.circular_cells import cell as circular
 from support.void_cells import write_voids
 
 from feti_homog import run
-from feti_homog.case import case as cases
+from feti_homog.case import cases
 from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.mesh.arrange import arrange

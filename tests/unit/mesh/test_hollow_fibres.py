@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import tomli_w
 
-from feti_homog.case import case as cases
+from feti_homog.case import cases
 from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError
 from feti_homog.mesh.coarse_mesh import areas, voids

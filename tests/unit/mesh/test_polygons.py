@@ -12,7 +12,7 @@ from mpi4py import MPI
 from unit.mesh.fill.test_gmsh_mesher import least_angle
 
 from feti_homog import run
-from feti_homog.case import case as cases
+from feti_homog.case import cases
 from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.mesh.arrange import arrange
@@ -21,7 +21,7 @@ from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.fill.shape_mesher import mesh_outlines
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.sizes.graded_size import MeshSizes
-from feti_homog.microstructure.arrangement import Arrangement
+from feti_homog.microstructure.arrangements import Arrangement
 from feti_homog.microstructure.shapes.convex_sums import ConvexSums
 from feti_homog.microstructure.shapes.shapes import outlines_of
 

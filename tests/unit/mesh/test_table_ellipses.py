@@ -16,7 +16,7 @@ from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice, refine
-from feti_homog.mesh.submesh import cut
+from feti_homog.mesh.submeshes import cut
 from feti_homog.microstructure.fibre_table import table_of
 from feti_homog.microstructure.shapes.ellipses import Ellipses, gaps
 

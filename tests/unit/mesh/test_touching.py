@@ -10,7 +10,7 @@ from support.pixel_images import SYMMETRIES, pixel_mesh
 
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers.msh_reader import read
-from feti_homog.mesh.submesh import pinned_class
+from feti_homog.mesh.submeshes import pinned_class
 
 # Rows from below: the fibre winds around the cell along the lowest, and its branches touch at (1, 2) / 4.
 BRANCHES = np.array([[1, 1, 1, 1], [1, 0, 0, 0], [0, 1, 0, 0], [0, 1, 0, 0]])

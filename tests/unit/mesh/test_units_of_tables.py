@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from feti_homog.case import case as cases
+from feti_homog.case import cases
 from feti_homog.mesh.fill.gmsh_mesher import generate
 
 LENGTHS = ("x", "y", "radius", "a", "b")

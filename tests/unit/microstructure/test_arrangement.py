@@ -10,7 +10,7 @@ from support.circular_cells import cell
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange, random_arrangement
-from feti_homog.microstructure.arrangement import Arrangement, clear_shift, neighbours
+from feti_homog.microstructure.arrangements import Arrangement, clear_shift, neighbours
 
 
 def smallest_gap(arrangement):

@@ -12,7 +12,7 @@ from support.base_case import BASE
 from support.fibre_patterns import hexagonal_lattice, poisson_points
 from support.measured_fibres import clustered_table
 
-from feti_homog.case import case as cases
+from feti_homog.case import cases
 from feti_homog.case.cell_section import Cell
 from feti_homog.errors import CaseError
 from feti_homog.mesh.arrange import arrange

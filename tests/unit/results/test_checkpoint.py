@@ -10,7 +10,7 @@ import pytest
 from mpi4py import MPI
 
 from feti_homog.errors import CaseError
-from feti_homog.results.checkpoint import (
+from feti_homog.results.checkpoints import (
     FORMAT,
     PREFIX,
     Checkpoint,

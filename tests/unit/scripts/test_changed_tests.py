@@ -9,7 +9,7 @@ from changed_tests import module_name, touched
 @pytest.mark.parametrize(
     ("path", "name"),
     [
-        ("feti_homog/mesh/submesh.py", "feti_homog.mesh.submesh"),
+        ("feti_homog/mesh/submeshes.py", "feti_homog.mesh.submeshes"),
         ("feti_homog/mesh/__init__.py", "feti_homog.mesh"),
         ("tests/support/cases.py", "support.cases"),
         ("scripts/mutations.py", "mutations"),

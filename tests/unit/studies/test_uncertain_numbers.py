@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support.base_case import changed
 
-from feti_homog.case.case import Case
+from feti_homog.case.cases import Case
 from feti_homog.case.sections import UNCERTAINTY
 from feti_homog.errors import CaseError
 from feti_homog.studies.uncertain_numbers import Uncertainty, number_at, read_uncertainty, with_number

@@ -7,9 +7,9 @@ import pytest
 from support.verified_results import CARBON as WARM_CARBON
 from support.verified_results import FIBRE, MATRIX, TURNED, TURNED_IN_SPACE, WARM
 
-from feti_homog.case.case import parse
+from feti_homog.case.cases import parse
 from feti_homog.errors import CaseError
-from feti_homog.materials.forms import Orthotropic
+from feti_homog.materials.material_forms import Orthotropic
 from feti_homog.materials.laws import expansion, isotropic_ratio, out_of_plane, plane_stiffness, spatial_stiffness
 from feti_homog.verify import constitutive_law
 from feti_homog.verify.constitutive_law import laws

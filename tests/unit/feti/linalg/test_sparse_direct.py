@@ -14,7 +14,7 @@ from feti_homog.feti.linalg.dense_matrices import check_lapack, cholesky, invert
 from feti_homog.feti.linalg.distributed_solver import DistributedSolver
 from feti_homog.feti.linalg.sparse_direct import DirectSolver, power_of_two
 from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, assemble_owned_rows
-from feti_homog.system.petsc.options import case_options
+from feti_homog.system.petsc.options_database import case_options
 from feti_homog.system.runtime import process_memory
 
 PAGE, MEGABYTE = 4096, 2**20

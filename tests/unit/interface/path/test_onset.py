@@ -9,7 +9,7 @@ import pytest
 
 from feti_homog.interface.laws.energy import SpringEnergy
 from feti_homog.interface.laws.strength import MaxStrength, QuadraticStrength, Strength
-from feti_homog.interface.path.onset import Onset
+from feti_homog.interface.path.onsets import Onset
 
 CRITERIA = {
     "max": MaxStrength(2.0, 1.5, 3.0),

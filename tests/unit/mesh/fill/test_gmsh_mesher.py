@@ -15,7 +15,7 @@ from feti_homog.mesh.coarse_mesh import areas, flip_double_arcs
 from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.outline.bare_outline import BareOutline
 from feti_homog.mesh.sizes.graded_size import MeshSizes
-from feti_homog.mesh.tiles.filling import Tile, fill
+from feti_homog.mesh.tiles.tile_filling import Tile, fill
 
 CELLS = {
     "square": cell("square"),

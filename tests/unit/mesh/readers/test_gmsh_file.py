@@ -15,7 +15,7 @@ from feti_homog.errors import MeshError
 from feti_homog.mesh.readers import gmsh_file
 from feti_homog.mesh.readers.msh_reader import made, read
 from feti_homog.mesh.readers.raw_mesh import Block, RawMesh, assembled
-from feti_homog.mesh.tiles.filling import gmsh_session
+from feti_homog.mesh.tiles.tile_filling import gmsh_session
 
 MESHES = Path(__file__).parents[4] / "meshes"
 TOLERANCE = 1e-12

@@ -11,7 +11,7 @@ from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers.msh_reader import read
 from feti_homog.mesh.readers.round_interfaces import fit_ellipse
 from feti_homog.mesh.refinement import ReferenceLattice, refine
-from feti_homog.mesh.submesh import cut
+from feti_homog.mesh.submeshes import cut
 
 A, B, TURN = 0.3, 0.2, 0.4
 

@@ -10,9 +10,9 @@ from support.tiled_cells import mesh_of, noded
 
 from feti_homog.homogenization.tile_tearing import tiles_to_fill
 from feti_homog.mesh.periodic_topology import Torus
-from feti_homog.mesh.submesh import SubdomainTable, cut_for_ranks, joined
-from feti_homog.mesh.tiles.filling import fill
-from feti_homog.mesh.tiles.tiles import FilledTile, tile_torus
+from feti_homog.mesh.submeshes import SubdomainTable, cut_for_ranks, joined
+from feti_homog.mesh.tiles.tile_filling import fill
+from feti_homog.mesh.tiles.tiling import FilledTile, tile_torus
 
 named = pytest.mark.parametrize("name", ["dense", "dilute", "coated, voids", "wide"])
 

@@ -18,9 +18,9 @@ from feti_homog.mesh.outline.bridges import CLEAR, LEAST_ANGLE
 from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE
 from feti_homog.mesh.outline.outline import images
 from feti_homog.mesh.periodic_topology import Torus
-from feti_homog.mesh.tiles import filling
-from feti_homog.mesh.tiles.tiles import TilePolicy, is_tiled, tiling
-from feti_homog.microstructure.arrangement import Arrangement
+from feti_homog.mesh.tiles import tile_filling
+from feti_homog.mesh.tiles.tiling import TilePolicy, is_tiled, tiling
+from feti_homog.microstructure.arrangements import Arrangement
 from feti_homog.microstructure.shapes.shapes import elliptic
 
 NONE = TilePolicy(least_discs=10**6)
@@ -143,7 +143,7 @@ def test_what_is_in_a_tile_is_of_it_alone():
 
 def test_order_of_filling_does_not_matter():
     found = noded("dense")
-    backwards = [filling.fill(tile) for _, tile in reversed(found.parts)][::-1]
+    backwards = [tile_filling.fill(tile) for _, tile in reversed(found.parts)][::-1]
     mesh = found.mesh(backwards)
     assert np.array_equal(mesh.points, mesh_of("dense").points)
     assert np.array_equal(mesh.triangles, mesh_of("dense").triangles)
@@ -158,15 +158,15 @@ def test_small_cells_and_other_shapes_are_not_tiled():
 
 def test_a_tile_that_gmsh_leaves_unfilled_is_reported(monkeypatch):
     _, tile = noded("dense").parts[0]
-    add = filling._add_surfaces
+    add = tile_filling._add_surfaces
 
     def without_last(gmsh, own):
         surfaces, circle = add(gmsh, own)
         return surfaces[:-1], circle[:-1]
 
-    monkeypatch.setattr(filling, "_add_surfaces", without_last)
+    monkeypatch.setattr(tile_filling, "_add_surfaces", without_last)
     with pytest.raises(MeshError, match=r"gmsh cannot fill the part from \(0, 0\) to .*: triangles are missing"):
-        filling.fill(tile)
+        tile_filling.fill(tile)
 
 
 def test_a_tile_that_gmsh_fails_on_is_reported(monkeypatch):
@@ -175,4 +175,4 @@ def test_a_tile_that_gmsh_fails_on_is_reported(monkeypatch):
 
     monkeypatch.setattr(gmsh.model.mesh, "generate", broken)
     with pytest.raises(MeshError, match=r"gmsh cannot fill the part .*: no mesh of dimension 2; expected another"):
-        filling.fill(noded("dense").parts[0][1])
+        tile_filling.fill(noded("dense").parts[0][1])

@@ -22,7 +22,7 @@ from support.effective_results import (
 
 from feti_homog import cli
 from feti_homog.errors import CaseError
-from feti_homog.materials.constants import engineering_constants
+from feti_homog.materials.engineering_constants import engineering_constants
 from feti_homog.report.cards import effective_material
 from feti_homog.report.cards.effective_material import in_axes_of_the_cell, nearest_transversely_isotropic
 from feti_homog.report.cards.export import FORMATS

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from feti_homog.report.text.stiffness_tables import moduli, stiffnesses
-from feti_homog.report.text.table import Column, Table
+from feti_homog.report.text.tables import Column, Table
 
 
 def test_html_has_the_decimals_of_text_and_small_errors():

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from support.base_case import BASE
 
-from feti_homog.case.case import Case
+from feti_homog.case.cases import Case
 from feti_homog.errors import CaseError
 from feti_homog.studies import uncertainty
 from feti_homog.studies.fit_file import parse

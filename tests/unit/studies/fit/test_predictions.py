@@ -7,7 +7,7 @@ import copy
 import pytest
 
 from feti_homog import run
-from feti_homog.case.case import Case
+from feti_homog.case.cases import Case
 from feti_homog.errors import CaseError
 from feti_homog.studies.predictions import Datum, exact_derivatives, predicted, responses
 

@@ -11,7 +11,7 @@ from matplotlib.image import imread
 from scipy import stats
 
 from feti_homog.materials.voigt import SPATIAL_STRESSES
-from feti_homog.report.text.table import unit, with_unit
+from feti_homog.report.text.tables import unit, with_unit
 from feti_homog.studies import collect, pictures
 from feti_homog.studies.outputs import numbers, outputs
 from feti_homog.studies.sweep_table import Statistics, SweepTable, series_over

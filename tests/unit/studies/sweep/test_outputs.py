@@ -7,7 +7,7 @@ from typing import Any
 
 from feti_homog.case import reference
 from feti_homog.case.sections import TOP_LEVEL
-from feti_homog.report.text.table import unit
+from feti_homog.report.text.tables import unit
 from feti_homog.studies.outputs import OUTPUT_COLUMNS, outputs
 from feti_homog.system.runtime.records import STRESS
 

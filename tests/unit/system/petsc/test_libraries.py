@@ -12,7 +12,7 @@ from support.jobs import PATIENCE
 
 from feti_homog.errors import EXIT_DONE, EXIT_INPUT
 from feti_homog.system.petsc.libraries import DEBIAN_MODULES, petsc4py_advice
-from feti_homog.system.petsc.options import case_options
+from feti_homog.system.petsc.options_database import case_options
 
 MISSING = "raise ModuleNotFoundError(f'No module named {__name__!r}', name=__name__)"
 OTHER_NUMPY = "def init(*_, **__): raise ValueError('numpy.dtype size changed, may indicate binary incompatibility')"

@@ -7,7 +7,7 @@ from petsc4py import PETSc
 
 from feti_homog.system.petsc.option_table import only_prints
 from feti_homog.system.petsc.option_values import petsc_words
-from feti_homog.system.petsc.options import case_options
+from feti_homog.system.petsc.options_database import case_options
 
 
 @pytest.fixture

@@ -14,8 +14,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feti_homog.materials.constants import constants
-from feti_homog.materials.forms import EXPANSION_PAIR, General, Isotropic, Material, Orthotropic, TransverselyIsotropic
+from feti_homog.materials.engineering_constants import constants
+from feti_homog.materials.material_forms import (
+    EXPANSION_PAIR,
+    General,
+    Isotropic,
+    Material,
+    Orthotropic,
+    TransverselyIsotropic,
+)
 from feti_homog.materials.laws import COUPLINGS, expansion, known_compliance, stiffness_of
 from feti_homog.materials.voigt import IN_PLANE, IN_PLANE_BLOCK, PLANE_STATES, strain_rotation
 from feti_homog.typing import Float

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.case.case import Case
+from feti_homog.case.cases import Case
 from feti_homog.case.material_sections import provider
 from feti_homog.fem import bubble
 from feti_homog.fem.assembly import ELEMENTS_AT_ONCE
@@ -29,7 +29,7 @@ from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.domain_partition import CellSummary
 from feti_homog.homogenization.uniform_parts import UniformPart
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.materials.derivatives import law_changes
+from feti_homog.materials.material_derivatives import law_changes
 from feti_homog.system.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float, Int32
 

@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 from feti_homog.case import section_values as kinds
 from feti_homog.materials.voigt import PLANE_STATES, SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS
 from feti_homog.schema.keys import Condition, key
-from feti_homog.schema.values import choice, either, integer, list_of, real, table_of
+from feti_homog.schema.types import choice, either, integer, list_of, real, table_of
 
 TEMPERATURE = "temperature"
 Strain = tuple[float, ...]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from feti_homog.schema.keys import key
-from feti_homog.schema.values import either, list_of, real
+from feti_homog.schema.types import either, list_of, real
 
 Matrix = tuple[tuple[float, ...], ...]
 

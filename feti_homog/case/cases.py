@@ -12,18 +12,18 @@ from typing import Any
 from feti_homog.case import cell_sizes, sections
 from feti_homog.case.cell_files import checked_cell
 from feti_homog.case.cell_section import GEOMETRY, Cell
-from feti_homog.case.document import read_document, short_digest, to_document
+from feti_homog.case.toml_files import read_document, short_digest, to_document
 from feti_homog.case.interface_section import Arc, InterfaceSection, interface_tables
-from feti_homog.case.loads import AnalysisSection, Angle, Envelope, LoadPath, SingleLoad, Stiffness, completed
+from feti_homog.case.load_sections import AnalysisSection, Angle, Envelope, LoadPath, SingleLoad, Stiffness, completed
 from feti_homog.case.material_sections import provider, read_materials
 from feti_homog.case.relations import axes_lines, idle_friction_keys, read_interfaces, relation_faults, stress_free
 from feti_homog.case.rules import RULES
 from feti_homog.case.section_values import ANALYSIS_TYPE, CRITERION, METHOD, PLANE
 from feti_homog.errors import CaseError
-from feti_homog.materials.forms import Material
+from feti_homog.materials.material_forms import Material
 from feti_homog.materials.laws import contrast_lines
 from feti_homog.schema.keys import Selected, Selector, TableReader, keys_of, to_table
-from feti_homog.schema.values import text
+from feti_homog.schema.types import text
 from feti_homog.schema.wording import suggestion, toml_key, toml_value
 from feti_homog.system.runtime import input_files
 

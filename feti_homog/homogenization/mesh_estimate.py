@@ -21,7 +21,7 @@ from feti_homog.homogenization.uniform_parts import UniformPart, groups, locks, 
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact.states import BONDED
 from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, joined
-from feti_homog.mesh.submesh import Submesh
+from feti_homog.mesh.submeshes import Submesh
 from feti_homog.system.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float, Int
 

@@ -18,8 +18,13 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from feti_homog.materials.constants import TransverseIsotropy, anisotropy, isotropic_part, transverse_constants
-from feti_homog.materials.forms import PER_TEMPERATURE
+from feti_homog.materials.engineering_constants import (
+    TransverseIsotropy,
+    anisotropy,
+    isotropic_part,
+    transverse_constants,
+)
+from feti_homog.materials.material_forms import PER_TEMPERATURE
 from feti_homog.system.runtime.records import STRESS, described
 from feti_homog.typing import Float
 

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from feti_homog.materials.forms import PER_TEMPERATURE
+from feti_homog.materials.material_forms import PER_TEMPERATURE
 from feti_homog.materials.laws import COUPLINGS
 from feti_homog.materials.voigt import EXPANSIONS, THERMAL_STRESSES
 from feti_homog.system.runtime.records import STRESS, described
