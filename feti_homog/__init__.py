@@ -40,7 +40,7 @@ __all__ = [
     "draw_state", "launch", "read_state", "run", "run_fit", "run_sweep",
 ]  # fmt: skip
 HOMES = {
-    "Case": "case.case",
+    "Case": "case.cases",
     "Result": "analysis.result",
     "draw_state": "report.plots.deformed_panels",
     "read_state": "results.viewed_states",

@@ -5,21 +5,19 @@ import signal
 import sys
 
 from feti_homog.errors import FetiHomogError
-from feti_homog.system.runtime import process_memory
-from feti_homog.system.runtime.environment import prepare
-from feti_homog.system.runtime.standard_streams import complain, launched_rank
+from feti_homog.system.runtime import environment, process_memory, standard_streams
 
 
 def main() -> int:
     """Run the command line in a prepared environment; returns the exit code."""
-    prepare(os.environ)
+    environment.prepare(os.environ)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the program listens, Ctrl-C ends it without a traceback
     try:
         process_memory.require_limits()
     except FetiHomogError as error:
-        rank = launched_rank()  # others may have other limits
-        complain(*(f"error: {f'rank {rank}: ' if rank else ''}{fault}" for fault in error.faults))
+        rank = standard_streams.launched_rank()  # others may have other limits
+        standard_streams.complain(*(f"error: {f'rank {rank}: ' if rank else ''}{fault}" for fault in error.faults))
         return error.exit_code
     from feti_homog.cli import main as command  # NumPy reads the environment when it is imported
 

@@ -10,21 +10,17 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from feti_homog.case.cases import Case
+from feti_homog.case import Case
 from feti_homog.errors import EXIT_DONE, CaseError, LibraryError
-from feti_homog.system.parallel.mpi_errors import on_root, on_root_only, run_main
-from feti_homog.system.petsc import libraries
-from feti_homog.system.petsc.option_table import unknown_options
-from feti_homog.system.petsc.option_values import faulty_values, named_values, petsc_words, split_argv
-from feti_homog.system.runtime import standard_streams
-from feti_homog.system.runtime.environment import ignore_settings_of_the_folder, prefer_own_toolkits
-from feti_homog.system.runtime.standard_streams import end_on_signals, launched_rank
+from feti_homog.system.parallel import mpi_errors
+from feti_homog.system.petsc import libraries, option_table, option_values
+from feti_homog.system.runtime import environment, standard_streams
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
-    from feti_homog.analysis.result import Result
-    from feti_homog.studies.sweep_table import SweepTable
+    from feti_homog.analysis import result
+    from feti_homog.studies import sweep_table
 
 
 def run(
@@ -35,7 +31,7 @@ def run(
     fields: bool = False,
     resume: bool = False,
     quiet: bool = True,
-) -> Result:
+) -> result.Result:
     """Return the result of a case on every rank of `comm` (default: all ranks).
 
     Collective over `comm`; ranks outside of it need not call it, nor wait.  If the program has not started PETSc,
@@ -72,7 +68,7 @@ def run_sweep(
     ranks_per_case: int | None = None,
     retry: bool = False,
     quiet: bool = True,
-) -> SweepTable:
+) -> sweep_table.SweepTable:
     """Run the cases in a file or document with [sweep]; returns their table on every rank.  Collective.
 
     Finished cases in `out` are kept, so that the same call goes on after an interruption.
@@ -90,12 +86,12 @@ def run_sweep(
     from feti_homog.studies import case_runs, collect, sweep_cases
 
     if isinstance(cases, Mapping):
-        sweep = on_root(comm, sweep_cases.expand, cases, Path())
+        sweep = mpi_errors.on_root(comm, sweep_cases.expand, cases, Path())
     else:
-        sweep = on_root(comm, sweep_cases.load, cases)
+        sweep = mpi_errors.on_root(comm, sweep_cases.load, cases)
     group = comm.size if ranks_per_case is None else ranks_per_case
     case_runs.run_all(sweep, folder(out), comm, group, retry, quiet)
-    return on_root(comm, collect.read, Path(out))
+    return mpi_errors.on_root(comm, collect.read, Path(out))
 
 
 def collect_sweep(out: str | Path, comm: Intracomm | None = None, *, pictures: bool = True) -> list[str]:
@@ -109,7 +105,7 @@ def collect_sweep(out: str | Path, comm: Intracomm | None = None, *, pictures: b
     comm = _started(comm)
     from feti_homog.studies import collect
 
-    return on_root(comm, collect.collect, Path(out), pictures)
+    return mpi_errors.on_root(comm, collect.collect, Path(out), pictures)
 
 
 def run_fit(
@@ -133,9 +129,9 @@ def run_fit(
     from feti_homog.studies import fit_file
 
     if isinstance(fit, str | Path):
-        study = on_root(comm, fit_file.load, Path(fit))
+        study = mpi_errors.on_root(comm, fit_file.load, Path(fit))
     else:
-        study = on_root(comm, fit_file.parse, fit, Path())
+        study = mpi_errors.on_root(comm, fit_file.parse, fit, Path())
     return study.run(folder(out), comm, comm.size if ranks_per_case is None else ranks_per_case, retry, quiet)
 
 
@@ -162,31 +158,31 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
 
     Returns the exit code of `run_main`.
     """
-    words, petsc = split_argv(sys.argv[1:] if argv is None else argv)
+    words, petsc = option_values.split_argv(sys.argv[1:] if argv is None else argv)
     standard_streams.prepare()
-    end_on_signals()
-    prefer_own_toolkits()
-    ignore_settings_of_the_folder()
+    standard_streams.end_on_signals()
+    environment.prefer_own_toolkits()
+    environment.ignore_settings_of_the_folder()
     try:
         libraries.require()
     except LibraryError as error:
-        if launched_rank() == 0:  # there may be no mpi4py to ask
+        if standard_streams.launched_rank() == 0:  # there may be no mpi4py to ask
             standard_streams.complain(*(f"error: {fault}" for fault in error.faults))
         return error.exit_code
     from mpi4py import MPI
 
     def main() -> int:
-        options = named_values(petsc)
-        faults = [*faulty_values(options), *unknown_options(options)]
+        options = option_values.named_values(petsc)
+        faults = [*option_values.faulty_values(options), *option_table.unknown_options(options)]
         if faults:
             raise CaseError(*faults)
         try:
-            libraries.start_petsc([sys.argv[0], *petsc_words(options)], MPI.COMM_WORLD)
+            libraries.start_petsc([sys.argv[0], *option_values.petsc_words(options)], MPI.COMM_WORLD)
         except RuntimeError as error:  # raised by petsc4py before PETSc can name it
             raise CaseError(f"PETSc does not start with {' '.join(petsc)}: {error}") from error
         return command(words, MPI.COMM_WORLD)
 
-    return run_main(MPI.COMM_WORLD, main)
+    return mpi_errors.run_main(MPI.COMM_WORLD, main)
 
 
 def folder(name: str | Path) -> Path:
@@ -211,13 +207,13 @@ def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracom
                 redirected.enter_context(contextlib.redirect_stderr(io.StringIO()))
             return parser.parse_args(words)
     except SystemExit:
-        on_root_only(comm, standard_streams.print_product, printed.getvalue().removesuffix("\n"))
+        mpi_errors.on_root_only(comm, standard_streams.print_product, printed.getvalue().removesuffix("\n"))
         raise
 
 
 def _started(comm: Intracomm | None) -> Intracomm:
     """Return the communicator, all ranks' by default, with PETSc started."""
-    prefer_own_toolkits()
+    environment.prefer_own_toolkits()
     libraries.require()
     from mpi4py import MPI
 

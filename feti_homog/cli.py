@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, NoReturn
 from feti_homog.api import parsed, start
 from feti_homog.commands import products, run, studies
 from feti_homog.errors import EXIT_DONE, CaseError
-from feti_homog.system.petsc.option_table import help_text
-from feti_homog.system.petsc.option_values import split_argv
+from feti_homog.system.petsc import option_table, option_values
 from feti_homog.version import __version__
 
 if TYPE_CHECKING:
@@ -36,7 +35,7 @@ class Parser(argparse.ArgumentParser):
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command on all ranks, `verify` without MPI; returns the exit code of `errors`."""
     words = sys.argv[1:] if argv is None else list(argv)
-    ours, _ = split_argv(words)
+    ours, _ = option_values.split_argv(words)
     return products.run_verify(command_parser(), ours) if ours[:1] == ["verify"] else start(_command, words)
 
 
@@ -61,7 +60,7 @@ def command_parser() -> Parser:
     parser = Parser(
         prog="feti-homog",
         description="Effective stiffness of fibre composites by FETI, on any number of MPI ranks.",
-        epilog=f"{help_text()}\n\n{LAUNCHER_HELP}",
+        epilog=f"{option_table.help_text()}\n\n{LAUNCHER_HELP}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"feti-homog {__version__}")

@@ -1,7 +1,5 @@
 """Aliases for NumPy's array types, whose shapes stand in docstrings, and for documents such as result.json."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -3,3 +3,5 @@
 Imports `case`, `feti`, `homogenization`, `interface`, `materials`, `microstructure`, `report`, `results` and `system`.
 Main entries: `runner.run` (with files) and `runner.compute` (without).
 """
+
+__all__ = ["result", "runner", "stored_result"]

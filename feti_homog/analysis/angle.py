@@ -1,7 +1,5 @@
 """`analysis.type = "angle"`: the response against the debonding angle, Fig. 3."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -10,8 +8,8 @@ from feti_homog.analysis.constants import energy_error, note_accuracy, state_err
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import AnglePoint
 from feti_homog.analysis.tip_records import tip_rates
-from feti_homog.case.load_sections import Angle
-from feti_homog.homogenization.averaging import Response, asymmetry
+from feti_homog.case import load_sections
+from feti_homog.homogenization import averaging
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
@@ -21,20 +19,20 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     previous angle's multipliers.
     """
     section = context.case.section
-    assert isinstance(section, Angle)
+    assert isinstance(section, load_sections.Angle)
     unit = section.strain is None
     starts = context.loads.zero_multipliers()[: None if unit else 1]
     points = []
     for number, value in enumerate(context.progress.bar(section.values, "angles")):
         bonds, label = context.bonds(value), f"{value:g} deg"
         point: dict[str, Any] = {"angle": value}
-        responses: list[Response]
+        responses: list[averaging.Response]
         if unit:
             columns, responses = context.unit_responses(f"{label} ", bonds, starts, 1.0)
             errors, responses = unit_errors(context, responses)
             point |= columns | energy_error(columns["stiffness"], errors)
             if not (context.plane.interface.contact and responses[0].debonded):
-                context.checks.require(label, {"symmetry": asymmetry(columns["stiffness"])})
+                context.checks.require(label, {"symmetry": averaging.asymmetry(columns["stiffness"])})
             context.record_unit_states(responses, 1.0, f"{label} ", number)
         else:
             responses = context.plane.respond(np.array([section.strain]), bonds, starts)

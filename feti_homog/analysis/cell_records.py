@@ -1,14 +1,12 @@
 """Records about cell, fibres, solver, checks and sensitivities in result.json."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.materials.phase_bounds import Bounds
-from feti_homog.system.runtime.records import DEGREES, LENGTH, STRESS, described, plain
+from feti_homog.materials import phase_bounds
+from feti_homog.system.runtime import described, records
 from feti_homog.typing import Float
 
 
@@ -16,9 +14,9 @@ from feti_homog.typing import Float
 class CellInfo:
     """The meshed cell."""
 
-    width: float = described("width of the cell", LENGTH)
-    height: float = described("height of the cell", LENGTH)
-    area: float = described("area of the cell", f"{LENGTH} squared")
+    width: float = described("width of the cell", records.LENGTH)
+    height: float = described("height of the cell", records.LENGTH)
+    area: float = described("area of the cell", f"{records.LENGTH} squared")
     fibre_fraction: float = described("share of all phases but matrix and coating in the area of the cell")
     fractions: Mapping[str, float] = described(
         "share of each phase in the area of the cell", entries={"PHASE": "that of one phase"}
@@ -46,12 +44,15 @@ class FibreInfo:
     number: int = described("number in `fibre = N` of case files, from 1")
     phase: str = described("name of its phase")
     centre: Float | None = described(
-        "that of its circle, else of its area, in the cell; absent if it winds around it", LENGTH, "(2,)", default=None
+        "that of its circle, else of its area, in the cell; absent if it winds around it",
+        records.LENGTH,
+        "(2,)",
+        default=None,
     )
-    radius: float | None = described("radius of its circle; absent if it is not round", LENGTH, default=None)
-    semi_axes: Float | None = described("of an ellipse; absent of other shapes", LENGTH, "(2,)", default=None)
-    angle: float | None = described("from x1 to the first semi-axis of an ellipse", DEGREES, default=None)
-    coating: float | None = described("thickness of its coating; absent without one", LENGTH, default=None)
+    radius: float | None = described("radius of its circle; absent if it is not round", records.LENGTH, default=None)
+    semi_axes: Float | None = described("of an ellipse; absent of other shapes", records.LENGTH, "(2,)", default=None)
+    angle: float | None = described("from x1 to the first semi-axis of an ellipse", records.DEGREES, default=None)
+    coating: float | None = described("thickness of its coating; absent without one", records.LENGTH, default=None)
     strength: float | None = described(
         "strength of its bonds / that of [interface]; absent where all fibres have the same", default=None
     )
@@ -100,7 +101,7 @@ class Checks:
 
     def by_law(self) -> dict[str, float]:
         """Return each checked law's error by name."""
-        errors: dict[str, float] = plain(self)
+        errors: dict[str, float] = records.plain(self)
         return errors
 
 
@@ -108,9 +109,11 @@ class Checks:
 class StiffnessBounds:
     """Phase bounds on L^ef, whatever the phases' arrangement."""
 
-    voigt: Float = described("upper bound of the stiffness: uniform strain", STRESS, "(3, 3)")
-    reuss: Float = described("lower bound of the stiffness: uniform stress", STRESS, "(3, 3)")
-    hashin_shtrikman: Bounds | None = described("bounds of isotropic composites; null if a phase is not isotropic")
+    voigt: Float = described("upper bound of the stiffness: uniform strain", records.STRESS, "(3, 3)")
+    reuss: Float = described("lower bound of the stiffness: uniform stress", records.STRESS, "(3, 3)")
+    hashin_shtrikman: phase_bounds.Bounds | None = described(
+        "bounds of isotropic composites; null if a phase is not isotropic"
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

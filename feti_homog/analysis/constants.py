@@ -13,19 +13,17 @@ from scipy.linalg import eigh
 from feti_homog.analysis.cell_records import StiffnessBounds
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import MeshErrors
-from feti_homog.case.cases import Case
+from feti_homog.case import Case
 from feti_homog.errors import NotCarriedError
-from feti_homog.homogenization import phase_laws
-from feti_homog.homogenization.averaging import Response
-from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.materials import phase_bounds, laws
+from feti_homog.homogenization import averaging, phase_laws, unit_cell
 from feti_homog.materials import engineering_constants as named_constants
-from feti_homog.microstructure.phase_names import COATING
-from feti_homog.system.runtime.records import plain
+from feti_homog.materials import laws, phase_bounds
+from feti_homog.microstructure import phase_names
+from feti_homog.system.runtime import records
 from feti_homog.typing import Float
 
 if TYPE_CHECKING:
-    from feti_homog.homogenization.mesh_estimate import EnergyErrors
+    from feti_homog.homogenization import mesh_estimate
 
 Named = Mapping[str, Float]
 PARTS = ("absolute", "signed", "least")
@@ -35,7 +33,7 @@ ROUNDING = 1e-9  # of bounds, relative
 SAME_RADIUS = 1e-6
 
 
-def constants(cell: TornCell, secants: Mapping[str, Any]) -> dict[str, Any]:
+def constants(cell: unit_cell.TornCell, secants: Mapping[str, Any]) -> dict[str, Any]:
     """Return `Result` entries that follow from `effective_stiffness` and `thermal_stress`.  Collective.
 
     None where faces touch without tension: each column is a secant under its own load.  None in the plane with
@@ -73,14 +71,16 @@ def stiffness_constants(stiffness: Float, thermal: Float | None) -> dict[str, An
     return entries if strains is None else entries | {"thermal_expansion": strains}
 
 
-def _comparisons(cell: TornCell, fractions: Mapping[str, float]) -> dict[str, Any]:
+def _comparisons(cell: unit_cell.TornCell, fractions: Mapping[str, float]) -> dict[str, Any]:
     """Return closed-form estimates for round fibres, bounds for rigidly bonded ones.
 
     Estimates exist for fibres without coatings, held in the matrix by the same bonds, with springs of one radius;
     bounds for transversely isotropic phases.
     """
-    from feti_homog.materials.phase_bounds import Fibres, Springs, fibre_bounds
-    from feti_homog.materials.estimates import estimates  # bonded cells in the plane have none
+    from feti_homog.materials import (
+        estimates,  # bonded cells in the plane have none
+        phase_bounds,
+    )
 
     summary, case, has_springs = cell.summary, cell.case, phase_laws.has_springs(cell.case)
     matrix, *fibre_phases = summary.phases
@@ -98,41 +98,46 @@ def _comparisons(cell: TornCell, fractions: Mapping[str, float]) -> dict[str, An
             if has_springs:
                 ((normal, tangential),) = phase_laws.springs(case).stiffness
                 ((axial,),) = phase_laws.springs(case, cell.problems[1].solver.problem).stiffness
-                springs = Springs(normal, tangential, axial, float(radii[phase][0]))
-            fibres.append(Fibres(fractions[phase], phases[phase], springs))
-        entries["estimates"] = estimates(phases[matrix], fibres)
+                springs = phase_bounds.Springs(normal, tangential, axial, float(radii[phase][0]))
+            fibres.append(phase_bounds.Fibres(fractions[phase], phases[phase], springs))
+        entries["estimates"] = estimates.estimates(phases[matrix], fibres)
     if not has_springs and all(map(named_constants.is_transversely_isotropic, phases.values())):
-        entries["fibre_bounds"] = fibre_bounds(list(fractions.values()), list(phases.values()))
+        entries["fibre_bounds"] = phase_bounds.fibre_bounds(list(fractions.values()), list(phases.values()))
     return entries
 
 
 def _has_estimates(case: Case, phases: Sequence[str], radii: Sequence[Float], has_springs: bool) -> bool:
     """Return whether estimates exist for fibre `radii`, NaN if not round."""
-    if COATING in phases or any(interface.between is not None for interface in case.interfaces):
+    if phase_names.COATING in phases or any(interface.between is not None for interface in case.interfaces):
         return False
     return not any(np.isnan(r).any() or (has_springs and np.ptp(r) > SAME_RADIUS * r.max()) for r in radii)
 
 
-def unit_errors(context: AnalysisContext, responses: list[Response]) -> tuple[list[EnergyErrors], list[Response]]:
+def unit_errors(
+    context: AnalysisContext, responses: list[averaging.Response]
+) -> tuple[list[mesh_estimate.EnergyErrors], list[averaging.Response]]:
     """Estimate unit load errors by problem; return responses with element shares.
 
     Without `mesh_error` no errors; without a use for shares the responses as they are.  Collective.
     """
     if not context.case.output.mesh_error:
         return [], responses
-    from feti_homog.homogenization.mesh_estimate import energy_errors  # with the recovery of stresses
+    from feti_homog.homogenization import mesh_estimate  # with the recovery of stresses
 
-    errors: list[EnergyErrors] = []
-    shared, keep = list[Response](), context.recovers_again
+    errors: list[mesh_estimate.EnergyErrors] = []
+    shared, keep = list[averaging.Response](), context.recovers_again
     for problem, group in zip(context.loads.problems, context.loads.by_problem(responses), strict=True):
         touches = problem.interface.contact and any(response.debonded for response in group)
-        errors.append(energy_errors(problem.cell, group, touches, keep))
+        errors.append(mesh_estimate.energy_errors(problem.cell, group, touches, keep))
         shared += [replace(response, shares=part) for response, part in zip(group, errors[-1].shares.T, strict=True)]
     return errors, shared if keep else responses
 
 
 def mesh_error(
-    context: AnalysisContext, secants: Mapping[str, Any], of_plus: list[EnergyErrors], of_minus: list[EnergyErrors]
+    context: AnalysisContext,
+    secants: Mapping[str, Any],
+    of_plus: list[mesh_estimate.EnergyErrors],
+    of_minus: list[mesh_estimate.EnergyErrors],
 ) -> dict[str, Any]:
     """Return the `Result` entry `mesh_error`, empty without errors.
 
@@ -192,7 +197,7 @@ def _note_bounds(
         limits |= {"bulk": plane.hashin_shtrikman.bulk} if is_square else {}
         limits |= {"shear": plane.hashin_shtrikman.shear} if is_isotropic else {}
     if secants.get("fibre_bounds") is not None and values["deviation"] <= errors["deviation"]:
-        limits |= {name: pair for name, pair in plain(secants["fibre_bounds"]).items() if pair is not None}
+        limits |= {name: pair for name, pair in records.plain(secants["fibre_bounds"]).items() if pair is not None}
     for name, (lower, upper) in limits.items():
         value, error = float(values[name]), float(errors[name])
         outside = max(lower - value, value - upper)
@@ -206,17 +211,19 @@ def _note_bounds(
             context.notes.append(f"{line}; the estimated error of the mesh is {error:.1e}: refine")
 
 
-def state_error(context: AnalysisContext, responses: Sequence[Response]) -> tuple[dict[str, float], list[Response]]:
+def state_error(
+    context: AnalysisContext, responses: Sequence[averaging.Response]
+) -> tuple[dict[str, float], list[averaging.Response]]:
     """Return `mesh_error`, the relative energy error, and responses with shares.
 
     Without `mesh_error` no error; without a use for shares the responses as they are.  Collective.
     """
     if not context.case.output.mesh_error:
         return {}, list(responses)
-    from feti_homog.homogenization.mesh_estimate import energy_errors  # with the recovery of stresses
+    from feti_homog.homogenization import mesh_estimate  # with the recovery of stresses
 
     keep, pairs = context.recovers_again, zip(context.loads.problems, responses, strict=False)
-    errors = [energy_errors(problem.cell, [response], keep=keep) for problem, response in pairs]
+    errors = [mesh_estimate.energy_errors(problem.cell, [response], keep=keep) for problem, response in pairs]
     energy = sum(2 * response.stored for response in responses)
     size = max(abs(sum(getattr(error, part).item() for error in errors)) for part in ("signed", "least"))
     shares = [error.shares[:, 0] if keep else None for error in errors]
@@ -237,12 +244,12 @@ def check_accuracy(context: AnalysisContext) -> None:
     note_accuracy(context, error["mesh_error"])
 
 
-def energy_error(stiffness: Float, errors: list[EnergyErrors]) -> dict[str, float]:
+def energy_error(stiffness: Float, errors: list[mesh_estimate.EnergyErrors]) -> dict[str, float]:
     """Return `mesh_error` for a secant stiffness, the largest relative strain energy error."""
     return {"mesh_error": _energy(stiffness, {name: _secants(errors, name) for name in PARTS})} if errors else {}
 
 
-def _secants(errors: Sequence[EnergyErrors], name: str) -> dict[str, Float]:
+def _secants(errors: Sequence[mesh_estimate.EnergyErrors], name: str) -> dict[str, Float]:
     """Return one kind of errors in `effective_stiffness` and `thermal_stress`."""
     if not errors:
         return {}
@@ -256,7 +263,7 @@ def _constants(stiffness: Float, heat: Float | None) -> dict[str, Float]:
     compliance = entries.pop("compliance", None)
     named: dict[str, Any] = {}
     for key, record in entries.items():
-        named |= {key: record} if key == "thermal_expansion" else plain(record)
+        named |= {key: record} if key == "thermal_expansion" else records.plain(record)
     if compliance is not None:  # nu12 and nu13 of the material
         named |= {f"nu3{k + 1}": -compliance[2, k] / compliance[2, 2] for k in range(2)}
     return {name: np.asarray(value) for name, value in named.items() if value is not None}

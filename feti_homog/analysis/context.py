@@ -10,21 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from feti_homog.analysis.recorders import CheckRecorder, StateRecorder
-from feti_homog.case.cases import Case
-from feti_homog.homogenization import cell_remarks, phase_laws
-from feti_homog.homogenization.averaging import FibreInterfaces, Homogenization, Response
-from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.load_scales import ABSURD
-from feti_homog.interface.contact.states import BONDED, OPEN, BondState, Equilibrium
-from feti_homog.interface.loads import Load
-from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS
-from feti_homog.results.checkpoints import EventsInMemory
-from feti_homog.system.runtime.progress_bar import Progress
+from feti_homog.case import Case
+from feti_homog.homogenization import averaging, cell_remarks, phase_laws, unit_cell
+from feti_homog.interface import Load
+from feti_homog.interface.contact import BONDED, OPEN, BondState, Equilibrium, coupled_interfaces, load_scales
+from feti_homog.materials import voigt
+from feti_homog.results import checkpoints
+from feti_homog.system.runtime import progress_bar
 from feti_homog.typing import Float
 
 if TYPE_CHECKING:
-    from feti_homog.homogenization.energy_release import EnergyReleaseRates
+    from feti_homog.homogenization import energy_release
 
 
 class CellLoads:
@@ -36,19 +32,21 @@ class CellLoads:
         names: unit loads in all problems.
     """
 
-    def __init__(self, cell: TornCell, contact: bool) -> None:
-        self.problems = tuple(Homogenization(problem, contact and problem is cell) for problem in cell.problems)
-        self.interfaces = CoupledInterfaces(*(problem.interface for problem in self.problems))
+    def __init__(self, cell: unit_cell.TornCell, contact: bool) -> None:
+        self.problems = tuple(
+            averaging.Homogenization(problem, contact and problem is cell) for problem in cell.problems
+        )
+        self.interfaces = coupled_interfaces.CoupledInterfaces(*(problem.interface for problem in self.problems))
         self.names = tuple(name for problem in self.problems for name in problem.loads)
 
     @property
-    def plane(self) -> Homogenization:
+    def plane(self) -> averaging.Homogenization:
         """The plane problem."""
         return self.problems[0]
 
     def load(self, target: Mapping[str, float]) -> Load:
         """Return the load, in all problems, that a waypoint names."""
-        stress = dict(zip(SPATIAL_STRAINS, SPATIAL_STRESSES, strict=True)) | {"temperature": "temperature"}
+        stress = dict(zip(voigt.SPATIAL_STRAINS, voigt.SPATIAL_STRESSES, strict=True)) | {"temperature": "temperature"}
         values = [target.get(name, target.get(stress[name], 0.0)) for name in self.names]
         return Load(np.array(values), np.array([name not in target for name in self.names]))
 
@@ -56,12 +54,12 @@ class CellLoads:
         """Zero first multipliers for each unit load."""
         return [np.zeros(problem.cell.solver.rows) for problem in self.problems for _ in problem.loads]
 
-    def by_problem(self, responses: Sequence[Response]) -> list[list[Response]]:
+    def by_problem(self, responses: Sequence[averaging.Response]) -> list[list[averaging.Response]]:
         """Group the unit load responses by problem."""
         rest = iter(responses)
         return [[next(rest) for _ in problem.loads] for problem in self.problems]
 
-    def responses(self, state: Equilibrium, scale: float, brief: bool = False) -> list[Response]:
+    def responses(self, state: Equilibrium, scale: float, brief: bool = False) -> list[averaging.Response]:
         """Average `scale` times the equilibrium in all problems.
 
         Collective; arguments and errors as in `Homogenization.response`.
@@ -69,18 +67,18 @@ class CellLoads:
         pairs = zip(self.problems, state.problems, strict=True)
         return [problem.response(part, scale, brief) for problem, part in pairs]
 
-    def undetermined(self, responses: Sequence[Response]) -> list[str]:
+    def undetermined(self, responses: Sequence[averaging.Response]) -> list[str]:
         """Return the strains under a load that nothing determines.  Collective."""
         pairs = zip(self.problems, responses, strict=True)
         masks = np.concatenate([problem.interface.undetermined(response.state) for problem, response in pairs])
         return [name for name, is_free in zip(self.names, masks, strict=True) if is_free]
 
-    def excess(self, responses: Sequence[Response]) -> float:
+    def excess(self, responses: Sequence[averaging.Response]) -> float:
         """Return the ratio of strains to the bonded cell's.  Collective."""
         pairs = zip((problem.interface.scales for problem in self.problems), (r.state for r in responses), strict=True)
         return max(scales.excess(state.solution.strain, state.asked) for scales, state in pairs)
 
-    def secants(self, responses: Sequence[Response], sign: float) -> dict[str, Float]:
+    def secants(self, responses: Sequence[averaging.Response], sign: float) -> dict[str, Float]:
         """Return `stiffness`, Eq. (39), and `thermal_stress` (6,) under a temperature.
 
         Stiffness is (3, 3) or (6, 6); `responses` are to plus or minus each unit load, by their `sign`.
@@ -88,7 +86,7 @@ class CellLoads:
         groups = self.by_problem(responses)
         return phase_laws.secants(*(np.stack([sign * r.stress for r in group], axis=1) for group in groups))
 
-    def means(self, responses: Sequence[Response]) -> dict[str, Float | float]:
+    def means(self, responses: Sequence[averaging.Response]) -> dict[str, Float | float]:
         """Return macroscopic `strain`, `stress` and, if a load, `temperature`."""
         strain = phase_laws.components(*(response.strain for response in responses))
         stress = phase_laws.components(*(response.stress for response in responses))
@@ -114,8 +112,8 @@ class AnalysisContext:
     loads: CellLoads
     checks: CheckRecorder
     states: StateRecorder
-    progress: Progress
-    checkpoint: EventsInMemory
+    progress: progress_bar.Progress
+    checkpoint: checkpoints.EventsInMemory
     resume: bool = False
     log: Callable[[str], object] = lambda line: None
     events: str = "result.path"
@@ -124,20 +122,22 @@ class AnalysisContext:
     notes: list[str] = field(default_factory=list)
 
     @classmethod
-    def of(cls, cell: TornCell, progress: Progress, states: StateRecorder | None = None) -> AnalysisContext:
+    def of(
+        cls, cell: unit_cell.TornCell, progress: progress_bar.Progress, states: StateRecorder | None = None
+    ) -> AnalysisContext:
         """Make a cell's context, without checkpoint; by default without states."""
         contact = cell.case.interface is not None and cell.case.interface.contact
         recorder = StateRecorder(cell, None, False, progress.say) if states is None else states
-        checks, checkpoint = CheckRecorder(cell.solver.rtol), EventsInMemory(cell.comm, 0)
+        checks, checkpoint = CheckRecorder(cell.solver.rtol), checkpoints.EventsInMemory(cell.comm, 0)
         return cls(CellLoads(cell, contact), checks, recorder, progress, checkpoint)
 
     @property
-    def plane(self) -> Homogenization:
+    def plane(self) -> averaging.Homogenization:
         """The plane problem."""
         return self.loads.plane
 
     @property
-    def cell(self) -> TornCell:
+    def cell(self) -> unit_cell.TornCell:
         """The cell in the plane problem."""
         return self.plane.cell
 
@@ -157,9 +157,9 @@ class AnalysisContext:
 
     def unit_responses(
         self, label: str, bonds: BondState, starts: Sequence[Float], sign: float
-    ) -> tuple[dict[str, Float], list[Response]]:
+    ) -> tuple[dict[str, Float], list[averaging.Response]]:
         """Return `CellLoads.secants` and responses to plus or minus unit loads.  Collective."""
-        responses = list[Response]()
+        responses = list[averaging.Response]()
         for problem in self.loads.problems:
             first, count = len(responses), len(problem.loads)
             responses += problem.respond(sign * np.eye(count), bonds, starts[first : first + count])
@@ -167,33 +167,35 @@ class AnalysisContext:
                 self.progress.say(self.checks.record(f"{label}{'-' if sign < 0 else ''}{name}", response))
         return self.loads.secants(responses, sign), responses
 
-    def record_unit_states(self, responses: Sequence[Response], load_factor: float, label: str, point: int) -> None:
+    def record_unit_states(
+        self, responses: Sequence[averaging.Response], load_factor: float, label: str, point: int
+    ) -> None:
         """Record the state under each unit load.  Collective."""
         in_plane = len(self.plane.loads)
         for number, (name, response) in enumerate(zip(self.loads.names, responses, strict=True)):
             plane, axial = (response, None) if number < in_plane else (None, response)
             self.states.record(plane, axial, load_factor, f"{label}{name}", point)
 
-    def record_state(self, responses: Sequence[Response], load_factor: float, label: str, point: int) -> None:
+    def record_state(self, responses: Sequence[averaging.Response], load_factor: float, label: str, point: int) -> None:
         """Record the state with these responses.  Collective."""
         plane, *axial = responses
         self.states.record(plane, axial[0] if axial else None, load_factor, label, point)
 
     @cached_property
-    def release_rates(self) -> EnergyReleaseRates:
+    def release_rates(self) -> energy_release.EnergyReleaseRates:
         """Energy release rates at debonded arc tips.  Collective when first read."""
-        from feti_homog.homogenization.energy_release import EnergyReleaseRates  # bonded cells have no tips
+        from feti_homog.homogenization import energy_release  # bonded cells have no tips
 
-        return EnergyReleaseRates(self.cell, self.plane.interface)
+        return energy_release.EnergyReleaseRates(self.cell, self.plane.interface)
 
     @cached_property
-    def fibre_interfaces(self) -> FibreInterfaces:
+    def fibre_interfaces(self) -> averaging.FibreInterfaces:
         """Fibre interfaces in the cell.  Collective when first read."""
-        return FibreInterfaces(self.cell)
+        return averaging.FibreInterfaces(self.cell)
 
-    def point(self, responses: Sequence[Response]) -> dict[str, Any]:
+    def point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
         """Return a point's debonding under the last plane strain, all iterations.  Collective."""
-        last = responses[: len(STRAINS)][-1]
+        last = responses[: len(voigt.STRAINS)][-1]
         length = self.fibre_interfaces.length(last.state.status != BONDED)
         debonding = {
             "debonded_share": self.fibre_interfaces.share(length),
@@ -204,7 +206,7 @@ class AnalysisContext:
             debonding["debonded_shares"] = self.fibre_interfaces.shares(last.state.status)
         return debonding | last.counts | {"iterations": sum(r.state.iterations for r in responses)}
 
-    def loaded_point(self, responses: Sequence[Response]) -> dict[str, Any]:
+    def loaded_point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
         """Return a loaded point's means, energies and debonding.  Collective."""
         self.undetermined.append(self.loads.undetermined(responses))
         self.excess = max(self.excess, self.loads.excess(responses))
@@ -218,11 +220,11 @@ class AnalysisContext:
     def remarks(self) -> list[str]:
         """List notes, and lines on undetermined and on absurd strains."""
         lines, points, label = [*self.notes], sum(map(bool, self.undetermined)), f"[{self.case.analysis.type}]"
-        if names := [name for name in SPATIAL_STRAINS if any(name in free for free in self.undetermined)]:
+        if names := [name for name in voigt.SPATIAL_STRAINS if any(name in free for free in self.undetermined)]:
             where = f" at {points} of {len(self.undetermined)} points" if self.case.section.is_followed else ""
             reason = "with a given stress nothing resists them, and the result has one value of many"
             lines.append(f"{label} {', '.join(names)}: undetermined{where}: {reason}")
-        if self.excess > ABSURD:
+        if self.excess > load_scales.ABSURD:
             reason = "hardly anything carries the stresses"
             lines.append(f"{label} strains {self.excess:.1e} times those of the bonded cell: {reason}")
         return lines

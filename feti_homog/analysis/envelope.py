@@ -3,8 +3,6 @@
 The cell is linear, so tractions under all loads are superposed from unit loads: no direction costs a solve.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,13 +14,12 @@ from feti_homog.analysis.constants import constants, mesh_error, unit_errors
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import EnvelopePoint
 from feti_homog.analysis.tip_records import DIRECTION_DIGITS, bond_directions, criterion_of
-from feti_homog.case.load_sections import Envelope
+from feti_homog.case import load_sections
 from feti_homog.errors import CaseError
-from feti_homog.homogenization.averaging import Response, asymmetry
-from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.interface.path.onsets import Onset
-from feti_homog.interface.path.path_points import UTILISATION_TIE
-from feti_homog.materials.voigt import voigt_names
+from feti_homog.homogenization import averaging
+from feti_homog.interface.laws import BondLaw
+from feti_homog.interface.path import onsets, path_points
+from feti_homog.materials import voigt
 from feti_homog.typing import Float, Int
 
 # Bonds times directions that are looked at together.
@@ -62,7 +59,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
         CaseError: faces in the mesh are debonded and may touch.
     """
     section, bonds = context.case.section, context.bonds(None)
-    assert isinstance(section, Envelope)
+    assert isinstance(section, load_sections.Envelope)
     if not context.plane.interface.is_linear(bonds.status):
         raise CaseError(
             '[interface] contact: expected false with a debonded curve of the mesh; [analysis] type = "envelope" '
@@ -72,11 +69,11 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     errors, responses = unit_errors(context, responses)
     context.record_unit_states(responses, 1.0, "", 0)
     stiffness = columns.pop("stiffness")
-    context.checks.require("L^ef", {"symmetry": asymmetry(stiffness)})
+    context.checks.require("L^ef", {"symmetry": averaging.asymmetry(stiffness)})
     angles = 360.0 * np.arange(section.directions) / section.directions
     rays = rays_of(section.plane, angles, stiffness, columns.get("thermal_stress"), section.temperature or 0.0)
     law = criterion_of(context.cell)
-    finder = _Finder(context, responses, law, Onset.of(law, context.loads.interfaces, bonds))
+    finder = _Finder(context, responses, law, onsets.Onset.of(law, context.loads.interfaces, bonds))
     pairs = zip(angles, finder.points(rays), strict=True)
     points = tuple(EnvelopePoint(angle=float(angle), **point) for angle, point in pairs)
     secants: dict[str, Any] = {"effective_stiffness": stiffness} | columns
@@ -91,7 +88,7 @@ def rays_of(
 
     Stress rays have E = C^-1 S and begin at zero stress after a temperature change, strain rays begin at zero strain.
     """
-    strains, stresses = voigt_names(len(stiffness))
+    strains, stresses = voigt.voigt_names(len(stiffness))
     by_stress = plane[0] in stresses
     names = stresses if by_stress else strains
     unit = np.stack([np.cos(np.radians(angles)), np.sin(np.radians(angles))], axis=1)
@@ -107,7 +104,9 @@ def rays_of(
 class _Finder:
     """Finds the first bond that breaks on each ray."""
 
-    def __init__(self, context: AnalysisContext, responses: Sequence[Response], law: BondLaw, onset: Onset) -> None:
+    def __init__(
+        self, context: AnalysisContext, responses: Sequence[averaging.Response], law: BondLaw, onset: onsets.Onset
+    ) -> None:
         """Take the responses to the unit loads.  Collective."""
         cell = context.cell
         self._comm, self._law, self._onset, self._loads = cell.comm, law, onset, context.loads.names
@@ -130,7 +129,7 @@ class _Finder:
 
     def points(self, rays: Rays) -> Iterator[dict[str, Any]]:
         """Yield each ray's entry in result.json, without its direction.  Collective."""
-        names = voigt_names(rays.strain.shape[1])[0]
+        names = voigt.voigt_names(rays.strain.shape[1])[0]
         start = np.tensordot(self._unit_loads(rays.strain_before[None], rays.temperature, names), self._unit, axes=1)[0]
         used = self._onset.utilisation(start, np.arange(len(start)))
         largest = float(self._comm.allreduce(used.max(initial=0.0), MPI.MAX))
@@ -142,7 +141,7 @@ class _Finder:
                 factors = self._onset.factors(directions, self._noise * self._error_utilisation(loads), before)
             else:
                 factors = np.tile(
-                    np.where(used >= largest * (1.0 - UTILISATION_TIE), 0.0, np.inf), (len(directions), 1)
+                    np.where(used >= largest * (1.0 - path_points.UTILISATION_TIE), 0.0, np.inf), (len(directions), 1)
                 )
             for ray, (factor, fibre, pair, angle, *shares) in enumerate(self._first(factors, start, directions), first):
                 if np.isinf(factor):
@@ -180,7 +179,7 @@ class _Finder:
         self._comm.Allreduce(MPI.IN_PLACE, smallest, MPI.MIN)
         best = np.full((n, 4 + len(self._break_names)), np.inf)
         best[:, 0] = smallest
-        together = factors[:, self._order] <= smallest[:, None] * (1.0 + UTILISATION_TIE)
+        together = factors[:, self._order] <= smallest[:, None] * (1.0 + path_points.UTILISATION_TIE)
         rays = np.flatnonzero(together.any(axis=1) & np.isfinite(smallest))
         node: Int = self._order[together[rays].argmax(axis=1)] if len(rays) else np.zeros(0, np.int64)
         best[rays, 1:4] = np.column_stack([self._fibre[node], self._pair[node], self._direction[node]])

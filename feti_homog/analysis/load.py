@@ -1,7 +1,5 @@
 """`analysis.type = "load"`: equilibrium under given strains, stresses, temperature; nothing breaks."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from feti_homog.analysis.constants import note_accuracy, state_error

@@ -1,7 +1,5 @@
 """`analysis.type = "path"`: debonding along a strain path, Section III.F, Fig. 5."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -9,34 +7,19 @@ from typing import Any
 
 import numpy as np
 
+from feti_homog.analysis import path_events
 from feti_homog.analysis.constants import check_accuracy, state_error
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.analysis.path_events import (
-    BARS,
-    EventProgress,
-    Work,
-    averages,
-    found_again,
-    holding,
-    read,
-    restored,
-    stored,
-)
 from feti_homog.analysis.result_records import PathPoint, Peak
 from feti_homog.analysis.tip_records import criterion_of, tips
-from feti_homog.case.load_sections import LoadPath
+from feti_homog.case import load_sections
 from feti_homog.errors import NotCarriedError
-from feti_homog.homogenization.averaging import Response
-from feti_homog.interface.friction.coulomb_faces import StuckError
-from feti_homog.interface.friction.sliding_cell import SlidingCell
-from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.interface.path.coulomb_leg import CoulombLeg
-from feti_homog.interface.path.frictionless_leg import FrictionlessLeg
-from feti_homog.interface.path.path_following import events, increments
-from feti_homog.interface.path.path_points import Energies, Point, unloaded
-from feti_homog.materials.voigt import voigt_names
-from feti_homog.results.checkpoints import has_multipliers
-from feti_homog.results.landmarks import kept, marks, peak_of
+from feti_homog.homogenization import averaging
+from feti_homog.interface.friction import coulomb_faces, sliding_cell
+from feti_homog.interface.laws import BondLaw
+from feti_homog.interface.path import coulomb_leg, frictionless_leg, path_following, path_points
+from feti_homog.materials import voigt
+from feti_homog.results import checkpoints, landmarks
 
 NAMED_FIBRES = 8  # in a remark
 LEAST_STRESS = 1e-9  # in a fault, relative to the largest
@@ -45,19 +28,19 @@ LEAST_STRESS = 1e-9  # in a fault, relative to the largest
 def run(context: AnalysisContext) -> dict[str, Any]:
     """Follow the case's path until its bonds break; see `follow`."""
     section = context.case.section
-    assert isinstance(section, LoadPath)
+    assert isinstance(section, load_sections.LoadPath)
     return follow(context, section, criterion_of(context.cell, grows=True))
 
 
-def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, Any]:
+def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw) -> dict[str, Any]:
     """Return `path`, a point an event (or increment), checkpointed at once.
 
     `states` numbers the points with recorded fields, chosen when all points are found.
     """
     check_accuracy(context)
     count = _events_in_checkpoint(context, law)
-    work, entries, last = Work(), list[dict[str, Any]](), None
-    with EventProgress(context.progress, BARS[path.method], context.events) as progress:
+    work, entries, last = path_events.Work(), list[dict[str, Any]](), None
+    with path_events.EventProgress(context.progress, path_events.BARS[path.method], context.events) as progress:
         for number, (point, energies, responses) in enumerate(_points(context, path, law, count)):
             place = f"at {point.load_factor:.6f}, {responses[0].leading}"
             place += "" if energies is None else ", from the checkpoint"
@@ -68,7 +51,7 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
                 if point.state.converged:
                     # Teeth are many and found again at once.
                     light = point.broke == 0 < point.softened
-                    event = stored(point, responses, work, context.loads.interfaces)
+                    event = path_events.stored(point, responses, work, context.loads.interfaces)
                     context.checkpoint.write(number, *event, light=light)
             for response, problem in zip(responses, ("", ", along the fibres"), strict=False):
                 faults = len(context.checks.faults)
@@ -90,13 +73,13 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
     else:
         _checked(context, last, _label(path, len(entries) - 1))
     _remark_loose_fibres(context, last)
-    for number, mark in marks(document).items():
+    for number, mark in landmarks.marks(document).items():
         entries[number]["mark"] = mark
     points = tuple(PathPoint(**entry) for entry in entries)
-    return {"path": points, "peak": Peak(**peak_of(document)), "resumed": count} | states
+    return {"path": points, "peak": Peak(**landmarks.peak_of(document)), "resumed": count} | states
 
 
-def _remark_loose_fibres(context: AnalysisContext, last: Point) -> None:
+def _remark_loose_fibres(context: AnalysisContext, last: path_points.Point) -> None:
     """Remark fibres that no bond holds at last, with friction.  Collective."""
     if context.case.has_friction and (loose := context.fibre_interfaces.loose(last.after.bonds.status)):
         names = ", ".join(map(str, loose[:NAMED_FIBRES])) + (", ..." if len(loose) > NAMED_FIBRES else "")
@@ -119,7 +102,7 @@ def _events_in_checkpoint(context: AnalysisContext, law: BondLaw) -> int:
             say(f"  {dropped} events of an earlier run are dropped; --resume would have gone on from them")
         return 0
     stored_events = context.checkpoint.count()
-    if (count := holding(context, law, stored_events)) < stored_events:
+    if (count := path_events.holding(context, law, stored_events)) < stored_events:
         say(f"  event {count} of the checkpoint does not hold: it and all after it are found again")
     begin = "there is no checkpoint: the path begins at its beginning"
     say(f"  {f'{count} events are taken from the checkpoint' if stored_events else begin}")
@@ -127,8 +110,8 @@ def _events_in_checkpoint(context: AnalysisContext, law: BondLaw) -> int:
 
 
 def _points(
-    context: AnalysisContext, path: LoadPath, law: BondLaw, stored_events: int
-) -> Iterator[tuple[Point, tuple[Energies, float] | None, list[Response]]]:
+    context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw, stored_events: int
+) -> Iterator[tuple[path_points.Point, tuple[path_points.Energies, float] | None, list[averaging.Response]]]:
     """Yield points with responses: first checkpointed ones, with energies, then new ones.
 
     Where nothing carries the stresses any more, or faces with friction cannot go on, the path ends with a fault.
@@ -137,24 +120,26 @@ def _points(
         NotCarriedError: nothing carries them from the beginning.
     """
     cell, waypoints = context.loads.interfaces, [context.loads.load(target) for target in context.case.targets]
-    begin = unloaded(cell, context.bonds(None))
-    responses: list[Response] = []
+    begin = path_points.unloaded(cell, context.bonds(None))
+    responses: list[averaging.Response] = []
     for number in range(stored_events):
         event = context.checkpoint.read(number)
-        point, energies = restored(event, cell)
-        if number == stored_events - 1 and not has_multipliers(event):  # from which the path goes on
-            point = found_again(point, cell, law)
-        begin, responses = point.after, averages(event, point, context.loads)
+        point, energies = path_events.restored(event, cell)
+        if number == stored_events - 1 and not checkpoints.has_multipliers(event):  # from which the path goes on
+            point = path_events.found_again(point, cell, law)
+        begin, responses = point.after, path_events.averages(event, point, context.loads)
         yield point, energies, responses
-    engine: type[FrictionlessLeg] | partial[CoulombLeg] = FrictionlessLeg
+    engine: type[frictionless_leg.FrictionlessLeg] | partial[coulomb_leg.CoulombLeg] = frictionless_leg.FrictionlessLeg
     if context.case.has_friction:
         pairs = np.array([(each.friction, each.friction_on_damage) for each in context.case.interfaces])
         friction, on_damage = pairs[cell.nodes.pair].T
-        engine = partial(CoulombLeg, sliding=SlidingCell(cell, friction, friction * on_damage))
+        engine = partial(coulomb_leg.CoulombLeg, sliding=sliding_cell.SlidingCell(cell, friction, friction * on_damage))
     if path.method == "events":
-        points = events(cell, law, waypoints, begin, engine)
+        points = path_following.events(cell, law, waypoints, begin, engine)
     else:
-        points = increments(cell, law, waypoints, path.increments or 1, path.release == "worst", begin, engine)
+        points = path_following.increments(
+            cell, law, waypoints, path.increments or 1, path.release == "worst", begin, engine
+        )
     count = stored_events
     try:
         for count, point in enumerate(points, stored_events + 1):  # noqa: B007
@@ -166,28 +151,32 @@ def _points(
         context.checks.faults.append(str(_with_advice(error, _end_of(context, responses), path)))
 
 
-def _end_of(context: AnalysisContext, responses: list[Response]) -> str:
+def _end_of(context: AnalysisContext, responses: list[averaging.Response]) -> str:
     """Return where a path ends: beyond its last point, with stresses."""
     stress = np.asarray(context.loads.means(responses)["stress"])
-    pairs = zip(voigt_names(len(stress))[1], stress, strict=True)
+    pairs = zip(voigt.voigt_names(len(stress))[1], stress, strict=True)
     large = [f", {name} {value:.6g}" for name, value in pairs if abs(value) > LEAST_STRESS * np.abs(stress).max()]
     return f" beyond the last point{''.join(large)}"
 
 
-def _with_advice(error: NotCarriedError, place: str, path: LoadPath) -> NotCarriedError:
+def _with_advice(error: NotCarriedError, place: str, path: load_sections.LoadPath) -> NotCarriedError:
     """Return a path's last error with place, initially empty, and remedy."""
-    if isinstance(error, StuckError):
+    if isinstance(error, coulomb_faces.StuckError):
         more = "" if path.method == "events" else " or more increments"
-        return StuckError(f"[path]: {error}{place}; a smaller friction{more} may lead further")
+        return coulomb_faces.StuckError(f"[path]: {error}{place}; a smaller friction{more} may lead further")
     return NotCarriedError(f"[path]: {error}{place}; prescribe strains there") if place else error
 
 
-def _label(path: LoadPath, number: int) -> str:
+def _label(path: load_sections.LoadPath, number: int) -> str:
     return f"{'event' if path.method == 'events' else 'increment'} {number}"
 
 
 def _entry(
-    context: AnalysisContext, law: BondLaw, point: Point, responses: Sequence[Response], work: Work
+    context: AnalysisContext,
+    law: BondLaw,
+    point: path_points.Point,
+    responses: Sequence[averaging.Response],
+    work: path_events.Work,
 ) -> dict[str, Any]:
     """Return a point's entry in result.json.  Collective."""
     energies, damage = work.all_equilibria, law.damage(point.state.bonds)
@@ -210,7 +199,7 @@ def _entry(
     return entry | context.loaded_point(responses)
 
 
-def _goes_on(context: AnalysisContext, path: LoadPath, point: Point, count: int) -> bool:
+def _goes_on(context: AnalysisContext, path: load_sections.LoadPath, point: path_points.Point, count: int) -> bool:
     """Return whether the path goes on after `count` points."""
     if not point.state.converged:  # a state that does not hold decided on the next break
         return False
@@ -224,7 +213,11 @@ def _goes_on(context: AnalysisContext, path: LoadPath, point: Point, count: int)
 
 
 def _recorded(
-    context: AnalysisContext, path: LoadPath, law: BondLaw, document: dict[str, Any], last: Point
+    context: AnalysisContext,
+    path: load_sections.LoadPath,
+    law: BondLaw,
+    document: dict[str, Any],
+    last: path_points.Point,
 ) -> dict[str, Any]:
     """Record tips and fields at kept checkpoint points and the last.  Collective.
 
@@ -232,10 +225,10 @@ def _recorded(
     """
     legs = len(context.case.targets) if path.method == "events" else 0
     entries = document["path"]
-    numbers = kept(entries, context.case.output.states, legs, marks(document))
+    numbers = landmarks.kept(entries, context.case.output.states, legs, landmarks.marks(document))
     with context.progress.stage("states") as line:
         for number in context.progress.bar(numbers, "states"):
-            point = last if number == len(entries) - 1 else read(context, law, number)[1]
+            point = last if number == len(entries) - 1 else path_events.read(context, law, number)[1]
             point, responses = _checked(context, point, _label(path, number))
             if law.has_tips:
                 entries[number]["tips"] = tips(context, law, point)
@@ -247,7 +240,9 @@ def _recorded(
     return {"states": numbers} if context.states.has_place else {}
 
 
-def _checked(context: AnalysisContext, point: Point, name: str) -> tuple[Point, Sequence[Response]]:
+def _checked(
+    context: AnalysisContext, point: path_points.Point, name: str
+) -> tuple[path_points.Point, Sequence[averaging.Response]]:
     """Return a point completed by F lambda; record its checks.  Collective."""
     point = replace(point, state=context.loads.interfaces.completed(point.state))
     responses = context.loads.responses(point.state, point.scale)

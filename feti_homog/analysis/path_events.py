@@ -1,7 +1,5 @@
 """Path events: energies, form in the checkpoint, and printed lines."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
@@ -11,16 +9,14 @@ from typing import Any, Self
 import numpy as np
 
 from feti_homog.analysis.context import AnalysisContext, CellLoads
-from feti_homog.feti.dual_solution import DualSolution
-from feti_homog.homogenization.averaging import Response
-from feti_homog.interface.contact.contact_problem import ContactProblem
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import BondState, Equilibrium
-from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.interface.loads import Load, Macroscopic
-from feti_homog.interface.path.path_points import NO_ENERGIES, Energies, PathState, Point, most_utilised
-from feti_homog.results.checkpoints import Arrays, has_multipliers
-from feti_homog.system.runtime.progress_bar import Progress
+from feti_homog.feti import DualSolution
+from feti_homog.homogenization import averaging
+from feti_homog.interface import Load, Macroscopic
+from feti_homog.interface.contact import BondState, Equilibrium, contact_problem, coupled_interfaces
+from feti_homog.interface.laws import BondLaw
+from feti_homog.interface.path import path_points
+from feti_homog.results import checkpoints
+from feti_homog.system.runtime import progress_bar
 
 SECONDS_A_LINE = 1.0
 # Equal steps tell the time left; the number of events is unknown.
@@ -47,27 +43,32 @@ class Work:
             largest load t so far, and loses (t / its load)^2 times as much, as all is of degree one in the load.
     """
 
-    all_equilibria: Energies = NO_ENERGIES
+    all_equilibria: path_points.Energies = path_points.NO_ENERGIES
     load_controlled: float = 0.0
     _load: float = 0.0
     _largest_load: float = 0.0
 
-    def arrive(self, point: Point) -> None:
+    def arrive(self, point: path_points.Point) -> None:
         """Add the energies on the way from the last point."""
         # Beyond the first leg loads do not fall.
         rise = self._largest_load / self._load if self._load else 1.0
         controlled = self.load_controlled + rise**2 * point.energies.released
         self.resume_from(self.all_equilibria.plus(point.energies), controlled, point)
 
-    def resume_from(self, all_equilibria: Energies, load_controlled: float, point: Point) -> None:
+    def resume_from(
+        self, all_equilibria: path_points.Energies, load_controlled: float, point: path_points.Point
+    ) -> None:
         """Go on from a point with the energies up to it."""
         self.all_equilibria, self.load_controlled = all_equilibria, load_controlled
         self._load, self._largest_load = point.load_factor, max(point.load_factor, self._largest_load)
 
 
 def stored(
-    point: Point, responses: Sequence[Response], work: Work, cell: CoupledInterfaces
-) -> tuple[dict[str, Any], Arrays]:
+    point: path_points.Point,
+    responses: Sequence[averaging.Response],
+    work: Work,
+    cell: coupled_interfaces.CoupledInterfaces,
+) -> tuple[dict[str, Any], checkpoints.Arrays]:
     """Take point and responses apart: checkpoint numbers and distributed arrays.
 
     A path goes on from its last state's multipliers.
@@ -80,7 +81,7 @@ def stored(
         "broken": np.nan if after.broken is None else after.broken,
         "stretched": after.stretched,
     }
-    distributed: Arrays = {"used": point.used} | _bonds_apart(after.bonds, "_after")
+    distributed: checkpoints.Arrays = {"used": point.used} | _bonds_apart(after.bonds, "_after")
     for suffix, interface, response, state in zip(
         SUFFIXES, cell.problems, responses, point.state.problems, strict=False
     ):
@@ -94,7 +95,9 @@ def stored(
     return numbers, distributed
 
 
-def restored(event: Arrays, cell: CoupledInterfaces) -> tuple[Point, tuple[Energies, float]]:
+def restored(
+    event: checkpoints.Arrays, cell: coupled_interfaces.CoupledInterfaces
+) -> tuple[path_points.Point, tuple[path_points.Energies, float]]:
     """Rebuild the event that `stored` took apart: point, and energies before.
 
     A lean event has empty arrays, which `found_again` fills.
@@ -106,7 +109,7 @@ def restored(event: Arrays, cell: CoupledInterfaces) -> tuple[Point, tuple[Energ
     state = replace(state, axial=axial[0]) if axial else state
     origin_strain, origin_stress, strain, stress = event["macroscopic"]
     broken = float(event["broken"])
-    after = PathState(
+    after = path_points.PathState(
         int(leg),
         position,
         _bonds_together(event, "_after"),
@@ -117,41 +120,45 @@ def restored(event: Arrays, cell: CoupledInterfaces) -> tuple[Point, tuple[Energ
         float(event["stretched"]),
     )
     broke, softened = map(int, counts)
-    n = len(NO_ENERGIES)
+    n = len(path_points.NO_ENERGIES)
     used = event.get("used", EMPTY)
-    point = Point(load_factor, scale, state, broke, softened, Energies(*energies[:n]), used, after)
-    return point, (Energies(*energies[n : 2 * n]), energies[2 * n])
+    point = path_points.Point(
+        load_factor, scale, state, broke, softened, path_points.Energies(*energies[:n]), used, after
+    )
+    return point, (path_points.Energies(*energies[n : 2 * n]), energies[2 * n])
 
 
-def averages(event: Arrays, point: Point, loads: CellLoads) -> list[Response]:
+def averages(event: checkpoints.Arrays, point: path_points.Point, loads: CellLoads) -> list[averaging.Response]:
     """Return a restored event's stored responses.  Collective."""
-    responses = list[Response]()
+    responses = list[averaging.Response]()
     for suffix, problem, state in zip(SUFFIXES, loads.problems, point.state.problems, strict=False):
         strain, stress = event[f"means{suffix}"]
         (stored, in_springs), errors = (event[f"{name}{suffix}"].tolist() for name in ("energies_of", "errors"))
         checks = {law: error for law, error in zip(LAWS, errors, strict=True) if error != UNCHECKED}
         counts, damage = problem.counts(state.status), problem.damage(state.bonds)
         means = strain, stress, point.scale, stored, in_springs
-        responses.append(Response(*means, state, EMPTY, checks, counts, damage))
+        responses.append(averaging.Response(*means, state, EMPTY, checks, counts, damage))
     return responses
 
 
-def found_again(point: Point, cell: CoupledInterfaces, law: BondLaw) -> Point:
+def found_again(
+    point: path_points.Point, cell: coupled_interfaces.CoupledInterfaces, law: BondLaw
+) -> path_points.Point:
     """Return a lean event's point with its equilibrium.  Collective."""
     loads = ((problem.load.values, problem.load.by_stress) for problem in point.state.problems)
     values, by_stress = zip(*loads, strict=True)
     load = Load(np.concatenate(values), np.concatenate(by_stress))
     state = cell.equilibrium(load, point.state.bonds, cell.no_multipliers())
     # An equilibrium under the whole load is scaled, and so are its utilisations.
-    used = point.scale * most_utilised(cell, law, state)[0]
+    used = point.scale * path_points.most_utilised(cell, law, state)[0]
     return replace(point, state=state, used=used, after=replace(point.after, lam=state.multipliers))
 
 
-def read(context: AnalysisContext, law: BondLaw, number: int) -> tuple[Arrays, Point]:
+def read(context: AnalysisContext, law: BondLaw, number: int) -> tuple[checkpoints.Arrays, path_points.Point]:
     """Read a checkpoint event and point; find missing multipliers again.  Collective."""
     event, cell = context.checkpoint.read(number), context.loads.interfaces
     point, _ = restored(event, cell)
-    return event, point if has_multipliers(event) else found_again(point, cell, law)
+    return event, point if checkpoints.has_multipliers(event) else found_again(point, cell, law)
 
 
 def holding(context: AnalysisContext, law: BondLaw, count: int) -> int:
@@ -179,7 +186,7 @@ def holding(context: AnalysisContext, law: BondLaw, count: int) -> int:
     return count
 
 
-def _taken_apart(state: Equilibrium, kernel: int) -> tuple[dict[str, Any], Arrays]:
+def _taken_apart(state: Equilibrium, kernel: int) -> tuple[dict[str, Any], checkpoints.Arrays]:
     """Take one problem's equilibrium apart; `kernel` amplitudes are NaN if not confirmed."""
     solution = state.solution
     numbers: dict[str, Any] = {
@@ -195,7 +202,7 @@ def _taken_apart(state: Equilibrium, kernel: int) -> tuple[dict[str, Any], Array
     return numbers, {"lam": solution.lam, "jump": solution.jump} | _bonds_apart(state.bonds, "")
 
 
-def _put_together(event: Arrays, interface: ContactProblem, suffix: str) -> Equilibrium:
+def _put_together(event: checkpoints.Arrays, interface: contact_problem.ContactProblem, suffix: str) -> Equilibrium:
     """Rebuild the equilibrium from the parts that `_taken_apart` made."""
     lam, jump, alpha = (event.get(f"{name}{suffix}", EMPTY) for name in ("lam", "jump", "alpha"))
     strain = event[f"strain{suffix}"]
@@ -211,12 +218,12 @@ def _put_together(event: Arrays, interface: ContactProblem, suffix: str) -> Equi
     return Equilibrium(load, bonds, solution, iterations, solves, free_motions, certificate, asked)
 
 
-def _bonds_apart(bonds: BondState, suffix: str) -> Arrays:
+def _bonds_apart(bonds: BondState, suffix: str) -> checkpoints.Arrays:
     """Return the bond state as distributed arrays with this suffix."""
     return {f"{name}{suffix}": values for name, values in vars(bonds).items() if values is not None}
 
 
-def _bonds_together(event: Arrays, suffix: str) -> BondState:
+def _bonds_together(event: checkpoints.Arrays, suffix: str) -> BondState:
     """Rebuild the bond state from the arrays that `_bonds_apart` made."""
     return BondState(*(event.get(f"{field.name}{suffix}") for field in fields(BondState)))  # type: ignore[arg-type]
 
@@ -227,7 +234,9 @@ class EventProgress:
     The first, the last and urgent lines are printed, other lines once a second at most; the bar on terminals alone.
     """
 
-    def __init__(self, progress: Progress, layout: str, file: str, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, progress: progress_bar.Progress, layout: str, file: str, clock: Callable[[], float] = time.monotonic
+    ) -> None:
         """Take the bar layout, STEPS_BAR or EVENTS_BAR, and the lines' file."""
         self._progress, self._layout, self._file, self._clock = progress, layout, file, clock
         self._next_line, self._held_back, self._left_out = float("-inf"), "", 0

@@ -5,8 +5,6 @@ cell with contact is homogeneous of degree one in its loads.  So a toughness s^2
 loads, has the same events at s times the strains and stresses, and s^2 times the energies.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -15,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from feti_homog.analysis.result_records import PathPoint, Peak, Tips
-from feti_homog.results.path_curves import interface_sections, scales_with_toughness
+from feti_homog.results import path_curves
 
 LOADS = ("strain", "to", "waypoints")
 ENERGIES = ("stored", "stored_in_springs", "work", "dissipated", "dissipated_strain_controlled", "fracture_energy")
@@ -34,11 +32,11 @@ def scaled(
 
     Raises ValueError for a result that does not scale, and for a toughness that is not positive.
     """
-    if not scales_with_toughness(document):
+    if not path_curves.scales_with_toughness(document):
         raise ValueError("only a path whose bonds break by energy on springs scales with the toughness")
     if not toughness > 0:
         raise ValueError(f"toughness = {toughness}: expected an energy per area above 0")
-    old, sections = document["case"], interface_sections(document)
+    old, sections = document["case"], path_curves.interface_sections(document)
     s = math.sqrt(toughness / sections[0]["toughness"])
     tougher = [{**section, "toughness": section["toughness"] * s**2} for section in sections]
     path = {name: _times(value, s) if name in LOADS else value for name, value in old["path"].items()}

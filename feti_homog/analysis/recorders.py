@@ -1,20 +1,14 @@
 """Run recorders: convergence, errors in response laws, states with fields."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import count
 
 from feti_homog.analysis.result import Fields
 from feti_homog.errors import FetiHomogError
-from feti_homog.homogenization.averaging import Response
-from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.results import field_parts, result_json
-from feti_homog.results.field_file import FieldFile
-from feti_homog.results.field_layout import StatePart
-from feti_homog.results.result_json import FileSeal
-from feti_homog.system.parallel.mpi_errors import on_root
+from feti_homog.homogenization import averaging, unit_cell
+from feti_homog.results import field_file, field_layout, field_parts, result_json
+from feti_homog.system.parallel import mpi_errors
 
 # Largest relative error of a check that passes, in relative tolerances of the Krylov method: sums over the cell and
 # jumps of stiffness make so much of the solver's error.
@@ -42,7 +36,7 @@ class CheckRecorder:
     errors: dict[str, float] = field(default_factory=dict)
     faults: list[str] = field(default_factory=list)
 
-    def record(self, name: str, response: Response) -> str:
+    def record(self, name: str, response: averaging.Response) -> str:
         """Record a response's checks and return a line about it.
 
         There is a fault if the response breaks a law.
@@ -96,19 +90,26 @@ class StateRecorder:
         error: why the file was given up; the numbers are computed without it.
     """
 
-    def __init__(self, cell: TornCell, file: FieldFile | None, keep: bool, say: Callable[[str], object]) -> None:
+    def __init__(
+        self, cell: unit_cell.TornCell, file: field_file.FieldFile | None, keep: bool, say: Callable[[str], object]
+    ) -> None:
         self._cell, self._file, self._keep = cell, file, keep
-        self._number, self._states, self._say = count(), list[StatePart](), say
+        self._number, self._states, self._say = count(), list[field_layout.StatePart](), say
         self.has_place = keep or file is not None
         self.error: FetiHomogError | None = None
 
     def record(
-        self, plane: Response | None, axial: Response | None, load_factor: float, label: str, point: int
+        self,
+        plane: averaging.Response | None,
+        axial: averaging.Response | None,
+        load_factor: float,
+        label: str,
+        point: int,
     ) -> None:
         """Record the next state, in the plane, along fibres, or both.  Collective."""
         if self._file is None and not self._keep:
             return
-        state: StatePart
+        state: field_layout.StatePart
         if plane is None or len(self._cell.problems) > 1:
             state = field_parts.spatial_state_part(self._cell, plane, axial, load_factor, label, point)
         else:
@@ -117,12 +118,12 @@ class StateRecorder:
         if self._keep:
             self._states.append(state)
 
-    def seal(self) -> FileSeal | None:
+    def seal(self) -> result_json.FileSeal | None:
         """Complete the file; returns its seal, None without a file.  Collective."""
-        self._write(FieldFile.close)
-        return None if self._file is None else on_root(self._cell.comm, result_json.seal, self._file.path)
+        self._write(field_file.FieldFile.close)
+        return None if self._file is None else mpi_errors.on_root(self._cell.comm, result_json.seal, self._file.path)
 
-    def _write(self, write: Callable[[FieldFile], object]) -> None:
+    def _write(self, write: Callable[[field_file.FieldFile], object]) -> None:
         """Write to the file, if any; failure ends it on all ranks."""
         if self._file is not None:
             try:

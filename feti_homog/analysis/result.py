@@ -9,42 +9,19 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from feti_homog.analysis.cell_records import (
-    CellInfo,
-    Checks,
-    FibreInfo,
-    Sensitivities,
-    SolverInfo,
-    StiffnessBounds,
-)
-from feti_homog.analysis.result_records import (
-    EITHER_STIFFNESS,
-    AnglePoint,
-    EnvelopePoint,
-    LoadPoint,
-    MeshErrors,
-    PathPoint,
-    Peak,
-    TipRates,
-)
-from feti_homog.materials.phase_bounds import Estimates, FibreBounds
-from feti_homog.materials.engineering_constants import (
-    EngineeringConstants,
-    Moduli,
-    TransverseIsotropy,
-    TransverseModuli,
-)
-from feti_homog.materials.voigt import voigt_names
-from feti_homog.results.field_layout import FibrePart, Header, InterfacePart, MeshPart, StatePart, tables
-from feti_homog.results.result_json import SCHEMA, FileSeal
-from feti_homog.system.runtime.records import BYTES, SECONDS, STRESS, ResultKey, described, keys, plain, restored
+from feti_homog.analysis import cell_records, result_records
+from feti_homog.materials import engineering_constants, phase_bounds, voigt
+from feti_homog.results import field_layout, result_json
+from feti_homog.system.runtime import described, records
 from feti_homog.typing import Float
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
 
-Part = TypeVar("Part", MeshPart, FibrePart, InterfacePart, StatePart)
+Part = TypeVar(
+    "Part", field_layout.MeshPart, field_layout.FibrePart, field_layout.InterfacePart, field_layout.StatePart
+)
 
 
 @dataclass(frozen=True, repr=False)
@@ -62,11 +39,11 @@ class Fields:
     """
 
     comm: Intracomm
-    header: Header
-    mesh: MeshPart
-    fibres: FibrePart
-    interface: InterfacePart
-    states: tuple[StatePart, ...]
+    header: field_layout.Header
+    mesh: field_layout.MeshPart
+    fibres: field_layout.FibrePart
+    interface: field_layout.InterfacePart
+    states: tuple[field_layout.StatePart, ...]
 
     def __repr__(self) -> str:
         return f"Fields({len(self.mesh.points)} nodes, {len(self.mesh.triangles)} elements, {len(self.states)} states)"
@@ -85,7 +62,7 @@ class Fields:
 
 def _gathered(comm: Intracomm, part: Part) -> Part | None:
     """Gather all ranks' rows, in rank order, on rank 0."""
-    parts = {name: comm.gather(getattr(part, name)) for name in tables(part)}
+    parts = {name: comm.gather(getattr(part, name)) for name in field_layout.tables(part)}
     if comm.rank:
         return None
     joined: dict[str, Any] = {name: np.concatenate(rows or []) for name, rows in parts.items()}
@@ -111,67 +88,85 @@ class Result:
         fields: mesh, interface and states on this rank if they were asked for, else None; not written to result.json.
     """
 
-    schema: int = described("version of this layout", default=SCHEMA)
+    schema: int = described("version of this layout", default=result_json.SCHEMA)
     version: str = described("version of the program")
     case: Mapping[str, Any] = described("the case with its defaults, as in a case file", entries={"KEY": "as there"})
     digest: str = described("short digest of the case without its name, labels, pictures and PETSc options")
-    cell: CellInfo = described("the meshed cell")
-    fibres: tuple[FibreInfo, ...] = described("the fibres in the order of their numbers", default=())
-    solver: SolverInfo = described("how the dual problem was solved")
-    checks: Checks = described("largest relative error of each law over all states")
+    cell: cell_records.CellInfo = described("the meshed cell")
+    fibres: tuple[cell_records.FibreInfo, ...] = described("the fibres in the order of their numbers", default=())
+    solver: cell_records.SolverInfo = described("how the dual problem was solved")
+    checks: cell_records.Checks = described("largest relative error of each law over all states")
     check_tolerance: float = described("largest error of a check that passes")
     kkt_tolerance: float = described("the same of the checks of contact")
     warnings: tuple[str, ...] = described("settings that are valid but probably unintended")
     remarks: tuple[str, ...] = described("assumptions about settings that the case does not give", default=())
     faults: tuple[str, ...] = described("solves that did not converge and checks that failed")
     status: str = described("`done`, or `not converged` if there are faults")
-    moduli: Moduli | None = described("engineering moduli of a perfectly bonded cell", default=None)
-    bounds: StiffnessBounds | None = described("bounds of a perfectly bonded cell", default=None)
+    moduli: engineering_constants.Moduli | None = described(
+        "engineering moduli of a perfectly bonded cell", default=None
+    )
+    bounds: cell_records.StiffnessBounds | None = described("bounds of a perfectly bonded cell", default=None)
     effective_stiffness: Float | None = described(
-        "L^ef: columns are the stresses under the unit strains", STRESS, EITHER_STIFFNESS, default=None
+        "L^ef: columns are the stresses under the unit strains",
+        records.STRESS,
+        result_records.EITHER_STIFFNESS,
+        default=None,
     )
     effective_stiffness_compression: Float | None = described(
-        "the same under minus the unit strains, with contact", STRESS, EITHER_STIFFNESS, default=None
+        "the same under minus the unit strains, with contact",
+        records.STRESS,
+        result_records.EITHER_STIFFNESS,
+        default=None,
     )
     compliance: Float | None = described(
-        "of generalized plane strain: inverse of L^ef", f"1 / {STRESS}", "(6, 6)", default=None
+        "of generalized plane strain: inverse of L^ef", f"1 / {records.STRESS}", "(6, 6)", default=None
     )
     thermal_stress: Float | None = described(
         "stress per unit of temperature at zero strain, if the phases have expansions",
-        f"{STRESS} per unit of temperature",
+        f"{records.STRESS} per unit of temperature",
         "(6,)",
         default=None,
     )
     thermal_stress_compression: Float | None = described(
         "minus the stress under minus a unit of temperature, with contact",
-        f"{STRESS} per unit of temperature",
+        f"{records.STRESS} per unit of temperature",
         "(6,)",
         default=None,
     )
     thermal_expansion: Float | None = described(
         "strains under a unit of temperature at no stress, without contact", "1 / temperature", "(6,)", default=None
     )
-    constants: EngineeringConstants | None = described(
+    constants: engineering_constants.EngineeringConstants | None = described(
         "of generalized plane strain: constants in the axes of the cell", default=None
     )
-    transversely_isotropic: TransverseIsotropy | None = described(
+    transversely_isotropic: engineering_constants.TransverseIsotropy | None = described(
         "constants of the nearest transversely isotropic stiffness about x3", default=None
     )
-    transverse_moduli: TransverseModuli | None = described(
+    transverse_moduli: engineering_constants.TransverseModuli | None = described(
         "ranges of Young's and shear moduli across the fibres", default=None
     )
-    estimates: Estimates | None = described("closed estimates of the same, of a cell without debonding", default=None)
-    fibre_bounds: FibreBounds | None = described("bounds of the same, of rigid bonds", default=None)
-    mesh_error: MeshErrors | None = described("estimated errors of a stiffness by its mesh", default=None)
-    sensitivities: Sensitivities | None = described(
+    estimates: phase_bounds.Estimates | None = described(
+        "closed estimates of the same, of a cell without debonding", default=None
+    )
+    fibre_bounds: phase_bounds.FibreBounds | None = described("bounds of the same, of rigid bonds", default=None)
+    mesh_error: result_records.MeshErrors | None = described(
+        "estimated errors of a stiffness by its mesh", default=None
+    )
+    sensitivities: cell_records.Sensitivities | None = described(
         "derivatives of a stiffness, if the case asks for them", default=None
     )
-    tips: TipRates | None = described("energy release rates at the tips of debonded arcs, of a stiffness", default=None)
-    angle: tuple[AnglePoint, ...] | None = described("points of analysis `angle`, as in angle.csv", default=None)
-    path: tuple[PathPoint, ...] | None = described("points of analysis `path`, as in path.csv", default=None)
-    peak: Peak | None = described("peak of the path, with its first break", default=None)
-    load: LoadPoint | None = described("state of analysis `load`, as in load.csv", default=None)
-    envelope: tuple[EnvelopePoint, ...] | None = described(
+    tips: result_records.TipRates | None = described(
+        "energy release rates at the tips of debonded arcs, of a stiffness", default=None
+    )
+    angle: tuple[result_records.AnglePoint, ...] | None = described(
+        "points of analysis `angle`, as in angle.csv", default=None
+    )
+    path: tuple[result_records.PathPoint, ...] | None = described(
+        "points of analysis `path`, as in path.csv", default=None
+    )
+    peak: result_records.Peak | None = described("peak of the path, with its first break", default=None)
+    load: result_records.LoadPoint | None = described("state of analysis `load`, as in load.csv", default=None)
+    envelope: tuple[result_records.EnvelopePoint, ...] | None = described(
         "directions of analysis `envelope`, as in envelope.csv",
         default=None,
     )
@@ -179,11 +174,15 @@ class Result:
         "of a path: the numbers, from 0, of the points whose fields are kept; /state/K is that of entry K", default=None
     )
     resumed: int | None = described("points of a path that were taken from a checkpoint", default=None)
-    result_h5: FileSeal | None = described("size and checksum of result.h5, if the run wrote it", default=None)
-    timings: Mapping[str, float] = described(
-        "wall time of each stage, the largest over ranks", SECONDS, entries={"STAGE": "of mesh, assemble, factor, ..."}
+    result_h5: result_json.FileSeal | None = described(
+        "size and checksum of result.h5, if the run wrote it", default=None
     )
-    memory: int = described("peak resident memory, the largest over ranks", BYTES)
+    timings: Mapping[str, float] = described(
+        "wall time of each stage, the largest over ranks",
+        records.SECONDS,
+        entries={"STAGE": "of mesh, assemble, factor, ..."},
+    )
+    memory: int = described("peak resident memory, the largest over ranks", records.BYTES)
     checksum: str | None = described(
         "of result.json: CRC-32, in hexadecimal, of its text without this key; checked and taken away when it is read",
         default=None,
@@ -193,12 +192,12 @@ class Result:
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> Result:
         """Build the result from result.json content; KeyError for missing keys."""
-        return restored(cls, document)
+        return records.restored(cls, document)
 
     @property
     def document(self) -> dict[str, Any]:
         """Return the result.json content, in its order; arrays are NumPy's."""
-        document: dict[str, Any] = plain(self)
+        document: dict[str, Any] = records.plain(self)
         return document
 
     @property
@@ -208,7 +207,7 @@ class Result:
         `angle` or `load_factor` (n,), `strain` and `stress` (n, 3) or (n, 6), `stiffness` (n, 3, 3) or (n, 6, 6),
         `debonded_length` (n, f), `bonded`, `open`, `closed`, ... (n,); NaN where a point has no such number; no tips.
         """
-        documents = [plain(point) for point in (*(self.angle or ()), *(self.path or ()))]
+        documents = [records.plain(point) for point in (*(self.angle or ()), *(self.path or ()))]
         names = dict.fromkeys(name for point in documents for name in point if name != "tips")
         return {name: np.array([point.get(name, np.nan) for point in documents]) for name in names}
 
@@ -226,7 +225,7 @@ class Result:
         if curve is None or self.peak is None:
             raise ValueError("only a path of one leg whose leading strain rises has a response to a rising strain")
         sign = np.sign((self.path or ())[-1].strain[path_curves.leading_component(self.document)])
-        names = (*voigt_names(curve.shape[1] - 1)[1], self.peak.strain_name)
+        names = (*voigt.voigt_names(curve.shape[1] - 1)[1], self.peak.strain_name)
         columns = dict(zip(names, (curve * [*[1.0] * (len(names) - 1), sign]).T, strict=True))
         return {self.peak.strain_name: columns.pop(self.peak.strain_name)} | columns
 
@@ -262,16 +261,16 @@ class Result:
 
     # Most runs print neither: the tables are imported by those that do.
     def __str__(self) -> str:
-        from feti_homog.report.text.summary import short_summary
+        from feti_homog.report.text import summary
 
-        return short_summary(self.document)
+        return summary.short_summary(self.document)
 
     def _repr_html_(self) -> str:
-        from feti_homog.report.text.summary import notebook  # notebooks alone show it
+        from feti_homog.report.text import summary  # notebooks alone show it
 
-        return notebook(self.document)
+        return summary.notebook(self.document)
 
 
-def schema_keys() -> Iterator[ResultKey]:
+def schema_keys() -> Iterator[records.ResultKey]:
     """Yield result.json keys with type, unit and meaning: its reference table."""
-    return keys(Result)
+    return records.keys(Result)

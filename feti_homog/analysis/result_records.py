@@ -4,25 +4,16 @@ Strains are [E11, E22, gamma12], stresses [S11, S22, S12], in the moduli's unit,
 plane strain [E11, E22, E33, gamma23, gamma13, gamma12] and [S11, S22, S33, S23, S13, S12].
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from feti_homog.materials.voigt import (
-    SPATIAL_STIFFNESSES,
-    SPATIAL_STRAINS,
-    SPATIAL_STRESSES,
-    STIFFNESSES,
-    STRAINS,
-    STRESSES,
-)
-from feti_homog.system.runtime.records import DEGREES, LENGTH, STRESS, described
+from feti_homog.materials import voigt
+from feti_homog.system.runtime import described, records
 from feti_homog.typing import Float
 
 EITHER, EITHER_STIFFNESS = "(3,) or (6,)", "(3, 3) or (6, 6)"
-ENERGY = f"{STRESS} times that of the cell"
-PER_DEGREE = f"{STRESS} per unit of temperature"
+ENERGY = f"{records.STRESS} times that of the cell"
+PER_DEGREE = f"{records.STRESS} per unit of temperature"
 TEMPERATURE = "change of temperature, in generalized plane strain with expansions"
 DEBONDED_ANGLE = (
     "the same in degrees of arc, `debonded_length` / radius; of a fibre that is not round, or whose coating has an "
@@ -37,9 +28,9 @@ DEBONDED_SHARES = "the same of the interfaces of each section [[interface]], in 
 class MeshErrors:
     """Estimated mesh errors, by the distance between recovered and element stresses."""
 
-    effective_stiffness: Float = described("error of each entry", STRESS, EITHER_STIFFNESS)
+    effective_stiffness: Float = described("error of each entry", records.STRESS, EITHER_STIFFNESS)
     effective_stiffness_compression: Float | None = described(
-        "the same under minus the unit strains, with contact", STRESS, EITHER_STIFFNESS, default=None
+        "the same under minus the unit strains, with contact", records.STRESS, EITHER_STIFFNESS, default=None
     )
     thermal_stress: Float | None = described("error of each entry", PER_DEGREE, "(6,)", default=None)
     thermal_stress_compression: Float | None = described(
@@ -62,11 +53,11 @@ class Tips:
 
     fibre: tuple[int, ...] = described("number of the fibre of each tip")
     angle: Float = described(
-        "direction from the fibre's centre; of a fibre without centre that of its normal", DEGREES, "(t,)"
+        "direction from the fibre's centre; of a fibre without centre that of its normal", records.DEGREES, "(t,)"
     )
     G_I: Float = described("energy release rate in opening, with G_II / G_I = tan^2 psi", ENERGY, "(t,)")
     G_II: Float = described("energy release rate in shear", ENERGY, "(t,)")
-    psi: Float = described("mode of its traction: 0 opens, 90 shears", DEGREES, "(t,)")
+    psi: Float = described("mode of its traction: 0 opens, 90 shears", records.DEGREES, "(t,)")
     interface: tuple[int, ...] | None = described(OWN_SECTION, default=None)
 
 
@@ -82,12 +73,14 @@ class TipRates:
         "`strain`: the strain that is given"
     )
     fibre: tuple[int, ...] = described("number of the fibre")
-    angle: Float = described("direction of the tip from the fibre's centre", DEGREES, "(t,)")
+    angle: Float = described("direction of the tip from the fibre's centre", records.DEGREES, "(t,)")
     G: Float = described("energy released per area of growing debonding", ENERGY, "(t,)")
     G_I: Float = described("its part in opening", ENERGY, "(t,)")
     G_II: Float = described("its part in shear", ENERGY, "(t,)")
-    psi: Float = described("its mode, tan^2 psi = G_II / G_I: 0 opens, 90 shears", DEGREES, "(t,)")
-    length: Float = described("length behind the tip at which the modes of rigid bonds are separated", LENGTH, "(t,)")
+    psi: Float = described("its mode, tan^2 psi = G_II / G_I: 0 opens, 90 shears", records.DEGREES, "(t,)")
+    length: Float = described(
+        "length behind the tip at which the modes of rigid bonds are separated", records.LENGTH, "(t,)"
+    )
     interface: tuple[int, ...] | None = described(OWN_SECTION, default=None)
 
 
@@ -95,33 +88,35 @@ class TipRates:
 class AnglePoint:
     """The response at one debonding angle."""
 
-    angle: float = described("opening of the arcs without an angle of their own", DEGREES)
+    angle: float = described("opening of the arcs without an angle of their own", records.DEGREES)
     stiffness: Float | None = described(
         "L^ef, if no strain is given",
-        STRESS,
+        records.STRESS,
         EITHER_STIFFNESS,
-        STIFFNESSES,
-        spatial_components=SPATIAL_STIFFNESSES,
+        voigt.STIFFNESSES,
+        spatial_components=voigt.SPATIAL_STIFFNESSES,
         default=None,
     )
     thermal_stress: Float | None = described(
         "stress under a unit of temperature at no strain, of generalized plane strain",
         PER_DEGREE,
         "(6,)",
-        tuple(f"thermal_{name}" for name in SPATIAL_STRESSES),
+        tuple(f"thermal_{name}" for name in voigt.SPATIAL_STRESSES),
         default=None,
     )
-    strain: Float | None = described("macroscopic strain that is given", "", "(3,)", STRAINS, default=None)
-    stress: Float | None = described("macroscopic stress under it", STRESS, "(3,)", STRESSES, default=None)
-    stored: float | None = described("energy stored under it per area of the cell", STRESS, default=None)
-    stored_in_springs: float | None = described("the share of elastic interfaces in it", STRESS, default=None)
+    strain: Float | None = described("macroscopic strain that is given", "", "(3,)", voigt.STRAINS, default=None)
+    stress: Float | None = described(
+        "macroscopic stress under it", records.STRESS, "(3,)", voigt.STRESSES, default=None
+    )
+    stored: float | None = described("energy stored under it per area of the cell", records.STRESS, default=None)
+    stored_in_springs: float | None = described("the share of elastic interfaces in it", records.STRESS, default=None)
     mesh_error: float | None = described(
         "estimated relative error of the strain energy by the mesh, of unit strains the largest", default=None
     )
     debonded_share: float = described("debonded share of the length of all interfaces")
     debonded_shares: Float | None = described(DEBONDED_SHARES, "", "(i,)", default=None)
-    debonded_length: Float = described("debonded length of each fibre's interface", LENGTH, "(f,)")
-    debonding_angle: Float = described(DEBONDED_ANGLE, DEGREES, "(f,)")
+    debonded_length: Float = described("debonded length of each fibre's interface", records.LENGTH, "(f,)")
+    debonding_angle: Float = described(DEBONDED_ANGLE, records.DEGREES, "(f,)")
     tips: TipRates | None = described("energy release rates at the tips of its arcs", default=None)
     bonded: int = described("bonded interface nodes; of unit strains under gamma12, as the next two")
     open: int = described("debonded interface nodes without contact")
@@ -134,13 +129,13 @@ class PathPoint:
     """A path point: break, contact change, end of leg or increment."""
 
     load_factor: float = described("position on the whole path, 0 to 1, every leg taking the same share")
-    strain: Float = described("macroscopic strain", "", EITHER, STRAINS, spatial_components=SPATIAL_STRAINS)
+    strain: Float = described("macroscopic strain", "", EITHER, voigt.STRAINS, spatial_components=voigt.SPATIAL_STRAINS)
     stress: Float = described(
         "macroscopic stress: of events before the bonds that `broke` break, of increments after them",
-        STRESS,
+        records.STRESS,
         EITHER,
-        STRESSES,
-        spatial_components=SPATIAL_STRESSES,
+        voigt.STRESSES,
+        spatial_components=voigt.SPATIAL_STRESSES,
     )
     temperature: float | None = described(TEMPERATURE, default=None)
     mark: str | None = described(
@@ -151,8 +146,8 @@ class PathPoint:
     broke: int = described("bonds that break at this event, or broke in the step to this increment")
     softened: int | None = described("bonds that lose a tooth at this event but hold, of softening laws", default=None)
     free_motions: int = described("rigid motions of fibres that no interface force resists")
-    stored: float = described("elastic energy stored per area of the cell", STRESS)
-    stored_in_springs: float = described("the share of elastic interfaces in it", STRESS)
+    stored: float = described("elastic energy stored per area of the cell", records.STRESS)
+    stored_in_springs: float = described("the share of elastic interfaces in it", records.STRESS)
     mesh_error: float | None = described(
         "estimated relative error of `stored` by the mesh, at the points that `states` in [output] chooses",
         default=None,
@@ -160,17 +155,21 @@ class PathPoint:
     work: float = described(
         "work of the loads so far per area of the cell, of a temperature too: `stored` and `dissipated` together, with "
         "friction and `friction_heat`",
-        STRESS,
+        records.STRESS,
     )
-    dissipated: float = described("energy lost to breaks so far per area of the cell, along all equilibria", STRESS)
-    dissipated_strain_controlled: float = described("the same if the load only rises on the first leg", STRESS)
+    dissipated: float = described(
+        "energy lost to breaks so far per area of the cell, along all equilibria", records.STRESS
+    )
+    dissipated_strain_controlled: float = described("the same if the load only rises on the first leg", records.STRESS)
     friction_heat: float | None = described(
-        "heat of friction so far per area of the cell: `work` is `stored`, `dissipated` and this", STRESS, default=None
+        "heat of friction so far per area of the cell: `work` is `stored`, `dissipated` and this",
+        records.STRESS,
+        default=None,
     )
     fracture_energy: float | None = described(
         "toughness of the bonds that the load broke so far, each in the mode in which it broke, times their lengths, "
         "per area of the cell; of bonds that break by energy",
-        STRESS,
+        records.STRESS,
         default=None,
     )
     dissipation_ratio: float | None = described(
@@ -179,14 +178,14 @@ class PathPoint:
     )
     debonded_share: float = described("debonded share of the length of all interfaces")
     debonded_shares: Float | None = described(DEBONDED_SHARES, "", "(i,)", default=None)
-    debonded_length: Float = described("debonded length of each fibre's interface", LENGTH, "(f,)")
+    debonded_length: Float = described("debonded length of each fibre's interface", records.LENGTH, "(f,)")
     damaged_length: Float | None = described(
         "length of each fibre's interface that is damaged, but holds: of its process zones; of laws that soften",
-        LENGTH,
+        records.LENGTH,
         "(f,)",
         default=None,
     )
-    debonding_angle: Float = described(DEBONDED_ANGLE, DEGREES, "(f,)")
+    debonding_angle: Float = described(DEBONDED_ANGLE, records.DEGREES, "(f,)")
     tips: Tips | None = described(
         "of bonds that break by energy, at the points that `states` in [output] chooses", default=None
     )
@@ -205,40 +204,44 @@ class Peak:
 
     stress_name: str = described("name of the component")
     strain_name: str = described("name of its strain")
-    stress: float = described("the largest in magnitude up to that fall, or of all without one, with its sign", STRESS)
+    stress: float = described(
+        "the largest in magnitude up to that fall, or of all without one, with its sign", records.STRESS
+    )
     strain: float = described("macroscopic strain there")
     event: int = described("number of its point in `path`, from 0")
-    first_break_stress: float | None = described("stress where the first bonds break", STRESS, default=None)
+    first_break_stress: float | None = described("stress where the first bonds break", records.STRESS, default=None)
     first_break_strain: float | None = described("strain there", default=None)
     first_break_event: int | None = described("number of that point", default=None)
     stress_left: float | None = described(
         "stress in the valley of that fall, the load only rising on a path of one leg; absent where it never falls by "
         "1 % as bonds break",
-        STRESS,
+        records.STRESS,
         default=None,
     )
     event_left: int | None = described("number of the point on whose branch the valley is", default=None)
     so_far: bool = described(
         "true of a path that was cut off before such a fall: no peak, a longer path may go higher", default=False
     )
-    dissipated: float = described("energy lost to breaks before the peak, per area of the cell", STRESS)
+    dissipated: float = described("energy lost to breaks before the peak, per area of the cell", records.STRESS)
 
 
 @dataclass(frozen=True, kw_only=True)
 class LoadPoint:
     """The equilibrium under one load, with faces debonded from the start."""
 
-    strain: Float = described("macroscopic strain", "", EITHER, STRAINS, spatial_components=SPATIAL_STRAINS)
-    stress: Float = described("macroscopic stress", STRESS, EITHER, STRESSES, spatial_components=SPATIAL_STRESSES)
+    strain: Float = described("macroscopic strain", "", EITHER, voigt.STRAINS, spatial_components=voigt.SPATIAL_STRAINS)
+    stress: Float = described(
+        "macroscopic stress", records.STRESS, EITHER, voigt.STRESSES, spatial_components=voigt.SPATIAL_STRESSES
+    )
     temperature: float | None = described(TEMPERATURE, default=None)
     free_motions: int = described("rigid motions of fibres that no interface force resists")
-    stored: float = described("elastic energy stored per area of the cell", STRESS)
-    stored_in_springs: float = described("the share of elastic interfaces in it", STRESS)
+    stored: float = described("elastic energy stored per area of the cell", records.STRESS)
+    stored_in_springs: float = described("the share of elastic interfaces in it", records.STRESS)
     mesh_error: float | None = described("estimated relative error of `stored` by the mesh", default=None)
     debonded_share: float = described("debonded share of the length of all interfaces")
     debonded_shares: Float | None = described(DEBONDED_SHARES, "", "(i,)", default=None)
-    debonded_length: Float = described("debonded length of each fibre's interface", LENGTH, "(f,)")
-    debonding_angle: Float = described(DEBONDED_ANGLE, DEGREES, "(f,)")
+    debonded_length: Float = described("debonded length of each fibre's interface", records.LENGTH, "(f,)")
+    debonding_angle: Float = described(DEBONDED_ANGLE, records.DEGREES, "(f,)")
     tips: TipRates | None = described(
         "energy release rates at the tips of its arcs; absent under loads other than strains of the plane", default=None
     )
@@ -255,28 +258,35 @@ class EnvelopePoint:
     All but the direction is absent where no load along it breaks a bond.
     """
 
-    angle: float = described("direction of the load in the plane, from the first axis towards the second", DEGREES)
+    angle: float = described(
+        "direction of the load in the plane, from the first axis towards the second", records.DEGREES
+    )
     factor: float | None = described(
         "load at onset, in the unit of the axes: their values are `factor` times cosine and sine of `angle`; 0 if the "
         "change of temperature alone breaks a bond",
         default=None,
     )
     strain: Float | None = described(
-        "macroscopic strain at onset", "", EITHER, STRAINS, spatial_components=SPATIAL_STRAINS, default=None
+        "macroscopic strain at onset", "", EITHER, voigt.STRAINS, spatial_components=voigt.SPATIAL_STRAINS, default=None
     )
     stress: Float | None = described(
-        "macroscopic stress at onset", STRESS, EITHER, STRESSES, spatial_components=SPATIAL_STRESSES, default=None
+        "macroscopic stress at onset",
+        records.STRESS,
+        EITHER,
+        voigt.STRESSES,
+        spatial_components=voigt.SPATIAL_STRESSES,
+        default=None,
     )
     fibre: int | None = described("number of the fibre whose bond breaks first", default=None)
     interface: int | None = described(OWN_SECTION, default=None)
     bond_angle: float | None = described(
         "direction of that bond from the fibre's centre; of a fibre without centre that of its normal",
-        DEGREES,
+        records.DEGREES,
         default=None,
     )
     normal: float | None = described("share of the normal strength that the bond uses", default=None)
     tangential: float | None = described("share of the tangential strength", default=None)
     axial: float | None = described("share of the strength along the fibre", default=None)
     psi: float | None = described(
-        "mode of a bond that breaks by energy: 0 opens, 90 shears, along the fibre too", DEGREES, default=None
+        "mode of a bond that breaks by energy: 0 opens, 90 shears, along the fibre too", records.DEGREES, default=None
     )

@@ -1,9 +1,4 @@
-"""One case from its description to its result.
-
-Tear, solve, homogenize, check, and write if there is a folder.
-"""
-
-from __future__ import annotations
+"""Tear, solve, homogenize and check one case, and write its result if there is a folder."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager, nullcontext
@@ -20,20 +15,14 @@ from feti_homog.analysis.cell_records import CellInfo, Checks, FibreInfo, Solver
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.recorders import CONTACT_TOLERANCE, StateRecorder
 from feti_homog.analysis.result import Fields, Result
-from feti_homog.case.cases import Case
+from feti_homog.case import Case
 from feti_homog.errors import ConvergenceError
-from feti_homog.homogenization.partition_policy import BY_COST
-from feti_homog.homogenization.uniform_parts import nodes_of_parts
-from feti_homog.homogenization.unit_cell import TornCell, tear
-from feti_homog.microstructure.shapes.ellipses import Ellipses
-from feti_homog.results import field_file, field_parts, output_folder, result_json, xdmf
-from feti_homog.results.checkpoints import WHOLE_BYTES, Checkpoint, EventsInMemory
-from feti_homog.results.field_file import FieldFile
-from feti_homog.results.output_folder import EventLog
-from feti_homog.system.parallel.mpi_errors import all_raise, on_root, on_root_only
-from feti_homog.system.petsc.options_database import case_options, refuse_unused, without_iterations
-from feti_homog.system.runtime import process_memory
-from feti_homog.system.runtime.progress_bar import Progress
+from feti_homog.homogenization import partition_policy, uniform_parts, unit_cell
+from feti_homog.microstructure.shapes import Ellipses
+from feti_homog.results import checkpoints, field_file, field_parts, output_folder, result_json, xdmf
+from feti_homog.system.parallel import mpi_errors
+from feti_homog.system.petsc import options_database
+from feti_homog.system.runtime import process_memory, progress_bar
 from feti_homog.version import __version__
 
 # Bytes kept between cases of a process; releasing them costs a small case 10 % of its time.
@@ -58,11 +47,11 @@ def run(
     if resume:
         from feti_homog.analysis import stored_result  # with readers that most runs do not use
 
-        if on_root(comm, stored_result.finished, directory, case):
+        if mpi_errors.on_root(comm, stored_result.finished, directory, case):
             progress.say(f"{directory} holds the finished result of this case: nothing to do")
-            return Result.of(on_root(comm, result_json.read, directory))
-    on_root(comm, output_folder.usable, directory)
-    on_root(comm, output_folder.refuse_files_of_others, directory)
+            return Result.of(mpi_errors.on_root(comm, result_json.read, directory))
+    mpi_errors.on_root(comm, output_folder.usable, directory)
+    mpi_errors.on_root(comm, output_folder.refuse_files_of_others, directory)
     with output_folder.held(directory, comm, progress.say), _torn(case, comm, progress) as cell:
         result = _run_and_write(cell, directory, progress, resume, keep_fields)
     if result.faults:
@@ -82,7 +71,7 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
         states = StateRecorder(cell, None, keep_fields, progress.say)
         context = AnalysisContext.of(cell, progress, states)
         if keep_fields or context.plane.law.has_toughness:
-            context = replace(context, checkpoint=EventsInMemory(comm, room_of(case)))
+            context = replace(context, checkpoint=checkpoints.EventsInMemory(comm, room_of(case)))
         _warn(context)
         result = _result(context, _analyse(context), states.fields())
     _print_summary(result, progress)
@@ -91,9 +80,9 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
     return result
 
 
-def _begun(case: Case, comm: MPI.Intracomm, quiet: bool) -> Progress:
+def _begun(case: Case, comm: MPI.Intracomm, quiet: bool) -> progress_bar.Progress:
     """Print warnings and remarks about a case; return its run's progress."""
-    progress = Progress(comm, quiet)
+    progress = progress_bar.Progress(comm, quiet)
     for label, lines in (("warning", case.warnings()), ("remark", case.remarks())):
         for line in lines:
             progress.say(f"{label}: {line}")
@@ -106,17 +95,17 @@ def _warn(context: AnalysisContext) -> None:
 
 
 @contextmanager
-def _torn(case: Case, comm: MPI.Intracomm, progress: Progress) -> Iterator[TornCell]:
+def _torn(case: Case, comm: MPI.Intracomm, progress: progress_bar.Progress) -> Iterator[unit_cell.TornCell]:
     """Provide the torn cell with the case's options in a block."""
     PETSc.garbage_cleanup(comm)  # parallel objects of earlier cases, which all ranks free together
     process_memory.forget_peak(kept=SPARE_BYTES)
-    with case_options(case.petsc):
-        cell = tear(case, comm, progress, policy=BY_COST)
+    with options_database.case_options(case.petsc):
+        cell = unit_cell.tear(case, comm, progress, policy=partition_policy.BY_COST)
         try:
-            refuse_unused()
+            options_database.refuse_unused()
             yield cell
         except BaseException as error:
-            if all_raise(comm, error):  # else the ranks that go on would not come to destroy it
+            if mpi_errors.all_raise(comm, error):  # else the ranks that go on would not come to destroy it
                 cell.destroy()
             raise
         cell.destroy()
@@ -127,24 +116,29 @@ def room_of(case: Case) -> int | None:
 
     With friction many equilibria exist under one load.
     """
-    return None if case.has_friction or case.output.states == "all" else WHOLE_BYTES
+    return None if case.has_friction or case.output.states == "all" else checkpoints.WHOLE_BYTES
 
 
-def _run_and_write(cell: TornCell, directory: Path, progress: Progress, resume: bool, keep_fields: bool) -> Result:
+def _run_and_write(
+    cell: unit_cell.TornCell, directory: Path, progress: progress_bar.Progress, resume: bool, keep_fields: bool
+) -> Result:
     """Analyse and write; the result may have faults."""
     output, file = cell.case.output, None
     if output.fields:
         with progress.stage("output") as line:
             line.append(f"{directory}: result.h5 with the mesh, the states follow")
             parts = field_parts.mesh_part(cell), field_parts.fibre_part(cell), field_parts.interface_part(cell)
-            file = FieldFile(directory, cell.comm, field_parts.header(cell), *parts)
-    with file or nullcontext(), closing(EventLog(directory, cell.comm, cell.case.name, progress.say)) as log:
+            file = field_file.FieldFile(directory, cell.comm, field_parts.header(cell), *parts)
+    with (
+        file or nullcontext(),
+        closing(output_folder.EventLog(directory, cell.comm, cell.case.name, progress.say)) as log,
+    ):
         states = StateRecorder(cell, file, keep_fields, progress.say)
         context = AnalysisContext.of(cell, progress, states)
         multipliers = cell.solver.jump_operator.global_rows
         pieces = f"{cell.summary.subdomains} subdomains on {cell.comm.size} ranks, {multipliers} multipliers"
-        digest = on_root(cell.comm, cell.case.digest, False)  # events are the same for any [output]
-        checkpoint = Checkpoint(directory, cell.comm, f"case {digest}, {pieces}", room_of(cell.case))
+        digest = mpi_errors.on_root(cell.comm, cell.case.digest, False)  # events are the same for any [output]
+        checkpoint = checkpoints.Checkpoint(directory, cell.comm, f"case {digest}, {pieces}", room_of(cell.case))
         context = replace(context, checkpoint=checkpoint, resume=resume, log=log.write, events=output_folder.LOG)
         _warn(context)
         analysis = _analyse(context)
@@ -160,7 +154,7 @@ def _run_and_write(cell: TornCell, directory: Path, progress: Progress, resume: 
     for name, is_asked, make in (("pictures", output.pictures, _draw), ("report", output.report, _report)):
         if is_asked:
             with progress.stage(name) as line:
-                line.append(", ".join(path.name for path in on_root(cell.comm, make, directory)))
+                line.append(", ".join(path.name for path in mpi_errors.on_root(cell.comm, make, directory)))
     _print_summary(result, progress)
     return result
 
@@ -172,7 +166,7 @@ def _analyse(context: AnalysisContext) -> dict[str, Any]:
         analysis: dict[str, Any] = module.run(context)
         iterations = context.checks.iterations
         line.append(f"{len(iterations)} states, {sum(iterations) or 'no'} iterations")
-    if not sum(iterations) and (remark := without_iterations()):
+    if not sum(iterations) and (remark := options_database.without_iterations()):
         context.progress.say(f"remark: {remark}")
     return analysis
 
@@ -194,7 +188,7 @@ def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Field
         fractions=fractions,
         porosity=1.0 - sum(fractions.values()) if cell.summary.voids else 0.0,
         elements=cell.sum_over_ranks(sum(len(s.mesh.triangles) for s in cell.subdomains)),
-        nodes=cell.sum_over_ranks(sum(map(nodes_of_parts, cell.subdomains))),
+        nodes=cell.sum_over_ranks(sum(map(uniform_parts.nodes_of_parts, cell.subdomains))),
         mesh_size=None if cell.case.cell.has_own_mesh else cell.case.cell.mesh_size,
         refine=cell.case.cell.refine,
         match_distance=cell.summary.match_distance,
@@ -202,7 +196,7 @@ def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Field
     return Result(
         version=__version__,
         case=cell.case.resolved(),
-        digest=on_root(cell.comm, cell.case.digest),
+        digest=mpi_errors.on_root(cell.comm, cell.case.digest),
         cell=cell_info,
         fibres=_fibres(cell),
         solver=_solver_info(context),
@@ -225,7 +219,7 @@ def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Field
     )
 
 
-def _fibres(cell: TornCell) -> tuple[FibreInfo, ...]:
+def _fibres(cell: unit_cell.TornCell) -> tuple[FibreInfo, ...]:
     """Return the cell's fibre records."""
     summary, factors = cell.summary, cell.strength_factors
     bodies, varies = summary.fibre_bodies, not (factors == 1.0).all()
@@ -269,18 +263,18 @@ def _solver_info(context: AnalysisContext) -> SolverInfo:
     )
 
 
-def _write(result: Result, directory: Path, cell: TornCell) -> None:
+def _write(result: Result, directory: Path, cell: unit_cell.TornCell) -> None:
     """Write result.json, then dependent files; remove an earlier result's files."""
-    on_root_only(cell.comm, result_json.write, directory, result.document)
+    mpi_errors.on_root_only(cell.comm, result_json.write, directory, result.document)
     written = {result_json.NAME}
     if result.result_h5 is not None:
-        written |= {field_file.NAME, *(path.name for path in on_root(cell.comm, xdmf.write, directory))}
+        written |= {field_file.NAME, *(path.name for path in mpi_errors.on_root(cell.comm, xdmf.write, directory))}
     points = vars(result).get(name := cell.case.analysis.type)
     if points is not None:
         rows = points if isinstance(points, tuple) else (points,)
-        written.add(on_root(cell.comm, result_json.write_csv, directory / f"{name}.csv", rows).name)
+        written.add(mpi_errors.on_root(cell.comm, result_json.write_csv, directory / f"{name}.csv", rows).name)
     written |= {output_folder.LOG} if cell.case.section.is_followed else set()
-    on_root_only(cell.comm, output_folder.remove_other_results, directory, written)
+    mpi_errors.on_root_only(cell.comm, output_folder.remove_other_results, directory, written)
 
 
 def _draw(directory: Path) -> list[Path]:
@@ -290,13 +284,13 @@ def _draw(directory: Path) -> list[Path]:
     return figures.plot(directory)
 
 
-def _print_summary(result: Result, progress: Progress) -> None:
+def _print_summary(result: Result, progress: progress_bar.Progress) -> None:
     """Print the summary on rank 0, which alone loads tables.  Collective."""
     timings = progress.timings()
     if progress.prints:
-        from feti_homog.report.text.summary import summary
+        from feti_homog.report.text import summary
 
-        progress.say(f"\n{summary(replace(result, timings=timings).document)}")
+        progress.say(f"\n{summary.summary(replace(result, timings=timings).document)}")
 
 
 def _report(directory: Path) -> list[Path]:

@@ -1,7 +1,5 @@
 """Derivatives of a stiffness with its constants, and of a state."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -11,14 +9,9 @@ from scipy.linalg import block_diag
 
 from feti_homog.analysis.cell_records import Sensitivities
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.homogenization import phase_laws
-from feti_homog.homogenization.averaging import Response
-from feti_homog.homogenization.stiffness_derivatives import derivatives
-from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.interface.loads import Load
-from feti_homog.materials.engineering_constants import constants
-from feti_homog.materials.material_derivatives import constant_changes
-from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, THERMAL_STRESSES
+from feti_homog.homogenization import averaging, phase_laws, stiffness_derivatives, unit_cell
+from feti_homog.interface import Load
+from feti_homog.materials import engineering_constants, material_derivatives, voigt
 from feti_homog.typing import Float
 
 Constant = tuple[str, float]
@@ -26,7 +19,7 @@ Constant = tuple[str, float]
 
 
 def sensitivities(
-    context: AnalysisContext, document: Mapping[str, Any], responses: Sequence[Response], one_sided: bool
+    context: AnalysisContext, document: Mapping[str, Any], responses: Sequence[averaging.Response], one_sided: bool
 ) -> dict[str, Any]:
     """Return the `Result` entry `sensitivities` from all unit load responses.  Collective.
 
@@ -38,15 +31,15 @@ def sensitivities(
     C, thermal = document["effective_stiffness"], document.get("thermal_stress")
     groups, columns = context.loads.by_problem(responses), dict[Constant, list[float]]()
     if not one_sided:
-        for change in derivatives(_cells(context), groups):
-            changes = constant_changes(C, thermal, *_secants(change.energies))
+        for change in stiffness_derivatives.derivatives(_cells(context), groups):
+            changes = material_derivatives.constant_changes(C, thermal, *_secants(change.energies))
             columns[change.name, change.value] = [*changes.values()]
-        return _entry(constants(C, thermal), columns, False)
+        return _entry(engineering_constants.constants(C, thermal), columns, False)
     plane, *axial = groups
     energies = dict[Constant, list[Float]]()
     for k, (name, response) in enumerate(zip(context.plane.loads, plane, strict=True)):
         fixed = _at_status(context, name, [response], [0])
-        for change in derivatives(_cells(context), [*fixed, *axial]):
+        for change in stiffness_derivatives.derivatives(_cells(context), [*fixed, *axial]):
             in_plane, *along_fibres = change.energies
             matrices = energies.setdefault((change.name, change.value), [np.zeros_like(in_plane), *along_fibres])
             matrices[0][:, k] = in_plane[:, k]
@@ -54,7 +47,7 @@ def sensitivities(
     return _entry(_entries(C, thermal), columns, True)
 
 
-def load_sensitivities(context: AnalysisContext, load: Load, responses: Sequence[Response]) -> dict[str, Any]:
+def load_sensitivities(context: AnalysisContext, load: Load, responses: Sequence[averaging.Response]) -> dict[str, Any]:
     """Return `sensitivities` for the state under one load, at its status.  Collective.
 
     With the cell stiffness A at this status, A x = s, where the load prescribes each component in x or in s,
@@ -64,7 +57,7 @@ def load_sensitivities(context: AnalysisContext, load: Load, responses: Sequence
     A = block_diag(*(np.stack([r.stress for r in group], axis=1) for group in fixed))
     x = np.concatenate([response.strain for response in responses])
     free, s = load.by_stress, A @ x
-    stress = dict(zip(SPATIAL_STRAINS, SPATIAL_STRESSES, strict=True))
+    stress = dict(zip(voigt.SPATIAL_STRAINS, voigt.SPATIAL_STRESSES, strict=True))
     names = [name if is_free else stress.get(name) for name, is_free in zip(context.loads.names, free, strict=True)]
 
     def entries(x: Float, s: Float, stored: float) -> dict[str, float]:
@@ -73,7 +66,7 @@ def load_sensitivities(context: AnalysisContext, load: Load, responses: Sequence
         return {name: value for name, value in pairs if name is not None} | {"stored": stored}
 
     columns = dict[Constant, list[float]]()
-    for change in derivatives(_cells(context), fixed):
+    for change in stiffness_derivatives.derivatives(_cells(context), fixed):
         dA, dx = block_diag(*change.energies), np.zeros(len(x))
         dx[free] = np.linalg.lstsq(A[np.ix_(free, free)], -(dA @ x)[free], rcond=None)[0]
         ds = dA @ x + A @ dx
@@ -98,7 +91,7 @@ def _entry(
     return {"sensitivities": record}
 
 
-def _cells(context: AnalysisContext) -> list[TornCell]:
+def _cells(context: AnalysisContext) -> list[unit_cell.TornCell]:
     return [problem.cell for problem in context.loads.problems]
 
 
@@ -110,14 +103,14 @@ def _secants(energies: Sequence[Float]) -> tuple[Float, Float | None]:
 def _entries(C: Float, thermal: Float | None) -> dict[str, float]:
     """Return named entries of an unsymmetric secant stiffness and thermal stress."""
     entries = {f"C{i + 1}{j + 1}": float(value) for (i, j), value in np.ndenumerate(C)}
-    return entries | dict(zip(THERMAL_STRESSES[:3], map(float, [] if thermal is None else thermal), strict=False))
+    return entries | dict(zip(voigt.THERMAL_STRESSES[:3], map(float, [] if thermal is None else thermal), strict=False))
 
 
 def _at_status(
-    context: AnalysisContext, name: str, states: Sequence[Response], problems: Sequence[int]
-) -> list[list[Response]]:
+    context: AnalysisContext, name: str, states: Sequence[averaging.Response], problems: Sequence[int]
+) -> list[list[averaging.Response]]:
     """Return unit load responses at one state's fixed status, by problem.  Collective."""
-    groups, bonds = list[list[Response]](), states[0].state.bonds
+    groups, bonds = list[list[averaging.Response]](), states[0].state.bonds
     for problem in (context.loads.problems[k] for k in problems):
         count, zero = len(problem.loads), np.zeros(problem.cell.solver.rows)
         groups.append([])

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 from feti_homog.analysis.constants import constants, mesh_error, unit_errors
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.homogenization.averaging import asymmetry
+from feti_homog.homogenization import averaging
 
 if TYPE_CHECKING:
-    from feti_homog.homogenization.mesh_estimate import EnergyErrors
+    from feti_homog.homogenization import mesh_estimate
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
@@ -24,7 +24,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     one_sided = context.plane.interface.contact and context.plane.counts(bonds.status)["open"] > 0
     columns, responses = context.unit_responses("", bonds, starts, 1.0)
     errors, responses = unit_errors(context, responses)
-    errors_of_minus: list[EnergyErrors] = []
+    errors_of_minus: list[mesh_estimate.EnergyErrors] = []
     context.record_unit_states(responses, 1.0, "", 0)
     document: dict[str, Any] = {"effective_stiffness": columns.pop("stiffness")} | columns
     under, loads, first = list(responses), list(context.loads.names), responses
@@ -36,7 +36,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
         document |= {f"{name}_compression": column for name, column in minus.items()}
         under, loads = [*under, *responses], [*loads, *(f"-{name}" for name in loads)]
     else:
-        context.checks.require("L^ef", {"symmetry": asymmetry(document["effective_stiffness"])})
+        context.checks.require("L^ef", {"symmetry": averaging.asymmetry(document["effective_stiffness"])})
     if context.case.interface is not None:
         from feti_homog.analysis.tip_records import tip_rates  # bonded cells have no tips
 

@@ -1,14 +1,12 @@
 """The result in a folder, complete and from one run."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from feti_homog.analysis.result import Result
-from feti_homog.case.cases import Case, check_stored
+from feti_homog.case import Case, cases
 from feti_homog.errors import CaseError
 from feti_homog.results import checkpoints, field_file, result_json
 
@@ -65,7 +63,7 @@ def finished(directory: Path, case: Case) -> bool:
 def _restored(directory: Path, document: Mapping[str, Any]) -> Result:
     try:
         result = Result.of(document)
-        check_stored(result.case)
+        cases.check_stored(result.case)
         if "output" not in result.case:
             raise TypeError("its case has no [output]")
         return result

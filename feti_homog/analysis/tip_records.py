@@ -1,7 +1,5 @@
 """Debonding tips in result.json: law, driving energies, release rates, modes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,29 +7,27 @@ import numpy as np
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import TipRates, Tips
 from feti_homog.errors import CaseError
-from feti_homog.homogenization.averaging import Response
-from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.interface.contact.states import BONDED
-from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.interface.laws.energy import ReleasedEnergy, SpringEnergy
-from feti_homog.interface.path.path_points import Point
-from feti_homog.materials.voigt import STRAINS
+from feti_homog.homogenization import averaging, unit_cell
+from feti_homog.interface.contact import BONDED
+from feti_homog.interface.laws import BondLaw, energy
+from feti_homog.interface.path import path_points
+from feti_homog.materials import voigt
 from feti_homog.typing import Float, Int
 
 # Loads with energy release rates; "strain" is a prescribed strain.
-IN_PLANE_LOADS = (*STRAINS, "strain")
+IN_PLANE_LOADS = (*voigt.STRAINS, "strain")
 # Directions of nodes differ by rounding from rank to rank, and so would their order.
 DIRECTION_DIGITS = 9
 
 
-def criterion_of(cell: TornCell, grows: bool = False) -> BondLaw:
+def criterion_of(cell: unit_cell.TornCell, grows: bool = False) -> BondLaw:
     """Return a cell's bond law; growing debonding makes tips.  Collective.
 
     Raises:
         CaseError: tips need the inverse dual operator, which the solver does not have.
     """
     law = cell.bond_law if grows else cell.bond_law.onset()
-    if not (isinstance(law, SpringEnergy) and cell.case.interfaces[0].growth == "released"):
+    if not (isinstance(law, energy.SpringEnergy) and cell.case.interfaces[0].growth == "released"):
         return law
     has_tips = grows or cell.sum_over_ranks(int(cell.debonded(None).sum())) > 0
     if not has_tips or not cell.solver.jump_operator.global_rows:
@@ -39,10 +35,10 @@ def criterion_of(cell: TornCell, grows: bool = False) -> BondLaw:
     inverses = [inverse for problem in cell.problems if (inverse := problem.solver.exact_inverse) is not None]
     if len(inverses) < len(cell.problems):
         raise CaseError('[interface] growth = "released": needs -feti_pc_type influence; or growth = "springs"')
-    return ReleasedEnergy.of(law, *inverses)
+    return energy.ReleasedEnergy.of(law, *inverses)
 
 
-def tip_rates(context: AnalysisContext, responses: Sequence[Response], loads: Sequence[str]) -> TipRates:
+def tip_rates(context: AnalysisContext, responses: Sequence[averaging.Response], loads: Sequence[str]) -> TipRates:
     """Return rates at all tips by plane load; none if bonded.  Collective."""
     rates = [
         (context.release_rates.of(response), load)
@@ -65,7 +61,7 @@ def tip_rates(context: AnalysisContext, responses: Sequence[Response], loads: Se
     )
 
 
-def tips(context: AnalysisContext, law: BondLaw, point: Point) -> Tips:
+def tips(context: AnalysisContext, law: BondLaw, point: path_points.Point) -> Tips:
     """Return a point's tips, by fibre, interface and direction.  Collective.
 
     Tips are bonds that hold next to broken ones.  G_I and G_II are energies per area with the sum used^2 G_c(psi),
@@ -88,12 +84,12 @@ def tips(context: AnalysisContext, law: BondLaw, point: Point) -> Tips:
     return Tips(tuple(fibre.astype(int).tolist()), angle, opening, shear, mode, _sections(cell, pair))
 
 
-def _sections(cell: TornCell, pair: Float | Int) -> tuple[int, ...] | None:
+def _sections(cell: unit_cell.TornCell, pair: Float | Int) -> tuple[int, ...] | None:
     """Return [[interface]] section numbers from 1; None if there is one section."""
     return tuple((pair + 1).astype(int).tolist()) if len(cell.case.interfaces) > 1 else None
 
 
-def bond_directions(cell: TornCell) -> Float:
+def bond_directions(cell: unit_cell.TornCell) -> Float:
     """(k,) degrees, above -180, from fibre centres to rank's interface nodes.
 
     A fibre without centre has its normals' directions.

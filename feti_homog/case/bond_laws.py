@@ -4,8 +4,6 @@ Two classes with the same name implement a law, `implementation`: in `interface/
 `verify`, which checks results by its own formulas.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -12,19 +12,16 @@ from typing import Any
 from feti_homog.case import cell_sizes, sections
 from feti_homog.case.cell_files import checked_cell
 from feti_homog.case.cell_section import GEOMETRY, Cell
-from feti_homog.case.toml_files import read_document, short_digest, to_document
 from feti_homog.case.interface_section import Arc, InterfaceSection, interface_tables
 from feti_homog.case.load_sections import AnalysisSection, Angle, Envelope, LoadPath, SingleLoad, Stiffness, completed
 from feti_homog.case.material_sections import provider, read_materials
 from feti_homog.case.relations import axes_lines, idle_friction_keys, read_interfaces, relation_faults, stress_free
 from feti_homog.case.rules import RULES
 from feti_homog.case.section_values import ANALYSIS_TYPE, CRITERION, METHOD, PLANE
+from feti_homog.case.toml_files import read_document, short_digest, to_document
 from feti_homog.errors import CaseError
-from feti_homog.materials.material_forms import Material
-from feti_homog.materials.laws import contrast_lines
-from feti_homog.schema.keys import Selected, Selector, TableReader, keys_of, to_table
-from feti_homog.schema.types import text
-from feti_homog.schema.wording import suggestion, toml_key, toml_value
+from feti_homog.materials import laws, material_forms
+from feti_homog.schema import TableReader, keys, types, wording
 from feti_homog.system.runtime import input_files
 
 FIELDS = {"load": "single_load"}  # of a section whose name is that of a method
@@ -48,7 +45,7 @@ class Case:
 
     name: str
     cell: Cell
-    materials: dict[str, Material]
+    materials: dict[str, material_forms.Material]
     analysis: sections.Analysis
     interfaces: tuple[InterfaceSection, ...]
     angle: Angle | None
@@ -98,14 +95,14 @@ class Case:
         """The analysis section."""
         return self.angle or self.path or self.single_load or self.envelope or Stiffness()
 
-    def material_of(self, phase: str) -> Material:
+    def material_of(self, phase: str) -> material_forms.Material:
         """Return a phase's material; "fibre:2" without its own takes it from "fibre". Raises KeyError."""
         return self.materials[provider(phase, self.materials)]
 
     def warnings(self) -> tuple[str, ...]:
         """List settings that are valid but probably unintended, a line each."""
         of_elements = cell_sizes.warnings(self.materials, self.analysis.plane)
-        _, contrast = contrast_lines(self.materials, self.analysis.plane)
+        _, contrast = laws.contrast_lines(self.materials, self.analysis.plane)
         return (*of_elements, *contrast, *idle_friction_keys(self.interfaces))
 
     def remarks(self) -> tuple[str, ...]:
@@ -118,7 +115,7 @@ class Case:
 
     def resolved(self) -> dict[str, Any]:
         """Return the case with its defaults as a plain document, of which `parse` makes an equal case."""
-        selected: Selected = {
+        selected: keys.Selected = {
             GEOMETRY: self.cell.geometry,
             ANALYSIS_TYPE: self.analysis.type,
             PLANE: self.analysis.plane,
@@ -126,20 +123,20 @@ class Case:
             CRITERION: None if self.interface is None else self.interface.criterion,
         }
         chosen: dict[str, Any] = {} if self.cell.accuracy is None else dict.fromkeys(cell_sizes.CHOSEN)
-        document: dict[str, Any] = {"name": self.name, "cell": to_table(replace(self.cell, **chosen), selected)}
-        document["material"] = {phase: to_table(material, selected) for phase, material in self.materials.items()}
+        document: dict[str, Any] = {"name": self.name, "cell": keys.to_table(replace(self.cell, **chosen), selected)}
+        document["material"] = {phase: keys.to_table(material, selected) for phase, material in self.materials.items()}
         for section in sections.SECTIONS:
             if section != "cell" and (contents := getattr(self, FIELDS.get(section, section))) is not None:
-                document[section] = to_table(contents, selected)
+                document[section] = keys.to_table(contents, selected)
         if len(self.interfaces) > 1:
-            document["interface"] = [to_table(interface, selected) for interface in self.interfaces]
+            document["interface"] = [keys.to_table(interface, selected) for interface in self.interfaces]
         return document | {"petsc": dict(self.petsc)}
 
     def digest(self, with_output: bool = True) -> str:
         """Hash everything that the case computes, and writes if `with_output`; not its name, options, max_events."""
         document = {k: v for k, v in self.resolved().items() if k not in ("name", "output", "petsc")}
         if with_output:
-            computed = [name for name, entry in keys_of(sections.Output).items() if not entry.presentation]
+            computed = [name for name, entry in keys.keys_of(sections.Output).items() if not entry.presentation]
             document["output"] = {name: getattr(self.output, name) for name in computed}
         document.get("path", {}).pop("max_events", None)
         document["cell"] = {k: v for k, v in document["cell"].items() if k not in ("file", "match")}
@@ -164,7 +161,7 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
     document = to_document(values)
     contents, faults = _read_sections(document, folder)
     if not faults:
-        faults += contrast_lines(contents["materials"], contents["analysis"].plane)[0]
+        faults += laws.contrast_lines(contents["materials"], contents["analysis"].plane)[0]
     if not faults:
         cell, materials = contents["cell"], contents["materials"]
         plane, free_faces = contents["analysis"].plane, bool(contents["interfaces"]) or cell.has_voids
@@ -203,18 +200,18 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
     return contents, faults
 
 
-def _selected(document: Mapping[str, Any]) -> Selected:
+def _selected(document: Mapping[str, Any]) -> keys.Selected:
     """Return the values that decide which keys belong to the case."""
     selectors = (GEOMETRY, ANALYSIS_TYPE, PLANE, METHOD, CRITERION)
     first = next(iter(interface_tables(document)), None)
     if isinstance(first, dict) and "law" in first:
         first = first | {"criterion": first["law"]}
-    tables, selected = dict(document) | {"interface": first}, dict[Selector, str | None]()
+    tables, selected = dict(document) | {"interface": first}, dict[keys.Selector, str | None]()
     for selector in selectors:
         section, table = sections.SECTIONS[selector.section], tables.get(selector.section)
         default = getattr(section, selector.key, None)
         value = table.get(selector.key, default) if isinstance(table, Mapping) else default
-        selected[selector] = value if keys_of(section)[selector.key].type.accepts(value) else None
+        selected[selector] = value if keys.keys_of(section)[selector.key].type.accepts(value) else None
     return selected
 
 
@@ -222,19 +219,19 @@ def _top_level_faults(document: Mapping[str, Any]) -> list[str]:
     """Faults in section names and in the keys before the first section."""
     faults = [f"[{section}]: missing section" for section in sections.REQUIRED if section not in document]
     for name, value in document.items():
-        hint = suggestion(name, sections.TOP_LEVEL, sections.KEY_OWNERS)
+        hint = wording.suggestion(name, sections.TOP_LEVEL, sections.KEY_OWNERS)
         if name in sections.FIT_SECTIONS:
             hint = "it belongs to the file of a fit; `feti-homog fit` runs it"
         if name in STUDIES:
-            words = f"{name} = {toml_value(value)}: expected a section [{name}]"
+            words = f"{name} = {wording.toml_value(value)}: expected a section [{name}]"
             faults.append(f"[{name}]: {STUDIES[name]}" if isinstance(value, dict) else words)
         elif name not in sections.TOP_LEVEL and isinstance(value, dict):
-            faults.append(f"[{toml_key(name)}]: unknown section; {hint}")
+            faults.append(f"[{wording.toml_key(name)}]: unknown section; {hint}")
         elif name not in sections.TOP_LEVEL:
-            faults.append(f"{toml_key(name)}: unknown key; {hint}")
+            faults.append(f"{wording.toml_key(name)}: unknown key; {hint}")
     name = document.get("name", "case")
-    if complaint := text.complaint(name):
-        faults.append(f"name = {toml_value(name)}: {complaint}")
+    if complaint := types.text.complaint(name):
+        faults.append(f"name = {wording.toml_value(name)}: {complaint}")
     return faults
 
 
@@ -249,9 +246,9 @@ def check_phases(case: Case, phases: Iterable[str]) -> None:
     """Raise CaseError if a mesh phase has no material, or a material no phase."""
     sources = {phase: provider(phase, case.materials) for phase in phases}
     without = [phase for phase, source in sources.items() if source not in case.materials]
-    faults = [f"[material.{toml_key(phase)}]: missing section; the mesh has this phase" for phase in without]
+    faults = [f"[material.{wording.toml_key(phase)}]: missing section; the mesh has this phase" for phase in without]
     unused = [phase for phase in case.materials if phase not in sources.values()]
-    has = ", ".join(map(toml_key, sources))
-    faults += [f"[material.{toml_key(phase)}]: the mesh has no such phase; it has {has}" for phase in unused]
+    has = ", ".join(map(wording.toml_key, sources))
+    faults += [f"[material.{wording.toml_key(phase)}]: the mesh has no such phase; it has {has}" for phase in unused]
     if faults:
         raise CaseError(*faults)

@@ -13,12 +13,12 @@ from feti_homog.case.cell_section import TOUCHING, Cell
 from feti_homog.case.cell_sizes import mix_faults
 from feti_homog.case.section_values import MESH_SUFFIXES, TABLE_SUFFIXES
 from feti_homog.errors import CaseError
-from feti_homog.microstructure.shapes.shapes import BOTH_SIZES, SHAPES, given_shapes, have_both_sizes
-from feti_homog.schema.wording import limit_in_words, toml_value
+from feti_homog.microstructure.shapes import shapes
+from feti_homog.schema import wording
 from feti_homog.typing import Bool
 
 if TYPE_CHECKING:
-    from feti_homog.microstructure.fibre_table import FibreTable
+    from feti_homog.microstructure import fibre_table
 
 SUFFIXES = {"mesh": MESH_SUFFIXES, "table": TABLE_SUFFIXES}
 LIST = "fibre_list"
@@ -39,8 +39,8 @@ def checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
             reason = "no circles min_gap apart are denser" if spacing > (cell.coating or 0.0) else reason
             faults.append(
                 f"[cell] fibre_fraction = {cell.fibre_fraction}: expected less than "
-                f"{limit_in_words(limit, cell.fibre_fraction, 4)} for "
-                f"geometry = {toml_value(cell.geometry)}: {reason}"
+                f"{wording.limit_in_words(limit, cell.fibre_fraction, 4)} for "
+                f"geometry = {wording.toml_value(cell.geometry)}: {reason}"
             )
     largest = ("mesh_size", cell.mesh_size)
     for name, size in (("interface_size", cell.interface_size), ("tip_size", cell.tip_size)):
@@ -63,7 +63,7 @@ def _with_files(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     if file.suffix not in SUFFIXES[cell.geometry]:
         return cell
     if words := missing(file):
-        faults.append(f"[cell] file = {toml_value(str(cell.file))}: {words}")
+        faults.append(f"[cell] file = {wording.toml_value(str(cell.file))}: {words}")
     elif cell.geometry == "table":
         return _with_table(replace(cell, file=file), faults)
     return replace(cell, file=file)
@@ -86,19 +86,21 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     """
     if cell.match is None:
         return cell
-    file, given = Path(os.path.realpath(folder / cell.match)), f"[cell] match = {toml_value(str(cell.match))}"
+    file, given = Path(os.path.realpath(folder / cell.match)), f"[cell] match = {wording.toml_value(str(cell.match))}"
     if words := missing(file):
         faults.append(f"{given}: {words}")
         return cell
-    from feti_homog.microstructure.fibre_pattern import read_window  # loads SciPy's trees, which few cases need
-    from feti_homog.microstructure.random_fibres import knows_neighbours
+    from feti_homog.microstructure import (
+        fibre_pattern,  # loads SciPy's trees, which few cases need
+        random_fibres,
+    )
 
     try:
-        window = read_window(file)
+        window = fibre_pattern.read_window(file)
     except CaseError as error:
         faults += [f"[cell] match: {fault}" for fault in error.faults]
         return cell
-    if not knows_neighbours(window):
+    if not random_fibres.knows_neighbours(window):
         faults.append(f"{given}: the window is too small to find the nearest and second neighbours of any fibre")
     if cell.fibres is None and window.count < FEWEST_MATCHED:
         faults.append(f"[cell] fibres = {window.count}: expected at least {FEWEST_MATCHED} with match")
@@ -109,10 +111,14 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
 
 def _with_table(cell: Cell, faults: list[str]) -> Cell:
     """Return the cell with its table, which has the cell size."""
-    from feti_homog.microstructure.fibre_table import read_table, table_of  # which few cases need
+    from feti_homog.microstructure import fibre_table  # which few cases need
 
     try:
-        table = read_table(cell.file, cell.columns) if cell.file is not None else table_of(cell.fibre_list or (), LIST)
+        table = (
+            fibre_table.read_table(cell.file, cell.columns)
+            if cell.file is not None
+            else fibre_table.table_of(cell.fibre_list or (), LIST)
+        )
     except CaseError as error:
         faults += [f"[cell] {fault}" for fault in error.faults]
         return cell
@@ -122,7 +128,7 @@ def _with_table(cell: Cell, faults: list[str]) -> Cell:
         coating = np.where(table.is_void, 0.0, cell.coating)
         table = replace(table, columns={**table.columns, "coating": coating})
     check_shapes(table, faults)
-    for shape in [] if cell.tip_size is None else given_shapes(table.columns, has_tips=False):
+    for shape in [] if cell.tip_size is None else shapes.given_shapes(table.columns, has_tips=False):
         words = f"{table.name} has {shape.name}, and with them no nodes at tips"
         faults.append(f"[cell] tip_size = {cell.tip_size:g}: {words}")
     width, height = (_size(name, getattr(cell, name), table, faults) for name in ("width", "height"))
@@ -130,7 +136,7 @@ def _with_table(cell: Cell, faults: list[str]) -> Cell:
     return replace(cell, table=_within(table) if cell.window == "cut" else table)
 
 
-def _within(table: FibreTable) -> FibreTable:
+def _within(table: fibre_table.FibreTable) -> fibre_table.FibreTable:
     """Return the table without rows whose centres are outside the cell by more than LEFT_OUT of their radii."""
     if table.width is None or table.height is None:
         return table
@@ -147,7 +153,7 @@ def _within(table: FibreTable) -> FibreTable:
     return replace(retained, remarks=(*table.remarks, line))
 
 
-def _size(name: str, asked: float | None, table: FibreTable, faults: list[str]) -> float | None:
+def _size(name: str, asked: float | None, table: fibre_table.FibreTable, faults: list[str]) -> float | None:
     """Cell width or height, from the case or from the table, which must not differ."""
     stored: float | None = getattr(table, name)
     if asked is None and stored is None and table.name != LIST:
@@ -162,11 +168,11 @@ WIDEST_CORE = 0.05, 0.98
 HOLLOW_WORDS = f"expected inner_radius / radius from {WIDEST_CORE[0]:g} to {WIDEST_CORE[1]:g}, or 0"
 
 
-def check_shapes(table: FibreTable, faults: list[str]) -> None:
+def check_shapes(table: fibre_table.FibreTable, faults: list[str]) -> None:
     """Add shape and hollow fibre faults to `faults`."""
     rows, before = table.columns, len(faults)
-    _tell(table, have_both_sizes(rows), BOTH_SIZES, faults)
-    for shape in SHAPES:
+    _tell(table, shapes.have_both_sizes(rows), shapes.BOTH_SIZES, faults)
+    for shape in shapes.SHAPES:
         for are_faulty, words in shape.faults(rows):
             _tell(table, are_faulty, words, faults)
     if len(faults) > before:
@@ -176,5 +182,5 @@ def check_shapes(table: FibreTable, faults: list[str]) -> None:
     _tell(table, hollow & (table.coating > 0), "has an inner_radius and a coating; give one", faults)
 
 
-def _tell(table: FibreTable, are_faulty: Bool, words: str, faults: list[str]) -> None:
+def _tell(table: fibre_table.FibreTable, are_faulty: Bool, words: str, faults: list[str]) -> None:
     faults += [f"[cell] {table.name}: row {row}: {words}" for row in table.row[are_faulty].tolist()]

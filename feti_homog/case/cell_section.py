@@ -10,15 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feti_homog.case import section_values as kinds
-from feti_homog.microstructure.phase_names import FIBRE
-from feti_homog.schema.keys import Selector, key
-from feti_homog.schema.types import choice, integer, real
+from feti_homog.microstructure import phase_names
+from feti_homog.schema import key, keys, types
 
 MOST_FIBRES = 100_000  # of a cell, and as many voids
 
 if TYPE_CHECKING:
-    from feti_homog.microstructure.fibre_pattern import FibrePattern
-    from feti_homog.microstructure.fibre_table import FibreTable
+    from feti_homog.microstructure import fibre_pattern, fibre_table
 
 CIRCULAR = ("square", "hexagonal", "random")
 TOUCHING = {"square": math.pi / 4, "hexagonal": math.pi / math.sqrt(12), "random": math.pi / math.sqrt(12)}
@@ -26,7 +24,7 @@ TOUCHING = {"square": math.pi / 4, "hexagonal": math.pi / math.sqrt(12), "random
 FIBRES_OF = {"square": 1, "hexagonal": 2}
 """Fibres of the lattices."""
 
-GEOMETRY = Selector("cell", "geometry")
+GEOMETRY = keys.Selector("cell", "geometry")
 ALL_CIRCULAR, RANDOM, TABLE = GEOMETRY.among(*CIRCULAR), GEOMETRY.among("random"), GEOMETRY.among("table")
 MESH = GEOMETRY.among("mesh")
 MESHED, FROM_A_FILE = GEOMETRY.among(*CIRCULAR, "table"), GEOMETRY.among("table", "mesh")
@@ -42,13 +40,13 @@ class Cell:
     """
 
     geometry: str = key(
-        choice(*CIRCULAR, "table", "mesh"),
+        types.choice(*CIRCULAR, "table", "mesh"),
         '"square": a fibre in the middle of a square cell; "hexagonal": a cell sqrt(3) times as high as wide with '
         'fibres in the middle and at the corners; "random": fibres in a square cell; "table": fibres of a table, as of '
         'a micrograph; "mesh": a file of gmsh, Abaqus or VTK.',
     )
     fibre_fraction: float | None = key(
-        real(above=0.0, below=1.0),
+        types.real(above=0.0, below=1.0),
         "Area of the fibres / area of the cell, below that at which they touch: pi/4 (square), pi/sqrt(12) "
         "(hexagonal; random, where min_gap lowers it).",
         only=ALL_CIRCULAR,
@@ -56,53 +54,53 @@ class Cell:
         default_words="required, or given by match or mix",
     )
     width: float | None = meshed_key(
-        real(least=1e-9, most=1e9),
+        types.real(least=1e-9, most=1e9),
         "Width of the cell.",
         unit="length",
         absent="1, or given by fibre_radius or the table",
     )
     height: float | None = key(
-        real(least=1e-9, most=1e9), "Height of the cell.", unit="length", only=TABLE, absent="given by the table"
+        types.real(least=1e-9, most=1e9), "Height of the cell.", unit="length", only=TABLE, absent="given by the table"
     )
     fibre_radius: float | None = key(
-        real(least=1e-9, most=1e9),
+        types.real(least=1e-9, most=1e9),
         "Mean radius of the fibres, in place of width.",
         unit="length",
         only=ALL_CIRCULAR,
         absent="given by width",
     )
     coating: float | None = meshed_key(
-        real(least=0.01, most=1.0),
+        types.real(least=0.01, most=1.0),
         'Thickness of the coatings of all fibres / radius of the fibre, which is within; of the phase "coating". '
         "fibre_fraction and fibre_radius are those without them, gaps those with them. Coatings of ellipses make both "
         "semi-axes longer by coating sqrt(a b).",
         absent="none, or the column coating of a table",
     )
     mesh_size: float = meshed_key(
-        real(least=1e-4, most=0.5),
+        types.real(least=1e-4, most=0.5),
         "Size of the elements, before refine, / width of the cell. At most 1000000 are made, 20000000 in cells of 400 "
         "or more round fibres and voids, counting the small ones in narrow gaps and thin coatings.",
         default=0.05,
     )
     interface_size: float | None = meshed_key(
-        real(least=1e-5, most=0.5),
+        types.real(least=1e-5, most=0.5),
         "Size of the elements on interfaces, before refine, / width of the cell; from there they grow to mesh_size, by "
         "0.4 of the distance. At most mesh_size.",
         absent="mesh_size",
     )
     tip_size: float | None = meshed_key(
-        real(least=1e-6, most=0.5),
+        types.real(least=1e-6, most=0.5),
         "Size of the elements at the tips of debonded arcs, before refine, / width of the cell; from there they grow "
         "like those on interfaces. At most interface_size.",
         absent="such that tips err no more than the rest; of paths and envelopes interface_size",
     )
     refine: int = key(
-        integer(least=0, most=8),
+        types.integer(least=0, most=8),
         "How many times every element is split in four, on the ranks; new nodes follow round and elliptic interfaces.",
         default=0,
     )
     accuracy: float | None = meshed_key(
-        real(least=1e-7, most=0.1),
+        types.real(least=1e-7, most=0.1),
         "Largest relative error of the strain energy under any macroscopic strain, and so of the entries of the "
         "effective stiffness: mesh_size and refine are chosen, which it excludes with interface_size and tip_size, and "
         "order, unless it is given. If the estimated error is more, a remark names the mesh that would do. It is not "
@@ -110,7 +108,7 @@ class Cell:
         absent="none",
     )
     order: int = key(
-        integer(least=1, most=2),
+        types.integer(least=1, most=2),
         "Order of the triangles. 1: linear; they lock above poisson = 0.49, but in plane stress. 2: quadratic, curved "
         "on round interfaces; those of phases with isotropic constants, but in plane stress, have a cubic bubble and a "
         "linear pressure of their own and serve up to poisson = 0.5. With accuracy that of the two which takes fewer "
@@ -119,13 +117,13 @@ class Cell:
         default_words="1, or 2 above poisson = 0.49",
     )
     bodies: str = key(
-        choice("torus", "plane"),
+        types.choice("torus", "plane"),
         '"torus": a fibre that the boundary of the cell cuts is one body; "plane": its parts are bodies of their own. '
         "The stiffness is the same.",
         default="torus",
     )
     fibres: int | None = random_key(
-        integer(least=1, most=MOST_FIBRES),
+        types.integer(least=1, most=MOST_FIBRES),
         "Number of fibres.",
         unless=("match", "radii"),
         default_words="required, or given by match, or by width and radii",
@@ -151,7 +149,7 @@ class Cell:
         absent="none", only=GEOMETRY.among("random", "mesh"),
     )  # fmt: skip
     void_radius: float | None = random_key(
-        real(least=0.05, most=20.0),
+        types.real(least=0.05, most=20.0),
         "Radius of the voids / mean radius of the fibres. There is the nearest whole number of voids, at least one; "
         "their radius is then scaled such that their fraction is exact.",
         absent="1",
@@ -166,7 +164,7 @@ class Cell:
         only=RANDOM,
     )
     min_gap: float = random_key(
-        real(least=0.0, most=1.0), "Smallest gap between fibres / their mean diameter.", default=0.05
+        types.real(least=0.0, most=1.0), "Smallest gap between fibres / their mean diameter.", default=0.05
     )
     seed: int = random_key(
         kinds.SEED,
@@ -174,7 +172,7 @@ class Cell:
         default=0,
     )
     radius_spread: float = random_key(
-        real(least=0.0, most=0.5), "Largest difference of a radius from the mean / mean radius.", default=0.0
+        types.real(least=0.0, most=0.5), "Largest difference of a radius from the mean / mean radius.", default=0.0
     )
     file: Path | None = key(
         kinds.CELL_FILE,
@@ -199,7 +197,7 @@ class Cell:
         absent="none",
     )
     repair: str = key(
-        choice("none", "snap", "overlaps"),
+        types.choice("none", "snap", "overlaps"),
         '"snap", of a mesh: nodes on sides that nearly match are moved to match; the result has how far. "overlaps", '
         "of a table: fibres that touch, or overlap by less than 1 % of a radius, are made smaller until they do not; "
         "the result names the rows.",
@@ -207,7 +205,7 @@ class Cell:
         only=FROM_A_FILE,
     )
     snap_tolerance: float = key(
-        real(least=0.0, most=0.1),
+        types.real(least=0.0, most=0.1),
         'How far nodes may be moved by repair = "snap" / width of the cell.',
         default=1e-3,
         only=MESH,
@@ -222,22 +220,22 @@ class Cell:
         kinds.FIBRE_LIST, "The fibres, in place of file.", only=TABLE, absent="given by file"
     )
     window: str = key(
-        choice("periodic", "cut"),
+        types.choice("periodic", "cut"),
         'What a table is. "periodic": a cell, whose fibres must not overlap; all are shifted so that its sides cut '
         'them well, unless a file gives left and bottom. "cut": a piece of something larger, whose fibres may overlap '
         "across the border: they are moved apart as little as can be. Those with centres outside are left out.",
         default="periodic",
         only=TABLE,
     )
-    table: FibreTable | None = field(default=None, compare=False)
-    matched: FibrePattern | None = field(default=None, compare=False)
+    table: fibre_table.FibreTable | None = field(default=None, compare=False)
+    matched: fibre_pattern.FibrePattern | None = field(default=None, compare=False)
 
     @property
     def fractions(self) -> dict[str, float]:
         """Fibre fraction for each round fibre phase, in name order; none where files give it."""
         if self.mix is not None:
             return dict(sorted(self.mix.items()))
-        return {} if self.fibre_fraction is None else {FIBRE: self.fibre_fraction}
+        return {} if self.fibre_fraction is None else {phase_names.FIBRE: self.fibre_fraction}
 
     @property
     def has_voids(self) -> bool:

@@ -4,8 +4,6 @@ Fibres of several phases have a fraction and a radius each: `mix` and `radii`.  
 a cell gives its accuracy.  Mixed elements have their own bubble and pressure.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import permutations
@@ -15,11 +13,9 @@ from typing import Any
 import numpy as np
 
 from feti_homog.case.cell_section import FIBRES_OF, MOST_FIBRES, Cell
-from feti_homog.materials.material_forms import Isotropic, Material
-from feti_homog.materials.laws import isotropic_ratio, plane_stiffness, stiffness_of
-from feti_homog.materials.voigt import PLANE_STATES
-from feti_homog.microstructure.phase_names import COATING
-from feti_homog.schema.wording import toml_key, toml_value
+from feti_homog.materials import laws, material_forms, voigt
+from feti_homog.microstructure import phase_names
+from feti_homog.schema import wording
 
 FEWEST = 0.5  # fibres of a phase, below which one would be another phase's worth
 LOCKING_POISSON = 0.49
@@ -29,31 +25,38 @@ LOCKING_POISSON = 0.49
 ROUNDING_POISSON = 0.49999999
 
 
-def is_mixed(order: int, material: Material, plane: str) -> bool:
+def is_mixed(order: int, material: material_forms.Material, plane: str) -> bool:
     """Return whether a phase's elements have their own bubble and pressure in the plane problem."""
-    return order == 2 and isotropic_ratio(material) is not None and not PLANE_STATES[plane].is_sheet
+    return order == 2 and laws.isotropic_ratio(material) is not None and not voigt.PLANE_STATES[plane].is_sheet
 
 
-def warnings(materials: Mapping[str, Material], plane: str) -> list[str]:
+def warnings(materials: Mapping[str, material_forms.Material], plane: str) -> list[str]:
     """List the phases whose elements err by rounding, a line each."""
     words = "so near to 0.5 that rounding may exceed the tolerance of the checks"
     lines = _above(ROUNDING_POISSON, materials, plane)
     return [f"{line}: {words}; use at most {ROUNDING_POISSON:.10g}" for line in lines]
 
 
-def remarks(materials: Mapping[str, Material], plane: str) -> tuple[str, ...]:
+def remarks(materials: Mapping[str, material_forms.Material], plane: str) -> tuple[str, ...]:
     """List the phases for which elements are quadratic, a line each."""
     lines = _above(LOCKING_POISSON, materials, plane)
     return tuple(f"{line}: elements are quadratic, for linear ones lock above {LOCKING_POISSON}" for line in lines)
 
 
-def _above(limit: float, materials: Mapping[str, Material], plane: str) -> list[str]:
+def _above(limit: float, materials: Mapping[str, material_forms.Material], plane: str) -> list[str]:
     """List the phases with a larger ratio that keep their volume: not in plane stress."""
-    if PLANE_STATES[plane].is_sheet:
+    if voigt.PLANE_STATES[plane].is_sheet:
         return []
-    ratios = {phase: isotropic_ratio(material) for phase, material in materials.items()}
-    names = {phase: "poisson" if isinstance(m, Isotropic) else "Poisson's ratio" for phase, m in materials.items()}
-    return [f"[material.{toml_key(phase)}] {names[phase]} = {nu}" for phase, nu in ratios.items() if nu and nu > limit]
+    ratios = {phase: laws.isotropic_ratio(material) for phase, material in materials.items()}
+    names = {
+        phase: "poisson" if isinstance(m, material_forms.Isotropic) else "Poisson's ratio"
+        for phase, m in materials.items()
+    }
+    return [
+        f"[material.{wording.toml_key(phase)}] {names[phase]} = {nu}"
+        for phase, nu in ratios.items()
+        if nu and nu > limit
+    ]
 
 
 CHOSEN = ("mesh_size", "interface_size", "tip_size", "refine")
@@ -74,7 +77,7 @@ MOST_REFINED = 8
 def sized(
     cell: Cell,
     table: Mapping[str, Any],
-    materials: Mapping[str, Material],
+    materials: Mapping[str, material_forms.Material],
     plane: str,
     free_faces: bool,
     faults: list[str],
@@ -120,7 +123,7 @@ def _coarsest(cell: Cell) -> float:
     return min(LARGEST, float(f"{PITCH_SHARE * sqrt(height / fibres):.2g}"))
 
 
-def coarse_error(materials: Mapping[str, Material], plane: str, order: int, free_faces: bool) -> float:
+def coarse_error(materials: Mapping[str, material_forms.Material], plane: str, order: int, free_faces: bool) -> float:
     """Return an upper estimate of the relative strain energy error on the coarsest mesh,
 
         C_p kappa max s beta^2,  beta = |lambda - 1| / (lambda + 1),
@@ -129,18 +132,18 @@ def coarse_error(materials: Mapping[str, Material], plane: str, order: int, free
     lambda < 1 and else 1, and kappa the condition of the plane stiffness in the phase nearest to incompressible,
     for mixed elements at most MIXED_CONDITION, as is kappa s where all are mixed.
     """
-    stiffness = {phase: stiffness_of(material, plane) for phase, material in materials.items()}
+    stiffness = {phase: laws.stiffness_of(material, plane) for phase, material in materials.items()}
     ratios = [
         np.linalg.eigvals(np.linalg.solve(stiffness[outer], stiffness[inner])).real
         for inner, outer in permutations(stiffness, 2)
-        if inner != "matrix" and outer in ("matrix", COATING)
+        if inner != "matrix" and outer in ("matrix", phase_names.COATING)
     ]
     if free_faces:
         ratios.append(np.zeros(1))
     mixed = [is_mixed(order, material, plane) for material in materials.values()]
     scale, conditions = np.sqrt([1.0, 1.0, 2.0]), []  # to orthonormal components, [E11, E22, gamma12 / sqrt(2)]
     for material, has_pressure in zip(materials.values(), mixed, strict=True):
-        condition = float(np.linalg.cond(plane_stiffness(material, plane) * np.outer(scale, scale)))
+        condition = float(np.linalg.cond(laws.plane_stiffness(material, plane) * np.outer(scale, scale)))
         conditions.append(min(condition, MIXED_CONDITION if has_pressure else inf))
     eigenvalues = np.concatenate([np.ones(1), *ratios])
     beta = (eigenvalues - 1) / (eigenvalues + 1)
@@ -183,7 +186,11 @@ def void_count(cell: Cell, fibre_radius: float) -> int:
 
 def fractions_in_words(cell: Cell) -> str:
     """Return the keys with the fractions in a cell without a file, and their values."""
-    fibres = f"fibre_fraction = {cell.fibre_fraction:g}" if cell.mix is None else f"mix = {toml_value(dict(cell.mix))}"
+    fibres = (
+        f"fibre_fraction = {cell.fibre_fraction:g}"
+        if cell.mix is None
+        else f"mix = {wording.toml_value(dict(cell.mix))}"
+    )
     return f"{fibres}, voids = {cell.voids:g}" if cell.voids else fibres
 
 
@@ -202,12 +209,14 @@ def mix_faults(cell: Cell) -> list[str]:
     """List the faults in the numbers of a mix together."""
     if cell.mix is None:
         return []
-    faults, given = [], f"[cell] mix = {toml_value(dict(cell.mix))}"
+    faults, given = [], f"[cell] mix = {wording.toml_value(dict(cell.mix))}"
     if fsum(cell.mix.values()) >= 1:
         faults.append(f"{given}: expected a sum below 1")
     if cell.radii is not None and set(cell.radii) != set(cell.mix):
         expected = ", ".join(cell.mix)
-        faults.append(f"[cell] radii = {toml_value(dict(cell.radii))}: expected a radius of each of mix: {expected}")
+        faults.append(
+            f"[cell] radii = {wording.toml_value(dict(cell.radii))}: expected a radius of each of mix: {expected}"
+        )
     if faults:
         return faults
     expected_counts = _expected_counts(cell)

@@ -1,7 +1,5 @@
 """The section [interface]: arcs that are debonded from the start, and bonds that hold or break."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -9,8 +7,7 @@ from typing import Any
 
 from feti_homog.case import section_values as kinds
 from feti_homog.case.bond_laws import DEFAULT, LAWS, REGISTRY
-from feti_homog.schema.keys import key
-from feti_homog.schema.types import POSITIVE_OR_INF, boolean, choice, integer, list_of, real, table_of
+from feti_homog.schema import key, types
 
 pair_key = partial(key, by_pair=True)
 """A key in which several sections [[interface]] may differ; they agree in all others."""
@@ -28,13 +25,13 @@ class Arc:
         "Which fibres, in the order of the arrangement; of the hexagonal cell 1 is at the corners, 2 in the middle.",
     )
     centre: float = key(
-        real(least=-360.0, most=360.0),
+        types.real(least=-360.0, most=360.0),
         "Direction of the middle of the arc, seen from the centre of the fibre, from x1 towards x2.",
         unit="degrees",
         default=0.0,
     )
     angle: float | None = key(
-        real(least=0.0, most=360.0),
+        types.real(least=0.0, most=360.0),
         "Whole opening of the arc, measured at the centre of the fibre. 0 is perfect bonding; at 360 nothing holds the "
         "fibre, and its rigid motions are left out.",
         unit="degrees",
@@ -47,7 +44,7 @@ class Scatter:
     """Scatter of strengths from fibre to fibre: a factor of Weibull's distribution with mean 1 for each fibre."""
 
     shape: float = key(
-        real(least=1.0, most=1000.0),
+        types.real(least=1.0, most=1000.0),
         "Weibull modulus m. Strengths have the coefficient of variation sqrt(Gamma(1 + 2/m) / Gamma(1 + 1/m)^2 - 1), "
         "about 1.2 / m: 0.23 of m = 5, 0.15 of 8, 0.06 of 20.",
     )
@@ -58,7 +55,7 @@ class Scatter:
     )
 
 
-ARCS = list_of(table_of(Arc, ""), "a list of arcs {fibre, centre, angle}")
+ARCS = types.list_of(types.table_of(Arc, ""), "a list of arcs {fibre, centre, angle}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,13 +69,13 @@ class InterfaceSection:
     """
 
     contact: bool = key(
-        boolean,
+        types.boolean,
         "true: debonded faces do not overlap, they touch, with friction where there is a coefficient. false: they "
         "overlap freely.",
         default=True,
     )
     friction: float = pair_key(
-        real(least=0.0),
+        types.real(least=0.0),
         "Coulomb's coefficient mu of debonded faces: they stick while |t_t| < mu |t_n|, and slide at that traction. "
         "The load is controlled from the first leg on, without snap-back. Cells too large for influence columns are "
         "refused. Increments are implicit steps, whose stresses and heat tend to those of events. Along the fibres "
@@ -88,7 +85,7 @@ class InterfaceSection:
         only=kinds.PATH_ANALYSIS,
     )
     friction_on_damage: bool = pair_key(
-        boolean,
+        types.boolean,
         "true: friction acts on the damaged share of bonds that hold, too, with the whole of their pressure. false: on "
         "broken bonds alone.",
         default=False,
@@ -113,7 +110,7 @@ class InterfaceSection:
         absent="inf",
     )
     axial_stiffness: float | None = pair_key(
-        POSITIVE_OR_INF,
+        types.POSITIVE_OR_INF,
         "Traction along the fibre / slip along it, k_a, of the bonds that hold; inf: no slip along it.",
         unit="stress / length",
         absent="tangential_stiffness",
@@ -136,14 +133,14 @@ class InterfaceSection:
         only=(kinds.BREAKING, kinds.BY_STRENGTH),
     )
     axial_strength: float | None = pair_key(
-        POSITIVE_OR_INF,
+        types.POSITIVE_OR_INF,
         "R^a: the traction along the fibre at which a bond breaks; inf: it breaks none.",
         unit="stress",
         absent="tangential_strength",
         only=(kinds.BREAKING, kinds.GENERALIZED, kinds.BY_AXIAL_STRENGTH),
     )
     law: str | None = key(
-        choice(*LAWS),
+        types.choice(*LAWS),
         "The law of the bonds. A bond breaks when this reaches 1: "
         + "; ".join(f'"{law.name}": {law.description}' for law in REGISTRY if not law.softens)
         + ". Or it softens under damage, until nothing is left: "
@@ -154,7 +151,7 @@ class InterfaceSection:
         only=kinds.BREAKING,
     )
     criterion: str = key(
-        choice(*LAWS),
+        types.choice(*LAWS),
         'The older word for law, with the same values: criterion = "energy" is law = "energy".',
         default=DEFAULT,
         only=kinds.BREAKING,
@@ -175,19 +172,19 @@ class InterfaceSection:
         only=(kinds.BREAKING, kinds.SOFTENING),
     )
     mixing_exponent: float = pair_key(
-        real(above=0.0),
+        types.real(above=0.0),
         "Exponent of Benzeggagh and Kenane's toughness.",
         default=2.0,
         only=(kinds.BREAKING, kinds.SOFTENING),
     )
     teeth: int | None = key(
-        integer(least=1, most=10_000),
+        types.integer(least=1, most=10_000),
         "Steps of damage; each is an event. Any number takes the energy of the law.",
         absent="as few as softening_tolerance allows",
         only=(kinds.BREAKING, kinds.SOFTENING),
     )
     softening_tolerance: float = key(
-        real(above=0.0, most=1.0),
+        types.real(above=0.0, most=1.0),
         "By how much of the peak traction the first tooth may exceed it.",
         default=0.02,
         only=(kinds.BREAKING, kinds.SOFTENING),
@@ -216,7 +213,7 @@ class InterfaceSection:
         only=kinds.BY_ENERGY,
     )
     growth: str = key(
-        choice("released", "springs"),
+        types.choice("released", "springs"),
         'Where debonding has begun: "released": a bond beside a broken one breaks when that releases G_c times its '
         'length, which hardly depends on the mesh; "springs": by the energy of its spring, as any other.',
         default="released",
@@ -224,13 +221,13 @@ class InterfaceSection:
         instead="no growth: a law that softens takes the energy of its teeth, at tips too",
     )
     mode_sensitivity: float = pair_key(
-        real(least=0.0, most=1.0),
+        types.real(least=0.0, most=1.0),
         "How much of the toughness in opening holds in shear: 1 all modes have the same, 0 shear alone breaks nothing.",
         default=0.25,
         only=kinds.BY_ENERGY,
     )
     scatter: Scatter | None = key(
-        table_of(Scatter, "a table such as {shape = 8.0, seed = 1}"),
+        types.table_of(Scatter, "a table such as {shape = 8.0, seed = 1}"),
         "Strengths that differ from fibre to fibre: each fibre has a random factor f of mean 1, by which all strengths "
         "of its interfaces are multiplied, and toughnesses by f^2; stiffnesses stay, and so does the length of the "
         "process zone. Strengths and toughness of this section are then those of a mean fibre, f = 1. The column "

@@ -3,8 +3,6 @@
 A load gives for each component its strain or its stress; along a path it is completed by the load before.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,20 +10,19 @@ from itertools import accumulate
 from typing import Any, ClassVar
 
 from feti_homog.case import section_values as kinds
-from feti_homog.materials.voigt import PLANE_STATES, SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS
-from feti_homog.schema.keys import Condition, key
-from feti_homog.schema.types import choice, either, integer, list_of, real, table_of
+from feti_homog.materials import voigt
+from feti_homog.schema import key, keys, types
 
 TEMPERATURE = "temperature"
 Strain = tuple[float, ...]
 
 
-def _strain(name: str, *only: Condition) -> Any:
-    return key(real(), f"Macroscopic strain {name}.", default=None, only=only)
+def _strain(name: str, *only: keys.Condition) -> Any:
+    return key(types.real(), f"Macroscopic strain {name}.", default=None, only=only)
 
 
-def _stress(name: str, *only: Condition) -> Any:
-    return key(real(), f"Macroscopic stress {name}.", unit="stress", default=None, only=only)
+def _stress(name: str, *only: keys.Condition) -> Any:
+    return key(types.real(), f"Macroscopic stress {name}.", unit="stress", default=None, only=only)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +45,7 @@ class MixedLoad:
     S13: float | None = _stress("S13", kinds.GENERALIZED)
     S12: float | None = _stress("S12")
     temperature: float | None = key(
-        real(),
+        types.real(),
         "A change of temperature, 0 until it is named. Every phase must give its expansion.",
         unit="temperature",
         default=None,
@@ -62,9 +59,9 @@ class MixedLoad:
         return {name: value for name, value in values if value is not None}
 
 
-LOAD = table_of(MixedLoad, "a table of strains and stresses such as {S11 = 60.0, S22 = 0.0}", least=1)
-WAYPOINTS = list_of(
-    either("", kinds.STRAIN, LOAD),
+LOAD = types.table_of(MixedLoad, "a table of strains and stresses such as {S11 = 60.0, S22 = 0.0}", least=1)
+WAYPOINTS = types.list_of(
+    types.either("", kinds.STRAIN, LOAD),
     f"a list of strains {kinds.STRAIN_COMPONENTS} or of tables such as {{S11 = 60.0}}",
     least=1,
 )
@@ -76,7 +73,7 @@ def completed(loads: Sequence[Strain | MixedLoad], plane: str) -> tuple[dict[str
     One name and value for each component, and the temperature in generalized plane strain. Components that a load does
     not name stay as in the load before, at first a stress of zero.
     """
-    state = PLANE_STATES[plane]
+    state = voigt.PLANE_STATES[plane]
     unloaded = dict.fromkeys((*state.stresses, *[TEMPERATURE] * state.is_spatial), 0.0)
 
     def after(before: Mapping[str, float], load: Strain | MixedLoad) -> dict[str, float]:
@@ -93,13 +90,13 @@ def first_named(loads: Sequence[Strain | MixedLoad], plane: str) -> dict[str, in
     """By its stress name, which load is the first to name each component; len(loads) if none does."""
     return {
         names[1]: next((k for k, load in enumerate(loads) if not named(load).keys().isdisjoint(names)), len(loads))
-        for names in PLANE_STATES[plane].components
+        for names in voigt.PLANE_STATES[plane].components
     }
 
 
 def named(load: Strain | MixedLoad) -> dict[str, float]:
     """Return a load's named components, [E11, E22, gamma12] if it is a strain."""
-    return load.named if isinstance(load, MixedLoad) else dict(zip(STRAINS, load, strict=True))
+    return load.named if isinstance(load, MixedLoad) else dict(zip(voigt.STRAINS, load, strict=True))
 
 
 class AnalysisSection:
@@ -132,11 +129,11 @@ class Stiffness(AnalysisSection):
     """The effective stiffness, which has no section."""
 
 
-FAMILIES = (SPATIAL_STRESSES, SPATIAL_STRAINS)
-PLANE_OF_LOADS = either(
-    f"two different names, both of stresses ({', '.join(SPATIAL_STRESSES)}) or both of strains "
-    f"({', '.join(SPATIAL_STRAINS)})",
-    *(list_of(choice(*family), "", count=2, unique=True) for family in FAMILIES),
+FAMILIES = (voigt.SPATIAL_STRESSES, voigt.SPATIAL_STRAINS)
+PLANE_OF_LOADS = types.either(
+    f"two different names, both of stresses ({', '.join(voigt.SPATIAL_STRESSES)}) or both of strains "
+    f"({', '.join(voigt.SPATIAL_STRAINS)})",
+    *(types.list_of(types.choice(*family), "", count=2, unique=True) for family in FAMILIES),
 )
 
 
@@ -175,13 +172,13 @@ class Envelope(AnalysisSection):
         "is shear across the fibres, S13 and S23 are along them.",
     )
     directions: int = key(
-        integer(least=4, most=100_000),
+        types.integer(least=4, most=100_000),
         "Number of rays, evenly spaced; the first is along the first axis. On each the load is a factor times "
         "(cos, sin) of its direction.",
         default=72,
     )
     temperature: float | None = key(
-        real(),
+        types.real(),
         "A change of temperature that comes first, at zero stress in a plane of stresses, at zero strain in one of "
         "strains. Every phase must give its expansion.",
         unit="temperature",
@@ -217,24 +214,24 @@ class LoadPath(AnalysisSection):
         default=None,
     )
     method: str = key(
-        choice("events", "increments"),
+        types.choice("events", "increments"),
         '"events": every break at its exact load; "increments": equal load steps.',
         default="events",
     )
     increments: int | None = key(
-        integer(least=1, most=1_000_000),
+        types.integer(least=1, most=1_000_000),
         "Number of load steps of the whole path, at least one for each waypoint. Steps end on every waypoint if it "
         "is a multiple of their number; others pass by the corners of the path.",
         only=kinds.BY_INCREMENTS,
     )
     release: str = key(
-        choice("all", "worst"),
+        types.choice("all", "worst"),
         'In a step "all" bonds over their strength break at once, or the "worst" first, until none is over.',
         default="all",
         only=kinds.BY_INCREMENTS,
     )
     max_events: int = key(
-        integer(least=1, most=10**9),
+        types.integer(least=1, most=10**9),
         "Stop after so many events, with exit code 3; --resume with a higher number goes on.",
         default=100_000,
         only=kinds.BY_EVENTS,

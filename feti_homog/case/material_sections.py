@@ -1,7 +1,5 @@
 """Reading the sections [material.PHASE], and which material a mesh phase has."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
@@ -9,22 +7,22 @@ from typing import Any
 
 from feti_homog.case.cell_section import CIRCULAR, GEOMETRY, Cell
 from feti_homog.case.section_values import FRACTIONS
-from feti_homog.materials.material_forms import MATERIAL_FORMS, Material
-from feti_homog.materials.laws import expansion, stiffness_of
-from feti_homog.microstructure.phase_names import COATING, FIBRE, MATRIX, PHASE
-from feti_homog.schema.keys import TableReader, keys_of
-from feti_homog.schema.wording import suggestion, toml_key, toml_value
+from feti_homog.materials import laws, material_forms
+from feti_homog.microstructure import phase_names
+from feti_homog.schema import TableReader, keys, wording
 
-SUGGESTED = (MATRIX, FIBRE, COATING, "fibre:2")  # of phases that may have any name
+SUGGESTED = (phase_names.MATRIX, phase_names.FIBRE, phase_names.COATING, "fibre:2")  # of phases that may have any name
 FORMS_OF = {
-    name: [form for form, constants in MATERIAL_FORMS.items() if name in keys_of(constants)]
-    for contents in MATERIAL_FORMS.values()
-    for name in keys_of(contents)
+    name: [form for form, constants in material_forms.MATERIAL_FORMS.items() if name in keys.keys_of(constants)]
+    for contents in material_forms.MATERIAL_FORMS.values()
+    for name in keys.keys_of(contents)
 }
 """Forms with each constant."""
 
 
-def read_materials(document: Mapping[str, Any], plane: str | None, reader: TableReader) -> dict[str, Material]:
+def read_materials(
+    document: Mapping[str, Any], plane: str | None, reader: TableReader
+) -> dict[str, material_forms.Material]:
     """Return the materials by phase, without checks that depend on a faulty geometry, mix or plane state.
 
     Empty without a section [material]: that is a fault of the whole document.
@@ -33,19 +31,21 @@ def read_materials(document: Mapping[str, Any], plane: str | None, reader: Table
         return {}
     table = document["material"]
     if not isinstance(table, dict):
-        reader.faults.append(f"material = {toml_value(table)}: expected sections [material.matrix], [material.fibre]")
+        reader.faults.append(
+            f"material = {wording.toml_value(table)}: expected sections [material.matrix], [material.fibre]"
+        )
         return {}
     geometry = reader.selected[GEOMETRY]
     fibres = fibre_phases(document.get("cell")) if geometry in CIRCULAR else None
-    known = None if fibres is None else (MATRIX, *fibres, COATING)
+    known = None if fibres is None else (phase_names.MATRIX, *fibres, phase_names.COATING)
     materials = {}
     for phase, constants in table.items():
         fault = _phase_fault(phase, known, geometry, reader.owners)
-        material = None if fault else _read_material(constants, f"material.{toml_key(phase)}", plane, reader)
+        material = None if fault else _read_material(constants, f"material.{wording.toml_key(phase)}", plane, reader)
         reader.faults += [fault] if fault else []
         if material is not None:
             materials[phase] = material
-    needed = (MATRIX, *(fibres or ()))
+    needed = (phase_names.MATRIX, *(fibres or ()))
     reader.faults += [f"[material.{phase}]: missing section" for phase in needed if phase not in table]
     return materials
 
@@ -54,7 +54,7 @@ def fibre_phases(cell: object) -> tuple[str, ...] | None:
     """Return the fibre phases in a section [cell] without a file, None if its mix is faulty."""
     mix = cell.get("mix") if isinstance(cell, dict) else None
     if mix is None:
-        return (FIBRE,)
+        return (phase_names.FIBRE,)
     return tuple(mix) if FRACTIONS.accepts(mix) else None
 
 
@@ -65,10 +65,12 @@ def coating_faults(cell: Cell | None, materials: object) -> list[str]:
     has_coatings = cell.coating is not None
     if cell.table is not None:
         has_coatings = bool((cell.table.coating > 0).any())
-    if has_coatings and COATING not in materials:
-        return [f"[material.{COATING}]: missing section; [cell] has coatings"]
-    if not has_coatings and COATING in materials:
-        return [f"[material.{COATING}]: no fibre has a coating; expected [cell] coating, or a column of a table"]
+    if has_coatings and phase_names.COATING not in materials:
+        return [f"[material.{phase_names.COATING}]: missing section; [cell] has coatings"]
+    if not has_coatings and phase_names.COATING in materials:
+        return [
+            f"[material.{phase_names.COATING}]: no fibre has a coating; expected [cell] coating, or a column of a table"
+        ]
     return []
 
 
@@ -77,17 +79,19 @@ def _phase_fault(phase: str, known: tuple[str, ...] | None, geometry: str | None
 
     `known` are a cell's phases, None if any may occur.
     """
-    section = f"[material.{toml_key(phase)}]"
+    section = f"[material.{wording.toml_key(phase)}]"
     is_unknown = known is not None and ":" not in phase and phase not in known
-    if is_unknown or not PHASE.fullmatch(phase) or phase in FORMS_OF:
-        elsewhere = {} if phase == FIBRE else owners
-        return f"{section}: unknown phase; {suggestion(phase, known or SUGGESTED, elsewhere)}"
+    if is_unknown or not phase_names.PHASE.fullmatch(phase) or phase in FORMS_OF:
+        elsewhere = {} if phase == phase_names.FIBRE else owners
+        return f"{section}: unknown phase; {wording.suggestion(phase, known or SUGGESTED, elsewhere)}"
     if ":" in phase and geometry in CIRCULAR:
-        return f'{section}: belongs to geometry = "mesh", not {toml_value(geometry)}'
+        return f'{section}: belongs to geometry = "mesh", not {wording.toml_value(geometry)}'
     return ""
 
 
-def _read_material(table: object, section: str, plane: str | None, reader: TableReader) -> Material | None:
+def _read_material(
+    table: object, section: str, plane: str | None, reader: TableReader
+) -> material_forms.Material | None:
     """Return a section's material, in the form of its keys; None if it is faulty."""
     given: dict[str, list[str]] = {}
     for name, (form, *further) in FORMS_OF.items():
@@ -98,12 +102,12 @@ def _read_material(table: object, section: str, plane: str | None, reader: Table
         groups = " and ".join(f"{', '.join(keys)} ({form})" for form, keys in given.items())
         reader.faults.append(f"[{section}] {groups}: exclude each other; a material is of one kind")
         return None
-    material: Material | None = reader.read(MATERIAL_FORMS[forms[0]], table, section)
+    material: material_forms.Material | None = reader.read(material_forms.MATERIAL_FORMS[forms[0]], table, section)
     if material is not None:
-        laws: list[Callable[[], Any]] = [partial(expansion, material)]
+        checked: list[Callable[[], Any]] = [partial(laws.expansion, material)]
         if plane is not None:
-            laws.insert(0, partial(stiffness_of, material, plane))
-        for law in laws:
+            checked.insert(0, partial(laws.stiffness_of, material, plane))
+        for law in checked:
             try:
                 law()
             except ValueError as error:
@@ -111,7 +115,7 @@ def _read_material(table: object, section: str, plane: str | None, reader: Table
     return material
 
 
-def missing_expansions(materials: Mapping[str, Material], needed_by: str) -> list[str]:
+def missing_expansions(materials: Mapping[str, material_forms.Material], needed_by: str) -> list[str]:
     """Faults of materials without thermal expansion, which something needs.
 
     Their other faults are reported elsewhere.
@@ -119,11 +123,11 @@ def missing_expansions(materials: Mapping[str, Material], needed_by: str) -> lis
     faults = []
     for phase, material in materials.items():
         with suppress(ValueError):
-            if expansion(material) is None:
-                faults.append(f"[material.{toml_key(phase)}] expansion: missing; {needed_by} needs it")
+            if laws.expansion(material) is None:
+                faults.append(f"[material.{wording.toml_key(phase)}] expansion: missing; {needed_by} needs it")
     return faults
 
 
-def provider(phase: str, materials: Mapping[str, Material]) -> str:
+def provider(phase: str, materials: Mapping[str, material_forms.Material]) -> str:
     """Return the phase whose material a phase has: itself, or "fibre" for "fibre:2"."""
     return phase if phase in materials else phase.partition(":")[0]

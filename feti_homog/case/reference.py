@@ -1,7 +1,5 @@
 """The case file reference, made from its keys alone: `feti-homog keys`."""
 
-from __future__ import annotations
-
 import inspect
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -10,9 +8,8 @@ from typing import Any
 
 from feti_homog.case import sections
 from feti_homog.errors import CaseError
-from feti_homog.materials.material_forms import Isotropic
-from feti_homog.schema.keys import Key, keys_of
-from feti_homog.schema.types import text
+from feti_homog.materials import material_forms
+from feti_homog.schema import keys, types
 
 ORDER = (
     *("name", "cell", "material", *[*sections.SECTIONS][1:]),
@@ -73,7 +70,7 @@ UNCERTAINTY_MEANING = (
     "scatter of numbers, which `feti-homog uncertainty` passes on to constants, onsets and peaks, of first order. "
     "`feti-homog run` takes none."
 )
-NAME = KeyRow("name", text.expected, "", "the file's name", "", "Name of the case.")
+NAME = KeyRow("name", types.text.expected, "", "the file's name", "", "Name of the case.")
 PETSC_OPTION = KeyRow(
     "feti_OPTION", sections.OPTION_EXPECTED, "", "", "",
     "An option of the solver, such as feti_ksp_rtol = 1e-10; `feti-homog options` lists them.",
@@ -120,12 +117,14 @@ def tables_of(section: str) -> list[TableReference]:
 def _table(table: sections.SectionTable, *rows: KeyRow) -> TableReference:
     first_paragraph = (inspect.getdoc(table.contents) or "").partition("\n\n")[0]
     meaning = " ".join(first_paragraph.split())
-    if table.contents is Isotropic:  # the first form
+    if table.contents is material_forms.Isotropic:  # the first form
         meaning = f"{MATERIAL_MEANING} {meaning}"
-    return TableReference(table.section, table.place, meaning, (*rows, *_rows(table.section, keys_of(table.contents))))
+    return TableReference(
+        table.section, table.place, meaning, (*rows, *_rows(table.section, keys.keys_of(table.contents)))
+    )
 
 
-def _rows(section: str, keys: Mapping[str, Key]) -> tuple[KeyRow, ...]:
+def _rows(section: str, keys: Mapping[str, keys.Key]) -> tuple[KeyRow, ...]:
     above = [sections.SECTIONS_OF_AN_ANALYSIS[section]] if section in sections.SECTIONS_OF_AN_ANALYSIS else []
     return tuple(
         KeyRow(

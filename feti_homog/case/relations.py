@@ -1,37 +1,22 @@
 """Reading the sections [interface], and relations between section values: faults, and remarks on loads."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
+from feti_homog.case import load_sections
 from feti_homog.case.bond_laws import BRANCH, COHESIVE, LAWS, STIFFNESSES
 from feti_homog.case.interface_section import InterfaceSection, Scatter, interface_label, interface_tables
-from feti_homog.case.load_sections import (
-    TEMPERATURE,
-    AnalysisSection,
-    Envelope,
-    LoadPath,
-    MixedLoad,
-    SingleLoad,
-    Strain,
-    completed,
-    first_named,
-    named,
-)
 from feti_homog.case.material_sections import coating_faults, missing_expansions
 from feti_homog.case.section_values import PAIR
-from feti_homog.materials.material_forms import Material, Orthotropic
-from feti_homog.materials.voigt import PLANE_STATES
-from feti_homog.schema.keys import TableReader, keys_of, to_table
-from feti_homog.schema.wording import toml_value
+from feti_homog.materials import material_forms, voigt
+from feti_homog.schema import TableReader, keys, wording
 
 # Relative difference of numbers that a table and other keys give alike.
 SAME = 1e-6
-COMMON = tuple(name for name, entry in keys_of(InterfaceSection).items() if not entry.by_pair)
+COMMON = tuple(name for name, entry in keys.keys_of(InterfaceSection).items() if not entry.by_pair)
 """The keys in which all sections [[interface]] agree."""
 
 
@@ -42,9 +27,13 @@ def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], pl
     heated = []
     for kind, section in (("load", load), ("path", path)):
         placed = {} if section is None else section.placed
-        heated += [f"[{kind}] {place}.{TEMPERATURE}" for place, given in placed.items() if TEMPERATURE in named(given)]
+        heated += [
+            f"[{kind}] {place}.{load_sections.TEMPERATURE}"
+            for place, given in placed.items()
+            if load_sections.TEMPERATURE in load_sections.named(given)
+        ]
     if envelope is not None and envelope.temperature is not None:
-        heated.append(f"[envelope] {TEMPERATURE}")
+        heated.append(f"[envelope] {load_sections.TEMPERATURE}")
     if heated:
         faults += missing_expansions(sections["materials"], heated[0])
     faults += coating_faults(sections["cell"], document.get("material"))
@@ -53,40 +42,53 @@ def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], pl
     return faults
 
 
-def _load_faults(path: LoadPath | None, load: SingleLoad | None, plane: str | None) -> Iterator[str]:
+def _load_faults(
+    path: load_sections.LoadPath | None, load: load_sections.SingleLoad | None, plane: str | None
+) -> Iterator[str]:
     """Yield loads that are zero or repeat the load before, and too few increments."""
     if load is not None and not any(load.to.named.values()):
-        yield f"[load] to = {toml_value(load.to.named)}: expected a load other than zero"
+        yield f"[load] to = {wording.toml_value(load.to.named)}: expected a load other than zero"
     elif path is not None:
         placed = path.placed
         if plane is not None and [path.strain, path.to, path.waypoints].count(None) == 2:
-            loads, last = completed(tuple(placed.values()), plane), ["zero, where the path begins", *placed]
+            loads, last = (
+                load_sections.completed(tuple(placed.values()), plane),
+                ["zero, where the path begins", *placed],
+            )
             repeats = [not any(loads[0].values()), *(before == after for before, after in pairwise(loads))]
             for k, (place, given) in enumerate(placed.items()):
-                noun, value = ("load", given.named) if isinstance(given, MixedLoad) else ("strain", list(given))
+                noun, value = (
+                    ("load", given.named) if isinstance(given, load_sections.MixedLoad) else ("strain", list(given))
+                )
                 if repeats[k]:
-                    yield f"[path] {place} = {toml_value(value)}: expected a {noun} other than {last[k]}"
+                    yield f"[path] {place} = {wording.toml_value(value)}: expected a {noun} other than {last[k]}"
         if path.increments is not None and path.increments < len(placed):
             yield f"[path] increments = {path.increments}: expected at least one for each waypoint"
 
 
-def axes_lines(kind: str, section: AnalysisSection, materials: Mapping[str, Material], plane: str) -> tuple[str, ...]:
+def axes_lines(
+    kind: str, section: load_sections.AnalysisSection, materials: Mapping[str, material_forms.Material], plane: str
+) -> tuple[str, ...]:
     """Return the axes of loads and of phase constants that could be a ply's, in a line; none in a plane."""
-    if not PLANE_STATES[plane].is_spatial:
+    if not voigt.PLANE_STATES[plane].is_spatial:
         return ()
-    from feti_homog.materials.engineering_constants import axes_line  # which nothing in a plane needs
+    from feti_homog.materials import engineering_constants  # which nothing in a plane needs
 
-    loaded = [name for load in section.placed.values() for name, value in named(load).items() if value]
-    of_loads = axes_line(section.plane if isinstance(section, Envelope) else loaded)
-    phases = [f"[material.{name}]" for name, material in materials.items() if isinstance(material, Orthotropic)]
+    loaded = [name for load in section.placed.values() for name, value in load_sections.named(load).items() if value]
+    of_loads = engineering_constants.axes_line(section.plane if isinstance(section, load_sections.Envelope) else loaded)
+    phases = [
+        f"[material.{name}]" for name, material in materials.items() if isinstance(material, material_forms.Orthotropic)
+    ]
     lines = [f"[{kind}] {of_loads}"] if of_loads else []
     lines += [f"{', '.join(phases)} E1 and E2 are across the fibres; along them E3"] if phases else []
     return (". ".join(lines),) if lines else ()
 
 
-def stress_free(section: str, placed: Mapping[str, Strain | MixedLoad], plane: str) -> tuple[str, ...]:
+def stress_free(
+    section: str, placed: Mapping[str, load_sections.Strain | load_sections.MixedLoad], plane: str
+) -> tuple[str, ...]:
     """List the components free of stress because no load in a section names them, or none so far; a line each."""
-    first = first_named(tuple(placed.values()), plane)
+    first = load_sections.first_named(tuple(placed.values()), plane)
     words = ["", *(f"stress-free until {place}" for place in [*placed][1:]), "never named: stress-free"]
     unnamed = {k: [name for name, number in first.items() if number == k] for k in range(1, len(words))}
     return tuple(f"[{section}] {', '.join(names)}: {words[k]}" for k, names in unnamed.items() if names)
@@ -125,7 +127,7 @@ def _faults_between(interfaces: Sequence[InterfaceSection], tables: Sequence[Map
             continue
         other = first.setdefault(frozenset(interface.between), number)
         if other != number:
-            pair = toml_value(list(interface.between))
+            pair = wording.toml_value(list(interface.between))
             faults.append(f"[{label}] between = {pair}: expected another pair than [interface {other + 1}] has")
         for name in COMMON:
             value, common = getattr(interface, name), getattr(interfaces[0], name)
@@ -138,8 +140,10 @@ def _faults_between(interfaces: Sequence[InterfaceSection], tables: Sequence[Map
 
 def _written(value: Any) -> str:
     """Return the value of a key that interfaces agree in, as TOML has it."""
-    table = to_table(value, {}) if isinstance(value, Scatter) else list(value) if isinstance(value, tuple) else value
-    return "none" if table is None else toml_value(table)
+    table = (
+        keys.to_table(value, {}) if isinstance(value, Scatter) else list(value) if isinstance(value, tuple) else value
+    )
+    return "none" if table is None else wording.toml_value(table)
 
 
 def _of_branch(interface: InterfaceSection) -> dict[str, Any]:
@@ -161,7 +165,7 @@ def _faults_within(interface: InterfaceSection, table: Mapping[str, Any]) -> Ite
     law, words = LAWS[interface.criterion], f"friction = {interface.friction:g}: expected 0 with"
     if law.softens:
         needed = [name for name in law.needs if name not in COHESIVE[2:] and getattr(interface, name) is None]
-        line = f"law = {toml_value(law.name)} needs a finite one"
+        line = f"law = {wording.toml_value(law.name)} needs a finite one"
         faults = [f"{name}: {line}" for name in filter(table.__contains__, needed)]
         faults += _branch_faults(interface)
         yield from faults if faults or needed else _short_of_energy(interface)
@@ -191,9 +195,10 @@ def _branch_faults(interface: InterfaceSection) -> Iterator[str]:
     if len(openings) != len(tractions):
         yield f"openings, tractions: {len(openings)} and {len(tractions)} numbers; expected as many of both"
     elif openings[0] <= 0.0 or sorted({*openings}) != [*openings]:
-        yield f"openings = {toml_value(list(openings))}: expected a rising list of numbers above 0"
+        yield f"openings = {wording.toml_value(list(openings))}: expected a rising list of numbers above 0"
     elif tractions[0] <= 0.0 or tractions[-1] != 0.0 or sorted(tractions) != [*tractions[::-1]]:
-        yield f"tractions = {toml_value(list(tractions))}: expected a softening branch, which falls from its peak to 0"
+        branch = wording.toml_value(list(tractions))
+        yield f"tractions = {branch}: expected a softening branch, which falls from its peak to 0"
     else:
         bare = replace(interface, normal_stiffness=None, normal_strength=None, normal_toughness=None)
         for name, number in _of_branch(bare).items():

@@ -1,7 +1,5 @@
 """Relations between keys in a case file: requirements, exclusions, and the lines of their faults."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,10 +16,8 @@ from feti_homog.case.cell_sizes import CHOSEN
 from feti_homog.case.interface_section import ARCS, Arc, Scatter, interface_tables
 from feti_homog.case.load_sections import MixedLoad
 from feti_homog.case.sections import DIFFERENTIABLE, SECTIONS, SECTIONS_OF_AN_ANALYSIS
-from feti_homog.materials.voigt import PLANE_STATES, SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
-from feti_homog.schema.keys import Condition, Selected, Selector, keys_of
-from feti_homog.schema.types import INF, Test, is_number
-from feti_homog.schema.wording import toml_value
+from feti_homog.materials import voigt
+from feti_homog.schema import keys, types, wording
 
 TablePath = tuple[str, ...]
 ITEMS = "items"
@@ -49,12 +45,12 @@ class Rule:
     """
 
     path: TablePath
-    holds: Test | None
-    words: str | Callable[[Any, Selected], str]
-    when: tuple[Condition, ...] = ()
+    holds: types.Test | None
+    words: str | Callable[[Any, keys.Selected], str]
+    when: tuple[keys.Condition, ...] = ()
     names: tuple[str, ...] = ()
 
-    def faults(self, document: Mapping[str, Any], selected: Selected) -> Iterator[str]:
+    def faults(self, document: Mapping[str, Any], selected: keys.Selected) -> Iterator[str]:
         """Yield a line for each invalid place in the document."""
         if not all(condition.holds(selected) for condition in self.when):
             return
@@ -66,7 +62,7 @@ class Rule:
     def _keys(self, place: str, value: Any) -> str:
         """Return the keys of a table, or a value with its key, as the fault of a place names them."""
         if not self.names:
-            return f" {place} = {toml_value(value)}" if place else ""
+            return f" {place} = {wording.toml_value(value)}" if place else ""
         above, names = f"{place}." if place else "", [name for name in self.names if name in value] or self.names
         return f" {', '.join(above + name for name in names)}"
 
@@ -82,7 +78,7 @@ def exclusive(path: TablePath, *names: str, words: str = "exclude each other; gi
 
 
 def needed(
-    path: TablePath, name: str, words: str, *when: Condition, beside: str = "", unless: Sequence[str] = ()
+    path: TablePath, name: str, words: str, *when: keys.Condition, beside: str = "", unless: Sequence[str] = ()
 ) -> Rule:
     """Require a key, or one of others in its place, under some conditions or beside another key."""
 
@@ -94,13 +90,13 @@ def needed(
 
 
 def belonging(
-    path: TablePath, condition: Condition, values: Sequence[str], *when: Condition, instead: str = ""
+    path: TablePath, condition: keys.Condition, values: Sequence[str], *when: keys.Condition, instead: str = ""
 ) -> Rule:
     """Refuse the key or section at the end of the path where the selector has other values than the condition."""
     others = tuple(value for value in values if value not in condition.values)
 
-    def words(_: Any, selected: Selected) -> str:
-        owner = f"{condition.in_words(path[0])}, not {toml_value(selected[condition.selector])}"
+    def words(_: Any, selected: keys.Selected) -> str:
+        owner = f"{condition.in_words(path[0])}, not {wording.toml_value(selected[condition.selector])}"
         return f": belongs to {owner}{f'; use {instead}' if instead else ''}"
 
     return Rule(path, None, words, (*when, condition.selector.among(*others)))
@@ -128,9 +124,9 @@ def _places(document: Mapping[str, Any], path: TablePath) -> Iterator[tuple[str,
         yield from within(path[0] if len(sections) == 1 else f"{path[0]} {number}", "", section, path[1:])
 
 
-def _values(selector: Selector) -> Sequence[str]:
+def _values(selector: keys.Selector) -> Sequence[str]:
     """Return the values that a selector may have."""
-    return keys_of(SECTIONS[selector.section])[selector.key].type.options
+    return keys.keys_of(SECTIONS[selector.section])[selector.key].type.options
 
 
 def _conditional_keys() -> Iterator[Rule]:
@@ -140,7 +136,7 @@ def _conditional_keys() -> Iterator[Rule]:
         yield needed((), section, line, condition)
         yield belonging((section,), condition, _values(kinds.ANALYSIS_TYPE))
     for path, contents in PLACES_OF_TABLES:
-        for name, entry in keys_of(contents).items():
+        for name, entry in keys.keys_of(contents).items():
             for k, condition in enumerate(entry.only):
                 above, values = entry.only[:k], _values(condition.selector)
                 yield belonging((*path, name), condition, values, *above, instead=entry.instead)
@@ -161,7 +157,7 @@ def _cell() -> Iterator[Rule]:
     yield exclusive(CELL, "fibre_radius", "radii")
     line = "exclude each other beside radii; one follows from the other"
     yield Rule(CELL, lambda cell: not has(cell, "radii", "fibres", "width"), line, names=("fibres", "width"))
-    number = keys_of(Cell)["fibres"].type.expected
+    number = keys.keys_of(Cell)["fibres"].type.expected
     line = f"missing; expected {number}, or the width of the cell"
     yield needed(CELL, "fibres", line, beside="radii", unless=("width",))
     line = "belongs to voids, which is missing"
@@ -175,7 +171,7 @@ def _cell() -> Iterator[Rule]:
     yield Rule(CELL, lambda cell: not has(cell, *pair) or cell["radius_spread"] == 0, line, names=pair)
     yield Rule(
         CELL,
-        lambda cell: not (has(cell, "match", "fibres") and is_number(n := cell["fibres"]) and n < FEWEST_MATCHED),
+        lambda cell: not (has(cell, "match", "fibres") and types.is_number(n := cell["fibres"]) and n < FEWEST_MATCHED),
         lambda cell, _: f" = {cell['fibres']}: expected at least {FEWEST_MATCHED} with match",
         names=("fibres",),
     )
@@ -219,7 +215,7 @@ def _bonds() -> Iterator[Rule]:
     yield exclusive(INTERFACE, "law", "criterion", words="exclude each other; criterion is the older word for law")
     for law in REGISTRY:
         for name in law.needs:
-            missing = f"missing; law = {toml_value(law.name)} needs it"
+            missing = f"missing; law = {wording.toml_value(law.name)} needs it"
             yield needed(INTERFACE, name, missing, kinds.BREAKING, kinds.CRITERION.among(law.name))
     type_ = kinds.ENVELOPE_ANALYSIS.in_words("")
     line = f"[interface]: missing section; {type_} needs it"
@@ -236,7 +232,7 @@ def _bonds() -> Iterator[Rule]:
     yield Rule((), touches_nowhere, f"[interface] contact: {line}", (kinds.ENVELOPE_ANALYSIS,))
 
 
-def _any_section(test: Test, document: Any) -> bool:
+def _any_section(test: types.Test, document: Any) -> bool:
     """Return whether [interface], or one of several, passes a test; other types are faults elsewhere."""
     tables = interface_tables(document)
     return "interface" not in document or any(not isinstance(table, dict) or test(table) for table in tables)
@@ -250,7 +246,7 @@ def _some_arc(table: Any) -> bool:
 def _breaks(strengths: Sequence[str], table: Any) -> bool:
     """Return whether bonds of a section break under some load: a finite strength, or a law without one."""
     unlimited = [law.name for law in REGISTRY if not law.limits]
-    is_finite = (has(table, name) and table[name] not in (math.inf, INF) for name in strengths)
+    is_finite = (has(table, name) and table[name] not in (math.inf, types.INF) for name in strengths)
     return any(is_finite) or any(has(table, key) and table[key] in unlimited for key in ("criterion", "law"))
 
 
@@ -260,12 +256,12 @@ def _loads_and_outputs() -> Iterator[Rule]:
     yield exclusive(("path",), *LOADS)
     line = f"expected a table such as {{E11 = 0.01}} in {kinds.GENERALIZED.in_words('path')}"
     yield Rule(("path", "waypoints", ITEMS), lambda value: not isinstance(value, list), line, (kinds.GENERALIZED,))
-    for path, pair in product(PLACES_OF_LOADS, PLANE_STATES["generalized"].components):
+    for path, pair in product(PLACES_OF_LOADS, voigt.PLANE_STATES["generalized"].components):
         yield exclusive(path, *pair)
     others = kinds.ANALYSIS_TYPE.among(*(name for name in _values(kinds.ANALYSIS_TYPE) if name not in DIFFERENTIABLE))
-    line = f"belongs to [analysis] type = {' or '.join(map(toml_value, DIFFERENTIABLE))}"
+    line = f"belongs to [analysis] type = {' or '.join(map(wording.toml_value, DIFFERENTIABLE))}"
     yield Rule(("output", "sensitivities"), lambda value: value is not True, line, (others,))
-    along = {*SPATIAL_STRESSES, *SPATIAL_STRAINS} - {*STRESSES, *STRAINS}
+    along = {*voigt.SPATIAL_STRESSES, *voigt.SPATIAL_STRAINS} - {*voigt.STRESSES, *voigt.STRAINS}
     for place in (("output", "stress"), ("envelope", "plane", ITEMS)):
         rule = belonging(place, kinds.GENERALIZED, _values(kinds.PLANE))
         yield replace(rule, holds=lambda value: str(value) not in along)

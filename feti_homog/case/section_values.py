@@ -1,43 +1,42 @@
 """Types of values in the sections of a case file, and the keys whose values decide which other keys belong to it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
 from feti_homog.case.bond_laws import laws_with
-from feti_homog.microstructure.phase_names import FIBRE_PHASE, PHASE
-from feti_homog.schema.keys import Selector
-from feti_homog.schema.types import ValueType, boolean, choice, either, file_name, integer, list_of, real, text
+from feti_homog.microstructure import phase_names
+from feti_homog.schema import keys, types
 
 STRAIN_COMPONENTS = "[E11, E22, gamma12]"
 PAIR_EXAMPLE = '["coating", "matrix"]'
-SEED = integer(least=0, most=10**15)
+SEED = types.integer(least=0, most=10**15)
 
 MESH_SUFFIXES = (".msh", ".inp", ".vtu", ".vtk", ".mesh")
 MESH_FILE = ".msh, .inp, .vtu, .vtk or .mesh file"
 
 
-def _by_phase(words: str, example: str, number: ValueType) -> ValueType:
+def _by_phase(words: str, example: str, number: types.ValueType) -> types.ValueType:
     """Return a table of numbers by the phases of fibres."""
 
     def accepts(value: Any) -> bool:
         is_table = isinstance(value, dict) and value != {}
-        return is_table and all(map(FIBRE_PHASE.fullmatch, value)) and all(map(number.accepts, value.values()))
+        return (
+            is_table and all(map(phase_names.FIBRE_PHASE.fullmatch, value)) and all(map(number.accepts, value.values()))
+        )
 
-    return ValueType(
+    return types.ValueType(
         f"a table by phase, other than matrix, coating and void, of {words}, such as {example}",
         accepts,
         lambda value: {phase: float(entry) for phase, entry in value.items()},
     )
 
 
-def _positive_or_inf(what: str) -> ValueType:
+def _positive_or_inf(what: str) -> types.ValueType:
     """Return a number above 0; inf is read as None."""
-    number = real(above=0.0)
-    return ValueType(
+    number = types.real(above=0.0)
+    return types.ValueType(
         f"{what} above 0, or inf",
         lambda value: number.accepts(value) or (isinstance(value, float) and value == math.inf),
         lambda value: None if value == math.inf else float(value),
@@ -45,46 +44,52 @@ def _positive_or_inf(what: str) -> ValueType:
 
 
 TABLE_SUFFIXES = (".csv", ".txt", ".dat")
-TABLE_FILE = file_name("the name of a .csv file", *TABLE_SUFFIXES)
-NAMES_OF_COLUMNS = list_of(text, 'a list of names such as ["x", "y", "radius"]', least=3)
-CELL_FILE = file_name(f"the name of a {MESH_FILE}, or of a .csv file of a table", *MESH_SUFFIXES, *TABLE_SUFFIXES)
-FIBRE_LIST = ValueType(
+TABLE_FILE = types.file_name("the name of a .csv file", *TABLE_SUFFIXES)
+NAMES_OF_COLUMNS = types.list_of(types.text, 'a list of names such as ["x", "y", "radius"]', least=3)
+CELL_FILE = types.file_name(f"the name of a {MESH_FILE}, or of a .csv file of a table", *MESH_SUFFIXES, *TABLE_SUFFIXES)
+FIBRE_LIST = types.ValueType(
     "a list of fibres such as {x = 0.5, y = 0.5, radius = 0.3}",
     lambda value: isinstance(value, list) and value != [] and all(isinstance(fibre, dict) for fibre in value),
     tuple,
 )
-FRACTIONS = _by_phase("numbers above 0 and below 1", "{glass = 0.3, carbon = 0.25}", real(above=0.0, below=1.0))
-_SELECTOR = either("", text, integer(least=0, most=10**9))
-_SELECTORS = either("", _SELECTOR, list_of(_SELECTOR, "", least=1))
-PHASES = ValueType(
+FRACTIONS = _by_phase("numbers above 0 and below 1", "{glass = 0.3, carbon = 0.25}", types.real(above=0.0, below=1.0))
+_SELECTOR = types.either("", types.text, types.integer(least=0, most=10**9))
+_SELECTORS = types.either("", _SELECTOR, types.list_of(_SELECTOR, "", least=1))
+PHASES = types.ValueType(
     "a table by phase of names or numbers in the file, or lists of them, such as "
     '{matrix = "Epoxy", fibre = [2, "Glass"]}',
-    lambda v: isinstance(v, dict) and v != {} and all(PHASE.fullmatch(k) and _SELECTORS.accepts(v[k]) for k in v),
+    lambda v: (
+        isinstance(v, dict) and v != {} and all(phase_names.PHASE.fullmatch(k) and _SELECTORS.accepts(v[k]) for k in v)
+    ),
     lambda v: {phase: tuple(names if isinstance(names, list) else [names]) for phase, names in v.items()},
 )
-VOIDS_OF_A_RANDOM_CELL = real(least=0.0, most=0.5)
-VOIDS = either(f"true of a mesh, or {VOIDS_OF_A_RANDOM_CELL.expected}", VOIDS_OF_A_RANDOM_CELL, boolean)
-RADII = _by_phase("numbers from 1e-9 to 1e9", "{glass = 6.0, carbon = 3.5}", real(least=1e-9, most=1e9))
-FIBRE = integer(least=1)
-_FIBRES = list_of(FIBRE, "", least=1)
+VOIDS_OF_A_RANDOM_CELL = types.real(least=0.0, most=0.5)
+VOIDS = types.either(f"true of a mesh, or {VOIDS_OF_A_RANDOM_CELL.expected}", VOIDS_OF_A_RANDOM_CELL, types.boolean)
+RADII = _by_phase("numbers from 1e-9 to 1e9", "{glass = 6.0, carbon = 3.5}", types.real(least=1e-9, most=1e9))
+FIBRE = types.integer(least=1)
+_FIBRES = types.list_of(FIBRE, "", least=1)
 FIBRES = replace(
-    either('the number of a fibre, counted from 1, a list of numbers, or "all"', choice("all"), FIBRE, _FIBRES),
+    types.either(
+        'the number of a fibre, counted from 1, a list of numbers, or "all"', types.choice("all"), FIBRE, _FIBRES
+    ),
     store=lambda value: value if value == "all" else tuple(value if isinstance(value, list) else [value]),
 )
-KEPT = integer(least=2, most=10**9)
-STATES = either(f'"all", "peaks" or {KEPT.expected}', choice("all", "peaks"), KEPT)
-PAIR = list_of(text, f"the names of two phases, such as {PAIR_EXAMPLE}", count=2, unique=True)
+KEPT = types.integer(least=2, most=10**9)
+STATES = types.either(f'"all", "peaks" or {KEPT.expected}', types.choice("all", "peaks"), KEPT)
+PAIR = types.list_of(types.text, f"the names of two phases, such as {PAIR_EXAMPLE}", count=2, unique=True)
 STRENGTH, STIFFNESS = _positive_or_inf("a traction"), _positive_or_inf("a stiffness")
-TOUGHNESS = replace(real(above=0.0), expected="an energy per area above 0")
-NUMBERS_ABOVE = list_of(real(least=0.0), "a list of two numbers or more, none below 0", least=2)
-_ANGLES = list_of(real(least=0.0, most=360.0), "a rising list of numbers from 0 to 360", least=1, unique=True)
+TOUGHNESS = replace(types.real(above=0.0), expected="an energy per area above 0")
+NUMBERS_ABOVE = types.list_of(types.real(least=0.0), "a list of two numbers or more, none below 0", least=2)
+_ANGLES = types.list_of(
+    types.real(least=0.0, most=360.0), "a rising list of numbers from 0 to 360", least=1, unique=True
+)
 OPENINGS = replace(_ANGLES, accepts=lambda v: _ANGLES.accepts(v) and all(a < b for a, b in pairwise(v)))
-STRAIN = list_of(real(), f"a list of three numbers {STRAIN_COMPONENTS}", count=3)
+STRAIN = types.list_of(types.real(), f"a list of three numbers {STRAIN_COMPONENTS}", count=3)
 
-ANALYSIS_TYPE = Selector("analysis", "type")
-PLANE = Selector("analysis", "plane")
-METHOD = Selector("path", "method")
-CRITERION = Selector("interface", "criterion", word="law")
+ANALYSIS_TYPE = keys.Selector("analysis", "type")
+PLANE = keys.Selector("analysis", "plane")
+METHOD = keys.Selector("path", "method")
+CRITERION = keys.Selector("interface", "criterion", word="law")
 
 ANGLE_ANALYSIS, PATH_ANALYSIS = ANALYSIS_TYPE.among("angle"), ANALYSIS_TYPE.among("path")
 ENVELOPE_ANALYSIS, BREAKING = ANALYSIS_TYPE.among("envelope"), ANALYSIS_TYPE.among("path", "envelope")

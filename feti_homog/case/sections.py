@@ -4,8 +4,6 @@
 starts and ends, which is on the command line alone.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,10 +13,8 @@ from feti_homog.case.cell_section import Cell
 from feti_homog.case.interface_section import Arc, InterfaceSection, Scatter
 from feti_homog.case.load_sections import Angle, Envelope, LoadPath, MixedLoad, SingleLoad
 from feti_homog.case.section_values import ANALYSIS_TYPE, PATH_ANALYSIS, SEED, STATES
-from feti_homog.materials.material_forms import MATERIAL_FORMS
-from feti_homog.schema.keys import Key, key, keys_of
-from feti_homog.schema.types import boolean, choice, file_name, integer, is_number, real, text
-from feti_homog.schema.wording import toml_key, toml_value
+from feti_homog.materials import material_forms
+from feti_homog.schema import key, keys, types, wording
 
 Scalar = str | int | float | bool
 
@@ -30,7 +26,7 @@ DIFFERENTIABLE = ("stiffness", "load")
 """Types of analyses that have derivatives."""
 UNKNOWN, MEASURED, TEST, CURVE = "unknown", "measured", "test", "curve"
 FIT_SECTIONS = (UNKNOWN, MEASURED, TEST)
-STD = real(above=0.0)
+STD = types.real(above=0.0)
 MAX_CASES = 20_000
 
 AXIS_EXPECTED = "a list of values, or a range {from, to} with step, with count, or with samples in [sweep]"
@@ -42,14 +38,16 @@ AXIS_MEANING = (
 
 
 RANGE_KEYS = {
-    "from": Key(real(), "First value, below the last.", required=True),
-    "to": Key(real(), "Last value.", required=True),
-    "step": Key(real(above=0.0), "Distance of the values, at most to - from; of linear ranges."),
-    "count": Key(
-        integer(least=2, most=MAX_CASES),
+    "from": keys.Key(types.real(), "First value, below the last.", required=True),
+    "to": keys.Key(types.real(), "Last value.", required=True),
+    "step": keys.Key(types.real(above=0.0), "Distance of the values, at most to - from; of linear ranges."),
+    "count": keys.Key(
+        types.integer(least=2, most=MAX_CASES),
         "Number of values, both ends included. Without step and count, samples in [sweep] gives the number.",
     ),
-    "scale": Key(choice("linear", "log"), '"log": values of even ratios, from a number above 0.', default='"linear"'),
+    "scale": keys.Key(
+        types.choice("linear", "log"), '"log": values of even ratios, from a number above 0.', default='"linear"'
+    ),
 }
 """A range is no dataclass: `from` is a word of Python's."""
 
@@ -59,22 +57,22 @@ class SweepSection:
     """Many cases in one file: keys that vary, each with its values, and how these are combined."""
 
     mode: str = key(
-        choice("grid", "zip"),
+        types.choice("grid", "zip"),
         '"grid": all combinations, the last key in the file fastest; "zip": first values with first, second with '
         "second.",
         default="grid",
     )
     samples: int | None = key(
-        integer(least=1, most=MAX_CASES),
+        types.integer(least=1, most=MAX_CASES),
         "Number of points in the box of the ranges that have neither step nor count.",
         default=None,
     )
     sampling: str = key(
-        choice("latin", "random"), '"latin": a Latin hypercube; "random": independent points.', default="latin"
+        types.choice("latin", "random"), '"latin": a Latin hypercube; "random": independent points.', default="latin"
     )
     seed: int = key(SEED, "Seed of the samples.", default=0)
     realisations: int | None = key(
-        integer(least=1, most=MAX_CASES),
+        types.integer(least=1, most=MAX_CASES),
         "Arrangements of each point with a random cell; the k-th has the seed [cell] seed + k - 1 at all points.",
         default=None,
     )
@@ -88,13 +86,13 @@ class Analysis:
     """Type of the analysis and its plane state."""
 
     type: str = key(
-        choice("stiffness", "angle", "path", "load", "envelope"),
+        types.choice("stiffness", "angle", "path", "load", "envelope"),
         '"stiffness": the effective stiffness; "angle": the response against the debonding angle, see [angle]; '
         '"path": debonding by the load, see [path]; "load": the response to one load, under which nothing breaks, see '
         '[load]; "envelope": the loads at which debonding begins, see [envelope].',
     )
     plane: str = key(
-        choice("strain", "stress", "generalized"),
+        types.choice("strain", "stress", "generalized"),
         'Plane state: "strain" for long fibres along x3, "stress" for a thin sheet; "generalized" is '
         "generalized plane strain: long fibres under all six strains, also along x3.",
     )
@@ -105,17 +103,17 @@ class Decomposition:
     """Into which subdomains the cell is cut. Give one of the first two keys, or neither."""
 
     subdomains: int | None = key(
-        integer(least=1, most=1_000_000),
+        types.integer(least=1, most=1_000_000),
         "Number of subdomains, at least that of the bodies; large bodies are cut to the fastest size.",
         absent="automatic",
     )
     max_dofs: int | None = key(
-        integer(least=100, most=10**9),
+        types.integer(least=100, most=10**9),
         "Bodies are cut such that no subdomain has many more unknowns than this.",
         absent="automatic",
     )
     cut: str = key(
-        choice("auto", "bodies"),
+        types.choice("auto", "bodies"),
         "What is cut: bodies one by one; or what is faster, which in cells up to 400 000 unknowns in which nothing can "
         "part is the whole cell, across its materials, unless stiffnesses differ by more than 1e4, or one of the other "
         "keys or an option of the solver is given, other than its tolerances and those that only print.",
@@ -127,7 +125,7 @@ class Decomposition:
 class Output:
     """Files and pictures of a run."""
 
-    fields: bool = key(boolean, "Write result.h5 and result.xdmf.", default=True)
+    fields: bool = key(types.boolean, "Write result.h5 and result.xdmf.", default=True)
     states: int | str = key(
         STATES,
         "The points of a path whose fields are written: at most so many, the first, the last, those around the deepest "
@@ -137,7 +135,7 @@ class Output:
         only=PATH_ANALYSIS,
     )
     mesh_error: bool = key(
-        boolean,
+        types.boolean,
         "Estimate the error that the mesh makes of every constant: about a twentieth of a run that writes fields where "
         "refine >= 1, up to a sixth of large cells without fields and of those with elements of order 2, a seventh of "
         "a case in sweeps of small cells, a fifth of bonded cells with linear elements; else, with polygons, and "
@@ -145,40 +143,42 @@ class Output:
         default=True,
     )
     sensitivities: bool = key(
-        boolean,
+        types.boolean,
         "Derivatives of every constant of the cell by every constant of its phases and elastic interfaces, and by the "
         "fraction of a bonded square or hexagonal pattern, and a picture of them, in [analysis] type = "
         '"stiffness" and "load". Bonded cells need no further solve. With contact they are those at fixed status, for '
         "which every load takes as many solves more as there are unit loads. Faces with friction have none.",
         default=False,
     )
-    pictures: bool = key(boolean, "Draw PNG files; without fields, the curves alone.", default=True, presentation=True)
-    report: bool = key(boolean, "Write report.html: tables, checks, pictures.", default=False, presentation=True)
+    pictures: bool = key(
+        types.boolean, "Draw PNG files; without fields, the curves alone.", default=True, presentation=True
+    )
+    report: bool = key(types.boolean, "Write report.html: tables, checks, pictures.", default=False, presentation=True)
     stress: str = key(
-        choice("auto", "S11", "S22", "S12", *OUT_OF_PLANE_STRESSES),
+        types.choice("auto", "S11", "S22", "S12", *OUT_OF_PLANE_STRESSES),
         'Component to draw; "auto": the component of the unit strain. "S33", "S23" and "S13" exist in generalized '
         "plane strain.",
         default="auto",
         presentation=True,
     )
     deformation_scale: float | None = key(
-        real(least=0.0),
+        types.real(least=0.0),
         "Factor of the displacements drawn; by default such that displacements and openings are seen and no element "
         "turns over, but at least 1 under a given strain.",
         absent="automatic",
         presentation=True,
     )
-    length_unit: str = key(text, "A label, such as mm; nothing is converted.", default="", presentation=True)
-    stress_unit: str = key(text, "A label, such as GPa; nothing is converted.", default="", presentation=True)
+    length_unit: str = key(types.text, "A label, such as mm; nothing is converted.", default="", presentation=True)
+    stress_unit: str = key(types.text, "A label, such as GPa; nothing is converted.", default="", presentation=True)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Unknown:
     """An unknown SECTION.KEY = {start, lower, upper} of a fit: any key of the file whose value is a number."""
 
-    start: float = key(real(), "First value, not outside of the bounds.")
-    lower: float = key(real(), "Lower bound.")
-    upper: float = key(real(), "Upper bound, above the lower one.")
+    start: float = key(types.real(), "First value, not outside of the bounds.")
+    lower: float = key(types.real(), "Lower bound.")
+    upper: float = key(types.real(), "Upper bound, above the lower one.")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -186,7 +186,7 @@ class Measured:
     """A measured NAME = {value, std}, of several tests as measured.NAME in a section [[test]] for each."""
 
     value: float = key(
-        real(),
+        types.real(),
         "Measured value. Names of a stiffness are those of `sensitivities` in result.json, such as E1 or G_axial: E1, "
         "E2, G12 are across the fibres, E_axial, G_axial, expansion_axial along them. Those of a path are those of "
         "cases.csv, such as onset_S11 and peak_S11. A section [[test]] has besides the keys in which its case differs, "
@@ -200,7 +200,7 @@ class MeasuredCurve:
     """A measured curve = {file, std} of a fit whose analysis is a path of one leg."""
 
     file: Path = key(
-        file_name("the name of a .csv file", ".csv"),
+        types.file_name("the name of a .csv file", ".csv"),
         "A table with a head: a column of strains, such as E11, that rise with the load, and one of stresses, S11. "
         "Columns are parted as in tables of fibres.",
     )
@@ -243,7 +243,10 @@ class SectionTable:
 
 TABLES = (
     *(SectionTable(section, f"[{section}]", contents) for section, contents in SECTIONS.items()),
-    *(SectionTable("material", f"[material.PHASE], {form}", contents) for form, contents in MATERIAL_FORMS.items()),
+    *(
+        SectionTable("material", f"[material.PHASE], {form}", contents)
+        for form, contents in material_forms.MATERIAL_FORMS.items()
+    ),
     SectionTable("interface", "an arc of [interface] debonded", Arc),
     SectionTable("interface", "[interface] scatter", Scatter),
     SectionTable("path", "a load of [path] to or waypoints", MixedLoad),
@@ -252,9 +255,11 @@ TABLES = (
 
 
 KEY_OWNERS = {
-    name: " or ".join(dict.fromkeys(each.place.partition(",")[0] for each in TABLES if name in keys_of(each.contents)))
+    name: " or ".join(
+        dict.fromkeys(each.place.partition(",")[0] for each in TABLES if name in keys.keys_of(each.contents))
+    )
     for table in TABLES
-    for name in keys_of(table.contents)
+    for name in keys.keys_of(table.contents)
 }
 """By key, the tables to which it belongs, in words."""
 
@@ -262,14 +267,14 @@ KEY_OWNERS = {
 def read_petsc(table: object, faults: list[str]) -> dict[str, Scalar]:
     """PETSc's options by name; only the run checks options of prefix feti_."""
     if not isinstance(table, dict):
-        faults.append(f"petsc = {toml_value(table)}: expected a section [petsc]")
+        faults.append(f"petsc = {wording.toml_value(table)}: expected a section [petsc]")
         return {}
     for name, value in table.items():
-        start = f"[petsc] {toml_key(name)} = {toml_value(value)}: expected"
+        start = f"[petsc] {wording.toml_key(name)} = {wording.toml_value(value)}: expected"
         if name.startswith("-"):
             faults.append(f"{start} the option's name without its dash")
         elif not re.fullmatch(PREFIXED, name):
             faults.append(f"{start} the prefix feti_; PETSc's own options are for the command line")
-        elif not (isinstance(value, bool) or is_number(value) or text.accepts(value)):
+        elif not (isinstance(value, bool) or types.is_number(value) or types.text.accepts(value)):
             faults.append(f"{start} {OPTION_EXPECTED}")
     return dict(table)

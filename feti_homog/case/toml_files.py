@@ -1,7 +1,5 @@
 """The document of a case: nested tables of TOML types, from a file or from Python and NumPy values."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import tomllib
@@ -12,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.errors import CaseError
-from feti_homog.schema.wording import dotted_key
+from feti_homog.schema import wording
 from feti_homog.system.runtime import input_files
 
 MAX_BYTES = 1 << 24
@@ -109,7 +107,7 @@ def short_digest(content: bytes) -> str:
 def _named_items(table: Mapping[Any, Any], path: TomlPath, faults: list[str]) -> list[tuple[str, Any]]:
     """Return a table's items; a key that is no text is a fault."""
     wrong = [name for name in table if not isinstance(name, str)]
-    place = f"[{dotted_key(path)}] " if path else ""
+    place = f"[{wording.dotted_key(path)}] " if path else ""
     faults += [f"{place}{name!r}: expected a text as key, not {_article(name)}" for name in wrong]
     return [(str(name), value) for name, value in table.items() if isinstance(name, str)]
 

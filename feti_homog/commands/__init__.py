@@ -4,3 +4,5 @@ Imports `analysis`, `api`, `case`, `mesh`, `microstructure`, `report`, `results`
 Modules import the computation inside their action, so that `--help` and `--version` start without NumPy and MPI.  Main
 entries: `run`, `products` and `studies`.
 """
+
+__all__ = ["products", "run", "studies"]

@@ -1,7 +1,5 @@
 """Fibres of a case or result, as the table that [cell] geometry = "table" reads."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,17 +8,12 @@ from typing import Any
 import numpy as np
 
 from feti_homog.analysis import stored_result
-from feti_homog.case import cases
-from feti_homog.case.cell_section import Cell
+from feti_homog.case import cases, cell_section
 from feti_homog.errors import CaseError
-from feti_homog.mesh.arrange import arrange
-from feti_homog.mesh.coarse_mesh import voids
-from feti_homog.mesh.fill.gmsh_mesher import arrangement_scale
-from feti_homog.mesh.mesh_fibres import coating_thickness, fibre_circles, fibre_frames, fibre_numbers
-from feti_homog.mesh.periodic_topology import Torus
-from feti_homog.mesh.readers.msh_reader import read_cell
-from feti_homog.microstructure.shapes.ellipses import Ellipses
-from feti_homog.microstructure.shapes.shapes import columns_without_tips, elliptic
+from feti_homog.mesh import Torus, arrange, coarse_mesh, mesh_fibres
+from feti_homog.mesh.fill import gmsh_mesher
+from feti_homog.mesh.readers import msh_reader
+from feti_homog.microstructure.shapes import Ellipses, shapes
 from feti_homog.typing import Float
 
 
@@ -134,27 +127,29 @@ def _of_records(fibres: Sequence[Mapping[str, Any]], cell: Mapping[str, Any]) ->
     )
 
 
-def _of_cell(cell: Cell) -> ListedFibres:
+def _of_cell(cell: cell_section.Cell) -> ListedFibres:
     if cell.has_own_mesh:
         return _of_mesh(cell)
-    arrangement = arrange(cell)
-    scale = arrangement_scale(cell, arrangement)
+    arrangement = arrange.arrange(cell)
+    scale = gmsh_mesher.arrangement_scale(cell, arrangement)
     size = scale * arrangement.size
-    own = elliptic(arrangement.outlines).grown(arrangement.walls)
+    own = shapes.elliptic(arrangement.outlines).grown(arrangement.walls)
     ellipses = Ellipses(scale * own.centres % size, scale * own.frames)
     coatings = scale * (arrangement.coating - arrangement.walls)
     cores = scale * np.where(arrangement.walls > 0, arrangement.radii, 0.0)
     others = {}
     if cell.table is not None:
-        others = columns_without_tips({name: of[arrangement.row] for name, of in cell.table.columns.items()})
+        others = shapes.columns_without_tips({name: of[arrangement.row] for name, of in cell.table.columns.items()})
     return ListedFibres(size, ellipses, arrangement.phase, coatings, cores, lacks_voids=False, others=others)
 
 
-def _of_mesh(cell: Cell) -> ListedFibres:
-    mesh = read_cell(cell)
+def _of_mesh(cell: cell_section.Cell) -> ListedFibres:
+    mesh = msh_reader.read_cell(cell)
     torus = Torus.of(mesh)
-    numbers, is_fibre = fibre_numbers(torus)
-    ellipses = Ellipses(fibre_circles(torus)[:, :2] % mesh.period, fibre_frames(torus))
-    coatings = coating_thickness(numbers, is_fibre, ellipses.semi_axes)
+    numbers, is_fibre = mesh_fibres.fibre_numbers(torus)
+    ellipses = Ellipses(mesh_fibres.fibre_circles(torus)[:, :2] % mesh.period, mesh_fibres.fibre_frames(torus))
+    coatings = mesh_fibres.coating_thickness(numbers, is_fibre, ellipses.semi_axes)
     phases = tuple(mesh.phases[phase] for phase in torus.constituent_phase[is_fibre])
-    return ListedFibres(mesh.period, ellipses[is_fibre], phases, coatings, np.zeros(len(phases)), voids(mesh) > 0)
+    return ListedFibres(
+        mesh.period, ellipses[is_fibre], phases, coatings, np.zeros(len(phases)), coarse_mesh.voids(mesh) > 0
+    )

@@ -14,15 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from feti_homog.api import folder
 from feti_homog.errors import EXIT_DEFECT, EXIT_DONE, EXIT_UNCONVERGED, CaseError, FetiHomogError
-from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
-from feti_homog.system.runtime.standard_streams import (
-    complain,
-    end_on_signals,
-    launched_rank,
-    prepare,
-    print_product,
-    say,
-)
+from feti_homog.system.parallel import mpi_errors
+from feti_homog.system.runtime import standard_streams
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -97,12 +90,12 @@ def _add(
 def _result_folder(name: str) -> Path:
     """Return a result folder by name; CaseError for a file, or a sweep's folder, whose cases have results."""
     from feti_homog.results import result_json
-    from feti_homog.studies.case_folders import INDEX_FILE
+    from feti_homog.studies import case_folders
 
     directory = folder(name)
     if os.path.isfile(directory):
         raise CaseError(f"{directory}: expected the folder of a result, not a file")
-    if os.path.exists(directory / INDEX_FILE) and not os.path.exists(directory / result_json.NAME):
+    if os.path.exists(directory / case_folders.INDEX_FILE) and not os.path.exists(directory / result_json.NAME):
         raise CaseError(
             f"{directory}: expected the folder of a case, such as {directory / 'case-0001'}, not that of a sweep; "
             f"`feti-homog collect {directory}` draws a sweep"
@@ -114,73 +107,75 @@ def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.analysis import stored_result
     from feti_homog.report.plots import figures
 
-    on_root_only(comm, stored_result.check_to_draw, arguments.directory)
-    paths = on_root_only(comm, figures.plot, arguments.directory)
+    mpi_errors.on_root_only(comm, stored_result.check_to_draw, arguments.directory)
+    paths = mpi_errors.on_root_only(comm, figures.plot, arguments.directory)
     if paths == []:
-        say(f"{arguments.directory}: nothing to draw: its case has no fields, and no points that make a curve")
+        standard_streams.say(
+            f"{arguments.directory}: nothing to draw: its case has no fields, and no points that make a curve"
+        )
     for path in paths or []:
-        say(str(path))
+        standard_streams.say(str(path))
 
 
 def _report(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.analysis import stored_result
     from feti_homog.report import page
 
-    on_root_only(comm, stored_result.read, arguments.directory)
-    path = on_root_only(comm, page.write, arguments.directory)
+    mpi_errors.on_root_only(comm, stored_result.read, arguments.directory)
+    path = mpi_errors.on_root_only(comm, page.write, arguments.directory)
     if path is not None:
-        say(str(path))
+        standard_streams.say(str(path))
 
 
 def _fields(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.analysis import stored_result
     from feti_homog.results import viewed_states
 
-    on_root_only(comm, stored_result.check_to_draw, arguments.directory)
-    for path in on_root_only(comm, viewed_states.write_vtk, arguments.directory, arguments.format) or []:
-        say(str(path))
+    mpi_errors.on_root_only(comm, stored_result.check_to_draw, arguments.directory)
+    for path in mpi_errors.on_root_only(comm, viewed_states.write_vtk, arguments.directory, arguments.format) or []:
+        standard_streams.say(str(path))
 
 
 def _export(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.report.cards import export
     from feti_homog.results import output_folder
 
-    text = on_root(comm, export.card, arguments.directory, arguments.format, arguments.symmetry)
+    text = mpi_errors.on_root(comm, export.card, arguments.directory, arguments.format, arguments.symmetry)
     if arguments.out is not None:
-        text = str(on_root(comm, output_folder.write_product, arguments.out, text))
-    on_root_only(comm, print_product, text)
+        text = str(mpi_errors.on_root(comm, output_folder.write_product, arguments.out, text))
+    mpi_errors.on_root_only(comm, standard_streams.print_product, text)
 
 
 def _fibres(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.commands import listed_fibres
     from feti_homog.results import output_folder
 
-    text = on_root(comm, listed_fibres.table, arguments.source)
+    text = mpi_errors.on_root(comm, listed_fibres.table, arguments.source)
     if arguments.out is None:
-        on_root_only(comm, print_product, text)
-    elif (path := on_root_only(comm, output_folder.write_product, arguments.out, text)) is not None:
-        say(str(path))
+        mpi_errors.on_root_only(comm, standard_streams.print_product, text)
+    elif (path := mpi_errors.on_root_only(comm, output_folder.write_product, arguments.out, text)) is not None:
+        standard_streams.say(str(path))
 
 
 def run_verify(parser: argparse.ArgumentParser, words: Sequence[str]) -> int:
     """Print the certificate of a result; returns the exit code."""
-    prepare()
-    end_on_signals()
-    prints = launched_rank() == 0
+    standard_streams.prepare()
+    standard_streams.end_on_signals()
+    prints = standard_streams.launched_rank() == 0
     os.environ.pop("H5PY_ALWAYS_USE_MPI", None)  # the serial h5py reads the files
-    from feti_homog.verify.certificate import verify
+    from feti_homog.verify import certificate
 
     try:
         arguments = parser.parse_args(words)
-        certificate = verify(arguments.directory)
+        outcome = certificate.verify(arguments.directory)
         if prints:
-            print_product(json.dumps(certificate.document, indent=1) if arguments.json else certificate.text)
+            standard_streams.print_product(json.dumps(outcome.document, indent=1) if arguments.json else outcome.text)
     except PermissionError as error:
         if prints:
-            complain(f"error: {error.filename}: {error.strerror}")
+            standard_streams.complain(f"error: {error.filename}: {error.strerror}")
         return EXIT_DEFECT
     except FetiHomogError as error:
         if prints:
-            complain(*(f"error: {fault}" for fault in error.faults))
+            standard_streams.complain(*(f"error: {fault}" for fault in error.faults))
         return error.exit_code
-    return EXIT_DONE if certificate.holds else EXIT_UNCONVERGED
+    return EXIT_DONE if outcome.holds else EXIT_UNCONVERGED

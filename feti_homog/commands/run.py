@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from feti_homog.api import folder
 from feti_homog.errors import CaseError
-from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
-from feti_homog.system.petsc.option_table import help_text
-from feti_homog.system.runtime.standard_streams import print_product
+from feti_homog.system.parallel import mpi_errors
+from feti_homog.system.petsc import option_table
+from feti_homog.system.runtime import standard_streams
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -31,30 +31,29 @@ def add(actions: argparse._SubParsersAction[Any]) -> None:
 
 
 def _run(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.analysis.runner import run
+    from feti_homog.analysis import runner
     from feti_homog.case import cases
     from feti_homog.results import output_folder
 
-    case = on_root(comm, cases.load, arguments.case)
+    case = mpi_errors.on_root(comm, cases.load, arguments.case)
     if arguments.resume and not case.section.is_followed:
         raise CaseError(f'--resume: only for [analysis] type = "path"; this case has "{case.analysis.type}"')
-    on_root(comm, output_folder.usable, arguments.out)
-    run(case, arguments.out, comm, arguments.quiet, arguments.resume)
+    mpi_errors.on_root(comm, output_folder.usable, arguments.out)
+    runner.run(case, arguments.out, comm, arguments.quiet, arguments.resume)
 
 
 def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.case.toml_files import read_document
-    from feti_homog.case.sections import FIT_SECTIONS
+    from feti_homog.case import sections, toml_files
     from feti_homog.studies import description, fit_file, uncertainty
 
-    document = on_root(comm, read_document, arguments.case)  # once: it may be a pipe
-    if document.keys() & {*FIT_SECTIONS}:
-        text = on_root(comm, fit_file.parse, document, arguments.case.parent).describe(comm)
-    elif on_root(comm, uncertainty.is_study, document):
-        text = on_root(comm, uncertainty.parse, document, arguments.case.parent).describe(comm)
+    document = mpi_errors.on_root(comm, toml_files.read_document, arguments.case)  # once: it may be a pipe
+    if document.keys() & {*sections.FIT_SECTIONS}:
+        text = mpi_errors.on_root(comm, fit_file.parse, document, arguments.case.parent).describe(comm)
+    elif mpi_errors.on_root(comm, uncertainty.is_study, document):
+        text = mpi_errors.on_root(comm, uncertainty.parse, document, arguments.case.parent).describe(comm)
     else:
         text = description.of_document(document, arguments.case.parent, comm)
-    on_root_only(comm, print_product, text)
+    mpi_errors.on_root_only(comm, standard_streams.print_product, text)
 
 
 def add_reference(actions: argparse._SubParsersAction[Any]) -> None:
@@ -70,9 +69,11 @@ def _keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.case import reference
 
     section = arguments.section
-    tables = on_root_only(comm, reference.tables if section is None else partial(reference.tables_of, section))
-    on_root_only(comm, print_product, reference.as_text(tables or []))
+    tables = mpi_errors.on_root_only(
+        comm, reference.tables if section is None else partial(reference.tables_of, section)
+    )
+    mpi_errors.on_root_only(comm, standard_streams.print_product, reference.as_text(tables or []))
 
 
 def _options(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    on_root_only(comm, print_product, help_text())
+    mpi_errors.on_root_only(comm, standard_streams.print_product, option_table.help_text())

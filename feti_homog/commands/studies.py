@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from feti_homog.api import folder
 from feti_homog.errors import CaseError
-from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
-from feti_homog.system.runtime.standard_streams import print_product, say
+from feti_homog.system.parallel import mpi_errors
+from feti_homog.system.runtime import standard_streams
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -96,12 +96,12 @@ def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
     if arguments.out is None and not arguments.list:
         raise CaseError("command line: the following arguments are required: --out (see --help)")
-    sweep = on_root(comm, sweep_cases.load, arguments.case)
+    sweep = mpi_errors.on_root(comm, sweep_cases.load, arguments.case)
     if arguments.list:
-        lines = on_root_only(comm, case_runs.list_cases, sweep, arguments.out) or []
-        on_root_only(comm, print_product, "\n".join(lines))
+        lines = mpi_errors.on_root_only(comm, case_runs.list_cases, sweep, arguments.out) or []
+        mpi_errors.on_root_only(comm, standard_streams.print_product, "\n".join(lines))
         return
-    on_root(comm, output_folder.usable, arguments.out)
+    mpi_errors.on_root(comm, output_folder.usable, arguments.out)
     if arguments.index is None:
         case_runs.run_all(sweep, arguments.out, comm, *_case_options(arguments, comm))
     else:
@@ -111,17 +111,17 @@ def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
 def _collect(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.studies import collect
 
-    for line in on_root_only(comm, collect.collect, arguments.directory, not arguments.no_pictures) or []:
-        say(line)
+    for line in mpi_errors.on_root_only(comm, collect.collect, arguments.directory, not arguments.no_pictures) or []:
+        standard_streams.say(line)
 
 
 def _fit(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.studies import fit_file
 
-    on_root(comm, fit_file.load, arguments.case).run(arguments.out, comm, *_case_options(arguments, comm))
+    mpi_errors.on_root(comm, fit_file.load, arguments.case).run(arguments.out, comm, *_case_options(arguments, comm))
 
 
 def _uncertainty(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.studies import uncertainty
 
-    on_root(comm, uncertainty.load, arguments.case).run(arguments.out, comm, *_case_options(arguments, comm))
+    mpi_errors.on_root(comm, uncertainty.load, arguments.case).run(arguments.out, comm, *_case_options(arguments, comm))

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from feti_homog.fem.stress_recovery import RecoveredStress
-from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.mesh.submeshes import Submesh
+from feti_homog.mesh import ReferenceLattice, Submesh
 from feti_homog.typing import Bool, Float, Int
 
 

@@ -16,8 +16,7 @@ from scipy.sparse import bsr_matrix, csc_matrix, csr_matrix
 from feti_homog.fem import bubble
 from feti_homog.fem.problem import PLANE, Problem
 from feti_homog.fem.shape_functions import gradients
-from feti_homog.mesh.refinement import FineMesh, ReferenceLattice
-from feti_homog.mesh.submeshes import Submesh
+from feti_homog.mesh import FineMesh, ReferenceLattice, Submesh
 from feti_homog.typing import Bool, Float, Int, Int32
 
 # Elements that are integrated at once: bounds the memory of their gradients, about 100 MB of quadratic ones.

@@ -3,8 +3,6 @@
 A growing crack releases the energy that elements lose when their nodes are moved.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ For long fibres strains do not vary along x3, and x3 is a plane of symmetry of e
 the plane and the one along x3 have a problem each: generalized plane strain and axial shear.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """Shape functions on linear and quadratic triangles, and gradients, also a bubble's, at quadrature points."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

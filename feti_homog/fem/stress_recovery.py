@@ -18,7 +18,7 @@ from feti_homog.fem.assembly import ELEMENTS_AT_ONCE
 from feti_homog.fem.local_fits import KnownTractions, PatchNeighbours, fitted, gathered, linear_values, polynomials
 from feti_homog.fem.problem import Problem
 from feti_homog.fem.shape_functions import barycentric, gradients, shape_functions
-from feti_homog.mesh.refinement import FineMesh
+from feti_homog.mesh import FineMesh
 from feti_homog.typing import Float, Int, Int32
 
 # Linear elements that are looked at together: few enough for the processor's cache.

@@ -1,7 +1,7 @@
 """The dual problem of the torn cell: subdomains, multipliers, dual operator, coarse spaces, preconditioners, solver.
 
-Imports `fem`, `feti.coarse`, `feti.decomposition`, `feti.exact`, `feti.operators`, `mesh` and `system`.  Main entry:
-`solver.FetiSolver`. Its own floors, each on the floors below:
+Imports `fem`, `feti.coarse`, `feti.decomposition`, `feti.exact`, `feti.linalg`, `feti.operators`, `mesh` and `system`.
+Main entry: `solver.FetiSolver`. Its own floors, each on the floors below:
 
     solver, factory, solver_plan, krylov, dual_solution, confirmation
     coarse           natural and adaptive coarse space, the preconditioner with the latter
@@ -11,3 +11,8 @@ Imports `fem`, `feti.coarse`, `feti.decomposition`, `feti.exact`, `feti.operator
     linalg           factorizations and matrices on one rank and on all
     thresholds       every tuning constant, with the command that measured it
 """
+
+from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.feti.solver import FetiSolver
+
+__all__ = ["DualSolution", "FetiSolver", "factory", "solver_plan", "thresholds"]

@@ -1,24 +1,16 @@
 """Solutions by influence columns; as long as F lambda confirms them, it is applied only now and then."""
 
-from __future__ import annotations
-
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from feti_homog.errors import ConvergenceError
+from feti_homog.feti import thresholds
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.dual_solution import ActiveJumps, DualSolution
 from feti_homog.feti.exact.exact_inverse import ExactInverse
 from feti_homog.feti.operators.interface_operators import DualOperator
-from feti_homog.feti.thresholds import (
-    LEAST_UNCONFIRMED_JUMP,
-    MOST_CONFIRMED_ROUNDING,
-    MOST_FOLLOWED_ERROR,
-    MOST_UNCONFIRMED,
-    MOST_UNCONFIRMED_ERROR,
-)
-from feti_homog.system.parallel.distributed_arrays import allreduce_sum
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float
 
 
@@ -53,7 +45,7 @@ class InfluenceSolutions:
         if not self._granted:
             return None
         seen, torn = np.einsum("ki,nij,kj->nk", strains, self._squares, strains)
-        if not (seen > LEAST_UNCONFIRMED_JUMP**2 * torn).all():
+        if not (seen > thresholds.LEAST_UNCONFIRMED_JUMP**2 * torn).all():
             return None
         free = self._natural.unconstrained_modes.shape[1]
         answer = self._inverse.answer(d, strains.T, free)
@@ -89,11 +81,11 @@ class InfluenceSolutions:
         if solutions and self._expected is not None:
             self._check(d, solutions)
         confirmed = bool(solutions) and all(solution.iterations == 0 and solution.reason > 0 for solution in solutions)
-        self._granted = min(2 * self._granted + 1, MOST_UNCONFIRMED) if confirmed else 0
+        self._granted = min(2 * self._granted + 1, thresholds.MOST_UNCONFIRMED) if confirmed else 0
         self._left, self._residual = self._granted, max((solution.residual for solution in solutions), default=0.0)
         if confirmed:
             seen = self._jumps.projected(d, self._jumps.norms(d))
-            self._squares = allreduce_sum(self._comm, np.stack([seen.T @ seen, d.T @ d]))
+            self._squares = distributed_arrays.allreduce_sum(self._comm, np.stack([seen.T @ seen, d.T @ d]))
 
     def _check(self, d: Float, solutions: list[DualSolution]) -> None:
         """Compare expected multipliers with solutions that F lambda confirms; renew them if more than rounding differs.
@@ -103,18 +95,18 @@ class InfluenceSolutions:
         lam, opening = (np.stack(x, axis=1) for x in zip(*((s.lam, s.jump) for s in solutions), strict=True))
         # Multipliers that F lambda confirms are off by no less than their residuals.
         lam_error, drift = self._errors(lam, opening, np.array([solution.residual for solution in solutions]))
-        if not lam_error <= MOST_UNCONFIRMED_ERROR:
+        if not lam_error <= thresholds.MOST_UNCONFIRMED_ERROR:
             raise ConvergenceError(
                 f"influence columns: multipliers of the last {self._granted} solves: {lam_error:.1e} off"
             )
-        if (error := float(np.max([lam_error, drift]))) <= max(MOST_FOLLOWED_ERROR, 2.0 * self._rounding):
+        if (error := float(np.max([lam_error, drift]))) <= max(thresholds.MOST_FOLLOWED_ERROR, 2.0 * self._rounding):
             return
         # If renewed multipliers stay the same, the error is rounding of F lambda.
         self._inverse.renew_answer(d)
         strains = np.stack([solution.strain for solution in solutions], axis=1)
         again = self._inverse.answer(d, strains, self._natural.unconstrained_modes.shape[1])
-        is_same = again is not None and float(np.max(self._errors(*again))) <= MOST_FOLLOWED_ERROR
-        self._rounding = min(error, MOST_CONFIRMED_ROUNDING) if is_same else 0.0
+        is_same = again is not None and float(np.max(self._errors(*again))) <= thresholds.MOST_FOLLOWED_ERROR
+        self._rounding = min(error, thresholds.MOST_CONFIRMED_ROUNDING) if is_same else 0.0
 
     def _errors(self, lam: Float, opening: Float, residuals: Float | float = 0.0) -> tuple[float, float]:
         """Return how far the expected multipliers and jumps on inactive rows are off these, (owned rows, k) each.
@@ -126,7 +118,7 @@ class InfluenceSolutions:
         assert self._expected is not None
         expected, jumps, terms = self._expected
         is_open = (jumps != 0.0) * (self._natural.unconstrained_modes.shape[1] == 0)
-        sizes = np.maximum(np.abs(lam), LEAST_UNCONFIRMED_JUMP * terms)
+        sizes = np.maximum(np.abs(lam), thresholds.LEAST_UNCONFIRMED_JUMP * terms)
         errors = np.maximum(np.abs(expected - lam), residuals * np.abs(lam))
         parts = np.abs([errors, sizes, is_open * (jumps - opening), opening]).max(axis=1, initial=0.0)
         parts = np.max(self._comm.allgather(parts), axis=0)  # keeps NaN, which MPI.MAX may lose

@@ -1,7 +1,5 @@
 """Solutions of the dual problem, and the jumps that they leave on the active rows, without rigid-body motions."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +11,7 @@ from feti_homog.feti.krylov import ActiveRows
 from feti_homog.feti.linalg.sparse_matrices import allreduce_sparse
 from feti_homog.feti.operators.interface_operators import DualOperator
 from feti_homog.feti.thresholds import CANCELLED, ROUNDING_MARGIN, SMALL_JUMP, ZERO_JUMP
-from feti_homog.system.parallel.distributed_arrays import allreduce_sum
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float
 
 
@@ -58,7 +56,7 @@ class ActiveJumps:
 
     def norms(self, x: Float) -> Float:
         """(k,) of the columns of x (owned rows, k)."""
-        norms: Float = np.sqrt(allreduce_sum(self._comm, np.einsum("ik,ik->k", x, x)))
+        norms: Float = np.sqrt(distributed_arrays.allreduce_sum(self._comm, np.einsum("ik,ik->k", x, x)))
         return norms
 
     def projected(self, x: Float, size: Float) -> Float:
@@ -104,7 +102,10 @@ class ActiveJumps:
         # Free bodies lie where faces part least, however they are cut.
         if (Z := self._natural.unconstrained_modes).shape[1]:
             M = self._natural.G @ Z
-            squares, sums = allreduce_sparse(self._comm, (M.T @ M).tocsr()), allreduce_sum(self._comm, M.T @ jump)
+            squares, sums = (
+                allreduce_sparse(self._comm, (M.T @ M).tocsr()),
+                distributed_arrays.allreduce_sum(self._comm, M.T @ jump),
+            )
             least = Z @ splu(squares.tocsc()).solve(sums)
             alpha, jump = alpha - least, jump - self._natural.G @ least
         residual = self.norms(self._active.restrict(jump)) / np.where(scale > 0, scale, 1.0)

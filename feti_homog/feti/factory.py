@@ -17,7 +17,7 @@ from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.preconditioners import Dirichlet, Identity, Lumped, Preconditioner
 from feti_homog.feti.solver_plan import BONDED, ProblemSizes, SolverOptions, choose
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
-from feti_homog.system.parallel.mpi_errors import agree
+from feti_homog.system.parallel import mpi_errors
 from feti_homog.typing import Float
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ def build(
     operator = "explicit" if one_each and options.operator == "auto" else options.operator
     how = operator, applications, soft, thresholds, springs, recovers and one_each
     with PETSc.Log.Event("FETISubdomains"):
-        operators = agree(comm, InterfaceOperators, jump_operator, subdomains, *how)
+        operators = mpi_errors.agree(comm, InterfaceOperators, jump_operator, subdomains, *how)
     plan = choose(_sizes(operators, applications, one_each), options, thresholds)
     preconditioner = construct(plan.preconditioner, operators)
     with PETSc.Log.Event("FETINatural"):

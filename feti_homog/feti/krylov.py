@@ -6,8 +6,6 @@ A vector holds k multiplier vectors, the k values of a row side by side, so that
 Errors that the contexts raise are kept until PETSc has returned (`CallbackErrors`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -18,8 +16,8 @@ from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.operators.interface_operators import DualOperator
 from feti_homog.feti.operators.preconditioners import Preconditioner
 from feti_homog.feti.thresholds import FORCE_STALL_ITERATIONS, MAX_ITERATIONS, RTOL, STALL_ITERATIONS
-from feti_homog.system.parallel.distributed_arrays import allreduce_sum, scale_rows
-from feti_homog.system.petsc.c_functions import CallbackErrors
+from feti_homog.system.parallel import distributed_arrays
+from feti_homog.system.petsc import c_functions
 from feti_homog.typing import Float
 
 # Methods that apply the preconditioner to the residual itself, so that the jump can be read off there.  With others
@@ -37,7 +35,7 @@ class ActiveRows:
 
     def restrict(self, x: Float) -> Float:
         """x (rows,) or (rows, k) with 0 on the inactive rows."""
-        return scale_rows(self.mask, x)
+        return distributed_arrays.scale_rows(self.mask, x)
 
 
 class ProjectedProblem:
@@ -45,7 +43,7 @@ class ProjectedProblem:
 
     def __init__(
         self,
-        errors: CallbackErrors,
+        errors: c_functions.CallbackErrors,
         operator: DualOperator,
         preconditioner: Preconditioner,
         natural: NaturalCoarseSpace,
@@ -77,7 +75,9 @@ class ProjectedProblem:
     def jump_norm(self) -> float:
         """|P r| of the last r: the jump that the best rigid-body motions leave.  Collective."""
         r = self._natural.project(self._residual)
-        return float(np.sqrt(allreduce_sum(self._operator.boundary.comm, np.array([(r * r).sum()]))[0]))
+        return float(
+            np.sqrt(distributed_arrays.allreduce_sum(self._operator.boundary.comm, np.array([(r * r).sum()]))[0])
+        )
 
 
 class Stall:
@@ -108,7 +108,7 @@ class PrimalTest:
         jump_scale, force_scale: norms of the torn cell's jump and of the forces that close it, for the next solve.
     """
 
-    def __init__(self, errors: CallbackErrors, problem: ProjectedProblem) -> None:
+    def __init__(self, errors: c_functions.CallbackErrors, problem: ProjectedProblem) -> None:
         self._errors, self._problem, self.ends_on_stall = errors, problem, False
         self.jump_scale, self.force_scale = 1.0, 1.0
         self._jump_stall, self._force_stall = Stall(STALL_ITERATIONS), Stall(FORCE_STALL_ITERATIONS)
@@ -170,7 +170,7 @@ class Krylov:
         self._columns = columns
         owned_rows, all_rows = vector.getSizes()
         sizes = (owned_rows * columns, all_rows * columns)
-        self._errors = CallbackErrors(comm)
+        self._errors = c_functions.CallbackErrors(comm)
         context = ProjectedProblem(self._errors, operator, preconditioner, natural, active, columns)
         self.test = PrimalTest(self._errors, context)
         A = PETSc.Mat().createPython((sizes, sizes), context, comm=vector.comm)

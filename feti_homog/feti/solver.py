@@ -7,8 +7,6 @@ With f = -Q E for the v unit loads E, the macroscopic strain first, Eqs. (34), (
 C is the compliance of elastic bonds, 0 of glue; then the faces part by B u* = C lam.
 """
 
-from __future__ import annotations
-
 import weakref
 from collections.abc import Sequence
 from functools import cached_property
@@ -18,7 +16,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from feti_homog.fem.problem import PLANE, Problem
+from feti_homog.fem import PLANE, Problem
 from feti_homog.feti import factory
 from feti_homog.feti.decomposition.jump_operator import GLUE, InterfaceSprings, JumpOperator
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
@@ -28,7 +26,7 @@ from feti_homog.feti.krylov import ActiveRows, Krylov
 from feti_homog.feti.operators.interface_operators import DualOperator
 from feti_homog.feti.operators.one_subdomain import CondensedLoads
 from feti_homog.feti.thresholds import DEFAULTS, MAX_RESTARTS, MOST_DOFS_UNTRIMMED, Thresholds
-from feti_homog.mesh.refinement import ReferenceLattice
+from feti_homog.mesh import ReferenceLattice
 from feti_homog.system.runtime import process_memory
 from feti_homog.typing import Float
 

@@ -6,8 +6,6 @@ constants below it are limits of rounding and of memory at a time; no result dep
 tolerance.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -11,15 +11,12 @@ from itertools import product
 
 import numpy as np
 
-from feti_homog.case.cases import Case
-from feti_homog.case.interface_section import interface_label
+from feti_homog.case import Case, interface_section
 from feti_homog.interface import debonded_arcs
-from feti_homog.interface.debonded_arcs import MovedTips
-from feti_homog.mesh.outline.outline import MERGED
-from feti_homog.mesh.periodic_topology import Torus
-from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.mesh.sizes.element_estimate import ElementEstimate, ratio_at_a_tip
-from feti_homog.microstructure.phase_names import COATING, MATRIX
+from feti_homog.mesh import ReferenceLattice, Torus
+from feti_homog.mesh.outline import outline
+from feti_homog.mesh.sizes import element_estimate
+from feti_homog.microstructure import phase_names
 from feti_homog.typing import Bool, Float, Int
 
 # The stress at a tip is singular, so that the energy errs by about the size of the elements there, elsewhere by
@@ -34,13 +31,15 @@ def marks(case: Case, fibres: int) -> dict[int, list[float]]:
     """Return all tip directions by their curve's number (`BareOutline.of`)."""
     by_curve: dict[int, set[float]] = {}
     for interface in case.interfaces:
-        is_within = interface.between is not None and {COATING, MATRIX} & set(interface.between) == {COATING}
+        is_within = interface.between is not None and {phase_names.COATING, phase_names.MATRIX} & set(
+            interface.between
+        ) == {phase_names.COATING}
         for fibre, directions in debonded_arcs.tips(interface.debonded, case.section.openings, fibres).items():
             by_curve.setdefault(~fibre if is_within else fibre, set()).update(directions)
     return {curve: sorted(by_curve[curve]) for curve in sorted(by_curve)}
 
 
-def size(case: Case, estimate: ElementEstimate) -> float | None:
+def size(case: Case, estimate: element_estimate.ElementEstimate) -> float | None:
     """Return element size at tips / cell width, or None: interface size.
 
     Without `tip_size` in the case it is, with the mean radius / width R,
@@ -59,7 +58,7 @@ def size(case: Case, estimate: ElementEstimate) -> float | None:
     size_at_tips = max(balanced, LEAST_SIZE)
     if len(case.section.openings) > 1:
         share = TIP_TRIANGLES * estimate.triangles / tips
-        size_at_tips = max(size_at_tips, around / ratio_at_a_tip(share))
+        size_at_tips = max(size_at_tips, around / element_estimate.ratio_at_a_tip(share))
     return min(around, size_at_tips)
 
 
@@ -94,14 +93,14 @@ class EstimatedNodes:
         is_vertex = (step == 0) | (step == lattice.intervals)
         return cls(numbers[inner[side]], pair[pair >= 0][side], directions, is_vertex)
 
-    def moved_tips(self, case: Case, fibres: int) -> tuple[MovedTips, ...]:
+    def moved_tips(self, case: Case, fibres: int) -> tuple[debonded_arcs.MovedTips, ...]:
         """Find each interface's tips that the mesher moved into a near vertex.
 
         A user's mesh has none.
         """
         if case.cell.has_own_mesh:
             return (debonded_arcs.NOT_MOVED,) * len(case.interfaces)
-        distance, moved = float(np.degrees(MERGED)), []
+        distance, moved = float(np.degrees(outline.MERGED)), []
         for pair, interface in enumerate(case.interfaces):
             at = self.is_vertex & (self.pair == pair)
             tips = debonded_arcs.tips(interface.debonded, case.section.openings, fibres)
@@ -114,17 +113,19 @@ def fibre_faults(case: Case, centres: Float) -> list[str]:
     return [
         fault
         for pair, interface in enumerate(case.interfaces)
-        for fault in debonded_arcs.faults(interface.debonded, centres, interface_label(pair, len(case.interfaces)))
+        for fault in debonded_arcs.faults(
+            interface.debonded, centres, interface_section.interface_label(pair, len(case.interfaces))
+        )
     ]
 
 
-def faults(case: Case, nodes: EstimatedNodes, moved: Sequence[MovedTips]) -> list[str]:
+def faults(case: Case, nodes: EstimatedNodes, moved: Sequence[debonded_arcs.MovedTips]) -> list[str]:
     """List faulty arcs, and nonzero [angle] openings that select no node."""
     openings: Sequence[float | None] = case.section.openings or [None]
     lines = []
     for pair, interface in enumerate(case.interfaces):
         fibres, directions = nodes.fibre[nodes.pair == pair], nodes.direction[nodes.pair == pair]
-        label = interface_label(pair, len(case.interfaces))
+        label = interface_section.interface_label(pair, len(case.interfaces))
         for (place, arc), opening in product(enumerate(interface.debonded), openings):
             angle, line = opening if arc.angle is None else arc.angle, f"[{label}] debonded[{place}]"
             inside = debonded_arcs.debonded([arc], opening, fibres, directions, moved[pair])

@@ -3,8 +3,6 @@
 Strains E are [E11, E22, gamma12] in the plane, then the problem's other loads; stresses are alike.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,14 +11,21 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.errors import ConvergenceError
-from feti_homog.feti.decomposition.jump_operator import NodeBlocks
+from feti_homog.feti.decomposition import jump_operator
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.interface.contact.contact_problem import ContactProblem
-from feti_homog.interface.contact.coupled_interfaces import energy_beside_springs, slipped
-from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status
-from feti_homog.interface.loads import Load
-from feti_homog.materials.voigt import STRAINS, STRESSES
-from feti_homog.system.parallel.distributed_arrays import allreduce_sum
+from feti_homog.interface import Load
+from feti_homog.interface.contact import (
+    BONDED,
+    CLOSED,
+    OPEN,
+    BondState,
+    Equilibrium,
+    Status,
+    contact_problem,
+    coupled_interfaces,
+)
+from feti_homog.materials import voigt
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Bool, Float
 
 
@@ -66,8 +71,8 @@ class Response:
     @property
     def leading(self) -> str:
         """Names and values for the largest plane strain and its stress."""
-        k = int(np.abs(self.strain[: len(STRAINS)]).argmax())
-        return f"{STRAINS[k]} {self.strain[k]:.4g}, {STRESSES[k]} {self.stress[k]:.4g}"
+        k = int(np.abs(self.strain[: len(voigt.STRAINS)]).argmax())
+        return f"{voigt.STRAINS[k]} {self.strain[k]:.4g}, {voigt.STRESSES[k]} {self.stress[k]:.4g}"
 
     @property
     def debonded(self) -> int:
@@ -86,7 +91,7 @@ class Homogenization:
     def __init__(self, cell: TornCell, contact: bool) -> None:
         self.cell, size = cell, np.array([cell.summary.width, cell.summary.height])
         self.law = cell.bond_law
-        self.interface = ContactProblem(cell.solver, contact, size, self.law.softening)
+        self.interface = contact_problem.ContactProblem(cell.solver, contact, size, self.law.softening)
 
     @property
     def intact(self) -> BondState:
@@ -136,11 +141,13 @@ class Homogenization:
         work = strain @ solver.condensed.energy @ strain + 2 * strain @ from_u
         work += u @ solver.interface_operators.apply_schur(u)
         sums = np.concatenate([without_u + from_u, self._strain_of_displacements.T @ u, [work]])
-        stress, star, (energy,) = np.split(allreduce_sum(cell.comm, sums) / cell.summary.area, [len(strain), -1])
+        stress, star, (energy,) = np.split(
+            distributed_arrays.allreduce_sum(cell.comm, sums) / cell.summary.area, [len(strain), -1]
+        )
         springs = state.solution.compliance * state.solution.lam
-        active = self.interface.active(state.status) * (slipped(self.interface, state) == 0.0)
+        active = self.interface.active(state.status) * (coupled_interfaces.slipped(self.interface, state) == 0.0)
         opened = state.solution.jump * (1 - active) + springs
-        opening = allreduce_sum(self.cell.comm, self._strain_of_jumps.T @ opened)
+        opening = distributed_arrays.allreduce_sum(self.cell.comm, self._strain_of_jumps.T @ opened)
         energy = float(energy) + self._stretched(state)
         rubbing = self._rubbing(state)
         acting, scales = self.interface.acting(state.bonds, strain, state.asked), self.interface.scales
@@ -160,7 +167,7 @@ class Homogenization:
     def _stretched(self, state: Equilibrium) -> float:
         """Return twice the spring energy per area, rubbing bonds included.  Collective."""
         springs = state.solution.compliance * state.solution.lam
-        twice = float(state.solution.lam @ springs) + energy_beside_springs(self.interface, state)
+        twice = float(state.solution.lam @ springs) + coupled_interfaces.energy_beside_springs(self.interface, state)
         return float(self.cell.comm.allreduce(twice)) / self.cell.summary.area
 
     def _scaled(
@@ -181,7 +188,9 @@ class Homogenization:
         """Sum friction work on faces per area, not stored.  Collective."""
         if state.bonds.gap_and_slip is None:
             return 0.0
-        work = float(state.solution.lam @ state.solution.jump) - energy_beside_springs(self.interface, state)
+        work = float(state.solution.lam @ state.solution.jump) - coupled_interfaces.energy_beside_springs(
+            self.interface, state
+        )
         return float(self.cell.comm.allreduce(work)) / self.cell.summary.area
 
     def _unmet_stress(self, state: Equilibrium, stress: Float) -> float:
@@ -207,7 +216,7 @@ class Homogenization:
         solver = self.cell.solver
         B = solver.interface_operators.B
         integrals = solver.jump_operator.sum(B @ self._strain_of_displacements)
-        gram = NodeBlocks(self.cell.comm, solver.jump_operator, B @ B.T)
+        gram = jump_operator.NodeBlocks(self.cell.comm, solver.jump_operator, B @ B.T)
         return np.asarray(gram.inverse(np.ones(gram.rows)) @ integrals)
 
     @cached_property
@@ -257,7 +266,7 @@ class FibreInterfaces:
     def length(self, which: Bool) -> Float:
         """(f,) interface length at the nodes `which` (k,) on all ranks.  Collective."""
         sums: Float = np.bincount(self._fibre, self._nodes.length * which, self._fibres).astype(float)
-        return allreduce_sum(self._comm, sums)
+        return distributed_arrays.allreduce_sum(self._comm, sums)
 
     def loose(self, status: Status) -> list[int]:
         """Return fibre numbers, from 1, without a bond that holds.  Collective."""
@@ -278,8 +287,8 @@ class FibreInterfaces:
             np.bincount(self._nodes.pair, values, self._pairs).astype(float)
             for values in (self._nodes.length, self._nodes.length * (status != BONDED))
         )
-        length = allreduce_sum(self._comm, length)
-        return np.asarray(allreduce_sum(self._comm, debonded) / np.where(length > 0, length, 1.0))
+        length = distributed_arrays.allreduce_sum(self._comm, length)
+        return np.asarray(distributed_arrays.allreduce_sum(self._comm, debonded) / np.where(length > 0, length, 1.0))
 
 
 def asymmetry(L: Float) -> float:

@@ -1,21 +1,15 @@
 """Interfaces between a cell's phases, unexpected cell properties, and unresolved bonds."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 
-from feti_homog.case import cell_sizes
-from feti_homog.case.cases import Case
-from feti_homog.case.interface_section import interface_label
+from feti_homog.case import Case, cell_sizes, interface_section
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.arc_selection import LEAST_SIZE
-from feti_homog.materials.engineering_constants import engineering_moduli
-from feti_homog.materials.laws import plane_stiffness
-from feti_homog.mesh.periodic_topology import Torus
-from feti_homog.mesh.submeshes import pinned_class
-from feti_homog.schema.wording import toml_value
+from feti_homog.materials import engineering_constants, laws
+from feti_homog.mesh import Torus, submeshes
+from feti_homog.schema import wording
 from feti_homog.typing import AnyInt, Float, Int
 
 SAME_FRACTION = 0.01  # of a matched table and its cell, relative
@@ -54,10 +48,11 @@ def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -
     for number, interface in enumerate(case.interfaces):
         if interface.between is None:
             continue
-        line = f"[{interface_label(number, len(case.interfaces))}] between = {toml_value(list(interface.between))}: "
+        section = interface_section.interface_label(number, len(case.interfaces))
+        line = f"[{section}] between = {wording.toml_value(list(interface.between))}: "
         unknown = [name for name in interface.between if name not in phases]
         if unknown:
-            lines.append(f"{line}the cell has no phase {toml_value(unknown[0])}; it has {', '.join(phases)}")
+            lines.append(f"{line}the cell has no phase {wording.toml_value(unknown[0])}; it has {', '.join(phases)}")
         elif not touching[tuple(map(phases.index, interface.between))]:
             lines.append(f"{line}expected phases that touch; in this cell they do nowhere")
     return lines
@@ -85,7 +80,7 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
 
 def _pinned_bond(torus: Torus) -> list[str]:
     """Remark a bond at the pinned node, Eq. (15): it never parts."""
-    at = np.searchsorted(torus.class_keys, pinned_class(torus))
+    at = np.searchsorted(torus.class_keys, submeshes.pinned_class(torus))
     if torus.never_part[at] or torus.meeting[at] < 2:
         return []
     x, y = torus.mesh.points[np.flatnonzero(torus.node_class == at)[0]]
@@ -140,7 +135,10 @@ def process_zone(case: Case) -> float | None:
         lengths += [toughness / strength**2 for toughness, strength in pure if toughness and strength]
     if not phase_laws.has_process_zone(case) or not lengths:
         return None
-    moduli = [engineering_moduli(plane_stiffness(m, case.analysis.plane)) for m in case.materials.values()]
+    moduli = [
+        engineering_constants.engineering_moduli(laws.plane_stiffness(m, case.analysis.plane))
+        for m in case.materials.values()
+    ]
     return min(min(m.E1, m.E2) for m in moduli) * min(lengths)
 
 
@@ -182,8 +180,9 @@ def _law_warnings(case: Case) -> list[str]:
         )
         similar = strength**2 / toughness
         if abs(stiffness / similar - 1.0) > SAME_RATIO:
+            section = interface_section.interface_label(number, len(case.interfaces))
             lines.append(
-                f"[{interface_label(number, len(case.interfaces))}] tangential_stiffness / normal_stiffness = "
+                f"[{section}] tangential_stiffness / normal_stiffness = "
                 f"{stiffness:.4g}: other than (normal_toughness / tangential_toughness) (tangential_strength / "
                 f"normal_strength)^2 = {similar:.4g}: the energy of bonds whose mode changes depends on the way"
             )

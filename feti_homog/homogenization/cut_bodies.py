@@ -13,12 +13,10 @@ from itertools import pairwise
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.fem.local_fits import PatchNeighbours, fitted
-from feti_homog.fem.stress_recovery import RecoveredStress
-from feti_homog.feti.decomposition.sharers import entity_code
-from feti_homog.mesh.refinement import FineMesh
-from feti_homog.mesh.submeshes import Submesh
-from feti_homog.system.parallel.distributed_arrays import exchange
+from feti_homog.fem import local_fits, stress_recovery
+from feti_homog.feti.decomposition import sharers
+from feti_homog.mesh import FineMesh, Submesh
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Array, Bool, Float, Int, Int32
 
 NO_ROWS = np.zeros((0, 3), np.int64)
@@ -77,7 +75,7 @@ class SharedVertices:
     def _at_home(self, rows: Int, values: Array, combine: Callable[[Int, Array], Array]) -> Array:
         """Call `combine` at home with rows (n, 3), values (n, k).  Collective."""
         comm, home = self._comm, rows[:, 1:].sum(axis=1) // 2 % self._comm.size
-        rows, values, source, place = exchange(
+        rows, values, source, place = distributed_arrays.exchange(
             comm, home, rows, values, np.full(len(rows), comm.rank), np.arange(len(rows))
         )
         order = np.lexsort(rows.T)
@@ -85,7 +83,7 @@ class SharedVertices:
         is_new[1:] = (np.diff(rows[order], axis=0) != 0).any(axis=1)
         number = np.empty(len(order), np.int64)
         number[order] = np.cumsum(is_new) - 1
-        place, combined = exchange(comm, source, place, combine(number, values))
+        place, combined = distributed_arrays.exchange(comm, source, place, combine(number, values))
         return np.asarray(combined[np.argsort(place)])
 
 
@@ -109,9 +107,11 @@ def _border(submeshes: Sequence[Submesh], mesh: FineMesh) -> tuple[Int, Int, Int
         ends[back] = ends[back, ::-1]
         place = np.arange(line.shape[1])
         place[-1] = 0
-        key = np.tile(entity_code(s.edge_keys[s.edge_class[s.triangle_edges[triangle, k]]], True)[:, None], len(place))
+        key = np.tile(
+            sharers.entity_code(s.edge_keys[s.edge_class[s.triangle_edges[triangle, k]]], True)[:, None], len(place)
+        )
         edges = np.column_stack([s.constituent[triangle], key[:, 0], np.zeros(len(key), np.int64)])
-        key[:, [0, -1]] = entity_code(s.class_keys[ends], False)
+        key[:, [0, -1]] = sharers.entity_code(s.class_keys[ends], False)
         rows = np.stack(np.broadcast_arrays(s.constituent[triangle][:, None], key, place), axis=2).reshape(-1, 3)
         classes, once = np.unique(line, return_index=True)
         borders.append((rows[once], classes, edges, line))
@@ -133,7 +133,9 @@ def border_lines(s: Submesh, mesh: FineMesh, classes: Int32) -> tuple[Int, Int, 
     return triangle, k, line
 
 
-def fits_across_cuts(shared: SharedVertices, bodies: Sequence[RecoveredStress]) -> dict[int, tuple[Int, Float]]:
+def fits_across_cuts(
+    shared: SharedVertices, bodies: Sequence[stress_recovery.RecoveredStress]
+) -> dict[int, tuple[Int, Float]]:
     """Return vertex classes (n,) and changed fits (n, p, m k), by mesh.  Collective."""
     pieces = zip(shared.meshes, shared.classes, shared.sides, shared.is_first, strict=True)
     strips = [_Strip.of(bodies[mesh], classes, sides, first) for mesh, classes, sides, first in pieces]
@@ -149,7 +151,7 @@ def fits_across_cuts(shared: SharedVertices, bodies: Sequence[RecoveredStress]) 
     more = _over_pieces(shared, strips, more)
     for mesh, strip, pairs, patch, added in zip(shared.meshes, strips, neighbours, patches, more, strict=True):
         changed = np.union1d(strip.shared, pairs.at[np.isin(pairs.other, strip.shared)])
-        of_strip = fitted(*(a[changed] + b[changed] for a, b in zip(patch, added, strict=True)))
+        of_strip = local_fits.fitted(*(a[changed] + b[changed] for a, b in zip(patch, added, strict=True)))
         fits[mesh] = np.flatnonzero(strip.is_vertex)[changed], of_strip
     return fits
 
@@ -166,7 +168,7 @@ class _Strip:
         bounds: (b,) vertices at which a side has no other element in the body.
     """
 
-    stress: RecoveredStress
+    stress: stress_recovery.RecoveredStress
     is_vertex: Bool
     shared: Int
     sides: Int
@@ -174,7 +176,7 @@ class _Strip:
     bounds: Int
 
     @classmethod
-    def of(cls, body: RecoveredStress, classes: Int, cut: Int, is_first: Bool) -> _Strip:
+    def of(cls, body: stress_recovery.RecoveredStress, classes: Int, cut: Int, is_first: Bool) -> _Strip:
         """Find elements; other pieces count sides `cut` (c, 2) except first copies."""
         is_vertex, at = np.zeros(len(body.u), bool), body.node_class[body.triangles[:, :3]]
         is_vertex[classes] = True
@@ -192,14 +194,14 @@ class _Strip:
         sides = np.stack([start, stop], axis=1)
         return cls(stress, is_vertex, stress.numbers[classes], sides[once], vector[once], np.unique(sides[single]))
 
-    def neighbours(self, at_boundary: Bool) -> PatchNeighbours:
+    def neighbours(self, at_boundary: Bool) -> local_fits.PatchNeighbours:
         """Return pairs from boundary vertices; shared vertices (n,) count if `at_boundary`."""
         is_bound = np.zeros(int(self.is_vertex.sum()), bool)
         is_bound[self.bounds] = True
         is_bound[self.shared] = at_boundary
         at, other = np.concatenate([self.sides, self.sides[:, ::-1]]).T
         vector = np.concatenate([self.vector, -self.vector])
-        return PatchNeighbours(at[is_bound[at]], other[is_bound[at]], vector[is_bound[at]])
+        return local_fits.PatchNeighbours(at[is_bound[at]], other[is_bound[at]], vector[is_bound[at]])
 
 
 def _code(a: Int, b: Int, size: int) -> Int:

@@ -1,33 +1,20 @@
 """The cut cell on rank 0: from coarse mesh to ranks' submeshes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.case.cases import Case
+from feti_homog.case import Case
 from feti_homog.errors import CaseError
-from feti_homog.feti.decomposition.partition import Partition, decompose, halves
-from feti_homog.homogenization import arc_selection, cell_remarks
+from feti_homog.feti.decomposition import partition
+from feti_homog.homogenization import arc_selection, cell_remarks, partition_policy
 from feti_homog.homogenization.arc_selection import EstimatedNodes
 from feti_homog.homogenization.cell_remarks import longest, mesh_remarks, subdomain_remarks, table_remarks
-from feti_homog.homogenization.partition_policy import (
-    DEFAULT_POLICY,
-    PartitionPolicy,
-    can_be_cut_across,
-    wanted_pieces,
-)
 from feti_homog.interface import debonded_arcs
-from feti_homog.interface.debonded_arcs import MovedTips
-from feti_homog.mesh.coarse_mesh import CoarseMesh, interface_edges, voids
-from feti_homog.mesh.fill.gmsh_mesher import NodedCell
-from feti_homog.mesh.mesh_fibres import coating_thickness, fibre_circles, fibre_frames, fibre_numbers
-from feti_homog.mesh.periodic_topology import Torus
-from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.mesh.submeshes import SubdomainTable, SubmeshesOfRank, cut_for_ranks, pinned_class
-from feti_homog.mesh.tiles.tile_filling import arc_edges
-from feti_homog.microstructure.shapes.ellipses import Ellipses
+from feti_homog.mesh import CoarseMesh, ReferenceLattice, SubmeshesOfRank, Torus, coarse_mesh, mesh_fibres, submeshes
+from feti_homog.mesh.fill import gmsh_mesher
+from feti_homog.mesh.tiles import tile_filling
+from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.typing import Bool, Float, Int
 
 ROUNDING = 1e-9  # of coordinates, relative to the cell
@@ -69,7 +56,7 @@ class CellSummary:
     centres: Float
     radii: Float
     frames: Float
-    moved_tips: tuple[MovedTips, ...]
+    moved_tips: tuple[debonded_arcs.MovedTips, ...]
     snapped: float
     voids: int
     match_distance: float | None
@@ -95,7 +82,7 @@ class CellSummary:
     @property
     def coatings(self) -> Float:
         """(fibres,) coating thickness, 0 without one; NaN if not round."""
-        return coating_thickness(self.numbers, self.is_fibre, Ellipses(self.centres, self.frames).semi_axes)
+        return mesh_fibres.coating_thickness(self.numbers, self.is_fibre, Ellipses(self.centres, self.frames).semi_axes)
 
     def fibre_number(self, constituent: Int) -> Int:
         """(k,) fibre `numbers` for constituents (k,)."""
@@ -128,13 +115,17 @@ class RankShare:
     """
 
     summary: CellSummary
-    table: SubdomainTable
+    table: submeshes.SubdomainTable
     pairs: Int
     submeshes: SubmeshesOfRank
 
 
 def distribute(
-    case: Case, mesh: CoarseMesh, lattice: ReferenceLattice, n_ranks: int, policy: PartitionPolicy = DEFAULT_POLICY
+    case: Case,
+    mesh: CoarseMesh,
+    lattice: ReferenceLattice,
+    n_ranks: int,
+    policy: partition_policy.PartitionPolicy = partition_policy.DEFAULT_POLICY,
 ) -> list[RankShare]:
     """Cut the cell into subdomains; return a share for each rank.
 
@@ -142,9 +133,8 @@ def distribute(
         CaseError: an arc lies on a fibre that cannot have it, or selects no node.
     """
     torus = Torus.of(mesh)
-    numbers, is_fibre = fibre_numbers(torus)
-    pairs = cell_remarks.pairs_of(case, mesh.phases)
-    circles = fibre_circles(torus)
+    numbers, is_fibre = mesh_fibres.fibre_numbers(torus)
+    circles, pairs = mesh_fibres.fibre_circles(torus), cell_remarks.pairs_of(case, mesh.phases)
     centres = in_cell(circles[:, :2], mesh.period)
     faults = cell_remarks.faults(case, mesh.phases, *(mesh.phase[side] for side in torus.sides[:2]))
     faults += arc_selection.fibre_faults(case, centres[is_fibre])
@@ -162,9 +152,10 @@ def distribute(
     if cut is None:
         sides = parts[np.stack(torus.sides[:2])]
         shared_edges = np.bincount(sides[:, sides[0] != sides[1]].ravel(), minlength=bodies)
-        pieces = wanted_pieces(case, np.bincount(parts), shared_edges, lattice, n_ranks, policy)
-        cut = decompose(torus, parts, pieces, n_ranks)
-    table = SubdomainTable.of(torus, cut.subdomain, cut.rank, across)
+        pieces = partition_policy.wanted_pieces(case, np.bincount(parts), shared_edges, lattice, n_ranks, policy)
+        cut = partition.decompose(torus, parts, pieces, n_ranks)
+    table = submeshes.SubdomainTable.of(torus, cut.subdomain, cut.rank, across)
+    notes = subdomain_remarks(case, bodies, len(cut.rank), triangles)
     summary = CellSummary(
         width=mesh.width,
         height=mesh.height,
@@ -172,30 +163,26 @@ def distribute(
         bodies=bodies,
         subdomains=len(cut.rank),
         coarse_triangles=triangles,
-        interface_edge=longest(mesh.points[interface_edges(mesh)]),
+        interface_edge=longest(mesh.points[coarse_mesh.interface_edges(mesh)]),
         numbers=numbers,
         is_fibre=is_fibre,
         constituent_phase=torus.constituent_phase,
         centres=centres,
         radii=circles[:, 2],
-        frames=fibre_frames(torus),
+        frames=mesh_fibres.fibre_frames(torus),
         moved_tips=tuple(map(dict, moved)),
         snapped=mesh.snapped,
-        voids=voids(mesh) if torus.at_void.any() else 0,
+        voids=coarse_mesh.voids(mesh) if torus.at_void.any() else 0,
         match_distance=match_distance(case, mesh.width, mesh.height, centres[is_fibre], circles[is_fibre, 2]),
-        remarks=(
-            *table_remarks(case),
-            *mesh_remarks(case, torus, pairs),
-            *subdomain_remarks(case, bodies, len(cut.rank), triangles),
-        ),
+        remarks=(*table_remarks(case), *mesh_remarks(case, torus, pairs), *notes),
         across=across,
         interface_nodes=_interface_nodes(torus, pairs, lattice) if across else None,
     )
-    submeshes = cut_for_ranks(torus, cut.subdomain, table, n_ranks, pinned_class(torus))
-    return [RankShare(summary, table, pairs, share) for share in submeshes]
+    shares = submeshes.cut_for_ranks(torus, cut.subdomain, table, n_ranks, submeshes.pinned_class(torus))
+    return [RankShare(summary, table, pairs, share) for share in shares]
 
 
-def summary_of(case: Case, noded: NodedCell, subdomains: int, triangles: int) -> CellSummary:
+def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triangles: int) -> CellSummary:
     """Summarize the cell with so many subdomains and coarse triangles."""
     regions, lines, arrangement = noded.regions, noded.lines, noded.arrangement
     inside = regions.constituent[:-1]
@@ -213,7 +200,7 @@ def summary_of(case: Case, noded: NodedCell, subdomains: int, triangles: int) ->
         bodies=len(regions.phase),
         subdomains=subdomains,
         coarse_triangles=triangles,
-        interface_edge=longest(noded.scale * lines.points[arc_edges(lines.curves)[0]]),
+        interface_edge=longest(noded.scale * lines.points[tile_filling.arc_edges(lines.curves)[0]]),
         numbers=np.append(0, disc + 1),
         is_fibre=np.append(False, is_fibre),
         constituent_phase=regions.phase,
@@ -233,20 +220,24 @@ def summary_of(case: Case, noded: NodedCell, subdomains: int, triangles: int) ->
 
 
 def _cut_across(
-    case: Case, torus: Torus, lattice: ReferenceLattice, n_ranks: int, policy: PartitionPolicy
-) -> Partition | None:
+    case: Case, torus: Torus, lattice: ReferenceLattice, n_ranks: int, policy: partition_policy.PartitionPolicy
+) -> partition.Partition | None:
     """Return the cell cut across materials.
 
     None if it is not asked for, or leaves a rank without a piece.
     """
     triangles = len(torus.mesh.triangles)
-    pieces = policy.across_pieces(triangles * lattice.intervals**2, n_ranks) if can_be_cut_across(case) else 0
+    pieces = (
+        policy.across_pieces(triangles * lattice.intervals**2, n_ranks)
+        if partition_policy.can_be_cut_across(case)
+        else 0
+    )
     if not 0 < pieces <= triangles:
         return None
     is_large = triangles * lattice.intervals**2 >= policy.strip_dofs
-    if pieces == n_ranks == 2 and is_large and (strips := halves(torus)):
+    if pieces == n_ranks == 2 and is_large and (strips := partition.halves(torus)):
         return strips
-    cut = decompose(torus, np.zeros(triangles, np.int64), np.array([pieces]), n_ranks)
+    cut = partition.decompose(torus, np.zeros(triangles, np.int64), np.array([pieces]), n_ranks)
     return cut if len(cut.rank) >= n_ranks else None  # METIS leaves some pieces empty
 
 
@@ -255,9 +246,9 @@ def match_distance(case: Case, width: float, height: float, centres: Float, radi
     window = case.cell.matched
     if window is None:
         return None
-    from feti_homog.microstructure.random_fibres import distance_of  # with statistics of neighbours
+    from feti_homog.microstructure import random_fibres  # with statistics of neighbours
 
-    return distance_of(window, width, height, centres, radii)
+    return random_fibres.distance_of(window, width, height, centres, radii)
 
 
 def in_cell(points: Float, period: Float) -> Float:
@@ -272,5 +263,5 @@ def _interface_nodes(torus: Torus, pairs: Int, lattice: ReferenceLattice) -> int
     between = edge[pairs[torus.mesh.phase[first], torus.mesh.phase[second]] >= 0]
     plane = np.unique(torus.torus_edge, return_index=True)[1][between]
     ends = np.unique(torus.node_class[torus.edges[plane]])
-    may_part = ~torus.never_part[ends] & (torus.class_keys[ends] != pinned_class(torus))
+    may_part = ~torus.never_part[ends] & (torus.class_keys[ends] != submeshes.pinned_class(torus))
     return len(between) * (lattice.intervals - 1) + int(may_part.sum())

@@ -11,26 +11,22 @@ the length of this part, because between two materials the stress oscillates tow
 For elastic bonds G = <t_n>^2 / (2 k_n) + t_t^2 / (2 k_t) is the spring energy at the tip.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from feti_homog.fem.assembly import nodes_along
-from feti_homog.fem.point_fields import energy_change
-from feti_homog.feti.decomposition.subdomain import Subdomain
+from feti_homog.fem import assembly, point_fields
+from feti_homog.feti.decomposition import Subdomain
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.domain_partition import in_cell
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.interface.contact.contact_problem import ContactProblem
-from feti_homog.interface.contact.states import BONDED, Status
-from feti_homog.interface.debonded_arcs import CrackTips, InterfaceChains, closing_work
-from feti_homog.materials.voigt import strain_tensor
-from feti_homog.system.parallel.distributed_arrays import allreduce_sum
+from feti_homog.interface import debonded_arcs
+from feti_homog.interface.contact import BONDED, Status, contact_problem
+from feti_homog.materials import voigt
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Array, Float, Int
 
 DIRECTION_DIGITS = 9
@@ -79,7 +75,9 @@ class CrackExtension:
         share = np.clip((reach - np.linalg.norm(away, axis=2)) / (reach * (1 - CORE)), 0.0, 1.0)[..., None]
         total = u.reshape(-1, 2)[mesh.node_class[nodes]] + away @ E
         moved, changed = share * ((away + spoke) @ QUARTER_TURN.T), share * (total @ QUARTER_TURN.T)
-        return energy_change(points, total, self.subdomain.L[:3, :3], moved, changed, self.subdomain.is_mixed)
+        return point_fields.energy_change(
+            points, total, self.subdomain.L[:3, :3], moved, changed, self.subdomain.is_mixed
+        )
 
 
 @dataclass(frozen=True)
@@ -121,11 +119,11 @@ class EnergyReleaseRates:
             and inner constituents, interface sections, degrees about the inner one's centre, lengths.
     """
 
-    def __init__(self, cell: TornCell, interface: ContactProblem) -> None:
+    def __init__(self, cell: TornCell, interface: contact_problem.ContactProblem) -> None:
         """Find the tips and their neighbours.  Collective."""
         nodes = interface.nodes
         self.cell, self.interface, self._period = cell, interface, cell.summary.period
-        self._chains = InterfaceChains(cell.neighbours.adjacency)
+        self._chains = debonded_arcs.InterfaceChains(cell.neighbours.adjacency)
         self._extensions = [CrackExtension(s, self._period) for s in cell.subdomains]
         self.points, self.bodies = self._gathered(nodes.points), self._gathered(nodes.bodies)
         self.pair = self._gathered(nodes.pair)
@@ -147,7 +145,7 @@ class EnergyReleaseRates:
         for s, border in zip(cell.subdomains, borders, strict=True):
             cut = np.isin(s.submesh.edge_keys, cuts[cuts[:, 1] == s.submesh.body, 0])
             for edge, name in ((border & ~cut & ~s.submesh.at_void, s.submesh.body), (s.submesh.at_void, VOID)):
-                points.append(s.mesh.points[np.unique(nodes_along(s.submesh, s.mesh, edge))])
+                points.append(s.mesh.points[np.unique(assembly.nodes_along(s.submesh, s.mesh, edge))])
                 body.append(np.full(len(points[-1]), name))
         self._boundaries = self._gathered(np.concatenate(points)), self._gathered(np.concatenate(body))
 
@@ -180,15 +178,15 @@ class EnergyReleaseRates:
             length=length,
         )
 
-    def _numbers(self, tips: CrackTips) -> Int:
+    def _numbers(self, tips: debonded_arcs.CrackTips) -> Int:
         """(t,) fibre numbers for tips, also for fibres within coatings."""
         return self.cell.summary.fibre_number(self.bodies[tips.node, 1])
 
-    def _radius(self, tips: CrackTips) -> Float:
+    def _radius(self, tips: debonded_arcs.CrackTips) -> Float:
         """(t,) circle radii at tips; NaN without a circle."""
         return np.asarray(self.cell.summary.radii[self.bodies[tips.node, 1]])
 
-    def _released(self, tips: CrackTips, response: Response) -> Float:
+    def _released(self, tips: debonded_arcs.CrackTips, response: Response) -> Float:
         """(t,) G from a virtual crack extension at each tip.  Collective."""
         if not len(tips.node):
             return np.zeros(0)
@@ -206,7 +204,7 @@ class EnergyReleaseRates:
             off_circle = np.abs(np.linalg.norm(away + spokes[t], axis=1) / radius[t] - 1) > OFF_CIRCLE
             limits = off_circle | ~np.isin(body[nodes], bodies[t])
             reach[t] = REACH * min(reach[t], np.linalg.norm(away[limits], axis=1).min(initial=np.inf))
-        u, E = self.cell.solver.displacement(solution), strain_tensor(solution.strain[:3])
+        u, E = self.cell.solver.displacement(solution), voigt.strain_tensor(solution.strain[:3])
         change, first = np.zeros(len(bodies)), 0
         for extension in self._extensions:
             last = first + extension.subdomain.n_dofs
@@ -215,9 +213,9 @@ class EnergyReleaseRates:
             first = last
         turn = self.direction[tips.node] - self.direction[tips.behind]
         outward = np.sign((turn + 180.0) % 360.0 - 180.0)
-        return np.asarray(-outward * allreduce_sum(self.cell.comm, change) / self._radius(tips))
+        return np.asarray(-outward * distributed_arrays.allreduce_sum(self.cell.comm, change) / self._radius(tips))
 
-    def _closing(self, tips: CrackTips, status: Status, force: Float, jump: Float) -> tuple[Float, Float]:
+    def _closing(self, tips: debonded_arcs.CrackTips, status: Status, force: Float, jump: Float) -> tuple[Float, Float]:
         """(t, 2) `closing_work` in opening and in shear, and (t,) closed lengths.
 
         Lengths are MODE_LENGTH radii, or the element behind the tip if it is longer.
@@ -242,7 +240,7 @@ class EnergyReleaseRates:
                 for chain in (behind, front)
             )
             length[t] = max(smallest[t], to_behind[min(order, len(behind) - 1)])
-            work[t] = closing_work(length[t], to_front, force[front], to_behind, jump[behind])
+            work[t] = debonded_arcs.closing_work(length[t], to_front, force[front], to_behind, jump[behind])
         return work, length
 
     def _gathered(self, values: Array) -> Array:

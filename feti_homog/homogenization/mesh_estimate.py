@@ -12,17 +12,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.fem.arc_error import ArcSides, arc_energy
-from feti_homog.fem.local_fits import KnownTractions
-from feti_homog.fem.stress_recovery import RecoveredStress
-from feti_homog.feti.decomposition.subdomain import Subdomain
+from feti_homog.fem import arc_error, local_fits, stress_recovery
+from feti_homog.feti.decomposition import Subdomain
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.uniform_parts import UniformPart, groups, locks, nested_interiors
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.interface.contact.states import BONDED
-from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, joined
-from feti_homog.mesh.submeshes import Submesh
-from feti_homog.system.parallel.distributed_arrays import allreduce_sum
+from feti_homog.interface.contact import BONDED
+from feti_homog.mesh import FineMesh, ReferenceLattice, Submesh, refinement
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int
 
 if TYPE_CHECKING:
@@ -101,9 +98,9 @@ def energy_errors(
     of_elements, of_arcs = factors(cell, fewer)
     for stress, sides in _recovered(cell, responses, keep, lattice):
         energy, of_each = stress.difference(keep)
-        sums += of_elements * energy, of_arcs * arc_energy(stress, sides)
+        sums += of_elements * energy, of_arcs * arc_error.arc_energy(stress, sides)
         shares.append(np.repeat(of_elements * of_each / 4**fewer, 4**fewer, axis=0))
-    elements, arcs = allreduce_sum(cell.comm, sums) / area
+    elements, arcs = distributed_arrays.allreduce_sum(cell.comm, sums) / area
     if cell.case.interfaces and not cell.summary.across:
         lam = np.stack([response.scale * response.state.solution.lam for response in responses], axis=1)
         state = responses[0].state
@@ -149,7 +146,7 @@ def _has_corners(cell: TornCell) -> bool:
 
 def _recovered(
     cell: TornCell, responses: Sequence[Response], keep: bool, lattice: ReferenceLattice
-) -> Iterator[tuple[RecoveredStress, ArcSides]]:
+) -> Iterator[tuple[stress_recovery.RecoveredStress, arc_error.ArcSides]]:
     """Yield recovered stresses and arcs in this rank's subdomains, group by group.
 
     They are refined by the lattice.  Collective before the first.
@@ -161,8 +158,8 @@ def _recovered(
     displacements = _nested_displacements if in_equilibrium else _displacements
     for members, mesh, displacement, place in displacements(cell, u, loads, keep, lattice):
         first, submeshes = members[0], [s.submesh for s in members]
-        stress = RecoveredStress.on(mesh, first.L, first.problem, displacement, loads, first.is_mixed)
-        sides = ArcSides.of(stress, submeshes, lattice)
+        stress = stress_recovery.RecoveredStress.on(mesh, first.L, first.problem, displacement, loads, first.is_mixed)
+        sides = arc_error.ArcSides.of(stress, submeshes, lattice)
         groups_of_rank.append(Group(stress, sides, place[:: first.problem.components]))
         meshes.append((submeshes, mesh))
     pieces, shared, fits = cell.table.body, None, dict[int, tuple[Int, Float]]()
@@ -171,7 +168,7 @@ def _recovered(
 
         shared = SharedVertices(cell.comm, meshes)
         fits = fits_across_cuts(shared, [group.stress for group in groups_of_rank])
-    tractions = dict[int, KnownTractions]()
+    tractions = dict[int, local_fits.KnownTractions]()
     if lattice.order == 1:
         tractions = boundary_tractions(cell, responses, groups_of_rank, shared, lattice is not cell.lattice)
     for number in range(len(groups_of_rank)):
@@ -206,7 +203,10 @@ def _displacements(
     dofs = [np.arange(len(part.dofs)) for part in cell.parts] if across else boundary.dofs
     for group in groups(cell.parts, lattice):
         members = [cell.parts[k] for k in group]
-        mesh, places = joined([part.mesh for part in members]), [np.full(len(part.dofs), INSIDE) for part in members]
+        mesh, places = (
+            refinement.joined([part.mesh for part in members]),
+            [np.full(len(part.dofs), INSIDE) for part in members],
+        )
         if is_nested:
             mesh = replace(mesh, nodes=mesh.nodes[:, lattice.within(cell.lattice)], lattice=lattice)
         for k, place in zip(group, places, strict=True):
@@ -219,14 +219,14 @@ def _displacements(
 class Group(NamedTuple):
     """Recovered stresses, arcs and (classes,) boundary displacement places in a group."""
 
-    stress: RecoveredStress
-    sides: ArcSides
+    stress: stress_recovery.RecoveredStress
+    sides: arc_error.ArcSides
     place: Int
 
 
 def boundary_tractions(
     cell: TornCell, responses: Sequence[Response], groups: Sequence[Group], shared: SharedVertices | None, nested: bool
-) -> dict[int, KnownTractions]:
+) -> dict[int, local_fits.KnownTractions]:
     """Return tractions by group, where arc sides meet and at voids.  Collective.
 
     They vanish at voids, else are forces over node lengths; on the mesh that has the forces, which is not `nested`,
@@ -245,7 +245,7 @@ def boundary_tractions(
         parts = [sums[number][classes] for number, classes in zip(shared.meshes, shared.classes, strict=True)]
         for number, classes, total in zip(shared.meshes, shared.classes, shared.sum(parts), strict=True):
             sums[number][classes] = total
-    by_group = dict[int, KnownTractions]()
+    by_group = dict[int, local_fits.KnownTractions]()
     for number, ((stress, _, place), table) in enumerate(zip(groups, sums, strict=True)):
         at = np.flatnonzero((table[:, 3] == 2) | (table[:, 4] > 0))
         if len(at):
@@ -254,7 +254,7 @@ def boundary_tractions(
             traction[is_free] = 0.0
             length = of_node[place[at]] if nested else np.hypot(*areas.T)
             traction /= np.where(is_free, 1.0, np.maximum(length, 1e-300))[:, None, None]
-            by_group[number] = KnownTractions.at(at, areas / size[:, None], traction)
+            by_group[number] = local_fits.KnownTractions.at(at, areas / size[:, None], traction)
     return by_group
 
 

@@ -4,8 +4,6 @@ The memory it needs, the ranks it can use, and how often its dual operator is ap
 of freedom, because bodies are cut into equally large pieces.  `scripts/measure_cost.py` measures its constants.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -13,18 +11,16 @@ from math import ceil
 
 import numpy as np
 
-from feti_homog.case.bond_laws import laws_with
-from feti_homog.case.cases import Case
-from feti_homog.fem.problem import AXIAL, Problem
-from feti_homog.feti.decomposition.partition import pieces_for_count, pieces_for_size
-from feti_homog.feti.thresholds import INFLUENCE_COLUMNS, NEVER_REFACTORED_ROWS
+from feti_homog.case import Case, bond_laws
+from feti_homog.fem import AXIAL, Problem
+from feti_homog.feti import thresholds
+from feti_homog.feti.decomposition import partition
 from feti_homog.homogenization import phase_laws
-from feti_homog.materials.laws import isotropic_ratio
-from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.mesh.tiles.tiling import DEFAULT_TILES, TilePolicy
-from feti_homog.microstructure.phase_names import COATING
-from feti_homog.system.petsc.option_table import only_prints
-from feti_homog.system.petsc.options_database import given_options
+from feti_homog.materials import laws
+from feti_homog.mesh import ReferenceLattice
+from feti_homog.mesh.tiles import tiling
+from feti_homog.microstructure import phase_names
+from feti_homog.system.petsc import option_table, options_database
 from feti_homog.typing import Int
 
 # Poisson's ratio up to which single nodes of mixed elements are hardly stiffer than mu makes them (`SCALED_LAME`).
@@ -84,7 +80,7 @@ class PartitionPolicy:
     even_cut_factor: float = 16.0
     even_share: float = 1 / 16
     breakable_boundary_dofs: int = 2500
-    tiles: TilePolicy = DEFAULT_TILES
+    tiles: tiling.TilePolicy = tiling.DEFAULT_TILES
     across_dofs: int = 0
     across_piece_dofs: int = 7000
     whole_dofs: int = 400_000
@@ -117,10 +113,10 @@ def can_be_cut_across(case: Case) -> bool:
     asked, free = case.decomposition, ("auto", None, None, "torus")
     if case.interfaces or (asked.cut, asked.subdomains, asked.max_dofs, case.cell.bodies) != free:
         return False
-    options = {*case.petsc, *given_options()} - TOLERANCES
-    if any(name.startswith("feti_") and not only_prints(name) for name in options):
+    options = {*case.petsc, *options_database.given_options()} - TOLERANCES
+    if any(name.startswith("feti_") and not option_table.only_prints(name) for name in options):
         return False
-    ratios = (isotropic_ratio(material) or 0.0 for material in case.materials.values())
+    ratios = (laws.isotropic_ratio(material) or 0.0 for material in case.materials.values())
     # Contrast: the largest ratio of the largest entries of two phases' stiffnesses, in any problem.
     pairs = product(phase_laws.problems(case), case.materials)
     sizes = np.array([np.abs(phase_laws.law(case, phase, problem)[:4, :4]).max() for problem, phase in pairs])
@@ -145,9 +141,9 @@ def wanted_pieces(
     # A coarse triangle brings about M^2 / 2 nodes.
     dofs_of_triangle = lattice.intervals**2
     if case.decomposition.max_dofs is not None:
-        return pieces_for_size(load, dofs_of_triangle, case.decomposition.max_dofs)
+        return partition.pieces_for_size(load, dofs_of_triangle, case.decomposition.max_dofs)
     if case.decomposition.subdomains is not None:
-        return pieces_for_count(load, case.decomposition.subdomains)
+        return partition.pieces_for_count(load, case.decomposition.subdomains)
     all_dofs = int(load.sum()) * dofs_of_triangle
     boundary = edges * 2 * lattice.intervals
     if case.interface is None:
@@ -156,10 +152,10 @@ def wanted_pieces(
         to_cut = (load * dofs_of_triangle > largest) | (boundary > policy.cut_factor * policy.piece_boundary_dofs)
     else:
         to_cut = boundary > policy.breakable_boundary_dofs
-    by_size = pieces_for_size(load, dofs_of_triangle, policy.piece_dofs)
+    by_size = partition.pieces_for_size(load, dofs_of_triangle, policy.piece_dofs)
     by_boundary = np.minimum(-(-boundary // policy.piece_boundary_dofs), load)
     pieces = np.where(to_cut, np.maximum(by_size, by_boundary), 1)
-    return pieces if pieces.sum() >= n_ranks else pieces_for_count(load, n_ranks)
+    return pieces if pieces.sum() >= n_ranks else partition.pieces_for_count(load, n_ranks)
 
 
 def applications(case: Case, problem: Problem, across: bool = False) -> int:
@@ -172,14 +168,16 @@ def applications(case: Case, problem: Problem, across: bool = False) -> int:
     contact = touches and problem != AXIAL  # along the fibres nothing touches
     many = case.section.is_followed or (has_arcs and _asks_for_tips(case))
     solves = SOLVES_OF_A_PATH if many else case.section.solves(len(problem.loads), contact)
-    iterations = ITERATIONS_WITH_COATINGS if COATING in case.materials and not across else ITERATIONS_OF_A_SOLVE
+    iterations = (
+        ITERATIONS_WITH_COATINGS if phase_names.COATING in case.materials and not across else ITERATIONS_OF_A_SOLVE
+    )
     return iterations * solves * (SOLVES_OF_A_CONTACT if contact else 1)
 
 
 def _asks_for_tips(case: Case) -> bool:
     """Return whether envelopes with arcs need the inverse, for many solves."""
     bond = case.interface
-    by_energy = bond is not None and bond.criterion in laws_with("growth") and bond.growth == "released"
+    by_energy = bond is not None and bond.criterion in bond_laws.laws_with("growth") and bond.growth == "released"
     return case.section.breaks and by_energy
 
 
@@ -200,7 +198,7 @@ def memory_to_the_end(case: Case, few: float, multipliers: int, columns: int, ra
 
     `few` are its bytes before the path breaks bonds.
     """
-    stored = columns if columns <= NEVER_REFACTORED_ROWS else INFLUENCE_COLUMNS
+    stored = columns if columns <= thresholds.NEVER_REFACTORED_ROWS else thresholds.INFLUENCE_COLUMNS
     faces = FACE_PAIR_BYTES * multipliers**2 if case.has_friction else 0
     return few + columns / ranks * (PATH_BYTES + stored * PAIR_BYTES) + faces
 

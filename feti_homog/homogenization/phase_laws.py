@@ -5,8 +5,6 @@ change, and A = N^T C N with N e = [E11, E22, gamma12, E33] - alpha T.  So A e i
 conjugate to T, and 1/2 e.A e the stored energy.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,15 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case import bond_laws, cell_sizes
-from feti_homog.case.cases import Case
-from feti_homog.case.interface_section import InterfaceSection
-from feti_homog.fem.problem import AXIAL, GENERALIZED, PLANE, Problem
-from feti_homog.feti.decomposition.jump_operator import InterfaceSprings
-from feti_homog.interface.laws.bond_law import BondLaw, law_class
-from feti_homog.materials.material_derivatives import LawChange
-from feti_homog.materials.laws import expansion, plane_stiffness, spatial_stiffness
-from feti_homog.materials.voigt import PLANE_STATES
+from feti_homog.case import Case, bond_laws, cell_sizes, interface_section
+from feti_homog.fem import AXIAL, GENERALIZED, PLANE, Problem
+from feti_homog.feti.decomposition import jump_operator
+from feti_homog.interface.laws import BondLaw, law_class
+from feti_homog.materials import laws, material_derivatives, voigt
 from feti_homog.typing import Float, Int
 
 IN_PLANE, AXIAL_SHEAR = [0, 1, 5, 2], [4, 3]
@@ -37,9 +31,9 @@ def problems(case: Case) -> tuple[Problem, ...]:
 
     A temperature is a load if the phases have thermal expansions.
     """
-    if not PLANE_STATES[case.analysis.plane].is_spatial:
+    if not voigt.PLANE_STATES[case.analysis.plane].is_spatial:
         return (PLANE,)
-    if any(expansion(material) is None for material in case.materials.values()):
+    if any(laws.expansion(material) is None for material in case.materials.values()):
         return replace(GENERALIZED, loads=GENERALIZED.loads[:4]), AXIAL
     return GENERALIZED, AXIAL
 
@@ -48,11 +42,11 @@ def law(case: Case, phase: str, problem: Problem) -> Float:
     """(v, v) phase stiffness A in a problem."""
     material = case.material_of(phase)
     if problem == PLANE:
-        return plane_stiffness(material, case.analysis.plane)
-    C = spatial_stiffness(material)
+        return laws.plane_stiffness(material, case.analysis.plane)
+    C = laws.spatial_stiffness(material)
     if problem == AXIAL:
         return C[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)]
-    C, alpha = C[np.ix_(IN_PLANE, IN_PLANE)], expansion(material)
+    C, alpha = C[np.ix_(IN_PLANE, IN_PLANE)], laws.expansion(material)
     if problem != GENERALIZED or alpha is None:
         return C
     N = np.column_stack([np.eye(4), -alpha[IN_PLANE]])
@@ -64,17 +58,17 @@ def is_mixed(case: Case, phase: str) -> bool:
     return cell_sizes.is_mixed(case.cell.order, case.material_of(phase), case.analysis.plane)
 
 
-def law_derivatives(case: Case, phase: str, change: LawChange) -> tuple[Float, ...]:
+def law_derivatives(case: Case, phase: str, change: material_derivatives.LawChange) -> tuple[Float, ...]:
     """Differentiate `law` in the plane and, if any, the axial problem."""
     problem, dC = problems(case)[0], change.stiffness
     if problem == PLANE:
         return (dC,)
     axial, dC = dC[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)], dC[np.ix_(IN_PLANE, IN_PLANE)]
     material = case.material_of(phase)
-    alpha = expansion(material)
+    alpha = laws.expansion(material)
     if problem != GENERALIZED or alpha is None:
         return dC, axial
-    C = spatial_stiffness(material)[np.ix_(IN_PLANE, IN_PLANE)]
+    C = laws.spatial_stiffness(material)[np.ix_(IN_PLANE, IN_PLANE)]
     N, dN = np.column_stack([np.eye(4), -alpha[IN_PLANE]]), np.zeros((4, 5))
     dN[:, 4] = -change.expansion[IN_PLANE]
     mixed = N.T @ C @ dN
@@ -109,14 +103,14 @@ def spatial_vector(plane: Float | None, axial: Float | None) -> Float:
     return vector
 
 
-def springs(case: Case, problem: Problem = PLANE) -> InterfaceSprings:
+def springs(case: Case, problem: Problem = PLANE) -> jump_operator.InterfaceSprings:
     """Return normal and tangential springs, or axial ones along the fibres.
 
     Axial springs without their own stiffness are as around the fibre.
     """
     along = [(bond.axial_stiffness or bond.tangential_stiffness or math.inf,) for bond in case.interfaces]
     around = [(bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf) for bond in case.interfaces]
-    return InterfaceSprings(tuple(along if problem == AXIAL else around), has_softening(case))
+    return jump_operator.InterfaceSprings(tuple(along if problem == AXIAL else around), has_softening(case))
 
 
 def has_softening(case: Case) -> bool:
@@ -144,9 +138,9 @@ def strength_factors(case: Case, fibres: int) -> Float:
     table = case.cell.table
     if table is None:
         return factors
-    from feti_homog.microstructure.periodic_table import fibre_rows  # with windows of tables
+    from feti_homog.microstructure import periodic_table  # with windows of tables
 
-    return factors * table.strength[fibre_rows(table, case.cell.window)]
+    return factors * table.strength[periodic_table.fibre_rows(table, case.cell.window)]
 
 
 @dataclass(frozen=True)
@@ -156,7 +150,7 @@ class SectionValues:
     `factor` (k,), by each node's fibre, multiplies strengths, and squared toughnesses.
     """
 
-    bonds: Sequence[InterfaceSection]
+    bonds: Sequence[interface_section.InterfaceSection]
     pair: Int
     factor: float | Float
 
@@ -178,7 +172,7 @@ class SectionValues:
         return getattr(self.bonds[0], key)
 
 
-def bond_law(bonds: Sequence[InterfaceSection], pair: Int, factor: float | Float = 1.0) -> BondLaw:
+def bond_law(bonds: Sequence[interface_section.InterfaceSection], pair: Int, factor: float | Float = 1.0) -> BondLaw:
     """Return bond law at nodes (k,), see `SectionValues`; unbreakable without sections."""
     name = bonds[0].criterion if bonds else bond_laws.DEFAULT
     return law_class(name).of_keys(SectionValues(bonds, pair, factor))

@@ -1,12 +1,10 @@
 """Response fields: nodal displacements, element strains and stresses, tractions, jumps."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.fem.assembly import element_strain
+from feti_homog.fem import assembly
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.materials import laws
@@ -51,7 +49,7 @@ def recover(cell: TornCell, response: Response | None) -> RecoveredFields:
         of_part = u[offset : offset + len(s.dofs)].reshape(-1, c)
         fluctuations.append(of_part[s.mesh.node_class])
         totals.append(s.mesh.points @ H.T + fluctuations[-1])
-        plane = element_strain(s.mesh.points, s.mesh.triangles, s.mesh.node_class, of_part, problem)[0]
+        plane = assembly.element_strain(s.mesh.points, s.mesh.triangles, s.mesh.node_class, of_part, problem)[0]
         strains.append(np.column_stack([loads[:m] + plane, np.tile(loads[m:], (len(plane), 1))]))
         stresses.append(strains[-1] @ s.L)
     total, fluctuation, strain, stress = (np.concatenate(rows) for rows in (totals, fluctuations, strains, stresses))

@@ -1,21 +1,17 @@
 """Energy errors by springs at nodes, besides element and arc errors."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
 from scipy.special import roots_legendre
 
-from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
-from feti_homog.feti.decomposition.shared_entities import along, edge_normals
+from feti_homog.feti.decomposition import JumpOperator, interface_neighbours, shared_entities
 from feti_homog.homogenization.cut_bodies import border_lines
 from feti_homog.homogenization.uniform_parts import UniformPart
-from feti_homog.interface.contact.states import BONDED, Status
-from feti_homog.interface.debonded_arcs import InterfaceChains
-from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.system.parallel.distributed_arrays import allreduce_sum
+from feti_homog.interface import debonded_arcs
+from feti_homog.interface.contact import BONDED, Status
+from feti_homog.mesh import ReferenceLattice
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int
 
 # Gauss points of a side, by which ellipses and products of quadratic functions are exact to rounding or nearly so.
@@ -28,14 +24,14 @@ class SpringSides:
     def __init__(
         self,
         jumps: JumpOperator,
-        neighbours: InterfaceNeighbours,
+        neighbours: interface_neighbours.InterfaceNeighbours,
         parts: Sequence[UniformPart],
         lattice: ReferenceLattice,
         period: Float,
     ) -> None:
         """Find fibre sides in the `parts`; the cell has `period` (2,).  Collective."""
         self._comm, self._jumps, self._order, self._period = neighbours.comm, jumps, lattice.order, period
-        self._chains = InterfaceChains(neighbours.adjacency)
+        self._chains = debonded_arcs.InterfaceChains(neighbours.adjacency)
         nodes = jumps.nodes
         rows = nodes.bodies[:, 1], nodes.points, nodes.normal
         fibre, self._points, self._normal = (
@@ -101,7 +97,7 @@ class SpringSides:
         on_sides = np.einsum("fq,fqc,fqci,fqcj->ij", ds, between, blended, blended, optimize=True)
         differences = (np.diff(values, n=self._order, axis=1)[:, 0] for values in (traction, moved))
         on_arcs = np.einsum("f,fdi,fdj->ij", self._share[side], *differences, optimize=True)
-        return np.asarray(beyond), allreduce_sum(self._comm, lumped - on_sides - on_arcs - on_arcs.T)
+        return np.asarray(beyond), distributed_arrays.allreduce_sum(self._comm, lumped - on_sides - on_arcs - on_arcs.T)
 
     def _in_space(self, components: Float) -> Float:
         """(n, 2, k) plane vectors from normal and tangent; (n, 1, k) stay."""
@@ -122,10 +118,10 @@ def _sides(part: UniformPart, number: Int, fibre: Int, lattice: ReferenceLattice
     nodes = number[line]
     inner = (nodes >= 0).all(axis=1)
     inner[inner] = (fibre[nodes[inner]] == part.submesh.constituent[triangle[inner], None]).all(axis=1)
-    normal, turn = edge_normals(part.submesh, triangle[inner], k[inner])
+    normal, turn = shared_entities.edge_normals(part.submesh, triangle[inner], k[inner])
     first = np.arange(0, lattice.intervals, lattice.order)
     nodes = nodes[inner][:, first[:, None] + np.arange(lattice.order + 1)].reshape(-1, lattice.order + 1)
     side = np.tile(np.arange(len(first)), len(turn))
     normal, turn = np.repeat(normal, len(first), axis=0), np.repeat(turn, len(first))
     places = (side[:, None] + (1 + POINTS) / 2) * lattice.order / lattice.intervals
-    return nodes, np.stack([along(normal, turn, place) for place in places.T], axis=1), turn
+    return nodes, np.stack([shared_entities.along(normal, turn, place) for place in places.T], axis=1), turn

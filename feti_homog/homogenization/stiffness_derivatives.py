@@ -18,19 +18,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.case.cases import Case
-from feti_homog.case.material_sections import provider
-from feti_homog.fem import bubble
-from feti_homog.fem.assembly import ELEMENTS_AT_ONCE
-from feti_homog.fem.problem import Problem
-from feti_homog.fem.shape_functions import gradients
+from feti_homog.case import Case, material_sections
+from feti_homog.fem import Problem, assembly, bubble, shape_functions
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.domain_partition import CellSummary
 from feti_homog.homogenization.uniform_parts import UniformPart
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.materials.material_derivatives import law_changes
-from feti_homog.system.parallel.distributed_arrays import allreduce_sum
+from feti_homog.materials import material_derivatives
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int32
 
 PATTERNS = ("square", "hexagonal")
@@ -74,7 +70,7 @@ def _by_phases(cell: TornCell, grams: Sequence[Mapping[str, Float]]) -> Iterator
     """Yield derivatives by phase constants, from each problem's integrals."""
     case, is_heated = cell.case, "temperature" in cell.solver.problem.loads
     for phase in grams[0]:
-        for change in law_changes(case.materials[phase], case.analysis.plane):
+        for change in material_derivatives.law_changes(case.materials[phase], case.analysis.plane):
             if is_heated or not change.name.startswith("expansion"):
                 pairs = zip(
                     phase_laws.law_derivatives(case, phase, change), (gram[phase] for gram in grams), strict=True
@@ -95,20 +91,23 @@ def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str,
     # From [strains of displacements, 1], whose products are summed, to [strains of displacements, other loads].
     T = np.zeros((m * k + 1, v * k))
     T[: m * k, : m * k], T[-1, m * k :] = np.eye(m * k), loads[m:].ravel()
-    materials = dict.fromkeys(provider(phase, cell.case.materials) for phase in cell.summary.phases)
+    materials = dict.fromkeys(material_sections.provider(phase, cell.case.materials) for phase in cell.summary.phases)
     sums = {material: np.zeros((m * k + 1,) * 2) for material in materials}
     grows, growth = any(_fractions(cell.case)), np.zeros((k, k))
     for s, displacement in cell.displacements(boundary, loads):
         u = displacement.reshape(-1, problem.components, k)
         V = _velocity(s.mesh.points, cell.summary) if grows else None
-        for first in range(0, len(s.mesh.triangles), ELEMENTS_AT_ONCE):
-            nodes = s.mesh.triangles[first : first + ELEMENTS_AT_ONCE]
+        for first in range(0, len(s.mesh.triangles), assembly.ELEMENTS_AT_ONCE):
+            nodes = s.mesh.triangles[first : first + assembly.ELEMENTS_AT_ONCE]
             fields = _Fields.of(s, nodes, u[s.mesh.node_class[nodes]], loads[:m])
-            sums[provider(s.submesh.phase, cell.case.materials)] += fields.products()
+            sums[material_sections.provider(s.submesh.phase, cell.case.materials)] += fields.products()
             if V is not None:
                 growth += fields.change(problem, s.L, V[nodes], loads[m:])
-    grams = {name: (T.T @ allreduce_sum(cell.comm, gram) @ T).reshape(v, k, v, k) for name, gram in sums.items()}
-    return grams, allreduce_sum(cell.comm, growth)
+    grams = {
+        name: (T.T @ distributed_arrays.allreduce_sum(cell.comm, gram) @ T).reshape(v, k, v, k)
+        for name, gram in sums.items()
+    }
+    return grams, distributed_arrays.allreduce_sum(cell.comm, growth)
 
 
 @dataclass(frozen=True)
@@ -136,7 +135,7 @@ class _Fields:
         """Find element fields: nodes (e, a), u (e, a, c, k), loads (m, k)."""
         points, (_, a, c, k) = s.mesh.points[nodes], u.shape
         elements = bubble.Elements.of(points, s.L) if s.is_mixed else None
-        g, w = gradients(points) if elements is None else (elements.gradients, elements.weights)
+        g, w = shape_functions.gradients(points) if elements is None else (elements.gradients, elements.weights)
         u = u if elements is None else elements.with_bubble(u)
         slopes = g.transpose(0, 1, 3, 2).reshape(len(g), -1, g.shape[2]) @ u.reshape(*u.shape[:2], -1)
         slopes = slopes.reshape(*w.shape, 2, c, k)
@@ -199,7 +198,7 @@ def _stretched_springs(cell: TornCell, responses: Sequence[Response]) -> Float:
         rows = nodes.row[nodes.pair == section] + component
         C = responses[0].state.solution.compliance[rows]
         work[section, component] = lam[rows].T @ (C[:, None] * lam[rows])
-    return np.asarray(allreduce_sum(cell.comm, work))
+    return np.asarray(distributed_arrays.allreduce_sum(cell.comm, work))
 
 
 def _spring_constants(case: Case) -> Iterator[tuple[str, float, tuple[list[tuple[int, int]], list[tuple[int, int]]]]]:

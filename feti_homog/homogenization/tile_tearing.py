@@ -5,8 +5,6 @@ tiles, and no rank has all tiles.  Matrix pieces lie within tiles, and a fibre l
 the case and the number of ranks, not on the rank that filled a tile.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import chain
 from operator import itemgetter
@@ -15,27 +13,18 @@ from typing import TypeVar
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.case import cases
-from feti_homog.case.cases import Case
+from feti_homog.case import Case, cases
 from feti_homog.errors import CaseError
-from feti_homog.feti.decomposition.partition import assign_ranks, cut_into_pieces
+from feti_homog.feti.decomposition import partition
 from feti_homog.homogenization import arc_selection, cell_remarks
 from feti_homog.homogenization.domain_partition import RankShare, distribute, summary_of
 from feti_homog.homogenization.partition_policy import PartitionPolicy, can_be_cut_across, wanted_pieces
-from feti_homog.mesh.arrange import listed_arrangement
-from feti_homog.mesh.coarse_mesh import CoarseMesh, representatives
-from feti_homog.mesh.fill.gmsh_mesher import NodedCell, UnmeshedCell, begin
-from feti_homog.mesh.outline.lines import MATRIX
-from feti_homog.mesh.periodic_topology import Torus, components, places_by_depth
-from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.mesh.sizes.element_estimate import ElementEstimate
-from feti_homog.mesh.sizes.graded_size import SizeField
-from feti_homog.mesh.submeshes import SubdomainTable, cut_for_ranks, joined, pinning
-from feti_homog.mesh.tiles.tile_filling import Filling, Tile, fill
-from feti_homog.mesh.tiles.tiling import FilledTile, NumberedTile, Regions, TilePolicy, tile_torus
-from feti_homog.system.parallel.distributed_arrays import alltoall, gather, scatter
-from feti_homog.system.parallel.dividing import balanced
-from feti_homog.system.parallel.mpi_errors import agree, on_root, on_root_only
+from feti_homog.mesh import CoarseMesh, ReferenceLattice, Torus, arrange, coarse_mesh, periodic_topology, submeshes
+from feti_homog.mesh.fill import gmsh_mesher
+from feti_homog.mesh.outline import lines
+from feti_homog.mesh.sizes import element_estimate, graded_size
+from feti_homog.mesh.tiles import tile_filling, tiling
+from feti_homog.system.parallel import distributed_arrays, dividing, mpi_errors
 from feti_homog.typing import Float, Int
 
 T = TypeVar("T")
@@ -44,14 +33,18 @@ T = TypeVar("T")
 def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy) -> RankShare:
     """Mesh and cut the cell; return this rank's share.  Collective."""
     noded = place_nodes(case, comm, policy.tiles)
-    if on_root(comm, can_be_torn_by_tiles, case, noded, lattice, policy):
+    if mpi_errors.on_root(comm, can_be_torn_by_tiles, case, noded, lattice, policy):
         assert not isinstance(noded, CoarseMesh)
         return tear_by_tiles(case, noded, lattice, comm, policy)
     mesh = fill_tiles(noded, comm)
-    return scatter(comm, on_root_only(comm, distribute, case, mesh, lattice, comm.size, policy) or [])
+    return distributed_arrays.scatter(
+        comm, mpi_errors.on_root_only(comm, distribute, case, mesh, lattice, comm.size, policy) or []
+    )
 
 
-def place_nodes(case: Case, comm: MPI.Intracomm, policy: TilePolicy) -> NodedCell | CoarseMesh | None:
+def place_nodes(
+    case: Case, comm: MPI.Intracomm, policy: tiling.TilePolicy
+) -> gmsh_mesher.NodedCell | CoarseMesh | None:
     """Return a user's mesh, or noded lines with empty tiles.  Collective.
 
     All ranks place nodes; None but on rank 0.
@@ -59,56 +52,58 @@ def place_nodes(case: Case, comm: MPI.Intracomm, policy: TilePolicy) -> NodedCel
     Raises:
         CaseError, MeshError: on every rank, as `begin_mesh`.
     """
-    cell = on_root_only(comm, begin_mesh, case, policy)
-    unmeshed = cell if isinstance(cell, UnmeshedCell) else None
+    cell = mpi_errors.on_root_only(comm, begin_mesh, case, policy)
+    unmeshed = cell if isinstance(cell, gmsh_mesher.UnmeshedCell) else None
     if not comm.bcast(unmeshed is not None):
-        assert not isinstance(cell, UnmeshedCell)
+        assert not isinstance(cell, gmsh_mesher.UnmeshedCell)
         return cell
-    field: SizeField = comm.bcast(None if unmeshed is None else unmeshed.bare.field)
-    lines = scatter(comm, [] if unmeshed is None else unmeshed.bare.lines.parts(comm.size))
-    stations = gather(comm, agree(comm, lines.stations, field))
+    field: graded_size.SizeField = comm.bcast(None if unmeshed is None else unmeshed.bare.field)
+    lines = distributed_arrays.scatter(comm, [] if unmeshed is None else unmeshed.bare.lines.parts(comm.size))
+    stations = distributed_arrays.gather(comm, mpi_errors.agree(comm, lines.stations, field))
 
-    def with_nodes(unmeshed: UnmeshedCell) -> NodedCell:
+    def with_nodes(unmeshed: gmsh_mesher.UnmeshedCell) -> gmsh_mesher.NodedCell:
         return unmeshed.with_nodes(unmeshed.bare.lines.joined(stations))
 
-    return on_root_only(comm, with_nodes, unmeshed)
+    return mpi_errors.on_root_only(comm, with_nodes, unmeshed)
 
 
-def begin_mesh(case: Case, policy: TilePolicy) -> UnmeshedCell | NodedCell | CoarseMesh:
+def begin_mesh(case: Case, policy: tiling.TilePolicy) -> gmsh_mesher.UnmeshedCell | gmsh_mesher.NodedCell | CoarseMesh:
     """Return a user's mesh, or the cell that rank 0 makes alone.
 
     Raises:
         CaseError: a phase has no material, or a material no phase.
         MeshError: the cell cannot be meshed, or its mesh file is faulty.
     """
-    cell: UnmeshedCell | NodedCell | CoarseMesh
+    cell: gmsh_mesher.UnmeshedCell | gmsh_mesher.NodedCell | CoarseMesh
     if case.cell.has_own_mesh:
-        from feti_homog.mesh.readers.msh_reader import read_cell  # with the readers of all formats
+        from feti_homog.mesh.readers import msh_reader  # with the readers of all formats
 
-        cell = read_cell(case.cell)
+        cell = msh_reader.read_cell(case.cell)
     else:
-        listed = listed_arrangement(case.cell)
-        estimate = ElementEstimate.of(case.cell, listed)
+        listed = arrange.listed_arrangement(case.cell)
+        estimate = element_estimate.ElementEstimate.of(case.cell, listed)
         section = replace(case.cell, tip_size=arc_selection.size(case, estimate))
-        cell = begin(section, listed, arc_selection.marks(case, estimate.fibres), policy)
+        cell = gmsh_mesher.begin(section, listed, arc_selection.marks(case, estimate.fibres), policy)
     cases.check_phases(case, cell.phases)
     return cell
 
 
-def fill_tiles(cell: NodedCell | CoarseMesh | None, comm: MPI.Intracomm) -> CoarseMesh | None:
+def fill_tiles(cell: gmsh_mesher.NodedCell | CoarseMesh | None, comm: MPI.Intracomm) -> CoarseMesh | None:
     """Return the mesh on rank 0; all ranks fill its tiles.  Collective.
 
     Raises:
         MeshError: on every rank, if one cannot fill a tile.
     """
     tiles = [] if cell is None or isinstance(cell, CoarseMesh) else [tile for _, tile in cell.parts]
-    gathered = gather(comm, agree(comm, fill_own, deal_tiles(tiles, [len(tile.points) for tile in tiles], comm)))
+    gathered = distributed_arrays.gather(
+        comm, mpi_errors.agree(comm, fill_own, deal_tiles(tiles, [len(tile.points) for tile in tiles], comm))
+    )
     fillings = [filling for _, filling in sorted(chain.from_iterable(gathered), key=itemgetter(0))]
 
-    def joined(cell: NodedCell | CoarseMesh) -> CoarseMesh:
+    def joined(cell: gmsh_mesher.NodedCell | CoarseMesh) -> CoarseMesh:
         return cell if isinstance(cell, CoarseMesh) else cell.mesh(fillings)
 
-    return on_root_only(comm, joined, cell)
+    return mpi_errors.on_root_only(comm, joined, cell)
 
 
 def deal_tiles(tiles: list[T], loads: list[int], comm: MPI.Intracomm) -> list[tuple[int, T]]:
@@ -117,22 +112,22 @@ def deal_tiles(tiles: list[T], loads: list[int], comm: MPI.Intracomm) -> list[tu
     The tiles have sizes `loads`; returns the numbers and tiles that this rank fills.
     """
     parts: list[list[tuple[int, T]]] = [[] for _ in range(comm.size)]
-    for k, rank in enumerate(balanced(np.array(loads, np.int64), comm.size).tolist()):
+    for k, rank in enumerate(dividing.balanced(np.array(loads, np.int64), comm.size).tolist()):
         parts[rank].append((k, tiles[k]))
-    return scatter(comm, parts)
+    return distributed_arrays.scatter(comm, parts)
 
 
-def fill_own(tiles: list[tuple[int, Tile]]) -> list[tuple[int, Filling]]:
+def fill_own(tiles: list[tuple[int, tile_filling.Tile]]) -> list[tuple[int, tile_filling.Filling]]:
     """Fill numbered tiles.
 
     Raises:
         MeshError: gmsh cannot fill one.
     """
-    return [(k, fill(tile)) for k, tile in tiles]
+    return [(k, tile_filling.fill(tile)) for k, tile in tiles]
 
 
 def can_be_torn_by_tiles(
-    case: Case, noded: NodedCell | CoarseMesh | None, lattice: ReferenceLattice, policy: PartitionPolicy
+    case: Case, noded: gmsh_mesher.NodedCell | CoarseMesh | None, lattice: ReferenceLattice, policy: PartitionPolicy
 ) -> bool:
     """Return whether nothing needs the mesh on one rank.
 
@@ -140,29 +135,33 @@ def can_be_torn_by_tiles(
     are expected to be small enough for cuts across materials.  A user's mesh is on one rank already.
     """
     on_one_rank = case.arcs or case.cell.bodies == "plane" or case.decomposition.subdomains is not None
-    if not isinstance(noded, NodedCell) or len(noded.parts) < 2 or on_one_rank:
+    if not isinstance(noded, gmsh_mesher.NodedCell) or len(noded.parts) < 2 or on_one_rank:
         return False
-    triangles = ElementEstimate.of(case.cell, noded.arrangement).triangles
+    triangles = element_estimate.ElementEstimate.of(case.cell, noded.arrangement).triangles
     dofs = round(triangles * lattice.intervals**2)
     return not (policy.across_pieces(dofs, 1) and can_be_cut_across(case))
 
 
 def tear_by_tiles(
-    case: Case, noded: NodedCell | None, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy
+    case: Case,
+    noded: gmsh_mesher.NodedCell | None,
+    lattice: ReferenceLattice,
+    comm: MPI.Intracomm,
+    policy: PartitionPolicy,
 ) -> RankShare:
     """Return this rank's share in a cell noded on rank 0.  Collective.
 
     Raises:
         CaseError, MeshError: on every rank, as `tiled_cell` and `filling.fill`.
     """
-    phase_pairs, nesting, edges = on_root(comm, tiled_cell, case, noded)
-    regions: Regions = comm.bcast(None if noded is None else noded.regions)
+    phase_pairs, nesting, edges = mpi_errors.on_root(comm, tiled_cell, case, noded)
+    regions: tiling.Regions = comm.bcast(None if noded is None else noded.regions)
     torus, tile = _filled(noded, regions, comm)
     load = np.bincount(torus.constituent, minlength=len(regions.phase))
     comm.Allreduce(MPI.IN_PLACE, load)
     pieces = wanted_pieces(case, load, edges, lattice, comm.size, policy)
     longest = comm.allreduce(float(torus.edge_lengths.max(initial=0.0)), MPI.MAX)
-    local = agree(comm, _cut, torus, tile, pieces / load, longest)
+    local = mpi_errors.agree(comm, _cut, torus, tile, pieces / load, longest)
     # Subdomains of all ranks are numbered by body and tile.
     first = np.unique(local, return_index=True)[1]
     parts = comm.allgather((torus.constituent[first], tile[first], np.bincount(local)))
@@ -170,30 +169,30 @@ def tear_by_tiles(
     order = np.lexsort((np.arange(len(body)), tiles, body))
     before = sum(len(bodies) for bodies, *_ in parts[: comm.rank])
     subdomain, body, loads = np.argsort(order)[before + local], body[order], loads[order]
-    neighbours = comm.gather(agree(comm, _neighbours, torus, subdomain))
-    rank = on_root(comm, _assigned, loads, neighbours or [], comm.size)
-    table = SubdomainTable(body, rank, nesting, regions.phase)
+    neighbours = comm.gather(mpi_errors.agree(comm, _neighbours, torus, subdomain))
+    rank = mpi_errors.on_root(comm, _assigned, loads, neighbours or [], comm.size)
+    table = submeshes.SubdomainTable(body, rank, nesting, regions.phase)
     # One class on all ranks is pinned, see `submesh.pinned_class`.
     at_interface, in_matrix = np.zeros((2, len(torus.class_keys)), bool)
     at_interface[torus.node_class[torus.mesh.arc_edges]] = True
     in_matrix[torus.node_class[torus.mesh.triangles[torus.constituent == 0]]] = True
-    candidates = comm.allgather(pinning(torus, np.select([at_interface, in_matrix], [2, 0], 1)))
+    candidates = comm.allgather(submeshes.pinning(torus, np.select([at_interface, in_matrix], [2, 0], 1)))
     pinned: int = min(chain.from_iterable(candidates))[-1]
-    shares = agree(comm, lambda: list(cut_for_ranks(torus, subdomain, table, comm.size, pinned)))
-    summary = on_root(comm, summary_of, case, noded, len(body), int(load.sum()))
-    return RankShare(summary, table, phase_pairs, joined(alltoall(comm, shares)))
+    shares = mpi_errors.agree(comm, lambda: list(submeshes.cut_for_ranks(torus, subdomain, table, comm.size, pinned)))
+    summary = mpi_errors.on_root(comm, summary_of, case, noded, len(body), int(load.sum()))
+    return RankShare(summary, table, phase_pairs, submeshes.joined(distributed_arrays.alltoall(comm, shares)))
 
 
-def _filled(noded: NodedCell | None, regions: Regions, comm: MPI.Intracomm) -> tuple[Torus, Int]:
+def _filled(noded: gmsh_mesher.NodedCell | None, regions: tiling.Regions, comm: MPI.Intracomm) -> tuple[Torus, Int]:
     """Return the torus that this rank's tiles fill, and tiles (m,).  Collective."""
-    tiles = on_root_only(comm, tiles_to_fill, noded) or []
+    tiles = mpi_errors.on_root_only(comm, tiles_to_fill, noded) or []
     dealt = deal_tiles(tiles, [len(tile.nodes) for tile in tiles], comm)
-    fillings = agree(comm, fill_own, [(k, tile.tile) for k, tile in dealt])
+    fillings = mpi_errors.agree(comm, fill_own, [(k, tile.tile) for k, tile in dealt])
     inner = dict(chain.from_iterable(comm.allgather([(k, len(filling.inner)) for k, filling in fillings])))
     ends = regions.nodes + np.cumsum([0, *(inner[k] for k in range(len(inner)))])
     pairs = zip(dealt, fillings, strict=True)
-    filled = [FilledTile(k, tile, filling, int(ends[k])) for (k, tile), (_, filling) in pairs]
-    return agree(comm, tile_torus, regions, filled, int(ends[-1]))
+    filled = [tiling.FilledTile(k, tile, filling, int(ends[k])) for (k, tile), (_, filling) in pairs]
+    return mpi_errors.agree(comm, tiling.tile_torus, regions, filled, int(ends[-1]))
 
 
 def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) -> Int:
@@ -203,13 +202,13 @@ def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) ->
     """
     a, b, _ = torus.sides
     within = (tile[a] == tile[b]) & (torus.constituent[a] == torus.constituent[b])
-    label = components(len(tile), a[within], b[within])
+    label = periodic_topology.components(len(tile), a[within], b[within])
     first = np.unique(label, return_index=True)[1]
     order = np.lexsort((first, tile[first], torus.constituent[first]))
     parts = np.argsort(order)[label]
     size = np.bincount(parts)
     pieces = np.round(pieces_per_triangle[torus.constituent[first[order]]] * size).astype(np.int64)
-    return cut_into_pieces(torus, parts, np.clip(pieces, 1, size), longest)
+    return partition.cut_into_pieces(torus, parts, np.clip(pieces, 1, size), longest)
 
 
 def _neighbours(torus: Torus, subdomain: Int) -> tuple[Int, Int, Int, Int]:
@@ -229,10 +228,10 @@ def _assigned(load: Int, neighbours: list[tuple[Int, Int, Int, Int]], n_ranks: i
     """(s,) each subdomain's rank, by all ranks' `neighbours`."""
     a, b, edge, side = (np.concatenate(rows) for rows in zip(*neighbours, strict=True))
     side = side[np.argsort(edge, kind="stable")]
-    return assign_ranks(load, np.append(a, side[::2]), np.append(b, side[1::2]), n_ranks)
+    return partition.assign_ranks(load, np.append(a, side[::2]), np.append(b, side[1::2]), n_ranks)
 
 
-def tiled_cell(case: Case, noded: NodedCell) -> tuple[Int, Int, Int]:
+def tiled_cell(case: Case, noded: gmsh_mesher.NodedCell) -> tuple[Int, Int, Int]:
     """Return facts about a tiled cell: `cell_remarks.pairs_of`, `Torus.nesting`, shared coarse edges (constituents,).
 
     Raises:
@@ -247,9 +246,9 @@ def tiled_cell(case: Case, noded: NodedCell) -> tuple[Int, Int, Int]:
         raise CaseError(*faults)
     n = len(regions.phase)
     depth = np.zeros(n, np.int64)
-    depth[inside[inside >= 0]] = np.where(around == MATRIX, 1, 2)[inside >= 0]
-    nesting = places_by_depth(depth, regions.phase, regions.phases)
-    arcs = np.flatnonzero(curves.circle != MATRIX)
+    depth[inside[inside >= 0]] = np.where(around == lines.MATRIX, 1, 2)[inside >= 0]
+    nesting = periodic_topology.places_by_depth(depth, regions.phase, regions.phases)
+    arcs = np.flatnonzero(curves.circle != lines.MATRIX)
     sides = np.stack([regions.constituent[side[arcs]] for side in (curves.inside, curves.outside)])
     shared = (sides >= 0).all(axis=0)
     count = np.diff(curves.first)[arcs] - 1
@@ -257,8 +256,8 @@ def tiled_cell(case: Case, noded: NodedCell) -> tuple[Int, Int, Int]:
     return cell_remarks.pairs_of(case, regions.phases), nesting, edges
 
 
-def tiles_to_fill(noded: NodedCell) -> list[NumberedTile]:
+def tiles_to_fill(noded: gmsh_mesher.NodedCell) -> list[tiling.NumberedTile]:
     """Return a noded cell's numbered tiles."""
     lines, arrangement = noded.lines, noded.arrangement
-    stands_for = representatives(lines.points, arrangement.width, arrangement.height).astype(np.int64)
-    return [NumberedTile(nodes, stands_for[nodes], tile) for nodes, tile in noded.parts]
+    stands_for = coarse_mesh.representatives(lines.points, arrangement.width, arrangement.height).astype(np.int64)
+    return [tiling.NumberedTile(nodes, stands_for[nodes], tile) for nodes, tile in noded.parts]

@@ -13,16 +13,18 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csr_matrix
 
-from feti_homog.fem.assembly import assemble
-from feti_homog.fem.problem import Problem
-from feti_homog.feti.decomposition.jump_operator import JumpOperator, NodeBlocks
-from feti_homog.feti.decomposition.shared_entities import SharedEntities, share_entities
-from feti_homog.feti.decomposition.subdomain import Subdomain
-from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.operators.one_subdomain import Interior
-from feti_homog.mesh.periodic_topology import present
-from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, joined, refine
-from feti_homog.mesh.submeshes import SubdomainTable, Submesh, SubmeshesOfRank, joined_meshes, part
+from feti_homog.fem import Problem, assembly
+from feti_homog.feti.decomposition import JumpOperator, SharedEntities, Subdomain, jump_operator, shared_entities
+from feti_homog.feti.operators import interface_operators, one_subdomain
+from feti_homog.mesh import (
+    FineMesh,
+    ReferenceLattice,
+    Submesh,
+    SubmeshesOfRank,
+    periodic_topology,
+    refinement,
+    submeshes,
+)
 from feti_homog.typing import Float, Int
 
 # Subdomains of so many elements at once: few enough for the processor's cache, many enough for NumPy.
@@ -66,7 +68,7 @@ def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterat
         bodies = s.submesh.constituent[order]
         for members in np.split(order, np.flatnonzero(np.diff(bodies)) + 1):
             body, law = int(s.submesh.constituent[members[0]]), s.material[members[0]]
-            submesh = replace(part(s.submesh, members), body=body, phase=phase_of[body])
+            submesh = replace(submeshes.part(s.submesh, members), body=body, phase=phase_of[body])
             mesh, classes = _restricted(s.mesh, members)
             is_mixed = bool(np.broadcast_to(s.mixed, len(s.laws))[law])
             yield UniformPart(place, submesh, mesh, s.problem.dofs(classes), s.laws[law], s.problem, is_mixed)
@@ -86,24 +88,28 @@ def _restricted(mesh: FineMesh, members: Int) -> tuple[FineMesh, Int]:
 
     Returns it and (c,) its classes in the whole mesh.
     """
-    nodes, local = present(mesh.nodes[members], len(mesh.points))
-    classes, node_class = present(mesh.node_class[nodes], mesh.n_classes)
+    nodes, local = periodic_topology.present(mesh.nodes[members], len(mesh.points))
+    classes, node_class = periodic_topology.present(mesh.node_class[nodes], mesh.n_classes)
     numbers, curved = (local.astype(np.int32), node_class.astype(np.int32)), mesh.curved[members]
     return FineMesh(mesh.points[nodes], numbers[0], curved, numbers[1], len(classes), mesh.lattice), classes
 
 
 def share_parts(
-    comm: MPI.Intracomm, parts: Sequence[UniformPart], table: SubdomainTable, pairs: Int, lattice: ReferenceLattice
+    comm: MPI.Intracomm,
+    parts: Sequence[UniformPart],
+    table: submeshes.SubdomainTable,
+    pairs: Int,
+    lattice: ReferenceLattice,
 ) -> SharedEntities:
     """Share part nodes as `share_entities` shares subdomain nodes, listed in `table`.  Collective."""
     body = np.array([p.submesh.body for p in parts])
     member = np.repeat(np.arange(len(parts)), [len(p.mesh.nodes) for p in parts])
     index, phase = np.array([p.submesh.index for p in parts]), tuple(p.submesh.phase for p in parts)
-    submeshes = SubmeshesOfRank(joined_meshes([p.submesh for p in parts]), member, index, body, phase)
+    joined = SubmeshesOfRank(submeshes.joined_meshes([p.submesh for p in parts]), member, index, body, phase)
     bodies = comm.allgather(body)
     rank = np.repeat(np.arange(comm.size), [len(bodies_of_rank) for bodies_of_rank in bodies])
-    table = SubdomainTable(np.concatenate(bodies), rank, table.nesting, table.phase)
-    return share_entities(comm, submeshes, table, pairs, lattice)
+    table = submeshes.SubdomainTable(np.concatenate(bodies), rank, table.nesting, table.phase)
+    return shared_entities.share_entities(comm, joined, table, pairs, lattice)
 
 
 class ForcesBetweenParts:
@@ -112,7 +118,7 @@ class ForcesBetweenParts:
     def __init__(self, comm: MPI.Intracomm, parts: Sequence[UniformPart], jumps: JumpOperator) -> None:
         """Assemble the coarse triangles at constraints.  Collective."""
         self._jumps, problem = jumps, jumps.problem
-        torn, nodes = joined([p.mesh for p in parts]), problem.nodes(np.flatnonzero(jumps.B.getnnz(axis=0)))
+        torn, nodes = refinement.joined([p.mesh for p in parts]), problem.nodes(np.flatnonzero(jumps.B.getnnz(axis=0)))
         is_shared = np.zeros(torn.n_classes, bool)
         is_shared[nodes] = True
         touching = np.flatnonzero(is_shared[torn.node_class[torn.nodes]].any(axis=1))
@@ -120,9 +126,9 @@ class ForcesBetweenParts:
         law = np.repeat(np.arange(len(parts)), [len(p.mesh.nodes) for p in parts])[touching]
         used, material = np.unique(law, return_inverse=True)
         mixed = tuple(parts[k].is_mixed for k in used)
-        body = assemble(mesh, np.stack([parts[k].L for k in used]), problem, mixed, material)
+        body = assembly.assemble(mesh, np.stack([parts[k].L for k in used]), problem, mixed, material)
         self._dofs, self._K, self._Q = problem.dofs(classes), body.K, body.Q
-        blocks = NodeBlocks(comm, jumps, csr_matrix(jumps.B @ jumps.B.T))
+        blocks = jump_operator.NodeBlocks(comm, jumps, csr_matrix(jumps.B @ jumps.B.T))
         self._inverse = blocks.inverse(np.ones(jumps.owned[1] - jumps.owned[0]))
 
     def multipliers(self, u: Float, loads: Float) -> Float:
@@ -149,16 +155,20 @@ class NestedInterior:
     mesh: FineMesh
     fixed: Int
     place: Int
-    interior: Interior
+    interior: one_subdomain.Interior
     loads: Float | None
 
     @classmethod
     def of(
-        cls, places: Sequence[int], boundary: InterfaceOperators, lattice: ReferenceLattice, nested: Int
+        cls,
+        places: Sequence[int],
+        boundary: interface_operators.InterfaceOperators,
+        lattice: ReferenceLattice,
+        nested: Int,
     ) -> NestedInterior:
         """Refine, assemble and factor; `nested` numbers lattice nodes among finer ones."""
         members = [boundary.subdomains[place] for place in places]
-        first, meshes, numbers = members[0], [refine(s.submesh, lattice) for s in members], list[Int]()
+        first, meshes, numbers = members[0], [refinement.refine(s.submesh, lattice) for s in members], list[Int]()
         for k, s, mesh in zip(places, members, meshes, strict=True):
             of_fine = np.full(s.n_dofs, INSIDE)
             of_fine[boundary.dofs[k]] = boundary.offsets[k] + np.arange(len(boundary.dofs[k]))
@@ -169,9 +179,9 @@ class NestedInterior:
             numbers.append(of_fine[s.problem.dofs(fine)])
         place = np.concatenate(numbers)
         fixed = np.flatnonzero(place != INSIDE)
-        mesh = joined(meshes)
-        body = assemble(mesh, first.L, first.problem, first.is_mixed)
-        interior = Interior(body.K, fixed)
+        mesh = refinement.joined(meshes)
+        body = assembly.assemble(mesh, first.L, first.problem, first.is_mixed)
+        interior = one_subdomain.Interior(body.K, fixed)
         loads = body.Q[interior.dofs] if any(s.submesh.at_void.any() for s in members) else None
         return cls(members, mesh, fixed, place[fixed], interior, loads)
 
@@ -193,7 +203,7 @@ def locks(subdomains: Sequence[Subdomain | UniformPart], comm: MPI.Intracomm) ->
 
 
 def nested_interiors(
-    boundary: InterfaceOperators, lattice: ReferenceLattice, coarser: ReferenceLattice
+    boundary: interface_operators.InterfaceOperators, lattice: ReferenceLattice, coarser: ReferenceLattice
 ) -> Iterator[NestedInterior]:
     """Yield this rank's subdomain interiors on the coarser lattice, in groups."""
     nested = coarser.within(lattice)

@@ -10,30 +10,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.case.cases import Case
-from feti_homog.fem.problem import AXIAL, Problem
-from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.decomposition.shared_entities import SharedEntities, share_entities
-from feti_homog.feti.decomposition.subdomain import Subdomain
-from feti_homog.feti.dual_solution import DualSolution
-from feti_homog.feti.solver import FetiSolver
-from feti_homog.feti.thresholds import DEFAULTS, Thresholds
+from feti_homog.case import Case
+from feti_homog.fem import AXIAL, Problem
+from feti_homog.feti import DualSolution, FetiSolver, thresholds
+from feti_homog.feti.decomposition import JumpOperator, SharedEntities, Subdomain, shared_entities
 from feti_homog.homogenization import cell_remarks, partition_policy, phase_laws, uniform_parts
 from feti_homog.homogenization.domain_partition import CellSummary, RankShare
 from feti_homog.homogenization.partition_policy import DEFAULT_POLICY, PartitionPolicy
 from feti_homog.homogenization.tile_tearing import cut
 from feti_homog.homogenization.uniform_parts import UniformPart, locks
 from feti_homog.interface import debonded_arcs
-from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.mesh.submeshes import SubdomainTable, Submesh, SubmeshesOfRank
-from feti_homog.microstructure.phase_names import COATING, MATRIX
-from feti_homog.system.parallel.mpi_errors import agree
-from feti_homog.system.runtime.progress_bar import Progress
+from feti_homog.interface.laws import BondLaw
+from feti_homog.mesh import ReferenceLattice, Submesh, SubmeshesOfRank, submeshes
+from feti_homog.microstructure import phase_names
+from feti_homog.system.parallel import mpi_errors
+from feti_homog.system.runtime import progress_bar
 from feti_homog.typing import Bool, Float, Int
 
 if TYPE_CHECKING:
-    from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
+    from feti_homog.feti.decomposition import interface_neighbours
     from feti_homog.homogenization.spring_errors import SpringSides
 
 
@@ -49,7 +44,7 @@ class TornCell:
     case: Case
     summary: CellSummary
     lattice: ReferenceLattice
-    table: SubdomainTable
+    table: submeshes.SubdomainTable
     subdomains: list[Subdomain]
     solver: FetiSolver
     axial: TornCell | None = None
@@ -110,11 +105,11 @@ class TornCell:
         return self._forces.multipliers(u, solution.strain), self.jumps.sum(self.jumps.B @ u)
 
     @cached_property
-    def neighbours(self) -> InterfaceNeighbours:
+    def neighbours(self) -> interface_neighbours.InterfaceNeighbours:
         """All ranks' interface nodes.  Collective when first read."""
-        from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours  # most cells have no interfaces
+        from feti_homog.feti.decomposition import interface_neighbours  # most cells have no interfaces
 
-        return InterfaceNeighbours(self.comm, self.solver.jump_operator, self.subdomains)
+        return interface_neighbours.InterfaceNeighbours(self.comm, self.solver.jump_operator, self.subdomains)
 
     @cached_property
     def spring_sides(self) -> SpringSides:
@@ -204,8 +199,8 @@ class TornCell:
 def tear(
     case: Case,
     comm: MPI.Intracomm,
-    progress: Progress,
-    thresholds: Thresholds = DEFAULTS,
+    progress: progress_bar.Progress,
+    thresholds: thresholds.Thresholds = thresholds.DEFAULTS,
     policy: PartitionPolicy = DEFAULT_POLICY,
 ) -> TornCell:
     """Tear a case's cell and factor its subdomains.  Collective.
@@ -229,7 +224,7 @@ def tear(
     if len(phase_laws.problems(case)) == 1:
         return cell
     with progress.stage("assemble") as line:
-        axial = agree(comm, assemble_axial, case, summary, subdomains)
+        axial = mpi_errors.agree(comm, assemble_axial, case, summary, subdomains)
         line.append(f"{comm.allreduce(sum(s.n_dofs for s in axial))} degrees of freedom along the fibres")
     with progress.stage("axial"):
         return replace(cell, axial=replace(cell, subdomains=axial, solver=solver_of(AXIAL, axial)))
@@ -245,7 +240,7 @@ def assemble_axial(case: Case, summary: CellSummary, subdomains: Sequence[Subdom
 
 
 def assemble_subdomains(
-    case: Case, comm: MPI.Intracomm, progress: Progress, policy: PartitionPolicy = DEFAULT_POLICY
+    case: Case, comm: MPI.Intracomm, progress: progress_bar.Progress, policy: PartitionPolicy = DEFAULT_POLICY
 ) -> tuple[RankShare, SharedEntities, ReferenceLattice, list[Subdomain]]:
     """Mesh and cut the cell; refine and assemble subdomains on their ranks.  Collective.
 
@@ -256,12 +251,12 @@ def assemble_subdomains(
     with progress.stage("mesh") as line:
         share = cut(case, lattice, comm, policy)
         summary = share.summary
-        shared = share_entities(comm, share.submeshes, share.table, share.pairs, lattice)
+        shared = shared_entities.share_entities(comm, share.submeshes, share.table, share.pairs, lattice)
         line.append(f"{summary.coarse_triangles} triangles, {summary.bodies} bodies, {summary.subdomains} subdomains")
     for remark in summary.remarks:
         progress.say(f"remark: {remark}")
     with progress.stage("assemble") as line:
-        subdomains = agree(comm, _assemble, case, summary, share.submeshes, lattice)
+        subdomains = mpi_errors.agree(comm, _assemble, case, summary, share.submeshes, lattice)
         dofs = comm.allreduce(sum(s.n_dofs for s in subdomains))
         meshed = comm.allreduce(sum(s.area for s in subdomains))
         if summary.voids:
@@ -279,7 +274,7 @@ def _assemble(
         phase_of = summary.constituent_phase[s.constituent]
         material = None if s.phase else np.unique(phase_of, return_inverse=True)[1]
         mixed = tuple(phase_laws.is_mixed(case, name) for name in _phases(summary, s))
-        flags = {"is_thin": s.phase == COATING, "is_outer": s.phase == MATRIX}
+        flags = {"is_thin": s.phase == phase_names.COATING, "is_outer": s.phase == phase_names.MATRIX}
         laws = _laws(case, summary, s, problem)
         subdomains.append(Subdomain.build(s, lattice, laws, problem, material, mixed, **flags))
     return subdomains

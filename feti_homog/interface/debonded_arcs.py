@@ -12,9 +12,9 @@ from types import MappingProxyType
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from feti_homog.case.interface_section import Arc
+from feti_homog.case import interface_section
 from feti_homog.interface.contact.states import BONDED, Status
-from feti_homog.schema.wording import toml_value
+from feti_homog.schema import wording
 from feti_homog.typing import Bool, Float, Int
 
 # A node this close to a tip, in degrees, is the tip: coordinates in files and on circles are rounded.
@@ -90,7 +90,7 @@ def closing_work(length: float, before: Float, force: Float, behind: Float, jump
     return np.asarray(np.maximum((force[within] * w).sum(axis=0), 0.0) / (2 * length))
 
 
-def tips(arcs: Sequence[Arc], values: Sequence[float], fibres: int) -> dict[int, list[float]]:
+def tips(arcs: Sequence[interface_section.Arc], values: Sequence[float], fibres: int) -> dict[int, list[float]]:
     """Return tip directions in [0, 360), by fibre number from 0.
 
     An arc without an angle takes all of `values`.  Openings of 0 and 360 degrees have no tips.
@@ -128,7 +128,7 @@ def moved_tips(marks: Mapping[int, Sequence[float]], fibre: Int, direction: Floa
 
 
 def debonded(
-    arcs: Sequence[Arc], opening: float | None, fibre: Int, angle: Float, moved: MovedTips = NOT_MOVED
+    arcs: Sequence[interface_section.Arc], opening: float | None, fibre: Int, angle: Float, moved: MovedTips = NOT_MOVED
 ) -> Bool:
     """(k,) True for nodes within an arc, on fibres (k,), numbered from 1, in directions (k,).
 
@@ -147,12 +147,12 @@ def debonded(
     return inside
 
 
-def _end(arc: Arc, half: float) -> float:
+def _end(arc: interface_section.Arc, half: float) -> float:
     """Return the direction in [0, 360) of an arc's tip, `half` away from its centre."""
     return round(arc.centre + half, 9) % 360.0
 
 
-def _ends(arc: Arc, half: float, fibre: Int, moved: MovedTips) -> Float:
+def _ends(arc: interface_section.Arc, half: float, fibre: Int, moved: MovedTips) -> Float:
     """(k,) directions of this tip on the fibres (k,), not reduced to [0, 360)."""
     ends, key = np.full(len(fibre), arc.centre + half), _end(arc, half)
     for (number, end), actual in moved.items():
@@ -161,13 +161,13 @@ def _ends(arc: Arc, half: float, fibre: Int, moved: MovedTips) -> Float:
     return ends
 
 
-def faults(arcs: Sequence[Arc], centres: Float, label: str = "interface") -> list[str]:
+def faults(arcs: Sequence[interface_section.Arc], centres: Float, label: str = "interface") -> list[str]:
     """List faults in the arcs of interface `label`, on fibres with centres (fibres, 2), NaN without one."""
     messages = []
     for place, arc in enumerate(arcs):
         chosen = range(1, len(centres) + 1) if isinstance(arc.fibre, str) else arc.fibre
         written = arc.fibre if isinstance(arc.fibre, str) or len(arc.fibre) > 1 else arc.fibre[0]
-        line = f"[{label}] debonded[{place}].fibre = {toml_value(written)}: "
+        line = f"[{label}] debonded[{place}].fibre = {wording.toml_value(written)}: "
         if max(chosen, default=0) > len(centres):
             most = f"expected at most {len(centres)}; the cell has {len(centres)} fibres, counted from 1"
             messages.append(line + most)

@@ -7,8 +7,6 @@ Axes 1, 2, 3 of a cell are x1 and x2, across the fibres, and x3, along them.  Ax
 of cards are x3, x1, x2: names with `axial`, `transverse`, `x1` or `x2` are the same in both.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -16,10 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from feti_homog.materials.material_forms import PER_TEMPERATURE
 from feti_homog.materials.laws import COUPLINGS
+from feti_homog.materials.material_forms import PER_TEMPERATURE
 from feti_homog.materials.voigt import EXPANSIONS, THERMAL_STRESSES
-from feti_homog.system.runtime.records import STRESS, described
+from feti_homog.system.runtime import described, records
 from feti_homog.typing import Array, Float
 
 DIRECTIONS = 720  # across the fibres
@@ -37,15 +35,15 @@ class Moduli:
     `bulk` and `shear` belong to the nearest isotropic stiffness, `anisotropy` is the relative distance to it.
     """
 
-    E1: float = described("Young's modulus along x1", STRESS)
-    E2: float = described("Young's modulus along x2", STRESS)
+    E1: float = described("Young's modulus along x1", records.STRESS)
+    E2: float = described("Young's modulus along x2", records.STRESS)
     nu12: float = described("contraction along x2 under stress along x1")
     nu21: float = described("contraction along x1 under stress along x2")
-    G12: float = described("shear modulus in the axes of the cell", STRESS)
+    G12: float = described("shear modulus in the axes of the cell", records.STRESS)
     eta1: float = described("shear strain gamma12 over the strain along x1 under stress along x1")
     eta2: float = described("shear strain gamma12 over the strain along x2 under stress along x2")
-    bulk: float = described("plane bulk modulus of the nearest isotropic stiffness", STRESS)
-    shear: float = described("shear modulus of the nearest isotropic stiffness", STRESS)
+    bulk: float = described("plane bulk modulus of the nearest isotropic stiffness", records.STRESS)
+    shear: float = described("shear modulus of the nearest isotropic stiffness", records.STRESS)
     anisotropy: float = described("relative distance to the nearest isotropic stiffness")
 
 
@@ -53,28 +51,28 @@ class Moduli:
 class EngineeringConstants:
     """Constants in the cell's axes: nu_ij = -eps_j/eps_i under stress along i."""
 
-    E1: float = described("Young's modulus along x1", STRESS)
-    E2: float = described("Young's modulus along x2", STRESS)
-    E3: float = described("Young's modulus along x3, the fibres", STRESS)
+    E1: float = described("Young's modulus along x1", records.STRESS)
+    E2: float = described("Young's modulus along x2", records.STRESS)
+    E3: float = described("Young's modulus along x3, the fibres", records.STRESS)
     nu12: float = described("contraction along x2 under stress along x1")
     nu13: float = described("contraction along x3 under stress along x1")
     nu23: float = described("contraction along x3 under stress along x2")
-    G12: float = described("shear modulus in the plane across the fibres", STRESS)
-    G13: float = described("shear modulus of x1 and the fibres", STRESS)
-    G23: float = described("shear modulus of x2 and the fibres", STRESS)
+    G12: float = described("shear modulus in the plane across the fibres", records.STRESS)
+    G13: float = described("shear modulus of x1 and the fibres", records.STRESS)
+    G23: float = described("shear modulus of x2 and the fibres", records.STRESS)
 
 
 @dataclass(frozen=True)
 class TransverseIsotropy:
     """Constants for the nearest transversely isotropic material about x3; five of the first seven are independent."""
 
-    E_axial: float = described("Young's modulus along the fibres", STRESS)
-    E_transverse: float = described("Young's modulus across the fibres", STRESS)
+    E_axial: float = described("Young's modulus along the fibres", records.STRESS)
+    E_transverse: float = described("Young's modulus across the fibres", records.STRESS)
     nu_axial: float = described("contraction across the fibres under stress along them")
     nu_transverse: float = described("contraction across the fibres under stress across them")
-    G_axial: float = described("shear modulus along the fibres", STRESS)
-    G_transverse: float = described("shear modulus across the fibres", STRESS)
-    K_transverse: float = described("bulk modulus across the fibres in plane strain", STRESS)
+    G_axial: float = described("shear modulus along the fibres", records.STRESS)
+    G_transverse: float = described("shear modulus across the fibres", records.STRESS)
+    K_transverse: float = described("bulk modulus across the fibres in plane strain", records.STRESS)
     expansion_axial: float | None = described(
         "expansion along the fibres; null if a phase does not give its own", PER_TEMPERATURE
     )
@@ -88,10 +86,10 @@ class TransverseIsotropy:
 class TransverseModuli:
     """Range of moduli across the fibres, over 720 directions in half a turn about x3."""
 
-    E_least: float = described("least Young's modulus across the fibres", STRESS)
-    E_largest: float = described("the largest one", STRESS)
-    G_least: float = described("least shear modulus in the plane across the fibres", STRESS)
-    G_largest: float = described("the largest one", STRESS)
+    E_least: float = described("least Young's modulus across the fibres", records.STRESS)
+    E_largest: float = described("the largest one", records.STRESS)
+    G_least: float = described("least shear modulus in the plane across the fibres", records.STRESS)
+    G_largest: float = described("the largest one", records.STRESS)
 
 
 def constants(C: Array, heat: Array | None = None) -> dict[str, Any]:

@@ -4,8 +4,6 @@ E_A, E_T, nu_A, nu_T: Young's moduli and contractions along and across the fibre
 across them and the bulk modulus across them; alpha: expansions; c: fractions; f, m: fibre and matrix.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -13,35 +11,28 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.materials.phase_bounds import (
-    NOTHING,
-    Estimate,
-    Estimates,
-    Fibres,
-    aligned_cylinders,
-    equivalent_fibre,
-    expansions,
-)
-from feti_homog.materials.engineering_constants import (
-    TransverseIsotropy,
-    is_transversely_isotropic,
-    transverse_constants,
-)
+from feti_homog.materials import engineering_constants, phase_bounds
 
 
-def estimates(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimates:
+def estimates(
+    matrix: engineering_constants.TransverseIsotropy, fibres: Sequence[phase_bounds.Fibres]
+) -> phase_bounds.Estimates:
     """Return each method's estimates for fibres in a matrix.
 
     The rule of mixtures and Mori and Tanaka's estimate are defined for any kinds of fibres, the others for one; on
     springs the last three.  No method gives a constant if a phase is not transversely isotropic about x3, nor an
     expansion if a phase has none.
     """
-    if not all(map(is_transversely_isotropic, [matrix, *(family.constants for family in fibres)])):
-        return Estimates(**dict.fromkeys(METHODS, NOTHING))
-    return Estimates(**{name: method(matrix, fibres) for name, method in METHODS.items()})
+    if not all(
+        map(engineering_constants.is_transversely_isotropic, [matrix, *(family.constants for family in fibres)])
+    ):
+        return phase_bounds.Estimates(**dict.fromkeys(METHODS, phase_bounds.NOTHING))
+    return phase_bounds.Estimates(**{name: method(matrix, fibres) for name, method in METHODS.items()})
 
 
-def rule_of_mixtures(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
+def rule_of_mixtures(
+    matrix: engineering_constants.TransverseIsotropy, fibres: Sequence[phase_bounds.Fibres]
+) -> phase_bounds.Estimate:
     """Phases in parallel along the fibres, in series across them; any number of phases.
 
         E_A = sum c E_A,  nu_A = sum c nu_A,  1/E_T = sum c/E_T,  1/G_A = sum c/G_A,  1/G_T = sum c/G_T,
@@ -51,12 +42,12 @@ def rule_of_mixtures(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Es
     Voigt 1889, Reuss 1929; the expansions Schapery 1968, of anisotropic fibres Hashin 1979.
     """
     if any(family.springs is not None for family in fibres):
-        return NOTHING
+        return phase_bounds.NOTHING
     phases, along = _phases(matrix, fibres), _in_parallel(matrix, fibres)
     E, nu, *_ = along.values()
     E_transverse = 1 / sum(c / x.E_transverse for c, x in phases)
     G = 1 / sum(c / x.G_transverse for c, x in phases)
-    return Estimate(
+    return phase_bounds.Estimate(
         **along,
         E_transverse=E_transverse,
         nu_transverse=E_transverse / (2 * G) - 1,
@@ -66,7 +57,9 @@ def rule_of_mixtures(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Es
     )
 
 
-def chamis(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
+def chamis(
+    matrix: engineering_constants.TransverseIsotropy, fibres: Sequence[phase_bounds.Fibres]
+) -> phase_bounds.Estimate:
     """Return Chamis's simplified equations; one kind of fibres.
 
         E_A, nu_A: rule of mixtures,  M = M_m / (1 - sqrt(c) (1 - M_m/M_f)) for M = E_T, G_A, G_T,
@@ -77,7 +70,7 @@ def chamis(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
     matrix.
     """
     if len(fibres) != 1 or fibres[0].springs is not None:
-        return NOTHING
+        return phase_bounds.NOTHING
     fibre, c = fibres[0].constants, fibres[0].fraction
     root = math.sqrt(c)
 
@@ -87,10 +80,10 @@ def chamis(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
     along = _in_parallel(matrix, fibres)
     E_transverse = mean(matrix.E_transverse, fibre.E_transverse)
     G = mean(matrix.G_transverse, fibre.G_transverse)
-    if (of_fibre := expansions(fibre)) and (of_matrix := expansions(matrix)):
+    if (of_fibre := phase_bounds.expansions(fibre)) and (of_matrix := phase_bounds.expansions(matrix)):
         restrained = c * matrix.nu_axial * fibre.E_axial / along["E_axial"] * of_matrix[0]
         along["expansion_transverse"] = root * of_fibre[1] + (1 - root) * (of_matrix[1] + restrained)
-    return Estimate(
+    return phase_bounds.Estimate(
         **along,
         E_transverse=E_transverse,
         nu_transverse=E_transverse / (2 * G) - 1,
@@ -100,7 +93,9 @@ def chamis(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
     )
 
 
-def halpin_tsai(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
+def halpin_tsai(
+    matrix: engineering_constants.TransverseIsotropy, fibres: Sequence[phase_bounds.Fibres]
+) -> phase_bounds.Estimate:
     """Return Halpin and Tsai's equations; one kind of fibres.
 
         E_A, nu_A: rule of mixtures,  M = M_m (1 + xi eta c)/(1 - eta c),  eta = (M_f - M_m)/(M_f + xi M_m),
@@ -110,7 +105,7 @@ def halpin_tsai(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimat
     Halpin and Kardos 1976.
     """
     if len(fibres) != 1 or fibres[0].springs is not None:
-        return NOTHING
+        return phase_bounds.NOTHING
     fibre, c = fibres[0].constants, fibres[0].fraction
 
     def mean(of_matrix: float, of_fibre: float, xi: float) -> float:
@@ -120,7 +115,7 @@ def halpin_tsai(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimat
     k, G = matrix.K_transverse, matrix.G_transverse
     along = _in_parallel(matrix, fibres)
     return dataclasses.replace(
-        NOTHING,
+        phase_bounds.NOTHING,
         E_axial=along["E_axial"],
         E_transverse=mean(matrix.E_transverse, fibre.E_transverse, 2),
         nu_axial=along["nu_axial"],
@@ -130,41 +125,51 @@ def halpin_tsai(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimat
     )
 
 
-def _phases(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> list[tuple[float, TransverseIsotropy]]:
+def _phases(
+    matrix: engineering_constants.TransverseIsotropy, fibres: Sequence[phase_bounds.Fibres]
+) -> list[tuple[float, engineering_constants.TransverseIsotropy]]:
     rest = 1 - sum(family.fraction for family in fibres)
     return [(rest, matrix), *((family.fraction, family.constants) for family in fibres)]
 
 
-def _in_parallel(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> dict[str, Any]:
+def _in_parallel(
+    matrix: engineering_constants.TransverseIsotropy, fibres: Sequence[phase_bounds.Fibres]
+) -> dict[str, Any]:
     """Tabulate E_A, nu_A, alpha_A and alpha_T by the rule of mixtures; no alpha if a phase has none."""
     phases = _phases(matrix, fibres)
     E, nu = sum(c * x.E_axial for c, x in phases), sum(c * x.nu_axial for c, x in phases)
     axial = transverse = 0.0
     for c, phase in phases:
-        if (strains := expansions(phase)) is None:
+        if (strains := phase_bounds.expansions(phase)) is None:
             return {"E_axial": E, "nu_axial": nu, "expansion_axial": None, "expansion_transverse": None}
         axial += c * phase.E_axial * strains[0] / E
         transverse += c * (strains[1] + phase.nu_axial * strains[0])
     return {"E_axial": E, "nu_axial": nu, "expansion_axial": axial, "expansion_transverse": transverse - nu * axial}
 
 
-def cylinders_in_matrix(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> TransverseIsotropy:
+def cylinders_in_matrix(
+    matrix: engineering_constants.TransverseIsotropy, fibres: Sequence[phase_bounds.Fibres]
+) -> engineering_constants.TransverseIsotropy:
     """`aligned_cylinders` with the matrix around, and for a fibre on springs the bonded one that does the same."""
     fractions = [c for c, _ in _phases(matrix, fibres)]
-    phases = [matrix, *(equivalent_fibre(family, matrix) for family in fibres)]
-    return aligned_cylinders(fractions, phases, (matrix.K_transverse, matrix.G_transverse, matrix.G_axial))
+    phases = [matrix, *(phase_bounds.equivalent_fibre(family, matrix) for family in fibres)]
+    return phase_bounds.aligned_cylinders(fractions, phases, (matrix.K_transverse, matrix.G_transverse, matrix.G_axial))
 
 
-def mori_tanaka(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
+def mori_tanaka(
+    matrix: engineering_constants.TransverseIsotropy, fibres: Sequence[phase_bounds.Fibres]
+) -> phase_bounds.Estimate:
     """Every fibre is alone in the matrix, under the matrix's mean field; any kinds of round fibres, on springs too.
 
     `cylinders_in_matrix`.  Mori and Tanaka 1973, Benveniste 1987; transversely isotropic phases Chen, Dvorak and
     Benveniste 1992; springs Benveniste 1985.
     """
-    return Estimate.of(cylinders_in_matrix(matrix, fibres))
+    return phase_bounds.Estimate.of(cylinders_in_matrix(matrix, fibres))
 
 
-def composite_cylinders(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
+def composite_cylinders(
+    matrix: engineering_constants.TransverseIsotropy, fibres: Sequence[phase_bounds.Fibres]
+) -> phase_bounds.Estimate:
     """Cylinders of fibre and matrix, alike but for their size, that fill space; one kind of fibres, on springs too.
 
     Exact for this arrangement: k, E_A, nu_A, G_A and the expansions, as of `cylinders_in_matrix`.  Of
@@ -172,26 +177,30 @@ def composite_cylinders(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) ->
     Rosen and Hashin 1970; springs, of fibres of equal radius, Hashin 1990.
     """
     if len(fibres) != 1:
-        return NOTHING
-    exact = Estimate.of(cylinders_in_matrix(matrix, fibres))
+        return phase_bounds.NOTHING
+    exact = phase_bounds.Estimate.of(cylinders_in_matrix(matrix, fibres))
     return dataclasses.replace(exact, E_transverse=None, nu_transverse=None, G_transverse=None)
 
 
-def self_consistent(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
+def self_consistent(
+    matrix: engineering_constants.TransverseIsotropy, fibres: Sequence[phase_bounds.Fibres]
+) -> phase_bounds.Estimate:
     """Christensen and Lo's estimate; one kind of fibres, on springs too.
 
     k, E_A, nu_A, G_A and the expansions come from `composite_cylinders`, G_T from `transverse_shear`;
     E_T and nu_T follow.  Christensen and Lo 1979; springs, of fibres of equal radius, Hashin 1990.
     """
     if len(fibres) != 1:
-        return NOTHING
+        return phase_bounds.NOTHING
     x = cylinders_in_matrix(matrix, fibres)
     G = transverse_shear(matrix, fibres[0])
-    E_transverse, nu_transverse = transverse_constants(x.E_axial, x.nu_axial, x.K_transverse, G)
-    return dataclasses.replace(Estimate.of(x), E_transverse=E_transverse, nu_transverse=nu_transverse, G_transverse=G)
+    E_transverse, nu_transverse = engineering_constants.transverse_constants(x.E_axial, x.nu_axial, x.K_transverse, G)
+    return dataclasses.replace(
+        phase_bounds.Estimate.of(x), E_transverse=E_transverse, nu_transverse=nu_transverse, G_transverse=G
+    )
 
 
-def transverse_shear(matrix: TransverseIsotropy, family: Fibres) -> float:
+def transverse_shear(matrix: engineering_constants.TransverseIsotropy, family: phase_bounds.Fibres) -> float:
     """Return the shear modulus m* of the medium that a coated fibre does not change.
 
     Under shear across it the coated fibre has the energy of the medium.
@@ -211,7 +220,7 @@ def transverse_shear(matrix: TransverseIsotropy, family: Fibres) -> float:
     fibre, c, m = family.constants, family.fraction, matrix.G_transverse
     normal, tangential, _ = (0.0, 0.0, 0.0) if family.springs is None else family.springs.compliances
     total, difference = m * (normal + tangential), m * (normal - tangential)
-    ratio = equivalent_fibre(family, matrix).G_transverse / m  # m_e/m
+    ratio = phase_bounds.equivalent_fibre(family, matrix).G_transverse / m  # m_e/m
     d = 1 / (1 + m / fibre.G_transverse + 2 * m / fibre.K_transverse + 3 * total)  # 1/(1 + V33)
     w, v = -difference * d * ratio, 3 * difference * d  # (m_e/m) V31/(1 + V33) and V13/(1 + V33)
     beta = 1 / (2 + 2 * m / matrix.K_transverse)  # 1/(kappa_m + 1)
@@ -228,7 +237,9 @@ def transverse_shear(matrix: TransverseIsotropy, family: Fibres) -> float:
     return float(m * roots.real.max())
 
 
-METHODS: Mapping[str, Callable[[TransverseIsotropy, Sequence[Fibres]], Estimate]] = {
+METHODS: Mapping[
+    str, Callable[[engineering_constants.TransverseIsotropy, Sequence[phase_bounds.Fibres]], phase_bounds.Estimate]
+] = {
     method.__name__: method
     for method in (rule_of_mixtures, chamis, halpin_tsai, mori_tanaka, composite_cylinders, self_consistent)
 }

@@ -4,41 +4,27 @@ Voigt order [11, 22, 12] in the plane, [11, 22, 33, 23, 13, 12] in space, with e
 plane of symmetry of every phase, so that [23, 13] are coupled to each other alone.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 
 import numpy as np
 
-from feti_homog.materials.material_forms import (
-    EXPANSION_PAIR,
-    General,
-    Isotropic,
-    Material,
-    Orthotropic,
-    TransverselyIsotropic,
-)
-from feti_homog.materials.voigt import (
-    GENERALIZED,
-    IN_PLANE,
-    IN_PLANE_BLOCK,
-    PLANE_STATES,
-    PLANE_STRAIN,
-    is_positive_definite,
-    rotated,
-    strain_rotation,
-)
-from feti_homog.schema.wording import limit_in_words, toml_key, toml_value
+from feti_homog.materials import material_forms, voigt
+from feti_homog.schema import wording
 from feti_homog.typing import Float
 
 COUPLINGS = ((0, 3), (0, 4), (1, 3), (1, 4), (2, 3), (2, 4), (3, 5), (4, 5))
 """Entries of a spatial stiffness that vanish where x3 is normal to a plane of symmetry."""
-NEEDED: dict[type[Orthotropic] | type[TransverselyIsotropic], dict[str, tuple[str, ...]]] = {
-    Orthotropic: {PLANE_STRAIN.name: ("E3", "nu13", "nu23"), GENERALIZED.name: ("E3", "nu13", "nu23", "G13", "G23")},
-    TransverselyIsotropic: {
-        PLANE_STRAIN.name: ("E_axial", "nu_axial"),
-        GENERALIZED.name: ("E_axial", "nu_axial", "G_axial"),
+NEEDED: dict[
+    type[material_forms.Orthotropic] | type[material_forms.TransverselyIsotropic], dict[str, tuple[str, ...]]
+] = {
+    material_forms.Orthotropic: {
+        voigt.PLANE_STRAIN.name: ("E3", "nu13", "nu23"),
+        voigt.GENERALIZED.name: ("E3", "nu13", "nu23", "G13", "G23"),
+    },
+    material_forms.TransverselyIsotropic: {
+        voigt.PLANE_STRAIN.name: ("E_axial", "nu_axial"),
+        voigt.GENERALIZED.name: ("E_axial", "nu_axial", "G_axial"),
     },
 }
 """The optional constants that a plane state needs."""
@@ -50,82 +36,84 @@ ISOTROPY = 1e-9
 WORRYING_CONTRAST, LARGEST_CONTRAST = 1e10, 1e14
 
 
-def stiffness_of(material: Material, plane: str) -> Float:
+def stiffness_of(material: material_forms.Material, plane: str) -> Float:
     """Return the stiffness (3, 3) in the plane, or (6, 6) if the plane state is spatial.
 
     Raises as `plane_stiffness`.
     """
-    return spatial_stiffness(material) if PLANE_STATES[plane].is_spatial else plane_stiffness(material, plane)
+    return spatial_stiffness(material) if voigt.PLANE_STATES[plane].is_spatial else plane_stiffness(material, plane)
 
 
-def plane_stiffness(material: Material, plane: str) -> Float:
+def plane_stiffness(material: material_forms.Material, plane: str) -> Float:
     """C with [S11, S22, S12] = C [E11, E22, gamma12], (3, 3), symmetric positive definite, stress unit.
 
     `plane` is "stress" (S33 = 0), "strain" (E33 = 0), or "generalized", where C is that at E33 = 0. Raises ValueError,
     with the keys at fault, if the constants leave C open or no material is stable with them.
     """
-    if isinstance(material, Isotropic):
+    if isinstance(material, material_forms.Isotropic):
         lame, shear = _lame(material, plane)
         return np.array([[lame + 2 * shear, lame, 0.0], [lame, lame + 2 * shear, 0.0], [0.0, 0.0, shear]])
-    is_sheet = PLANE_STATES[plane].is_sheet
-    if isinstance(material, General):
+    is_sheet = voigt.PLANE_STATES[plane].is_sheet
+    if isinstance(material, material_forms.General):
         stiffness = _checked_stiffness(material)
         if len(stiffness) == 3:
             return stiffness
-        block, out = stiffness[IN_PLANE_BLOCK], stiffness[IN_PLANE, 2]
+        block, out = stiffness[voigt.IN_PLANE_BLOCK], stiffness[voigt.IN_PLANE, 2]
         return np.asarray(block - np.outer(out, out) / stiffness[2, 2]) if is_sheet else block
     compliance = stable_compliance(material, plane)
-    reduced = compliance[IN_PLANE_BLOCK]
+    reduced = compliance[voigt.IN_PLANE_BLOCK]
     if not is_sheet:
-        out = compliance[IN_PLANE, 2]
+        out = compliance[voigt.IN_PLANE, 2]
         reduced = reduced - np.outer(out, out) / compliance[2, 2]
-    return rotated(np.asarray(np.linalg.inv(reduced), float), _angle(material))
+    return voigt.rotated(np.asarray(np.linalg.inv(reduced), float), _angle(material))
 
 
-def isotropic_ratio(material: Material) -> float | None:
+def isotropic_ratio(material: material_forms.Material) -> float | None:
     """Poisson's ratio of an isotropic material, None for another, and for one that gives its stiffness.
 
     A transversely isotropic one is isotropic if its constants are, to ISOTROPY.
     """
-    if isinstance(material, TransverselyIsotropic):
+    if isinstance(material, material_forms.TransverselyIsotropic):
         young, ratio, shear = material.E_transverse, material.nu_transverse, material.G_axial
         pairs = [(material.E_axial, young), (material.nu_axial, ratio), (shear, young / (2 + 2 * ratio))]
         known = pairs if shear is not None else pairs[:2]
         alike = all(first is not None and math.isclose(first, second, rel_tol=ISOTROPY) for first, second in known)
         return ratio if alike else None
-    return material.poisson if isinstance(material, Isotropic) else None
+    return material.poisson if isinstance(material, material_forms.Isotropic) else None
 
 
-def spatial_stiffness(material: Material) -> Float:
+def spatial_stiffness(material: material_forms.Material) -> Float:
     """C with S = C E in the cell's axes, (6, 6), symmetric positive definite, unit of stress.
 
     Raises ValueError as `plane_stiffness` does.
     """
-    if isinstance(material, Isotropic):
-        lame, shear = _lame(material, GENERALIZED.name)
+    if isinstance(material, material_forms.Isotropic):
+        lame, shear = _lame(material, voigt.GENERALIZED.name)
         stiffness = np.diag([2 * shear] * 3 + [shear] * 3)
         stiffness[:3, :3] += lame
         return stiffness
-    if isinstance(material, General):
+    if isinstance(material, material_forms.General):
         stiffness = _checked_stiffness(material)
         if len(stiffness) == 3:
             raise ValueError("stiffness: expected 6x6 in generalized plane strain; 3x3 serves one plane state only")
         return stiffness
-    return rotated(np.asarray(np.linalg.inv(stable_compliance(material, GENERALIZED.name)), float), _angle(material))
+    return voigt.rotated(
+        np.asarray(np.linalg.inv(stable_compliance(material, voigt.GENERALIZED.name)), float), _angle(material)
+    )
 
 
-def expansion(material: Material) -> Float | None:
+def expansion(material: material_forms.Material) -> Float | None:
     """Strains per unit of temperature in the free material, in the cell's axes, (6,); None if not given.
 
     Raises ValueError, with the keys at fault, if they are given twice or by half.
     """
     free = material.expansion
-    if isinstance(material, TransverselyIsotropic):
-        pair = [name for name in EXPANSION_PAIR if getattr(material, name) is not None]
+    if isinstance(material, material_forms.TransverselyIsotropic):
+        pair = [name for name in material_forms.EXPANSION_PAIR if getattr(material, name) is not None]
         if pair and free is not None:
             raise ValueError(f"expansion, {', '.join(pair)}: exclude each other; give one or a pair")
         if len(pair) == 1:
-            (absent,) = set(EXPANSION_PAIR).difference(pair)
+            (absent,) = set(material_forms.EXPANSION_PAIR).difference(pair)
             raise ValueError(f"{absent}: missing; {pair[0]} needs it")
         axial, transverse = material.expansion_axial, material.expansion_transverse
         if axial is not None and transverse is not None:
@@ -133,33 +121,33 @@ def expansion(material: Material) -> Float | None:
     if free is None:
         return None
     along_axes = free if isinstance(free, tuple) else (free,) * 3
-    return np.asarray(strain_rotation(-_angle(material)) @ [*along_axes, 0.0, 0.0, 0.0])
+    return np.asarray(voigt.strain_rotation(-_angle(material)) @ [*along_axes, 0.0, 0.0, 0.0])
 
 
-def out_of_plane(material: Material, plane: str) -> tuple[Float, Float]:
+def out_of_plane(material: material_forms.Material, plane: str) -> tuple[Float, Float]:
     """s and e, (3,) each, with S33 = s . [S11, S22, S12] and E33 = e . [S11, S22, S12], in plane strain and stress.
 
     S33 vanishes in plane stress, E33 in plane strain. NaN if the material's constants leave it open.
     """
     # E33 = row . [S11, S22, S12] + S33 / young
-    if isinstance(material, Isotropic):
+    if isinstance(material, material_forms.Isotropic):
         ratio = -material.poisson / material.young
         row, young = np.array([ratio, ratio, 0.0]), material.young
-    elif isinstance(material, General):
+    elif isinstance(material, material_forms.General):
         stiffness = _checked_stiffness(material)
         compliance = np.full((6, 6), np.nan) if len(stiffness) == 3 else np.linalg.inv(stiffness)
-        row, young = compliance[2, IN_PLANE], 1.0 / compliance[2, 2]
+        row, young = compliance[2, voigt.IN_PLANE], 1.0 / compliance[2, 2]
     else:
         compliance = known_compliance(material)
         # Stresses turn as the transpose of strains that turn the other way.
-        to_axes = strain_rotation(-_angle(material)).T[IN_PLANE_BLOCK]
+        to_axes = voigt.strain_rotation(-_angle(material)).T[voigt.IN_PLANE_BLOCK]
         row, young = np.array([compliance[2, 0], compliance[2, 1], 0.0]) @ to_axes, 1.0 / compliance[2, 2]
-    return (np.zeros(3), row) if PLANE_STATES[plane].is_sheet else (-young * row, np.zeros(3))
+    return (np.zeros(3), row) if voigt.PLANE_STATES[plane].is_sheet else (-young * row, np.zeros(3))
 
 
-def _lame(material: Isotropic, plane: str) -> tuple[float, float]:
+def _lame(material: material_forms.Isotropic, plane: str) -> tuple[float, float]:
     """Lame's constant, in plane stress the reduced one, and the shear modulus."""
-    state = PLANE_STATES[plane]
+    state = voigt.PLANE_STATES[plane]
     if not state.is_sheet and material.poisson >= 0.5:
         raise ValueError(f"poisson = {material.poisson}: expected less than 0.5 in {state.title}; 0.49999999 serves")
     shear = material.young / (2.0 * (1.0 + material.poisson))
@@ -167,17 +155,17 @@ def _lame(material: Isotropic, plane: str) -> tuple[float, float]:
     return 2.0 * shear * material.poisson / thickness, shear
 
 
-def _angle(material: Material) -> float:
+def _angle(material: material_forms.Material) -> float:
     """Direction of the first material axis, degrees from x1 towards x2."""
-    return material.angle if isinstance(material, Orthotropic) else 0.0
+    return material.angle if isinstance(material, material_forms.Orthotropic) else 0.0
 
 
-def _checked_stiffness(material: General) -> Float:
+def _checked_stiffness(material: material_forms.General) -> Float:
     """Return the stiffness that a phase gives, (3, 3) or (6, 6), checked."""
     given = np.array(material.stiffness)
     noise = 1e-9 * np.abs(given).max()
     if not np.allclose(given, given.T, rtol=0.0, atol=noise):
-        raise ValueError(f"stiffness = {toml_value(material.stiffness)}: expected a symmetric matrix")
+        raise ValueError(f"stiffness = {wording.toml_value(material.stiffness)}: expected a symmetric matrix")
     stiffness = np.asarray((given + given.T) / 2.0)
     if len(stiffness) == 6:
         i, j = max(COUPLINGS, key=lambda entry: float(abs(stiffness[entry])))
@@ -186,17 +174,17 @@ def _checked_stiffness(material: General) -> Float:
             raise ValueError(f"stiffness: {entry}: expected 0; x3 must be normal to a plane of symmetry")
         rows, columns = np.transpose(COUPLINGS)
         stiffness[rows, columns] = stiffness[columns, rows] = 0.0
-    if not is_positive_definite(stiffness):
-        raise ValueError(f"stiffness = {toml_value(material.stiffness)}: expected a positive definite matrix")
+    if not voigt.is_positive_definite(stiffness):
+        raise ValueError(f"stiffness = {wording.toml_value(material.stiffness)}: expected a positive definite matrix")
     return stiffness
 
 
-def stable_compliance(material: Orthotropic | TransverselyIsotropic, plane: str) -> Float:
+def stable_compliance(material: material_forms.Orthotropic | material_forms.TransverselyIsotropic, plane: str) -> Float:
     """Compliance (6, 6) in the material axes, checked as far as the plane state needs it."""
-    compliance, state = known_compliance(material), PLANE_STATES[plane]
-    if not is_positive_definite(compliance[:2, :2]):
-        if isinstance(material, Orthotropic):
-            limit = limit_in_words(material.E1 / material.E2, material.nu12**2, 6)
+    compliance, state = known_compliance(material), voigt.PLANE_STATES[plane]
+    if not voigt.is_positive_definite(compliance[:2, :2]):
+        if isinstance(material, material_forms.Orthotropic):
+            limit = wording.limit_in_words(material.E1 / material.E2, material.nu12**2, 6)
             fault = f"nu12 = {material.nu12}: expected nu12^2 < E1/E2 = {limit}"
         else:
             fault = f"nu_transverse = {material.nu_transverse}: expected a number above -1 and below 1"
@@ -204,20 +192,20 @@ def stable_compliance(material: Orthotropic | TransverselyIsotropic, plane: str)
     absent = [name for name in NEEDED[type(material)].get(plane, ()) if getattr(material, name) is None]
     if absent:
         fault = f"{', '.join(absent)}: missing; {state.title} {'needs it' if len(absent) == 1 else 'needs them'}"
-        raise ValueError(f"{fault}; {OF_DATA_SHEETS}" if isinstance(material, Orthotropic) else fault)
-    if state.is_sheet or is_positive_definite(compliance[:3, :3]):
+        raise ValueError(f"{fault}; {OF_DATA_SHEETS}" if isinstance(material, material_forms.Orthotropic) else fault)
+    if state.is_sheet or voigt.is_positive_definite(compliance[:3, :3]):
         return compliance
-    if isinstance(material, Orthotropic):
+    if isinstance(material, material_forms.Orthotropic):
         raise ValueError("E1, E2, E3, nu12, nu13, nu23: expected a positive definite compliance")
     E_transverse, E_axial, nu_axial = _numbers(material.E_transverse, material.E_axial, material.nu_axial)
-    limit = limit_in_words((1.0 - material.nu_transverse) * E_axial / (2.0 * E_transverse), nu_axial**2, 6)
+    limit = wording.limit_in_words((1.0 - material.nu_transverse) * E_axial / (2.0 * E_transverse), nu_axial**2, 6)
     words = "nu_axial^2 < (1 - nu_transverse) E_axial/(2 E_transverse)"
     raise ValueError(f"nu_axial = {nu_axial}: expected {words} = {limit}; no material is stable otherwise")
 
 
-def known_compliance(material: Orthotropic | TransverselyIsotropic) -> Float:
+def known_compliance(material: material_forms.Orthotropic | material_forms.TransverselyIsotropic) -> Float:
     """Compliance (6, 6) in the material axes; NaN where the constants leave it open."""
-    if isinstance(material, TransverselyIsotropic):
+    if isinstance(material, material_forms.TransverselyIsotropic):
         E1, E3, G13, nu31 = _numbers(material.E_transverse, material.E_axial, material.G_axial, material.nu_axial)
         nu12, nu13 = material.nu_transverse, nu31 * E1 / E3
         G12 = E1 / (2.0 * (1.0 + nu12))
@@ -237,12 +225,12 @@ def _numbers(*constants: float | None) -> list[float]:
     return [np.nan if constant is None else constant for constant in constants]
 
 
-def contrast_lines(materials: Mapping[str, Material], plane: str) -> tuple[list[str], list[str]]:
+def contrast_lines(materials: Mapping[str, material_forms.Material], plane: str) -> tuple[list[str], list[str]]:
     """Return a fault if the stiffnesses of two stable phases are too far apart, a warning if rounding may matter."""
     with np.errstate(over="ignore"):
         sizes = {phase: float(np.abs(stiffness_of(material, plane)).max()) for phase, material in materials.items()}
     stiffest, softest = max(sizes, key=sizes.__getitem__), min(sizes, key=sizes.__getitem__)
-    phases = ", ".join(f"[material.{toml_key(phase)}]" for phase in (stiffest, softest))
+    phases = ", ".join(f"[material.{wording.toml_key(phase)}]" for phase in (stiffest, softest))
     contrast = sizes[stiffest] / sizes[softest]
     if contrast > LARGEST_CONTRAST:
         words = f"stiffnesses that differ by a factor of {contrast:.1e}: expected at most {LARGEST_CONTRAST:g}"

@@ -5,8 +5,6 @@ absolute values are differentiated by an imaginary step, f'(x) = Im f(x + i h) /
 and Trapp, SIAM Review 40 (1998) 110).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -14,15 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from feti_homog.materials import material_forms
 from feti_homog.materials.engineering_constants import constants
-from feti_homog.materials.material_forms import (
-    EXPANSION_PAIR,
-    General,
-    Isotropic,
-    Material,
-    Orthotropic,
-    TransverselyIsotropic,
-)
 from feti_homog.materials.laws import COUPLINGS, expansion, known_compliance, stiffness_of
 from feti_homog.materials.voigt import IN_PLANE, IN_PLANE_BLOCK, PLANE_STATES, strain_rotation
 from feti_homog.typing import Float
@@ -53,25 +44,25 @@ class LawChange:
     expansion: Float
 
 
-def law_changes(material: Material, plane: str) -> Iterator[LawChange]:
+def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawChange]:
     """Yield the derivatives by every given constant; expansions, (6, 6) alone, come last."""
     C, none = stiffness_of(material, plane), np.zeros(6)
-    is_general = isinstance(material, General)
+    is_general = isinstance(material, material_forms.General)
     for name, value, change in (_of_entries if is_general else _of_constants)(material, plane, C):
         yield LawChange(name, value, change, none)
     free = expansion(material)
-    if isinstance(material, Orthotropic):
+    if isinstance(material, material_forms.Orthotropic):
         turn = TURN if len(C) == 6 else TURN[IN_PLANE_BLOCK]
         yield LawChange("angle", material.angle, turn.T @ C + C @ turn, none if free is None else -TURN @ free)
     if len(C) == 6 and free is not None:
-        to_cell = strain_rotation(-material.angle if isinstance(material, Orthotropic) else 0.0)[:, :3]
+        to_cell = strain_rotation(-material.angle if isinstance(material, material_forms.Orthotropic) else 0.0)[:, :3]
         for name, value, axes in _expansions(material):
             yield LawChange(name, value, np.zeros((6, 6)), to_cell @ axes)
 
 
 def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:
     """Engineering constants: dC = -C dS C with the plane state's compliance S, in the cell's axes."""
-    skipped = ("angle", "expansion", *EXPANSION_PAIR)
+    skipped = ("angle", "expansion", *material_forms.EXPANSION_PAIR)
     names = [field.name for field in fields(material) if field.name not in skipped]
     values = {name: value for name in names if (value := getattr(material, name)) is not None}
     turn = strain_rotation(-getattr(material, "angle", 0.0))
@@ -79,9 +70,9 @@ def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, fl
     for name, value in values.items():
         moved = {other: complex(known, STEP * (other == name)) for other, known in values.items()}
         varied = replace(material, **moved)
-        if isinstance(varied, Isotropic):
+        if isinstance(varied, material_forms.Isotropic):
             named = {entry: getattr(varied, key) for entry, key in ISOTROPIC_COMPLIANCE.items()}
-            varied = TransverselyIsotropic(**named, G_axial=varied.young / (2 * (1 + varied.poisson)))
+            varied = material_forms.TransverselyIsotropic(**named, G_axial=varied.young / (2 * (1 + varied.poisson)))
         with np.errstate(invalid="ignore"):  # NaN where the constants leave the compliance open
             changed = _of_plane_state(known_compliance(varied), plane, condensed="strain")
         yield name, value, -C @ turn @ changed @ turn.T @ C
@@ -112,15 +103,15 @@ def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
     return np.asarray(block.imag / STEP)
 
 
-def _expansions(material: Material) -> Iterator[tuple[str, float, Float]]:
+def _expansions(material: material_forms.Material) -> Iterator[tuple[str, float, Float]]:
     """Yield each expansion that is given, and (3,) along which material axes it is."""
     if isinstance(material.expansion, tuple):
         for axis, value in enumerate(material.expansion):
             yield f"expansion.{axis + 1}", value, np.eye(3)[axis]
     elif material.expansion is not None:
         yield "expansion", material.expansion, np.ones(3)
-    elif isinstance(material, TransverselyIsotropic):
-        for name, axes in zip(EXPANSION_PAIR, ([0.0, 0.0, 1.0], [1.0, 1.0, 0.0]), strict=True):
+    elif isinstance(material, material_forms.TransverselyIsotropic):
+        for name, axes in zip(material_forms.EXPANSION_PAIR, ([0.0, 0.0, 1.0], [1.0, 1.0, 0.0]), strict=True):
             yield name, getattr(material, name), np.array(axes)
 
 

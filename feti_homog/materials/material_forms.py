@@ -1,21 +1,18 @@
 """The forms in which a section [material.PHASE] gives the constants of a linear elastic phase."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
-from feti_homog.schema.keys import key
-from feti_homog.schema.types import either, list_of, real
+from feti_homog.schema import key, types
 
 Matrix = tuple[tuple[float, ...], ...]
 
 
-POSITIVE = real(above=0.0)
-MATRIX = either(
+POSITIVE = types.real(above=0.0)
+MATRIX = types.either(
     "a symmetric 3x3 array of numbers in the order 11, 22, 12, or 6x6 in the order 11, 22, 33, 23, 13, 12",
-    *(list_of(list_of(real(), "", count=size), "", count=size) for size in (3, 6)),
+    *(types.list_of(types.list_of(types.real(), "", count=size), "", count=size) for size in (3, 6)),
 )
-EXPANSION = either("a number or a list of three numbers", real(), list_of(real(), "", count=3))
+EXPANSION = types.either("a number or a list of three numbers", types.real(), types.list_of(types.real(), "", count=3))
 PER_TEMPERATURE = "1 / temperature"
 EXPANSION_PAIR = ("expansion_axial", "expansion_transverse")
 """Keys that are given together, in place of one expansion."""
@@ -26,8 +23,8 @@ class Isotropic:
     """Young's modulus and Poisson's ratio."""
 
     young: float = key(POSITIVE, "Young's modulus.", unit="stress")
-    poisson: float = key(real(above=-1.0, most=0.5), "Poisson's ratio; 0.5 in plane stress alone.")
-    expansion: float | None = key(real(), "Thermal expansion.", unit=PER_TEMPERATURE, default=None)
+    poisson: float = key(types.real(above=-1.0, most=0.5), "Poisson's ratio; 0.5 in plane stress alone.")
+    expansion: float | None = key(types.real(), "Thermal expansion.", unit=PER_TEMPERATURE, default=None)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,9 +40,9 @@ class Orthotropic:
     E3: float | None = key(
         POSITIVE, "Young's modulus out of the plane; plane strain needs it.", unit="stress", default=None
     )
-    nu12: float = key(real(), "Poisson's ratio in the plane; nu12^2 < E1/E2.")
-    nu13: float | None = key(real(), "Poisson's ratio out of the plane; plane strain needs it.", default=None)
-    nu23: float | None = key(real(), "Poisson's ratio out of the plane; plane strain needs it.", default=None)
+    nu12: float = key(types.real(), "Poisson's ratio in the plane; nu12^2 < E1/E2.")
+    nu13: float | None = key(types.real(), "Poisson's ratio out of the plane; plane strain needs it.", default=None)
+    nu23: float | None = key(types.real(), "Poisson's ratio out of the plane; plane strain needs it.", default=None)
     G12: float = key(POSITIVE, "Shear modulus in the plane.", unit="stress")
     G13: float | None = key(
         POSITIVE, "Shear modulus between axis 1 and x3; generalized plane strain needs it.", unit="stress", default=None
@@ -53,7 +50,7 @@ class Orthotropic:
     G23: float | None = key(
         POSITIVE, "Shear modulus between axis 2 and x3; generalized plane strain needs it.", unit="stress", default=None
     )
-    angle: float = key(real(), "Direction of axis 1, from x1 towards x2.", unit="degrees", default=0.0)
+    angle: float = key(types.real(), "Direction of axis 1, from x1 towards x2.", unit="degrees", default=0.0)
     expansion: float | tuple[float, ...] | None = key(
         EXPANSION,
         "Thermal expansion, the same in all directions or along axes 1, 2, 3.",
@@ -75,12 +72,12 @@ class TransverselyIsotropic:
     )
     E_transverse: float = key(POSITIVE, "Young's modulus in the plane.", unit="stress")
     nu_axial: float | None = key(
-        real(),
+        types.real(),
         "Contraction in the plane per stretch under stress along x3, "
         "2 nu_axial^2 < (1 - nu_transverse) E_axial/E_transverse; plane strain needs it.",
         default=None,
     )
-    nu_transverse: float = key(real(above=-1.0, below=1.0), "Poisson's ratio in the plane.")
+    nu_transverse: float = key(types.real(above=-1.0, below=1.0), "Poisson's ratio in the plane.")
     G_axial: float | None = key(
         POSITIVE,
         "Shear modulus between x3 and the plane; generalized plane strain needs it.",
@@ -88,13 +85,13 @@ class TransverselyIsotropic:
         default=None,
     )
     expansion: float | None = key(
-        real(), "Thermal expansion, the same in all directions.", unit=PER_TEMPERATURE, default=None
+        types.real(), "Thermal expansion, the same in all directions.", unit=PER_TEMPERATURE, default=None
     )
     expansion_axial: float | None = key(
-        real(), "Thermal expansion along x3; with expansion_transverse.", unit=PER_TEMPERATURE, default=None
+        types.real(), "Thermal expansion along x3; with expansion_transverse.", unit=PER_TEMPERATURE, default=None
     )
     expansion_transverse: float | None = key(
-        real(), "Thermal expansion in the plane; with expansion_axial.", unit=PER_TEMPERATURE, default=None
+        types.real(), "Thermal expansion in the plane; with expansion_axial.", unit=PER_TEMPERATURE, default=None
     )
 
 

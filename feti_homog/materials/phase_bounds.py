@@ -18,14 +18,9 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from feti_homog.materials.engineering_constants import (
-    TransverseIsotropy,
-    anisotropy,
-    isotropic_part,
-    transverse_constants,
-)
+from feti_homog.materials import engineering_constants
 from feti_homog.materials.material_forms import PER_TEMPERATURE
-from feti_homog.system.runtime.records import STRESS, described
+from feti_homog.system.runtime import described, records
 from feti_homog.typing import Float
 
 Pair = tuple[float, float]
@@ -35,21 +30,21 @@ Pair = tuple[float, float]
 class Bounds:
     """Lower and upper bounds on the plane bulk modulus and the shear modulus."""
 
-    bulk: Pair = described("lower and upper bound of the plane bulk modulus", STRESS, "(2,)")
-    shear: Pair = described("lower and upper bound of the shear modulus", STRESS, "(2,)")
+    bulk: Pair = described("lower and upper bound of the plane bulk modulus", records.STRESS, "(2,)")
+    shear: Pair = described("lower and upper bound of the shear modulus", records.STRESS, "(2,)")
 
 
 @dataclass(frozen=True)
 class FibreBounds:
     """Lower and upper bounds on the constants for any arrangement of bonded fibres."""
 
-    E_axial: Pair = described("of Young's modulus along the fibres", STRESS, "(2,)")
+    E_axial: Pair = described("of Young's modulus along the fibres", records.STRESS, "(2,)")
     nu_axial: Pair | None = described(
         "of the contraction across the fibres under stress along them; null of more than two phases", shape="(2,)"
     )
-    G_axial: Pair = described("of the shear modulus along the fibres", STRESS, "(2,)")
-    G_transverse: Pair = described("of the shear modulus across the fibres", STRESS, "(2,)")
-    K_transverse: Pair = described("of the bulk modulus across the fibres in plane strain", STRESS, "(2,)")
+    G_axial: Pair = described("of the shear modulus along the fibres", records.STRESS, "(2,)")
+    G_transverse: Pair = described("of the shear modulus across the fibres", records.STRESS, "(2,)")
+    K_transverse: Pair = described("of the bulk modulus across the fibres in plane strain", records.STRESS, "(2,)")
 
 
 @dataclass(frozen=True)
@@ -80,7 +75,7 @@ class Fibres:
     """Volume fraction, constants and springs of the fibres of one phase; on springs they have one radius."""
 
     fraction: float
-    constants: TransverseIsotropy
+    constants: engineering_constants.TransverseIsotropy
     springs: Springs | None = None
 
 
@@ -88,18 +83,18 @@ class Fibres:
 class Estimate:
     """Constants by one method; null where it gives none."""
 
-    E_axial: float | None = described("Young's modulus along the fibres", STRESS)
-    E_transverse: float | None = described("Young's modulus across the fibres", STRESS)
+    E_axial: float | None = described("Young's modulus along the fibres", records.STRESS)
+    E_transverse: float | None = described("Young's modulus across the fibres", records.STRESS)
     nu_axial: float | None = described("contraction across the fibres under stress along them")
     nu_transverse: float | None = described("contraction across the fibres under stress across them")
-    G_axial: float | None = described("shear modulus along the fibres", STRESS)
-    G_transverse: float | None = described("shear modulus across the fibres", STRESS)
-    K_transverse: float | None = described("bulk modulus across the fibres in plane strain", STRESS)
+    G_axial: float | None = described("shear modulus along the fibres", records.STRESS)
+    G_transverse: float | None = described("shear modulus across the fibres", records.STRESS)
+    K_transverse: float | None = described("bulk modulus across the fibres in plane strain", records.STRESS)
     expansion_axial: float | None = described("expansion along the fibres", PER_TEMPERATURE)
     expansion_transverse: float | None = described("expansion across the fibres", PER_TEMPERATURE)
 
     @classmethod
-    def of(cls, constants: TransverseIsotropy) -> Estimate:
+    def of(cls, constants: engineering_constants.TransverseIsotropy) -> Estimate:
         """Return the estimate of all constants."""
         return cls(**{name: getattr(constants, name) for name in CONSTANTS})
 
@@ -131,7 +126,7 @@ def reuss(fractions: ArrayLike, stiffnesses: ArrayLike) -> Float:
 
 
 def is_isotropic(stiffness: ArrayLike) -> bool:
-    return anisotropy(stiffness) < 1e-9
+    return engineering_constants.anisotropy(stiffness) < 1e-9
 
 
 def hashin_shtrikman(fractions: ArrayLike, stiffnesses: Sequence[ArrayLike]) -> Bounds:
@@ -145,7 +140,7 @@ def hashin_shtrikman(fractions: ArrayLike, stiffnesses: Sequence[ArrayLike]) -> 
     if not all(map(is_isotropic, stiffnesses)):
         raise ValueError("the Hashin-Shtrikman bounds hold for isotropic phases")
     c = np.asarray(fractions, dtype=float)
-    bulk, shear = np.array([isotropic_part(stiffness) for stiffness in stiffnesses]).T
+    bulk, shear = np.array([engineering_constants.isotropic_part(stiffness) for stiffness in stiffnesses]).T
 
     def bounds(k0: float, mu0: float) -> tuple[float, float]:
         h0 = k0 * mu0 / (k0 + 2 * mu0)
@@ -156,8 +151,10 @@ def hashin_shtrikman(fractions: ArrayLike, stiffnesses: Sequence[ArrayLike]) -> 
 
 
 def aligned_cylinders(
-    fractions: Sequence[float], phases: Sequence[TransverseIsotropy], surroundings: tuple[float, float, float]
-) -> TransverseIsotropy:
+    fractions: Sequence[float],
+    phases: Sequence[engineering_constants.TransverseIsotropy],
+    surroundings: tuple[float, float, float],
+) -> engineering_constants.TransverseIsotropy:
     """Estimate constants: each phase is a cylinder in one reference medium k0, m0, p0, under the same far field.
 
     With x_i = k_i + m0 and h0 = k0 m0/(k0 + 2 m0),
@@ -180,7 +177,7 @@ def aligned_cylinders(
     coupling = stiff * mean
     poisson = coupling / (2 * bulk)
     young = np.sum(c * (along - across**2 / x)) + coupling * mean - coupling**2 / bulk
-    E_transverse, nu_transverse = transverse_constants(young, poisson, bulk, shear)
+    E_transverse, nu_transverse = engineering_constants.transverse_constants(young, poisson, bulk, shear)
     strains: tuple[float | None, float | None] = (None, None)
     if None not in (free := [expansions(phase) for phase in phases]):
         axial, transverse = np.array(free, dtype=float).T
@@ -189,7 +186,7 @@ def aligned_cylinders(
         stresses = [B / np.sum(c / x), np.sum(c * (g - across * b / x)) + coupling * B]
         area, length = np.linalg.solve([[bulk, coupling], [coupling, young + coupling**2 / bulk]], stresses)
         strains = float(length), float(area / 2)
-    return TransverseIsotropy(
+    return engineering_constants.TransverseIsotropy(
         E_axial=float(young),
         E_transverse=float(E_transverse),
         nu_axial=float(poisson),
@@ -203,14 +200,16 @@ def aligned_cylinders(
     )
 
 
-def expansions(phase: TransverseIsotropy) -> Pair | None:
+def expansions(phase: engineering_constants.TransverseIsotropy) -> Pair | None:
     """Axial and transverse expansion, if the phase has both."""
     if phase.expansion_axial is None or phase.expansion_transverse is None:
         return None
     return phase.expansion_axial, phase.expansion_transverse
 
 
-def equivalent_fibre(family: Fibres, matrix: TransverseIsotropy) -> TransverseIsotropy:
+def equivalent_fibre(
+    family: Fibres, matrix: engineering_constants.TransverseIsotropy
+) -> engineering_constants.TransverseIsotropy:
     """Return the bonded fibre that replaces one on springs in a matrix whose field is uniform far away.
 
     E_axial, nu_axial and the expansions stay;
@@ -229,7 +228,7 @@ def equivalent_fibre(family: Fibres, matrix: TransverseIsotropy) -> TransverseIs
     x = 1 / m + 2 / k + 1 / matrix.G_transverse
     bulk = 1 / (1 / k + 2 * normal)
     shear = 1 / (1 / m + (x * total + 12 * normal * tangential) / (x + 3 * total))
-    E_transverse, nu_transverse = transverse_constants(fibre.E_axial, fibre.nu_axial, bulk, shear)
+    E_transverse, nu_transverse = engineering_constants.transverse_constants(fibre.E_axial, fibre.nu_axial, bulk, shear)
     return replace(
         fibre,
         E_transverse=E_transverse,
@@ -240,7 +239,7 @@ def equivalent_fibre(family: Fibres, matrix: TransverseIsotropy) -> TransverseIs
     )
 
 
-def fibre_bounds(fractions: Sequence[float], phases: Sequence[TransverseIsotropy]) -> FibreBounds:
+def fibre_bounds(fractions: Sequence[float], phases: Sequence[engineering_constants.TransverseIsotropy]) -> FibreBounds:
     """Bounds on bonded, transversely isotropic phases: cylinders along x3 with any section.
 
     `aligned_cylinders` with the least moduli of the phases around, and with the greatest.  Bounds on nu_A are the

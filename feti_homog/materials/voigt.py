@@ -3,8 +3,6 @@
 [11, 22, 12] in plane strain and plane stress, [11, 22, 33, 23, 13, 12] in space and generalized plane strain.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

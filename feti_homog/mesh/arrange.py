@@ -1,23 +1,19 @@
 """Arrange the fibres of a cell: square, hexagonal, random, matched or listed in a table."""
 
-from __future__ import annotations
-
 from math import fsum, pi, sqrt
 
 import numpy as np
 
-from feti_homog.case.cell_section import MOST_FIBRES, Cell
-from feti_homog.case.cell_sizes import fibre_counts, fractions_in_words, void_count
+from feti_homog.case import cell_section, cell_sizes
 from feti_homog.errors import MeshError
-from feti_homog.microstructure.arrangements import Arrangement, clear_shift
-from feti_homog.microstructure.phase_names import FIBRE, VOID
+from feti_homog.microstructure import Arrangement, arrangements, phase_names
 from feti_homog.typing import Float
 
 # Quenched random packings jam near this area fraction.
 JAMMED = 0.84
 
 
-def arrange(cell: Cell) -> Arrangement:
+def arrange(cell: cell_section.Cell) -> Arrangement:
     """Arrange fibres in a cell of width 1, with the fractions `cell.fractions` to rounding.
 
     square: one disc in the middle of a 1 x 1 cell. hexagonal: 1 x sqrt(3), a disc in the middle and one at
@@ -30,15 +26,15 @@ def arrange(cell: Cell) -> Arrangement:
     if cell.geometry == "random":
         return random_arrangement(cell) if cell.match is None else matched_arrangement(cell)
     if cell.table is not None:
-        from feti_homog.microstructure.periodic_table import table_arrangement
+        from feti_homog.microstructure import periodic_table
 
-        return table_arrangement(cell.table, cell.window, cell.repair == "overlaps")
+        return periodic_table.table_arrangement(cell.table, cell.window, cell.repair == "overlaps")
     if cell.geometry == "square":
         return _lattice(cell, 1.0, np.array([[0.5, 0.5]]), pi / 4)
     return _lattice(cell, sqrt(3), np.array([[0.0, 0.0], [0.5, sqrt(3) / 2]]), pi / (2 * sqrt(3)))
 
 
-def listed_arrangement(cell: Cell) -> Arrangement | None:
+def listed_arrangement(cell: cell_section.Cell) -> Arrangement | None:
     """Arrange a table; None for other cells, which may be too large to be arranged.
 
     Raises as `arrange`.
@@ -46,7 +42,7 @@ def listed_arrangement(cell: Cell) -> Arrangement | None:
     return None if cell.table is None else arrange(cell)
 
 
-def _lattice(cell: Cell, height: float, centres: Float, limit: float) -> Arrangement:
+def _lattice(cell: cell_section.Cell, height: float, centres: Float, limit: float) -> Arrangement:
     """Place equal discs at centres (N, 2) in a 1 x height cell; bare ones touch at the fraction `limit`."""
     fraction = cell.fibre_fraction
     limit /= (1 + (cell.coating or 0.0)) ** 2
@@ -58,10 +54,14 @@ def _lattice(cell: Cell, height: float, centres: Float, limit: float) -> Arrange
         )
     radius = sqrt(fraction * height / (pi * len(centres)))
     radii = np.full(len(centres), radius)
-    return Arrangement.of_discs(1.0, height, centres, radii, (FIBRE,) * len(centres), (cell.coating or 0.0) * radii)
+    return Arrangement.of_discs(
+        1.0, height, centres, radii, (phase_names.FIBRE,) * len(centres), (cell.coating or 0.0) * radii
+    )
 
 
-def random_arrangement(cell: Cell, max_steps: int | None = None, max_attempts: int | None = None) -> Arrangement:
+def random_arrangement(
+    cell: cell_section.Cell, max_steps: int | None = None, max_attempts: int | None = None
+) -> Arrangement:
     """Place discs at random on the unit torus, alike on every machine for one case.
 
     Radii are uniform in mean * (1 - s, 1 + s), s = `radius_spread`, and scaled to the phase fractions; voids
@@ -74,9 +74,9 @@ def random_arrangement(cell: Cell, max_steps: int | None = None, max_attempts: i
     Raises:
         MeshError: no arrangement is found.
     """
-    from feti_homog.microstructure.random_fibres import MAX_STEPS, relax  # other cells do without
+    from feti_homog.microstructure import random_fibres  # other cells do without
 
-    phase = tuple(name for name, members in fibre_counts(cell).items() for _ in range(members))
+    phase = tuple(name for name, members in cell_sizes.fibre_counts(cell).items() for _ in range(members))
     fibres, gap, fraction = len(phase), cell.min_gap, fsum(cell.fractions.values())
     generator = np.random.default_rng(cell.seed)
     radii = 1 + cell.radius_spread * generator.uniform(-1, 1, fibres)
@@ -85,9 +85,9 @@ def random_arrangement(cell: Cell, max_steps: int | None = None, max_attempts: i
         radii[members] *= sqrt(share / (pi * fsum(radii[members] ** 2)))
     coating, clear = (cell.coating or 0.0) * radii, gap * fsum(radii) / fibres
     radii, coating = _with_voids(cell, radii, coating)
-    count, phase = len(radii), phase + (VOID,) * (len(radii) - fibres)
+    count, phase = len(radii), phase + (phase_names.VOID,) * (len(radii) - fibres)
     grown = radii + coating + clear
-    ask = f"[cell] {fractions_in_words(cell)} with min_gap = {gap:g} and fibres = {fibres}"
+    ask = f"[cell] {cell_sizes.fractions_in_words(cell)} with min_gap = {gap:g} and fibres = {fibres}"
     of_all = "fraction of fibres and voids" if cell.voids else "fibre fraction"
     if pi * np.sum(grown**2) > 0.9:
         raise MeshError(
@@ -96,9 +96,11 @@ def random_arrangement(cell: Cell, max_steps: int | None = None, max_attempts: i
         )
     attempts, best = max_attempts or max(3, min(10, 100 // count)), 0.0
     for _ in range(attempts):
-        centres, reached = relax(generator.random((count, 2)), grown, max_steps or MAX_STEPS)
+        centres, reached = random_fibres.relax(
+            generator.random((count, 2)), grown, max_steps or random_fibres.MAX_STEPS
+        )
         if reached >= 1:
-            return clear_shift(Arrangement.of_discs(1.0, 1.0, centres, radii, phase, coating))
+            return arrangements.clear_shift(Arrangement.of_discs(1.0, 1.0, centres, radii, phase, coating))
         best = max(best, reached)
     raise MeshError(
         f"{ask}: no arrangement found in {attempts} attempts; they reached a fibre fraction of at most about "
@@ -106,21 +108,21 @@ def random_arrangement(cell: Cell, max_steps: int | None = None, max_attempts: i
     )
 
 
-def _with_voids(cell: Cell, radii: Float, coating: Float) -> tuple[Float, Float]:
+def _with_voids(cell: cell_section.Cell, radii: Float, coating: Float) -> tuple[Float, Float]:
     """Append the voids to radii and coatings."""
-    count = void_count(cell, float(radii.mean()))
+    count = cell_sizes.void_count(cell, float(radii.mean()))
     if not count:
         return radii, coating
-    if count > MOST_FIBRES:
+    if count > cell_section.MOST_FIBRES:
         raise MeshError(
-            f"[cell] {fractions_in_words(cell)}: makes {count:.2g} voids; expected at most {MOST_FIBRES}; make "
-            "void_radius larger"
+            f"[cell] {cell_sizes.fractions_in_words(cell)}: makes {count:.2g} voids; expected at most "
+            f"{cell_section.MOST_FIBRES}; make void_radius larger"
         )
     void_radii = np.full(count, sqrt((cell.voids or 0.0) / (pi * count)))
     return np.append(radii, void_radii), np.append(coating, np.zeros(count))
 
 
-def matched_arrangement(cell: Cell) -> Arrangement:
+def matched_arrangement(cell: cell_section.Cell) -> Arrangement:
     """Place discs at random on the unit torus, with the neighbours in a measured window.
 
     The radii are quantiles of the window `cell.matched`, dealt at random and scaled to the fraction. Centres
@@ -131,8 +133,7 @@ def matched_arrangement(cell: Cell) -> Arrangement:
     Raises:
         MeshError: no arrangement is found.
     """
-    from feti_homog.microstructure.fibre_pattern import FibrePattern
-    from feti_homog.microstructure.random_fibres import matched, placed, wanted_distances
+    from feti_homog.microstructure import fibre_pattern, random_fibres
 
     count, fraction = cell.fibres, cell.fibre_fraction
     window = cell.matched
@@ -143,10 +144,14 @@ def matched_arrangement(cell: Cell) -> Arrangement:
     radii *= sqrt(fraction / (pi * fsum(radii * radii)))
     gap, grown = cell.min_gap * 2 * fsum(radii) / count, 1 + (cell.coating or 0.0)
     try:
-        start = placed(FibrePattern(1.0, 1.0, np.zeros((count, 2)), radii * grown, periodic=True), gap, generator)
+        start = random_fibres.placed(
+            fibre_pattern.FibrePattern(1.0, 1.0, np.zeros((count, 2)), radii * grown, periodic=True), gap, generator
+        )
     except MeshError as error:
         keys = f"[cell] fibre_fraction = {fraction:g} with min_gap = {cell.min_gap:g} and fibres = {count}"
         raise MeshError(f"{keys}: no arrangement found; lower one of them, or change seed") from error
-    centres = matched(start, gap, wanted_distances(window, count) / grown, generator)
+    centres = random_fibres.matched(start, gap, random_fibres.wanted_distances(window, count) / grown, generator)
     coating = (cell.coating or 0.0) * radii
-    return clear_shift(Arrangement.of_discs(1.0, 1.0, centres, radii, (FIBRE,) * count, coating))
+    return arrangements.clear_shift(
+        Arrangement.of_discs(1.0, 1.0, centres, radii, (phase_names.FIBRE,) * count, coating)
+    )

@@ -1,7 +1,5 @@
 """The coarse periodic mesh of a rectangular cell, as rank 0 makes it, and its interface edges."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -9,7 +7,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from feti_homog.microstructure.shapes.ellipses import Ellipses
+from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.typing import Bool, Float, Index, Int, Int32
 
 

@@ -3,8 +3,6 @@
 Directions on interfaces are measured about the centres.
 """
 
-from __future__ import annotations
-
 from collections import deque
 
 import numpy as np
@@ -12,7 +10,7 @@ import numpy as np
 from feti_homog.mesh.coarse_mesh import areas, twins
 from feti_homog.mesh.periodic_topology import Torus, components, edge_pairs
 from feti_homog.mesh.submeshes import Submesh, cut_bodies
-from feti_homog.microstructure.phase_names import COATING
+from feti_homog.microstructure import phase_names
 from feti_homog.typing import Bool, Float, Int
 
 # Relative to the longer semi-axis: curves with centres nearer than this are images of one, or one within another.
@@ -126,7 +124,7 @@ def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
     A coating around several fibres has their lowest number; one that coats none is a fibre itself.
     """
     phase, n = torus.constituent_phase, len(torus.constituent_phase)
-    coats = np.array([name == COATING for name in torus.mesh.phases])[phase]
+    coats = np.array([name == phase_names.COATING for name in torus.mesh.phases])[phase]
     sides = torus.constituent[np.stack(torus.sides[:2])]
     coating, core = np.hstack([sides, sides[::-1]])
     inside = coats[coating] & ~coats[core] & (phase[core] > 0)

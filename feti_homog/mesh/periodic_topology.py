@@ -15,8 +15,8 @@ from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from feti_homog.mesh.coarse_mesh import CoarseMesh, paired_sides, twins
-from feti_homog.microstructure.phase_names import COATING
-from feti_homog.microstructure.shapes.ellipses import Ellipses
+from feti_homog.microstructure import phase_names
+from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.typing import Bool, Float, Int, Int32
 
 # Numbers below a size, in proportion to it, below which sorting them costs less than an entry for each below it.
@@ -206,7 +206,7 @@ def places_by_depth(depth: Float | Int, phase: Int, phases: tuple[str, ...]) -> 
 
     A coating is before the fibre within, and then they go by number; `phase` (n,) are phase numbers.
     """
-    coats = np.array([name == COATING for name in phases])[phase]
+    coats = np.array([name == phase_names.COATING for name in phases])[phase]
     return np.argsort(np.lexsort((~coats, depth)))
 
 

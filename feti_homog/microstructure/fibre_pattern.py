@@ -1,7 +1,5 @@
 """Round fibres in a rectangle: a periodic cell, or a window of something larger, such as a micrograph."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product

@@ -12,27 +12,14 @@ from typing import Any
 import numpy as np
 
 from feti_homog.errors import CaseError
+from feti_homog.microstructure import table_columns
 from feti_homog.microstructure.phase_names import MATRIX, PHASE, VOID
 from feti_homog.microstructure.shapes.outlines import Columns, Outlines
 from feti_homog.microstructure.shapes.shapes import REPLACING, outlines_of
-from feti_homog.microstructure.table_columns import (
-    FIBRE_CELLS,
-    NUMBERS,
-    SourceColumn,
-    are_units,
-    cells_of,
-    delimiter_of,
-    lines_of,
-    misspelt,
-    number_of,
-    row_fault,
-    understood,
-)
-from feti_homog.schema.types import is_number
-from feti_homog.schema.wording import suggestion, toml_value
+from feti_homog.schema import types, wording
 from feti_homog.typing import Bool, Float, Int
 
-COLUMNS = (*list(NUMBERS)[:3], "phase", *list(NUMBERS)[3:])
+COLUMNS = (*list(table_columns.NUMBERS)[:3], "phase", *list(table_columns.NUMBERS)[3:])
 SIZES = ("width", "height", "left", "bottom")
 """Names in comment lines about the cell: its size, and the coordinates of its lower left corner."""
 OF_FIBRES = ("coating", "inner_radius")
@@ -129,25 +116,25 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
     name, faults = path.name, _Faults(path.name)
     sizes: dict[str, float] = {}
     lines = list[tuple[int, str]]()
-    for number, contents, comment in lines_of(path):
+    for number, contents, comment in table_columns.lines_of(path):
         _read_sizes(comment, number, sizes, faults)
         if contents:
             lines.append((number, contents))
     if not lines:
         raise CaseError(*faults.lines, f"{name}: no rows; expected a line of names such as x, y, radius, then fibres")
-    delimiter = delimiter_of(lines[0][1])
-    words = cells_of(lines[0][1], delimiter) if columns is None else list(columns)
-    read, others = understood(words, COLUMNS)
+    delimiter = table_columns.delimiter_of(lines[0][1])
+    words = table_columns.cells_of(lines[0][1], delimiter) if columns is None else list(columns)
+    read, others = table_columns.understood(words, COLUMNS)
     _check_names(words, read, others, lines[0][0], faults)
     faults.throw()
     rows: dict[int, dict[str, Any]] = {}
     for number, line in _below_names(lines, columns is None, delimiter):
-        cells = cells_of(line, delimiter)
-        if fault := row_fault(line, cells, len(words)):
+        cells = table_columns.cells_of(line, delimiter)
+        if fault := table_columns.row_fault(line, cells, len(words)):
             faults.add(number, fault)
         else:
             rows[number] = {c.name: c.read(cells[c.place], delimiter) for c in read if cells[c.place]}
-    remarks = (f"[cell] {name}: not read: {', '.join(map(toml_value, others))}",) if others else ()
+    remarks = (f"[cell] {name}: not read: {', '.join(map(wording.toml_value, others))}",) if others else ()
     return replace(_table(name, rows, {column.name for column in read}, sizes, faults), remarks=remarks)
 
 
@@ -160,7 +147,9 @@ def table_of(entries: Sequence[Mapping[str, Any]], name: str) -> FibreTable:
     faults = _Faults(name)
     for number, entry in enumerate(entries, 1):
         for key in entry.keys() - set(COLUMNS):
-            faults.add(number, f"{key} = {toml_value(entry[key])}: unknown key; {suggestion(key, COLUMNS, {})}")
+            faults.add(
+                number, f"{key} = {wording.toml_value(entry[key])}: unknown key; {wording.suggestion(key, COLUMNS, {})}"
+            )
     return _table(name, dict(enumerate(entries, 1)), {key for entry in entries for key in entry}, {}, faults)
 
 
@@ -182,17 +171,17 @@ class _Faults:
 
 def _below_names(lines: list[tuple[int, str]], has_names: bool, delimiter: str | None) -> list[tuple[int, str]]:
     """Return the fibre lines: without the first if it has names, or no numbers, and without a next one with units."""
-    first, *others = [cells_of(line, delimiter) for _, line in lines[:2]]
-    if not has_names and any(number_of(word, delimiter) is not None for word in first):
+    first, *others = [table_columns.cells_of(line, delimiter) for _, line in lines[:2]]
+    if not has_names and any(table_columns.number_of(word, delimiter) is not None for word in first):
         return lines
-    return lines[2 if others and are_units(others[0]) else 1 :]
+    return lines[2 if others and table_columns.are_units(others[0]) else 1 :]
 
 
 def _read_sizes(comment: str, row: int, sizes: dict[str, float], faults: _Faults) -> None:
     """Add the cell sizes in a comment to `sizes`."""
     for key, word in SIZE.findall(comment):
-        value = number_of(word, ";")
-        if value is None or not is_number(value) or (value <= 0 and key in SIZES[:2]):
+        value = table_columns.number_of(word, ";")
+        if value is None or not types.is_number(value) or (value <= 0 and key in SIZES[:2]):
             expected = "a number above 0" if key in SIZES[:2] else "a number"
             faults.add(row, f"{key} = {word}: expected {expected}")
         elif sizes.setdefault(key, value) != value:
@@ -200,21 +189,21 @@ def _read_sizes(comment: str, row: int, sizes: dict[str, float], faults: _Faults
 
 
 def _check_names(
-    words: Sequence[str], read: Sequence[SourceColumn], others: Sequence[str], row: int, faults: _Faults
+    words: Sequence[str], read: Sequence[table_columns.SourceColumn], others: Sequence[str], row: int, faults: _Faults
 ) -> None:
     """Add the faults in a name line: none that is known, some twice, misspelt or missing."""
     names = [column.name for column in read]
     if not names:
-        given = toml_value(", ".join(words))
+        given = wording.toml_value(", ".join(words))
         ways = 'in [cell] columns = ["x", "y", "radius"]'
         faults.add(row, f"{given}: expected names of columns, as x, y, radius, here or {ways}")
         faults.throw()
     for name in dict.fromkeys(name for name in names if names.count(name) > 1):
         faults.add(row, f"column {name}: there are two of it")
     for word in others:
-        if meant := misspelt(word, [name for name in COLUMNS if name not in names]):
-            faults.add(row, f"column {toml_value(word)}: unknown; did you mean {meant}?")
-    ignored = f"; not read: {', '.join(map(toml_value, others))}" if others else ""
+        if meant := table_columns.misspelt(word, [name for name in COLUMNS if name not in names]):
+            faults.add(row, f"column {wording.toml_value(word)}: unknown; did you mean {meant}?")
+    ignored = f"; not read: {', '.join(map(wording.toml_value, others))}" if others else ""
     for name in _missing(set(names)):
         faults.add(row, f"column {name}: missing{ignored}")
 
@@ -237,7 +226,7 @@ def _table(
     faults.throw()
     columns = {
         key: np.array([cells.get(key, column.empty) for cells in rows.values()], float)
-        for key, column in NUMBERS.items()
+        for key, column in table_columns.NUMBERS.items()
     }
     return FibreTable(
         name=name,
@@ -258,10 +247,10 @@ def _cell_faults(cells: Mapping[str, Any]) -> Iterator[str]:
     for key in ("x", "y", *([] if has_size else ["radius"])):
         if key not in cells:
             yield f"{key}: no value; expected a number"
-    for key in NUMBERS:
-        complaint = FIBRE_CELLS[key].complaint(cells.get(key, 1.0))
+    for key in table_columns.NUMBERS:
+        complaint = table_columns.FIBRE_CELLS[key].complaint(cells.get(key, 1.0))
         if complaint:
-            yield f"{key} = {toml_value(cells[key])}: {complaint}"
+            yield f"{key} = {wording.toml_value(cells[key])}: {complaint}"
     yield from _phase_faults(cells)
 
 
@@ -269,9 +258,9 @@ def _phase_faults(cells: Mapping[str, Any]) -> Iterator[str]:
     """Yield the faults in the phase of one row."""
     phase = cells.get("phase", "fibre")
     if phase == VOID:
-        yield from (f"{key} = {toml_value(cells[key])}: a void has none" for key in OF_FIBRES if cells.get(key))
+        yield from (f"{key} = {wording.toml_value(cells[key])}: a void has none" for key in OF_FIBRES if cells.get(key))
     if not isinstance(phase, str) or not (phase == VOID or PHASE.fullmatch(phase)) or phase == MATRIX:
         yield (
-            f"phase = {toml_value(phase)}: expected a name of letters, digits, _, - and :, "
+            f"phase = {wording.toml_value(phase)}: expected a name of letters, digits, _, - and :, "
             'but not "matrix", which is around the fibres'
         )

@@ -1,7 +1,5 @@
 """The arrangement of a table's fibres: images of one fibre, and faults."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

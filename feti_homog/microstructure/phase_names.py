@@ -1,7 +1,5 @@
 """Names of phases, and the reserved ones."""
 
-from __future__ import annotations
-
 import re
 
 MATRIX = "matrix"

@@ -1,7 +1,5 @@
 """Random discs that do not overlap, and discs moved until their neighbours are as far as in a measured pattern."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import sqrt

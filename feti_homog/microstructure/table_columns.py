@@ -3,8 +3,6 @@
 Columns have units in brackets, diameters, areas and axes of ellipses.
 """
 
-from __future__ import annotations
-
 import difflib
 import math
 import operator
@@ -16,7 +14,7 @@ from pathlib import Path
 from feti_homog.errors import CaseError
 from feti_homog.microstructure.shapes.outlines import ColumnRange
 from feti_homog.microstructure.shapes.shapes import SHAPES
-from feti_homog.schema.types import ValueType, real
+from feti_homog.schema import types
 from feti_homog.system.runtime import input_files
 
 # Of an empty cell, and the bounds, of the columns that are numbers.
@@ -28,8 +26,8 @@ NUMBERS = {
     "inner_radius": ColumnRange(0.0, least=0.0),
     "strength": ColumnRange(1.0, above=0.0),
 } | {name: column for shape in SHAPES for name, column in shape.columns.items()}
-FIBRE_CELLS: Mapping[str, ValueType] = {
-    name: real(least=column.least, above=column.above) for name, column in NUMBERS.items()
+FIBRE_CELLS: Mapping[str, types.ValueType] = {
+    name: types.real(least=column.least, above=column.above) for name, column in NUMBERS.items()
 }
 """The numbers of a fibre in a table."""
 

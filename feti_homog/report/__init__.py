@@ -3,3 +3,5 @@
 Imports `materials`, `report.text` and `results`.  Main entries: its own floors, from below `text`, `plots`, `page` and
 `cards`.
 """
+
+__all__ = ["page"]

@@ -1,20 +1,18 @@
 """report.html: one page of a result with its tables, checks and pictures, readable without a network."""
 
-from __future__ import annotations
-
 import base64
 from html import escape
 from importlib import resources
 from pathlib import Path
 
 from feti_homog.errors import CaseError
-from feti_homog.materials.voigt import SPATIAL_STRAINS, STRAINS
+from feti_homog.materials import voigt
 from feti_homog.report.text.summary import REMARKS, answers, checks, summary, title_of
 from feti_homog.results import atomic, output_folder, result_json
 from feti_homog.typing import Document
 
 NAME, SWEEP = "report.html", "sweep.json"
-UNIT_LOADS = dict.fromkeys((*STRAINS, *SPATIAL_STRAINS, "temperature"))
+UNIT_LOADS = dict.fromkeys((*voigt.STRAINS, *voigt.SPATIAL_STRAINS, "temperature"))
 PICTURES = {
     "cell": "The cell: phases and numbers of the fibres",
     "partition": "The subdomains",

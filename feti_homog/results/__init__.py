@@ -3,3 +3,8 @@
 Imports `case`, `fem`, `homogenization`, `materials`, `system` and `verify`.  Main entries: `field_file.FieldFile`,
 `result_json.write`, `viewed_states.read_state`.
 """
+
+__all__ = [
+    "atomic", "checkpoints", "field_file", "field_layout", "field_parts", "landmarks", "output_folder",
+    "path_curves", "result_json", "viewed_states", "xdmf",
+]  # fmt: skip

@@ -3,8 +3,6 @@
 File and folder are synchronised: content and name are on the disk before the writer goes on.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import re

@@ -9,8 +9,6 @@ packed by zlib: a JSON line with names, types and shapes of its arrays, then the
 record shorter than its length, which does not count.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import re
@@ -27,7 +25,7 @@ from numpy.typing import NDArray
 
 from feti_homog.errors import CaseError
 from feti_homog.results import atomic
-from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
+from feti_homog.system.parallel import mpi_errors
 
 FOLDER, DROPPED, NAME = "checkpoint", "checkpoint.dropped", "events"  # the second folder while it is removed
 FORMAT = 11  # to be raised when the content of an event changes
@@ -109,22 +107,22 @@ class Checkpoint(EventsInMemory):
         self._ends: list[int] = []  # of the records, on rank 0; the signature's first
 
     def clear(self) -> int:
-        return on_root(self.comm, self._clear)
+        return mpi_errors.on_root(self.comm, self._clear)
 
     def count(self) -> int:
         try:
-            return on_root(self.comm, self._count)
+            return mpi_errors.on_root(self.comm, self._count)
         except CaseError as error:
             raise CaseError(*(f"--resume: {fault}" for fault in error.faults)) from error
 
     def read(self, number: int) -> Arrays:
-        event = on_root_only(self.comm, lambda: unpacked(next(records(self.path, self._ends[number]))[1]))
+        event = mpi_errors.on_root_only(self.comm, lambda: unpacked(next(records(self.path, self._ends[number]))[1]))
         part: Arrays = self.comm.scatter([] if event is None else [_part(event, k) for k in range(self.comm.size)])
         return part
 
     def write(self, number: int, shared: Mapping[str, Any], distributed: Arrays, light: bool = False) -> None:
         gathered = {name: self.comm.gather(part) for name, part in distributed.items()}
-        on_root(self.comm, self._write, number, shared, gathered, light)
+        mpi_errors.on_root(self.comm, self._write, number, shared, gathered, light)
 
     def _clear(self) -> int:
         try:

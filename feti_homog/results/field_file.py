@@ -15,22 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feti_homog.errors import FetiHomogError
-from feti_homog.results import atomic
-from feti_homog.results.field_layout import (
-    PROGRAM,
-    FibrePart,
-    Header,
-    InterfacePart,
-    MeshPart,
-    StatePart,
-    attributes,
-    rows_of,
-    tables,
-)
+from feti_homog.results import atomic, field_layout
 from feti_homog.results.field_views import add_views, bytes_of_views
-from feti_homog.system.parallel.mpi_errors import agree, agree_after, all_raise, on_root, on_root_only
-from feti_homog.system.runtime import file_locks
-from feti_homog.system.runtime.records import LENGTH, STRESS, Description
+from feti_homog.system.parallel import mpi_errors
+from feti_homog.system.runtime import file_locks, records
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Comm
@@ -71,16 +59,16 @@ class FieldFile:
         self,
         directory: Path,
         comm: Comm,
-        header: Header,
-        mesh: MeshPart,
-        fibres: FibrePart,
-        interface: InterfacePart,
+        header: field_layout.Header,
+        mesh: field_layout.MeshPart,
+        fibres: field_layout.FibrePart,
+        interface: field_layout.InterfacePart,
     ) -> None:
         self._comm = comm
         self.path = Path(directory) / NAME
-        self.part: Path = on_root(comm, atomic.part_of, self.path)
+        self.part: Path = mpi_errors.on_root(comm, atomic.part_of, self.path)
         file_locks.files.add(self.part)
-        self._units = {LENGTH: header.length_unit, STRESS: header.stress_unit}
+        self._units = {records.LENGTH: header.length_unit, records.STRESS: header.stress_unit}
         counts = {
             "n": len(mesh.points),
             "m": len(mesh.triangles),
@@ -90,32 +78,38 @@ class FieldFile:
         self._rows = {symbol: _Rows.of(comm, count) for symbol, count in counts.items()}
         self._reserved = RESERVE
         size = RESERVE + sum(map(self._bytes, (mesh, fibres, interface)))
-        on_root(comm, _with_write_errors, self.path, _create, self.part, size)
+        mpi_errors.on_root(comm, _with_write_errors, self.path, _create, self.part, size)
         self._is_open = True
         self._opened = contextlib.ExitStack()
         # By a descriptor of its folder: MPI-IO has short name buffers.
-        folder = self._agreed(agree, os.open, self.part.parent, os.O_RDONLY)
+        folder = self._agreed(mpi_errors.agree, os.open, self.part.parent, os.O_RDONLY)
         self._opened.callback(os.close, folder)
         path = f"/proc/self/fd/{folder}/{self.part.name}"
         self._file = self._agreed(
-            agree_after, lambda: self._opened.enter_context(h5py.File(path, "r+", driver="mpio", comm=comm))
+            mpi_errors.agree_after, lambda: self._opened.enter_context(h5py.File(path, "r+", driver="mpio", comm=comm))
         )
-        self._agreed(agree_after, _set_attributes, self._file, "/", attributes(header) | {"created_by": PROGRAM})
+        self._agreed(
+            mpi_errors.agree_after,
+            _set_attributes,
+            self._file,
+            "/",
+            field_layout.attributes(header) | {"created_by": field_layout.PROGRAM},
+        )
         self._write_part("mesh", replace(mesh, triangles=mesh.triangles + np.int64(self._rows["n"].start)))
         self._write_part("fibre", fibres)
         self._write_part("interface", interface)
 
-    def write_state(self, number: int, state: StatePart) -> None:
+    def write_state(self, number: int, state: field_layout.StatePart) -> None:
         """Add state `number` (0, 1, ...) and flush; cell means are equal on all ranks."""
         group = f"state/{number}"
         self._write_part(group, state)
-        self._agreed(agree_after, _set_attributes, self._file, group, attributes(state))
-        self._agreed(agree_after, self._file.flush)
+        self._agreed(mpi_errors.agree_after, _set_attributes, self._file, group, field_layout.attributes(state))
+        self._agreed(mpi_errors.agree_after, self._file.flush)
 
     def close(self) -> Path:
         """Complete the file under its final name; returns its path."""
-        self._agreed(agree_after, self._opened.close)
-        self._agreed(on_root_only, _complete, self.part, self.path)
+        self._agreed(mpi_errors.agree_after, self._opened.close)
+        self._agreed(mpi_errors.on_root_only, _complete, self.part, self.path)
         self._is_open = False
         file_locks.files.discard(self.part)
         return self.path
@@ -130,7 +124,7 @@ class FieldFile:
             return
         if error is None:
             self.close()
-        elif all_raise(self._comm, error):
+        elif mpi_errors.all_raise(self._comm, error):
             self._remove()
 
     def _bytes(self, part: Any) -> int:
@@ -139,23 +133,23 @@ class FieldFile:
             (1 << 12)  # HDF5's own, of which 0.6 KB were measured
             + np.dtype(d.dtype).itemsize
             * int(np.prod(np.shape(getattr(part, name))[1:]))
-            * self._rows[rows_of(d)].total
-            for name, d in tables(part).items()
+            * self._rows[field_layout.rows_of(d)].total
+            for name, d in field_layout.tables(part).items()
         )
 
     def _write_part(self, group: str, part: Any) -> None:
         """Write the tables of a group, each rank its rows."""
         size = self._bytes(part)
-        self._agreed(on_root_only, _reserve, self.part, self._reserved, size)
+        self._agreed(mpi_errors.on_root_only, _reserve, self.part, self._reserved, size)
         self._reserved += size
-        described = tables(part)
+        described = field_layout.tables(part)
         for symbol, rows in self._rows.items():
-            of_rows = {name: d for name, d in described.items() if rows_of(d) == symbol}
-            arrays = agree(self._comm, _arrays, group, rows.count, part, of_rows) if of_rows else {}
+            of_rows = {name: d for name, d in described.items() if field_layout.rows_of(d) == symbol}
+            arrays = mpi_errors.agree(self._comm, _arrays, group, rows.count, part, of_rows) if of_rows else {}
             for name, array in arrays.items():
                 d = of_rows[name]
                 texts = {"meaning": d.meaning, "unit": self._units.get(d.unit) or d.unit or PURE_NUMBER}
-                self._agreed(agree_after, _write_rows, self._file, f"{group}/{name}", rows, array, texts)
+                self._agreed(mpi_errors.agree_after, _write_rows, self._file, f"{group}/{name}", rows, array, texts)
 
     def _agreed(self, agreed: Callable[..., Any], function: Callable[..., Any], *args: Any) -> Any:
         """function(*args) by `agree_after` where HDF5 communicates.
@@ -222,7 +216,7 @@ def _set_attributes(file: Any, name: str, attributes: Mapping[str, Any]) -> None
         target.attrs[key] = value
 
 
-def _arrays(group: str, count: int, part: Any, described: Mapping[str, Description]) -> dict[str, NDArray[Any]]:
+def _arrays(group: str, count: int, part: Any, described: Mapping[str, records.Description]) -> dict[str, NDArray[Any]]:
     arrays = {name: np.ascontiguousarray(getattr(part, name), np.dtype(d.dtype)) for name, d in described.items()}
     for name, array in arrays.items():
         if len(array) != count:

@@ -4,16 +4,14 @@ Lengths have the cell's unit, stresses the moduli's.  The file has n nodes, m el
 which each rank holds a part; nodes are torn: each body in a subdomain has its own.
 """
 
-from __future__ import annotations
-
 import typing
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from feti_homog.materials.voigt import AXIAL_STRESSES, SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
+from feti_homog.materials import voigt
 from feti_homog.results.field_views import GROUP_OF_STATES, SPATIAL_VIEWS, VIEWS, View
-from feti_homog.system.runtime.records import LENGTH, STRESS, Description, described, descriptions, type_words
+from feti_homog.system.runtime import described, records
 from feti_homog.typing import AnyInt, Float, Float32
 
 PROGRAM = "feti_homog"
@@ -25,8 +23,8 @@ class Header:
 
     title: str = described("name of the case")
     version: str = described("version of the program")
-    width: float = described("width of the cell", LENGTH)
-    height: float = described("height of the cell", LENGTH)
+    width: float = described("width of the cell", records.LENGTH)
+    height: float = described("height of the cell", records.LENGTH)
     order: int = described("order of the elements: 1, or 2 with curved sides at interfaces")
     refine: int = described("times that every triangle of the coarse mesh was cut in four")
     phases: tuple[str, ...] = described("names of the phases")
@@ -42,7 +40,7 @@ class MeshPart:
     Each group of 4**refine consecutive triangles fills one coarse triangle.
     """
 
-    points: Float = described("positions of the nodes", LENGTH, "(n, 2)")
+    points: Float = described("positions of the nodes", records.LENGTH, "(n, 2)")
     triangles: AnyInt = described(
         "nodes of the elements, from 0: vertices, then of order 2 the mid-side nodes 01, 12, 20",
         shape="(m, 3 or 6)", dtype="int64",
@@ -68,10 +66,10 @@ class FibrePart:
     phase: AnyInt = described("phase, a place in `phases`", shape="(f,)", dtype="int32")
     centre: Float = described(
         "centre of the circle, within the cell, or of the area of a fibre that is not round; NaN if it winds around",
-        LENGTH,
+        records.LENGTH,
         "(f, 2)",
     )
-    radius: Float = described("radius; NaN of a fibre that is not round", LENGTH, "(f,)")
+    radius: Float = described("radius; NaN of a fibre that is not round", records.LENGTH, "(f,)")
     strength: Float = described("strength of the bonds of the fibre / that of [interface]", shape="(f,)")
 
 
@@ -79,9 +77,11 @@ class FibrePart:
 class InterfacePart:
     """The k fibre-matrix interface nodes whose multipliers this rank owns; k may be 0."""
 
-    points: Float = described("positions of the interface nodes", LENGTH, "(k, 2)")
+    points: Float = described("positions of the interface nodes", records.LENGTH, "(k, 2)")
     normal: Float = described("unit normals (n1, n2), from fibre to matrix; tangents are (-n2, n1)", shape="(k, 2)")
-    length: Float = described("tributary length: the length of interface that a node represents", LENGTH, "(k,)")
+    length: Float = described(
+        "tributary length: the length of interface that a node represents", records.LENGTH, "(k,)"
+    )
     fibre: AnyInt = described("body of the fibre, or of its coating", shape="(k,)", dtype="int32")
     fibre_number: AnyInt = described("number of the fibre, from 1", shape="(k,)", dtype="int32")
     pair: AnyInt = described(
@@ -100,16 +100,18 @@ class InterfacePart:
 class StatePart:
     """One state of the cell and this rank's part of its fields."""
 
-    strain: Float = described(f"macroscopic strain {', '.join(STRAINS)}", shape="(3,)")
-    stress_mean: Float = described(f"macroscopic stress {', '.join(STRESSES)}", STRESS, "(3,)", name="stress")
+    strain: Float = described(f"macroscopic strain {', '.join(voigt.STRAINS)}", shape="(3,)")
+    stress_mean: Float = described(
+        f"macroscopic stress {', '.join(voigt.STRESSES)}", records.STRESS, "(3,)", name="stress"
+    )
     load_factor: float = described("position on the path, 0 to 1; 1 of other analyses")
     point: int = described("number, from 0, of its point in `path` or `angle` of result.json; 0 of a stiffness")
     label: str = described("label of the state, as `E11`, `60 deg E11`, `event 12`")
-    displacement: Float = described("displacement, including that of the macroscopic strain", LENGTH, "(n, 2)")
-    stress: Float = described(f"means over the elements, {', '.join(STRESSES)}", STRESS, "(m, 3)")
+    displacement: Float = described("displacement, including that of the macroscopic strain", records.LENGTH, "(n, 2)")
+    stress: Float = described(f"means over the elements, {', '.join(voigt.STRESSES)}", records.STRESS, "(m, 3)")
     stress_33: Float = described(
         "stress 33, out of the plane: 0 in plane stress, NaN where the material's constants do not determine it",
-        STRESS,
+        records.STRESS,
         "(m,)",
     )
     mesh_error: Float32 = described(
@@ -118,16 +120,20 @@ class StatePart:
         shape="(m,)",
         dtype="float32",
     )
-    traction: Float = described("sigma n, normal (tension positive) and tangential", STRESS, "(k, 2)")
+    traction: Float = described("sigma n, normal (tension positive) and tangential", records.STRESS, "(k, 2)")
     jump: Float = described(
-        "gap and slip: displacement of the matrix minus that of the fibre, normal and tangential", LENGTH, "(k, 2)"
+        "gap and slip: displacement of the matrix minus that of the fibre, normal and tangential",
+        records.LENGTH,
+        "(k, 2)",
     )
-    traction_vector: Float = described("`traction` as (x, y, z), along x3 `axial_traction` or 0", STRESS, "(k, 3)")
-    jump_vector: Float = described("`jump` as (x, y, z), along x3 `axial_jump` or 0", LENGTH, "(k, 3)")
-    displacement_fibre: Float = described("displacement (x, y, z) of the fibre's face", LENGTH, "(k, 3)")
+    traction_vector: Float = described(
+        "`traction` as (x, y, z), along x3 `axial_traction` or 0", records.STRESS, "(k, 3)"
+    )
+    jump_vector: Float = described("`jump` as (x, y, z), along x3 `axial_jump` or 0", records.LENGTH, "(k, 3)")
+    displacement_fibre: Float = described("displacement (x, y, z) of the fibre's face", records.LENGTH, "(k, 3)")
     displacement_matrix: Float = described(
         "displacement (x, y, z) of the matrix's face, at the same place: `displacement_fibre` plus `jump_vector`",
-        LENGTH,
+        records.LENGTH,
         "(k, 3)",
     )
     status: AnyInt = described("0 bonded, 1 closed (debonded, in contact), 2 open", shape="(k,)", dtype="int8")
@@ -166,17 +172,17 @@ def items() -> Iterator[Item]:
         yield from items_of(part, group, VIEWS.get(group, ()))
 
 
-def tables(part: Any) -> dict[str, Description]:
+def tables(part: Any) -> dict[str, records.Description]:
     """Return the fields of a part that are datasets: with a row per node, element, interface node or fibre."""
-    return {name: d for name, d in descriptions(part).items() if rows_of(d)}
+    return {name: d for name, d in records.descriptions(part).items() if rows_of(d)}
 
 
 def attributes(part: Any) -> dict[str, Any]:
     """Return the other fields as attributes, values by name."""
-    return {d.name or name: getattr(part, name) for name, d in descriptions(part).items() if not rows_of(d)}
+    return {d.name or name: getattr(part, name) for name, d in records.descriptions(part).items() if not rows_of(d)}
 
 
-def rows_of(description: Description) -> str:
+def rows_of(description: records.Description) -> str:
     """Return the row kind of a dataset: `n` nodes, `m` elements, `k` interface nodes, `f` fibres; else empty."""
     first = description.shape[1:2]
     return first if first in ("n", "m", "k", "f") else ""
@@ -185,14 +191,14 @@ def rows_of(description: Description) -> str:
 def items_of(part: type, group: str, views: Iterable[View]) -> Iterator[Item]:
     """Yield the items of a group with these views."""
     hints = typing.get_type_hints(part)
-    for name, d in descriptions(part).items():
+    for name, d in records.descriptions(part).items():
         if rows_of(d):
             yield Item(f"/{group}/{name}", "dataset", d.shape, d.dtype, d.unit, d.meaning)
         else:
-            type_name = type_words(hints[name], d)
+            type_name = records.type_words(hints[name], d)
             yield Item(f"/{group}", f"attribute {d.name or name}", d.shape, type_name, d.unit, d.meaning)
     for view in views:
-        d = descriptions(part)[view.source]
+        d = records.descriptions(part)[view.source]
         shape = f"({rows_of(d)}, {view.components})" if view.components else f"({rows_of(d)},)"
         yield Item(f"/{view.path(group)}", "dataset", shape, d.dtype, d.unit, view.words)
 
@@ -204,16 +210,22 @@ class SpatialStatePart(StatePart):
     Fields are constant along x3, except for the displacement E33 x3.
     """
 
-    strain: Float = described(f"macroscopic strain {', '.join(SPATIAL_STRAINS)}", shape="(6,)")
-    stress_mean: Float = described(f"macroscopic stress {', '.join(SPATIAL_STRESSES)}", STRESS, "(6,)", name="stress")
-    temperature: float = described("change of temperature", "temperature")
-    stress_33: Float = described("stress 33, along the fibres", STRESS, "(m,)")
-    axial_displacement: Float = described(
-        "displacement along x3 at x3 = 0, that of the macroscopic strain included", LENGTH, "(n,)"
+    strain: Float = described(f"macroscopic strain {', '.join(voigt.SPATIAL_STRAINS)}", shape="(6,)")
+    stress_mean: Float = described(
+        f"macroscopic stress {', '.join(voigt.SPATIAL_STRESSES)}", records.STRESS, "(6,)", name="stress"
     )
-    axial_stress: Float = described(f"means over the elements, {', '.join(AXIAL_STRESSES)}", STRESS, "(m, 2)")
-    axial_traction: Float = described("sigma n along x3", STRESS, "(k,)")
-    axial_jump: Float = described("slip along x3: displacement of the matrix minus that of the fibre", LENGTH, "(k,)")
+    temperature: float = described("change of temperature", "temperature")
+    stress_33: Float = described("stress 33, along the fibres", records.STRESS, "(m,)")
+    axial_displacement: Float = described(
+        "displacement along x3 at x3 = 0, that of the macroscopic strain included", records.LENGTH, "(n,)"
+    )
+    axial_stress: Float = described(
+        f"means over the elements, {', '.join(voigt.AXIAL_STRESSES)}", records.STRESS, "(m, 2)"
+    )
+    axial_traction: Float = described("sigma n along x3", records.STRESS, "(k,)")
+    axial_jump: Float = described(
+        "slip along x3: displacement of the matrix minus that of the fibre", records.LENGTH, "(k,)"
+    )
 
 
 def spatial_items() -> Iterator[Item]:

@@ -1,23 +1,18 @@
 """The torn cell and its responses as the parts of result.h5 that this rank writes."""
 
-from __future__ import annotations
-
 import json
 import os
 from typing import Any
 
 import numpy as np
 
-from feti_homog.homogenization import phase_laws
-from feti_homog.homogenization.averaging import Response
-from feti_homog.homogenization.recovered_fields import RecoveredFields, out_of_plane_stress, recover
-from feti_homog.homogenization.unit_cell import TornCell
+from feti_homog.homogenization import averaging, phase_laws, recovered_fields, unit_cell
 from feti_homog.results.field_layout import FibrePart, Header, InterfacePart, MeshPart, SpatialStatePart, StatePart
 from feti_homog.typing import Float, Float32
 from feti_homog.version import __version__
 
 
-def header(cell: TornCell) -> Header:
+def header(cell: unit_cell.TornCell) -> Header:
     """Return the attributes of the whole cell."""
     case, plan = cell.case, cell.summary
     return Header(
@@ -34,7 +29,7 @@ def header(cell: TornCell) -> Header:
     )
 
 
-def mesh_part(cell: TornCell) -> MeshPart:
+def mesh_part(cell: unit_cell.TornCell) -> MeshPart:
     """Concatenate the refined meshes of this rank's parts."""
     subdomains = cell.parts
     nodes = np.cumsum([0, *(len(s.mesh.points) for s in subdomains)])
@@ -52,7 +47,7 @@ def mesh_part(cell: TornCell) -> MeshPart:
     )
 
 
-def fibre_part(cell: TornCell) -> FibrePart:
+def fibre_part(cell: unit_cell.TornCell) -> FibrePart:
     """Return the fibres on rank 0, none on the others."""
     summary = cell.summary
     body = summary.fibre_bodies[: None if cell.comm.rank == 0 else 0]
@@ -66,7 +61,7 @@ def fibre_part(cell: TornCell) -> FibrePart:
     )
 
 
-def interface_part(cell: TornCell) -> InterfacePart:
+def interface_part(cell: unit_cell.TornCell) -> InterfacePart:
     """Return the interface nodes whose multipliers this rank owns. Collective."""
     jumps, nodes = cell.jumps, cell.jumps.nodes
     first = cell.comm.exscan(sum(len(s.mesh.points) for s in cell.parts)) or 0
@@ -84,9 +79,11 @@ def interface_part(cell: TornCell) -> InterfacePart:
     )
 
 
-def state_part(cell: TornCell, response: Response, load_factor: float, label: str, point: int) -> StatePart:
+def state_part(
+    cell: unit_cell.TornCell, response: averaging.Response, load_factor: float, label: str, point: int
+) -> StatePart:
     """Return the fields of a response in plane strain or stress. Collective when first called."""
-    fields = recover(cell, response)
+    fields = recovered_fields.recover(cell, response)
     return StatePart(
         strain=response.strain,
         stress_mean=response.stress,
@@ -94,14 +91,19 @@ def state_part(cell: TornCell, response: Response, load_factor: float, label: st
         point=point,
         label=label,
         stress=fields.stress,
-        stress_33=out_of_plane_stress(cell, fields.stress),
+        stress_33=recovered_fields.out_of_plane_stress(cell, fields.stress),
         mesh_error=_relative(fields.shares, response),
         **_at_nodes(cell, response, fields),
     )
 
 
 def spatial_state_part(
-    cell: TornCell, plane: Response | None, axial: Response | None, load_factor: float, label: str, point: int
+    cell: unit_cell.TornCell,
+    plane: averaging.Response | None,
+    axial: averaging.Response | None,
+    load_factor: float,
+    label: str,
+    point: int,
 ) -> SpatialStatePart:
     """Return the fields in generalized plane strain, from responses of the plane and the axial problem.
 
@@ -113,7 +115,7 @@ def spatial_state_part(
     response = plane or axial
     if response is None or cell.axial is None:
         raise ValueError("expected a response of a cell with an axial problem")
-    in_plane, along = recover(cell, plane), recover(cell.axial, axial)
+    in_plane, along = recovered_fields.recover(cell, plane), recovered_fields.recover(cell.axial, axial)
     return SpatialStatePart(
         strain=phase_laws.spatial_vector(*(r if r is None else r.strain for r in (plane, axial))),
         stress_mean=phase_laws.spatial_vector(*(r if r is None else r.stress for r in (plane, axial))),
@@ -133,7 +135,10 @@ def spatial_state_part(
 
 
 def _at_nodes(
-    cell: TornCell, response: Response, in_plane: RecoveredFields, along: RecoveredFields | None = None
+    cell: unit_cell.TornCell,
+    response: averaging.Response,
+    in_plane: recovered_fields.RecoveredFields,
+    along: recovered_fields.RecoveredFields | None = None,
 ) -> dict[str, Any]:
     """Return displacements, and tractions, jumps, status, damage and sliding at the interface nodes.
 
@@ -158,7 +163,7 @@ def _at_nodes(
     }
 
 
-def _relative(shares: Float, *responses: Response | None) -> Float32:
+def _relative(shares: Float, *responses: averaging.Response | None) -> Float32:
     """(m,) element shares of the error, relative to E . Sigma summed over all responses."""
     energy = sum(2 * response.stored for response in responses if response is not None)
     return (shares / (energy if energy > 0 else 1.0)).astype(np.float32)

@@ -3,8 +3,6 @@
 They are virtual and nearly free: HDF5 fills them from other datasets when they are read.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -12,7 +10,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from feti_homog.materials.voigt import AXIAL_STRESSES, STRESSES
+from feti_homog.materials import voigt
 
 GROUP_OF_STATES = "state/K"
 WHOLE = -1  # instead of a column: all of a dataset that has none
@@ -67,7 +65,7 @@ def _column(name: str, source: str, column: int) -> View:
 PLACES = ((0, 0), (1, 1), (0, 1), (2, 2))  # of 11, 22, 12, 33
 STRESS_TENSOR = dict(zip(PLACES, (("stress", 0), ("stress", 1), ("stress", 2), ("stress_33", WHOLE)), strict=True))
 COLUMNS = (
-    *(_column(name, "stress", column) for column, name in enumerate(STRESSES)),
+    *(_column(name, "stress", column) for column, name in enumerate(voigt.STRESSES)),
     *(_column(f"{table}_{name}", table, k) for table in ("traction", "jump") for k, name in enumerate("nt")),
 )
 AXIAL = "axial_displacement"  # that states of generalized plane strain have, and only they
@@ -88,7 +86,7 @@ SPATIAL_VIEWS: tuple[View, ...] = (
     _vector("displacement", AXIAL),
     _tensor("stress", "stress", STRESS_TENSOR | {at: ("axial_stress", k) for k, at in enumerate(AXIAL_PLACES)}),
     *COLUMNS,
-    *(_column(name, "axial_stress", column) for column, name in enumerate(AXIAL_STRESSES)),
+    *(_column(name, "axial_stress", column) for column, name in enumerate(voigt.AXIAL_STRESSES)),
 )
 
 

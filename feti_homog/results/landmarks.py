@@ -4,8 +4,6 @@ The peak is the largest stress before a fall, in the component whose strain lead
 result.json.  At the end of the path fields are kept for its ends, for points around drops, and evenly between.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from heapq import heapify, heapreplace
 from itertools import pairwise
@@ -13,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.materials.voigt import STRAINS, voigt_names
+from feti_homog.materials import voigt
 from feti_homog.results import path_curves
 from feti_homog.results.path_curves import SAME_LOAD, Document, Point
 from feti_homog.typing import Float
@@ -55,7 +53,7 @@ def peak_of(document: Document) -> dict[str, Any]:
     # 0.0 is added, for a zero may have a sign.
     stress, strain = (np.array([p[name] for p in points], float)[:, component] + 0.0 for name in ("stress", "strain"))
     event, remaining, valley = _deepest_fall(document, stress)
-    names = [names[component] for names in voigt_names(len(points[0]["stress"]))]
+    names = [names[component] for names in voigt.voigt_names(len(points[0]["stress"]))]
     entries = {"stress": float(stress[event]), "strain": float(strain[event]), "event": event}
     first = next((number for number, point in enumerate(points) if point["broke"]), None)
     if first is not None:
@@ -74,7 +72,7 @@ def peak_of(document: Document) -> dict[str, Any]:
 
 def stresses_of(document: Document, peak: Document) -> list[float]:
     """Return the stress at each point, in the component of the peak."""
-    component = voigt_names(len(document["path"][0]["stress"]))[1].index(peak["stress_name"])
+    component = voigt.voigt_names(len(document["path"][0]["stress"]))[1].index(peak["stress_name"])
     return [float(point["stress"][component]) for point in document["path"]]
 
 
@@ -196,7 +194,7 @@ def drops(points: Sequence[Point], legs: int) -> list[Drop]:
 
 def _norm(values: Float, shear: float) -> Float:
     """(n,) size of tensors (n, 3) or (n, 6); squared shears have weight `shear`."""
-    tensions = 2 if values.shape[1] == len(STRAINS) else 3
+    tensions = 2 if values.shape[1] == len(voigt.STRAINS) else 3
     square = np.square(values)
     return np.asarray(np.sqrt(square[:, :tensions].sum(axis=1) + shear * square[:, tensions:].sum(axis=1)))
 

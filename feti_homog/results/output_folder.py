@@ -15,12 +15,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from feti_homog.errors import CaseError, FetiHomogError
-from feti_homog.materials.voigt import SPATIAL_STRAINS
+from feti_homog.materials import voigt
 from feti_homog.results import atomic, checkpoints, field_file, result_json
 from feti_homog.results.field_layout import PROGRAM
-from feti_homog.system.parallel.mpi_errors import on_root
-from feti_homog.system.runtime import input_files
-from feti_homog.system.runtime.file_locks import Lock, LockHeld, LocksUnsupported, holder
+from feti_homog.system.parallel import mpi_errors
+from feti_homog.system.runtime import file_locks, input_files
 from feti_homog.version import __version__
 
 if TYPE_CHECKING:
@@ -36,7 +35,7 @@ RESULT_FILE = re.compile(
     r"|(angle|path|load|envelope)\.csv|path\.gif"
     r"|(cell|partition|mesh_error|sensitivities|energy|interface|load|envelope|(angle|path)(_states)?)\.png"
     r"|(cell|interface)(_\d{4,}\.vtu|\.pvd|\.vtkhdf)"
-    rf"|case_(minus_)?({'|'.join(SPATIAL_STRAINS)}|temperature)\.png|state_\d+\.png"
+    rf"|case_(minus_)?({'|'.join(voigt.SPATIAL_STRAINS)}|temperature)\.png|state_\d+\.png"
 )
 # Of these those that show that a run has written to the folder.
 SIGNS = (result_json.NAME, field_file.NAME, LOG, LOCK)
@@ -65,7 +64,7 @@ def usable(directory: Path) -> None:
         raise CaseError(f"--out {directory}: cannot be used: {error.strerror}") from error
     if (directory / LOCK).is_symlink():  # whose file elsewhere would get the name of the holder
         raise CaseError(f"--out {directory}: {LOCK} is a link there; move it away or choose another folder")
-    if (who := holder(directory / LOCK)) is not None:
+    if (who := file_locks.holder(directory / LOCK)) is not None:
         raise _busy(directory, who)
 
 
@@ -131,8 +130,8 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
     Raises:
         CaseError: it cannot be made, or another run has it.
     """
-    lock = Lock(directory / LOCK)
-    made, warning = on_root(comm, _hold, lock, directory)
+    lock = file_locks.Lock(directory / LOCK)
+    made, warning = mpi_errors.on_root(comm, _hold, lock, directory)
     if warning:
         say(f"warning: {warning}")
     try:
@@ -175,7 +174,7 @@ def write_product(path: Path, text: str) -> Path:
     return path
 
 
-def _hold(lock: Lock, directory: Path) -> tuple[list[Path], str]:
+def _hold(lock: file_locks.Lock, directory: Path) -> tuple[list[Path], str]:
     """Make and lock the folder; returns new folders, innermost first, and a warning if it has no lock."""
     made = [path for path in (directory, *directory.parents) if not path.exists()]
     try:
@@ -184,9 +183,9 @@ def _hold(lock: Lock, directory: Path) -> tuple[list[Path], str]:
     except OSError as error:
         _remove_empty(made)
         raise CaseError(f"--out {directory}: cannot be made: {error.strerror}") from error
-    except LockHeld as held:
+    except file_locks.LockHeld as held:
         raise _busy(directory, str(held)) from held
-    except LocksUnsupported as error:
+    except file_locks.LocksUnsupported as error:
         lock.path.unlink(missing_ok=True)
         return made, f"{error}; nothing keeps another run from writing to the same folder"
     except FetiHomogError:

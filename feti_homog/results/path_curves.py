@@ -4,17 +4,14 @@ Points are entries of `path` in result.json: mappings with `load_factor`, `strai
 order: [11, 22, 12], or [11, 22, 33, 23, 13, 12] in generalized plane strain; stresses in the moduli's unit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from feti_homog.case.bond_laws import DEFAULT, LAWS
-from feti_homog.case.load_sections import TEMPERATURE, MixedLoad, Strain, completed, first_named
-from feti_homog.materials.voigt import plane_state_of
+from feti_homog.case import bond_laws, load_sections
+from feti_homog.materials import voigt
 from feti_homog.typing import Float
 
 SAME_LOAD = 1e-9  # load factors that differ by less, relatively, are one
@@ -27,26 +24,26 @@ Document = Mapping[str, Any]
 
 def targets(document: Document) -> tuple[dict[str, float], ...]:
     """Return the waypoints of a path, or the one load, with strain or stress of each component by name."""
-    return completed(_given(document), document["case"]["analysis"]["plane"])
+    return load_sections.completed(_given(document), document["case"]["analysis"]["plane"])
 
 
 def named_components(document: Document) -> list[int]:
     """Return the components that the waypoints name, in Voigt order."""
     loads = _given(document)
-    first = first_named(loads, document["case"]["analysis"]["plane"])
+    first = load_sections.first_named(loads, document["case"]["analysis"]["plane"])
     return [component for component, number in enumerate(first.values()) if number < len(loads)]
 
 
-def _given(document: Document) -> list[Strain | MixedLoad]:
+def _given(document: Document) -> list[load_sections.Strain | load_sections.MixedLoad]:
     """Return the loads as the case gives them."""
     section = document["case"].get("path") or document["case"]["load"]
     as_written = section.get("waypoints") or [section[name] for name in ("strain", "to") if name in section]
-    return [MixedLoad(**load) if isinstance(load, Mapping) else tuple(load) for load in as_written]
+    return [load_sections.MixedLoad(**load) if isinstance(load, Mapping) else tuple(load) for load in as_written]
 
 
 def changed_components(document: Document) -> list[int]:
     """Return the components that the waypoints change, in Voigt order."""
-    pairs, matches = plane_state_of(document).components, set[int]()
+    pairs, matches = voigt.plane_state_of(document).components, set[int]()
     before: Mapping[str, float] = {stress: 0.0 for _, stress in pairs}
     for target in targets(document):
         for component, names in enumerate(pairs):
@@ -81,7 +78,7 @@ def shown_stresses(document: Document) -> list[int]:
 def what_rises(document: Document) -> str:
     """Return "strain" if nothing but strains rises on the first leg of a path, else "load"."""
     first = targets(document)[0]
-    other_loads = {*plane_state_of(document).stresses, TEMPERATURE}
+    other_loads = {*voigt.plane_state_of(document).stresses, load_sections.TEMPERATURE}
     return "load" if any(first[name] for name in other_loads & first.keys()) else "strain"
 
 
@@ -122,7 +119,7 @@ def scales_with_toughness(document: Document) -> bool:
 
     Bonds break by energy, on springs that the toughness does not change.
     """
-    laws = [LAWS.get(section.get("criterion", DEFAULT)) for section in interface_sections(document)]
+    laws = [bond_laws.LAWS.get(section.get("criterion", bond_laws.DEFAULT)) for section in interface_sections(document)]
     by_energy = [law is not None and "toughness" in law.keys and not law.softens for law in laws]
     return bool(document.get("path")) and bool(laws) and all(by_energy)
 

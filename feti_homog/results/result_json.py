@@ -4,8 +4,6 @@ Checksums tell damaged or edited files: in a JSON document, and of a large file.
 large file is checked before it is opened.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import json
@@ -21,8 +19,7 @@ import numpy as np
 
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.results import atomic
-from feti_homog.system.runtime import input_files
-from feti_homog.system.runtime.records import BYTES, Description, described, descriptions, is_record, plain
+from feti_homog.system.runtime import described, input_files, records
 
 NAME = "result.json"
 KEY = "checksum"
@@ -119,7 +116,7 @@ def write_csv(path: Path, points: Sequence[Any]) -> Path:
     rows = []
     for point in points:
         row: dict[str, Any] = {}
-        for name, value in plain(point).items():
+        for name, value in records.plain(point).items():
             if name in fields:
                 values, components = np.ravel(value).tolist(), _names(name, fields[name])
                 if len(values) > len(components):
@@ -135,16 +132,16 @@ def write_csv(path: Path, points: Sequence[Any]) -> Path:
     return atomic.replace_text(path, stream.getvalue())
 
 
-def _names(name: str, description: Description) -> tuple[str, ...]:
+def _names(name: str, description: records.Description) -> tuple[str, ...]:
     """Return the columns of a field: its name, or its components in the plane."""
     return description.components or (name,)
 
 
-def _in_columns(kind: type) -> dict[str, Description]:
+def _in_columns(kind: type) -> dict[str, records.Description]:
     """Return the record fields that fill columns: numbers, and arrays with named components."""
     hints = get_type_hints(kind)
-    entry = {name: d for name, d in descriptions(kind).items() if d.components or not d.shape}
-    return {name: d for name, d in entry.items() if not is_record(hints[name])}
+    entry = {name: d for name, d in records.descriptions(kind).items() if d.components or not d.shape}
+    return {name: d for name, d in entry.items() if not records.is_record(hints[name])}
 
 
 def dumps(document: Mapping[str, Any]) -> str:
@@ -183,7 +180,7 @@ def loads(text: str) -> dict[str, Any]:
 class FileSeal:
     """Size and checksum of a file."""
 
-    bytes: int = described("size", BYTES)
+    bytes: int = described("size", records.BYTES)
     checksum: str = described("CRC-32, in hexadecimal, of the CRC-32s (32 bits, little-endian) of its blocks of 64 MiB")
 
 

@@ -3,8 +3,6 @@
 VTK's file formats, .vtu, a file for each state, and .vtkhdf: https://docs.vtk.org/en/latest/vtk_file_formats.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 from collections.abc import Mapping
@@ -18,13 +16,12 @@ import h5py
 import numpy as np
 
 from feti_homog.errors import CaseError
-from feti_homog.fem.assembly import element_strain
-from feti_homog.fem.problem import AXIAL, PLANE
+from feti_homog.fem import AXIAL, PLANE, assembly
 from feti_homog.materials import voigt
 from feti_homog.results import atomic, field_file, xdmf
 from feti_homog.results.field_views import AXIAL as AXIAL_DISPLACEMENT
 from feti_homog.typing import Array, Float
-from feti_homog.verify.constitutive_law import out_of_plane
+from feti_homog.verify import constitutive_law
 
 
 @dataclass(frozen=True, repr=False)
@@ -84,11 +81,11 @@ def cell_state(file: Any, state: int) -> ViewedState:
     if more:
         E33 = np.full(len(in_plane), strain[2])
     else:  # as the materials make it, in plane strain and stress
-        rules = out_of_plane(json.loads(file.attrs["case"]), tuple(map(str, file.attrs["phases"])))
+        rules = constitutive_law.out_of_plane(json.loads(file.attrs["case"]), tuple(map(str, file.attrs["phases"])))
         E33 = np.einsum("ei,ei->e", rules[file["mesh/phase"][()], 1], in_plane)
     every, displacement = np.arange(len(points), dtype=np.int32), nodes["displacement"]
-    E11, E22, gamma12 = element_strain(points, triangles, every, displacement[:, :2], PLANE)[0].T
-    gamma13, gamma23 = element_strain(points, triangles, every, displacement[:, 2:], AXIAL)[0].T
+    E11, E22, gamma12 = assembly.element_strain(points, triangles, every, displacement[:, :2], PLANE)[0].T
+    gamma13, gamma23 = assembly.element_strain(points, triangles, every, displacement[:, 2:], AXIAL)[0].T
     E12, E13, E23 = gamma12 / 2, gamma13 / 2, gamma23 / 2
     elements["strain"] = np.stack([E11, E12, E13, E12, E22, E23, E13, E23, E33], axis=1)
     shears = group["axial_stress"][()] if more else np.zeros((len(triangles), 2))

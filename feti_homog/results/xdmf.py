@@ -5,8 +5,6 @@ components, one collection per file.  Readers take no texts: a state label is th
 show, and an array with the bytes of its letters, equally long in all states.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,7 +13,7 @@ from xml.etree import ElementTree as ET
 import h5py
 import numpy as np
 
-from feti_homog.materials.voigt import AXIAL_STRESSES, STRESSES
+from feti_homog.materials import voigt
 from feti_homog.results import atomic, field_file
 from feti_homog.results.field_layout import StatePart, tables
 from feti_homog.results.field_views import AXIAL
@@ -29,7 +27,7 @@ CELL_NODES = {"displacement": "vector/state/K/displacement"}
 CELL_ELEMENTS = {
     **{name: f"mesh/{name}" for name in ("body", "fibre_number", "phase", "subdomain")},
     "stress": "tensor/state/K/stress",
-    **{name: f"column/state/K/{name}" for name in STRESSES},
+    **{name: f"column/state/K/{name}" for name in voigt.STRESSES},
     "S33": "state/K/stress_33",
 }
 INTERFACE_POINTS = {
@@ -43,7 +41,7 @@ INTERFACE_POINTS = {
     **{name: f"interface/{name}" for name in ("length", "fibre", "fibre_number", "pair")},
 }
 # Of generalized plane strain there are these too.
-SPATIAL_ELEMENTS = {name: f"column/state/K/{name}" for name in AXIAL_STRESSES}
+SPATIAL_ELEMENTS = {name: f"column/state/K/{name}" for name in voigt.AXIAL_STRESSES}
 SPATIAL_POINTS = {f"{name}_a": f"state/K/axial_{name}" for name in ("traction", "jump")}
 LISTED = {*CELL_ELEMENTS.values(), *INTERFACE_POINTS.values(), *SPATIAL_POINTS.values()}
 

@@ -1,7 +1,5 @@
 """Fault wording: values and keys as TOML writes them, and where an unknown name may belong."""
 
-from __future__ import annotations
-
 import difflib
 import json
 import re

@@ -4,3 +4,7 @@ Imports `analysis`, `case`, `feti`, `homogenization`, `materials`, `mesh`, `micr
 `schema` and `system`.  Main entries: `sweep_cases.load`, `case_runs.run_all`, `collect.collect`, `fit_file.load`,
 `uncertainty.load` and `study.Study`.
 """
+
+__all__ = [
+    "case_folders", "case_runs", "collect", "description", "fit_file", "sweep_cases", "sweep_table", "uncertainty",
+]  # fmt: skip

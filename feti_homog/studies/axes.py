@@ -1,7 +1,5 @@
 """Points of a sweep: axis values combined to a grid, row by row, or sampled."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -11,21 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from feti_homog.case.toml_files import TomlPath, leaves
-from feti_homog.case.sections import AXIS_EXPECTED, MAX_CASES, RANGE_KEYS, SECTIONS, SWEEP, TOP_LEVEL, SweepSection
-from feti_homog.schema.keys import TableReader, keys_of
-from feti_homog.schema.types import is_number, magnitudes_in_words
-from feti_homog.schema.wording import dotted_key, suggestion, toml_value
+from feti_homog.case import sections, toml_files
+from feti_homog.schema import TableReader, keys, types, wording
 
 STEP_TOLERANCE = 1e-9  # of a step: a rounding error that does not cost the last one
-Assignment = dict[TomlPath, Any]
+Assignment = dict[toml_files.TomlPath, Any]
 
 
 @dataclass(frozen=True)
 class Axis:
     """A key that varies: its values or, if it is sampled, the ends that they lie between."""
 
-    path: TomlPath
+    path: toml_files.TomlPath
     values: tuple[Any, ...] = ()
     ends: tuple[float, float] = (0.0, 0.0)
     log: bool = False
@@ -37,58 +32,68 @@ class Axis:
         return [_rounded(value, self.path) for value in (np.exp(values) if self.log else values).tolist()]
 
 
-def read_points(table: Mapping[str, Any], faults: list[str]) -> tuple[list[Assignment], SweepSection]:
+def read_points(table: Mapping[str, Any], faults: list[str]) -> tuple[list[Assignment], sections.SweepSection]:
     """Return the points of a table [sweep] as values by key, in their order, and its settings.
 
     A faulty table has no points, and adds a line for each fault to `faults`.
     """
-    names = keys_of(SweepSection)
+    names = keys.keys_of(sections.SweepSection)
     reader = TableReader()
     given_settings = {name: value for name, value in table.items() if name in names}
-    settings = reader.read(SweepSection, given_settings, SWEEP) or SweepSection()
+    settings = reader.read(sections.SweepSection, given_settings, sections.SWEEP) or sections.SweepSection()
     axes, lines = list[Axis](), reader.faults
-    for path, value in leaves({name: value for name, value in table.items() if name not in names}, _is_value):
+    for path, value in toml_files.leaves(
+        {name: value for name, value in table.items() if name not in names}, _is_value
+    ):
         if fault := _value_fault(path, value, "samples" in given_settings):
-            lines.append(f"[{SWEEP}] {dotted_key(path)} = {toml_value(value)}: {fault}")
+            lines.append(f"[{sections.SWEEP}] {wording.dotted_key(path)} = {wording.toml_value(value)}: {fault}")
         else:
             axes.append(_axis(path, value))
     lines += _axis_faults(axes, settings)
     if not axes and not lines and settings.realisations is None:
-        lines.append(f"[{SWEEP}]: nothing varies; expected keys with {AXIS_EXPECTED}, or realisations")
+        lines.append(
+            f"[{sections.SWEEP}]: nothing varies; expected keys with {sections.AXIS_EXPECTED}, or realisations"
+        )
     lines += _count_faults(axes, settings)
     faults += lines
     return ([] if lines else _combined(axes, settings)), settings
 
 
-def _axis_faults(axes: Sequence[Axis], settings: SweepSection) -> list[str]:
+def _axis_faults(axes: Sequence[Axis], settings: sections.SweepSection) -> list[str]:
     """Faults between axes: nothing to sample, or a key twice."""
     faults = []
     if settings.samples is not None and all(axis.values for axis in axes):
-        faults.append(f"[{SWEEP}] samples = {settings.samples}: no key is to be sampled; expected a range {{from, to}}")
+        faults.append(
+            f"[{sections.SWEEP}] samples = {settings.samples}: no key is to be sampled; expected a range {{from, to}}"
+        )
     paths = [axis.path for axis in axes]
     repeated = [path for path in dict.fromkeys(paths) if paths.count(path) > 1]
-    return faults + [f"[{SWEEP}] {dotted_key(path)}: given twice" for path in repeated]
+    return faults + [f"[{sections.SWEEP}] {wording.dotted_key(path)}: given twice" for path in repeated]
 
 
-def _count_faults(axes: Sequence[Axis], settings: SweepSection) -> list[str]:
+def _count_faults(axes: Sequence[Axis], settings: sections.SweepSection) -> list[str]:
     """Faults in value counts: unequal ones in rows, or too many cases."""
     faults, lengths = [], _lengths(axes, settings)
     counts = [length for _, length in lengths]
     if settings.mode == "zip" and len({*counts}) > 1:
         listed = ", ".join(f"{length} of {names}" for names, length in lengths)
-        faults.append(f'[{SWEEP}] mode = "zip": expected as many values of each key; there are {listed}')
+        faults.append(f'[{sections.SWEEP}] mode = "zip": expected as many values of each key; there are {listed}')
     cases = (prod(counts) if settings.mode == "grid" else max(counts, default=1)) * (settings.realisations or 1)
-    return faults + ([f"[{SWEEP}]: {cases} cases; expected at most {MAX_CASES}"] if cases > MAX_CASES else [])
+    return faults + (
+        [f"[{sections.SWEEP}]: {cases} cases; expected at most {sections.MAX_CASES}"]
+        if cases > sections.MAX_CASES
+        else []
+    )
 
 
-def _lengths(axes: Sequence[Axis], settings: SweepSection) -> list[tuple[str, int]]:
+def _lengths(axes: Sequence[Axis], settings: sections.SweepSection) -> list[tuple[str, int]]:
     """Return the keys of each axis in words, and its value count; sampled keys are one axis."""
-    lengths = [(dotted_key(axis.path), len(axis.values)) for axis in axes if axis.values]
-    sampled = [dotted_key(axis.path) for axis in axes if not axis.values]
+    lengths = [(wording.dotted_key(axis.path), len(axis.values)) for axis in axes if axis.values]
+    sampled = [wording.dotted_key(axis.path) for axis in axes if not axis.values]
     return [*lengths, (" and ".join(sampled), settings.samples)] if sampled and settings.samples else lengths
 
 
-def _combined(axes: Sequence[Axis], settings: SweepSection) -> list[Assignment]:
+def _combined(axes: Sequence[Axis], settings: sections.SweepSection) -> list[Assignment]:
     """Return the points on axes without fault.
 
     In a grid the last key in the file runs fastest; sampled keys are one axis, the last.
@@ -99,7 +104,7 @@ def _combined(axes: Sequence[Axis], settings: SweepSection) -> list[Assignment]:
     return [{path: value for part in row for path, value in part.items()} for row in rows]
 
 
-def _samples(axes: Sequence[Axis], settings: SweepSection) -> list[list[Assignment]]:
+def _samples(axes: Sequence[Axis], settings: sections.SweepSection) -> list[list[Assignment]]:
     """Return one list of sampled points, a Latin hypercube or independent; none without axes."""
     if not axes or settings.samples is None:
         return []
@@ -114,35 +119,36 @@ def _samples(axes: Sequence[Axis], settings: SweepSection) -> list[list[Assignme
     return [[dict(zip(paths, row, strict=True)) for row in zip(*columns, strict=True)]]
 
 
-def _is_value(path: TomlPath, table: Mapping[str, Any]) -> bool:
+def _is_value(path: toml_files.TomlPath, table: Mapping[str, Any]) -> bool:
     """Return whether a table is a value: a range, or anything in an unknown section."""
-    return path[0] not in TOP_LEVEL or path[0] in ("name", SWEEP) or _is_range(path, table)
+    return path[0] not in sections.TOP_LEVEL or path[0] in ("name", sections.SWEEP) or _is_range(path, table)
 
 
-def _is_range(path: TomlPath, value: Any) -> bool:
+def _is_range(path: toml_files.TomlPath, value: Any) -> bool:
     """Return whether the value of a key is meant as a range; a section, which may have a key "to", is none."""
     return len(path) > 1 and isinstance(value, dict) and bool(value.keys() & {"from", "to"})
 
 
-def _value_fault(path: TomlPath, value: Any, is_sampled: bool) -> str:
+def _value_fault(path: toml_files.TomlPath, value: Any, is_sampled: bool) -> str:
     """Return the fault of an axis, empty if there is none; sampled ranges need no step and no count."""
-    if path[0] not in TOP_LEVEL or path[0] in ("name", SWEEP):
-        return f"unknown key; {suggestion(path[0], [*keys_of(SweepSection), *SECTIONS, 'material', 'petsc'], {})}"
+    if path[0] not in sections.TOP_LEVEL or path[0] in ("name", sections.SWEEP):
+        names = [*keys.keys_of(sections.SweepSection), *sections.SECTIONS, "material", "petsc"]
+        return f"unknown key; {wording.suggestion(path[0], names, {})}"
     if isinstance(value, list):
         return "" if value else "expected at least one value"
-    return _range_fault(value, is_sampled) if _is_range(path, value) else f"expected {AXIS_EXPECTED}"
+    return _range_fault(value, is_sampled) if _is_range(path, value) else f"expected {sections.AXIS_EXPECTED}"
 
 
 def _range_fault(value: Mapping[str, Any], is_sampled: bool) -> str:
     """Return the fault of a range, empty if there is none."""
-    unknown = [name for name in value if name not in RANGE_KEYS]
+    unknown = [name for name in value if name not in sections.RANGE_KEYS]
     if unknown:
-        return f"{unknown[0]}: unknown key; expected one of {', '.join(RANGE_KEYS)}"
+        return f"{unknown[0]}: unknown key; expected one of {', '.join(sections.RANGE_KEYS)}"
     low: Any = value.get("from")
     high: Any = value.get("to")
     scale = value.get("scale", "linear")
-    if not (is_number(low) and is_number(high) and low < high):
-        return f"expected numbers from < to{magnitudes_in_words([low, high])}"
+    if not (types.is_number(low) and types.is_number(high) and low < high):
+        return f"expected numbers from < to{types.magnitudes_in_words([low, high])}"
     if scale not in ("linear", "log") or (scale == "log" and low <= 0):
         return 'expected scale = "linear" or "log", this from a number above 0'
     return _spacing_fault(value, is_sampled)
@@ -155,17 +161,17 @@ def _spacing_fault(table: Mapping[str, Any], is_sampled: bool) -> str:
         return "step, count: exclude each other; give one"
     if step is not None:
         width = table["to"] - table["from"]
-        if not is_number(step) or not 0 < step <= width or table.get("scale") == "log":
-            return f"expected a step above 0 and at most to - from, linear{magnitudes_in_words(step)}"
-        too_many = f"about {width / step:.6g} values; expected a step that makes at most {MAX_CASES}"
-        return too_many if width / step >= MAX_CASES else ""
+        if not types.is_number(step) or not 0 < step <= width or table.get("scale") == "log":
+            return f"expected a step above 0 and at most to - from, linear{types.magnitudes_in_words(step)}"
+        too_many = f"about {width / step:.6g} values; expected a step that makes at most {sections.MAX_CASES}"
+        return too_many if width / step >= sections.MAX_CASES else ""
     if count is not None:
-        is_valid = isinstance(count, int) and 2 <= count <= MAX_CASES
-        return "" if is_valid else f"expected a count from 2 to {MAX_CASES}"
-    return "" if is_sampled else f"expected {AXIS_EXPECTED}"
+        is_valid = isinstance(count, int) and 2 <= count <= sections.MAX_CASES
+        return "" if is_valid else f"expected a count from 2 to {sections.MAX_CASES}"
+    return "" if is_sampled else f"expected {sections.AXIS_EXPECTED}"
 
 
-def _axis(path: TomlPath, value: Any) -> Axis:
+def _axis(path: toml_files.TomlPath, value: Any) -> Axis:
     """Return the axis of a list or a range without fault."""
     if isinstance(value, list):
         return Axis(path, tuple(value))
@@ -177,11 +183,11 @@ def _axis(path: TomlPath, value: Any) -> Axis:
     return axis if count is None else Axis(path, tuple(axis.at(np.linspace(0, 1, count))))
 
 
-def _rounded(value: float, path: TomlPath) -> Any:
+def _rounded(value: float, path: toml_files.TomlPath) -> Any:
     """Return the number without the noise of its last digits; an integer where the key takes nothing else."""
     value = float(f"{value:.12g}")
-    section = SECTIONS.get(path[0])
-    entry = keys_of(section).get(path[1]) if section is not None and len(path) == 2 else None
+    section = sections.SECTIONS.get(path[0])
+    entry = keys.keys_of(section).get(path[1]) if section is not None and len(path) == 2 else None
     takes_integers_only = (
         entry is not None and entry.type.accepts(round(value)) and not entry.type.accepts(round(value) + 0.5)
     )

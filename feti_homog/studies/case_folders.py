@@ -6,8 +6,6 @@ DIR/case-0001/result.json     as of any run
 DIR/case-0001/error.txt       why it failed, if it did
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import math
@@ -20,13 +18,12 @@ from typing import Any
 
 import tomli_w
 
-from feti_homog.case.cases import Case
+from feti_homog.case import Case
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.results import atomic, checkpoints, output_folder, result_json
-from feti_homog.schema.types import INF
+from feti_homog.schema import types
 from feti_homog.studies.sweep_cases import Sweep, SweepCase, identity_of
-from feti_homog.system.runtime import input_files
-from feti_homog.system.runtime.file_locks import Lock, LockHeld, holder
+from feti_homog.system.runtime import file_locks, input_files
 from feti_homog.version import __version__
 
 INDEX_FILE, TABLE_FILE, ERROR_FILE, CASE_FILE, LOCK_FILE = (
@@ -101,7 +98,7 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
     if _stored_entries(directory) == sweep.entries and (directory / TABLE_FILE).exists():
         return
     try:
-        with Lock(directory / INDEX_LOCK_FILE, timeout=INDEX_LOCK_TIMEOUT_S):
+        with file_locks.Lock(directory / INDEX_LOCK_FILE, timeout=INDEX_LOCK_TIMEOUT_S):
             stored = _stored_entries(directory)
             _refuse_another(directory, stored, sweep.entries)
             if not stored:
@@ -109,10 +106,10 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
             atomic.remove_unfinished(directory, re.compile(rf"{INDEX_FILE}|{TABLE_FILE}"))
             if stored != sweep.entries:
                 document = {"version": __version__, "name": sweep.name, "stress_unit": sweep.stress_unit}
-                entries = [_replaced(asdict(entry), math.inf, INF) for entry in sweep.entries]
+                entries = [_replaced(asdict(entry), math.inf, types.INF) for entry in sweep.entries]
                 atomic.replace_text(directory / INDEX_FILE, result_json.dumps(document | {"cases": entries}))
             atomic.replace_text(directory / TABLE_FILE, _table(sweep.entries))
-    except LockHeld as error:
+    except file_locks.LockHeld as error:
         raise CaseError(f"--out {directory}: {error} has been writing its list of cases for long") from error
 
 
@@ -155,7 +152,7 @@ def read_index(directory: Path) -> SweepIndex:
     path = directory / INDEX_FILE
     try:
         document = result_json.loads(input_files.read(path).decode("utf-8"))
-        entries = tuple(SweepCase(**_replaced(entry, INF, math.inf)) for entry in document["cases"])
+        entries = tuple(SweepCase(**_replaced(entry, types.INF, math.inf)) for entry in document["cases"])
         if not all(isinstance(e.number, int) and isinstance(e.inputs, dict) for e in entries):
             raise TypeError("a case has no number or no inputs")
         return SweepIndex(document["name"], document["stress_unit"], entries)
@@ -179,7 +176,7 @@ def case_state(directory: Path, entry: SweepCase) -> CaseState:
     """Return case progress; RUNNING while another process holds the case's lock.  On one rank."""
     state = stored_state(directory, entry)
     is_open = state.status in (Status.WAITING, Status.FAILED)
-    return CaseState(Status.RUNNING) if is_open and holder(directory / entry.folder / LOCK_FILE) else state
+    return CaseState(Status.RUNNING) if is_open and file_locks.holder(directory / entry.folder / LOCK_FILE) else state
 
 
 def stored_state(directory: Path, entry: SweepCase) -> CaseState:

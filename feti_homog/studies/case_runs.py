@@ -10,16 +10,15 @@ from enum import Enum, auto
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from feti_homog.analysis.runner import run
-from feti_homog.case.cases import Case
+from feti_homog.analysis import runner
+from feti_homog.case import Case
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError
 from feti_homog.studies import case_folders
 from feti_homog.studies.case_folders import LOCK_FILE, Status
 from feti_homog.studies.description import check_options
 from feti_homog.studies.sweep_cases import Sweep, SweepCase
-from feti_homog.system.parallel.mpi_errors import ARRIVAL_TIMEOUT_S, on_root, on_root_only, others_come
-from feti_homog.system.runtime.file_locks import LOCK_TIMEOUT_S, Lock, LockHeld
-from feti_homog.system.runtime.standard_streams import complain, say
+from feti_homog.system.parallel import mpi_errors
+from feti_homog.system.runtime import file_locks, standard_streams
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -56,7 +55,7 @@ def run_all(sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int,
         is_split = ranks_per_case != comm.size
         group: Any = comm.Split(comm.rank // ranks_per_case) if is_split else comm
         if retry:
-            on_root_only(comm, _reset_failures, directory, sweep)
+            mpi_errors.on_root_only(comm, _reset_failures, directory, sweep)
         fault = _run_free_cases(CaseRunner(group, directory, False, quiet), sweep)
         faults = [fault for fault in comm.allgather(fault) if fault is not None]
         if faults:
@@ -82,8 +81,8 @@ def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: 
     if outcome is Outcome.HELD_ELSEWHERE:
         raise CaseError(f"--index {number}: {entry.folder} is being computed by {holder}")
     if outcome is Outcome.FINISHED_BEFORE and comm.rank == 0 and not quiet:
-        say(f"{entry.folder} is finished: nothing to do")
-    state = on_root(comm, case_folders.case_state, directory, entry)
+        standard_streams.say(f"{entry.folder} is finished: nothing to do")
+    state = mpi_errors.on_root(comm, case_folders.case_state, directory, entry)
     if state.status.is_failure:
         hint = "; it failed before, --retry computes it again" if outcome is Outcome.FAILED_BEFORE else ""
         raise ConvergenceError(f"{entry.folder} ({entry.describe(sweep.stress_unit)}): {state.reason}{hint}")
@@ -91,14 +90,14 @@ def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: 
 
 def _report(sweep: Sweep, directory: Path, comm: Intracomm, quiet: bool) -> None:
     """Print the number of finished cases; raises ConvergenceError if some failed.  Collective."""
-    states = on_root(comm, lambda: [case_folders.case_state(directory, entry) for entry in sweep.entries])
+    states = mpi_errors.on_root(comm, lambda: [case_folders.case_state(directory, entry) for entry in sweep.entries])
     if comm.rank == 0 and not quiet:
         done = sum(state.status is Status.DONE for state in states)
-        say(f"{done} of {len(states)} cases done in {directory}")
+        standard_streams.say(f"{done} of {len(states)} cases done in {directory}")
     failed = [(entry, state) for entry, state in zip(sweep.entries, states, strict=True) if state.status.is_failure]
     if failed:
         if comm.rank == 0:
-            say("\n".join(case_folders.failure_lines(failed, sweep.stress_unit)))
+            standard_streams.say("\n".join(case_folders.failure_lines(failed, sweep.stress_unit)))
         raise ConvergenceError(f"{len(failed)} of {len(states)} cases failed; --retry computes them again")
 
 
@@ -107,7 +106,7 @@ def _run_free_cases(runner: CaseRunner, sweep: Sweep) -> FetiHomogError | None:
 
     The group passes over cases of others at once; in a last round it waits for each as `Lock` does.
     """
-    timeouts = [0.0, LOCK_TIMEOUT_S]
+    timeouts = [0.0, file_locks.LOCK_TIMEOUT_S]
     try:
         while timeouts:
             some_computed = False
@@ -116,10 +115,10 @@ def _run_free_cases(runner: CaseRunner, sweep: Sweep) -> FetiHomogError | None:
                 some_computed = some_computed or outcome is Outcome.COMPUTED
             timeouts = timeouts if some_computed else timeouts[1:]
     except FetiHomogError as error:
-        if not others_come(runner.comm, ARRIVAL_TIMEOUT_S):
+        if not mpi_errors.others_come(runner.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
             raise
         if runner.comm.rank == 0:
-            complain(*error.faults)
+            standard_streams.complain(*error.faults)
         return error
     return None
 
@@ -134,17 +133,17 @@ def _reset_failures(directory: Path, sweep: Sweep) -> None:
 @contextmanager
 def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) -> Iterator[None]:
     """Provide the folder made and held: by one sweep, or by any number of single cases. Collective."""
-    lock = Lock(directory / LOCK_FILE, shared)
+    lock = file_locks.Lock(directory / LOCK_FILE, shared)
 
     def prepare() -> None:
         case_folders.prepare_folder(directory, sweep)
         try:
             lock.acquire()
-        except LockHeld as holder:
+        except file_locks.LockHeld as holder:
             who = str(holder) if shared else f"{holder} (or single cases of it)"
             raise CaseError(f"--out {directory}: this sweep is being run by {who}") from holder
 
-    on_root(comm, prepare)
+    mpi_errors.on_root(comm, prepare)
     try:
         yield
     finally:
@@ -169,15 +168,17 @@ class CaseRunner:
     retry: bool
     quiet: bool
 
-    def run(self, entry: SweepCase, case: Case, total: int, timeout: float = LOCK_TIMEOUT_S) -> tuple[Outcome, str]:
+    def run(
+        self, entry: SweepCase, case: Case, total: int, timeout: float = file_locks.LOCK_TIMEOUT_S
+    ) -> tuple[Outcome, str]:
         """Run a case unless it is finished, failed before, or another has it for `timeout` seconds.  Collective.
 
         Returns the outcome, and the other process that has the case, if any.  Raises FetiHomogError if the folder
         cannot be written.
         """
-        lock = Lock(self.directory / entry.folder / LOCK_FILE, timeout=timeout)
+        lock = file_locks.Lock(self.directory / entry.folder / LOCK_FILE, timeout=timeout)
         try:
-            outcome, holder = on_root(self.comm, self._claim, lock, entry, case)
+            outcome, holder = mpi_errors.on_root(self.comm, self._claim, lock, entry, case)
             if outcome is Outcome.COMPUTED:
                 start = time.perf_counter()
                 status = self._compute(entry, case)
@@ -188,13 +189,13 @@ class CaseRunner:
         finally:
             lock.release()
 
-    def _claim(self, lock: Lock, entry: SweepCase, case: Case) -> tuple[Outcome, str]:
+    def _claim(self, lock: file_locks.Lock, entry: SweepCase, case: Case) -> tuple[Outcome, str]:
         """Take the case's lock, and keep it if the case is to be computed."""
         folder = self.directory / entry.folder
         try:
             folder.mkdir(exist_ok=True)
             lock.acquire()
-        except LockHeld as holder:
+        except file_locks.LockHeld as holder:
             return Outcome.HELD_ELSEWHERE, str(holder)
         except OSError as error:
             raise FetiHomogError(f"cannot make {folder}: {error.strerror}") from error
@@ -212,18 +213,18 @@ class CaseRunner:
     def _compute(self, entry: SweepCase, case: Case) -> str:
         """Run a case and keep its error if it is the case's own.  Collective; returns its status in words."""
         try:
-            run(case, self.directory / entry.folder, self.comm, quiet=True, resume=case.section.is_followed)
+            runner.run(case, self.directory / entry.folder, self.comm, quiet=True, resume=case.section.is_followed)
             return Status.DONE
         except (CaseError, MeshError, ConvergenceError) as error:
-            if not others_come(self.comm, ARRIVAL_TIMEOUT_S):
+            if not mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
                 raise
-            on_root_only(self.comm, case_folders.write_error, self.directory, entry, error)
+            mpi_errors.on_root_only(self.comm, case_folders.write_error, self.directory, entry, error)
             return f"failed ({error.faults[0]})"
         except FetiHomogError:  # a file could not be written: the case is to be computed again
-            if others_come(self.comm, ARRIVAL_TIMEOUT_S):
-                on_root_only(self.comm, case_folders.set_aside, self.directory, entry, Status.DAMAGED)
+            if mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
+                mpi_errors.on_root_only(self.comm, case_folders.set_aside, self.directory, entry, Status.DAMAGED)
             raise
 
     def _print(self, line: str) -> None:
         if self.comm.rank == 0 and not self.quiet:
-            say(line)
+            standard_streams.say(line)

@@ -1,7 +1,5 @@
 """`feti-homog collect DIR`: tables of a sweep, finished or not, and its picture."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -13,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.report.text.point_tables import STATES
-from feti_homog.report.text.tables import unit
+from feti_homog.report.text import point_tables, tables
 from feti_homog.results import atomic
 from feti_homog.studies import case_folders
 from feti_homog.studies.case_folders import CaseState, Status, SweepIndex
@@ -83,7 +80,7 @@ def _case_rows(table: SweepTable) -> Iterator[list[Any]]:
     yield ["case", *CASE, *table.inputs, *table.outputs]
     columns = [*table.inputs.values()]
     for name, values in table.outputs.items():
-        is_count = name in COUNTS or name.endswith(tuple(f"_{state}" for state in STATES))
+        is_count = name in COUNTS or name.endswith(tuple(f"_{state}" for state in point_tables.STATES))
         columns.append([int(v) if is_count and np.isfinite(v) else v for v in values.tolist()])
     for row, _ in enumerate(table.folder):
         place = (getattr(table, name)[row] for name in CASE)
@@ -99,7 +96,7 @@ def _statistics_rows(table: SweepTable) -> Iterator[list[Any]]:
         for name, statistics in table.statistics.items():
             count, *moments = (float(getattr(statistics, part)[number]) for part in PARTS)
             if count:
-                yield [*place, name, unit(name, table.stress_unit), int(count), *moments]
+                yield [*place, name, tables.unit(name, table.stress_unit), int(count), *moments]
 
 
 def _index_and_states(directory: Path) -> tuple[SweepIndex, list[CaseState]]:

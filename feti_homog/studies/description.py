@@ -10,24 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.case import cases
-from feti_homog.case.cases import Case
-from feti_homog.case.sections import SWEEP
+from feti_homog.case import Case, cases, sections
 from feti_homog.errors import CaseError
-from feti_homog.feti import solver_plan
-from feti_homog.feti.decomposition.shared_entities import share_entities
-from feti_homog.feti.factory import database_options
-from feti_homog.feti.solver_plan import ProblemSizes, SolverOptions, SolverPlan
-from feti_homog.homogenization import cell_remarks, partition_policy, phase_laws
-from feti_homog.homogenization.domain_partition import CellSummary
-from feti_homog.homogenization.partition_policy import BY_COST
-from feti_homog.homogenization.tile_tearing import cut
-from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.microstructure.phase_names import COATING
+from feti_homog.feti import factory, solver_plan
+from feti_homog.feti.decomposition import shared_entities
+from feti_homog.homogenization import cell_remarks, domain_partition, partition_policy, phase_laws, tile_tearing
+from feti_homog.mesh import ReferenceLattice
+from feti_homog.microstructure import phase_names
 from feti_homog.studies import sweep_cases
 from feti_homog.studies.sweep_cases import Sweep, case_names
-from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
-from feti_homog.system.petsc.options_database import case_options
+from feti_homog.system.parallel import mpi_errors
+from feti_homog.system.petsc import options_database
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -38,22 +31,25 @@ def describe(case: Case, comm: MPI.Intracomm) -> str:
 
     Raises as `tear`.
     """
-    with case_options(case.petsc):
+    with options_database.case_options(case.petsc):
         lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
-        part = cut(case, lattice, comm, BY_COST)
-        constraints = share_entities(comm, part.submeshes, part.table, part.pairs, lattice).constraints
+        part = tile_tearing.cut(case, lattice, comm, partition_policy.BY_COST)
+        constraints = shared_entities.share_entities(comm, part.submeshes, part.table, part.pairs, lattice).constraints
         loads = comm.gather((len(part.submeshes.index), len(part.submeshes.member))) or []
-        options = database_options()
-        return on_root_only(comm, _described, case, part.summary, lattice, 2 * constraints, loads, options) or ""
+        options = factory.database_options()
+        return (
+            mpi_errors.on_root_only(comm, _described, case, part.summary, lattice, 2 * constraints, loads, options)
+            or ""
+        )
 
 
 def _described(
     case: Case,
-    summary: CellSummary,
+    summary: domain_partition.CellSummary,
     lattice: ReferenceLattice,
     multipliers: int,
     loads: Sequence[tuple[int, int]],
-    options: SolverOptions,
+    options: solver_plan.SolverOptions,
 ) -> str:
     """Return the text for `describe`; `loads` has subdomains and coarse triangles of each rank."""
     subdomains = [count for count, _ in loads]
@@ -90,7 +86,12 @@ def _described(
 
 
 def _estimate_lines(
-    case: Case, summary: CellSummary, multipliers: int, nodes: Sequence[int], subdomains: Sequence[int], columns: int
+    case: Case,
+    summary: domain_partition.CellSummary,
+    multipliers: int,
+    nodes: Sequence[int],
+    subdomains: Sequence[int],
+    columns: int,
 ) -> list[str]:
     """Return lines about memory, of a path also to complete debonding, and about ranks.
 
@@ -115,27 +116,31 @@ def _subdomains(count: int) -> str:
 
 
 def _plan(
-    case: Case, summary: CellSummary, multipliers: int, options: SolverOptions, subdomains: Sequence[int]
-) -> SolverPlan:
+    case: Case,
+    summary: domain_partition.CellSummary,
+    multipliers: int,
+    options: solver_plan.SolverOptions,
+    subdomains: Sequence[int],
+) -> solver_plan.SolverPlan:
     """Plan the plane problem, with `subdomains` counted on each rank; pieces are dense by default.
 
     Raises:
         CaseError: as `solver_plan.choose`; or with friction there are no influence columns.
     """
     dense = options.operator != "implicit"
-    has_thin = COATING in case.materials and not summary.across
+    has_thin = phase_names.COATING in case.materials and not summary.across
     one_each = summary.across and len(subdomains) > 1 and set(subdomains) == {1}
     applications = max(
         partition_policy.applications(case, problem, summary.across) for problem in phase_laws.problems(case)
     )
-    sizes = ProblemSizes(applications, summary.is_cut, dense, dense, multipliers, has_thin, one_each)
+    sizes = solver_plan.ProblemSizes(applications, summary.is_cut, dense, dense, multipliers, has_thin, one_each)
     plan = solver_plan.choose(sizes, options)
     if case.has_friction and plan.preconditioner != "influence":
         raise CaseError(solver_plan.WITHOUT_INVERSE)
     return plan
 
 
-def _fibre_lines(case: Case, summary: CellSummary) -> Iterator[str]:
+def _fibre_lines(case: Case, summary: domain_partition.CellSummary) -> Iterator[str]:
     """Yield fibre counts and sizes: with interfaces or a table, by mixed phases, of a match."""
     if case.interface is not None or case.cell.table is not None:
         frames, sizes = summary.frames[summary.fibre_bodies], ""
@@ -160,9 +165,9 @@ def of_document(document: dict[str, Any], folder: Path, comm: Intracomm) -> str:
     Raises:
         CaseError, MeshError: the document is faulty, or the cell of its first case.
     """
-    if SWEEP not in document:
-        return describe(on_root(comm, cases.parse, document, folder), comm)
-    sweep = on_root(comm, sweep_cases.expand, document, folder)
+    if sections.SWEEP not in document:
+        return describe(mpi_errors.on_root(comm, cases.parse, document, folder), comm)
+    sweep = mpi_errors.on_root(comm, sweep_cases.expand, document, folder)
     points = len({entry.point for entry in sweep.entries})
     heading = f"sweep      {len(sweep.cases)} cases, {points} points, all of them valid; the first:"
     return first_of(sweep, heading, comm)
@@ -183,7 +188,7 @@ def check_options(sweep: Sweep) -> None:
     faults = []
     for options, numbers in numbers_by_options.items():
         try:
-            with case_options(json.loads(options)):
+            with options_database.case_options(json.loads(options)):
                 pass
         except CaseError as error:
             faults += [f"{case_names(numbers)}: {fault}" for fault in error.faults]

@@ -4,8 +4,6 @@ Data y have independent errors with standard deviations s, so that residuals are
 J = dr/dx the estimate is the minimum of r^T r within bounds, and its covariance (J^T J)^-1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

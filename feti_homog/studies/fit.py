@@ -5,8 +5,6 @@ DIR/differences-0001          cases at values beside an evaluation, where no der
 DIR/fit.json, measured.csv, fit.png
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -16,10 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case.toml_files import TomlPath
-from feti_homog.case.sections import MEASURED, UNKNOWN, Unknown
-from feti_homog.materials.engineering_constants import axes_line
-from feti_homog.materials.voigt import PLANE_STATES
+from feti_homog.case import sections, toml_files
+from feti_homog.materials import engineering_constants, voigt
 from feti_homog.results import atomic
 from feti_homog.studies import estimation, fit_result
 from feti_homog.studies.axes import Assignment
@@ -27,8 +23,8 @@ from feti_homog.studies.estimation import ParameterEstimates
 from feti_homog.studies.predictions import Datum, exact_derivatives, predicted
 from feti_homog.studies.study import SILENT, Evaluator, Study
 from feti_homog.studies.sweep_cases import Sweep, cases_at
-from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
-from feti_homog.system.runtime.standard_streams import say
+from feti_homog.system.parallel import mpi_errors
+from feti_homog.system.runtime import standard_streams
 from feti_homog.typing import Float
 
 DIGITS = 12  # of a value of an unknown, so that a repeated fit makes the same cases
@@ -50,8 +46,8 @@ class Fit(Study):
     KIND, FILE = "fit", "fit.json"
     ENTRIES = re.compile(r"fit\.(json|png)|measured\.csv|(evaluation|differences)-\d{4,}")
 
-    unknowns: Mapping[str, Unknown]
-    paths: Sequence[TomlPath]
+    unknowns: Mapping[str, sections.Unknown]
+    paths: Sequence[toml_files.TomlPath]
     tests: Sequence[Assignment]
     data: Sequence[Datum]
 
@@ -66,7 +62,7 @@ class Fit(Study):
             CaseError: with the faults of all cases.
         """
         points = [self.tests[test] | dict(zip(self.paths, _rounded(x), strict=True)) for test, x in places]
-        return cases_at(self.document, points, self.folder, section=UNKNOWN, complete=_set_output)
+        return cases_at(self.document, points, self.folder, section=sections.UNKNOWN, complete=_set_output)
 
     def first_cases(self) -> Sweep:
         return self.at([unknown.start for unknown in self.unknowns.values()])
@@ -83,9 +79,9 @@ class Fit(Study):
     def axes(self) -> str:
         """Return a line on the axes that measured values may mistake for a ply's; empty without any."""
         cases = self.first_cases().cases
-        spatial = [datum for datum in self.data if PLANE_STATES[cases[datum.test].analysis.plane].is_spatial]
-        line = axes_line(name for datum in spatial for name in (datum.name, datum.strain_name))
-        return f"[{MEASURED}] {line}" if line else ""
+        spatial = [datum for datum in self.data if voigt.PLANE_STATES[cases[datum.test].analysis.plane].is_spatial]
+        line = engineering_constants.axes_line(name for datum in spatial for name in (datum.name, datum.strain_name))
+        return f"[{sections.MEASURED}] {line}" if line else ""
 
     def identity(self, cases: list[str]) -> Any:
         unknowns = {name: asdict(unknown) for name, unknown in self.unknowns.items()}
@@ -98,9 +94,9 @@ class Fit(Study):
 
     def answer(self, evaluator: Evaluator) -> dict[str, Any]:
         if evaluator.comm.rank == 0 and not evaluator.quiet and (line := self.axes()):
-            say(f"remark: {line}")
+            standard_streams.say(f"remark: {line}")
         estimates = Evaluations(self, evaluator).estimate()
-        return on_root(evaluator.comm, self._write, evaluator.directory, estimates)
+        return mpi_errors.on_root(evaluator.comm, self._write, evaluator.directory, estimates)
 
     def text(self, document: Mapping[str, Any]) -> str:
         return fit_result.text(document)
@@ -176,7 +172,9 @@ class Evaluations:
             self.answers[key] = self._ask(f"evaluation-{number:04d}", [(t, key) for t in range(len(self.fit.tests))])
             if not self.evaluator.quiet:
                 pairs = zip(self.fit.unknowns, key, strict=True)
-                say(f"evaluation {number}: {', '.join(f'{name} = {value:.6g}' for name, value in pairs)}")
+                standard_streams.say(
+                    f"evaluation {number}: {', '.join(f'{name} = {value:.6g}' for name, value in pairs)}"
+                )
         return np.concatenate([answer.values for answer in self.answers[key]])
 
     def jacobian(self, x: Float) -> Float:
@@ -210,7 +208,9 @@ class Evaluations:
     def _run(self, name: str, places: Sequence[tuple[int, Point]]) -> list[Answer]:
         """Run the cases at `places`; returns their results on rank 0.  Collective."""
         comm = self.evaluator.comm
-        documents = self.evaluator.results(name, on_root(comm, self.fit.cases, places))
+        documents = self.evaluator.results(name, mpi_errors.on_root(comm, self.fit.cases, places))
         data = [self.fit.data_of(test) for test, _ in places]
         pairs = zip(documents, data, strict=False)  # other ranks have no results
-        return on_root_only(comm, lambda: [Answer(result, predicted(result, y)) for result, y in pairs]) or []
+        return (
+            mpi_errors.on_root_only(comm, lambda: [Answer(result, predicted(result, y)) for result, y in pairs]) or []
+        )

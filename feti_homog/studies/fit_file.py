@@ -1,24 +1,16 @@
 """A fit file: cases with unknown constants, and measured values; all their faults."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from feti_homog.case.cases import Case
-from feti_homog.case.toml_files import TomlPath, leaves, read_document, to_document
-from feti_homog.case.load_sections import TEMPERATURE
-from feti_homog.case.sections import CURVE, MEASURED, SWEEP, TEST, UNKNOWN, Measured, MeasuredCurve, Unknown
+from feti_homog.case import Case, load_sections, sections, toml_files
 from feti_homog.errors import CaseError
-from feti_homog.materials.engineering_constants import FORMER
-from feti_homog.materials.voigt import PLANE_STATES, SPATIAL_STRAINS, SPATIAL_STRESSES, voigt_names
-from feti_homog.microstructure.table_columns import cells_of, delimiter_of, lines_of, number_of, row_fault
-from feti_homog.results.path_curves import SAME_LOAD
-from feti_homog.schema.keys import TableReader, keys_of
-from feti_homog.schema.types import is_number
-from feti_homog.schema.wording import dotted_key, suggestion, toml_key, toml_value
+from feti_homog.materials import engineering_constants, voigt
+from feti_homog.microstructure import table_columns
+from feti_homog.results import path_curves
+from feti_homog.schema import TableReader, keys, types, wording
 from feti_homog.studies.axes import Assignment
 from feti_homog.studies.fit import Fit
 from feti_homog.studies.predictions import Datum, available
@@ -29,21 +21,22 @@ LEAST_STD = 1e-12  # of the value: below it are the roundings of what is compute
 
 def load(path: Path) -> Fit:
     """Return the fit in a file. Raises CaseError with all faults in its tables, or else in its cases."""
-    return parse(read_document(path), path.parent)
+    return parse(toml_files.read_document(path), path.parent)
 
 
 def parse(values: Mapping[str, Any], folder: Path) -> Fit:
     """Return the fit of nested dictionaries; its files are relative to `folder`. Raises CaseError as `load`."""
-    document = {"name": "fit", **to_document(values)}
+    document = {"name": "fit", **toml_files.to_document(values)}
     reader = FitReader(folder)
-    unknowns = reader.unknowns(document.pop(UNKNOWN, None))
-    measured, tests = document.pop(MEASURED, None), document.pop(TEST, None)
-    if SWEEP in document:
-        reader.faults.append(f"[{SWEEP}]: a fit has no sweep; expected [[{TEST}]] for each test")
+    unknowns = reader.unknowns(document.pop(sections.UNKNOWN, None))
+    measured, tests = document.pop(sections.MEASURED, None), document.pop(sections.TEST, None)
+    if sections.SWEEP in document:
+        reader.faults.append(f"[{sections.SWEEP}]: a fit has no sweep; expected [[{sections.TEST}]] for each test")
     assignments, data = reader.tests(measured, tests, {*unknowns})
     if unknowns and len(data) < len(unknowns) and not reader.faults:
         reader.faults.append(
-            f"[{UNKNOWN}]: {len(unknowns)} unknowns, {len(data)} measured values; expected at least as many values"
+            f"[{sections.UNKNOWN}]: {len(unknowns)} unknowns, {len(data)} measured values; "
+            "expected at least as many values"
         )
     if reader.faults:
         raise CaseError(*reader.faults)
@@ -62,39 +55,46 @@ class FitReader:
     folder: Path
     faults: list[str] = field(default_factory=list)
 
-    def unknowns(self, table: object) -> dict[TomlPath, Unknown]:
+    def unknowns(self, table: object) -> dict[toml_files.TomlPath, sections.Unknown]:
         """Return the unknowns by key."""
         if not isinstance(table, dict) or not table:
-            self.faults.append(f"[{UNKNOWN}]: expected a table of SECTION.KEY = {{start, lower, upper}}")
+            self.faults.append(f"[{sections.UNKNOWN}]: expected a table of SECTION.KEY = {{start, lower, upper}}")
             return {}
         unknowns = {}
-        for path, value in _entries(table, keys_of(Unknown)):
-            name = dotted_key(path)
-            unknown = self._read(Unknown, value, UNKNOWN, name, "{start, lower, upper}")
+        for path, value in _entries(table, keys.keys_of(sections.Unknown)):
+            name = wording.dotted_key(path)
+            unknown = self._read(sections.Unknown, value, sections.UNKNOWN, name, "{start, lower, upper}")
             if unknown is not None:
                 unknowns[path] = unknown
                 if not unknown.lower < unknown.upper or not unknown.lower <= unknown.start <= unknown.upper:
                     bounds = f"lower = {unknown.lower:g}, start = {unknown.start:g}, upper = {unknown.upper:g}"
-                    self.faults.append(f"[{UNKNOWN}] {name}: {bounds}: expected lower <= start <= upper, lower < upper")
+                    self.faults.append(
+                        f"[{sections.UNKNOWN}] {name}: {bounds}: expected lower <= start <= upper, lower < upper"
+                    )
         return unknowns
 
-    def tests(self, measured: object, tests: object, unknowns: set[TomlPath]) -> tuple[list[Assignment], list[Datum]]:
+    def tests(
+        self, measured: object, tests: object, unknowns: set[toml_files.TomlPath]
+    ) -> tuple[list[Assignment], list[Datum]]:
         """Return each test's changes, and all data."""
         if (measured is None) == (tests is None):
-            self.faults.append(f"expected [{MEASURED}] for one test or [[{TEST}]] for each of several, with measured")
+            self.faults.append(
+                f"expected [{sections.MEASURED}] for one test or [[{sections.TEST}]] for each of several, with measured"
+            )
             return [], []
-        rows = [{MEASURED: measured}] if tests is None else tests
+        rows = [{sections.MEASURED: measured}] if tests is None else tests
         if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-            self.faults.append(f"{TEST} = {toml_value(rows)}: expected sections [[{TEST}]]")
+            self.faults.append(f"{sections.TEST} = {wording.toml_value(rows)}: expected sections [[{sections.TEST}]]")
             return [], []
         assignments, data = list[Assignment](), list[Datum]()
         for number, row in enumerate(rows):
-            place = MEASURED if tests is None else f"[{TEST}]] {number + 1}, [{MEASURED}"
-            data += self._data(row.get(MEASURED), number, place)
-            changes = dict(leaves({name: value for name, value in row.items() if name != MEASURED}))
+            place = sections.MEASURED if tests is None else f"[{sections.TEST}]] {number + 1}, [{sections.MEASURED}"
+            data += self._data(row.get(sections.MEASURED), number, place)
+            changes = dict(toml_files.leaves({name: value for name, value in row.items() if name != sections.MEASURED}))
             assignments.append(changes)
             for path in changes.keys() & unknowns:
-                self.faults.append(f"[[{TEST}]] {number + 1}, {dotted_key(path)}: it is an unknown of [{UNKNOWN}]")
+                name = f"[[{sections.TEST}]] {number + 1}, {wording.dotted_key(path)}"
+                self.faults.append(f"{name}: it is an unknown of [{sections.UNKNOWN}]")
         return assignments, data
 
     def _data(self, table: object, test: int, place: str) -> list[Datum]:
@@ -103,22 +103,22 @@ class FitReader:
             self.faults.append(f"[{place}]: expected a table of NAME = {{value, std}}")
             return []
         data = list[Datum]()
-        for path, value in _entries(table, {*keys_of(Measured), *keys_of(MeasuredCurve)}):
+        for path, value in _entries(table, {*keys.keys_of(sections.Measured), *keys.keys_of(sections.MeasuredCurve)}):
             name = ".".join(path)
-            if path == (CURVE,):
+            if path == (sections.CURVE,):
                 data += self._curve(value, test, place)
-            elif (measured := self._read(Measured, value, place, name, "{value, std}")) is not None:
+            elif (measured := self._read(sections.Measured, value, place, name, "{value, std}")) is not None:
                 data.append(Datum(test, name, measured.value, measured.std))
                 self._check_std(measured.std, measured.value, f"[{place}] {name}.std")
         return data
 
     def _check_std(self, std: float, value: float, place: str) -> None:
         if std < LEAST_STD * abs(value):
-            self.faults.append(f"{place} = {toml_value(std)}: expected at least {LEAST_STD:g} of {value:g}")
+            self.faults.append(f"{place} = {wording.toml_value(std)}: expected at least {LEAST_STD:g} of {value:g}")
 
     def _curve(self, value: object, test: int, place: str) -> list[Datum]:
         """Return the points of a measured curve."""
-        measured = self._read(MeasuredCurve, value, place, CURVE, "{file, std}")
+        measured = self._read(sections.MeasuredCurve, value, place, sections.CURVE, "{file, std}")
         if measured is None:
             return []
         path = self.folder / measured.file
@@ -126,15 +126,15 @@ class FitReader:
             names, rows = _curve_rows(path)
         except CaseError as error:
             reason = error.__cause__.strerror if isinstance(error.__cause__, OSError) else error
-            self.faults.append(f"[{place}] {CURVE}.file = {toml_value(str(measured.file))}: {reason}")
+            self.faults.append(f"[{place}] {sections.CURVE}.file = {wording.toml_value(str(measured.file))}: {reason}")
             return []
-        self._check_std(measured.std, max((stress for _, stress in rows), key=abs), f"[{place}] {CURVE}.std")
+        self._check_std(measured.std, max((stress for _, stress in rows), key=abs), f"[{place}] {sections.CURVE}.std")
         return [Datum(test, names[1], stress, measured.std, strain, names[0]) for strain, stress in rows]
 
     def _read(self, kind: type[Any], value: object, section: str, name: str, form: str) -> Any:
         """Return the dataclass of a table named `name`, None if it is faulty."""
         if not isinstance(value, dict):
-            self.faults.append(f"[{section}] {name} = {toml_value(value)}: expected a table {form}")
+            self.faults.append(f"[{section}] {name} = {wording.toml_value(value)}: expected a table {form}")
             return None
         reader = TableReader()
         contents = reader.read(kind, value, section, f"{name}.")
@@ -142,18 +142,18 @@ class FitReader:
         return contents
 
 
-def _entries(table: Mapping[str, Any], keys: Collection[str]) -> Iterator[tuple[TomlPath, Any]]:
+def _entries(table: Mapping[str, Any], keys: Collection[str]) -> Iterator[tuple[toml_files.TomlPath, Any]]:
     """Yield paths and values in a nested table; a table with one of the keys is a value."""
-    return leaves(table, lambda path, value: bool(value.keys() & {*keys}))
+    return toml_files.leaves(table, lambda path, value: bool(value.keys() & {*keys}))
 
 
 def _curve_rows(path: Path) -> tuple[tuple[str, str], list[tuple[float, float]]]:
     """Return the strain's and stress's names, and the rows, of a measured curve. Raises CaseError."""
-    lines = [(number, line) for number, line, _ in lines_of(path) if line]
+    lines = [(number, line) for number, line, _ in table_columns.lines_of(path) if line]
     head = lines[0][1] if lines else ""
-    delimiter = delimiter_of(head)
-    heads = cells_of(head, delimiter)
-    names = SPATIAL_STRAINS, SPATIAL_STRESSES
+    delimiter = table_columns.delimiter_of(head)
+    heads = table_columns.cells_of(head, delimiter)
+    names = voigt.SPATIAL_STRAINS, voigt.SPATIAL_STRESSES
     strains, stresses = ([k for k, head in enumerate(heads) if head in kind] for kind in names)
     if (len(strains), len(stresses)) != (1, 1):
         raise CaseError(f"{path}: expected one column of a strain, as E11, and one of a stress, as S11")
@@ -161,8 +161,8 @@ def _curve_rows(path: Path) -> tuple[tuple[str, str], list[tuple[float, float]]]
         raise CaseError(f"{path}: {len(lines) - 1} rows; expected at least one and at most {MOST_ROWS}")
     rows = list[tuple[float, float]]()
     for number, line in lines[1:]:
-        cells, place = cells_of(line, delimiter), f"{path}, line {number}"
-        if fault := row_fault(line, cells, len(heads)):
+        cells, place = table_columns.cells_of(line, delimiter), f"{path}, line {number}"
+        if fault := table_columns.row_fault(line, cells, len(heads)):
             raise CaseError(f"{place}: {fault}")
         strain, stress = (_number(cells[k], delimiter, f"{place}: {heads[k]}") for k in strains + stresses)
         rows.append((strain, stress))
@@ -171,9 +171,9 @@ def _curve_rows(path: Path) -> tuple[tuple[str, str], list[tuple[float, float]]]
 
 def _number(word: str, delimiter: str | None, place: str) -> float:
     """Return the number in a cell. Raises CaseError."""
-    value = number_of(word, delimiter)
-    if value is None or not is_number(value):
-        raise CaseError(f"{place} = {toml_value(word)}: expected a number")
+    value = table_columns.number_of(word, delimiter)
+    if value is None or not types.is_number(value):
+        raise CaseError(f"{place} = {wording.toml_value(word)}: expected a number")
     return value
 
 
@@ -182,7 +182,7 @@ def _case_faults(fit: Fit) -> Iterator[str]:
     start = [unknown.start for unknown in fit.unknowns.values()]
     cases = fit.at(start).cases
     for test, case in enumerate(cases):
-        place = f"[[{TEST}]] {test + 1}, {MEASURED}." if len(cases) > 1 else f"[{MEASURED}] "
+        place = f"[[{sections.TEST}]] {test + 1}, {sections.MEASURED}." if len(cases) > 1 else f"[{sections.MEASURED}] "
         yield from _name_faults(place, case, fit.data_of(test))
     digests = [case.digest() for case in cases]
     for k, (name, unknown) in enumerate(fit.unknowns.items()):
@@ -192,8 +192,8 @@ def _case_faults(fit: Fit) -> Iterator[str]:
             try:
                 changes |= [case.digest() for case in fit.at([*start[:k], end, *start[k + 1 :]]).cases] != digests
             except CaseError as error:
-                lines += [f"[{UNKNOWN}] {name}, {side} = {end}: {fault}" for fault in error.faults]
-        yield from lines if changes or lines else [f"[{UNKNOWN}] {name}: no measured value depends on it"]
+                lines += [f"[{sections.UNKNOWN}] {name}, {side} = {end}: {fault}" for fault in error.faults]
+        yield from lines if changes or lines else [f"[{sections.UNKNOWN}] {name}: no measured value depends on it"]
 
 
 def _name_faults(place: str, case: Case, data: Sequence[Datum]) -> Iterator[str]:
@@ -202,20 +202,21 @@ def _name_faults(place: str, case: Case, data: Sequence[Datum]) -> Iterator[str]
     if not names:
         yield f'[analysis] type = "{case.analysis.type}": a fit takes "stiffness" and "path"'
         return
-    yield from _curve_faults(f"{place}{CURVE}: ", case, [datum for datum in data if datum.strain is not None])
+    yield from _curve_faults(f"{place}{sections.CURVE}: ", case, [datum for datum in data if datum.strain is not None])
     for name in dict.fromkeys(datum.name for datum in data if datum.strain is None):
-        if name in FORMER:
-            yield f"{place}{toml_key(name)}: its name is {FORMER[name]}"
+        if name in engineering_constants.FORMER:
+            yield f"{place}{wording.toml_key(name)}: its name is {engineering_constants.FORMER[name]}"
         elif name not in names:
-            yield f"{place}{toml_key(name)}: the analysis does not give it; {suggestion(name, names, {})}"
+            hint = wording.suggestion(name, names, {})
+            yield f"{place}{wording.toml_key(name)}: the analysis does not give it; {hint}"
 
 
 def _curve_faults(place: str, case: Case, points: Sequence[Datum]) -> Iterator[str]:
     """Yield faults of a measured curve beside its test's analysis."""
     if not points:
         return
-    state = PLANE_STATES[case.analysis.plane]
-    names = voigt_names(6 if state.is_spatial else 3)
+    state = voigt.PLANE_STATES[case.analysis.plane]
+    names = voigt.voigt_names(6 if state.is_spatial else 3)
     unknown = sorted({name for datum in points for name in (datum.strain_name, datum.name)}.difference(*names))
     for name in unknown:
         yield f'{place}plane = "{case.analysis.plane}" has no {name}'
@@ -232,7 +233,7 @@ def _strain_faults(points: Sequence[Datum], rising: str, end: float, is_strain: 
         yield f"expected the strain that rises along the path, {rising}"
     elif any(strain * end < 0 for strain in strains):
         yield f"expected strains of the sign of the path, which ends at {end:g}"
-    elif is_strain and (largest := max(map(abs, strains))) > abs(end) * (1 + SAME_LOAD):
+    elif is_strain and (largest := max(map(abs, strains))) > abs(end) * (1 + path_curves.SAME_LOAD):
         yield f"a strain of {largest:g} is beyond the end of the path at {abs(end):g}"
 
 
@@ -246,4 +247,6 @@ def _rising(target: Mapping[str, float], components: Sequence[tuple[str, str]]) 
     if loads and all(name == strain for strain, name, _ in loads):
         strain, _, end = max(loads, key=lambda load: abs(load[2]))
         return strain, end, True
-    return (loads[0][0], 0.0 if target.get(TEMPERATURE) else loads[0][2], False) if len(loads) == 1 else None
+    return (
+        (loads[0][0], 0.0 if target.get(load_sections.TEMPERATURE) else loads[0][2], False) if len(loads) == 1 else None
+    )

@@ -1,23 +1,23 @@
 """A fit's result: the content of fit.json, the table of measured values, and the text."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from feti_homog.case.sections import Unknown
-from feti_homog.report.text.tables import Column, Table
+from feti_homog.case import sections
+from feti_homog.report.text import tables
 from feti_homog.studies.case_folders import csv_text
 from feti_homog.studies.estimation import CONFIDENCE, ParameterEstimates, names_of
 from feti_homog.studies.predictions import Datum
 
-FIRST, LEAST_SHARE, MOST_DEVIATIONS = Column("", -38), 0.01, 3.0
+FIRST, LEAST_SHARE, MOST_DEVIATIONS = tables.Column("", -38), 0.01, 3.0
 HEAD = ("test", "name", "strain", "value", "std", "computed", "residual")
 
 
-def content(unknowns: Mapping[str, Unknown], data: Sequence[Datum], estimates: ParameterEstimates) -> dict[str, Any]:
+def content(
+    unknowns: Mapping[str, sections.Unknown], data: Sequence[Datum], estimates: ParameterEstimates
+) -> dict[str, Any]:
     """Return the content of fit.json behind its name; numbers that are not finite are None."""
     faults = _faults(unknowns, estimates)
     return {
@@ -50,7 +50,7 @@ def content(unknowns: Mapping[str, Unknown], data: Sequence[Datum], estimates: P
     }  # fmt: skip
 
 
-def _faults(unknowns: Mapping[str, Unknown], estimates: ParameterEstimates) -> list[str]:
+def _faults(unknowns: Mapping[str, sections.Unknown], estimates: ParameterEstimates) -> list[str]:
     """Return a line for each reason to distrust the estimates."""
     faults = [] if estimates.converged else [f"no minimum after {estimates.evaluations} evaluations"]
     faults += names_of(estimates.undetermined, [*unknowns])
@@ -74,21 +74,26 @@ def measured_csv(document: Mapping[str, Any]) -> str:
 def text(document: Mapping[str, Any]) -> str:
     """Return the tables of a fit for a terminal."""
     data = _labels(document["measured"])
-    heads = [FIRST, Column("estimate"), Column("std"), Column(f"{document['confidence']:.0%} interval", 14)]
-    heads += [Column("", 12), Column("  determined by", -40)]
+    heads = [
+        FIRST,
+        tables.Column("estimate"),
+        tables.Column("std"),
+        tables.Column(f"{document['confidence']:.0%} interval", 14),
+    ]
+    heads += [tables.Column("", 12), tables.Column("  determined by", -40)]
     rows = [_unknown_row(name, unknown, data) for name, unknown in document["unknowns"].items()]
-    tables = [Table("Unknowns", heads, rows, title_in_head=True)]
+    printed = [tables.Table("Unknowns", heads, rows, title_in_head=True)]
     rows = [[name, *map(_dash, row)] for name, row in zip(document["unknowns"], document["correlation"], strict=True)]
-    columns = [FIRST, *(Column(str(k + 1), 8, ".3f") for k in range(len(rows)))]
-    tables += [Table("Correlation", columns, rows, title_in_head=True)] if len(rows) > 1 else []
-    columns = [FIRST, *(Column(name) for name in HEAD[3:6]), Column("in std", 10, ".2f")]
+    columns = [FIRST, *(tables.Column(str(k + 1), 8, ".3f") for k in range(len(rows)))]
+    printed += [tables.Table("Correlation", columns, rows, title_in_head=True)] if len(rows) > 1 else []
+    columns = [FIRST, *(tables.Column(name) for name in HEAD[3:6]), tables.Column("in std", 10, ".2f")]
     rows = [[label, *(datum[n] for n in HEAD[3:])] for label, datum in zip(data, document["measured"], strict=True)]
-    tables.append(Table("Measured", columns, rows, title_in_head=True))
+    printed.append(tables.Table("Measured", columns, rows, title_in_head=True))
     chance = "" if document["chance"] is None else f", as large or larger with a chance of {document['chance']:.2g}"
     squares = document["sum_of_squares"]
     total = "beyond all numbers" if squares is None else f"{squares:.4g}"
     last = f"Sum of squares {total}{chance}; {document['evaluations']} evaluations"
-    return "\n\n".join(["", *("\n".join(table.lines) for table in tables), last, *_remarks(document, data)])
+    return "\n\n".join(["", *("\n".join(table.lines) for table in printed), last, *_remarks(document, data)])
 
 
 def _labels(measured: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -1,27 +1,14 @@
 """Case outputs: numbers in result.json by their column in cases.csv; the meaning of all columns."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from feti_homog.materials.engineering_constants import EngineeringConstants, Moduli, TransverseIsotropy
-from feti_homog.materials.voigt import (
-    EXPANSIONS,
-    GENERALIZED,
-    PLANE_STRAIN,
-    SPATIAL_STRESSES,
-    STRESSES,
-    THERMAL_STRESSES,
-    voigt_names,
-)
+from feti_homog.materials import engineering_constants, voigt
 from feti_homog.report.text import point_tables
-from feti_homog.results.landmarks import peak_of
-from feti_homog.results.result_json import DescribedColumn as Column
-from feti_homog.results.result_json import columns
-from feti_homog.system.runtime.records import STRESS
+from feti_homog.results import landmarks, result_json
+from feti_homog.system.runtime import records
 from feti_homog.typing import Document
 
 PHASES_OF_ONE_FIBRE = 2
@@ -32,17 +19,19 @@ def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
 
     Where some cases are in space, Cij is the same entry in all.
     """
-    return (GENERALIZED if GENERALIZED.name in planes else PLANE_STRAIN).numbers
+    return (voigt.GENERALIZED if voigt.GENERALIZED.name in planes else voigt.PLANE_STRAIN).numbers
 
 
-def outputs(document: Document, numbers: Sequence[int] = PLANE_STRAIN.numbers) -> dict[str, float]:
+def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numbers) -> dict[str, float]:
     """Return the numbers in a result.json by column name; `numbers` as in Cij for strains in the plane."""
     solver = document["solver"]
     values = _cell(document["cell"])
     values |= {name: solver[name] for name in ("ranks", "subdomains", "dofs", "multipliers")}
     values |= {"iterations": sum(solver["iterations"])} | _constants(document, numbers)
     for point in document.get("angle", ()):
-        entries = _entries(point["stiffness"], numbers) if "stiffness" in point else _named(STRESSES, point["stress"])
+        entries = (
+            _entries(point["stiffness"], numbers) if "stiffness" in point else _named(voigt.STRESSES, point["stress"])
+        )
         values |= {f"angle_{point['angle']:g}_{name}": value for name, value in entries.items()}
     values |= _path(document) | _envelope(document)
     if (load := document.get("load")) is not None:
@@ -83,8 +72,8 @@ def _linear(section: Document, numbers: Sequence[int]) -> dict[str, float]:
     """Return stiffness, thermal stress and expansion in a section, of a result or its mesh errors."""
     values = _entries(section.get("effective_stiffness", ()), numbers)
     values |= _entries(section.get("effective_stiffness_compression", ()), numbers, "_compression")
-    values |= _named(THERMAL_STRESSES, section.get("thermal_stress", ()))
-    return values | _named(EXPANSIONS, section.get("thermal_expansion", ()))
+    values |= _named(voigt.THERMAL_STRESSES, section.get("thermal_stress", ()))
+    return values | _named(voigt.EXPANSIONS, section.get("thermal_expansion", ()))
 
 
 def _named(names: Iterable[str], values: Iterable[float]) -> dict[str, float]:
@@ -93,7 +82,7 @@ def _named(names: Iterable[str], values: Iterable[float]) -> dict[str, float]:
 
 def _entries(stiffness: Any, numbers: Sequence[int], suffix: str = "") -> dict[str, float]:
     """C11, C12, ... for a stiffness (6, 6), or (3, 3) with the `numbers`; none without entries."""
-    rows = range(1, 7) if len(stiffness) == len(SPATIAL_STRESSES) else numbers
+    rows = range(1, 7) if len(stiffness) == len(voigt.SPATIAL_STRESSES) else numbers
     return _named((f"C{i}{j}{suffix}" for i in rows for j in rows), np.ravel(stiffness).tolist())
 
 
@@ -112,14 +101,14 @@ def _path(document: Document) -> dict[str, float]:
     if not points:
         return {}
     stress = np.array([point["stress"] for point in points])
-    stresses = voigt_names(stress.shape[1])[1]
+    stresses = voigt.voigt_names(stress.shape[1])[1]
     peak = stress[np.abs(stress).argmax(axis=0), range(len(stresses))]
     onset = next((point for point in points if point["broke"] or point.get("softened")), None)
     values = {} if onset is None else {"onset_load_factor": onset["load_factor"]} | _at_point("onset", onset)
     values |= _at_point("end", points[-1])
     values |= {name: points[-1][name] for name in ("dissipated", "work")}
     values |= {f"peak_{name}": value for name, value in zip(stresses, peak.tolist(), strict=True)}
-    summit = peak_of(document)
+    summit = landmarks.peak_of(document)
     values |= {f"peak_{summit[f'{kind}_name']}": summit[kind] for kind in ("stress", "strain")}
     return values | {f"end_{state}": points[-1][state] for state in point_tables.STATES}
 
@@ -138,87 +127,133 @@ def _envelope(document: Document) -> dict[str, float]:
 
 
 def _at_point(place: str, point: Document) -> dict[str, float]:
-    names = zip(voigt_names(len(point["strain"])), (point["strain"], point["stress"]), strict=True)
+    names = zip(voigt.voigt_names(len(point["strain"])), (point["strain"], point["stress"]), strict=True)
     return {f"{place}_{name}": value for keys, values in names for name, value in zip(keys, values, strict=True)}
 
 
 CASE_COLUMNS = (
-    Column("case", "", "number of the case, from 1"),
-    Column("folder", "", "folder of the case, below the folder of the sweep"),
-    Column("point", "", "number of the point, from 1"),
-    Column("realisation", "", "number of the realisation of the point, from 1"),
-    Column("status", "", "`done`, `not converged`, `failed`, `damaged`, `running` or `waiting`"),
-    Column("reason", "", "why there is no result"),
+    result_json.DescribedColumn("case", "", "number of the case, from 1"),
+    result_json.DescribedColumn("folder", "", "folder of the case, below the folder of the sweep"),
+    result_json.DescribedColumn("point", "", "number of the point, from 1"),
+    result_json.DescribedColumn("realisation", "", "number of the realisation of the point, from 1"),
+    result_json.DescribedColumn("status", "", "`done`, `not converged`, `failed`, `damaged`, `running` or `waiting`"),
+    result_json.DescribedColumn("reason", "", "why there is no result"),
 )
-INPUT_COLUMNS = (Column("SECTION.KEY", "that of the key", "value of a key that varies"),)
-MODULI = {column.name for column in columns(Moduli)}
+INPUT_COLUMNS = (result_json.DescribedColumn("SECTION.KEY", "that of the key", "value of a key that varies"),)
+MODULI = {column.name for column in result_json.columns(engineering_constants.Moduli)}
 OUTPUT_COLUMNS = (
-    Column("fraction_meshed", "", "share of all fibres in the meshed area"),
-    Column("fraction_PHASE", "", "share of a phase in the meshed area, if there are more than matrix and fibre"),
-    Column("porosity", "", "share of voids in the area of the cell, where there are some"),
-    Column("match_distance", "", "of cells with `match`: how far they are from the table, in mean diameters"),
-    Column("refine", "", "halvings of the mesh"),
-    Column("elements", "", "triangles of the refined mesh"),
-    Column("nodes", "", "nodes of the refined mesh, once for each body in each subdomain: depends on ranks"),
-    Column("ranks", "", "MPI ranks"),
-    Column("subdomains", "", "subdomains that the bodies are cut into"),
-    Column("dofs", "", "degrees of freedom of all subdomains"),
-    Column("multipliers", "", "Lagrange multipliers of the dual problem"),
-    Column("iterations", "", "Krylov iterations of all states"),
-    Column("Cij", STRESS, "entry of L^ef; beside generalized plane strain C66 is the shear modulus of all"),
-    Column("Cij_compression", STRESS, "the same under minus the unit strains, with contact"),
-    Column("thermal_Sij", f"{STRESS} per unit of temperature", "stress per unit of temperature at no strain"),
-    Column("expansion_x1", "1 / temperature", "strain along x1 per unit of temperature at no stress; expansion_x2 too"),
-    Column("expansion_STRAIN", "1 / temperature", "the same of a shear strain"),
-    Column("anisotropy_normal", STRESS, "C11 - C22"),
-    Column("anisotropy_shear", STRESS, "C33 - (C11 + C22 - 2 C12) / 4; with generalized plane strain C66 - ..."),
-    *columns(Moduli),
-    *(column for column in columns(EngineeringConstants) if column.name not in MODULI),
-    *columns(TransverseIsotropy),
-    Column("NAME_mesh_error", "that of NAME", "estimated error of an entry or constant by its mesh"),
-    Column("energy_mesh_error", "", "estimated relative error of the strain energy, the largest under any strain"),
-    Column("Cii_reuss", STRESS, "lower bound of Cii"),
-    Column("Cii_voigt", STRESS, "upper bound of Cii"),
-    Column("bulk_lower", STRESS, "lower bound of bulk, by Hashin and Shtrikman"),
-    Column("bulk_upper", STRESS, "upper bound of bulk, by Hashin and Shtrikman"),
-    Column("shear_lower", STRESS, "lower bound of shear, by Hashin and Shtrikman"),
-    Column("shear_upper", STRESS, "upper bound of shear, by Hashin and Shtrikman"),
-    Column("angle_ANGLE_Cij", STRESS, "entry of L^ef at an opening of that many degrees"),
-    Column("angle_ANGLE_Sij", STRESS, "macroscopic stress at an opening of that many degrees"),
-    Column("onset_load_factor", "", "load factor at which the first bond of a path breaks or softens"),
-    Column("dissipated", STRESS, "energy lost to all breaks of a path, per area of the cell"),
-    Column("work", STRESS, "work of the loads along a path, per area of the cell"),
-    Column("onset_Sij", STRESS, "macroscopic stress where the first bond of a path breaks or softens"),
-    Column("onset_STRAIN", "", "macroscopic strain where the first bond of a path breaks or softens"),
-    Column(
+    result_json.DescribedColumn("fraction_meshed", "", "share of all fibres in the meshed area"),
+    result_json.DescribedColumn(
+        "fraction_PHASE", "", "share of a phase in the meshed area, if there are more than matrix and fibre"
+    ),
+    result_json.DescribedColumn("porosity", "", "share of voids in the area of the cell, where there are some"),
+    result_json.DescribedColumn(
+        "match_distance", "", "of cells with `match`: how far they are from the table, in mean diameters"
+    ),
+    result_json.DescribedColumn("refine", "", "halvings of the mesh"),
+    result_json.DescribedColumn("elements", "", "triangles of the refined mesh"),
+    result_json.DescribedColumn(
+        "nodes", "", "nodes of the refined mesh, once for each body in each subdomain: depends on ranks"
+    ),
+    result_json.DescribedColumn("ranks", "", "MPI ranks"),
+    result_json.DescribedColumn("subdomains", "", "subdomains that the bodies are cut into"),
+    result_json.DescribedColumn("dofs", "", "degrees of freedom of all subdomains"),
+    result_json.DescribedColumn("multipliers", "", "Lagrange multipliers of the dual problem"),
+    result_json.DescribedColumn("iterations", "", "Krylov iterations of all states"),
+    result_json.DescribedColumn(
+        "Cij", records.STRESS, "entry of L^ef; beside generalized plane strain C66 is the shear modulus of all"
+    ),
+    result_json.DescribedColumn(
+        "Cij_compression", records.STRESS, "the same under minus the unit strains, with contact"
+    ),
+    result_json.DescribedColumn(
+        "thermal_Sij", f"{records.STRESS} per unit of temperature", "stress per unit of temperature at no strain"
+    ),
+    result_json.DescribedColumn(
+        "expansion_x1", "1 / temperature", "strain along x1 per unit of temperature at no stress; expansion_x2 too"
+    ),
+    result_json.DescribedColumn("expansion_STRAIN", "1 / temperature", "the same of a shear strain"),
+    result_json.DescribedColumn("anisotropy_normal", records.STRESS, "C11 - C22"),
+    result_json.DescribedColumn(
+        "anisotropy_shear", records.STRESS, "C33 - (C11 + C22 - 2 C12) / 4; with generalized plane strain C66 - ..."
+    ),
+    *result_json.columns(engineering_constants.Moduli),
+    *(
+        column
+        for column in result_json.columns(engineering_constants.EngineeringConstants)
+        if column.name not in MODULI
+    ),
+    *result_json.columns(engineering_constants.TransverseIsotropy),
+    result_json.DescribedColumn(
+        "NAME_mesh_error", "that of NAME", "estimated error of an entry or constant by its mesh"
+    ),
+    result_json.DescribedColumn(
+        "energy_mesh_error", "", "estimated relative error of the strain energy, the largest under any strain"
+    ),
+    result_json.DescribedColumn("Cii_reuss", records.STRESS, "lower bound of Cii"),
+    result_json.DescribedColumn("Cii_voigt", records.STRESS, "upper bound of Cii"),
+    result_json.DescribedColumn("bulk_lower", records.STRESS, "lower bound of bulk, by Hashin and Shtrikman"),
+    result_json.DescribedColumn("bulk_upper", records.STRESS, "upper bound of bulk, by Hashin and Shtrikman"),
+    result_json.DescribedColumn("shear_lower", records.STRESS, "lower bound of shear, by Hashin and Shtrikman"),
+    result_json.DescribedColumn("shear_upper", records.STRESS, "upper bound of shear, by Hashin and Shtrikman"),
+    result_json.DescribedColumn("angle_ANGLE_Cij", records.STRESS, "entry of L^ef at an opening of that many degrees"),
+    result_json.DescribedColumn(
+        "angle_ANGLE_Sij", records.STRESS, "macroscopic stress at an opening of that many degrees"
+    ),
+    result_json.DescribedColumn(
+        "onset_load_factor", "", "load factor at which the first bond of a path breaks or softens"
+    ),
+    result_json.DescribedColumn(
+        "dissipated", records.STRESS, "energy lost to all breaks of a path, per area of the cell"
+    ),
+    result_json.DescribedColumn("work", records.STRESS, "work of the loads along a path, per area of the cell"),
+    result_json.DescribedColumn(
+        "onset_Sij", records.STRESS, "macroscopic stress where the first bond of a path breaks or softens"
+    ),
+    result_json.DescribedColumn(
+        "onset_STRAIN", "", "macroscopic strain where the first bond of a path breaks or softens"
+    ),
+    result_json.DescribedColumn(
         "peak_Sij",
-        STRESS,
+        records.STRESS,
         "largest in magnitude of a path, with its sign, also where it ends before it falls; of the leading strain as "
         "`peak` has it",
     ),
-    Column("peak_STRAIN", "", "strain at the peak of the stress of the component whose strain leads"),
-    Column("end_Sij", STRESS, "macroscopic stress at the end of a path"),
-    Column("end_STRAIN", "", "macroscopic strain at the end of a path"),
-    Column("end_STATUS", "", "interface nodes that are bonded, open or closed at the end of a path"),
-    Column("load_STRAIN", "", "macroscopic strain under the load of analysis `load`"),
-    Column("load_Sij", STRESS, "macroscopic stress under it"),
-    Column("load_stored", STRESS, "elastic energy stored under it, per area of the cell"),
-    Column("load_STATUS", "", "interface nodes that are bonded, open or closed under it"),
-    Column("envelope_AXIS", "that of the axis", "load at onset along the first axis of an envelope"),
-    Column("envelope_least_AXIS_AXIS", "that of the axes", "least load at onset of all directions"),
-    Column("envelope_largest_AXIS_AXIS", "that of the axes", "largest, if every direction has one"),
-    Column("check_LAW", "", "largest relative error of a law, as in result.json"),
-    Column("seconds_STAGE", "s", "wall time of a stage, the largest over ranks"),
-    Column("memory", "bytes", "peak resident memory, the largest over ranks"),
+    result_json.DescribedColumn(
+        "peak_STRAIN", "", "strain at the peak of the stress of the component whose strain leads"
+    ),
+    result_json.DescribedColumn("end_Sij", records.STRESS, "macroscopic stress at the end of a path"),
+    result_json.DescribedColumn("end_STRAIN", "", "macroscopic strain at the end of a path"),
+    result_json.DescribedColumn(
+        "end_STATUS", "", "interface nodes that are bonded, open or closed at the end of a path"
+    ),
+    result_json.DescribedColumn("load_STRAIN", "", "macroscopic strain under the load of analysis `load`"),
+    result_json.DescribedColumn("load_Sij", records.STRESS, "macroscopic stress under it"),
+    result_json.DescribedColumn("load_stored", records.STRESS, "elastic energy stored under it, per area of the cell"),
+    result_json.DescribedColumn("load_STATUS", "", "interface nodes that are bonded, open or closed under it"),
+    result_json.DescribedColumn(
+        "envelope_AXIS", "that of the axis", "load at onset along the first axis of an envelope"
+    ),
+    result_json.DescribedColumn(
+        "envelope_least_AXIS_AXIS", "that of the axes", "least load at onset of all directions"
+    ),
+    result_json.DescribedColumn(
+        "envelope_largest_AXIS_AXIS", "that of the axes", "largest, if every direction has one"
+    ),
+    result_json.DescribedColumn("check_LAW", "", "largest relative error of a law, as in result.json"),
+    result_json.DescribedColumn("seconds_STAGE", "s", "wall time of a stage, the largest over ranks"),
+    result_json.DescribedColumn("memory", "bytes", "peak resident memory, the largest over ranks"),
 )
 COLUMNS = (*CASE_COLUMNS, *INPUT_COLUMNS, *OUTPUT_COLUMNS)
 STATISTICS_COLUMNS = (
-    Column("point", "", "number of the point, from 1"),
+    result_json.DescribedColumn("point", "", "number of the point, from 1"),
     *INPUT_COLUMNS,
-    Column("output", "", "name of a column of cases.csv"),
-    Column("unit", "", "its unit"),
-    Column("count", "", "finished realisations of the point that have it"),
-    Column("mean", "that of the output", "mean over them"),
-    Column("std", "that of the output", "standard deviation, from two on"),
-    Column("ci95", "that of the output", "half the width of the 95 % confidence interval of the mean"),
+    result_json.DescribedColumn("output", "", "name of a column of cases.csv"),
+    result_json.DescribedColumn("unit", "", "its unit"),
+    result_json.DescribedColumn("count", "", "finished realisations of the point that have it"),
+    result_json.DescribedColumn("mean", "that of the output", "mean over them"),
+    result_json.DescribedColumn("std", "that of the output", "standard deviation, from two on"),
+    result_json.DescribedColumn(
+        "ci95", "that of the output", "half the width of the 95 % confidence interval of the mean"
+    ),
 )

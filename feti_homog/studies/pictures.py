@@ -1,7 +1,5 @@
 """moduli.png of a sweep, over the fibre fraction and between bounds; fit.png, with computed and measured values."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,20 +10,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from feti_homog.case.cell_section import GEOMETRY
-from feti_homog.case.material_sections import read_materials
+from feti_homog.case import cell_section, material_sections
+from feti_homog.materials import engineering_constants, laws, phase_bounds, voigt
 from feti_homog.materials import phase_bounds as mechanics
-from feti_homog.materials.phase_bounds import fibre_bounds
-from feti_homog.materials.engineering_constants import (
-    ABOUT_FIBRES,
-    is_transversely_isotropic,
-    isotropic_part,
-    transversely_isotropic_part,
-)
-from feti_homog.materials.laws import stiffness_of
-from feti_homog.materials.voigt import PLANE_STATES, plane_state_of
-from feti_homog.report.plots.plot_helpers import STYLE, faint_grid, plain, save, stress_label
-from feti_homog.schema.keys import TableReader
+from feti_homog.report.plots import plot_helpers
+from feti_homog.schema import TableReader
 from feti_homog.studies.sweep_table import Series, SweepTable, series_over, varies
 from feti_homog.typing import Float
 
@@ -52,7 +41,7 @@ NAMES = {
     **{name: f"$C_{{{name[1:]}}}$" for name in ("C11", "C33", "C44", "C66")},
     **{
         name: f"{constant.symbol} {constant.way} the fibres{' (1 / temperature)' * name.startswith('expansion')}"
-        for name, constant in ABOUT_FIBRES.items()
+        for name, constant in engineering_constants.ABOUT_FIBRES.items()
     },
     "bulk": "plane bulk modulus $k$",
     "shear": "shear modulus $\\mu$",
@@ -63,8 +52,8 @@ def draw_moduli(directory: Path, table: SweepTable) -> list[Path]:
     """Draw moduli.png of a sweep over fibre fractions; returns its path, or nothing without moduli.  On one rank."""
     if not varies(table, FRACTION) or not panels_of(table):
         return []
-    with mpl.rc_context(STYLE):
-        return [save(moduli_figure(table), directory / "moduli.png")]
+    with mpl.rc_context(plot_helpers.STYLE):
+        return [plot_helpers.save(moduli_figure(table), directory / "moduli.png")]
 
 
 @dataclass(frozen=True)
@@ -84,7 +73,7 @@ class PanelBounds:
 
 def panels_of(table: SweepTable) -> tuple[str, ...]:
     """Return the drawn outputs; none if the cases have no moduli."""
-    spatial = {plane_state_of(document).is_spatial for document in table.finished}
+    spatial = {voigt.plane_state_of(document).is_spatial for document in table.finished}
     in_space = (COMMON_PANELS,) if False in spatial else (SPATIAL_PANELS, SECANTS)
     choices = in_space if True in spatial else (PANELS,)
     return next((names for names in choices if all(name in table.outputs for name in names)), ())
@@ -106,15 +95,15 @@ def moduli_figure(table: SweepTable) -> Figure:
             _draw_bounds(axes, bounds, name)
         for style, one_series in enumerate(series):
             _plot_series(axes, table, one_series, name, style)
-        unit = "" if name.startswith(("nu_", "expansion_")) else stress_label(table.stress_unit)
+        unit = "" if name.startswith(("nu_", "expansion_")) else plot_helpers.stress_label(table.stress_unit)
         axes.set(xlabel="fibre fraction", ylabel=f"{NAMES[name]} {unit}".rstrip())
-        faint_grid(axes)
+        plot_helpers.faint_grid(axes)
         axes.tick_params(labelbottom=True)
     for axes in panels[len(names) :]:
         axes.set_axis_off()
     planes = sorted({document["case"]["analysis"]["plane"] for document in table.finished})
     without = "" if bounds else f"; no bounds, for {_why_no_bounds(table)}"
-    picture.suptitle(f"{plain(table.name)}: plane {' and '.join(planes)}{without}", fontsize=12)
+    picture.suptitle(f"{plot_helpers.plain(table.name)}: plane {' and '.join(planes)}{without}", fontsize=12)
     _add_legend(picture, list(panels)[::-1])
     return picture
 
@@ -125,13 +114,15 @@ def moduli_bounds(table: SweepTable) -> PanelBounds | None:
         return None
     case = table.finished[0]["case"]
     plane = case["analysis"]["plane"]
-    materials = read_materials(case, plane, TableReader({GEOMETRY: case["cell"]["geometry"]}))
-    phases = [stiffness_of(materials[phase], plane) for phase in ("matrix", "fibre")]
+    materials = material_sections.read_materials(
+        case, plane, TableReader({cell_section.GEOMETRY: case["cell"]["geometry"]})
+    )
+    phases = [laws.stiffness_of(materials[phase], plane) for phase in ("matrix", "fibre")]
     meshed = [float(document["cell"]["fibre_fraction"]) for document in table.finished]
     smallest, largest = min(meshed), max(meshed)
     first = 0.0 if smallest <= largest / 2 else smallest - BEFORE * (largest - smallest or smallest)
     fractions = np.linspace(first, min(1.0, MARGIN * largest), FRACTIONS)
-    spatial = PLANE_STATES[plane].is_spatial
+    spatial = voigt.PLANE_STATES[plane].is_spatial
     bounds_at, tight = (_spatial_bounds, "Hill, Hashin") if spatial else (_plane_bounds, "Hashin-Shtrikman")
     columns = [bounds_at([1 - share, share], phases) for share in fractions]
     rows = {name: np.array([column[name] for column in columns]).T for name in columns[0]}
@@ -156,7 +147,7 @@ def _plane_bounds(shares: list[float], phases: list[Float]) -> dict[str, list[fl
     """Bounds by panel: Reuss, Voigt, and Hashin and Shtrikman's two for isotropic phases."""
     bounds: dict[str, list[float]] = {name: [] for name in PANELS}
     for stiffness in (mechanics.reuss(shares, phases), mechanics.voigt(shares, phases)):
-        bulk, shear = isotropic_part(stiffness)
+        bulk, shear = engineering_constants.isotropic_part(stiffness)
         for name, value in zip(PANELS, (stiffness[0, 0], stiffness[2, 2], bulk, shear), strict=True):
             bounds[name].append(float(value))
     if all(map(mechanics.is_isotropic, phases)):
@@ -168,11 +159,14 @@ def _plane_bounds(shares: list[float], phases: list[Float]) -> dict[str, list[fl
 
 def _spatial_bounds(shares: list[float], phases: list[Float]) -> dict[str, list[float]]:
     """Bounds by panel: Reuss, Voigt, and two for fibres of any section if phases are alike across them."""
-    ends = [transversely_isotropic_part(bound(shares, phases)) for bound in (mechanics.reuss, mechanics.voigt)]
+    ends = [
+        engineering_constants.transversely_isotropic_part(bound(shares, phases))
+        for bound in (mechanics.reuss, mechanics.voigt)
+    ]
     bounds = {name: [float(getattr(end, name)) for end in ends] for name in SPATIAL_PANELS}
-    isotropic = [transversely_isotropic_part(phase) for phase in phases]
-    if all(map(is_transversely_isotropic, isotropic)):
-        tight = fibre_bounds(shares, isotropic)
+    isotropic = [engineering_constants.transversely_isotropic_part(phase) for phase in phases]
+    if all(map(engineering_constants.is_transversely_isotropic, isotropic)):
+        tight = phase_bounds.fibre_bounds(shares, isotropic)
         for name in ("G_axial", "G_transverse", "E_axial"):
             bounds[name] += getattr(tight, name)
     return bounds
@@ -223,12 +217,12 @@ def draw_fit(path: Path, document: Mapping[str, Any]) -> Path:
     single = [row for row in document["measured"] if row["strain"] is None]
     curves = [row for row in document["measured"] if row["strain"] is not None]
     parts = [(_draw_residuals, single)] * bool(single) + [(_draw_curves, curves)] * bool(curves)
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(plot_helpers.STYLE):
         figure = Figure(figsize=(6.5 * len(parts), 4.5), layout="constrained")
         for axes, (draw, rows) in zip(figure.subplots(1, len(parts), squeeze=False)[0], parts, strict=True):
             draw(axes, rows)
-        figure.suptitle(f"{plain(document['name'])}: computed and measured", fontsize=12)
-        return save(figure, path)
+        figure.suptitle(f"{plot_helpers.plain(document['name'])}: computed and measured", fontsize=12)
+        return plot_helpers.save(figure, path)
 
 
 def _draw_residuals(axes: Axes, rows: Rows) -> None:
@@ -242,7 +236,7 @@ def _draw_residuals(axes: Axes, rows: Rows) -> None:
         colour, marker = COLOURS[k % len(COLOURS)], MARKERS[k % len(MARKERS)]
         axes.plot(residuals[tests == test], place[tests == test], marker, color=colour, label=f"test {test}")
     labels = [f"{row['name']} {row['value']:.4g} / {row['computed']:.4g}" for row in rows]
-    axes.set_yticks(place, [plain(label) for label in labels])
+    axes.set_yticks(place, [plot_helpers.plain(label) for label in labels])
     axes.invert_yaxis()
     axes.set_xlabel("(computed - measured) / std")
     axes.set_title("measured / computed")

@@ -1,7 +1,5 @@
 """Measured values, and the values of a result.json in their place, with derivatives where they are exact."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,15 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case.bond_laws import DEFAULT, LAWS
-from feti_homog.case.cases import Case
+from feti_homog.case import Case, bond_laws
 from feti_homog.errors import CaseError
-from feti_homog.materials.engineering_constants import constants
-from feti_homog.materials.laws import expansion
-from feti_homog.materials.voigt import PLANE_STATES, voigt_names
-from feti_homog.report.text.point_tables import STATES
+from feti_homog.materials import engineering_constants, laws, voigt
+from feti_homog.report.text import point_tables
 from feti_homog.results import path_curves
-from feti_homog.results.path_curves import Document
 from feti_homog.studies.outputs import outputs
 from feti_homog.typing import Float
 
@@ -46,28 +40,28 @@ class Datum:
 
 def available(case: Case) -> list[str]:
     """Return the value names in a result; none for analyses that no fit takes."""
-    spatial = PLANE_STATES[case.analysis.plane].is_spatial
+    spatial = voigt.PLANE_STATES[case.analysis.plane].is_spatial
     size = 6 if spatial else 3
     if case.analysis.type == "stiffness":
-        is_heated = spatial and all(expansion(material) is not None for material in case.materials.values())
-        return [*constants(np.eye(size), np.zeros(6) if is_heated else None)]
+        is_heated = spatial and all(laws.expansion(material) is not None for material in case.materials.values())
+        return [*engineering_constants.constants(np.eye(size), np.zeros(6) if is_heated else None)]
     if case.analysis.type == "path":
-        strains, stresses = voigt_names(size)
+        strains, stresses = voigt.voigt_names(size)
         places = [f"{place}_{name}" for place in OF_PATHS for name in (*stresses, *strains)]
         return ["onset_load_factor", *places, "dissipated", "work"]
     return []
 
 
-def responses(document: Document) -> dict[str, float]:
+def responses(document: path_curves.Document) -> dict[str, float]:
     """Return a result's constants, or its loads and onsets: the numbers whose scatter matters."""
     values, kind = _values(document), document["case"]["analysis"]["type"]
     if kind == "stiffness" or "sensitivities" in document:
         return values
     starts = ("onset_", "peak_") if kind == "path" else (f"{kind}_",)
-    return {name: values[name] for name in values if name.startswith(starts) and not name.endswith(STATES)}
+    return {name: values[name] for name in values if name.startswith(starts) and not name.endswith(point_tables.STATES)}
 
 
-def _values(document: Document) -> dict[str, float]:
+def _values(document: path_curves.Document) -> dict[str, float]:
     """Return the numbers in a result by their names in a fit."""
     if "sensitivities" in document:
         sensitivities = document["sensitivities"]
@@ -75,11 +69,14 @@ def _values(document: Document) -> dict[str, float]:
     if document["case"]["analysis"]["type"] == "stiffness":
         thermal = document.get("thermal_stress")
         heat = None if thermal is None else np.array(thermal)
-        return {k: float(v) for k, v in constants(np.array(document["effective_stiffness"]), heat).items()}
+        return {
+            k: float(v)
+            for k, v in engineering_constants.constants(np.array(document["effective_stiffness"]), heat).items()
+        }
     return outputs(document)
 
 
-def predicted(document: Document, data: Sequence[Datum]) -> Float:
+def predicted(document: path_curves.Document, data: Sequence[Datum]) -> Float:
     """(m,) result values in place of the data.
 
     Raises:
@@ -94,7 +91,7 @@ def predicted(document: Document, data: Sequence[Datum]) -> Float:
     return np.array([values[d.name] if d.strain is None else _on_curve(document, d)[0] for d in data])
 
 
-def exact_derivatives(document: Document, data: Sequence[Datum], name: str) -> Float | None:
+def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], name: str) -> Float | None:
     """(m,) derivatives of the values by an unknown; None where the result does not give them."""
     sections = path_curves.interface_sections(document)
     name = name.replace("interface.1.", "interface.") if len(sections) == 1 else name
@@ -105,7 +102,7 @@ def exact_derivatives(document: Document, data: Sequence[Datum], name: str) -> F
     return None if exponent is None else _by_scaling(document, data, exponent / float(sections[0][key]))
 
 
-def _of_stiffness(sensitivities: Document, data: Sequence[Datum], name: str) -> Float | None:
+def _of_stiffness(sensitivities: path_curves.Document, data: Sequence[Datum], name: str) -> Float | None:
     """Return derivatives of constants: zero by strengths, and by expansions in a plane; None by other unknowns."""
     if name in sensitivities["parameters"]:
         values = np.array(sensitivities["derivatives"])[:, sensitivities["parameters"].index(name)]
@@ -116,7 +113,7 @@ def _of_stiffness(sensitivities: Document, data: Sequence[Datum], name: str) -> 
     return np.zeros(len(data)) if is_idle else None
 
 
-def _exponent(document: Document, section: Mapping[str, Any], key: str) -> float | None:
+def _exponent(document: path_curves.Document, section: Mapping[str, Any], key: str) -> float | None:
     """Return the degree to which loads at breaks are homogeneous in a key of the only interface.
 
     All loads up to the onset must grow alike; a temperature that comes before them does not.  The degree is 1/2 in the
@@ -126,14 +123,14 @@ def _exponent(document: Document, section: Mapping[str, Any], key: str) -> float
     is_envelope = case["analysis"]["type"] == "envelope" and case["envelope"].get("temperature") is None
     if not is_envelope and not (case["analysis"]["type"] == "path" and path_curves.is_proportional(document)):
         return None
-    law = LAWS[section.get("criterion", DEFAULT)]
+    law = bond_laws.LAWS[section.get("criterion", bond_laws.DEFAULT)]
     if key == TOUGHNESS and key in law.keys and not law.softens:
         return 0.5
     strengths = [name for name in law.limits if math.isfinite(float(section.get(name) or "inf"))]
     return 1.0 if strengths == [key] else None
 
 
-def _by_scaling(document: Document, data: Sequence[Datum], share: float) -> Float | None:
+def _by_scaling(document: path_curves.Document, data: Sequence[Datum], share: float) -> Float | None:
     """Return the derivatives along S(E; s R) = s S(E / s; R), unless a value depends on the end of the load."""
     values, derivatives = _values(document), []
     for datum in data:
@@ -149,14 +146,14 @@ def _by_scaling(document: Document, data: Sequence[Datum], share: float) -> Floa
     return np.array(derivatives)
 
 
-def _on_curve(document: Document, datum: Datum) -> tuple[float, float]:
+def _on_curve(document: path_curves.Document, datum: Datum) -> tuple[float, float]:
     """Return the stress of a path at a strain, and its slope.
 
     Raises:
         CaseError: the strain is not that which rises, or the path ends before it.
     """
     curve = path_curves.rising_strain(document)
-    strains, stresses = voigt_names(len(document["path"][0]["stress"]))
+    strains, stresses = voigt.voigt_names(len(document["path"][0]["stress"]))
     leading = strains[path_curves.leading_component(document)]
     place = f"[measured] curve: {datum.strain_name} = {datum.strain:g}"
     if curve is None or datum.strain_name != leading:

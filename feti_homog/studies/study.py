@@ -16,14 +16,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from feti_homog.case.toml_files import short_digest
+from feti_homog.case import toml_files
 from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.results import atomic, output_folder, result_json
 from feti_homog.studies import case_folders, case_runs, description
 from feti_homog.studies.sweep_cases import Sweep
-from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
-from feti_homog.system.runtime import input_files
-from feti_homog.system.runtime.standard_streams import complain, say
+from feti_homog.system.parallel import mpi_errors
+from feti_homog.system.runtime import input_files, standard_streams
 from feti_homog.version import __version__
 
 if TYPE_CHECKING:
@@ -50,7 +49,7 @@ class Evaluator:
         """
         folder = self.directory / name
         case_runs.run_all(sweep, folder, self.comm, self.ranks_per_case, self.retry, quiet=True)
-        states = on_root_only(
+        states = mpi_errors.on_root_only(
             self.comm, lambda: [case_folders.case_state(folder, entry).document or {} for entry in sweep.entries]
         )
         return states or []
@@ -97,7 +96,7 @@ class Study(ABC):
     def digest(self) -> str:
         """Short name of the study: equal for equal cases and inputs."""
         cases = [entry.identity for entry in self.first_cases().entries]
-        return short_digest(json.dumps(self.identity(cases)).encode())
+        return toml_files.short_digest(json.dumps(self.identity(cases)).encode())
 
     def describe(self, comm: Intracomm) -> str:
         """Describe the study and its first case; empty except on rank 0.  Collective.
@@ -105,8 +104,8 @@ class Study(ABC):
         Raises:
             CaseError, MeshError: the cell of the first case is faulty.
         """
-        heading = on_root(comm, self.heading)
-        return description.first_of(on_root(comm, self.first_cases), heading, comm)
+        heading = mpi_errors.on_root(comm, self.heading)
+        return description.first_of(mpi_errors.on_root(comm, self.first_cases), heading, comm)
 
     def run(self, directory: Path, comm: Intracomm, ranks_per_case: int, retry: bool, quiet: bool) -> dict[str, Any]:
         """Run the study, or resume it, and return its document on every rank.  Collective.
@@ -117,14 +116,16 @@ class Study(ABC):
             ConvergenceError: a case failed, or the study has no sound answer; then its files are written.
         """
         case_runs.check_groups(comm, ranks_per_case)
-        on_root(comm, output_folder.usable, directory)
-        head = {"version": __version__, "digest": on_root(comm, self.digest)}
-        with output_folder.held(directory, comm, lambda line: complain(line) if comm.rank == 0 else None):
-            on_root(comm, self._begin, directory, head)
+        mpi_errors.on_root(comm, output_folder.usable, directory)
+        head = {"version": __version__, "digest": mpi_errors.on_root(comm, self.digest)}
+        with output_folder.held(
+            directory, comm, lambda line: standard_streams.complain(line) if comm.rank == 0 else None
+        ):
+            mpi_errors.on_root(comm, self._begin, directory, head)
             document = head | self.answer(Evaluator(directory, comm, ranks_per_case, retry, quiet))
-            on_root_only(comm, atomic.replace_text, directory / self.FILE, result_json.dumps(document))
+            mpi_errors.on_root_only(comm, atomic.replace_text, directory / self.FILE, result_json.dumps(document))
         if comm.rank == 0 and not quiet:
-            say(self.text(document))
+            standard_streams.say(self.text(document))
         if document.get("faults"):
             raise ConvergenceError(*document["faults"])
         return document

@@ -1,7 +1,5 @@
 """A sweep file expanded: its numbered cases, all of them checked."""
 
-from __future__ import annotations
-
 import copy
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -9,15 +7,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from feti_homog.case import cases
-from feti_homog.case.cases import Case
-from feti_homog.case.toml_files import read_document, short_digest, to_document
-from feti_homog.case.sections import SWEEP
+from feti_homog.case import Case, cases, sections, toml_files
 from feti_homog.errors import CaseError
-from feti_homog.report.text.tables import unit
-from feti_homog.schema.wording import dotted_key, toml_value
+from feti_homog.report.text import tables
+from feti_homog.schema import wording
 from feti_homog.studies.axes import Assignment, read_points
-from feti_homog.system.petsc.option_table import only_prints
+from feti_homog.system.petsc import option_table
 
 MAX_NAMED_CASES = 4  # in one fault
 
@@ -46,7 +41,10 @@ class SweepCase:
 
     def describe(self, stress_unit: str) -> str:
         """Return the inputs in one line, with their units."""
-        values = [(f"{name} = {toml_value(value)}", unit(name, stress_unit)) for name, value in self.inputs.items()]
+        values = [
+            (f"{name} = {wording.toml_value(value)}", tables.unit(name, stress_unit))
+            for name, value in self.inputs.items()
+        ]
         return ", ".join(f"{text} {label}".rstrip() for text, label in values)
 
 
@@ -65,9 +63,9 @@ class Sweep:
 
 def load(path: str | Path) -> Sweep:
     """Return the sweep in a file. Raises CaseError with all faults in [sweep], or else in all cases."""
-    document = read_document(path)
-    if SWEEP not in document:
-        raise CaseError(f"{path}: [{SWEEP}]: missing section; `feti-homog run` runs a single case")
+    document = toml_files.read_document(path)
+    if sections.SWEEP not in document:
+        raise CaseError(f"{path}: [{sections.SWEEP}]: missing section; `feti-homog run` runs a single case")
     return expand(document, Path(path).parent)
 
 
@@ -77,12 +75,12 @@ def expand(values: Mapping[str, Any], folder: Path) -> Sweep:
     All points come once before any comes in its next realisation, so that more realisations add cases at the end.
     Raises CaseError as `load` does.
     """
-    document = to_document(values)
-    if SWEEP not in document:
-        raise CaseError(f"[{SWEEP}]: missing section; a single case is not a sweep")
-    table = document.pop(SWEEP)
+    document = toml_files.to_document(values)
+    if sections.SWEEP not in document:
+        raise CaseError(f"[{sections.SWEEP}]: missing section; a single case is not a sweep")
+    table = document.pop(sections.SWEEP)
     if not isinstance(table, dict):
-        raise CaseError(f"{SWEEP} = {toml_value(table)}: expected a section [{SWEEP}]")
+        raise CaseError(f"{sections.SWEEP} = {wording.toml_value(table)}: expected a section [{sections.SWEEP}]")
     faults: list[str] = []
     points, settings = read_points(table, faults)
     return cases_at(document, points, folder, settings.realisations, faults=faults)
@@ -94,7 +92,7 @@ def cases_at(
     folder: Path,
     realisations: int | None = None,
     *,
-    section: str = SWEEP,
+    section: str = sections.SWEEP,
     faults: Sequence[str] = (),
     complete: Callable[[dict[str, Any]], None] | None = None,
 ) -> Sweep:
@@ -131,8 +129,8 @@ def cases_at(
 
 def identity_of(digest: str, petsc: Mapping[str, Any]) -> str:
     """Digest of a case with its options, but for options that only print."""
-    chosen = {name: value for name, value in petsc.items() if not only_prints(name)}
-    return short_digest((digest + json.dumps(chosen, sort_keys=True)).encode())
+    chosen = {name: value for name, value in petsc.items() if not option_table.only_prints(name)}
+    return toml_files.short_digest((digest + json.dumps(chosen, sort_keys=True)).encode())
 
 
 def case_names(numbers: list[int]) -> str:
@@ -147,7 +145,7 @@ def case_documents(
     points: Sequence[Assignment],
     realisations: int | None,
     faults: list[str],
-    section: str = SWEEP,
+    section: str = sections.SWEEP,
 ) -> list[tuple[SweepCase, dict[str, Any]]]:
     """Return the cases and their documents: all points, then the next realisation of points with a random cell.
 
@@ -155,10 +153,10 @@ def case_documents(
     """
     documents = [_with_values(base, point, faults, section) for point in points]
     if realisations is not None and not any(map(_is_random, documents)):
-        faults.append(f'[{SWEEP}] realisations: only cells with geometry = "random" have several')
+        faults.append(f'[{sections.SWEEP}] realisations: only cells with geometry = "random" have several')
     keys = [key for path, value in next(iter(points), {}).items() for key in _inputs({path: value})]
     if realisations is not None and "cell.seed" in keys:
-        faults.append(f"[{SWEEP}] realisations: excludes cell.seed, the first of which is that of [cell]")
+        faults.append(f"[{sections.SWEEP}] realisations: excludes cell.seed, the first of which is that of [cell]")
     faults += [f"[{section}] {key}: given twice" for key in dict.fromkeys(keys) if keys.count(key) > 1]
     return [] if faults else _in_order(points, documents, realisations)
 
@@ -189,14 +187,14 @@ def _with_values(base: Mapping[str, Any], point: Assignment, faults: list[str], 
         for name in path[:-1]:
             table = _entry(table, name)
             if table is None:
-                faults.append(f"[{section}] {dotted_key(path)}: {toml_value(name)} is no section")
+                faults.append(f"[{section}] {wording.dotted_key(path)}: {wording.toml_value(name)} is no section")
                 return document
         if isinstance(table, list) and len(table) == 1 and isinstance(table[0], dict):
             table = table[0]
-        place, last = dotted_key(path[:-1]), path[-1]
+        place, last = wording.dotted_key(path[:-1]), path[-1]
         if isinstance(table, list):
             several = f"there are {len(table)} sections [[{place}]]; expected {place}.1.{last} or the like"
-            faults.append(f"[{section}] {dotted_key(path)}: {several}")
+            faults.append(f"[{section}] {wording.dotted_key(path)}: {several}")
             return document
         is_merged = isinstance(value, dict) and isinstance(table.get(last, {}), dict)
         table[last] = table.get(last, {}) | value if is_merged else value
@@ -226,5 +224,5 @@ def _inputs(point: Assignment) -> dict[str, Any]:
     inputs: dict[str, Any] = {}
     for path, value in point.items():
         parts = {(*path, name): part for name, part in value.items()} if isinstance(value, dict) else {path: value}
-        inputs |= {dotted_key(key): part for key, part in parts.items()}
+        inputs |= {wording.dotted_key(key): part for key, part in parts.items()}
     return inputs

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import t as student
 
-from feti_homog.report.text.tables import unit
+from feti_homog.report.text import tables
 from feti_homog.results import path_curves
 from feti_homog.typing import Document, Float
 
@@ -79,7 +79,7 @@ class SweepTable:
         varied = [name for name in keys if len({repr(value) for value in self.inputs[name]}) > 1]
         values = [(name, self.input_of(point, name)) for name in varied]
         return ", ".join(
-            f"{_in_words(name, value)} {unit(name, self.stress_unit)}".rstrip()
+            f"{_in_words(name, value)} {tables.unit(name, self.stress_unit)}".rstrip()
             for name, value in values
             if value is not None
         )

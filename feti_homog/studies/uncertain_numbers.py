@@ -1,7 +1,5 @@
 """Uncertain numbers in a case: KEY = {mean, std} or {mean, cv} in place of a number, and their correlation."""
 
-from __future__ import annotations
-
 import copy
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,10 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case.toml_files import TomlPath, leaves
-from feti_homog.case.sections import CORRELATION, UNCERTAINTY
-from feti_homog.schema.types import is_number, magnitudes_in_words
-from feti_homog.schema.wording import dotted_key, toml_value
+from feti_homog.case import sections, toml_files
+from feti_homog.schema import types, wording
 from feti_homog.typing import Float
 
 STIFFNESS = "stiffness"
@@ -52,40 +48,43 @@ class Uncertainty:
 
     def to_table(self) -> dict[str, Any]:
         """Return a case's section [uncertainty] with means in place of numbers; empty without any."""
-        pairs = {CORRELATION: [list(pair) for pair in self.correlation]} if self.correlation else {}
+        pairs = {sections.CORRELATION: [list(pair) for pair in self.correlation]} if self.correlation else {}
         return {**self.std, **pairs}
 
 
 def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty:
     """Take the uncertain numbers out of a document, which keeps their means."""
-    table = document.pop(UNCERTAINTY, {})
+    table = document.pop(sections.UNCERTAINTY, {})
     if not isinstance(table, dict):
-        faults.append(f"{UNCERTAINTY} = {toml_value(table)}: expected a section [{UNCERTAINTY}]")
+        faults.append(
+            f"{sections.UNCERTAINTY} = {wording.toml_value(table)}: expected a section [{sections.UNCERTAINTY}]"
+        )
         return Uncertainty({})
-    stds = leaves({name: value for name, value in table.items() if name != CORRELATION})
+    stds = toml_files.leaves({name: value for name, value in table.items() if name != sections.CORRELATION})
     given = [(path, value) for path, value in stds if value != {}]
     for section in document:
         document[section] = _means(document[section], (section,), given, faults)
-    named, pairs = {".".join(path): value for path, value in dict(given).items()}, table.get(CORRELATION, [])
+    named, pairs = {".".join(path): value for path, value in dict(given).items()}, table.get(sections.CORRELATION, [])
     faults += [*_deviation_faults(document, given), *_pair_faults(pairs, named)]
     if faults:
         return Uncertainty({})
     result = Uncertainty(named, tuple((first, second, float(value)) for first, second, value in pairs))
     if named and np.linalg.eigvalsh(result.matrix()).min() < -ROUNDING:
-        faults.append(f"[{UNCERTAINTY}] {CORRELATION}: no constants are so correlated; expected a positive matrix")
+        place = f"[{sections.UNCERTAINTY}] {sections.CORRELATION}"
+        faults.append(f"{place}: no constants are so correlated; expected a positive matrix")
     return result
 
 
-def _deviation_faults(document: Mapping[str, Any], given: Sequence[tuple[TomlPath, Any]]) -> Iterator[str]:
+def _deviation_faults(document: Mapping[str, Any], given: Sequence[tuple[toml_files.TomlPath, Any]]) -> Iterator[str]:
     """Yield what is wrong with standard deviations and their places."""
     paths = [path for path, _ in given]
     for path, value in dict(given).items():
-        name = f"[{UNCERTAINTY}] {dotted_key(path)}"
+        name = f"[{sections.UNCERTAINTY}] {wording.dotted_key(path)}"
         if paths.count(path) > 1:
             yield f"{name}: its standard deviation is given twice"
-        if not is_number(value) or value <= 0:
-            words = f"expected a standard deviation above 0{magnitudes_in_words(value)}"
-            yield f"{name} = {toml_value(value)}: {words}"
+        if not types.is_number(value) or value <= 0:
+            words = f"expected a standard deviation above 0{types.magnitudes_in_words(value)}"
+            yield f"{name} = {wording.toml_value(value)}: {words}"
         elif number_at(document, path) is None:
             yield f"{name}: expected a key of the case whose value is a number"
 
@@ -97,15 +96,18 @@ def _pair_faults(pairs: Any, named: Mapping[str, Any]) -> Iterator[str]:
     for pair in pairs if isinstance(pairs, list) else [pairs]:
         is_triple = isinstance(pair, list) and len(pair) == len(("KEY", "KEY", "VALUE"))
         names = frozenset(map(str, pair[:2])) if is_triple else frozenset[str]()
-        if len(names & named.keys()) != 2 or not is_number(pair[2]) or abs(pair[2]) > 1:
-            yield f"[{UNCERTAINTY}] {CORRELATION} = {toml_value(pair)}: {words}"
+        place = f"[{sections.UNCERTAINTY}] {sections.CORRELATION} = {wording.toml_value(pair)}"
+        if len(names & named.keys()) != 2 or not types.is_number(pair[2]) or abs(pair[2]) > 1:
+            yield f"{place}: {words}"
         elif names in known:
-            yield f"[{UNCERTAINTY}] {CORRELATION} = {toml_value(pair)}: this pair is given twice"
+            yield f"{place}: this pair is given twice"
         else:
             known.add(names)
 
 
-def _means(value: Any, path: TomlPath, given: list[tuple[TomlPath, Any]], faults: list[str]) -> Any:
+def _means(
+    value: Any, path: toml_files.TomlPath, given: list[tuple[toml_files.TomlPath, Any]], faults: list[str]
+) -> Any:
     """Return a value with the means for uncertain numbers; their deviations are appended to `given`."""
     if isinstance(value, list):
         numbers = [()] if len(value) == 1 else [(str(k + 1),) for k in range(len(value))]
@@ -116,9 +118,9 @@ def _means(value: Any, path: TomlPath, given: list[tuple[TomlPath, Any]], faults
         return {name: _means(item, (*path, name), given, faults) for name, item in value.items()}
     deviation = _deviation(value)
     if len(path) == 1:
-        faults.append(f"{path[0]} = {toml_value(value)}: expected no number")
+        faults.append(f"{path[0]} = {wording.toml_value(value)}: expected no number")
     elif deviation is None:
-        faults.append(f"[{dotted_key(path[:-1])}] {path[-1]} = {toml_value(value)}: {EXPECTED}")
+        faults.append(f"[{wording.dotted_key(path[:-1])}] {path[-1]} = {wording.toml_value(value)}: {EXPECTED}")
     else:
         entry = (_named(path), deviation)
         # A pair of entries of a symmetric stiffness is one number.
@@ -126,12 +128,12 @@ def _means(value: Any, path: TomlPath, given: list[tuple[TomlPath, Any]], faults
     return value["mean"]
 
 
-def _named(path: TomlPath) -> TomlPath:
+def _named(path: toml_files.TomlPath) -> toml_files.TomlPath:
     """Return the path to a stiffness row and column by entry name, as for its derivatives."""
     return (*path[:-2], "C" + "".join(sorted(path[-2:]))) if path[-3:-2] == (STIFFNESS,) else path
 
 
-def _in_lists(path: TomlPath) -> TomlPath:
+def _in_lists(path: toml_files.TomlPath) -> toml_files.TomlPath:
     """Return the path to a stiffness entry Cij with its row and column."""
     result = re.fullmatch(r"C([1-6])([1-6])", path[-1]) if path[-2:-1] == (STIFFNESS,) else None
     return path if result is None else (*path[:-1], *result.groups())
@@ -139,19 +141,21 @@ def _in_lists(path: TomlPath) -> TomlPath:
 
 def _deviation(value: Mapping[str, Any]) -> float | None:
     """Return the standard deviation from {mean, std} or {mean, cv}; None if it is faulty."""
-    if value.keys() not in ({"mean", "std"}, {"mean", "cv"}) or not all(map(is_number, value.values())):
+    if value.keys() not in ({"mean", "std"}, {"mean", "cv"}) or not all(map(types.is_number, value.values())):
         return None
     spread = value["std"] if "std" in value else value["cv"] * abs(value["mean"])
     return float(spread) if spread > 0 else None
 
 
-def number_at(document: Mapping[str, Any], path: TomlPath) -> float | None:
+def number_at(document: Mapping[str, Any], path: toml_files.TomlPath) -> float | None:
     """Return the number at a place of the case; None for other values, and in a section that stands several times."""
     result = _at(document, _in_lists(path))
-    return float(result) if is_number(result) else None
+    return float(result) if types.is_number(result) else None
 
 
-def with_number(document: Mapping[str, Any], path: TomlPath, value: float) -> tuple[TomlPath, Any]:
+def with_number(
+    document: Mapping[str, Any], path: toml_files.TomlPath, value: float
+) -> tuple[toml_files.TomlPath, Any]:
     """Return a number's key and another value for it; for one in a list the list's key and value."""
     full = _in_lists(path)
     for k in range(1, len(full)):
@@ -166,7 +170,7 @@ def with_number(document: Mapping[str, Any], path: TomlPath, value: float) -> tu
     return path, value
 
 
-def _at(document: Any, path: TomlPath) -> Any:
+def _at(document: Any, path: toml_files.TomlPath) -> Any:
     result = document
     for name in path:
         result = result[0] if isinstance(result, list) and len(result) == 1 else result

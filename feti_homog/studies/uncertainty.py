@@ -18,18 +18,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from feti_homog.case.toml_files import TomlPath, read_document, to_document
-from feti_homog.case.sections import DIFFERENTIABLE, SWEEP, UNCERTAINTY
+from feti_homog.case import sections, toml_files
 from feti_homog.errors import CaseError
-from feti_homog.report.text.constant_tables import mesh_errors, shown
-from feti_homog.report.text.tables import Column, Table, with_unit, without_noise
-from feti_homog.schema.wording import toml_value
+from feti_homog.report.text import constant_tables, tables
+from feti_homog.schema import wording
 from feti_homog.studies.axes import Assignment, read_points
 from feti_homog.studies.predictions import Datum, exact_derivatives, responses
 from feti_homog.studies.study import SILENT, Evaluator, Study
 from feti_homog.studies.sweep_cases import Sweep, cases_at
 from feti_homog.studies.uncertain_numbers import SECTIONS, Uncertainty, number_at, read_uncertainty, with_number
-from feti_homog.system.parallel.mpi_errors import on_root
+from feti_homog.system.parallel import mpi_errors
 from feti_homog.typing import Float
 
 if TYPE_CHECKING:
@@ -52,7 +50,7 @@ class ScatterStudy(Study):
     def cases(self, points: Sequence[Assignment], **output: bool) -> Sweep:
         """Return the cases at some values, every realisation of each. Raises CaseError with their faults."""
         document = {**self.document, "output": self.document["output"] | output}
-        return cases_at(document, points, self.folder, self.realisations, section=UNCERTAINTY)
+        return cases_at(document, points, self.folder, self.realisations, section=sections.UNCERTAINTY)
 
     def first_cases(self) -> Sweep:
         return self.cases([{}])
@@ -72,10 +70,10 @@ class ScatterStudy(Study):
 
     def answer(self, evaluator: Evaluator) -> dict[str, Any]:
         comm = evaluator.comm
-        means = evaluator.results("means", on_root(comm, self.first_cases))
-        inexact = on_root(comm, self._inexact, means)
-        ends = evaluator.results("differences", on_root(comm, self.differing, inexact)) if inexact else []
-        return on_root(comm, self._content, means, inexact, ends)
+        means = evaluator.results("means", mpi_errors.on_root(comm, self.first_cases))
+        inexact = mpi_errors.on_root(comm, self._inexact, means)
+        ends = evaluator.results("differences", mpi_errors.on_root(comm, self.differing, inexact)) if inexact else []
+        return mpi_errors.on_root(comm, self._content, means, inexact, ends)
 
     def text(self, document: Mapping[str, Any]) -> str:
         return text(document)
@@ -129,17 +127,17 @@ class ScatterStudy(Study):
 
 def load(path: Path) -> ScatterStudy:
     """Return the study of a file. Raises CaseError with its faults."""
-    return parse(read_document(path), path.parent)
+    return parse(toml_files.read_document(path), path.parent)
 
 
 def parse(values: Mapping[str, Any], folder: Path) -> ScatterStudy:
     """Return the study of nested dictionaries. Raises CaseError as `load`."""
-    document, faults = {"name": "case", **to_document(values)}, list[str]()
-    realisations = _realisations(document.pop(SWEEP, None), faults)
+    document, faults = {"name": "case", **toml_files.to_document(values)}, list[str]()
+    realisations = _realisations(document.pop(sections.SWEEP, None), faults)
     uncertainty = read_uncertainty(document, faults)
     output = document.setdefault("output", {})
     if not isinstance(output, dict):
-        faults.append(f"output = {toml_value(output)}: expected a section [output]")
+        faults.append(f"output = {wording.toml_value(output)}: expected a section [output]")
     if not uncertainty.std and not faults:
         faults.append("expected KEY = {mean, std} in place of some number")
     if faults:
@@ -147,7 +145,9 @@ def parse(values: Mapping[str, Any], folder: Path) -> ScatterStudy:
     output |= SILENT
     case = cases_at(document, [{}], folder).cases[0]
     places = {name.partition(".")[0] for name in uncertainty.std}
-    if case.analysis.type in DIFFERENTIABLE and (places & {*SECTIONS} or "cell.fibre_fraction" in uncertainty.std):
+    if case.analysis.type in sections.DIFFERENTIABLE and (
+        places & {*SECTIONS} or "cell.fibre_fraction" in uncertainty.std
+    ):
         output["sensitivities"] = True
     means = {name: number_at(document, _path(name)) or 0.0 for name in uncertainty.std}
     study = ScatterStudy(document, folder, uncertainty, means, realisations)
@@ -158,18 +158,22 @@ def parse(values: Mapping[str, Any], folder: Path) -> ScatterStudy:
 
 def is_study(values: Mapping[str, Any]) -> bool:
     """Return whether a document has uncertain numbers."""
-    document = to_document(values)
-    return UNCERTAINTY in document or bool(read_uncertainty(document, []).std)
+    document = toml_files.to_document(values)
+    return sections.UNCERTAINTY in document or bool(read_uncertainty(document, []).std)
 
 
 def _realisations(table: object, faults: list[str]) -> int | None:
     """Return the realisations in a section [sweep], which may have nothing else."""
     if not isinstance(table, dict):
-        faults += [] if table is None else [f"{SWEEP} = {toml_value(table)}: expected a section [{SWEEP}]"]
+        faults += (
+            []
+            if table is None
+            else [f"{sections.SWEEP} = {wording.toml_value(table)}: expected a section [{sections.SWEEP}]"]
+        )
         return None
     points, settings = read_points(table, faults)
     if not faults and any(points):
-        faults.append(f"[{SWEEP}]: expected realisations alone")
+        faults.append(f"[{sections.SWEEP}]: expected realisations alone")
     return settings.realisations
 
 
@@ -182,11 +186,11 @@ def _faults_of_ends(study: ScatterStudy) -> Iterator[str]:
         try:
             study.differing([name])
         except CaseError as error:
-            place = f"[{UNCERTAINTY}] {name} = {study.means[name]:g} +- {std:g}"
+            place = f"[{sections.UNCERTAINTY}] {name} = {study.means[name]:g} +- {std:g}"
             yield from (f"{place}: {fault}" for fault in error.faults)
 
 
-def _path(name: str) -> TomlPath:
+def _path(name: str) -> toml_files.TomlPath:
     return tuple(name.split("."))
 
 
@@ -204,7 +208,7 @@ def _values(documents: Documents, data: Sequence[Datum]) -> Float:
 
 def _mesh_error(documents: Documents, name: str) -> float | None:
     """Return the mean estimated error of a constant; None without an estimate."""
-    errors = [mesh_errors(document).get(name) for document in documents]
+    errors = [constant_tables.mesh_errors(document).get(name) for document in documents]
     return None if None in errors else float(np.mean(np.array(errors, float)))
 
 
@@ -215,10 +219,10 @@ def text(document: Mapping[str, Any]) -> str:
     heads["+- mesh"] = "mesh_error"
     results, labels = _scattered(document), [number["name"].removeprefix("material.") for number in inputs]
     rows = [_row(result, document.get("stress_unit", ""), [*heads.values()]) for result in results]
-    columns = [Column("", -max([18, *(len(row[0]) for row in rows)]) - 2), *map(Column, heads)]
-    columns += [Column(label, max(12, len(label) + 2), ".1f") for label in labels]
+    columns = [tables.Column("", -max([18, *(len(row[0]) for row in rows)]) - 2), *map(tables.Column, heads)]
+    columns += [tables.Column(label, max(12, len(label) + 2), ".1f") for label in labels]
     title = "Scatter by uncertain numbers (std), and their shares of its variance (%)"
-    lines = Table(title, columns, rows).lines if rows else ["No result depends on the uncertain numbers."]
+    lines = tables.Table(title, columns, rows).lines if rows else ["No result depends on the uncertain numbers."]
     differing = ", ".join(number["name"] for number in inputs if number["by"] == "differences")
     lines = ["", *lines, f"By differences of runs: {differing or 'none'}"]
     for k, number in enumerate(inputs):
@@ -229,7 +233,7 @@ def text(document: Mapping[str, Any]) -> str:
 
 def _row(result: Mapping[str, Any], stress_unit: str, keys: Sequence[str]) -> list[Any]:
     numbers = ("-" if result[key] is None else result[key] for key in keys)
-    return [with_unit(result["name"], stress_unit), *numbers, *(100 * share for share in result["shares"])]
+    return [tables.with_unit(result["name"], stress_unit), *numbers, *(100 * share for share in result["shares"])]
 
 
 def _noisy(results: Documents, k: int) -> Iterator[str]:
@@ -243,11 +247,13 @@ def _scattered(document: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """Return results with more scatter than solver noise beside the largest of their kind."""
     results = document["results"]
     names = [result["name"] for result in results]
-    listed, sizes = {*(shown(names) if "C11" in names else names)}, dict[str, float]()
+    listed, sizes = {*(constant_tables.shown(names) if "C11" in names else names)}, dict[str, float]()
     for result in results:
         kind = result["name"].rstrip("0123456789")
         sizes[kind] = max(sizes.get(kind, 0.0), abs(result["value"]), result["std"])
     return [
-        result for result in results
-        if result["name"] in listed and without_noise(result["std"], sizes[result["name"].rstrip("0123456789")]) > 0
-    ]  # fmt: skip
+        result
+        for result in results
+        if result["name"] in listed
+        and tables.without_noise(result["std"], sizes[result["name"].rstrip("0123456789")]) > 0
+    ]

@@ -3,8 +3,6 @@
 A law is a class with the name that `case/bond_laws.py` gives it, here or in `softening`.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from importlib import import_module
@@ -12,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from feti_homog.case.bond_laws import DEFAULT, LAWS
+from feti_homog.case import bond_laws
 from feti_homog.typing import AnyInt, Bool, Float, Int
 from feti_homog.verify.reading import ResultFiles, State
 
@@ -142,7 +140,7 @@ def pulled(traction: Float) -> Float:
 
 def law_of(section: Mapping[str, Any]) -> BondLaw:
     """Law that a section [[interface]] names, or the default law."""
-    module, name = LAWS[section.get("criterion", DEFAULT)].implementation.split(".")
+    module, name = bond_laws.LAWS[section.get("criterion", bond_laws.DEFAULT)].implementation.split(".")
     home = import_module(f"{__package__}.{module if module == 'softening' else 'bonds'}")
     law: BondLaw = getattr(home, name)(section)
     return law

@@ -1,7 +1,5 @@
 """All laws on a result folder, if need be in a separate process, and the certificate as text."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.errors import CaseError
-from feti_homog.system.runtime.own_process import in_own_process
+from feti_homog.system.runtime import own_process
 from feti_homog.verify.check_constants import check_constants
 from feti_homog.verify.check_loads import StateNumbers, States, check_loads
 from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh, check_mesh_error, check_rates
@@ -62,7 +60,7 @@ class Certificate:
 
 def verify(directory: Path) -> Certificate:
     """Check the laws on all states of a result folder. Raises CaseError, one line, if it is unreadable."""
-    return in_own_process(directory, _verified) if altered(directory) else _verified(directory)
+    return own_process.in_own_process(directory, _verified) if altered(directory) else _verified(directory)
 
 
 def _verified(directory: Path) -> Certificate:

@@ -1,7 +1,5 @@
 """Laws of the summary in result.json: status, mesh counts, moduli, engineering constants, expansion, bounds."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.special import gammaln
 

@@ -3,8 +3,6 @@
 Element shares of the mesh error are compared with averages at nodes (Zienkiewicz and Zhu 1987).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

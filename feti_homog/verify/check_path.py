@@ -3,8 +3,6 @@
 Fields may be kept at some points only; the others in result.json obey the same laws of counts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Sensitivity law: field energies change as in the file where constants of the case change."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

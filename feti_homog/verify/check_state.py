@@ -1,7 +1,5 @@
 """Laws of one state: stresses, periodicity, equilibrium, averages; jumps, bonds, contact, friction."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from feti_homog.typing import Bool, Float, Int

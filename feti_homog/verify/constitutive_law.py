@@ -1,7 +1,5 @@
 """Stress from strain in each phase: the constants of the case, taken through the three-dimensional compliance."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -7,8 +7,6 @@ Written for the certificate alone, from barycentric coordinates r: N_a = r_a, or
 (isoparametric) sides.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache, cached_property

@@ -9,8 +9,6 @@ Solver.  The Krylov method leaves jumps of `rtol`, relative; laws for closed fac
 checks, min(1000 rtol, 1e-4).  `rtol` is written in the result, so 1e-4 is the most that any result may claim.
 """
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

@@ -17,8 +17,6 @@ cascade, and where a later leg is on a ray.  There the loss obeys an equation; e
 Between event points without breaks the response is straight, so the work is (Sigma + Sigma').(E' - E) / 2.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The files of a result as arrays: result.json with the resolved case, result.h5 with mesh, interface and states."""
 
-from __future__ import annotations
-
 import json
 import os
 import zlib

@@ -3,8 +3,6 @@
 K is the stiffness of a mode: K (delta_n^2 + delta_s^2) = k_n delta_n^2 + k_t delta_s^2.
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from functools import cached_property
 from itertools import count

@@ -1,7 +1,5 @@
 """Places of a torn mesh on the periodic cell: nodes and sides at one place, and the bodies that meet there."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -194,7 +194,7 @@ def test_a_rank_without_memory_ends_the_job(tmp_path, name):
 def test_a_rank_that_fails_while_meshing_ends_the_job(tmp_path, fault, code, words):
     case, out = tmp_path / "tiled.toml", tmp_path / "results"
     case.write_text(f"[cell]\n{TILED_CELL}\n\n" + BASE[BASE.index("[material.matrix]") :])
-    hook = Hook("feti_homog.homogenization.tile_tearing:fill", fault, rank=1)
+    hook = Hook("feti_homog.mesh.tiles.tile_filling:fill", fault, rank=1)
     job = hooked(2, [hook], "run", case, "--out", out)
     assert job.returncode == code if code else job.returncode != 0
     assert words in job.stderr and "Traceback" not in job.stderr

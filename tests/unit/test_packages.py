@@ -6,10 +6,11 @@ import ast
 import re
 
 import pytest
-from unit.test_architecture import PACKAGE, imported_names, name_of
+from unit.test_architecture import MODULES, PACKAGE, imported_names, name_of, nodes
 
 PACKAGES = {name_of(path).removesuffix("__init__").rstrip("."): path for path in PACKAGE.rglob("__init__.py")}
 DESCRIBED = sorted(set(PACKAGES) - {""})
+LARGEST_FACE = 12
 EVERYWHERE = {"errors", "typing", "version"}  # modules that every package may import
 
 
@@ -56,3 +57,25 @@ def test_main_entries_exist(package):
 def _targets(node: ast.stmt) -> list[str]:
     targets = [*getattr(node, "targets", []), getattr(node, "target", None)]
     return [target.id for target in targets if isinstance(target, ast.Name)]
+
+
+def test_packages_import_from_faces_alone():
+    """Other packages import the names in `__all__` of a package, or of one in it: modules, and a few classes."""
+    faces = {
+        package: set(ast.literal_eval(node.value))
+        for package, path in PACKAGES.items()
+        for node in nodes(path, ast.Assign, words="__all__")
+        if ast.unparse(node.targets[0]) == "__all__"
+    }
+    faces.pop("")
+    assert {name: len(face) for name, face in faces.items() if len(face) > LARGEST_FACE} == {}
+    packages = {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
+    hidden = {
+        f"{name_of(path)}: {name}"
+        for path in MODULES
+        for name in imported_names(path)
+        if name.split(".")[0] in packages - {name_of(path).split(".")[0]}
+        and name not in packages
+        and name.rpartition(".")[2] not in faces.get(name.rpartition(".")[0], ())
+    }
+    assert not {line for line in hidden if not line.startswith("__init__:")}

@@ -3,3 +3,5 @@
 Imports `fem`, `feti`, `feti.decomposition`, `feti.linalg`, `feti.operators`, `mesh` and `system`.  Main entries:
 `natural.NaturalCoarseSpace`, `adaptive.AdaptiveCoarseSpace` and `adaptive.Balanced`.
 """
+
+__all__ = ["natural"]

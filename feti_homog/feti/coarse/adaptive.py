@@ -19,20 +19,14 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix, diags
 
-from feti_homog.feti.coarse.geneo import (
-    AveragedModes,
-    kernels_and_soft_modes,
-    local_columns,
-    scaled_constraints,
-    subdomain_blocks,
-)
+from feti_homog.feti.coarse import geneo
 from feti_homog.feti.decomposition.interface_neighbours import Neighbours
 from feti_homog.feti.linalg.distributed_solver import DistributedSolver
 from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, scaled
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.preconditioners import Dirichlet, Preconditioner, StiffnessScaled, never_softens
 from feti_homog.feti.thresholds import COARSE_REGULARISATIONS, DEFAULTS, ROUNDED_MODE_ENERGY, UNCONSTRAINED, Thresholds
-from feti_homog.system.parallel.distributed_arrays import allreduce_sum, scale_rows
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.system.runtime import process_memory
 from feti_homog.typing import Float, Int
 
@@ -72,11 +66,11 @@ class AdaptiveCoarseSpace:
         self.comm, self.threshold = comm, threshold
         self._jump_operator, self._operators, self._scaling = jump_operator, operators, scaling
         self._neighbours = Neighbours(comm, jump_operator, operators.subdomains)
-        blocks = subdomain_blocks(operators, scaling, self._neighbours.rows)
-        V = kernels_and_soft_modes(blocks, self._neighbours, threshold, thresholds)
+        blocks = geneo.subdomain_blocks(operators, scaling, self._neighbours.rows)
+        V = geneo.kernels_and_soft_modes(blocks, self._neighbours, threshold, thresholds)
         process_memory.trim()
         self.counts = [v.shape[1] - b.R.shape[1] for v, b in zip(V, blocks, strict=True)]
-        self._modes = AveragedModes(comm, blocks, self._neighbours, V)
+        self._modes = geneo.AveragedModes(comm, blocks, self._neighbours, V)
         self.coarse_dimension = self._modes.total
         self.solver = DistributedSolver(comm, self.coarse_dimension, "feti_coarse_")
         self._columns = [np.searchsorted(self._modes.reaching, columns) for columns in self._modes.columns]
@@ -100,8 +94,8 @@ class AdaptiveCoarseSpace:
         mask = self._jump_operator.gather(active).copy()
         changed = mask != self._mask
         touched = [i for i, rows in enumerate(self._neighbours.rows) if changed[rows].any()]
-        BW = scaled_constraints(self._scaling)
-        of = [local_columns(BW, self._operators.slices[i], self._neighbours.rows[i]) for i in touched]
+        BW = geneo.scaled_constraints(self._scaling)
+        of = [geneo.local_columns(BW, self._operators.slices[i], self._neighbours.rows[i]) for i in touched]
         self._update(touched, of)
         self._mask = mask
         self.factor(self.part())
@@ -138,7 +132,7 @@ class AdaptiveCoarseSpace:
             return
         energies = np.zeros(self.coarse_dimension)
         energies[self._modes.reaching] = part.diagonal()
-        energy = allreduce_sum(self.comm, energies)[self._modes.reaching]
+        energy = distributed_arrays.allreduce_sum(self.comm, energies)[self._modes.reaching]
         if self._free_energy is None:
             largest = self.comm.allreduce(energy.max(initial=0.0), MPI.MAX)
             self._free_energy = UNCONSTRAINED * np.where(energy > ROUNDED_MODE_ENERGY * largest, energy, largest)
@@ -172,7 +166,9 @@ class AdaptiveCoarseSpace:
     def solve(self, work: Float) -> Float:
         """c with Z_0^T S Z_0 c = the sum over ranks of work, (u,) or (u, k) both.  Collective."""
         with self._solve_event:
-            return scale_rows(self._weights, self.solver.solve(scale_rows(self._weights, work)))
+            return distributed_arrays.scale_rows(
+                self._weights, self.solver.solve(distributed_arrays.scale_rows(self._weights, work))
+            )
 
     def _parts(self) -> zip[tuple[Int, Float, slice]]:
         """Return places of the modes that reach each subdomain, S Z_0, and where it is among the boundary dofs."""

@@ -12,22 +12,18 @@ Refinement hardly changes the soft modes of a subdomain, so a fine boundary is s
 space of enough dofs: P q for the values q at the vertices of the coarse mesh and at every k-th node along its edges.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from feti_homog.fem.problem import Problem
+from feti_homog.fem import Problem
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.linalg.dense_matrices import schur_complement
 from feti_homog.feti.operators.one_subdomain import ExplicitInterfaceOperator
 from feti_homog.feti.thresholds import DEFAULTS, MIN_FACE_NODES, Thresholds
-from feti_homog.mesh.periodic_topology import components, edge_pairs
-from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.mesh.submeshes import Submesh, part
+from feti_homog.mesh import ReferenceLattice, Submesh, periodic_topology, submeshes
 from feti_homog.typing import Bool, Float, Int
 
 
@@ -111,7 +107,7 @@ def face_neighbourhoods(
         is_near |= corners[classes[:, :3]].any(axis=1)
     triangles = np.flatnonzero(is_near)
     edges = body.submesh.edge_class[body.submesh.triangle_edges[triangles]]
-    label = components(len(triangles), *edge_pairs(edges))
+    label = periodic_topology.components(len(triangles), *periodic_topology.edge_pairs(edges))
     neighbourhoods = (
         _neighbourhood(body, dofs, triangles[label == k], on_face, on_others, thresholds.min_trace_dofs)
         for k in range(label.max() + 1)
@@ -125,7 +121,7 @@ def _neighbourhood(
     """Return the neighbourhood in coarse triangles if it has enough face nodes."""
     outside = np.zeros_like(on_face)
     outside[body.mesh.node_class[np.delete(body.mesh.nodes, triangles, axis=0)]] = True
-    piece = part(body.submesh, triangles)
+    piece = submeshes.part(body.submesh, triangles)
     subdomain = Subdomain.build(piece, body.mesh.lattice, body.L, body.problem, is_thin=body.is_thin, mixed=body.mixed)
     of_body = np.empty(subdomain.mesh.n_classes, np.int64)
     of_body[subdomain.mesh.node_class[subdomain.mesh.nodes]] = body.mesh.node_class[body.mesh.nodes[triangles]]

@@ -9,8 +9,6 @@ B Z_0 = 0, for B B_D^T = I, so they are displacements of the cell whose active r
 reaches the subdomains that share nodes with it, and no further.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -23,8 +21,7 @@ from feti_homog.feti.linalg.sparse_matrices import add_shared_rows
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.preconditioners import StiffnessScaled
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
-from feti_homog.system.parallel.distributed_arrays import allreduce_sum
-from feti_homog.system.parallel.mpi_errors import agree
+from feti_homog.system.parallel import distributed_arrays, mpi_errors
 from feti_homog.typing import Float, Float32, Int
 
 # Jumps B V that the modes of a subdomain, itself or a neighbour, open on subdomain rows: positions (r,) among the rows
@@ -81,7 +78,7 @@ class AveragedModes:
         amplitudes = np.zeros((self.total, comm.allreduce(c, MPI.MAX)))
         for first, s in zip(self._first, subdomains, strict=True):
             amplitudes[first : first + s.R.shape[1]] = np.stack([s.R[i::c].sum(axis=0) for i in range(c)], axis=1)
-        return np.asarray(allreduce_sum(comm, amplitudes)[self.reaching])
+        return np.asarray(distributed_arrays.allreduce_sum(comm, amplitudes)[self.reaching])
 
 
 def _exchange_jumps(
@@ -149,7 +146,7 @@ def kernels_and_soft_modes(
         MeshError: the neighbourhood of a face, on any rank, is no subdomain.
     """
     parts = list(zip(blocks, neighbours.common, strict=True))
-    problems = agree(neighbours.comm, lambda: [eigenproblem(*part, thresholds) for part in parts])
+    problems = mpi_errors.agree(neighbours.comm, lambda: [eigenproblem(*part, thresholds) for part in parts])
     # Of the neighbours' shares in M^-1 the rows that both have.
     received: list[list[tuple[int, Float32]]] = [[] for _ in blocks]
 

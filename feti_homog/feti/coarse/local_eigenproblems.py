@@ -10,8 +10,6 @@ share is no more than S_s, and the neighbour's share makes p stiff: so each face
 the Schur complement of the face's neighbourhood for S_s.  The eigenproblems are projected to trace spaces.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter

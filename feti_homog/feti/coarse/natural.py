@@ -12,8 +12,8 @@ from feti_homog.feti.linalg.distributed_solver import DistributedSolver
 from feti_homog.feti.linalg.sparse_matrices import assemble_owned_rows
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.thresholds import UNCONSTRAINED
-from feti_homog.mesh.periodic_topology import components
-from feti_homog.system.parallel.distributed_arrays import allreduce_sum
+from feti_homog.mesh import periodic_topology
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int
 
 
@@ -57,7 +57,7 @@ class NaturalCoarseSpace:
         columns = np.arange(first, first + modes)
         self.G = assemble_owned_rows(comm, operators.B @ self.R, jump_operator.rows, columns, (owned, modes))
         self.factorizations, self._active = 0, np.ones(owned)
-        self._diagonal = allreduce_sum(comm, np.asarray(self.G.power(2).sum(axis=0)).ravel())
+        self._diagonal = distributed_arrays.allreduce_sum(comm, np.asarray(self.G.power(2).sum(axis=0)).ravel())
         self.unconstrained_modes = self._no_motions = csc_matrix((self.kernel_dimension, 0))
         self._reaching = np.union1d(self.G.indices, columns).astype(np.int64)
         self.solver = DistributedSolver(comm, self.kernel_dimension, "feti_natural_")
@@ -147,7 +147,7 @@ class NaturalCoarseSpace:
         place = np.searchsorted(self.unknowns, np.arange(self.kernel_dimension)[self.owned_modes])
         amplitudes = np.zeros((self.kernel_dimension, *x.shape[1:]))
         amplitudes[self.owned_modes] = self.solve(self._GT @ x)[place]
-        return allreduce_sum(self.comm, amplitudes)
+        return distributed_arrays.allreduce_sum(self.comm, amplitudes)
 
     def solve(self, work: Float) -> Float:
         """(G^T G)^-1 times the sum over ranks of work, for the `unknowns`: (u,) or (u, k) both.  Collective."""
@@ -211,7 +211,7 @@ class GramMatrix:
         products = self._product[at] * np.repeat((active - self._active)[changed], count)
         self._own = self._own + np.bincount(self._entry[at], products, len(self._own))
         self._active = active.copy()
-        return allreduce_sum(self._comm, self._own)
+        return distributed_arrays.allreduce_sum(self._comm, self._own)
 
     def groups(self, some: Int) -> list[Int]:
         """Return the numbers `some` in groups that G^T G couples: of each size, (groups, size)."""
@@ -219,7 +219,7 @@ class GramMatrix:
         place[some] = np.arange(len(some))
         i, j = place[self._rows], place[self._columns]
         coupled = (i >= 0) & (j >= 0)
-        group = components(len(some), i[coupled], j[coupled])
+        group = periodic_topology.components(len(some), i[coupled], j[coupled])
         order, sizes = np.argsort(group, kind="stable"), np.bincount(group)
         starts = np.cumsum(sizes) - sizes
         return [some[order[starts[sizes == size][:, None] + np.arange(size)]] for size in np.unique(sizes)]

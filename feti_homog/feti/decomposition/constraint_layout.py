@@ -1,7 +1,5 @@
 """Rows and columns of the gluing constraints B on one rank, and their interface nodes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -11,8 +9,7 @@ from scipy.linalg import block_diag, helmert
 from scipy.sparse import coo_matrix, csr_matrix
 
 from feti_homog.feti.decomposition.shared_entities import SharedEntities, along, side_lengths
-from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, edge_node
-from feti_homog.mesh.submeshes import Submesh
+from feti_homog.mesh import FineMesh, ReferenceLattice, Submesh, refinement
 from feti_homog.typing import Bool, Float, Int
 
 
@@ -85,7 +82,7 @@ class ConstraintLayout:
             mine = np.flatnonzero(shared.sharer == submesh.index)
             key, is_edge = shared.key[entity[mine]], shared.is_edge[entity[mine]]
             place = np.searchsorted(submesh.edge_keys, key)
-            edge = edge_node(len(submesh.class_keys), place, np.ones_like(key), lattice)
+            edge = refinement.edge_node(len(submesh.class_keys), place, np.ones_like(key), lattice)
             self.base[mine] = offset + np.where(is_edge, edge, np.searchsorted(submesh.class_keys, key))
 
     @property

@@ -1,7 +1,5 @@
 """Subdomains that meet in constraints, and messages between them; interface nodes that lie beside each other."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 

@@ -16,12 +16,12 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from feti_homog.fem.problem import PLANE, Problem
+from feti_homog.fem import PLANE, Problem
 from feti_homog.feti.decomposition.constraint_layout import ConstraintLayout, Meshed, expand
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.linalg.sparse_matrices import assemble_owned_rows
 from feti_homog.feti.thresholds import KEPT_EXCHANGES
-from feti_homog.mesh.refinement import ReferenceLattice
+from feti_homog.mesh import ReferenceLattice
 from feti_homog.typing import Float, Int
 
 

@@ -1,7 +1,5 @@
 """Bodies cut into subdomains, and subdomains assigned to ranks."""
 
-from __future__ import annotations
-
 import heapq
 from dataclasses import dataclass
 
@@ -10,8 +8,8 @@ import pymetis
 from scipy.sparse import coo_matrix, csr_matrix
 
 from feti_homog.feti.thresholds import LENGTH_CLASSES, MAX_IMBALANCE, STRIP_SLACK, STRIP_WIDTHS
-from feti_homog.mesh.periodic_topology import Torus, components, renumber
-from feti_homog.system.parallel.dividing import balanced
+from feti_homog.mesh import Torus, periodic_topology
+from feti_homog.system.parallel import dividing
 from feti_homog.typing import Int
 
 
@@ -58,12 +56,12 @@ def halves(torus: Torus) -> Partition | None:
         strips.append((place - first) % m < ends[end])
     piece = min(strips, key=lambda strip: int((strip[tail] != strip[head]).sum())).astype(np.int64)
     together = piece[tail] == piece[head]
-    connected = components(len(piece), tail[together], head[together])
+    connected = periodic_topology.components(len(piece), tail[together], head[together])
     sizes = np.bincount(connected)
     main = [np.argmax(np.where(np.bincount(connected, piece) == sizes * k, sizes, 0)) for k in range(2)]
     piece ^= ~np.isin(connected, main)  # islands go to the half around them
     together = piece[tail] == piece[head]
-    is_whole = components(len(piece), tail[together], head[together]).max() == 1
+    is_whole = periodic_topology.components(len(piece), tail[together], head[together]).max() == 1
     return Partition(piece, np.arange(2)) if is_whole else None
 
 
@@ -92,9 +90,9 @@ def cut_into_pieces(torus: Torus, parts: Int, pieces: Int, longest: float, lengt
         piece[members[first[body] : first[body] + load[body]]] = _metis(graph, int(pieces[body]))
     key = parts * (piece.max(initial=0) + 1) + piece
     together = key[tail] == key[head]
-    connected = components(len(parts), tail[together], head[together])
+    connected = periodic_topology.components(len(parts), tail[together], head[together])
     # Numbered body by body, so that neighbours in number are neighbours in place.
-    return renumber(connected, np.lexsort((connected, piece, parts)))
+    return periodic_topology.renumber(connected, np.lexsort((connected, piece, parts)))
 
 
 def pieces_for_count(load: Int, count: int) -> Int:
@@ -137,7 +135,7 @@ def assign_ranks(load: Int, left: Int, right: Int, n_ranks: int) -> Int:
     Neighbours (left, right), in a row for each edge that they share, are on one rank as far as the loads stay even;
     some ranks get none if there are more ranks than subdomains.
     """
-    by_load = balanced(load, n_ranks)
+    by_load = dividing.balanced(load, n_ranks)
     if n_ranks == 1 or len(load) <= n_ranks:
         return by_load
     by_place = _metis(_graph(len(load), left, right, np.ones_like(left)), n_ranks, load)

@@ -5,8 +5,6 @@ subdomains needs k - 1 vector constraints.  It belongs to the rank of its last s
 others.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,10 +13,8 @@ from scipy.special import roots_legendre
 
 from feti_homog.errors import MeshError
 from feti_homog.feti.decomposition.sharers import Sharers, entity_code, find_sharers
-from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.mesh.submeshes import SubdomainTable, Submesh, SubmeshesOfRank
-from feti_homog.system.parallel.distributed_arrays import exchange
-from feti_homog.system.parallel.mpi_errors import agree
+from feti_homog.mesh import ReferenceLattice, Submesh, SubmeshesOfRank, submeshes
+from feti_homog.system.parallel import distributed_arrays, mpi_errors
 from feti_homog.typing import Array, Bool, Float, Int
 
 # Gauss points of one side of an element, on arcs that the mesh follows well.
@@ -48,7 +44,7 @@ def side_lengths(ends: Float, turn: Float, low: Float, order: int, side: float) 
     return np.asarray(np.stack(speeds, axis=1) * WEIGHTS @ SHARES[order].T * (side / 2))
 
 
-def breakable_pairs(submeshes: SubmeshesOfRank, table: SubdomainTable, pairs: Int, sharers: Sharers) -> Int:
+def breakable_pairs(submeshes: SubmeshesOfRank, table: submeshes.SubdomainTable, pairs: Int, sharers: Sharers) -> Int:
     """(n,) the interface of the two bodies that meet there.
 
     -1 where it never parts, where a third body meets them, and where they do not meet along one line.
@@ -66,7 +62,7 @@ def breakable_pairs(submeshes: SubmeshesOfRank, table: SubdomainTable, pairs: In
 def interface_geometry(
     comm: MPI.Intracomm,
     submeshes: SubmeshesOfRank,
-    table: SubdomainTable,
+    table: submeshes.SubdomainTable,
     pairs: Int,
     sharers: Sharers,
     lattice: ReferenceLattice,
@@ -96,7 +92,9 @@ def interface_geometry(
     vertices = ~sharers.is_edge
     scaled = sums[:, :2] * (sums[:, 2] / np.maximum(np.hypot(*sums[:, :2].T), 1e-300))[:, None]
     normals[vertices], precracked[vertices] = scaled[vertices, None], sums[vertices, 3] == 0
-    agree(comm, _check, submeshes, sharers.chosen(np.flatnonzero(can_part)), normals[can_part], sums[can_part])
+    mpi_errors.agree(
+        comm, _check, submeshes, sharers.chosen(np.flatnonzero(can_part)), normals[can_part], sums[can_part]
+    )
     return normals, turns, precracked
 
 
@@ -127,7 +125,7 @@ def _sums_at_vertices(comm: MPI.Intracomm, sharers: Sharers, owner: Int, ends: I
     is_entity = np.isin(code, ordered)
     at = np.stack(np.broadcast_arrays(edge[:, None], np.arange(2)), axis=-1)
     to = owner[order[np.searchsorted(ordered, code[is_entity])]]
-    code, at, parts = exchange(comm, to, code[is_entity], at[is_entity], parts[is_entity])
+    code, at, parts = distributed_arrays.exchange(comm, to, code[is_entity], at[is_entity], parts[is_entity])
     sums = np.zeros((len(order), parts.shape[1]))
     # Rounding depends on the order, which is that of the edges on any number of ranks.
     sequence = np.lexsort(at.T)
@@ -201,7 +199,11 @@ class SharedEntities(Sharers):
 
 
 def share_entities(
-    comm: MPI.Intracomm, submeshes: SubmeshesOfRank, table: SubdomainTable, pairs: Int, lattice: ReferenceLattice
+    comm: MPI.Intracomm,
+    submeshes: SubmeshesOfRank,
+    table: submeshes.SubdomainTable,
+    pairs: Int,
+    lattice: ReferenceLattice,
 ) -> SharedEntities:
     """Return the shared entities of this rank; constraints are numbered rank by rank. Collective.
 
@@ -224,7 +226,9 @@ def share_entities(
     mine = (owner == comm.rank)[entity]
     to = np.unique(entity[mine] * comm.size + rank[mine])
     entity, to = to // comm.size, to % comm.size
-    code, *received = exchange(comm, to, sharers.code[entity], *(column[entity] for column in (numbers, *geometry)))
+    code, *received = distributed_arrays.exchange(
+        comm, to, sharers.code[entity], *(column[entity] for column in (numbers, *geometry))
+    )
     place = np.argsort(code)
     place = place[np.searchsorted(code[place], sharers.code)]
     first, normal, turn, precracked = (column[place] for column in received)

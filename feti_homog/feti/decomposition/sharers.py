@@ -11,9 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.mesh.submeshes import SubdomainTable, SubmeshesOfRank
-from feti_homog.system.parallel.distributed_arrays import exchange
-from feti_homog.system.parallel.dividing import ranges
+from feti_homog.mesh import SubmeshesOfRank, submeshes
+from feti_homog.system.parallel import distributed_arrays, dividing
 from feti_homog.typing import Bool, Int
 
 
@@ -51,7 +50,7 @@ class Sharers:
     def chosen(self, which: Int) -> Sharers:
         """Return the entities of these numbers (k,), in that order."""
         copies = self.copies[which]
-        sharer = self.sharer[ranges(self.pointer[which], copies)]
+        sharer = self.sharer[dividing.ranges(self.pointer[which], copies)]
         return Sharers(self.key[which], self.is_edge[which], np.r_[0, np.cumsum(copies)], sharer)
 
 
@@ -60,13 +59,13 @@ def entity_code(key: Int, is_edge: Bool | bool) -> Int:
     return np.asarray(2 * key + is_edge)
 
 
-def find_sharers(comm: MPI.Intracomm, submeshes: SubmeshesOfRank, table: SubdomainTable) -> Sharers:
+def find_sharers(comm: MPI.Intracomm, submeshes: SubmeshesOfRank, table: submeshes.SubdomainTable) -> Sharers:
     """Return the vertex classes, but for the pinned one, and the torus edges that subdomains share. Collective.
 
     Several subdomains share each, one on this rank at least.
     """
     code, subdomain = _to_send(submeshes)
-    code, subdomain = exchange(comm, code // 2 % comm.size, code, subdomain)
+    code, subdomain = distributed_arrays.exchange(comm, code // 2 % comm.size, code, subdomain)
     order = np.lexsort((subdomain, table.nesting[table.body[subdomain]], code))
     code, subdomain = code[order], subdomain[order]
     _, entity, copies = np.unique(code, return_inverse=True, return_counts=True)
@@ -77,9 +76,9 @@ def find_sharers(comm: MPI.Intracomm, submeshes: SubmeshesOfRank, table: Subdoma
     entity = np.repeat(np.arange(len(code)), copies)
     pairs = np.unique(entity * comm.size + table.rank[subdomain])
     entity, to = pairs // comm.size, pairs % comm.size
-    code, count = exchange(comm, to, code[entity], copies[entity])
-    whose = ranges(first[entity], copies[entity])
-    (sharer,) = exchange(comm, np.repeat(to, copies[entity]), subdomain[whose])
+    code, count = distributed_arrays.exchange(comm, to, code[entity], copies[entity])
+    whose = dividing.ranges(first[entity], copies[entity])
+    (sharer,) = distributed_arrays.exchange(comm, np.repeat(to, copies[entity]), subdomain[whose])
     sharers = Sharers(code // 2, code % 2 == 1, np.r_[0, np.cumsum(count)], sharer)
     return sharers.chosen(np.lexsort((sharers.key, sharers.is_edge)))
 

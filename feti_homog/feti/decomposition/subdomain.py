@@ -8,13 +8,9 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from feti_homog.errors import MeshError
-from feti_homog.fem.assembly import Mixed, assemble, void_integrals
-from feti_homog.fem.bubble import lame
-from feti_homog.fem.problem import PLANE, Problem
+from feti_homog.fem import PLANE, Problem, assembly, bubble
 from feti_homog.feti.thresholds import KERNEL_TOLERANCE, LEAST_ORDERED_DOFS, SCALED_LAME
-from feti_homog.mesh.mesh_fibres import unwrap
-from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, elimination_order, refine
-from feti_homog.mesh.submeshes import Submesh
+from feti_homog.mesh import FineMesh, ReferenceLattice, Submesh, mesh_fibres, refinement
 from feti_homog.typing import Float, Int
 
 
@@ -56,7 +52,7 @@ class Subdomain:
     _built_stiffness: csr_matrix | None = field(repr=False)
     is_thin: bool = False
     is_outer: bool = False
-    mixed: Mixed = False
+    mixed: assembly.Mixed = False
 
     @classmethod
     def build(
@@ -66,7 +62,7 @@ class Subdomain:
         laws: Float,
         problem: Problem = PLANE,
         material: Int | None = None,
-        mixed: Mixed = False,
+        mixed: assembly.Mixed = False,
         **flags: bool,
     ) -> Subdomain:
         """Refine and assemble, without communication; `flags` are `is_thin` and `is_outer`.
@@ -76,7 +72,7 @@ class Subdomain:
         Raises:
             MeshError: an element is inverted, or the rigid-body modes are not in the kernel of K.
         """
-        mesh = refine(submesh, lattice)
+        mesh = refinement.refine(submesh, lattice)
         # Bending towards the circles may turn triangles over.
         triangles = mesh.nodes[mesh.curved][:, mesh.lattice.triangles[:, :3]].reshape(-1, 3)
         a, b, c = (mesh.points[triangles[:, k]] for k in range(3))
@@ -99,12 +95,12 @@ class Subdomain:
         laws: Float,
         problem: Problem,
         material: Int | None = None,
-        mixed: Mixed = False,
+        mixed: assembly.Mixed = False,
         **flags: bool,
     ) -> Subdomain:
         """Assemble on a refined mesh, without communication.  Arguments and errors as of `build`."""
-        body = assemble(mesh, laws, problem, mixed, material)
-        shift, closes = unwrap(submesh)
+        body = assembly.assemble(mesh, laws, problem, mixed, material)
+        shift, closes = mesh_fibres.unwrap(submesh)
         positions = np.empty((mesh.n_classes, 2))
         positions[mesh.node_class[mesh.nodes]] = mesh.points[mesh.nodes] + shift[:, None]
         R = kernel(problem, positions, closes, submesh.pinned)
@@ -133,7 +129,7 @@ class Subdomain:
         """
         m, slopes = self.problem.strains, self.slopes
         if self.submesh.at_void.any():
-            slopes = slopes + void_integrals(self.submesh, self.mesh)
+            slopes = slopes + assembly.void_integrals(self.submesh, self.mesh)
         return np.asarray((slopes @ np.concatenate(np.eye(m)[self.problem.voigt], axis=1)).reshape(-1, m)[dofs])
 
     @property
@@ -179,7 +175,7 @@ class Subdomain:
         """
         if not self.is_mixed or self.material is not None:
             return 1.0
-        first, shear = lame(self.L)
+        first, shear = bubble.lame(self.L)
         return (min(first, SCALED_LAME * shear) + 3 * shear) / (first + 3 * shear)
 
     def elimination_order(self) -> Int | None:
@@ -188,7 +184,7 @@ class Subdomain:
         It does where all nodes are coarse nodes, for then all triangles are to be halved.
         """
         pays = self.n_dofs >= LEAST_ORDERED_DOFS and self.mesh.lattice.intervals > 1
-        return self.problem.dofs(elimination_order(self.mesh)) if pays else None
+        return self.problem.dofs(refinement.elimination_order(self.mesh)) if pays else None
 
     def take_stiffness(self) -> csr_matrix:
         """(cn, cn) K, which belongs to the caller: the one of `build` at first, then one assembled anew."""
@@ -197,7 +193,7 @@ class Subdomain:
 
     def assemble_stiffness(self) -> csr_matrix:
         """(cn, cn) K, Eq. (28), the pinned class (15) eliminated by a unit row scaled like the others."""
-        body = assemble(self.mesh, self.laws, self.problem, self.mixed, self.material)
+        body = assembly.assemble(self.mesh, self.laws, self.problem, self.mixed, self.material)
         return _pinned(body.K, self.problem, self.submesh.pinned)
 
     def fixing(self, K: csr_matrix, candidates: Int) -> tuple[Int, Float]:

@@ -3,3 +3,5 @@
 Imports `feti`, `feti.decomposition`, `feti.linalg`, `feti.operators` and `system`.  Main entries:
 `exact_inverse.ExactInverse` and `reference_cell.BondedInverse`.
 """
+
+__all__ = ["exact_inverse"]

@@ -1,7 +1,5 @@
 """The cell with the bonds of its active rows, on its shared nodes: u = Z y with B Z = 0 on these rows."""
 
-from __future__ import annotations
-
 import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csr_matrix, diags, hstack
@@ -12,8 +10,8 @@ from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, allreduce_spar
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.with_springs import is_dense
 from feti_homog.feti.thresholds import DEFAULTS, DENSE_SHARE
-from feti_homog.system.parallel.distributed_arrays import share_columns
-from feti_homog.system.petsc.options_database import choices
+from feti_homog.system.parallel import distributed_arrays
+from feti_homog.system.petsc import options_database
 from feti_homog.typing import Float
 
 # Entries of Z, which are cosines of angles or their products, that rounding leaves of zero.
@@ -49,7 +47,7 @@ class AssembledSchur:
         """
         right = -self._ZT @ forces
         self.comm.Allreduce(MPI.IN_PLACE, right)
-        return np.asarray(self._Z @ share_columns(self.comm, self._solver.solve, right))
+        return np.asarray(self._Z @ distributed_arrays.share_columns(self.comm, self._solver.solve, right))
 
     def destroy(self) -> None:
         """Free the factor."""
@@ -68,7 +66,11 @@ def assembled_stiffness(operators: InterfaceOperators, active: Float) -> tuple[c
     comm, Z = operators.comm, _released(operators, active)
     size, columns = Z.shape[1], [np.unique(Z[span].indices) for span in operators.slices]
     entries = comm.allreduce(sum(len(of) ** 2 for of in columns))
-    is_full = entries >= DENSE_SHARE * size**2 and size <= DEFAULTS.dense_boundary_dofs and not choices("feti_bonded_")
+    is_full = (
+        entries >= DENSE_SHARE * size**2
+        and size <= DEFAULTS.dense_boundary_dofs
+        and not options_database.choices("feti_bonded_")
+    )
     dense, blocks = np.zeros((size, size) if is_full else (0, 0)), DenseBlockSum((size, size))
     for operator, span, of in zip(operators.with_springs, operators.slices, columns, strict=True):
         if not is_dense(operator):

@@ -10,28 +10,18 @@ of compliance, is factored in its place.  Where changes cannot be followed, for 
 factored too, and its response is followed from there.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from petsc4py import PETSc
 
 from feti_homog.errors import CaseError
+from feti_homog.feti import thresholds
 from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.feti.exact.followed_response import FollowedResponse
 from feti_homog.feti.exact.reference_cell import BodyTies, ReferenceCell, one_sided_jumps, stiffness_of_rows
 from feti_homog.feti.exact.reference_changes import ReferenceChanges
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.preconditioners import Preconditioner
-from feti_homog.feti.thresholds import (
-    FOLLOWED_COLUMNS,
-    INFLUENCE_BATCH,
-    INFLUENCE_COLUMNS,
-    LEAST_FOLLOWED_PIVOT,
-    MOST_ASYMMETRY,
-    NEVER_REFACTORED_ROWS,
-    NORM_MARGIN,
-)
-from feti_homog.system.parallel.distributed_arrays import scale_rows
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.system.runtime import process_memory
 from feti_homog.typing import Bool, Float, Int
 
@@ -62,7 +52,11 @@ class ExactInverse(Preconditioner):
             CaseError: the option has no such value.
         """
         comm, jump_operator = operators.comm, operators.jump_operator
-        max_changes = NEVER_REFACTORED_ROWS if jump_operator.global_rows <= NEVER_REFACTORED_ROWS else INFLUENCE_COLUMNS
+        max_changes = (
+            thresholds.NEVER_REFACTORED_ROWS
+            if jump_operator.global_rows <= thresholds.NEVER_REFACTORED_ROWS
+            else thresholds.INFLUENCE_COLUMNS
+        )
         max_changes = PETSc.Options("feti_").getInt("influence_columns", max_changes)
         if max_changes < 1:
             raise CaseError(f"-feti_influence_columns {max_changes}: expected a whole number above 0")
@@ -73,15 +67,15 @@ class ExactInverse(Preconditioner):
         self._one_sided = one_sided_jumps(operators)
         self._ties = BodyTies(comm, jump_operator)
         self.neighbours = InterfaceNeighbours(comm, jump_operator, operators.subdomains)
-        self.batch = INFLUENCE_BATCH * comm.size
-        self.most_followed = min(max(FOLLOWED_COLUMNS, 2 * max_changes), jump_operator.global_rows)
+        self.batch = thresholds.INFLUENCE_BATCH * comm.size
+        self.most_followed = min(max(thresholds.FOLLOWED_COLUMNS, 2 * max_changes), jump_operator.global_rows)
         self.factorizations = 0
         # Of the present state active rows and what springs gained; the latter from the next `activate` on.
         self._active, self._more = np.ones(self._rows), np.zeros(self._rows)
         self._next = self._more
         self._restart()
         # Rows that leave make H smaller.
-        self.norm = NORM_MARGIN * self.reference.largest_eigenvalue()
+        self.norm = thresholds.NORM_MARGIN * self.reference.largest_eigenvalue()
 
     def soften(self, more: Float) -> None:
         """Let springs have `more` compliance (owned rows,) than at first, from the next `activate` on."""
@@ -89,7 +83,7 @@ class ExactInverse(Preconditioner):
 
     def activate(self, active: Float) -> None:
         """Restrict to the rows where `active` is 1.  Collective."""
-        if not self._follow(active, self._next, LEAST_FOLLOWED_PIVOT):
+        if not self._follow(active, self._next, thresholds.LEAST_FOLLOWED_PIVOT):
             self._active, self._more = active, self._next
             self._restart()
 
@@ -170,7 +164,9 @@ class ExactInverse(Preconditioner):
             rows = np.union1d(rows, self._followed.pins)
             self._add(self._followed.lacking(rows), self._changes(), rows, np.inf)
 
-    def _add(self, rows: Int, changes: ReferenceChanges, needed: Int, max_error: float = MOST_ASYMMETRY) -> bool:
+    def _add(
+        self, rows: Int, changes: ReferenceChanges, needed: Int, max_error: float = thresholds.MOST_ASYMMETRY
+    ) -> bool:
         """Follow columns of global rows (k,) too, unless followed ones are asymmetric with them.  Collective."""
         if not len(rows):
             return True
@@ -208,16 +204,16 @@ class ExactInverse(Preconditioner):
     def apply(self, r: Float) -> Float:
         """H r for r (owned rows,) or (owned rows, k); 0 on inactive rows.  Collective."""
         z = self._up_to_date().refined(self._of_reference(r if r.ndim == 2 else r[:, None]))
-        return scale_rows(self._active, z.reshape(r.shape))
+        return distributed_arrays.scale_rows(self._active, z.reshape(r.shape))
 
     def _of_reference(self, g: Float) -> Float:
         """(owned rows, k) Gamma g_A + g_R: jumps of rows that are not active stay.  Collective."""
-        at_rest = scale_rows(1.0 - self.reference.active, g)
-        return self.reference.respond(scale_rows(self.reference.active, g)) + at_rest
+        at_rest = distributed_arrays.scale_rows(1.0 - self.reference.active, g)
+        return self.reference.respond(distributed_arrays.scale_rows(self.reference.active, g)) + at_rest
 
     def multipliers(self, d: Float, E: Float) -> Float:
         """H d E, but for rounding, for d (owned rows, v), equal at every call, and E (v, k).  Collective."""
-        return scale_rows(self._active, self.renew_answer(d) @ E)
+        return distributed_arrays.scale_rows(self._active, self.renew_answer(d) @ E)
 
     def answer(self, d: Float, E: Float, free: int = 0) -> tuple[Float, Float] | None:
         """Multipliers H d E and jumps on inactive rows, (owned rows, k), with arguments as of `multipliers`.
@@ -231,7 +227,7 @@ class ExactInverse(Preconditioner):
             return None
         is_exact = self._followed.answer.shape[1] and not self._followed.had_pins
         U = (self._followed.answer if is_exact else self.renew_answer(d)) @ E
-        lam = scale_rows(self._active, U)
+        lam = distributed_arrays.scale_rows(self._active, U)
         return lam, U - lam
 
     def renew_answer(self, d: Float) -> Float:
@@ -242,7 +238,9 @@ class ExactInverse(Preconditioner):
         if self._answer is None:
             self._answer = self._of_reference(d)
         # Pins bear nothing, and stay.
-        self._followed.answer = scale_rows(1.0 - self._held + self._active, changes.refined(self._answer))
+        self._followed.answer = distributed_arrays.scale_rows(
+            1.0 - self._held + self._active, changes.refined(self._answer)
+        )
         return self._followed.answer
 
     def inverse_blocks(self, pairs: Int) -> Float:

@@ -19,22 +19,14 @@ ones, where it bears nothing and its jump, like the place of the body, is as goo
 come that resist the motion.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from mpi4py import MPI
 from scipy.linalg.blas import dgemm
 from scipy.linalg.lapack import dpstrf
 
+from feti_homog.feti import thresholds
 from feti_homog.feti.linalg.dense_matrices import product_with_some
-from feti_homog.feti.thresholds import (
-    FOLLOWED_SHARE,
-    LEAST_FOLLOWED_PIVOT,
-    RIGID_SHARE,
-    SINGULAR_PIVOT,
-    WAITING_COLUMNS,
-)
-from feti_homog.system.parallel.distributed_arrays import allreduce_sum, gather_rows
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Bool, Float, Int
 
 
@@ -61,8 +53,8 @@ class FollowedResponse:
         # Memory is taken when columns come.
         self._buffer = np.zeros((len(answer), capacity), order="F")
         # What is taken off at changes that wait, and its factors in the columns of the rows K that are kept.
-        self._waiting = np.zeros((len(answer), WAITING_COLUMNS), order="F")
-        self._factors = np.zeros((capacity, WAITING_COLUMNS))
+        self._waiting = np.zeros((len(answer), thresholds.WAITING_COLUMNS), order="F")
+        self._factors = np.zeros((capacity, thresholds.WAITING_COLUMNS))
         self._count = 0
 
     def lacking(self, rows: Int) -> Int:
@@ -78,7 +70,7 @@ class FollowedResponse:
         if len(self._rows) + more <= capacity:
             return
         # Some more at once, for the others move.
-        count = max(min(int(FOLLOWED_SHARE * capacity), capacity - more), 0)
+        count = max(min(int(thresholds.FOLLOWED_SHARE * capacity), capacity - more), 0)
         spared, is_useful = np.isin(self._rows, needed), useful[self._rows]
         order = np.lexsort([-self._used[: len(self._rows)], ~is_useful, ~spared])
         stay = np.sort(order[: max(count, int(spared.sum()))])
@@ -86,7 +78,7 @@ class FollowedResponse:
         self._slot[self._rows] = -1
         self._slot[rows] = np.arange(n)
         self._rows, self._used[:n] = rows, self._used[stay]
-        for part in np.array_split(np.arange(n), n // WAITING_COLUMNS + 1):
+        for part in np.array_split(np.arange(n), n // thresholds.WAITING_COLUMNS + 1):
             # Columns move to the left, so that none is lost.
             self._buffer[:, part] = self._buffer[:, stay[part]]
         self._factors[:n] = self._factors[stay]
@@ -113,7 +105,7 @@ class FollowedResponse:
         mine = np.flatnonzero((places >= 0) & (places < len(self._buffer)))
         places, entries = places[mine], np.zeros((len(rows), len(of)))
         entries[mine] = self._buffer[places[:, None], at] - self._waiting[places, :n] @ self._factors[at, :n].T
-        return allreduce_sum(self._comm, entries)
+        return distributed_arrays.allreduce_sum(self._comm, entries)
 
     def blocks(self, pairs: Int) -> Float:
         """(m, 2, 2) diagonal blocks of Gamma at global row pairs (m, 2), which have columns.  Collective.
@@ -129,7 +121,7 @@ class FollowedResponse:
         blocks = np.zeros((len(pairs), 2, 2))
         blocks[mine] = self._buffer[places[:, :, None], at[:, None, :]]
         blocks[mine] -= self._waiting[places, :n] @ self._factors[at, :n].transpose(0, 2, 1)
-        return allreduce_sum(self._comm, blocks)
+        return distributed_arrays.allreduce_sum(self._comm, blocks)
 
     def add(self, rows: Int, columns: Float) -> None:
         """Take the columns (owned rows, k) of these global rows (k,) in, for which there is room."""
@@ -139,7 +131,7 @@ class FollowedResponse:
         self._rows = np.concatenate([self._rows, rows])
         self._buffer[:, old:new], self._used[old:new] = columns, self._now
 
-    def follow(self, rows: Int, turned: Float, gained: Float, pivot: float = LEAST_FOLLOWED_PIVOT) -> bool:
+    def follow(self, rows: Int, turned: Float, gained: Float, pivot: float = thresholds.LEAST_FOLLOWED_PIVOT) -> bool:
         """Let the global rows (k,) leave (`turned` is 1), come (-1) or soften (0), their springs gain compliance (k,).
 
         All of them and the pins have columns.  False where pivots below `pivot` lose too many digits; then this is the
@@ -150,13 +142,13 @@ class FollowedResponse:
             self.pins = np.setdiff1d(self.pins, rows)
         stays = (turned == 0.0) | is_pin
         softer = np.flatnonzero(stays & (gained != 0.0))
-        parts = np.array_split(softer, len(softer) // WAITING_COLUMNS + 1)
+        parts = np.array_split(softer, len(softer) // thresholds.WAITING_COLUMNS + 1)
         if not all(self.soften(rows[some], gained[some], pivot) for some in parts if len(some)):
             return False
         # Rows come before others leave, so that fewer bodies are free meanwhile; half of the room is for pins.
         moves = np.flatnonzero(~stays)
         moves = moves[np.argsort(turned[moves], kind="stable")]
-        parts = np.array_split(moves, 2 * len(moves) // WAITING_COLUMNS + 1)
+        parts = np.array_split(moves, 2 * len(moves) // thresholds.WAITING_COLUMNS + 1)
         return all(self._exchange(rows[some], turned[some], gained[some], pivot) for some in parts if len(some))
 
     def soften(self, rows: Int, more: Float, pivot: float = 0.0) -> bool:
@@ -180,11 +172,11 @@ class FollowedResponse:
         columns, values = self._present(rows)
         # Pins that unit forces on rows that come press.
         forces = values[len(rows) :, : len(rows)][:, sign < 0.0]
-        if len(moved := self.pins[(np.abs(forces[self._slot[self.pins]]) > RIGID_SHARE).any(axis=1)]):
+        if len(moved := self.pins[(np.abs(forces[self._slot[self.pins]]) > thresholds.RIGID_SHARE).any(axis=1)]):
             rows, none = np.concatenate([rows, moved]), np.zeros(len(moved))
             sign, gained = np.concatenate([sign, none + 1.0]), np.concatenate([gained, none])
             columns, values = self._present(rows)
-        if (k := len(rows)) > WAITING_COLUMNS:
+        if (k := len(rows)) > thresholds.WAITING_COLUMNS:
             return False
         block = (values[:k, :k] + values[:k, :k].T) / 2 - np.diag(np.where(sign < 0.0, gained, 0.0))
         inverse = self._comm.bcast(_regular(block, sign, self._stiffness[rows], pivot))
@@ -228,7 +220,9 @@ class FollowedResponse:
         self._used[self._slot[rows]] = self._now
         columns = self.columns(rows)
         everywhere = np.concatenate([rows, self._rows])
-        return columns, gather_rows(self._comm, np.hstack([columns, self.answer]), self._first, everywhere)
+        return columns, distributed_arrays.gather_rows(
+            self._comm, np.hstack([columns, self.answer]), self._first, everywhere
+        )
 
     def _change(self, difference: Float, B: Float, values: Float) -> None:
         """Take `difference` B times the rows I off the answer, and later off all columns."""
@@ -238,7 +232,7 @@ class FollowedResponse:
         self._count += k
 
     def _make_room(self, k: int) -> None:
-        if self._count + k > WAITING_COLUMNS:
+        if self._count + k > thresholds.WAITING_COLUMNS:
             self._apply_waiting()
 
     def _apply_waiting(self) -> None:
@@ -259,15 +253,15 @@ def _regular(block: Float, sign: Float, stiffness: Float, pivot: float) -> tuple
     root = np.sqrt(np.maximum(np.where(sign > 0.0, stiffness, 1.0 / stiffness), np.abs(block.diagonal())))
     outer = np.outer(root, root)
     scaled, which = block / outer, np.arange(len(block))
-    if not _has_digits(scaled, LEAST_FOLLOWED_PIVOT):
+    if not _has_digits(scaled, thresholds.LEAST_FOLLOWED_PIVOT):
         come, leave = np.flatnonzero(sign < 0.0), np.flatnonzero(sign > 0.0)
         if not len(leave) or not _has_digits(scaled[come[:, None], come], pivot):
             return None
         across = scaled[come[:, None], leave]
         rest = scaled[leave[:, None], leave] - across.T @ np.linalg.solve(scaled[come[:, None], come], across)
-        factor, order, rank, _ = dpstrf(rest, tol=SINGULAR_PIVOT, lower=1)
+        factor, order, rank, _ = dpstrf(rest, tol=thresholds.SINGULAR_PIVOT, lower=1)
         # The first pivot is taken whatever it is.
-        rank = min(rank, int((factor.diagonal() ** 2 > SINGULAR_PIVOT).sum()))
+        rank = min(rank, int((factor.diagonal() ** 2 > thresholds.SINGULAR_PIVOT).sum()))
         which = np.concatenate([come, leave[order[:rank] - 1]])
         if not _has_digits(scaled[which[:, None], which], pivot):
             return None

@@ -9,8 +9,6 @@ the principal pivot transform of the dual operator, with F_AA^-1 the inverse on 
 positive semi-definite on A and negative definite on I.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csr_matrix
@@ -21,7 +19,7 @@ from feti_homog.feti.exact.spring_update import SpringUpdate
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.preconditioners import Preconditioner, never_softens
 from feti_homog.feti.thresholds import CHUNK_RANKS, INFLUENCE_BATCH, NORM_ITERATIONS, STIFF_FIBRES
-from feti_homog.system.parallel.distributed_arrays import allreduce_sum, scale_rows
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int
 
 # Bonds, each in all directions, that let no rigid-body motion pass between two bodies.
@@ -49,7 +47,9 @@ class BodyTies:
     def tied(self, active: Float) -> Float:
         """`active` (owned rows,) with all rows of the ties where fewer than two bonds hold two bodies.  Collective."""
         bonded = active[self._rows].prod(axis=1)
-        holding = allreduce_sum(self._comm, np.bincount(self._pair, bonded, len(self._ties)).astype(float))
+        holding = distributed_arrays.allreduce_sum(
+            self._comm, np.bincount(self._pair, bonded, len(self._ties)).astype(float)
+        )
         ties = self._ties[holding < HOLDING_BONDS].ravel()
         rows = self._rows[ties[(ties >= 0) & (ties < len(self._rows))]]
         tied = active.copy()
@@ -107,8 +107,8 @@ class ReferenceCell:
         moved = np.concatenate(
             [np.zeros(0), *(motion / (np.abs(motion).max(initial=0.0) or 1.0) for motion in motions)]
         )
-        jump = scale_rows(self.active, self._jump_operator.sum(self._operators.B @ moved))
-        force = scale_rows(self.active, self.respond(jump)) / stiffness
+        jump = distributed_arrays.scale_rows(self.active, self._jump_operator.sum(self._operators.B @ moved))
+        force = distributed_arrays.scale_rows(self.active, self.respond(jump)) / stiffness
         return float(self._comm.allreduce(np.abs(force).max(initial=0.0), MPI.MAX))
 
     def largest_eigenvalue(self) -> float:
@@ -116,11 +116,11 @@ class ReferenceCell:
         x = np.cos((self._first + np.arange(len(self.active))) ** 2.0)
         norm = 0.0
         for _ in range(NORM_ITERATIONS):
-            length = np.sqrt(allreduce_sum(self._comm, np.array([x @ x]))[0])
+            length = np.sqrt(distributed_arrays.allreduce_sum(self._comm, np.array([x @ x]))[0])
             if length == 0.0:
                 break
             x = self.respond(x / length)
-            norm = float(np.sqrt(allreduce_sum(self._comm, np.array([x @ x]))[0]))
+            norm = float(np.sqrt(distributed_arrays.allreduce_sum(self._comm, np.array([x @ x]))[0]))
         return norm
 
     def _without_springs(self, x: Float) -> Float:
@@ -129,7 +129,7 @@ class ReferenceCell:
         Displacements u = B_D^T g + Z y whose forces S u - B_I^T f vanish on Z; then B_A^T lam = S u - B_I^T f.
         """
         operators, jump_operator = self._operators, self._jump_operator
-        g, f = scale_rows(self.active, x), scale_rows(1.0 - self.active, x)
+        g, f = distributed_arrays.scale_rows(self.active, x), distributed_arrays.scale_rows(1.0 - self.active, x)
         is_pulled = not self._is_bonded and self._comm.allreduce(bool(f.any()), MPI.LOR)
         pulled = operators.BT @ jump_operator.gather(f) if is_pulled else 0.0
 
@@ -139,13 +139,13 @@ class ReferenceCell:
 
         u = self._BDT @ jump_operator.gather(g)
         u += self.assembled.relieving_displacement(forces_by(u))
-        lam = scale_rows(self.active, jump_operator.sum(self._BD @ forces_by(u)))
+        lam = distributed_arrays.scale_rows(self.active, jump_operator.sum(self._BD @ forces_by(u)))
         if self._is_bonded:
             return lam
         gap = -jump_operator.sum(operators.B @ u)
         if is_pulled:
-            gap -= scale_rows(operators.compliance, f)
-        return lam + scale_rows(1.0 - self.active, gap)
+            gap -= distributed_arrays.scale_rows(operators.compliance, f)
+        return lam + distributed_arrays.scale_rows(1.0 - self.active, gap)
 
 
 def one_sided_jumps(operators: InterfaceOperators) -> csr_matrix:
@@ -165,7 +165,7 @@ def one_sided_jumps(operators: InterfaceOperators) -> csr_matrix:
         np.bincount(side[mine], values, count_of_sides)
         for values in (weights * operators.diagonal[B.col[mine]], weights)
     ]
-    total, count = allreduce_sum(comm, np.stack(sums))
+    total, count = distributed_arrays.allreduce_sum(comm, np.stack(sums))
     outer_mean, inner_mean = (total / np.maximum(count, 1.0)).reshape(-1, 2).T
     moves_inner = np.append(inner_mean <= STIFF_FIBRES * outer_mean, False)[inside]
     moved = ~mine | (operators.of_inner[B.col] == moves_inner[B.row])
@@ -203,4 +203,4 @@ class BondedInverse(Preconditioner):
 
     def apply(self, r: Float) -> Float:
         """Return the multipliers that close the jump r on the active rows."""
-        return self._cell.respond(scale_rows(self._cell.active, r))
+        return self._cell.respond(distributed_arrays.scale_rows(self._cell.active, r))

@@ -7,15 +7,13 @@ answers U, follow from the columns and answers of the reference cell by one prod
     U' = U - Gamma'_:C W U_C,  U 0 before on rows that left or came.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from mpi4py import MPI
 
 from feti_homog.feti.exact.followed_response import FollowedResponse
 from feti_homog.feti.exact.reference_cell import ReferenceCell
 from feti_homog.feti.thresholds import CHECKED_COLUMNS
-from feti_homog.system.parallel.distributed_arrays import gather_rows
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int
 
 
@@ -70,14 +68,17 @@ class ReferenceChanges:
         """
         rows, columns = rows[:CHECKED_COLUMNS], columns[:, :CHECKED_COLUMNS]
         entries, followed = self._gathered(columns), self._followed.entries(rows, self.rows).T
-        holds = self._turned[:, 0] <= 0.0, gather_rows(self._comm, self._cell.active, self._first, rows) > 0.0
+        holds = (
+            self._turned[:, 0] <= 0.0,
+            distributed_arrays.gather_rows(self._comm, self._cell.active, self._first, rows) > 0.0,
+        )
         pairs = zip(holds, (np.sqrt(stiffness[some]) for some in (self.rows, rows)), strict=True)
         units = np.multiply.outer(*(np.where(is_active, 1.0 / root, root) for is_active, root in pairs))
         error, largest = (np.abs(units * x).max(initial=0.0) for x in (entries - followed, entries))
         return float(self._comm.bcast(error / max(largest, 1.0)))
 
     def _gathered(self, x: Float) -> Float:
-        return gather_rows(self._comm, x, self._first, self.rows)
+        return distributed_arrays.gather_rows(self._comm, x, self._first, self.rows)
 
     def _spread(self, values: Float) -> Float:
         """(owned rows, k) these (c, k) on C, 0 elsewhere."""

@@ -11,8 +11,6 @@ which is (H^-1 + X C X^T)^-1 where H is definite, as H_0 is on G^T lam = 0.  On 
 of which, however soft the springs, nothing cancels.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -21,8 +19,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from feti_homog.errors import ConvergenceError
 from feti_homog.feti.operators.preconditioners import Preconditioner
-from feti_homog.system.parallel.distributed_arrays import gather_rows, scale_rows
-from feti_homog.system.parallel.mpi_errors import agree
+from feti_homog.system.parallel import distributed_arrays, mpi_errors
 from feti_homog.typing import Float
 
 
@@ -45,17 +42,17 @@ class SpringUpdate:
         unit[places, np.flatnonzero(mine)] = 1.0
         self._columns = inverse(unit)
         stiffness = 1.0 / np.concatenate(comm.allgather(compliance[places]))
-        block = gather_rows(comm, self._columns, first, self.rows)
-        self._factor = agree(comm, _factored, np.diag(stiffness) + (block + block.T) / 2)
+        block = distributed_arrays.gather_rows(comm, self._columns, first, self.rows)
+        self._factor = mpi_errors.agree(comm, _factored, np.diag(stiffness) + (block + block.T) / 2)
         self._own, self._mine, self._stiffness = places, mine, stiffness[mine]
 
     def apply(self, z: Float) -> Float:
         """Return the updated H times r, for z = H r (owned rows,) or (owned rows, k). Collective."""
         if not len(self.rows):
             return z
-        stretch = cho_solve(self._factor, gather_rows(self.comm, z, self.first, self.rows))
+        stretch = cho_solve(self._factor, distributed_arrays.gather_rows(self.comm, z, self.first, self.rows))
         updated = np.asarray(z - self._columns @ stretch)
-        updated[self._own] = scale_rows(self._stiffness, stretch[self._mine])
+        updated[self._own] = distributed_arrays.scale_rows(self._stiffness, stretch[self._mine])
         return updated
 
 

@@ -13,8 +13,7 @@ from scipy.sparse import bmat, csr_matrix
 
 from feti_homog.feti.linalg.sparse_direct import check_factor, mumps_error, power_of_two
 from feti_homog.feti.thresholds import COPIED_AT_ONCE, COPIED_COLUMNS, MIRRORED_BLOCK_ROWS, TRIANGLE_INVERSE_ROWS
-from feti_homog.system.petsc import c_functions
-from feti_homog.system.petsc.options_database import choices
+from feti_homog.system.petsc import c_functions, options_database
 from feti_homog.typing import Float, Int
 
 if TYPE_CHECKING:
@@ -108,7 +107,7 @@ def _can_be_ordered() -> bool:
     """Return whether CHOLMOD can eliminate in a given order, and no option asks for anything of MUMPS."""
     from feti_homog.feti.linalg import partial_cholesky  # only large subdomains need it
 
-    return partial_cholesky.is_available() and not choices("feti_schur_")
+    return partial_cholesky.is_available() and not options_database.choices("feti_schur_")
 
 
 def _by_cholmod(matrix: csr_matrix, rows: Int, loads: Float, order: Int, keep_factor: bool) -> CondensedMatrix:

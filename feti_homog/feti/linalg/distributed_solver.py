@@ -1,7 +1,5 @@
 """Direct and iterative solves with sparse matrices of all ranks, through PETSc's KSP and PC."""
 
-from __future__ import annotations
-
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -10,7 +8,7 @@ from scipy.sparse import csr_matrix
 from feti_homog.feti.linalg.sparse_direct import factored, is_direct, power_of_two, sequential, solve_columns
 from feti_homog.feti.linalg.sparse_matrices import assemble_distributed, gathered_sum
 from feti_homog.feti.thresholds import CHOLMOD_COLUMNS_ONE_BY_ONE, MUMPS_COLUMNS_ONE_BY_ONE, REPLICATED_UNKNOWNS
-from feti_homog.system.parallel.distributed_arrays import allgather_rows, allreduce_sum
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int
 
 
@@ -78,14 +76,14 @@ class DistributedSolver:
         X = solve_columns(self._ksp, self._x, self._b, right, self.max_columns_one_by_one)
         X *= self._scale
         if self.is_distributed:
-            X = allgather_rows(self.comm, X, np.diff(self._b.getOwnershipRanges()))
+            X = distributed_arrays.allgather_rows(self.comm, X, np.diff(self._b.getOwnershipRanges()))
         return np.asarray(X[self._unknowns]).reshape(B.shape)
 
     def _sum(self, B: Float) -> Float:
         """(n, k) the sum over ranks of B (u, k)."""
         part = np.zeros((self.total, B.shape[1]))
         part[self._unknowns] = B
-        return allreduce_sum(self.comm, part)
+        return distributed_arrays.allreduce_sum(self.comm, part)
 
     @property
     def iterations(self) -> int:

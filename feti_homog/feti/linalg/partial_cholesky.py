@@ -4,8 +4,6 @@ MUMPS orders the eliminated rows without regard to rows that stay, and takes lon
 functions take a given order of all rows.  The structures below are from its manual, equal in KNOWN_VERSIONS.
 """
 
-from __future__ import annotations
-
 import ctypes
 import weakref
 from contextlib import suppress

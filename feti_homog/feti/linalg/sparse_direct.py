@@ -4,8 +4,6 @@ Libraries have thresholds without a unit: where MUMPS leaves a Schur complement,
 So each matrix is factored with its largest diagonal entry between 1 and 2.  A power of two changes no digit.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 import weakref
@@ -19,7 +17,7 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.errors import CaseError
 from feti_homog.feti.thresholds import CHOLMOD_COLUMNS_ONE_BY_ONE, ITERATIVE_RTOL, MUMPS_EXTRA_WORKSPACE_PERCENT
-from feti_homog.system.petsc.c_functions import error_words
+from feti_homog.system.petsc import c_functions
 from feti_homog.typing import Float
 
 Options = Mapping[str, bool | int | str]
@@ -185,7 +183,7 @@ def factored(
         try:
             ksp.setUp()
         except PETSc.Error as error:
-            message = error_words(error)
+            message = c_functions.error_words(error)
             if message.endswith(CHOLMOD_OUT_OF_MEMORY):
                 raise MemoryError(message) from error
             raise np.linalg.LinAlgError(f"not positive definite ({message})") from error

@@ -1,14 +1,12 @@
 """Sparse matrices: sums of dense blocks, symmetric scaling, and sums over ranks whose rows belong to one rank each."""
 
-from __future__ import annotations
-
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix, diags
 
 from feti_homog.feti.thresholds import MAX_BUFFERED_ENTRIES
-from feti_homog.system.parallel.distributed_arrays import allgather_rows
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Bool, Float, Int, Int32
 
 
@@ -140,8 +138,8 @@ def allreduce_sparse(comm: MPI.Intracomm, part: csr_matrix) -> csr_matrix:
     parts = A.getValuesCSR()
     A.destroy()
     counts, entries = (np.array(comm.allgather(n)) for n in (len(parts[0]) - 1, len(parts[1])))
-    lengths = allgather_rows(comm, np.diff(parts[0]), counts)
-    indices, values = (allgather_rows(comm, x, entries) for x in parts[1:])
+    lengths = distributed_arrays.allgather_rows(comm, np.diff(parts[0]), counts)
+    indices, values = (distributed_arrays.allgather_rows(comm, x, entries) for x in parts[1:])
     return csr_matrix((values, indices, np.concatenate([[0], np.cumsum(lengths)])), shape=part.shape)
 
 

@@ -3,3 +3,5 @@
 Imports `feti`, `feti.decomposition`, `feti.linalg` and `system`.  Main entries: `choice.choose`,
 `interface_operators.InterfaceOperators`, `interface_operators.DualOperator` and `preconditioners.Preconditioner`.
 """
+
+__all__ = ["interface_operators", "one_subdomain"]

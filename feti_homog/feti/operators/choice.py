@@ -3,8 +3,6 @@
 A pure function of sizes: it needs no mesh and no MPI.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

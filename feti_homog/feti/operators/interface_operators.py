@@ -14,19 +14,14 @@ from feti_homog.errors import MeshError
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain, label
+from feti_homog.feti.operators import one_subdomain
 from feti_homog.feti.operators.choice import SubdomainSize, choose
-from feti_homog.feti.operators.one_subdomain import (
-    CondensedLoads,
-    ExplicitInterfaceOperator,
-    ImplicitInterfaceOperator,
-    Interior,
-)
 from feti_homog.feti.operators.with_springs import BoundaryOperator, WithSprings, compliance_root
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
-from feti_homog.system.parallel.distributed_arrays import scale_rows
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Bool, Float, Int
 
-InterfaceOperator = ExplicitInterfaceOperator | ImplicitInterfaceOperator
+InterfaceOperator = one_subdomain.ExplicitInterfaceOperator | one_subdomain.ImplicitInterfaceOperator
 
 
 class DualOperator:
@@ -41,7 +36,7 @@ class DualOperator:
 
     def apply(self, x: Float) -> Float:
         """Return sum_s B K+ B^T x + C x for x (owned rows,) or (owned rows, k)."""
-        return self.jump(self.displacement(x)) + scale_rows(self.compliance, x)
+        return self.jump(self.displacement(x)) + distributed_arrays.scale_rows(self.compliance, x)
 
     def displacement(self, lam: Float) -> Float:
         """K+ B^T lam on the boundary dofs: minus the torn cell's answer to multipliers in Eq. (34)."""
@@ -110,7 +105,7 @@ class InterfaceOperators:
         self.facewise = [choice.facewise for choice in chosen]
         self.operators: list[InterfaceOperator] = []
         self.with_springs: list[BoundaryOperator] = []
-        self.interiors: dict[int, Interior] = {}
+        self.interiors: dict[int, one_subdomain.Interior] = {}
         bodies, diagonals = [np.zeros(0)], [np.zeros(0)]
         for subdomain, dofs, choice, root in zip(subdomains, self.dofs, chosen, roots, strict=True):
             operator, diagonal = _factor(subdomain, dofs, choice.explicit, keep_factors)
@@ -181,13 +176,15 @@ class InterfaceOperators:
         return csr_matrix(block_diag(blocks or [csr_matrix((0, 0))]))
 
     @cached_property
-    def condensed(self) -> CondensedLoads:
+    def condensed(self) -> one_subdomain.CondensedLoads:
         """The unit loads on all boundaries, and the sum of the stiffnesses."""
         v = self._loads
         parts = [operator.condensed for operator in self.operators]
         boundary = np.concatenate([np.zeros((0, v)), *(part.boundary for part in parts)])
         of_stresses = sum((part.stiffness for part in parts), np.zeros((v, v)))
-        return CondensedLoads(boundary, of_stresses, sum((part.energy for part in parts), np.zeros((v, v))))
+        return one_subdomain.CondensedLoads(
+            boundary, of_stresses, sum((part.energy for part in parts), np.zeros((v, v)))
+        )
 
     def extend(self, place: int, x: Float, loads: Float | None = None, keep: bool = True) -> Float:
         """(dofs, k) displacements of the subdomain at a place, of x (n_s, k) on its boundary and loads (v, k), if any.
@@ -196,14 +193,14 @@ class InterfaceOperators:
         call if that may `keep` it, else by every call.
         """
         operator, s = self.operators[place], self.subdomains[place]
-        if isinstance(operator, ExplicitInterfaceOperator) and operator.factor is not None:
+        if isinstance(operator, one_subdomain.ExplicitInterfaceOperator) and operator.factor is not None:
             return operator.extend(x, loads)
-        if isinstance(operator, ImplicitInterfaceOperator):
+        if isinstance(operator, one_subdomain.ImplicitInterfaceOperator):
             interior = operator.interior
         elif (stored := self.interiors.get(place)) is not None:
             interior = stored
         else:
-            interior = Interior(s.take_stiffness(), self.dofs[place], s.elimination_order())
+            interior = one_subdomain.Interior(s.take_stiffness(), self.dofs[place], s.elimination_order())
             if keep:
                 self.interiors[place] = interior
         u = np.empty((s.n_dofs, *x.shape[1:]))
@@ -229,9 +226,9 @@ def _factor(subdomain: Subdomain, dofs: Int, explicit: bool, keep_factor: bool) 
     operator: InterfaceOperator
     try:
         if explicit:
-            operator = ExplicitInterfaceOperator(subdomain, K, dofs, keep_factor)
+            operator = one_subdomain.ExplicitInterfaceOperator(subdomain, K, dofs, keep_factor)
         else:
-            operator = ImplicitInterfaceOperator(subdomain, K, dofs)
+            operator = one_subdomain.ImplicitInterfaceOperator(subdomain, K, dofs)
     except np.linalg.LinAlgError as error:
         faults = f"its stiffness cannot be factored, {error}; its elements are degenerate"
         raise MeshError(f"{label(subdomain.submesh)}: {faults}") from error

@@ -15,15 +15,10 @@ import numpy as np
 from scipy.linalg.blas import dsymm, dsymv
 from scipy.sparse import csr_matrix
 
+from feti_homog.feti import thresholds
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.linalg.dense_matrices import condensed_with_loads, full_from_lower, invert_upper, schur_complement
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
-from feti_homog.feti.thresholds import (
-    DENSE_COLUMNS_ONE_BY_ONE,
-    ILL_CONDITIONED,
-    INCOMPRESSIBLE_SHARE,
-    SPARSE_COLUMNS_AT_ONCE,
-)
 from feti_homog.typing import Float, Int
 
 
@@ -67,8 +62,8 @@ class ExplicitInterfaceOperator:
         self._flexibility_diagonal = both.diagonal().copy()
         # Each diagonal has less than the norm of its matrix.
         conditioning = self._schur_diagonal.max(initial=0.0) * self._flexibility_diagonal.max(initial=0.0)
-        is_thin = subdomain.is_thin and bool(conditioning > ILL_CONDITIONED)
-        self._refines = is_thin or subdomain.compressible_share < INCOMPRESSIBLE_SHARE
+        is_thin = subdomain.is_thin and bool(conditioning > thresholds.ILL_CONDITIONED)
+        self._refines = is_thin or subdomain.compressible_share < thresholds.INCOMPRESSIBLE_SHARE
         np.fill_diagonal(both, 0.0)
         self._both = both
 
@@ -97,7 +92,7 @@ class ExplicitInterfaceOperator:
         A = self._both
         if out is None:
             out = np.empty(x.shape, order="F")
-        if x.size > DENSE_COLUMNS_ONE_BY_ONE * self.n:
+        if x.size > thresholds.DENSE_COLUMNS_ONE_BY_ONE * self.n:
             scaled = np.multiply(diagonal[:, None], x, order="F")
             out[:] = dsymm(1.0, A, x, beta=1.0, c=scaled, overwrite_c=1, lower=lower)
         else:
@@ -266,10 +261,10 @@ def _by_columns(apply: Callable[[Float], Float], x: Float, out: Float | None) ->
         out = np.empty_like(x)
     if not len(x):
         return out
-    if x.size <= SPARSE_COLUMNS_AT_ONCE * len(x):
+    if x.size <= thresholds.SPARSE_COLUMNS_AT_ONCE * len(x):
         out[:] = apply(x)
         return out
-    for first in range(0, x.shape[1], SPARSE_COLUMNS_AT_ONCE):
-        some = slice(first, first + SPARSE_COLUMNS_AT_ONCE)
+    for first in range(0, x.shape[1], thresholds.SPARSE_COLUMNS_AT_ONCE):
+        some = slice(first, first + thresholds.SPARSE_COLUMNS_AT_ONCE)
         out[:, some] = apply(x[:, some])
     return out

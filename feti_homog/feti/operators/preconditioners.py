@@ -4,8 +4,6 @@ M^-1 = W^-1 B D^-1 S D^-1 B^T W^-1 on the active rows, with W = B D^-1 B^T and D
 each node.  W is block-diagonal by node.  S is the boundary block of K (lumped), or its Schur complement (Dirichlet).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Protocol
 

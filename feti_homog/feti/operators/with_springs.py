@@ -13,8 +13,6 @@ no kernel, R is the kernel of S~ but for rounding, and along the springs
 takes the place of the difference.
 """
 
-from __future__ import annotations
-
 from typing import Protocol, TypeGuard
 
 import numpy as np

@@ -11,8 +11,6 @@ s = jump - C_0 force >= 0 and w = s / (C - C_0) - force >= 0, s w = 0: the condi
 infinite.  So one search finds both.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -21,9 +19,8 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.errors import NotCarriedError
-from feti_homog.feti.decomposition.constraint_layout import InterfaceNodes
-from feti_homog.feti.dual_solution import DualSolution
-from feti_homog.feti.solver import FetiSolver
+from feti_homog.feti import DualSolution, FetiSolver
+from feti_homog.feti.decomposition import constraint_layout
 from feti_homog.interface.contact import mixed_load
 from feti_homog.interface.contact.floating_bodies import FloatingBodies
 from feti_homog.interface.contact.load_scales import LoadScales
@@ -60,7 +57,7 @@ class ContactProblem:
     _kept: list[tuple[BondState, tuple[Float, Float] | None]] = field(default_factory=list, compare=False, repr=False)
 
     @property
-    def nodes(self) -> InterfaceNodes:
+    def nodes(self) -> constraint_layout.InterfaceNodes:
         """Interface nodes that this rank owns."""
         return self.solver.jump_operator.nodes
 

@@ -9,16 +9,14 @@ g = d s_i this is a face with the jump g on the spring 1 / (C - C_0) and the ext
 s = C_0 lam + g.  The solution has r = s - C lam.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.feti.decomposition.constraint_layout import InterfaceNodes
-from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.feti import DualSolution
+from feti_homog.feti.decomposition import constraint_layout
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.states import BONDED, BondState, Equilibrium
 from feti_homog.interface.loads import Load, Macroscopic, Multipliers
@@ -44,7 +42,7 @@ class CoupledInterfaces:
         return self.plane.solver.comm
 
     @property
-    def nodes(self) -> InterfaceNodes:
+    def nodes(self) -> constraint_layout.InterfaceNodes:
         """Interface nodes of this rank."""
         return self.plane.nodes
 

@@ -16,11 +16,11 @@ from mpi4py import MPI
 from scipy.sparse import csr_matrix, vstack
 
 from feti_homog.errors import ConvergenceError
-from feti_homog.feti.coarse.natural import NaturalCoarseSpace
-from feti_homog.feti.decomposition.constraint_layout import InterfaceNodes
-from feti_homog.feti.dual_solution import DualSolution
-from feti_homog.mesh.periodic_topology import components
-from feti_homog.system.parallel.mpi_errors import on_root
+from feti_homog.feti import DualSolution
+from feti_homog.feti.coarse import natural
+from feti_homog.feti.decomposition import constraint_layout
+from feti_homog.mesh import periodic_topology
+from feti_homog.system.parallel import mpi_errors
 from feti_homog.typing import Array, Bool, Float
 
 if TYPE_CHECKING:
@@ -103,8 +103,8 @@ class FloatingBodies:
     """Free fibres, with the open nodes (k,) of this rank; gaps below `noise` may be the solver's error."""
 
     comm: MPI.Intracomm
-    coarse: NaturalCoarseSpace
-    nodes: InterfaceNodes
+    coarse: natural.NaturalCoarseSpace
+    nodes: constraint_layout.InterfaceNodes
     is_open: Bool
     noise: float
 
@@ -151,12 +151,12 @@ class FloatingBodies:
             # Bodies between two fibres link their motions, except the pinned body.
             pairs, fixed = np.concatenate(bodies), self.coarse.pinned_body
             (outer, inner), between = pairs.T, (pairs != fixed).all(axis=1)
-            labels = components(int(pairs.max(initial=0)) + 1, outer[between], inner[between])
+            labels = periodic_topology.components(int(pairs.max(initial=0)) + 1, outer[between], inner[between])
             groups = np.asarray(labels[np.where(inner == fixed, outer, inner)])
             fibres = _Fibres(np.concatenate(is_open), vstack(opening).tocsr(), np.max(reach, axis=0), groups)
             return decide(fibres, *map(np.concatenate, gaps), self.noise)
 
-        return on_root(self.comm, decided)
+        return mpi_errors.on_root(self.comm, decided)
 
 
 def shares_to_zero(before: Float, after: Float, noise: float | Float) -> tuple[float, float]:

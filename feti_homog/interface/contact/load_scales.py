@@ -1,16 +1,13 @@
 """Sizes of load effects, independent of debonding: scales for tolerances and errors."""
 
-from __future__ import annotations
-
 from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.feti.dual_solution import DualSolution
-from feti_homog.feti.solver import FetiSolver
+from feti_homog.feti import DualSolution, FetiSolver
 from feti_homog.interface.loads import Load
-from feti_homog.materials.phase_bounds import reuss, voigt
+from feti_homog.materials import phase_bounds
 from feti_homog.typing import Float
 
 # A strain so many times the bonded one is no scale for errors.
@@ -36,13 +33,13 @@ class LoadScales:
         shares, stiffnesses = self._phases
         m, bound = self.solver.problem.strains, self.mean_stiffness.copy()
         bound[:m, m:] = bound[m:, :m] = 0.0
-        bound[:m, :m] = reuss(shares, stiffnesses[:, :m, :m])
+        bound[:m, :m] = phase_bounds.reuss(shares, stiffnesses[:, :m, :m])
         return bound
 
     @cached_property
     def mean_stiffness(self) -> Float:
         """(v, v) <L>, Voigt's bound for strains.  Collective."""
-        return voigt(*self._phases)
+        return phase_bounds.voigt(*self._phases)
 
     @cached_property
     def _phases(self) -> tuple[Float, Float]:

@@ -4,19 +4,16 @@ With fixed active rows the response is linear: the answers to the prescribed str
 factors that meet the stresses.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from feti_homog.errors import NotCarriedError
-from feti_homog.feti.dual_solution import DualSolution
-from feti_homog.feti.solver import FetiSolver
+from feti_homog.feti import DualSolution, FetiSolver
 from feti_homog.interface.contact.load_scales import LoadScales
 from feti_homog.interface.loads import Load
-from feti_homog.system.parallel.distributed_arrays import allreduce_sum
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Bool, Float
 
 # Share of the stresses that may act on directions without stiffness: rounding of these.
@@ -71,7 +68,7 @@ def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:
     unknown, undetermined = np.flatnonzero(by_stress), np.zeros(len(by_stress), bool)
     torn = solver.d[:, unknown]
     opened = solver.natural.project(solver.active.restrict(torn))
-    sizes, open_jumps = (allreduce_sum(solver.comm, jumps.T @ jumps) for jumps in (torn, opened))
+    sizes, open_jumps = (distributed_arrays.allreduce_sum(solver.comm, jumps.T @ jumps) for jumps in (torn, opened))
     largest = np.array([np.diag(sizes), np.abs(voigt[unknown, unknown])])
     scales = np.sqrt(np.where(largest > 0.0, largest, 1.0))
     pairs = zip((open_jumps, solver.torn_stiffness[np.ix_(unknown, unknown)]), scales, strict=True)
@@ -92,7 +89,7 @@ def superposed(solver: FetiSolver, solutions: Sequence[DualSolution], factors: F
     alpha = np.stack(amplitudes, axis=1) @ factors
     torn = solver.natural.project(solver.active.restrict(solver.d @ strain))
     pairs = np.stack([torn, solver.active.restrict(jump)])
-    scale, residual = np.sqrt(allreduce_sum(solver.comm, np.einsum("ij,ij->i", pairs, pairs)))
+    scale, residual = np.sqrt(distributed_arrays.allreduce_sum(solver.comm, np.einsum("ij,ij->i", pairs, pairs)))
     iterations, reason = max(s.iterations for s in solutions), min(s.reason for s in solutions)
     residual = float(residual / (scale or 1.0))
     return replace(total, alpha=alpha, iterations=iterations, reason=reason, residual=residual)

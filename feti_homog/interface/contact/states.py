@@ -11,7 +11,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.feti import DualSolution
 from feti_homog.interface.contact.load_scales import LoadScales
 from feti_homog.interface.loads import Load, Multipliers
 from feti_homog.typing import Bool, Float

@@ -3,3 +3,5 @@
 Imports `feti`, `interface`, `interface.contact` and `system`.  Main entries: `coulomb_faces` (dense arrays alone) and
 `sliding_cell`.
 """
+
+__all__ = ["coulomb_faces", "sliding_cell"]

@@ -14,8 +14,6 @@ Pivots change all wrong statuses at once while their number falls, and nearly al
 of statuses are tried, if they are few; then the coefficients rise from a share at which pivots find statuses.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from copy import copy
 from dataclasses import dataclass, replace

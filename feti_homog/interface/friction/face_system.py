@@ -12,15 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from feti_homog.interface.contact.states import Status
-from feti_homog.interface.friction.status_system import (
-    OPEN_FACE,
-    STICK,
-    FollowedStatuses,
-    StatusSystem,
-    free_rows,
-    largest_share,
-    residual,
-)
+from feti_homog.interface.friction import status_system
 from feti_homog.typing import Bool, Float, Float32, Int
 
 # Arrays whose products are stored.
@@ -66,8 +58,8 @@ class FaceSystem:
         size = np.sqrt(np.concatenate([nodes, np.maximum(diagonal[2 * n :], 0.0)]))
         self.size = np.where(size > 0.0, size, 1.0)
         self.S = stiffness / np.outer(self.size, self.size)
-        self._followed: FollowedStatuses | None = None
-        self._last: tuple[bytes, StatusSystem] | None = None
+        self._followed: status_system.FollowedStatuses | None = None
+        self._last: tuple[bytes, status_system.StatusSystem] | None = None
         self._factored = 0
         self._products: deque[tuple[Float, Float]] = deque(maxlen=PRODUCTS)
 
@@ -118,7 +110,10 @@ class FaceSystem:
 
     def linear(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, bool]:
         """(m,) scaled x with these statuses, and whether it is a solution; start as in `StatusSystem.solve`."""
-        rows, (x, values) = free_rows(status, self.friction, load.by_stress), self.prescribed(status, load, start)
+        rows, (x, values) = (
+            status_system.free_rows(status, self.friction, load.by_stress),
+            self.prescribed(status, load, start),
+        )
         followed = self._turned(*rows)
         if followed is not None:
             solution = followed.solve(x, values, self.terms)
@@ -130,22 +125,22 @@ class FaceSystem:
 
     def sign(self, status: Status, by_stress: Bool) -> int:
         """Return the determinant's sign with these statuses, 0 with free motions."""
-        rows = free_rows(status, self.friction, by_stress)
+        rows = status_system.free_rows(status, self.friction, by_stress)
         return (self._turned(*rows) or self._system(*rows)).sign
 
-    def _turned(self, free: Bool, slope: Float) -> FollowedStatuses | None:
+    def _turned(self, free: Bool, slope: Float) -> status_system.FollowedStatuses | None:
         """Return the followed response with these rows; None with free motions, or before it pays."""
         if self._followed is None:
             if self._factored < FACTORIZATIONS:
                 return None
-            self._followed = FollowedStatuses(self.S)
+            self._followed = status_system.FollowedStatuses(self.S)
         return self._followed if self._followed.turn(free, slope) else None
 
-    def _system(self, free: Bool, slope: Float) -> StatusSystem:
+    def _system(self, free: Bool, slope: Float) -> status_system.StatusSystem:
         """Return the factored system of these rows; the last one is stored."""
         key = free.tobytes() + slope.tobytes()
         if self._last is None or self._last[0] != key:
-            self._last = key, StatusSystem(self.S, free, slope)
+            self._last = key, status_system.StatusSystem(self.S, free, slope)
             self._factored += 1
         return self._last[1]
 
@@ -158,21 +153,23 @@ class FaceSystem:
 
     def is_balanced(self, status: Status, load: Prescribed, x: Float) -> bool:
         """Return False if a force drives a free motion, such as a fibre that turns in its hole."""
-        (free, slope), fixed = free_rows(status, self.friction, load.by_stress), np.zeros(len(x))
+        (free, slope), fixed = status_system.free_rows(status, self.friction, load.by_stress), np.zeros(len(x))
         # Prescribed entries alone: a free motion is as large as its force over the stiffness HELD.
         fixed[self.loads] = np.where(load.by_stress, 0.0, load.values)
-        fixed[1 : 2 * self.nodes : 2] = np.where(status == STICK, load.slip, 0.0)
+        fixed[1 : 2 * self.nodes : 2] = np.where(status == status_system.STICK, load.slip, 0.0)
         rows = self.prescribed(status, load, x)[1]
-        unbalanced = np.abs(residual(self.product(x), rows, free, slope))
+        unbalanced = np.abs(status_system.residual(self.product(x), rows, free, slope))
         unbalanced = np.maximum(unbalanced - np.finfo(float).eps * np.abs(x).max(initial=0.0), 0.0)
         # Relative to forces of prescribed entries, at a node and its neighbours in S.
-        return largest_share(unbalanced, np.abs(rows) + self.terms(self.terms(fixed)), slope) <= UNBALANCED
+        return (
+            status_system.largest_share(unbalanced, np.abs(rows) + self.terms(self.terms(fixed)), slope) <= UNBALANCED
+        )
 
     def prescribed(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, Float]:
         """(m,) x with its prescribed entries, and (m,) S x on the rows of loads."""
         last, loads, x, rows = 2 * self.nodes, self.loads, start.copy(), np.zeros(len(start))
-        x[:last:2] = np.where(status == OPEN_FACE, x[:last:2], 0.0)
-        x[1:last:2] = np.where(status == STICK, load.slip, x[1:last:2])
+        x[:last:2] = np.where(status == status_system.OPEN_FACE, x[:last:2], 0.0)
+        x[1:last:2] = np.where(status == status_system.STICK, load.slip, x[1:last:2])
         x[loads] = np.where(load.by_stress, x[loads], load.values)
         rows[loads] = load.values
         return x, rows

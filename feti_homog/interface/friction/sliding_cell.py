@@ -9,8 +9,6 @@ L the bonded stiffness times the area: the cell stores x.S x / 2 with x = (g, E)
 matrix S of `coulomb_faces` is the plane one; in generalized plane strain `AxialFaces` adds rows and columns behind it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -19,15 +17,14 @@ from mpi4py import MPI
 from scipy.linalg import block_diag, lu_factor, lu_solve
 
 from feti_homog.errors import CaseError
-from feti_homog.feti.dual_solution import DualSolution
-from feti_homog.feti.solver_plan import WITHOUT_INVERSE
+from feti_homog.feti import DualSolution, solver_plan
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status, coulomb_errors
 from feti_homog.interface.friction.coulomb_faces import CoulombFaces
 from feti_homog.interface.friction.status_system import HELD, OPEN_FACE, REFINEMENTS, STICK
 from feti_homog.interface.loads import Load, Macroscopic
-from feti_homog.system.parallel.distributed_arrays import allreduce_sum, gather_rows
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int
 
 # Stiffness, relative to the bonded one, that is rounding.
@@ -51,10 +48,12 @@ class CondensedProblem:
         """
         self.interface, self.solver = interface, interface.solver
         if self.solver.exact_inverse is None:
-            raise CaseError(WITHOUT_INVERSE)
+            raise CaseError(solver_plan.WITHOUT_INVERSE)
         self._inverse, self.first = self.solver.exact_inverse, self.solver.jump_operator.owned[0]
         self._response = self._inverse.multipliers(self.solver.d, np.eye(len(self.solver.problem.loads)))
-        bonded = self.solver.torn_stiffness + allreduce_sum(self.solver.comm, self.solver.d.T @ self._response)
+        bonded = self.solver.torn_stiffness + distributed_arrays.allreduce_sum(
+            self.solver.comm, self.solver.d.T @ self._response
+        )
         self._bonded = (bonded + bonded.T) / 2
         self._some: tuple[Int, Float] | None = None
 
@@ -63,7 +62,7 @@ class CondensedProblem:
         self.rows, self._some = rows, None
         self._columns, K = self._inverse.columns(rows)
         K[np.diag_indices(len(K))] += springs
-        return K, gather_rows(self.solver.comm, self._response, self.first, rows), self._bonded
+        return K, distributed_arrays.gather_rows(self.solver.comm, self._response, self.first, rows), self._bonded
 
     def gained(self, bonds: BondState) -> Float:
         """(k, c) compliance that damage adds to springs under tension."""
@@ -97,7 +96,7 @@ class CondensedProblem:
             alpha -= solver.natural.amplitudes(jumps - opened)
             jumps = jumps + solver.natural.G @ alpha
         sums = np.array([(jumps - opened) @ (jumps - opened), jumps @ jumps, torn @ torn])
-        error, *sizes = np.sqrt(allreduce_sum(solver.comm, sums))
+        error, *sizes = np.sqrt(distributed_arrays.allreduce_sum(solver.comm, sums))
         C = self.interface.compliance(bonds)
         jumps = jumps - (C - solver.intact_compliance) * lam
         return DualSolution(strain, lam, jumps, alpha, 0, 2, float(error / (max(sizes) or 1.0)), C)

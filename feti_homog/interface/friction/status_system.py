@@ -8,8 +8,6 @@ grows with the sign s.  Row r in place of row j changes R = [M^-1; S M^-1] by ra
 w a row of R itself.  Changes are collected and added to R by blocks.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cached_property
 

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 
-from feti_homog.case.bond_laws import LAWS
+from feti_homog.case import bond_laws
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BondState
 from feti_homog.typing import Bool, Float, Int
@@ -178,6 +178,6 @@ class SpringLaw(BondLaw):
 
 def law_class(name: str) -> type[BondLaw]:
     """Return the class of a law by name, as in `case.bond_laws`."""
-    module, cls = LAWS[name].implementation.split(".")
+    module, cls = bond_laws.LAWS[name].implementation.split(".")
     law: type[BondLaw] = getattr(import_module(f"{__package__}.{module}"), cls)
     return law

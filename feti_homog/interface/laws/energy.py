@@ -26,7 +26,7 @@ from feti_homog.interface.laws.bond_law import KeyValues, SpringLaw
 from feti_homog.typing import Bool, Float, Int
 
 if TYPE_CHECKING:
-    from feti_homog.feti.exact.exact_inverse import ExactInverse
+    from feti_homog.feti.exact import exact_inverse
 
 # Blocks of H are rounding if smaller than this share of the stiffness beside the bond.
 RIGID = 1e-9
@@ -116,11 +116,16 @@ class ReleasedEnergy(SpringEnergy):
         axial: inverse for slip along the fibres, if that is a problem.
     """
 
-    influence: ExactInverse
-    axial: ExactInverse | None = None
+    influence: exact_inverse.ExactInverse
+    axial: exact_inverse.ExactInverse | None = None
 
     @classmethod
-    def of(cls, springs: SpringEnergy, influence: ExactInverse, axial: ExactInverse | None = None) -> Self:
+    def of(
+        cls,
+        springs: SpringEnergy,
+        influence: exact_inverse.ExactInverse,
+        axial: exact_inverse.ExactInverse | None = None,
+    ) -> Self:
         """Make the law from springs and the problems' inverses."""
         return cls(**vars(springs), influence=influence, axial=axial)
 
@@ -150,7 +155,7 @@ class ReleasedEnergy(SpringEnergy):
         return SpringsAndTips(**springs, tips=tips, number=number, contact=cell.plane.contact)
 
     @staticmethod
-    def _activate(influence: ExactInverse, interface: ContactProblem, bonds: BondState) -> None:
+    def _activate(influence: exact_inverse.ExactInverse, interface: ContactProblem, bonds: BondState) -> None:
         """Update the inverse to these bonds.  Collective; raises as `in_state`."""
         interface.prepare(bonds)
         if not influence.rounding <= MOST_ROUNDING:

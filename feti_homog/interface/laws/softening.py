@@ -14,8 +14,6 @@ So damage d takes the energy W_0 phi, phi = 2 int_0^x tau dx - tau x.  The tooth
 breaks at W_j = W_0 (phi_j+1 - phi_j) / (d_j+1 - d_j) and takes W_j (d_j+1 - d_j): the energy of the law in between.
 """
 
-from __future__ import annotations
-
 import math
 from abc import abstractmethod
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Bonds that break at a strength, a limit of their traction, force per area; compression breaks none."""
 
-from __future__ import annotations
-
 import math
 from abc import abstractmethod
 from dataclasses import dataclass

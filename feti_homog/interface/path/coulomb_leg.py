@@ -4,8 +4,6 @@ An equal load step is implicit: slips grow with the sign of the traction at its 
 its heat is the work of final forces on slips, and the work of the loads is stored, released or heat.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -23,7 +21,7 @@ from feti_homog.interface.loads import Load, Macroscopic
 from feti_homog.interface.path.leg import Leg
 from feti_homog.interface.path.onsets import first_break
 from feti_homog.interface.path.path_points import Energies, PathState, Point
-from feti_homog.system.parallel.mpi_errors import on_root
+from feti_homog.system.parallel import mpi_errors
 from feti_homog.typing import Float
 
 # Share of a leg between points, after which a change of statuses is a point.
@@ -81,7 +79,7 @@ class CoulombLeg(Leg):
             status, x = find(*arguments)
             return status, x, faces.product(x)
 
-        status, x, product = on_root(self.cell.comm, found)
+        status, x, product = mpi_errors.on_root(self.cell.comm, found)
         faces.keep(x, product)
         return status, x
 
@@ -173,7 +171,7 @@ class CoulombLeg(Leg):
             NotCarriedError: the cell carries nothing beyond the last step.
         """
         sliding, x = self.sliding, self._x
-        self._share, self.limit = on_root(self.cell.comm, self._carried, share)
+        self._share, self.limit = mpi_errors.on_root(self.cell.comm, self._carried, share)
         status, after = self._on_root(sliding.faces.step, self._status, self._given(self._share, x), x)
         heat = sliding.faces.heat_behind(status, x, after) / self.cell.area
         way = Energies(sliding.stored(after) - sliding.stored(x) + heat, 0.0, 0.0, heat)

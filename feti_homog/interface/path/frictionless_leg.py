@@ -1,7 +1,5 @@
 """Legs without friction: the load is controlled and the response piecewise linear."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -9,7 +7,7 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.errors import NotCarriedError
-from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.feti import DualSolution
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BondState, Equilibrium
 from feti_homog.interface.laws.bond_law import BondLaw

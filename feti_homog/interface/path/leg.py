@@ -3,8 +3,6 @@
 Two engines follow the load: `FrictionlessLeg` solves equilibria, `CoulombLeg` rates of faces with friction.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -14,15 +12,7 @@ from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, Equilibrium
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.loads import Load, Macroscopic
-from feti_homog.interface.path.path_points import (
-    NO_ENERGIES,
-    UTILISATION_TIE,
-    PathState,
-    Point,
-    break_bonds,
-    count_on_all_ranks,
-    most_utilised,
-)
+from feti_homog.interface.path import path_points
 from feti_homog.typing import Bool, Float
 
 
@@ -39,7 +29,7 @@ class Leg(ABC):
     _mean: Macroscopic
 
     def __init__(
-        self, cell: CoupledInterfaces, law: BondLaw, waypoints: Sequence[Load], leg: int, begin: PathState
+        self, cell: CoupledInterfaces, law: BondLaw, waypoints: Sequence[Load], leg: int, begin: path_points.PathState
     ) -> None:
         """Begin at the position in `begin`, on the way to waypoint `leg`.  Collective."""
         self.cell, self.law, self.leg, self.waypoints = cell, law, leg, waypoints
@@ -47,7 +37,7 @@ class Leg(ABC):
         self.origin = begin.last if begin.position == 0.0 else begin.origin
         self.start = cell.leg_start(self.origin, waypoints[leg - 1] if leg else None, self.end)
         self._share = self._reported = begin.position
-        self._bonds, self._energies = begin.bonds, NO_ENERGIES
+        self._bonds, self._energies = begin.bonds, path_points.NO_ENERGIES
         self._utilisation: tuple[Equilibrium, tuple[Float, float, Bool]] | None = None
 
     @property
@@ -56,25 +46,25 @@ class Leg(ABC):
         """Equilibrium at s.  Collective."""
 
     @abstractmethod
-    def _settle(self, begin: PathState) -> None:
+    def _settle(self, begin: path_points.PathState) -> None:
         """Find the state at s with the bonds of `begin`, after its break if any.  Collective."""
 
     @abstractmethod
-    def _advance(self) -> Iterator[Point]:
+    def _advance(self) -> Iterator[path_points.Point]:
         """Advance to the next event, or part of the way, and yield its points.  Collective."""
 
     @abstractmethod
     def _go_to(self, share: float) -> None:
         """Advance to a share of the leg in one step, with fixed bonds.  Collective."""
 
-    def points(self) -> Iterator[Point]:
+    def points(self) -> Iterator[path_points.Point]:
         """Yield the leg's points, up to a solve without convergence.  Collective."""
         yield from self._break_overloaded()
         while not self._is_over():
             yield from self._advance()
         yield self._point(0, 0, replace(self._path_state(), leg=self.leg + 1, position=0.0))
 
-    def step(self, number: int, steps: int, worst_only: bool) -> Point:
+    def step(self, number: int, steps: int, worst_only: bool) -> path_points.Point:
         """Return the point after the path's step `number`, from 1.  Collective."""
         before, parted = self._bonds.history, 0
         self._go_to(number * len(self.waypoints) / steps - self.leg)
@@ -84,7 +74,9 @@ class Leg(ABC):
             parted += count
             self._settle(broken)
         bonds, after = self.state.bonds, self._path_state()
-        weaker = count_on_all_ranks(self.cell, (bonds.history != before).any(axis=1) & (bonds.status == BONDED))
+        weaker = path_points.count_on_all_ranks(
+            self.cell, (bonds.history != before).any(axis=1) & (bonds.status == BONDED)
+        )
         if self.limit is not None:
             return self._point(parted, weaker, replace(after, leg=number - 1))
         point = self._point(parted, weaker, replace(after, leg=number, position=0.0))
@@ -100,34 +92,34 @@ class Leg(ABC):
     def _used(self) -> tuple[Float, float, Bool]:
         """Return `most_utilised` for the state, computed once.  Collective."""
         if self._utilisation is None or self._utilisation[0] is not self.state:
-            self._utilisation = self.state, most_utilised(self.cell, self.law, self.state)
+            self._utilisation = self.state, path_points.most_utilised(self.cell, self.law, self.state)
         return self._utilisation[1]
 
     def _is_overloaded(self) -> bool:
         """Return whether a break or a change of contact has overloaded bonds.  Collective."""
-        return self._used()[1] > 1.0 + UTILISATION_TIE and self.state.converged
+        return self._used()[1] > 1.0 + path_points.UTILISATION_TIE and self.state.converged
 
-    def _break_overloaded(self) -> Iterator[Point]:
+    def _break_overloaded(self) -> Iterator[path_points.Point]:
         while self._is_overloaded():
             yield from self._break()
 
-    def _break(self) -> Iterator[Point]:
+    def _break(self) -> Iterator[path_points.Point]:
         """Break the worst bonds at s, and find the state after the break.  Collective."""
         broke, softened, broken = self._release(self._used()[2])
         yield self._point(broke, softened, broken)
         self._settle(broken)
 
-    def _release(self, which: Bool) -> tuple[int, int, PathState]:
+    def _release(self, which: Bool) -> tuple[int, int, path_points.PathState]:
         """Break the bonds `which` (k,): numbers that part and that soften, and the path state.  Collective."""
-        return break_bonds(self.cell, self.law, which, self.state, self._path_state())
+        return path_points.break_bonds(self.cell, self.law, which, self.state, self._path_state())
 
-    def _point(self, broke: int, softened: int, after: PathState) -> Point:
+    def _point(self, broke: int, softened: int, after: path_points.PathState) -> path_points.Point:
         """Return the point at s, with the numbers of bonds that part and that soften.  Collective."""
-        energies, self._energies, self._reported = self._energies, NO_ENERGIES, self._share
+        energies, self._energies, self._reported = self._energies, path_points.NO_ENERGIES, self._share
         load_factor = (self.leg + self._share) / len(self.waypoints)
-        return Point(load_factor, 1.0, self.state, broke, softened, energies, self._used()[0], after)
+        return path_points.Point(load_factor, 1.0, self.state, broke, softened, energies, self._used()[0], after)
 
-    def _path_state(self) -> PathState:
+    def _path_state(self) -> path_points.PathState:
         """Return the path state at s.  Collective."""
         state = self.state
-        return PathState(self.leg, self._share, state.bonds, state.multipliers, self.origin, self._mean)
+        return path_points.PathState(self.leg, self._share, state.bonds, state.multipliers, self.origin, self._mean)

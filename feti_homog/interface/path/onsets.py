@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.feti import DualSolution
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.floating_bodies import FloatingBodies, shares_to_zero

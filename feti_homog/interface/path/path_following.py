@@ -8,8 +8,6 @@ Energy.  A break happens at constant load, at which stresses or strains jump, an
 between breaks no energy is lost.  The `energies` of a point belong to the way from the last point.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 

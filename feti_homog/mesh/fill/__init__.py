@@ -3,3 +3,5 @@
 Imports `case`, `mesh`, `mesh.outline`, `mesh.readers`, `mesh.sizes`, `mesh.tiles` and `microstructure`.  Main entries:
 `gmsh_mesher.begin` and `gmsh_mesher.NodedCell`.
 """
+
+__all__ = ["gmsh_mesher"]

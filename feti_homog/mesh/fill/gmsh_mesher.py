@@ -9,27 +9,19 @@ from types import MappingProxyType
 
 import numpy as np
 
-from feti_homog.case.cell_section import Cell
-from feti_homog.case.cell_sizes import fractions_in_words, mixed_width
+from feti_homog.case import cell_section, cell_sizes
 from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange, listed_arrangement
 from feti_homog.mesh.coarse_mesh import CoarseMesh, representatives
 from feti_homog.mesh.outline.bare_outline import BareOutline, LineStations
 from feti_homog.mesh.outline.lines import IN_TILES
 from feti_homog.mesh.outline.outline import Outline
-from feti_homog.mesh.sizes.element_estimate import (
-    MAX_TRIANGLES,
-    MAX_TRIANGLES_OF_TILES,
-    ElementEstimate,
-    refuse_many,
-    triangles_of_a_tip,
-)
+from feti_homog.mesh.sizes import element_estimate
 from feti_homog.mesh.sizes.graded_size import MeshSizes
 from feti_homog.mesh.tiles.tile_filling import Filling, Tile, arc_edges, fill
 from feti_homog.mesh.tiles.tiling import DEFAULT_TILES, Regions, TilePolicy, Tiling, cut, is_tiled, tiling
-from feti_homog.microstructure.arrangements import Arrangement
-from feti_homog.microstructure.phase_names import VOID
-from feti_homog.microstructure.shapes.ellipses import Discs, Ellipses
+from feti_homog.microstructure import Arrangement, phase_names
+from feti_homog.microstructure.shapes import Discs, Ellipses
 from feti_homog.typing import Int, Int32
 
 # Radius / width of the cell above which positions on a circle differ by more than rounding.
@@ -38,7 +30,7 @@ NO_MARKS: Mapping[int, Sequence[float]] = MappingProxyType({})
 
 
 def generate(
-    cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS, policy: TilePolicy = DEFAULT_TILES
+    cell: cell_section.Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS, policy: TilePolicy = DEFAULT_TILES
 ) -> CoarseMesh:
     """Return the mesh that `begin` begins, all of it made here."""
     begun = begin(cell, listed_arrangement(cell), marks, policy)
@@ -47,7 +39,7 @@ def generate(
 
 
 def begin(
-    cell: Cell,
+    cell: cell_section.Cell,
     listed: Arrangement | None,
     marks: Mapping[int, Sequence[float]] = NO_MARKS,
     policy: TilePolicy = DEFAULT_TILES,
@@ -69,14 +61,14 @@ def begin(
         MeshError: the fibres cannot be arranged, or there would be too many elements.
     """
     sizes = MeshSizes.of(cell, len(marks) > 0)
-    estimate = ElementEstimate.of(cell, listed)
+    estimate = element_estimate.ElementEstimate.of(cell, listed)
     tiled = estimate.fibres >= policy.least_discs if listed is None else is_tiled(listed, policy)
-    limit = MAX_TRIANGLES_OF_TILES if tiled else MAX_TRIANGLES
+    limit = element_estimate.MAX_TRIANGLES_OF_TILES if tiled else element_estimate.MAX_TRIANGLES
     _refuse_extremes(estimate, sizes, sum(map(len, marks.values())), limit)
     arrangement = arrange(cell) if listed is None else listed
     smallest = int(arrangement.radii.argmin())
     if arrangement.radii[smallest] < SMALLEST_RADIUS * arrangement.width:
-        asked = fractions_in_words(cell) if cell.fractions else 'geometry = "table"'
+        asked = cell_sizes.fractions_in_words(cell) if cell.fractions else 'geometry = "table"'
         raise MeshError(
             f"[cell] {asked}: a {'void' if arrangement.is_void[smallest] else 'fibre'} has a radius of "
             f"{arrangement.radii.min():.2g}; expected at least {SMALLEST_RADIUS} of the width of the cell"
@@ -85,7 +77,7 @@ def begin(
     if isinstance(arrangement.outlines, Discs):
         cell_of_discs = UnmeshedCell.of(arrangement, sizes, marks, scale, policy)
         field = cell_of_discs.bare.field
-        refuse_many(field.at, field.least, arrangement.size, limit)
+        element_estimate.refuse_many(field.at, field.least, arrangement.size, limit)
         return cell_of_discs
     if isinstance(arrangement.outlines, Ellipses):
         from feti_homog.mesh.outline import elliptic_outline  # discs, the common case, do without
@@ -97,18 +89,18 @@ def begin(
     return mesh_outlines(arrangement, sizes, scale)
 
 
-def arrangement_scale(cell: Cell, arrangement: Arrangement) -> float:
+def arrangement_scale(cell: cell_section.Cell, arrangement: Arrangement) -> float:
     """Return lengths in the cell / lengths in the arrangement."""
     if cell.fibre_radius is not None:
         return float(cell.fibre_radius / arrangement.radii[: arrangement.fibres].mean())
-    width = mixed_width(cell) if cell.table is None else cell.table.width
+    width = cell_sizes.mixed_width(cell) if cell.table is None else cell.table.width
     return width or 1.0
 
 
-def _refuse_extremes(estimate: ElementEstimate, sizes: MeshSizes, tips: int, limit: int) -> None:
+def _refuse_extremes(estimate: element_estimate.ElementEstimate, sizes: MeshSizes, tips: int, limit: int) -> None:
     """Raise MeshError for a cell that would take hours to mesh, before it is begun."""
     cell, around = estimate.cell, min(sizes.interface, estimate.interface_size)
-    at_tips = tips * triangles_of_a_tip(max(1.0, around / sizes.tip))
+    at_tips = tips * element_estimate.triangles_of_a_tip(max(1.0, around / sizes.tip))
     count = estimate.triangles + at_tips
     if count > limit:
         keys = ("mesh_size", "interface_size", "tip_size") if at_tips else ("mesh_size", "interface_size")
@@ -244,7 +236,7 @@ class NodedCell:
         arrangement, lines = self.arrangement, self.lines
         in_disc, in_ring = arrangement.within
         within = [(in_ring if ring else in_disc)[disc] for disc, ring in zip(lines.disc, lines.is_coating, strict=True)]
-        place = {name: number for number, name in enumerate((*arrangement.phases, VOID))}
+        place = {name: number for number, name in enumerate((*arrangement.phases, phase_names.VOID))}
         phase = np.array([place[name] for name in (*within, arrangement.phases[0])], np.int32)
         precedence = arrangement.precedence(lines.disc, lines.is_coating)
         return phase, np.append(precedence, 0).astype(np.int32)

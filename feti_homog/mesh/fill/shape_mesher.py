@@ -3,8 +3,6 @@
 Middle nodes on second-order edges define the curves, as in users' meshes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise, product
@@ -22,10 +20,8 @@ from feti_homog.mesh.sizes.element_estimate import refuse_many
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, wrap
 from feti_homog.mesh.sizes.graded_size import MIN_EDGES_AROUND, PASSAGE_EDGE, MeshSizes
 from feti_homog.mesh.tiles.tile_filling import gmsh_session
-from feti_homog.microstructure.arrangements import Arrangement
-from feti_homog.microstructure.phase_names import MATRIX, VOID
-from feti_homog.microstructure.shapes.convex_sums import POINTS, ConvexSums
-from feti_homog.microstructure.shapes.outlines import Outlines
+from feti_homog.microstructure import Arrangement, phase_names
+from feti_homog.microstructure.shapes import Outlines, convex_sums
 from feti_homog.typing import Float
 
 # Distance from a line / size of the cell within which curves lie on it.
@@ -94,17 +90,17 @@ def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
     added, disc, ring = _add_outlines(gmsh, arrangement)
     _, parts = occ.fragment([rectangle], added)
     occ.synchronize()
-    number, phase = dict.fromkeys(parts[0], 0), dict.fromkeys(parts[0], MATRIX)
+    number, phase = dict.fromkeys(parts[0], 0), dict.fromkeys(parts[0], phase_names.MATRIX)
     numbers = arrangement.precedence(np.array(disc), np.array(ring))
     for pieces, entry, is_ring, precedence in zip(parts[1:], disc, ring, numbers, strict=True):
         inside = set(pieces) & set(number)
         number |= dict.fromkeys(inside, int(precedence))
         phase |= dict.fromkeys(inside, arrangement.within[is_ring][entry])
     outside = {piece for pieces in parts for piece in pieces} - set(number)
-    voids = {piece for piece, name in phase.items() if name == VOID}
+    voids = {piece for piece, name in phase.items() if name == phase_names.VOID}
     occ.remove(sorted(outside | voids), recursive=True)
     occ.synchronize()
-    for name in sorted(set(phase.values()) - {VOID}):
+    for name in sorted(set(phase.values()) - {phase_names.VOID}):
         gmsh.model.addPhysicalGroup(2, sorted(tag for (_, tag), entry in phase.items() if entry == name), name=name)
     return {tag: entry for (_, tag), entry in number.items()}
 
@@ -126,12 +122,12 @@ def _add_outlines(gmsh: ModuleType, arrangement: Arrangement) -> tuple[list[Surf
     return added, disc, ring
 
 
-def _sums(outlines: Outlines) -> ConvexSums:
+def _sums(outlines: Outlines) -> convex_sums.ConvexSums:
     """Return the outlines as sums of polygons and ellipses."""
-    return ConvexSums(outlines.centres, outlines.cores, outlines.frames)
+    return convex_sums.ConvexSums(outlines.centres, outlines.cores, outlines.frames)
 
 
-def _add_shape(gmsh: ModuleType, shapes: ConvexSums, number: int, shift: Float) -> int:
+def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int, shift: Float) -> int:
     """Return the plane surface of one shape, moved."""
     occ, (x, y) = gmsh.model.occ, (shapes.centres[number] + shift).tolist()
     frame, core = shapes.frames[number], shapes.cores[number]
@@ -197,7 +193,7 @@ def _sizes_at(arrangement: Arrangement, sizes: MeshSizes) -> tuple[float, SizeAt
     next outline or to a cell side that the outline faces there.
     """
     size, shapes = arrangement.size, _sums(arrangement.outer)
-    places, normal, shape = shapes.boundary(POINTS)
+    places, normal, shape = shapes.boundary(convex_sums.POINTS)
     rounds = np.linalg.norm(shapes.frames, axis=1).min(axis=1)
     rounds = np.where(rounds > 0, rounds, np.inf)
     thickness = np.where(arrangement.coated, arrangement.coating, np.inf)

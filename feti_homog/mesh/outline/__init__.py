@@ -2,3 +2,5 @@
 
 Imports `mesh.sizes`, `microstructure` and `system`.  Main entries: `bare_outline` and `outline`.
 """
+
+__all__ = ["lines", "outline"]

@@ -26,10 +26,9 @@ from feti_homog.mesh.outline.outline import (
     vertex_angles,
 )
 from feti_homog.mesh.sizes.graded_size import MeshSizes, SizeField, circle_size, size_field
-from feti_homog.microstructure.arrangements import Arrangement
-from feti_homog.microstructure.shapes.ellipses import Ellipses
-from feti_homog.microstructure.shapes.outlines import on_circle
-from feti_homog.system.parallel.dividing import even
+from feti_homog.microstructure import Arrangement
+from feti_homog.microstructure.shapes import Ellipses, on_circle
+from feti_homog.system.parallel import dividing
 from feti_homog.typing import Bool, Float, Int
 
 NO_BRIDGES = Bridges(np.zeros((0, 2), np.int64), np.zeros(0))
@@ -49,7 +48,7 @@ class SizedLines:
 
     def parts(self, count: int) -> list[SizedLines]:
         """Divide the lines, in order, into `count` parts of equal numbers."""
-        arcs, bridges = (pairwise(even(len(lines), count)) for lines in (self.arcs, self.bridges))
+        arcs, bridges = (pairwise(dividing.even(len(lines), count)) for lines in (self.arcs, self.bridges))
         return [
             SizedLines(self.arcs.chosen(slice(*arcs_part)), self.bridges.chosen(slice(*bridges_part)), self.sampling)
             for arcs_part, bridges_part in zip(arcs, bridges, strict=True)

@@ -22,20 +22,11 @@ from feti_homog.mesh.outline.outline import (
     side_curves,
     tip_vertices,
 )
+from feti_homog.mesh.sizes import graded_size
 from feti_homog.mesh.sizes.element_estimate import refuse_many
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, Source, SourcedSize, wrap
-from feti_homog.mesh.sizes.graded_size import (
-    MIN_EDGES_AROUND,
-    PASSAGE_EDGE,
-    WEDGE,
-    MeshSizes,
-    SizeField,
-    at_vertices,
-    passage_growth,
-)
-from feti_homog.microstructure.arrangements import Arrangement, neighbours
-from feti_homog.microstructure.shapes.ellipses import Ellipses, gaps
-from feti_homog.microstructure.shapes.outlines import directions
+from feti_homog.microstructure import Arrangement, arrangements
+from feti_homog.microstructure.shapes import Ellipses, directions, gaps
 from feti_homog.typing import Bool, Float, Int
 
 # Steps of a quarter of an ellipse between which its length is taken to be linear.
@@ -47,7 +38,7 @@ LONGEST = 10.0
 
 
 def outline(
-    arrangement: Arrangement, inner: Ellipses, sizes: MeshSizes, marks: Mapping[int, Sequence[float]]
+    arrangement: Arrangement, inner: Ellipses, sizes: graded_size.MeshSizes, marks: Mapping[int, Sequence[float]]
 ) -> Outline:
     """Make lines as `BareOutline.of` for an arrangement with outlines `inner`, with nodes on them."""
     size = arrangement.size
@@ -193,11 +184,11 @@ class EllipticArcs(Lines):
 def _size_field(
     arrangement: Arrangement,
     inner: Ellipses,
-    sizes: MeshSizes,
+    sizes: graded_size.MeshSizes,
     vertices: Float,
     crossings: tuple[Float, Float],
     tips: Float,
-) -> SizeField:
+) -> graded_size.SizeField:
     """Return the size field as `graded_size.size_field`, for the ellipses `inner`.
 
     `crossings` are where cell sides meet ellipses (c, 2), and the length (c,) R phi there: they meet at the angle phi,
@@ -214,22 +205,24 @@ def _size_field(
     points, normal = ellipses[around].points(angle), ellipses[around].normal(angle)
     thin = _coating_size(arrangement, inner, disc[around], normal)
     # As on circles of the same curvature.
-    caps = np.minimum(2 * np.pi * ellipses[around].bend(normal) / MIN_EDGES_AROUND, np.minimum(sizes.interface, thin))
+    caps = np.minimum(
+        2 * np.pi * ellipses[around].bend(normal) / graded_size.MIN_EDGES_AROUND, np.minimum(sizes.interface, thin)
+    )
     outer = ellipses[np.sort(np.unique(disc, return_index=True)[1])]
     offset = (points + size / 2) % size - size / 2
     nearest = offset[np.argmin(np.linalg.norm(offset, axis=1))]
-    to_corner = min(PASSAGE_EDGE * float(np.linalg.norm(nearest)), largest)
+    to_corner = min(graded_size.PASSAGE_EDGE * float(np.linalg.norm(nearest)), largest)
     sources = [
         (points, caps, np.full(len(points), MAX_GROWTH)),
         _between(outer, size, largest),
         _beside_sides(ellipses, size, largest),
-        (crossings[0], np.minimum(crossings[1] / WEDGE, largest), np.full(len(crossings[0]), MAX_GROWTH)),
+        (crossings[0], np.minimum(crossings[1] / graded_size.WEDGE, largest), np.full(len(crossings[0]), MAX_GROWTH)),
         (np.stack([nearest, np.zeros(2)]), np.full(2, to_corner), np.full(2, MAX_GROWTH)),
-        at_vertices(vertices, size, largest),
+        graded_size.at_vertices(vertices, size, largest),
     ]
     base = SourcedSize(sources, size, largest)
     if not sizes.are_graded(arrangement):
-        return SizeField(base)
+        return graded_size.SizeField(base)
     on_curves, sizes_there = cKDTree(wrap(points, size), boxsize=size), np.minimum(sizes.interface, thin)
     tree = cKDTree(wrap(tips.reshape(-1, 2), size), boxsize=size)
 
@@ -239,7 +232,7 @@ def _size_field(
         distance, nearest = on_curves.query(places)
         return np.asarray(np.minimum(sizes_there[nearest] + MAX_GROWTH * distance, at_tips))
 
-    return SizeField(base, graded, min(sizes.tip, float(sizes_there.min())))
+    return graded_size.SizeField(base, graded, min(sizes.tip, float(sizes_there.min())))
 
 
 def _coating_size(arrangement: Arrangement, inner: Ellipses, disc: Int, normal: Float) -> Float:
@@ -257,13 +250,13 @@ def _coating_size(arrangement: Arrangement, inner: Ellipses, disc: Int, normal: 
 
 def _between(ellipses: Ellipses, size: Float, largest: float) -> Source:
     """Facing points of near fibres, with the edges that suit their gap."""
-    first, second, vector = neighbours(ellipses.centres, size, 2 * ellipses.longest.max() + largest)
+    first, second, vector = arrangements.neighbours(ellipses.centres, size, 2 * ellipses.longest.max() + largest)
     one = ellipses[first]
     other = Ellipses(one.centres + vector, ellipses.frames[second])
     gap, direction = gaps(one, other)
     normal = directions(direction)
-    length = PASSAGE_EDGE * gap
-    growth = passage_growth(gap, 1 / one.bend(normal) + 1 / other.bend(-normal))
+    length = graded_size.PASSAGE_EDGE * gap
+    growth = graded_size.passage_growth(gap, 1 / one.bend(normal) + 1 / other.bend(-normal))
     narrow = length < largest
     places = np.concatenate([one.facing(normal)[narrow], other.facing(-normal)[narrow]])
     return places, np.tile(length[narrow], 2), np.tile(growth[narrow], 2)
@@ -279,9 +272,9 @@ def _beside_sides(ellipses: Ellipses, size: Float, largest: float) -> Source:
         foot = extreme.copy()
         foot[:, axis] = np.round(extreme[:, axis] / size[axis]) * size[axis]
         width = np.abs(extreme - foot)[:, axis]
-        length = PASSAGE_EDGE * width
+        length = graded_size.PASSAGE_EDGE * width
         narrow = length < largest
-        growth = passage_growth(width, 1 / ellipses.bend(normal))
+        growth = graded_size.passage_growth(width, 1 / ellipses.bend(normal))
         sources += [(place[narrow], length[narrow], growth[narrow]) for place in (extreme, foot)]
     places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
     return places, lengths, growths

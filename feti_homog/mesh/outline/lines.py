@@ -10,8 +10,8 @@ import numpy as np
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.sizes.graded_size import SizeField
-from feti_homog.microstructure.shapes.outlines import on_circle
-from feti_homog.system.parallel.dividing import ranges
+from feti_homog.microstructure.shapes import on_circle
+from feti_homog.system.parallel import dividing
 from feti_homog.typing import Float, Int
 
 # Regions beside a curve that are no disc or coating.
@@ -64,7 +64,7 @@ class Curves:
     def chosen(self, some: Int) -> Curves:
         """Return the curves `some` (k,)."""
         counts = np.diff(self.first)[some]
-        node, first = self.node[ranges(self.first[some], counts)], np.concatenate([[0], np.cumsum(counts)])
+        node, first = self.node[dividing.ranges(self.first[some], counts)], np.concatenate([[0], np.cumsum(counts)])
         return Curves(node, first, self.circle[some], self.inside[some], self.outside[some])
 
     @classmethod

@@ -1,7 +1,5 @@
 """The lines of a cell with nodes on them, and before: images, vertices, arcs, pieces of sides."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -12,8 +10,8 @@ from scipy.spatial import cKDTree
 from feti_homog.mesh.outline.bridges import TURN, OnCircles
 from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE, Curves, EdgeSamples, Sampling, Segments
 from feti_homog.mesh.sizes.graded_size import SizeField
-from feti_homog.microstructure.arrangements import Arrangement
-from feti_homog.microstructure.shapes.ellipses import Ellipses
+from feti_homog.microstructure import Arrangement
+from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.typing import Bool, Float, Int
 
 # Relative distance below which two positions are one.

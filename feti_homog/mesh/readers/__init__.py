@@ -2,3 +2,5 @@
 
 Imports `case`, `mesh`, `mesh.tiles`, `microstructure`, `schema` and `system`.  Main entry: `msh_reader.read`.
 """
+
+__all__ = ["msh_reader"]

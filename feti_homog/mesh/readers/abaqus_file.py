@@ -1,7 +1,5 @@
 """Read the triangles and the lines of an Abaqus input file (.inp)."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -13,7 +11,7 @@ import numpy as np
 from feti_homog.errors import MeshError
 from feti_homog.mesh.readers.abaqus_keywords import REFUSED, KeywordBlock, blocks, name_of
 from feti_homog.mesh.readers.raw_mesh import Block, RawMesh, assembled
-from feti_homog.schema.wording import toml_value
+from feti_homog.schema import wording
 from feti_homog.system.runtime import input_files
 from feti_homog.typing import Int
 
@@ -215,7 +213,7 @@ def _names_of(sets: Iterable[tuple[str, set[int]]]) -> dict[int, tuple[str, ...]
 def _integer(word: str) -> int:
     """Return the whole number that a word is; ValueError if it is none."""
     if not re.fullmatch(r"[+-]?[0-9]{1,15}", word):
-        raise ValueError(f"{toml_value(word)}: expected a whole number of at most 15 digits")
+        raise ValueError(f"{wording.toml_value(word)}: expected a whole number of at most 15 digits")
     return int(word)
 
 
@@ -226,4 +224,4 @@ def _real(word: str) -> float:
             return float(word.upper().replace("D", "E"))  # 1.0D+00 is Fortran's
     except ValueError:
         pass
-    raise ValueError(f"{toml_value(word)}: expected a number")
+    raise ValueError(f"{wording.toml_value(word)}: expected a number")

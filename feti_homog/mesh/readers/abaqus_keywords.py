@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 from feti_homog.errors import MeshError
-from feti_homog.schema.wording import toml_value
+from feti_homog.schema import wording
 
 # Keywords that are read and their parameters; None: any parameters may be there.
 READ: dict[str, tuple[str, ...] | None] = {
@@ -141,7 +141,9 @@ def _parameters(keyword: str, parts: Iterable[str]) -> dict[str, str]:
         longer = [full for full in names if full.startswith(name)]
         values[longer[0] if len(longer) == 1 and name not in names else name] = name_of(value)
     if READ.get(keyword) and (unread := [name for name in values if name not in names]):
-        raise ValueError(f"its parameter {toml_value(unread[0])} is not read: write nodes and elements out without it")
+        raise ValueError(
+            f"its parameter {wording.toml_value(unread[0])} is not read: write nodes and elements out without it"
+        )
     return values
 
 

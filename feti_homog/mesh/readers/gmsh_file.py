@@ -22,9 +22,8 @@ import numpy as np
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, Block, RawMesh, assembled, at, first_of
 from feti_homog.mesh.tiles.tile_filling import gmsh_session
-from feti_homog.schema.wording import toml_value
-from feti_homog.system.runtime import input_files
-from feti_homog.system.runtime.own_process import in_own_process
+from feti_homog.schema import wording
+from feti_homog.system.runtime import input_files, own_process
 from feti_homog.typing import Float, Int
 
 # Types of points, lines and triangles, which quadrilaterals are cut into.
@@ -102,7 +101,7 @@ def load(path: Path) -> RawMesh:
             b"".join(b"$%b%b\n$End%b\n" % (k.encode(), sections[k], k.encode()) for k in GIVEN if k in sections)
         )
         try:
-            content = in_own_process(copy, _read_by_gmsh, memory=max(MOST_BYTES, MOST_RATIO * len(data)))
+            content = own_process.in_own_process(copy, _read_by_gmsh, memory=max(MOST_BYTES, MOST_RATIO * len(data)))
         except CaseError:
             raise MeshError("the file is damaged: gmsh crashes on it, or needs too much time or memory") from None
     read = sum(len(numbers) for numbers, *_ in content.elements.values())
@@ -143,7 +142,7 @@ def _sections(content: bytes) -> dict[str, bytes]:
         if header is None or name not in {*GIVEN, *OTHERS, "PhysicalNames"}:
             place += len(content[place:end]) - len(content[place:end].lstrip())
             line, text = content.count(b"\n", 0, place) + 1, content[place : place + 80].partition(b"\n")[0]
-            word = toml_value(text.decode(errors="replace").strip())
+            word = wording.toml_value(text.decode(errors="replace").strip())
             raise MeshError(f"line {line}: {word}: expected a section of a mesh, such as $Nodes, or $Comments")
         if name in sections:
             raise MeshError(f"${name}: it is there twice")
@@ -163,7 +162,9 @@ def _form(head: bytes) -> tuple[bool, str]:
     version, *rest = head.split()[:3]
     number = float(version) if re.fullmatch(rb"[0-9]\.?[0-9]{0,9}", version) else 0.0
     if number not in VERSIONS:
-        raise MeshError(f"format {toml_value(version.decode(errors='replace'))} of gmsh: expected 2.2, 4.0 or 4.1")
+        raise MeshError(
+            f"format {wording.toml_value(version.decode(errors='replace'))} of gmsh: expected 2.2, 4.0 or 4.1"
+        )
     if rest not in ([b"0", b"8"], [b"1", b"8"]):
         raise MeshError("$MeshFormat: expected 0 8 behind the version of text and 1 8 of binary files")
     return number >= 4, "" if rest[0] == b"0" else ">" if b"\n\0\0\0\1" in head else "<"

@@ -1,7 +1,5 @@
 """Checks for users' meshes: each function finds one kind of fault and names the first offenders."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A user's mesh: read from a file, its phases named, moved onto a rectangle, checked, made into a coarse mesh."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -11,16 +9,16 @@ from types import MappingProxyType
 import numpy as np
 from scipy.spatial import ConvexHull, cKDTree
 
-from feti_homog.case.cell_section import Cell
+from feti_homog.case import cell_section
 from feti_homog.errors import MeshError, escaped
 from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, can_debond, edge_keys, edges, paired_sides, representatives
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers import abaqus_file, gmsh_file, mesh_checks, vtk_file, vtu_file
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, first_of
 from feti_homog.mesh.readers.round_interfaces import with_bent_edges, with_circles, with_ellipses
-from feti_homog.microstructure.phase_names import PHASE, VOID
-from feti_homog.microstructure.shapes.ellipses import Ellipses
-from feti_homog.schema.wording import toml_key, toml_value
+from feti_homog.microstructure import phase_names
+from feti_homog.microstructure.shapes import Ellipses
+from feti_homog.schema import wording
 from feti_homog.typing import Float, Int, Int32
 
 LOADERS = {
@@ -40,7 +38,7 @@ STRAIGHT = 1e-5
 UPRIGHT, FILLED = 1e-2, 0.4
 
 
-def read_cell(cell: Cell) -> CoarseMesh:
+def read_cell(cell: cell_section.Cell) -> CoarseMesh:
     """Return the user's mesh of a cell, repaired as the case asks for. Raises as `read`."""
     assert cell.file is not None
     snap = cell.snap_tolerance if cell.repair == "snap" else None
@@ -224,7 +222,7 @@ def _unknown_names(mesh: RawMesh, pairs: Iterable[tuple[str, str | int]]) -> lis
     for phase, name in pairs:
         of_curves = phase == DEBONDED
         if _key(name) not in map(_key, _names(mesh, of_curves)):
-            selected = f"[cell.phases] {toml_key(phase)} = {toml_value(name)}"
+            selected = f"[cell.phases] {wording.toml_key(phase)} = {wording.toml_value(name)}"
             kind = "lines" if of_curves else "elements"
             faults.append(f"{selected}: no {kind} of that name; {known_names(mesh, of_curves)}")
     return faults
@@ -247,9 +245,9 @@ def unknown_phases(mesh: RawMesh) -> list[str]:
     expected = 'expected "matrix", "fibre", "glass", ... of letters, digits, _ and -, "fibre:2"'
     # Without a matrix all groups are named anew, and numbers need no further word.
     faults = [
-        f'{mesh.container} "{name}" is not a phase: {HOLE if name == VOID else expected}'
+        f'{mesh.container} "{name}" is not a phase: {HOLE if name == phase_names.VOID else expected}'
         for name in names
-        if not PHASE.fullmatch(name) and (has_matrix or not NUMBER.fullmatch(name))
+        if not phase_names.PHASE.fullmatch(name) and (has_matrix or not NUMBER.fullmatch(name))
     ]
     if not has_matrix:
         faults.append(f'no {mesh.container} is named "matrix"')
@@ -264,7 +262,7 @@ def _way_out(mesh: RawMesh) -> str:
     with np.errstate(all="ignore"):  # coordinates are judged later
         sizes = np.bincount(mesh.group, np.abs(areas(mesh.points[:, :2], mesh.triangles)), len(mesh.groups))
         for names, percent in zip(mesh.groups, 100 * sizes / sizes.sum(), strict=True):
-            if names and names[0] != VOID:
+            if names and names[0] != phase_names.VOID:
                 shares[names[0]] = shares.get(names[0], 0.0) + percent
     if not shares:
         return ""
@@ -290,4 +288,4 @@ def _names(mesh: RawMesh, of_curves: bool) -> list[str]:
 
 def _as_selected(name: str) -> str:
     """Return the name or number of a group as a case file has it."""
-    return name.removeprefix("number ") if NUMBER.fullmatch(name) else toml_value(name)
+    return name.removeprefix("number ") if NUMBER.fullmatch(name) else wording.toml_value(name)

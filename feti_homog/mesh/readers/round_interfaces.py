@@ -1,7 +1,5 @@
 """Curves along users' interfaces: circles and ellipses, closed on the torus, and arcs through middle nodes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +9,7 @@ from scipy.sparse.csgraph import connected_components, depth_first_order
 from feti_homog.mesh.coarse_mesh import CoarseMesh, double_arcs, edge_keys, edges, flip_double_arcs, interface_edges
 from feti_homog.mesh.periodic_topology import components
 from feti_homog.mesh.readers.raw_mesh import MiddleNodes
-from feti_homog.microstructure.shapes.ellipses import Ellipses
+from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.typing import Float, Int, Int32
 
 # Largest distance of a node from its circle, relative to the radius: files may round coordinates to seven digits.

@@ -1,7 +1,5 @@
 """Points and cells with VTK's types and cell data, as VTK and Medit files have them."""
 
-from __future__ import annotations
-
 import re
 import warnings
 from collections.abc import Mapping
@@ -12,7 +10,7 @@ import numpy as np
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, Block, RawMesh, assembled
-from feti_homog.schema.wording import toml_value
+from feti_homog.schema import wording
 from feti_homog.typing import Float, Int
 
 Numbers = np.ndarray[Any, Any]
@@ -190,7 +188,7 @@ class NotANumber(ValueError):
     def __init__(self, text: bytes, kind: str) -> None:
         wrong = WRONG_WORD[kind].search(text)
         self.place = 0 if wrong is None else wrong.start()
-        word = "" if wrong is None else f"{toml_value(wrong[0].decode(errors='replace'))}: "
+        word = "" if wrong is None else f"{wording.toml_value(wrong[0].decode(errors='replace'))}: "
         super().__init__(f"{word}expected a {'whole number' if kind == 'i8' else 'number'}")
 
 

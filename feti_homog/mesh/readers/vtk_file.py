@@ -21,7 +21,7 @@ from feti_homog.errors import MeshError
 from feti_homog.mesh.readers.raw_mesh import RawMesh
 from feti_homog.mesh.readers.unstructured_grid import Grid, NotANumber, Numbers, mesh_of, numbers
 from feti_homog.mesh.readers.vtu_file import TYPES as XML_TYPES
-from feti_homog.schema.wording import toml_value
+from feti_homog.schema import wording
 from feti_homog.system.runtime import input_files
 from feti_homog.typing import Int
 
@@ -58,7 +58,7 @@ def load(path: Path) -> RawMesh:
     file.place = file.content.find(b"\n", file.place) + 1 or len(file.content)  # the title, which may be empty
     form = " ".join(file.line()).upper()
     if form not in ("ASCII", "BINARY"):
-        file.refuse(f"{toml_value(form)}: expected ASCII or BINARY")
+        file.refuse(f"{wording.toml_value(form)}: expected ASCII or BINARY")
     file.is_binary = form == "BINARY"
     legacy = _Legacy(file)
     while words := file.line():
@@ -143,7 +143,7 @@ class _Legacy:
             self._keep(words[0], file.take(self.length * width, self._type(words[1])), width)
         else:
             expected = "expected DATASET, POINTS, CELLS, CELL_TYPES, CELL_DATA, POINT_DATA or numbers of these"
-            file.refuse(f"{toml_value(section)}: {expected}")
+            file.refuse(f"{wording.toml_value(section)}: {expected}")
 
     def _keep(self, name: str, values: Numbers, width: int) -> None:
         if self.are_of_cells:
@@ -156,7 +156,7 @@ class _Legacy:
 
     def _type(self, name: str) -> str:
         if name.lower() not in TYPES:
-            self.file.refuse(f"{toml_value(name)}: expected a type of numbers, such as int or double")
+            self.file.refuse(f"{wording.toml_value(name)}: expected a type of numbers, such as int or double")
         return TYPES[name.lower()]
 
 
@@ -175,7 +175,7 @@ def load_medit(path: Path) -> RawMesh:
     while (word := file.word()) and word.upper() != "END":
         section = word.upper()
         if not section.isalnum() or section[0].isdigit():
-            file.refuse(f"{toml_value(word)}: expected the name of a section")
+            file.refuse(f"{wording.toml_value(word)}: expected the name of a section")
         count, width = file.count(file.word()), widths.get(section, 1)
         if section not in widths and count:
             expected = "only triangles of three nodes, quadrilaterals of four and edges of two can be used"
@@ -232,7 +232,7 @@ class Scanner:
     def count(self, word: str) -> int:
         """Return the number of values that a word announces."""
         if not re.fullmatch("[0-9]{1,15}", word):
-            self.refuse(f"{toml_value(word)}: expected a number of values")
+            self.refuse(f"{wording.toml_value(word)}: expected a number of values")
         return int(word)
 
     def take(self, count: int, kind: str) -> Numbers:

@@ -17,7 +17,7 @@ import numpy as np
 from feti_homog.errors import MeshError
 from feti_homog.mesh.readers.raw_mesh import RawMesh
 from feti_homog.mesh.readers.unstructured_grid import Grid, NotANumber, Numbers, mesh_of, numbers
-from feti_homog.schema.wording import toml_value
+from feti_homog.schema import wording
 from feti_homog.system.runtime import input_files
 from feti_homog.typing import Int
 
@@ -93,7 +93,7 @@ def _piece(piece: ElementTree.Element, arrays: _Arrays) -> Grid:
     for name in ("NumberOfPoints", "NumberOfCells"):
         word = piece.get(name, "").strip()
         if not re.fullmatch("[0-9]{1,15}", word):
-            raise MeshError(f"{name} is {toml_value(word)}: expected a whole number")
+            raise MeshError(f"{name} is {wording.toml_value(word)}: expected a whole number")
         counts.append(int(word))
     points = next(iter(arrays.of(children["Points"][0]).values()), np.zeros(0))
     cells = arrays.of(children["Cells"][0])
@@ -124,7 +124,7 @@ class _Arrays:
         for name, (value, choices) in expected.items():
             if value not in choices:
                 choice = " or ".join(filter(None, choices))
-                raise MeshError(f"{name} is {toml_value(value or '')}: expected {choice}")
+                raise MeshError(f"{name} is {wording.toml_value(value or '')}: expected {choice}")
         self.order, self.budget = ORDERS[order], budget
         self.header = np.dtype(f"{self.order}{TYPES[header]}")
         self.decompressor: Any = COMPRESSORS.get(compressor)
@@ -144,9 +144,9 @@ class _Arrays:
                 values, width = self._values(array, kind), int(array.get("NumberOfComponents") or 1)
                 arrays[name] = values if width == 1 else values.reshape(-1, width)
             except NotANumber as error:
-                raise MeshError(f"array {toml_value(name)}: {error}") from None
+                raise MeshError(f"array {wording.toml_value(name)}: {error}") from None
             except (ValueError, zlib.error, lzma.LZMAError, binascii.Error):
-                raise MeshError(f"array {toml_value(name)}: its data are damaged or broken off") from None
+                raise MeshError(f"array {wording.toml_value(name)}: its data are damaged or broken off") from None
         return arrays
 
     def _values(self, array: ElementTree.Element, kind: str) -> Numbers:
@@ -157,7 +157,7 @@ class _Arrays:
             start = self._offset(array)
             text = self.appended[start : next((other for other in self.starts if other > start), start)]
         elif form != "binary":
-            raise MeshError(f"format is {toml_value(form)}: expected ascii, binary or appended")
+            raise MeshError(f"format is {wording.toml_value(form)}: expected ascii, binary or appended")
         if not (self.is_raw and form == "appended"):
             # Header and data may be encoded separately, each with its own padding.
             parts = SEGMENT.findall(b"".join(text.split()))
@@ -167,7 +167,9 @@ class _Arrays:
     def _offset(self, array: ElementTree.Element) -> int:
         word = array.get("offset", "").strip()
         if not re.fullmatch("[0-9]{1,15}", word) or int(word) > len(self.appended):
-            raise MeshError(f"offset is {toml_value(word)}: expected one in {len(self.appended)} appended bytes")
+            raise MeshError(
+                f"offset is {wording.toml_value(word)}: expected one in {len(self.appended)} appended bytes"
+            )
         return int(word)
 
     def _words(self, data: bytes, count: int) -> Int:

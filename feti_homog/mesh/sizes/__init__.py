@@ -2,3 +2,5 @@
 
 Imports `case` and `microstructure`.  Main entry: `graded_size`.
 """
+
+__all__ = ["element_estimate", "graded_size"]

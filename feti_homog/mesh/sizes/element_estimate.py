@@ -8,14 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.case.cell_section import FIBRES_OF, Cell
-from feti_homog.case.cell_sizes import fibre_counts
+from feti_homog.case import cell_section, cell_sizes
 from feti_homog.errors import MeshError
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH
 from feti_homog.mesh.sizes.graded_size import MIN_EDGES_AROUND
-from feti_homog.microstructure.arrangements import Arrangement
-from feti_homog.microstructure.shapes.ellipses import Ellipses
-from feti_homog.microstructure.shapes.shapes import elliptic
+from feti_homog.microstructure import Arrangement
+from feti_homog.microstructure.shapes import Ellipses, shapes
 from feti_homog.typing import Float
 
 # Elements that are meshed in some minutes on one rank, and by all ranks together.
@@ -43,7 +41,7 @@ class ElementEstimate:
         ovals: fibres that are ellipses.
     """
 
-    cell: Cell
+    cell: cell_section.Cell
     fibres: int
     mean_radius: float
     height: float
@@ -51,14 +49,14 @@ class ElementEstimate:
     ovals: Ellipses
 
     @classmethod
-    def of(cls, cell: Cell, listed: Arrangement | None) -> ElementEstimate:
+    def of(cls, cell: cell_section.Cell, listed: Arrangement | None) -> ElementEstimate:
         """Estimate the elements of a cell, with the arrangement of its table if it has one."""
         if listed is not None:
-            ellipses, radius = elliptic(listed.outlines), float(listed.radii.mean())
+            ellipses, radius = shapes.elliptic(listed.outlines), float(listed.radii.mean())
             ovals = ellipses[~ellipses.are_round]
             length = math.fsum(ellipses.perimeters) if len(ovals) else 2 * math.pi * radius * listed.fibres
             return cls(cell, listed.fibres, radius, listed.height, length, ovals)
-        fibres = FIBRES_OF.get(cell.geometry) or sum(fibre_counts(cell).values())
+        fibres = cell_section.FIBRES_OF.get(cell.geometry) or sum(cell_sizes.fibre_counts(cell).values())
         height = math.sqrt(3.0) if cell.geometry == "hexagonal" else 1.0
         radius = math.sqrt(math.fsum(cell.fractions.values()) * height / (math.pi * fibres))
         return cls(cell, fibres, radius, height, 2 * math.pi * radius * fibres, Ellipses.round(np.zeros((0, 3))))
@@ -76,7 +74,7 @@ class ElementEstimate:
         On both sides of interfaces with length P there are 2 P int dx / (A (h + g x)^2) = 2 P / (A g h) triangles.
         """
         cell = self.cell
-        irregular = 0 if cell.geometry in FIBRES_OF else self.fibres
+        irregular = 0 if cell.geometry in cell_section.FIBRES_OF else self.fibres
         count = self.height / (TRIANGLE_AREA * cell.mesh_size**2) + TRIANGLES_OF_A_FIBRE * irregular
         # Ends of long axes have the radius of curvature b^2 / a.
         short, long = np.sort(self.ovals.semi_axes, axis=1).T

@@ -1,7 +1,5 @@
 """Edge lengths that grow with the distance from places where they are known."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

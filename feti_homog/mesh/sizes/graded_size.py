@@ -9,10 +9,10 @@ from itertools import product
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.case.cell_section import Cell
+from feti_homog.case import cell_section
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, Source, SourcedSize, wrap
-from feti_homog.microstructure.arrangements import Arrangement, neighbours
-from feti_homog.microstructure.shapes.outlines import on_circle
+from feti_homog.microstructure import Arrangement, arrangements
+from feti_homog.microstructure.shapes import on_circle
 from feti_homog.typing import Bool, Float, Int
 
 # Edges around a fibre, at least.
@@ -42,7 +42,7 @@ def coating_size(arrangement: Arrangement) -> Float:
 def _between_fibres(circles: Float, size: Float, caps: Float, largest: float) -> Source:
     """Facing points on neighbouring fibres; edges there suit the gap and the other fibre's edges."""
     centres, radii = circles[:, :2], circles[:, 2]
-    first, second, vector = neighbours(centres, size, 2 * radii.max() + largest)
+    first, second, vector = arrangements.neighbours(centres, size, 2 * radii.max() + largest)
     distance = np.linalg.norm(vector, axis=1)
     gap = distance - radii[first] - radii[second]
     normal = vector / distance[:, None]
@@ -145,7 +145,7 @@ class MeshSizes:
         return cls(largest, largest, largest)
 
     @classmethod
-    def of(cls, cell: Cell, has_tips: bool) -> MeshSizes:
+    def of(cls, cell: cell_section.Cell, has_tips: bool) -> MeshSizes:
         """Return the sizes that a cell with width 1 is asked for."""
         interface = cell.mesh_size if cell.interface_size is None else cell.interface_size
         return cls(cell.mesh_size, interface, interface if cell.tip_size is None or not has_tips else cell.tip_size)

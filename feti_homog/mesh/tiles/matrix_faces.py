@@ -12,7 +12,7 @@ import numpy as np
 
 from feti_homog.mesh.outline.bridges import TURN, Bridges, CentreLines
 from feti_homog.mesh.periodic_topology import components
-from feti_homog.microstructure.shapes.outlines import on_circle
+from feti_homog.microstructure.shapes import on_circle
 from feti_homog.typing import Float, Int
 
 NOWHERE = -1

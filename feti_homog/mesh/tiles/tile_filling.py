@@ -1,7 +1,5 @@
 """The regions of an outline filled with triangles by gmsh."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -5,8 +5,6 @@ that it has filled: nodes on lines have their numbers in the outline, nodes with
 after the other; a torus edge has the number that its two classes make.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -19,10 +17,10 @@ from feti_homog.mesh.outline.bridges import CLEAR, Bridges, bridges, centre_line
 from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE
 from feti_homog.mesh.outline.outline import Outline, crossings, disc_at, images, on_side
 from feti_homog.mesh.periodic_topology import Torus, plane_edges_of
-from feti_homog.mesh.tiles.tile_filling import Filling, Tile, arc_edges
 from feti_homog.mesh.tiles.matrix_faces import MatrixTiles, beside, grid_cell, matrix_tiles
-from feti_homog.microstructure.arrangements import Arrangement
-from feti_homog.microstructure.shapes.ellipses import Discs, Ellipses
+from feti_homog.mesh.tiles.tile_filling import Filling, Tile, arc_edges
+from feti_homog.microstructure import Arrangement
+from feti_homog.microstructure.shapes import Discs, Ellipses
 from feti_homog.typing import Array, Float, Int, Int32
 
 

@@ -1,7 +1,5 @@
 """Protocols for fibre outlines and row shapes, and the common base for curves of any shape."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import NamedTuple, Protocol, Self

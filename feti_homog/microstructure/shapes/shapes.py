@@ -1,7 +1,5 @@
 """The shapes that table rows may have, and the outlines of all rows."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

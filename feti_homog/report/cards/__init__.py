@@ -2,3 +2,5 @@
 
 Imports `materials`, `report.text` and `results`.  Main entry: `export.card`.
 """
+
+__all__ = ["export"]

@@ -1,7 +1,5 @@
 """The effective material of a result in card axes, axis 1 along the fibre; comments, numbers and names of all cards."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.errors import CaseError
-from feti_homog.materials.engineering_constants import ABOUT_FIBRES, OF_THE_CELL
-from feti_homog.materials.voigt import is_positive_definite
+from feti_homog.materials import engineering_constants, voigt
 from feti_homog.report.text import constant_tables
 from feti_homog.typing import Document, Float
 
@@ -26,8 +23,9 @@ COUPLINGS = ~np.eye(6, dtype=bool)
 """(6, 6) where the stiffness of an orthotropic material is 0 in its axes."""
 COUPLINGS[:3, :3] = False
 AXES = (
-    f"Axis 1 is the fibre, x3 of the cell; axes 2 and 3 are x1 and x2 of the cell. So {', '.join(OF_THE_CELL)} of this "
-    f"card are {', '.join(OF_THE_CELL.values())} of the cell. nu_ij = -eps_j/eps_i under stress along i."
+    "Axis 1 is the fibre, x3 of the cell; axes 2 and 3 are x1 and x2 of the cell. So "
+    f"{', '.join(engineering_constants.OF_THE_CELL)} of this card are "
+    f"{', '.join(engineering_constants.OF_THE_CELL.values())} of the cell. nu_ij = -eps_j/eps_i under stress along i."
 )
 TINY = float(np.finfo(float).tiny)
 NEGLIGIBLE = 1e-3
@@ -130,7 +128,7 @@ def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
     compliance = np.diag([1 / E_a, 1 / E_t, 1 / E_t, 2 * (1 + nu_t) / E_t, 1 / G_a, 1 / G_a])
     compliance[0, 1:3] = compliance[1:3, 0] = -nu_a / E_a
     compliance[1, 2] = compliance[2, 1] = -nu_t / E_t
-    if not is_positive_definite(compliance):
+    if not voigt.is_positive_definite(compliance):
         raise ValueError("transversely_isotropic: no stable material")
     expansion = None
     if computed["expansion_axial"] is not None:
@@ -145,7 +143,7 @@ def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
         expansion=expansion,
         errors={
             name: float(errors[constant])
-            for constant, about in ABOUT_FIBRES.items()
+            for constant, about in engineering_constants.ABOUT_FIBRES.items()
             if constant in errors
             for name in about.card
         },
@@ -176,7 +174,7 @@ def _stiffness(document: Document) -> Float:
         raise CaseError("its debonded faces touch under some loads alone; cards are of linear materials")
     C = _numbers(document["effective_stiffness"], (6, 6))
     C = (C + C.T) / 2.0
-    if not is_positive_definite(C):
+    if not voigt.is_positive_definite(C):
         raise CaseError("its effective stiffness is not positive definite; cards are of stable materials")
     return C
 

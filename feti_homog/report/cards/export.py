@@ -16,8 +16,6 @@ of `symmetric21` the upper triangle by rows in the order [11, 22, 33, 23, 13, 12
 components 11, 22, 33, 23, 13, 12 of a tensor, so half of the engineering shears.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -27,16 +25,8 @@ from typing import Any
 import numpy as np
 
 from feti_homog.errors import CaseError
-from feti_homog.materials.engineering_constants import MATERIAL_EXPANSIONS
-from feti_homog.report.cards.effective_material import (
-    PAIRS,
-    EffectiveMaterial,
-    comments,
-    identifier,
-    in_axes_of_the_cell,
-    nearest_transversely_isotropic,
-    number,
-)
+from feti_homog.materials import engineering_constants
+from feti_homog.report.cards import effective_material
 from feti_homog.results import result_json
 from feti_homog.typing import Float
 
@@ -61,7 +51,7 @@ FIBRE_AXES = ("the fibre (x3 of the cell)", "x1 of the cell", "x2 of the cell")
 COMPONENTS = ("11", "22", "33", "gamma23", "gamma13", "gamma12")
 
 
-def abaqus(material: EffectiveMaterial) -> str:
+def abaqus(material: effective_material.EffectiveMaterial) -> str:
     """Return the card. Raises CaseError for an expansion with shears."""
     if material.expansion is not None and material.expansion[3:].any():
         # Abaqus' guide leaves open whether alpha12 of TYPE=ANISO is the tensor's shear or the engineering one.
@@ -69,22 +59,25 @@ def abaqus(material: EffectiveMaterial) -> str:
             "its thermal expansion has shears in its axes, which cards for Abaqus do not carry; "
             "use --transversely-isotropic"
         )
-    lines = [*comments(material, "**"), *elastic(material, "ANISOTROPIC")]
+    lines = [*effective_material.comments(material, "**"), *elastic(material, "ANISOTROPIC")]
     if material.expansion is not None:
         lines += expansion("ORTHO", material.expansion[:3])
     return "\n".join(lines)
 
 
-def elastic(material: EffectiveMaterial, anisotropic: str) -> Iterator[str]:
+def elastic(material: effective_material.EffectiveMaterial, anisotropic: str) -> Iterator[str]:
     """*MATERIAL and *ELASTIC; `anisotropic` is the TYPE of all 21 entries."""
-    yield f"*MATERIAL, NAME={identifier(material.name)}"
+    yield f"*MATERIAL, NAME={effective_material.identifier(material.name)}"
     if material.is_orthotropic:
         yield "*ELASTIC, TYPE=ENGINEERING CONSTANTS"
         yield "** E1, E2, E3, nu12, nu13, nu23, G12, G13, and on the next line G23"
         yield from data_lines(material.constants.values())
     else:
         C = material.stiffness
-        names = ["D" + "".join(str(axis + 1) for axis in (*PAIRS[i], *PAIRS[j])) for i, j in ABAQUS_ENTRIES]
+        names = [
+            "D" + "".join(str(axis + 1) for axis in (*effective_material.PAIRS[i], *effective_material.PAIRS[j]))
+            for i, j in ABAQUS_ENTRIES
+        ]
         yield f"*ELASTIC, TYPE={anisotropic}"
         yield from (f"** {', '.join(names[k : k + FIELDS])}" for k in range(0, len(names), FIELDS))
         yield from data_lines(C[i, j] for i, j in ABAQUS_ENTRIES)
@@ -97,13 +90,13 @@ def expansion(kind: str, values: Float) -> list[str]:
 
 def data_lines(values: Iterable[float]) -> list[str]:
     """Return the numbers, separated by commas, eight to a line."""
-    fields = [number(value, FIELD) for value in values]
+    fields = [effective_material.number(value, FIELD) for value in values]
     return [", ".join(fields[k : k + FIELDS]) for k in range(0, len(fields), FIELDS)]
 
 
-def calculix(material: EffectiveMaterial) -> str:
+def calculix(material: effective_material.EffectiveMaterial) -> str:
     """Return the card of CalculiX, with TYPE=ANISO for all 21 entries."""
-    lines = [*comments(material, "**"), *elastic(material, "ANISO")]
+    lines = [*effective_material.comments(material, "**"), *elastic(material, "ANISO")]
     if material.expansion is not None and material.is_orthotropic:
         lines += expansion("ORTHO", material.expansion[:3])
     elif material.expansion is not None:
@@ -111,7 +104,7 @@ def calculix(material: EffectiveMaterial) -> str:
     return "\n".join(lines)
 
 
-def ansys(material: EffectiveMaterial) -> str:
+def ansys(material: effective_material.EffectiveMaterial) -> str:
     """Return the card. Raises CaseError for an expansion with shears."""
     alpha = material.expansion
     if alpha is not None and alpha[3:].any():
@@ -119,25 +112,31 @@ def ansys(material: EffectiveMaterial) -> str:
             "its thermal expansion has shears in its axes, for which ANSYS has no constants; "
             "use --transversely-isotropic"
         )
-    lines = [*comments(material, "!"), "! Material 1; x, y, z are axes 1, 2, 3. To be read in /PREP7."]
+    lines = [
+        *effective_material.comments(material, "!"),
+        "! Material 1; x, y, z are axes 1, 2, 3. To be read in /PREP7.",
+    ]
     if material.is_orthotropic:
-        lines += [f"MP,{label},1,{number(material.constants[name])}" for label, name in ANSYS_LABELS.items()]
+        lines += [
+            f"MP,{label},1,{effective_material.number(material.constants[name])}"
+            for label, name in ANSYS_LABELS.items()
+        ]
     else:
         C = material.stiffness
-        values = [number(C[i, j]) for i, j in ANSYS_ENTRIES]
+        values = [effective_material.number(C[i, j]) for i, j in ANSYS_ENTRIES]
         lines += ["! Stiffness in the order x, y, z, xy, yz, xz: D11, D21, D31, D41, D51, D61, D22, ..., D66"]
         lines += ["TB,ANEL,1,1,21,0"]
         lines += [f"TBDATA,{k + 1},{','.join(values[k : k + 6])}" for k in range(0, len(values), 6)]
     if alpha is not None:
-        lines += [f"MP,ALP{axis},1,{number(alpha[i])}" for i, axis in enumerate("XYZ")]
+        lines += [f"MP,ALP{axis},1,{effective_material.number(alpha[i])}" for i, axis in enumerate("XYZ")]
     return "\n".join(lines)
 
 
-def moose(material: EffectiveMaterial) -> str:
+def moose(material: effective_material.EffectiveMaterial) -> str:
     """Return the card: a block [Materials]."""
-    name, C = identifier(material.name), material.stiffness
+    name, C = effective_material.identifier(material.name), material.stiffness
     method, entries = ("symmetric9", SYMMETRIC9) if material.is_orthotropic else ("symmetric21", SYMMETRIC21)
-    lines = [*comments(material, "#"), "[Materials]"]
+    lines = [*effective_material.comments(material, "#"), "[Materials]"]
     lines += _block(
         f"{name}_elasticity",
         type="ComputeElasticityTensor",
@@ -170,10 +169,10 @@ def _block(name: str, **parameters: str) -> list[str]:
 
 
 def _quoted(values: Iterable[float]) -> str:
-    return f"'{' '.join(number(value) for value in values)}'"
+    return f"'{' '.join(effective_material.number(value) for value in values)}'"
 
 
-def csv_table(material: EffectiveMaterial) -> str:
+def csv_table(material: effective_material.EffectiveMaterial) -> str:
     """Return the table: engineering constants, expansions, and the stiffness in the order [11, 22, 33, 23, 13, 12]."""
     rows, unit = [CSV_COLUMNS], material.stress_unit
     for name, value in material.constants.items():
@@ -181,30 +180,41 @@ def csv_table(material: EffectiveMaterial) -> str:
         where = " and ".join(f"axis {axis}, {FIBRE_AXES[axis - 1]}" for axis in axes)
         meanings = {"E": f"Young's modulus along {where}", "G": f"shear modulus between {where}"}
         ratio = f"-eps_{axes[-1]}/eps_{axes[0]} under stress along axis {axes[0]}: {where}"
-        rows.append((name, number(value), "" if name[0] == "n" else unit, meanings.get(name[0], ratio)))
+        rows.append(
+            (name, effective_material.number(value), "" if name[0] == "n" else unit, meanings.get(name[0], ratio))
+        )
     if material.expansion is not None:
-        for name, component, value in zip(MATERIAL_EXPANSIONS, COMPONENTS, material.expansion, strict=True):
-            rows.append((name, number(value), "1 / temperature", f"thermal strain {component} per unit of temperature"))
+        for name, component, value in zip(
+            engineering_constants.MATERIAL_EXPANSIONS, COMPONENTS, material.expansion, strict=True
+        ):
+            rows.append(
+                (
+                    name,
+                    effective_material.number(value),
+                    "1 / temperature",
+                    f"thermal strain {component} per unit of temperature",
+                )
+            )
     C = material.stiffness
     for i, j in SYMMETRIC21:
-        digits = "".join(str(axis + 1) for axis in PAIRS[i])
+        digits = "".join(str(axis + 1) for axis in effective_material.PAIRS[i])
         meaning = f"stiffness: stress {digits} under the unit strain {COMPONENTS[j]}"
-        rows.append((f"C{i + 1}{j + 1}", number(C[i, j]), unit, meaning))
+        rows.append((f"C{i + 1}{j + 1}", effective_material.number(C[i, j]), unit, meaning))
     stream = io.StringIO()
     csv.writer(stream, lineterminator="\n").writerows(rows)
     return stream.getvalue().removesuffix("\n")
 
 
-FORMATS: dict[str, Callable[[EffectiveMaterial], str]] = {
+FORMATS: dict[str, Callable[[effective_material.EffectiveMaterial], str]] = {
     "abaqus": abaqus,
     "calculix": calculix,
     "ansys": ansys,
     "moose": moose,
     "csv": csv_table,
 }
-SYMMETRIES: dict[str, Callable[[Mapping[str, Any]], EffectiveMaterial]] = {
-    "orthotropic": in_axes_of_the_cell,
-    "transversely isotropic": nearest_transversely_isotropic,
+SYMMETRIES: dict[str, Callable[[Mapping[str, Any]], effective_material.EffectiveMaterial]] = {
+    "orthotropic": effective_material.in_axes_of_the_cell,
+    "transversely isotropic": effective_material.nearest_transversely_isotropic,
 }
 
 

@@ -2,3 +2,5 @@
 
 Imports `case`, `materials`, `report.text` and `results`. Loads Matplotlib.  Main entry: `figures.plot`.
 """
+
+__all__ = ["figures", "plot_helpers"]

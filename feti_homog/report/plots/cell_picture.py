@@ -3,8 +3,6 @@
 Fibres have the numbers N of `fibre = N` in case files.
 """
 
-from __future__ import annotations
-
 from textwrap import fill
 from typing import Any
 

@@ -3,8 +3,6 @@
 At most about TRIANGLE_LIMIT triangles, read in blocks; outlines, values, displacements and their largest scale.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.materials.voigt import voigt_names
+from feti_homog.materials import voigt
 from feti_homog.typing import Array
 
 LEAST_AREA = 0.5  # area of a triangle in a picture / its own: at zero it would be turned over
@@ -143,7 +141,7 @@ def drawn_displacement(state: Any, drawn: DrawnMesh) -> Array:
     Shifted to zero mean of u* = u - E x over the triangles drawn: the solution leaves the translation open.
     """
     displacement = nodal_values(state["displacement"], drawn)
-    loads = dict(zip(voigt_names(len(state.attrs["strain"]))[0], state.attrs["strain"], strict=True))
+    loads = dict(zip(voigt.voigt_names(len(state.attrs["strain"]))[0], state.attrs["strain"], strict=True))
     shear = 0.5 * loads["gamma12"]
     fluctuation = displacement - drawn.points @ np.array([[loads["E11"], shear], [shear, loads["E22"]]])
     areas = _determinant(_sides(drawn.points, drawn))

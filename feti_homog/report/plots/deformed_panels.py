@@ -20,7 +20,6 @@ from feti_homog.errors import FetiHomogError
 from feti_homog.report.plots import decimation, drawn_cell, plot_helpers
 from feti_homog.report.text.summary import reported
 from feti_homog.results import atomic, field_file, landmarks
-from feti_homog.results.landmarks import marks
 from feti_homog.typing import Array, Document
 
 MAX_PANELS = 6
@@ -46,7 +45,7 @@ class DeformedCell(drawn_cell.DrawnCell):
         """Choose a stress, by the case or to suit all states, and one colour range."""
         cell, states = drawn_cell.DrawnCell.of(file, limit), [file[f"state/{n}"] for n in numbers]
         component = plot_helpers.stress_component(document["case"]["output"].get("stress", "auto"), states)
-        mark_of = marks(document) if reported(document).is_followed else {}
+        mark_of = landmarks.marks(document) if reported(document).is_followed else {}
         # At the end, once all fibres have come off, stresses may be many times those of the peak.
         marked = [state for state in states if mark_of.get(int(state.attrs["point"]), "end") != "end"] or states
         stress = np.concatenate([plot_helpers.nodal_stress(state, component, cell.drawn) for state in marked])

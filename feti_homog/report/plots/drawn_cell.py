@@ -12,11 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from scipy.spatial import cKDTree
 
-from feti_homog.materials.voigt import voigt_names
+from feti_homog.materials import voigt
 from feti_homog.report.plots.decimation import TRIANGLE_LIMIT, DrawnMesh, drawn_mesh, outline_edges
 from feti_homog.report.plots.plot_helpers import SYMBOLS, draw_segments, unit_label
 from feti_homog.report.text.summary import reported
-from feti_homog.results.path_curves import FAINT, ZERO, components_above, leading_component
+from feti_homog.results import path_curves
 from feti_homog.typing import Array, Document
 
 BAR_INCHES = 1.1  # room for a colour bar beside the cell
@@ -164,7 +164,7 @@ class LoadLabels:
         analysis = reported(document)
         if analysis.is_followed:
             largest = np.abs([point["stress"] for point in document[analysis.name]]).max()
-            return cls(leading_component(document), ZERO * float(largest))
+            return cls(path_curves.leading_component(document), path_curves.ZERO * float(largest))
         return cls(given=document["case"][analysis.name]["to"] if analysis.picture else None)
 
     def words(self, attributes: Any) -> list[str]:
@@ -175,8 +175,8 @@ class LoadLabels:
         if self.given is not None:
             return [_formula(name, value) for name, value in self.given.items()]
         strain, temperature = np.asarray(attributes["strain"]), float(attributes.get("temperature", 0.0))
-        strains, stresses = voigt_names(len(strain))
-        loads = [(strains[k], float(strain[k])) for k in components_above(FAINT, strain[None])]
+        strains, stresses = voigt.voigt_names(len(strain))
+        loads = [(strains[k], float(strain[k])) for k in path_curves.components_above(path_curves.FAINT, strain[None])]
         if self.leading is not None and len(loads) > 2:
             stress = float(attributes["stress"][self.leading])
             loads = [

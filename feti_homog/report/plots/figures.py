@@ -1,7 +1,5 @@
 """The pictures of a result: cell, deformed cell under each load, curves and panels of an angle or path."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 
 from feti_homog.errors import FetiHomogError
-from feti_homog.materials.voigt import voigt_names
+from feti_homog.materials import voigt
 from feti_homog.report.plots import (
     cell_picture,
     decimation,
@@ -85,7 +83,7 @@ def _pictures(directory: Path, document: Document) -> list[Path]:
 
 def _name(number: str, attributes: Any) -> str:
     strain = attributes["strain"]
-    loads = dict(zip(voigt_names(len(strain))[0], strain, strict=True))
+    loads = dict(zip(voigt.voigt_names(len(strain))[0], strain, strict=True))
     loads["temperature"] = attributes.get("temperature", 0.0)
     name, value = max(loads.items(), key=lambda load: abs(load[1]))
     if abs(value) != 1.0 or np.count_nonzero(list(loads.values())) != 1:

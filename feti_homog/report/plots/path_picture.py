@@ -1,7 +1,5 @@
 """path.png and energy.png: stresses, interface states and energies along a path."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,10 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from feti_homog.materials.voigt import voigt_names
+from feti_homog.materials import voigt
 from feti_homog.report.plots import drawn_cell, plot_helpers
 from feti_homog.results import landmarks, path_curves
-from feti_homog.results.landmarks import name_of, peak_of
 from feti_homog.typing import Array, Document
 
 ARROWS = 6  # at most, along a path
@@ -47,7 +44,7 @@ def figure(document: Document) -> Figure:
     middle.sharex(lower)
     _stress_curves(upper, document, strain, components, style)
     upper.set_ylabel(f"macroscopic stress {plot_helpers.stress_unit(case)}")
-    upper.set_xlabel(f"macroscopic strain ${plot_helpers.SYMBOLS[voigt_names(strains.shape[1])[0][component]]}$")
+    upper.set_xlabel(f"macroscopic strain ${plot_helpers.SYMBOLS[voigt.voigt_names(strains.shape[1])[0][component]]}$")
     upper.set_title(
         "\n".join([plot_helpers.title_of(case, f"plane {case['analysis']['plane']}"), *plot_helpers.bond_limits(case)])
     )
@@ -63,8 +60,8 @@ def figure(document: Document) -> Figure:
     by_state = landmarks.kept_points(document)
     numbers = [by_state[state] for state in landmarks.landmark_states(document, 6, len(by_state))]
     curve = np.stack([strain, stress[:, component]], axis=1)
-    peak, unit = peak_of(document), case.get("output", {}).get("stress_unit", "")
-    caption = f"{name_of(document, peak)} {peak['stress']:.4g} {plot_helpers.plain(unit)}".rstrip()
+    peak, unit = landmarks.peak_of(document), case.get("output", {}).get("stress_unit", "")
+    caption = f"{landmarks.name_of(document, peak)} {peak['stress']:.4g} {plot_helpers.plain(unit)}".rstrip()
     star: dict[str, Any] = {"markersize": 11, "markeredgecolor": "white", "zorder": 5, "linestyle": "none"}
     upper.plot(peak["strain"], peak["stress"], "*", color=plot_helpers.INK[component], **star, label=caption)
     for axes in (upper, middle, lower):
@@ -85,7 +82,7 @@ def _stress_curves(
     """Draw the first leg with its snap-back; thick lines: the response to a controlled load, on all legs."""
     points, first = document["path"], path_curves.first_leg(document)
     stress = np.array([point["stress"] for point in points])
-    names = voigt_names(stress.shape[1])[1]
+    names = voigt.voigt_names(stress.shape[1])[1]
     rising = path_curves.load_controlled(points[:first]) if document["case"]["path"]["method"] == "events" else None
     along = stress.shape[1] + path_curves.leading_component(document)
     for i in components:

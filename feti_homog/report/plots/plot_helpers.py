@@ -1,7 +1,5 @@
 """Parts that pictures share: their style, triangles and lines, colour ranges, labels."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections.abc import Sequence
@@ -20,25 +18,24 @@ from matplotlib.path import Path as Path2D
 from matplotlib.tri import Triangulation
 from PIL import Image
 
-from feti_homog.case.bond_laws import DEFAULT, LAWS
-from feti_homog.materials.voigt import AXIAL_STRESSES, SPATIAL_STRAINS, SPATIAL_STRESSES, STRESSES, voigt_names
+from feti_homog.case import bond_laws
+from feti_homog.materials import voigt
 from feti_homog.report.plots.decimation import DrawnMesh, node_means, triangle_means
-from feti_homog.results import atomic
-from feti_homog.results.path_curves import FAINT, components_above, interface_sections
+from feti_homog.results import atomic, path_curves
 from feti_homog.typing import Array, Document
 
 # Symbols of macroscopic strains and stresses by name, and of local stresses.
 SYMBOLS = {
-    **{name: f"{name[:-2].replace('gamma', chr(92) + 'gamma')}_{{{name[-2:]}}}" for name in SPATIAL_STRAINS},
-    **{name: rf"\Sigma_{{{name[1:]}}}" for name in SPATIAL_STRESSES},
+    **{name: f"{name[:-2].replace('gamma', chr(92) + 'gamma')}_{{{name[-2:]}}}" for name in voigt.SPATIAL_STRAINS},
+    **{name: rf"\Sigma_{{{name[1:]}}}" for name in voigt.SPATIAL_STRESSES},
     "temperature": r"\Delta T",
 }
-STRESS_SYMBOLS = {name: rf"\sigma_{{{name[1:]}}}" for name in SPATIAL_STRESSES}
+STRESS_SYMBOLS = {name: rf"\sigma_{{{name[1:]}}}" for name in voigt.SPATIAL_STRESSES}
 # Table of each stress in a state of result.h5, and its column if the table has several.
 STRESS_TABLES: dict[str, tuple[str, int | None]] = {
-    **{name: ("stress", column) for column, name in enumerate(STRESSES)},
+    **{name: ("stress", column) for column, name in enumerate(voigt.STRESSES)},
     "S33": ("stress_33", None),
-    **{name: ("axial_stress", column) for column, name in enumerate(AXIAL_STRESSES)},
+    **{name: ("axial_stress", column) for column, name in enumerate(voigt.AXIAL_STRESSES)},
 }
 OUTLIERS = 0.005  # share of the area that may lie outside of a colour range, at either end
 INK = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d", "#8a6d00", "#0f7c8c", "#8c1d40")  # of curves
@@ -190,8 +187,8 @@ def stress_component(chosen: str, states: Sequence[Any]) -> str:
     if chosen in STRESS_SYMBOLS:
         return chosen
     strains, stresses = (np.array([state.attrs[name] for state in states]) for name in ("strain", "stress"))
-    loaded = components_above(FAINT, stresses) or list(range(strains.shape[1]))
-    return voigt_names(strains.shape[1])[1][loaded[int(np.abs(strains[:, loaded]).max(axis=0).argmax())]]
+    loaded = path_curves.components_above(path_curves.FAINT, stresses) or list(range(strains.shape[1]))
+    return voigt.voigt_names(strains.shape[1])[1][loaded[int(np.abs(strains[:, loaded]).max(axis=0).argmax())]]
 
 
 def drawn_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
@@ -207,7 +204,7 @@ def nodal_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
 
 def bond_limits(case: Document) -> list[str]:
     """Describe each interface law in a line; several laws with their phases."""
-    bonds, output = interface_sections({"case": case}) or [{}], case.get("output", {})
+    bonds, output = path_curves.interface_sections({"case": case}) or [{}], case.get("output", {})
     stress, length = output.get("stress_unit", ""), output.get("length_unit", "")
     units = stress, f"{stress} {length}" if stress and length else ""
     if len(bonds) == 1:
@@ -217,11 +214,11 @@ def bond_limits(case: Document) -> list[str]:
 
 def _limits(bond: Document, units: tuple[str, str]) -> str:
     """Describe a law; `units` are for stresses and for energies per area."""
-    criterion = bond.get("criterion", DEFAULT)
-    symbols = [entry for entry in LAWS[criterion].symbols if bond.get(entry[1])]
+    criterion = bond.get("criterion", bond_laws.DEFAULT)
+    symbols = [entry for entry in bond_laws.LAWS[criterion].symbols if bond.get(entry[1])]
     constants = [(symbol, key, units[0 if of_stress else 1]) for symbol, key, of_stress in symbols]
     phrase = [f"${symbol} = {bond[key]:g}$ {plain(label)}".rstrip() for symbol, key, label in constants]
-    law = f"{criterion} law" if LAWS[criterion].softens else f"law {criterion}"
+    law = f"{criterion} law" if bond_laws.LAWS[criterion].softens else f"law {criterion}"
     return ", ".join([law, *phrase]) if phrase else "no debonding by load"
 
 

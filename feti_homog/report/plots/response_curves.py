@@ -1,7 +1,5 @@
 """Pictures from numbers in result.json: angle.png, envelope.png, sensitivities.png; `path_picture` draws paths."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,12 +10,12 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
-from feti_homog.materials.voigt import STRESSES
+from feti_homog.materials import voigt
 from feti_homog.report.plots import path_picture, plot_helpers
 from feti_homog.report.text import constant_tables
 from feti_homog.report.text.point_tables import shown_entries
 from feti_homog.report.text.summary import reported
-from feti_homog.results.path_curves import interface_sections
+from feti_homog.results import path_curves
 from feti_homog.typing import Array, Document
 
 MARKS = ("o", "s", "^", "D", "v", "P", "X")
@@ -47,7 +45,7 @@ def angle(document: Document) -> Figure:
     axes.set_xlabel("debonding angle (degrees)")
     axes.set_ylabel(f"{'effective stiffness' if stiff else 'macroscopic stress'} {plot_helpers.stress_unit(case)}")
     axes.xaxis.set_major_locator(MultipleLocator(60 if angles[-1] > 180 else 30))
-    contact = "contact" if all(bond["contact"] for bond in interface_sections(document)) else "no contact"
+    contact = "contact" if all(bond["contact"] for bond in path_curves.interface_sections(document)) else "no contact"
     load = "" if stiff else f", $E = [{', '.join(f'{e:g}' for e in points[0]['strain'])}]$"
     axes.set_title(plot_helpers.title_of(case, f"plane {case['analysis']['plane']}, {contact}{load}"))
     axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
@@ -61,7 +59,7 @@ def _angle_columns(points: Sequence[Document], stiff: bool) -> list[tuple[str, A
     """Return name and values (points,) for each curve."""
     if not stiff:
         stress = np.array([point["stress"] for point in points])
-        return list(zip((plot_helpers.SYMBOLS[name] for name in STRESSES), stress.T, strict=True))
+        return list(zip((plot_helpers.SYMBOLS[name] for name in voigt.STRESSES), stress.T, strict=True))
     stiffness = np.array([point["stiffness"] for point in points])
     return [(f"C_{{{i + 1}{j + 1}}}", stiffness[:, i, j]) for i, j in shown_entries(points).values()]
 

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from feti_homog.report.plots import drawn_cell, plot_helpers
 from feti_homog.report.text.summary import reported
-from feti_homog.results.landmarks import peak_of
+from feti_homog.results import landmarks
 from feti_homog.typing import Array, Document
 
 DEGREES = (-180.0, 180.0)
@@ -49,7 +49,7 @@ def plot(directory: Path, cell: drawn_cell.DrawnCell, document: Document) -> lis
     drawn = [(partly or [last])[len(partly) // 2]]
     if reported(document).is_followed:
         of_point = {int(file[f"state/{name}"].attrs["point"]): name for name in names}
-        peak = peak_of(document)
+        peak = landmarks.peak_of(document)
         before, after = of_point.get(peak["event"], names[0]), of_point.get(peak.get("event_left", -1), last)
         drawn = list(dict.fromkeys([before, after if debonded[after] else last]))
     figure = _figure(cell, drawn, drawn_cell.LoadLabels.of(document))

@@ -3,15 +3,12 @@
 Axes 1, 2, 3 of the material, as data sheets and cards have them, are x3, along the fibres, x1, x2 of the cell.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from feti_homog.materials.engineering_constants import ABOUT_FIBRES, MATERIAL_AXES, MATERIAL_EXPANSIONS, OF_THE_CELL
-from feti_homog.materials.voigt import EXPANSIONS
+from feti_homog.materials import engineering_constants, voigt
 from feti_homog.report.text.stiffness_tables import ENGINEERING, with_errors
 from feti_homog.report.text.tables import UNKNOWN, Column, Table, stress_label, without_noise
 from feti_homog.typing import Document
@@ -31,15 +28,15 @@ def constants(document: Document) -> dict[str, float]:
 
 def in_material_axes(numbers: Mapping[str, float]) -> dict[str, float]:
     """Rename numbers from cell axes to material axes; expansions keep their names."""
-    places = {name: OF_THE_CELL[name] for name in ENGINEERING}
-    places |= {name: name for name in MATERIAL_EXPANSIONS[:3]}
+    places = {name: engineering_constants.OF_THE_CELL[name] for name in ENGINEERING}
+    places |= {name: name for name in engineering_constants.MATERIAL_EXPANSIONS[:3]}
     return {name: numbers[constant] for name, constant in places.items() if constant in numbers}
 
 
 def table(document: Document) -> Table:
     """Return the constants in material axes, with their mesh errors."""
     errors = in_material_axes(mesh_errors(document))
-    title = f"{MATERIAL_AXES}{stress_label(document)}{'; +- error of the mesh' if errors else ''}"
+    title = f"{engineering_constants.MATERIAL_AXES}{stress_label(document)}{'; +- error of the mesh' if errors else ''}"
     computed = constants(document)
     return with_errors(title, {name: computed[name] for name in ENGINEERING if name in computed}, errors, 3)
 
@@ -47,7 +44,7 @@ def table(document: Document) -> Table:
 # Constants of which sensitivities are shown, by whether the cell is in space; all are in result.json.
 SHOWN = {
     False: ("C11", "C22", "C12", "C33", "E1", "E2", "nu12", "G12"),
-    True: tuple(name for name in ABOUT_FIBRES if name != "K_transverse"),
+    True: tuple(name for name in engineering_constants.ABOUT_FIBRES if name != "K_transverse"),
 }
 MOST = 9  # of other constants
 
@@ -84,7 +81,7 @@ def mesh_errors(document: Document) -> dict[str, float]:
     """Return estimated mesh errors of constants, stiffness entries (C11, ...) and expansions, by name."""
     numbers: Document = document.get("mesh_error") or {}
     entries = np.ndenumerate(np.array(numbers.get("effective_stiffness", [])))
-    strains = dict(zip(EXPANSIONS[:3], map(float, numbers.get("thermal_expansion", ())), strict=False))
+    strains = dict(zip(voigt.EXPANSIONS[:3], map(float, numbers.get("thermal_expansion", ())), strict=False))
     named = {f"C{i + 1}{j + 1}": float(error) for (i, j), error in entries}
     return named | {**numbers.get("constants", {})} | strains
 

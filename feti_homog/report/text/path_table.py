@@ -1,19 +1,16 @@
 """The table of a path: peak, energies, and rows of some points."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from textwrap import wrap
 from typing import Any
 
 import numpy as np
 
-from feti_homog.case.load_sections import TEMPERATURE
-from feti_homog.materials.voigt import voigt_names
+from feti_homog.case import load_sections
+from feti_homog.materials import voigt
 from feti_homog.report.text.point_tables import COUNTS, WIDTH, columns_without_noise, counts, debonded, energies
 from feti_homog.report.text.tables import Column, Table, stress_label, without_noise
-from feti_homog.results import path_curves
-from feti_homog.results.landmarks import LARGEST, PEAK, chosen, fall_of, name_of, peak_of, stresses_of
+from feti_homog.results import landmarks, path_curves
 from feti_homog.typing import Document
 
 ROWS = 15  # of the table
@@ -21,7 +18,7 @@ ROWS = 15  # of the table
 
 def path_table(document: Document, limit: int = ROWS) -> Table:
     """Return totals of the path above at most `limit` rows of points."""
-    points, numbers, varying = document["path"], chosen(document, limit), _path_columns(document)
+    points, numbers, varying = document["path"], landmarks.chosen(document, limit), _path_columns(document)
     first = dict(list(varying.items())[:5])
     rest = [name for name in varying if name not in first]
     broke = sum(point["broke"] for point in points)
@@ -33,7 +30,7 @@ def path_table(document: Document, limit: int = ROWS) -> Table:
     columns = [Column("point", 5, "d"), *(Column(name, max(11, len(name) + 1)) for name in first)]
     columns += [Column("load", 9, ".6f"), *COUNTS]
     label = stress_label(document)
-    totals = [*_peak_lines(document, peak_of(document)), *_path_energies(document, label)]
+    totals = [*_peak_lines(document, landmarks.peak_of(document)), *_path_energies(document, label)]
     totals += [f"Also in path.csv: {', '.join(rest)}"] if rest else []
     return Table(f"Path{label}: {len(points)} points{some}; {broke} bonds broke", columns, rows, totals)
 
@@ -45,12 +42,12 @@ def _path_columns(document: Document) -> dict[str, Any]:
     """
     points = document["path"]
     strain, stress = (columns_without_noise([point[name] for point in points]) for name in ("strain", "stress"))
-    strains, stresses = voigt_names(strain.shape[1])
+    strains, stresses = voigt.voigt_names(strain.shape[1])
     leading = path_curves.leading_component(document)
     visible = {*path_curves.named_components(document), *path_curves.components_above(path_curves.FAINT, stress)}
     curves = {strains[leading]: strain[:, leading]} | {stresses[k]: stress[:, k] for k in sorted(visible)}
     if any(point.get("temperature") for point in points):
-        curves[TEMPERATURE] = np.array([point["temperature"] for point in points])
+        curves[load_sections.TEMPERATURE] = np.array([point["temperature"] for point in points])
     prescribed = {name for target in path_curves.targets(document) for name in target}
     more = path_curves.components_above(path_curves.FAINT, strain)
     return curves | {strains[k]: strain[:, k] for k in more if stresses[k] in prescribed}
@@ -59,8 +56,8 @@ def _path_columns(document: Document) -> dict[str, Any]:
 def _peak_lines(document: Document, peak: Mapping[str, Any]) -> list[str]:
     """Describe peak, first break, stress left after the peak, and scaling by the toughness."""
     strain, stress = (without_noise(peak[name]) for name in ("strain", "stress"))
-    largest, name = name_of(document, peak), peak["stress_name"] + stress_label(document)
-    begins = {PEAK: f"Peak {name}", LARGEST: f"Largest {name}"}
+    largest, name = landmarks.name_of(document, peak), peak["stress_name"] + stress_label(document)
+    begins = {landmarks.PEAK: f"Peak {name}", landmarks.LARGEST: f"Largest {name}"}
     text = begins.get(largest, f"Largest {name} so far, the path being cut off")
     text += f": {stress:.6g} at {peak['strain_name']} = {strain:.6g}"
     text += f" (point {peak['event']})"
@@ -80,7 +77,7 @@ def _peak_lines(document: Document, peak: Mapping[str, Any]) -> list[str]:
 
 def _afterwards(document: Document, peak: Mapping[str, Any], largest: str) -> str:
     """Describe the path after the largest stress: a valley, still larger stresses, or an end near the peak."""
-    text, stresses = "", stresses_of(document, peak)
+    text, stresses = "", landmarks.stresses_of(document, peak)
     if "event_left" in peak:
         lost = 1.0 - peak["stress_left"] / peak["stress"]
         rises = f" as the {path_curves.what_rises(document)} rises" if path_curves.is_proportional(document) else ""
@@ -88,9 +85,10 @@ def _afterwards(document: Document, peak: Mapping[str, Any], largest: str) -> st
     later = max(range(len(stresses)), key=lambda number: abs(stresses[number]))
     if later > peak["event"] and abs(stresses[later]) > abs(peak["stress"]):
         text += f"; later up to {stresses[later]:.6g} (point {later})"
-    if largest == LARGEST:
+    if largest == landmarks.LARGEST:
         at_end = peak["event"] == len(stresses) - 1
-        text += f"; the path ends {'there' if at_end else f'near its peak, {fall_of(document, peak):.1%} below it'}"
+        place = "there" if at_end else f"near its peak, {landmarks.fall_of(document, peak):.1%} below it"
+        text += f"; the path ends {place}"
     return text
 
 

@@ -1,7 +1,5 @@
 """Tables of an angle, a load or an envelope, and of energy release rates at tips."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import cos, radians, sin
@@ -10,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.materials.voigt import STRAINS, STRESSES, voigt_names
+from feti_homog.materials import voigt
 from feti_homog.report.text.tables import Column, Table, stress_label, toughness_label, without_noise
 from feti_homog.results import path_curves
 from feti_homog.typing import Document
@@ -41,7 +39,7 @@ Point = Mapping[str, Any]
 
 def shown_entries(points: Sequence[Point]) -> dict[str, tuple[int, int]]:
     """Return names and places of the stiffness entries that tables of an angle show."""
-    return ENTRIES if len(points[0]["stiffness"]) == len(STRAINS) else SPATIAL_ENTRIES
+    return ENTRIES if len(points[0]["stiffness"]) == len(voigt.STRAINS) else SPATIAL_ENTRIES
 
 
 def angle_table(document: Document, limit: int | None = None) -> Table:
@@ -56,7 +54,7 @@ def angle_table(document: Document, limit: int | None = None) -> Table:
         return [point["angle"], *map(without_noise, values), *(point[column.name] for column in counted)]
 
     width = 12 if counted else 10
-    columns = [Column("angle", 9), *(Column(name, width) for name in tuple(entries) or STRESSES), *counted]
+    columns = [Column("angle", 9), *(Column(name, width) for name in tuple(entries) or voigt.STRESSES), *counted]
     title = f"{'Stiffness' if stiff else 'Stress'}{stress_label(document)} against the debonding angle (degrees)"
     title += "" if len(some) == len(points) else f", {len(some)} of {len(points)}"
     return Table(title, columns, [*map(row, some)], [LAST_STRAIN] if stiff and counted else [])
@@ -73,7 +71,7 @@ def load_table(document: Document) -> Table:
     """Return the equilibrium under one load: strains, stresses, energies, interface node counts."""
     point, label = document["load"], stress_label(document)
     strain, sigma = (map(without_noise, columns_without_noise([point[name]])[0]) for name in ("strain", "stress"))
-    strains, stresses = voigt_names(len(point["strain"]))
+    strains, stresses = voigt.voigt_names(len(point["strain"]))
     target = path_curves.targets(document)[0]
     loads = ", ".join(f"{name} = {value:g}" for name, value in target.items() if value or name in strains)
     title, *more = wrap(f"Equilibrium under {loads}", WIDTH)

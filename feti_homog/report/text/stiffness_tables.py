@@ -1,7 +1,5 @@
 """Tables of stiffness, thermal constants, moduli and engineering constants, with bounds and estimates."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import zip_longest
 from math import floor, log10
@@ -9,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.materials.engineering_constants import ABOUT_FIBRES, CELL_AXES
-from feti_homog.materials.voigt import SPATIAL_STRESSES, STRAINS, voigt_names
-from feti_homog.microstructure.phase_names import COATING
+from feti_homog.materials import engineering_constants, voigt
+from feti_homog.microstructure import phase_names
 from feti_homog.report.text.tables import UNKNOWN, Column, Table, number, stress_label
 from feti_homog.typing import Document
 
@@ -35,7 +32,7 @@ def stiffnesses(document: Document) -> list[Table]:
     tables, errors, label = list[Table](), _errors(document), stress_label(document)
     for key, title in titles.items():
         if document.get(key) is not None:
-            axes = "" if len(document[key]) == len(STRAINS) else f", {CELL_AXES}"
+            axes = "" if len(document[key]) == len(voigt.STRAINS) else f", {engineering_constants.CELL_AXES}"
             tables.append(_matrix(f"{title}{axes}{label}", document[key]))
         if errors.get(key) is not None:
             tables.append(_matrix(f"{MESH_ERROR}{label}", errors[key], ".1e"))
@@ -75,8 +72,8 @@ def with_errors(title: str, values: Mapping[str, float], errors: Mapping[str, fl
 
 
 def _matrix(title: str, rows: Sequence[Sequence[float]], fixed: str = "") -> Table:
-    strains, stresses = voigt_names(len(rows))
-    in_plane = len(rows) == len(STRAINS)
+    strains, stresses = voigt.voigt_names(len(rows))
+    in_plane = len(rows) == len(voigt.STRAINS)
     names, width, digits, limit, short = (NAMES, 16, 8, 1e8, ".7e") if in_plane else (Column("", -6), 12, 7, 1e6, ".4e")
     largest = max(abs(entry) for row in rows for entry in row)
     form = f".{digits - 1 - floor(log10(largest))}f" if 10.0 ** (4 - digits) < largest < limit else short
@@ -88,14 +85,14 @@ def _matrix(title: str, rows: Sequence[Sequence[float]], fixed: str = "") -> Tab
 def thermal(document: Document) -> list[Table]:
     """Return thermal constants: a row per component, a column per known quantity."""
     present = {key: title for key, title in THERMAL.items() if document.get(key) is not None}
-    names = [stress[1:] for stress in SPATIAL_STRESSES]
+    names = [stress[1:] for stress in voigt.SPATIAL_STRESSES]
     errors = {key: _errors(document)[key] for key in present if _errors(document).get(key) is not None}
     values = [np.array(document[key], float) for key in present]
     rounded = [np.where(np.abs(v) > 10.0**-7 * np.abs(v).max(), v, 0.0).tolist() for v in values]
     rows = list(zip(names, *rounded, *errors.values(), strict=True))
     columns = [Column("", -6), *(Column(title, 22, ".7g") for title in present.values())]
     columns += [Column(f"{key.rpartition('_')[2]}: error", 18, ".1e") for key in errors]
-    title = f"Per unit of temperature, {CELL_AXES}{stress_label(document)}"
+    title = f"Per unit of temperature, {engineering_constants.CELL_AXES}{stress_label(document)}"
     return [Table(title, columns, rows)] if present else []
 
 
@@ -129,7 +126,7 @@ def constants(document: Document) -> list[Table]:
     """Return engineering constants in space; constants about the fibres with estimates and bounds."""
     tables, values = list[Table](), document.get("constants")
     if values is not None:
-        title = f"Engineering constants, {CELL_AXES}{stress_label(document)}"
+        title = f"Engineering constants, {engineering_constants.CELL_AXES}{stress_label(document)}"
         values = {name: values[name] for name in ENGINEERING if name in values}
         tables.append(with_errors(title, values, _errors(document).get("constants", {}), 3))
     return [*tables, *([_estimates(document)] if document.get("transversely_isotropic") is not None else [])]
@@ -138,7 +135,7 @@ def constants(document: Document) -> list[Table]:
 def _estimates(document: Document) -> Table:
     """Return constants about the fibres: a row per source, a column per constant known from any source."""
     sources = _sources(document)
-    names = [name for name in ABOUT_FIBRES if any(name in row for row in sources.values())]
+    names = [name for name in engineering_constants.ABOUT_FIBRES if any(name in row for row in sources.values())]
     rows = [
         [title, *(_short(row.get(name), ".1e" if title == ITS_ERROR else ".5g") for name in names)]
         for title, row in sources.items()
@@ -163,7 +160,11 @@ def _sources(document: Document) -> dict[str, Document]:
     """Return known constants about the fibres by source: this cell, its errors, estimates, bounds."""
     limits = _known(document.get("fibre_bounds") or {})
     errors, sources = _errors(document).get("constants", {}), {THIS_CELL: document["transversely_isotropic"]}
-    sources |= {ITS_ERROR: {name: errors[name] for name in ABOUT_FIBRES if name in errors}} if errors else {}
+    sources |= (
+        {ITS_ERROR: {name: errors[name] for name in engineering_constants.ABOUT_FIBRES if name in errors}}
+        if errors
+        else {}
+    )
     sources |= {name.replace("_", " "): row for name, row in (document.get("estimates") or {}).items()}
     sources |= {name: {key: limits[key][k] for key in limits} for k, name in enumerate((LOWER, UPPER))}
     return {title: present for title, row in sources.items() if (present := _known(row))}
@@ -178,7 +179,7 @@ def _why_no_estimates(document: Document) -> list[str]:
         return ["composites"]
     if cell.get("porosity"):
         return ["cells without voids"]
-    if COATING in case.get("material", {}):
+    if phase_names.COATING in case.get("material", {}):
         return ["fibres without coatings"]
     return ["round fibres that are bonded, all alike" if case.get("interface") else "round fibres"]
 

@@ -3,8 +3,6 @@
 Modules of pictures find an analysis by its name: `response_curves.CURVES`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -14,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.materials.voigt import plane_state_of
+from feti_homog.materials import voigt
 from feti_homog.report.text import point_tables
 from feti_homog.report.text.constant_tables import sensitivities, table
 from feti_homog.report.text.path_table import ROWS, path_table
 from feti_homog.report.text.stiffness_tables import bounds, constants, moduli, stiffnesses, thermal
 from feti_homog.report.text.tables import ERROR, Column, Table
-from feti_homog.results.landmarks import chosen_states
+from feti_homog.results import landmarks
 from feti_homog.typing import Document
 
 LABEL = 12  # columns of the labels at the left
@@ -32,7 +30,7 @@ REMARKS = ("Remark", "Warning", "Fault")
 def _stiffness_tables(document: Document) -> list[Table]:
     """Return effective stiffness, constants and bounds."""
     last = [*point_tables.tip_table(document, document.get("tips")), *sensitivities(document)]
-    if plane_state_of(document).is_spatial:
+    if voigt.plane_state_of(document).is_spatial:
         first = [table(document)] if document.get("constants") else []
         return [*first, *stiffnesses(document), *thermal(document), *constants(document), *last]
     if document["case"].get("interface"):  # moduli and bounds are of bonded, linear composites
@@ -81,7 +79,7 @@ PATH = ReportedAnalysis(
     is_curve=True,
     is_followed=True,
     is_load_given=lambda document: True,
-    states=chosen_states,
+    states=landmarks.chosen_states,
 )
 LOAD = ReportedAnalysis(
     "load",

@@ -1,7 +1,5 @@
 """Tables of a result, written as text for a terminal and as HTML; units of their columns."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

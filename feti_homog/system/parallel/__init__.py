@@ -2,3 +2,5 @@
 
 Imports `system.runtime`.  Main entries: `mpi_errors.run_main` and `mpi_errors.agree`.
 """
+
+__all__ = ["distributed_arrays", "dividing", "mpi_errors"]

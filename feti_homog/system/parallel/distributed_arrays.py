@@ -4,8 +4,6 @@ MPI's own exchange of objects would pickle all parts at once and fail from 2 GiB
 they are.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import TypeVar
 

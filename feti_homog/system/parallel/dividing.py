@@ -1,7 +1,5 @@
 """Loads divided among ranks, and ranges of numbers one after the other."""
 
-from __future__ import annotations
-
 import heapq
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Names of PETSc's options: the solver's own, PETSc's, and names that are almost theirs."""
 
-from __future__ import annotations
-
 import difflib
 import re
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """PETSc's options before PETSc has started: words of the command line, values that can be checked, files."""
 
-from __future__ import annotations
-
 import math
 import os
 import re

@@ -1,7 +1,5 @@
 """PETSc's options for one run: the case's defaults below the command line's, none ignored in silence."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 

@@ -1,4 +1,11 @@
 """The process: memory, progress, locks of files, interrupts, standard streams; records that become documents.
 
-Imports nothing.  Main entries: `progress.Progress`, `file_locks`, `standard_streams`.
+Imports nothing.  Main entries: `progress_bar.Progress`, `file_locks`, `standard_streams`.
 """
+
+from feti_homog.system.runtime.records import described
+
+__all__ = [
+    "described", "environment", "file_locks", "input_files", "own_process", "process_memory", "progress_bar",
+    "records", "standard_streams",
+]  # fmt: skip

@@ -1,7 +1,5 @@
 """Settings that a process needs before it imports NumPy, h5py and MPI, and libraries that are optional."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import sys

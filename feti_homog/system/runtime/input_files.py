@@ -1,7 +1,5 @@
 """Files that users name: regular ones, of bounded size; files that wait for a writer or have no end are refused."""
 
-from __future__ import annotations
-
 import errno
 import os
 import stat

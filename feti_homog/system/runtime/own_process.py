@@ -1,7 +1,5 @@
 """Functions on files that may be damaged, each in a process of its own: libraries may crash on them."""
 
-from __future__ import annotations
-
 import multiprocessing
 import resource
 import signal

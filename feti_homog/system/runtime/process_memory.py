@@ -1,7 +1,5 @@
 """The memory of the process, and limits under which the program would hang or crash without a word."""
 
-from __future__ import annotations
-
 import ctypes
 import math
 import resource

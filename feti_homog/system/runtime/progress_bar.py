@@ -1,7 +1,5 @@
 """Stages of a run: printed on rank 0, timed on every rank, and shown by PETSc's -log_view."""
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Iterable, Iterator

@@ -4,16 +4,12 @@ The writers of files take names and types from these descriptions, and so do the
 Fields without a description are not written.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import types
 import typing
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
-
-import numpy as np
 
 T = TypeVar("T")
 
@@ -110,7 +106,7 @@ def restored(kind: type[T], document: Mapping[str, Any]) -> T:
         value = values[field.name] = _restored_value(hints[field.name], document[field.name])
         shape = field.metadata[DESCRIPTION].shape
         axes = [words.rstrip("(),").count(",") + 1 for words in shape.split(" or ")]
-        if isinstance(value, np.ndarray) and value.ndim not in axes:
+        if getattr(value, "ndim", axes[0]) not in axes:
             raise TypeError(f"{field.name} is no array {shape}")
     return kind(**values)
 
@@ -142,7 +138,9 @@ def _restored_value(hint: Any, value: Any) -> Any:
     if dataclasses.is_dataclass(hint):
         return restored(typing.cast(type, hint), value)
     origin = typing.get_origin(hint) or hint
-    if origin is np.ndarray:
+    if origin.__module__ == "numpy":
+        import numpy as np  # it reads the environment
+
         return np.asarray(value, dtype=float)
     if origin is tuple:
         _require(value, list | tuple)

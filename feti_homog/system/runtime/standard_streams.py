@@ -6,8 +6,6 @@ take handlers away, and an exception in the middle of a collective call would le
 are blocked, and a thread waits for them.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os

@@ -12,12 +12,12 @@ from feti_homog import Result
 from feti_homog.analysis.cell_records import CellInfo, Checks, SolverInfo, StiffnessBounds
 from feti_homog.analysis.result import schema_keys
 from feti_homog.analysis.result_records import AnglePoint, LoadPoint, PathPoint, TipRates, Tips
-from feti_homog.materials.phase_bounds import Bounds
 from feti_homog.materials.engineering_constants import (
     engineering_constants,
     engineering_moduli,
     transversely_isotropic_part,
 )
+from feti_homog.materials.phase_bounds import Bounds
 from feti_homog.results import result_json
 
 STIFFNESS = np.array([[9.0, 2.0, 0.0], [2.0, 8.0, 0.0], [0.0, 0.0, 3.0]])

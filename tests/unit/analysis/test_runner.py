@@ -11,7 +11,9 @@ from support.cases import make_case
 
 from feti_homog.analysis import runner
 from feti_homog.errors import CaseError
+from feti_homog.homogenization import unit_cell
 from feti_homog.results import output_folder
+from feti_homog.system.runtime import file_locks
 from feti_homog.system.runtime.progress_bar import Progress
 
 
@@ -20,7 +22,7 @@ def test_only_ranks_that_all_come_destroy_the_solver(monkeypatch, error, destroy
     """After a defect, which may be one rank's own, the others would not come to the collective call."""
     calls = []
     cell = SimpleNamespace(destroy=lambda: calls.append("destroy"))
-    monkeypatch.setattr(runner, "tear", lambda case, comm, progress, policy: cell)
+    monkeypatch.setattr(unit_cell, "tear", lambda case, comm, progress, policy: cell)
     comm = MPI.COMM_SELF
     try:
         with runner._torn(make_case(fibre_fraction=0.4, mesh_size=0.3), comm, Progress(comm, quiet=True)):
@@ -35,10 +37,10 @@ def test_the_folder_is_held_before_the_work_begins(tmp_path, monkeypatch):
     held = []
 
     def no_tear(case, comm, progress, policy):
-        held.append(output_folder.holder(tmp_path / "out" / output_folder.LOCK))
+        held.append(file_locks.holder(tmp_path / "out" / output_folder.LOCK))
         raise CaseError("refused")
 
-    monkeypatch.setattr(runner, "tear", no_tear)
+    monkeypatch.setattr(unit_cell, "tear", no_tear)
     case = make_case(fibre_fraction=0.4, mesh_size=0.3)
     with pytest.raises(CaseError, match="refused"):
         runner.run(case, tmp_path / "out", MPI.COMM_SELF, quiet=True)

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from reference.references import HASHIN_SHTRIKMAN_BULK, HASHIN_SHTRIKMAN_SHEAR, REUSS_MODULI, VOIGT_MODULI
 
-from feti_homog.materials.phase_bounds import hashin_shtrikman, reuss, voigt
 from feti_homog.materials.engineering_constants import (
     anisotropy,
     engineering_moduli,
     isotropic_part,
     isotropic_stiffness,
 )
-from feti_homog.materials.material_forms import Isotropic, Orthotropic
 from feti_homog.materials.laws import plane_stiffness
+from feti_homog.materials.material_forms import Isotropic, Orthotropic
+from feti_homog.materials.phase_bounds import hashin_shtrikman, reuss, voigt
 from feti_homog.materials.voigt import rotated
 
 MATRIX = plane_stiffness(Isotropic(88.0, 0.299), "strain")

@@ -13,9 +13,9 @@ from feti_homog.materials.engineering_constants import (
     engineering_moduli,
     transversely_isotropic_part,
 )
+from feti_homog.materials.laws import expansion, spatial_stiffness, stiffness_of
 from feti_homog.materials.material_derivatives import constant_changes, law_changes
 from feti_homog.materials.material_forms import General, Isotropic, Orthotropic, TransverselyIsotropic
-from feti_homog.materials.laws import expansion, spatial_stiffness, stiffness_of
 
 TURNED = Orthotropic(
     E1=20.0, E2=9.0, E3=30.0, nu12=0.2, nu13=0.1, nu23=0.15, G12=5.0, G13=4.0, G23=6.0, angle=33.0,

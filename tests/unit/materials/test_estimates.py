@@ -21,10 +21,11 @@ from reference.fibre_composites import (
     isotropic,
 )
 
-from feti_homog.materials.phase_bounds import CONSTANTS, NOTHING, Fibres, Springs, fibre_bounds, hashin_shtrikman
 from feti_homog.materials.engineering_constants import transversely_isotropic_part
 from feti_homog.materials.estimates import METHODS, estimates
-from feti_homog.materials.laws import Isotropic, plane_stiffness
+from feti_homog.materials.laws import plane_stiffness
+from feti_homog.materials.material_forms import Isotropic
+from feti_homog.materials.phase_bounds import CONSTANTS, NOTHING, Fibres, Springs, fibre_bounds, hashin_shtrikman
 
 ANISOTROPIC_MATRIX = fibre_like(5.0, 3.0, 0.3, 0.4, 1.7, 40.0, 60.0)
 PAIRS = [(ALUMINIUM, isotropic(379.3, 0.1, 8.1)), (EPOXY, CARBON), (SOFT_EPOXY, GLASS), (ANISOTROPIC_MATRIX, CARBON)]

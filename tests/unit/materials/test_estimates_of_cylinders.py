@@ -26,9 +26,9 @@ from reference.fibre_composites import (
 )
 from reference.references import ELASTIC
 
-from feti_homog.materials.phase_bounds import Fibres, Springs, equivalent_fibre
 from feti_homog.materials.engineering_constants import transversely_isotropic_stiffness
 from feti_homog.materials.estimates import METHODS
+from feti_homog.materials.phase_bounds import Fibres, Springs, equivalent_fibre
 
 PAIRS = [(ALUMINIUM, BORON), (EPOXY, CARBON), (SOFT_EPOXY, GLASS), (GLASS, EPOXY)]
 BONDS = {

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from feti_homog.materials.material_forms import General, Isotropic, Orthotropic
 from feti_homog.materials.laws import out_of_plane, plane_stiffness
+from feti_homog.materials.material_forms import General, Isotropic, Orthotropic
 from feti_homog.materials.voigt import rotated
 
 CONSTANTS = {"E1": 140.0, "E2": 10.0, "E3": 12.0, "nu12": 0.3, "nu13": 0.25, "nu23": 0.4, "G12": 5.0}

@@ -7,8 +7,8 @@ import pytest
 from support.cases import make_case
 
 from feti_homog.homogenization import phase_laws
-from feti_homog.materials.material_forms import Isotropic
 from feti_homog.materials.laws import out_of_plane, stiffness_of
+from feti_homog.materials.material_forms import Isotropic
 from feti_homog.materials.voigt import PLANE_STATES, plane_state_of
 
 

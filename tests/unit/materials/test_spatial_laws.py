@@ -10,8 +10,8 @@ import pytest
 from support.base_case import SPATIAL
 
 from feti_homog.case.cases import parse
-from feti_homog.materials.material_forms import General, Isotropic, Material, Orthotropic, TransverselyIsotropic
 from feti_homog.materials.laws import expansion, out_of_plane, plane_stiffness, spatial_stiffness
+from feti_homog.materials.material_forms import General, Isotropic, Material, Orthotropic, TransverselyIsotropic
 
 AXES = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))  # of the order 11, 22, 33, 23, 13, 12
 ORTHOTROPIC = Orthotropic(

@@ -9,8 +9,8 @@ from support.verified_results import FIBRE, MATRIX, TURNED, TURNED_IN_SPACE, WAR
 
 from feti_homog.case.cases import parse
 from feti_homog.errors import CaseError
-from feti_homog.materials.material_forms import Orthotropic
 from feti_homog.materials.laws import expansion, isotropic_ratio, out_of_plane, plane_stiffness, spatial_stiffness
+from feti_homog.materials.material_forms import Orthotropic
 from feti_homog.verify import constitutive_law
 from feti_homog.verify.constitutive_law import laws
 
