@@ -7,8 +7,6 @@ arrangement, the others those of finer cells.  The epoxy and the fibre's constan
 returns E_transverse, nu_transverse and G_axial with their intervals, beside those from which the plies were made.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -7,8 +7,6 @@ Glass in epoxy, hexagonal cell in plane strain.  The plane bulk modulus stands b
 S11 alone at which the fibre comes off its coating, and the coating off the matrix, are those of equal bonds.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

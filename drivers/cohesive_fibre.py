@@ -10,8 +10,6 @@ its strain, and the semi-angle of each debond at the end; for the bilinear law a
 elements and teeth.  `--table` compares it with a prototype of its own, on meshes of its own.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

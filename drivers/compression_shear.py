@@ -10,8 +10,6 @@ the S12 at which the first bond breaks in shear, the largest one, which counts a
 are usually drawn.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

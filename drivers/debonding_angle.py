@@ -10,8 +10,6 @@ Convention: every fibre has one debonded arc, centred on the positive x1 axis th
 arc's whole opening in degrees, measured at that centre.  0 is perfect bonding, 360 a loose fibre.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence

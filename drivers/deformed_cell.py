@@ -6,8 +6,6 @@ The debonding angle is the whole opening of one arc on every fibre, centred on t
 Without contact the faces overlap, and the material that is drawn last hides the other.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

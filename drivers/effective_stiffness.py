@@ -6,8 +6,6 @@ Fibres of 40 % with E = 200, nu = 0.222 in a matrix with E = 88, nu = 0.299, per
 each case, and entries.png with the stiffnesses over the fibre fraction if --fractions are given.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence

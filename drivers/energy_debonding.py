@@ -9,8 +9,6 @@ infinite matrix (Tavara, Mantic, Graciani, Paris 2011), and how far the two debo
 before the stress must rise again.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -7,8 +7,6 @@ mean of several arrangements.  It is a sweep: started again it goes on; statisti
 its picture.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from typing import Any

@@ -7,8 +7,6 @@ periodic.  Ellipses count as discs of the same area.  With --out, tables of all 
 written, and statistics.png.
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 import sys

@@ -1,7 +1,5 @@
 """Parts that the drivers of the paper's Figures 3 to 5 share: options, cases, tables."""
 
-from __future__ import annotations
-
 import argparse
 import csv
 import sys

@@ -8,8 +8,6 @@ heat of friction in it, per area of the cell; beside the largest energy stored i
 area / (2 pi stored).  Coulomb's law has no unit of stress: amplitudes over pressures give all the loops.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -9,8 +9,6 @@ mean times the root of their number, returns both: peaks scale as the root of th
 derivatives are differences.  Strengths of single bonds follow, sqrt(2 k_n G_I) and in shear sqrt(2 k_t G_II).
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -3,8 +3,6 @@
 mpirun -n 2 .venv/bin/python drivers/iterations.py --refine 1 2 3 4 5
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

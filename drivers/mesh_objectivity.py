@@ -9,8 +9,6 @@ releases ("released").  The curves are those of a strain that only rises.  Strai
 0.01175333 with springs.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -7,8 +7,6 @@ of 40 MPa in tension and 60 MPa in shear.  Beside each fibre's largest traction 
 fraction, its area over that of its Voronoi cell.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -7,8 +7,6 @@ random cells; constants are those of the nearest transversely isotropic material
 Every result has the estimates beside its own constants; nothing but the phases and their fractions enters them.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence

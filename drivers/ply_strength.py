@@ -6,8 +6,6 @@ A random cell of long fibres that debond by energy.  Tension is a uniaxial test,
 gamma23, along the fibres, rising.  Cooling comes first, free of stress: the matrix shrinks on the fibres.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

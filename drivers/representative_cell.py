@@ -8,8 +8,6 @@ confidence interval, and one arrangement scatters by less than what is asked for
 goes on; statistics.csv and representative_cell.png are its table and its picture.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from functools import partial

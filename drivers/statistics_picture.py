@@ -1,7 +1,5 @@
 """statistics.png: fibres with their local fractions, and the distributions of what was measured of them."""
 
-from __future__ import annotations
-
 from itertools import product
 from pathlib import Path
 from typing import Any

@@ -7,8 +7,6 @@ GPa.  Thick: the strain only rises, so the stress drops where bonds break; thin:
 After its first drop a curve depends on the mesh: the mesh is in the title, compare others with --mesh-size.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Parts that the drivers that are sweeps share: options, sections, and the way from cases to tables and pictures."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 from pathlib import Path

@@ -9,8 +9,6 @@ and 506.25 MPa/um, toughness 2 J/m2; where debonding has begun bonds break by wh
 break is then that of a tooth.  The matrix stays elastic: the peak is that of debonding.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -7,8 +7,6 @@ bulk and shear moduli stand beside those of T. Mori and K. Tanaka (Y. Benveniste
 fibres and voids in the matrix; onset is the stress S11 alone at which the first bond breaks.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

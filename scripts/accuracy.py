@@ -6,8 +6,6 @@ preconditioner and the three load cases, "direct" the periodic gluing, one facto
 and three solves.  The best of several repetitions counts.
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 import sys

@@ -8,8 +8,6 @@ and one of those along the fibres, and solves the same cell in plane strain, too
 number of ranks.  Memory is the largest resident memory of each rank, summed over ranks.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import subprocess

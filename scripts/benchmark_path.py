@@ -4,8 +4,6 @@ The hexagonal cell of the paper debonds under E = [0.2, 0, 0] in plane stress.  
 from one break to the next: contact states, projected Krylov solves, coarse factorizations, stresses.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

@@ -1,7 +1,5 @@
 """Times and memory of the benchmark's tools, as a table, a CSV file and a picture."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields

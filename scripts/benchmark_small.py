@@ -1,7 +1,5 @@
 """Table of `scripts/benchmark --table small`: cells of everyday size, bonded, against direct solvers on equal ranks."""
 
-from __future__ import annotations
-
 import argparse
 import tempfile
 from collections.abc import Callable

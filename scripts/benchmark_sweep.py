@@ -4,8 +4,6 @@ All are whole commands, start-up included, run in turns. The loop only meshes, a
 nothing and estimates no errors. The processor's time, which other programs change least, is that of all ranks.
 """
 
-from __future__ import annotations
-
 import argparse
 import resource
 import subprocess

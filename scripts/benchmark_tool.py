@@ -5,8 +5,6 @@ problem of the plane and the one along the fibres, which share nothing, for all 
 `peer_` in the environment's PETSC_OPTIONS go before those of the peer.
 """
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import json

@@ -4,8 +4,6 @@
 Modules of `tests/` that are not tests pass a change on to whatever imports them.
 """
 
-from __future__ import annotations
-
 import ast
 import subprocess
 import sys

@@ -3,8 +3,6 @@
 With --quick, only that the modules are found, without importing them. With --versions, print the versions found.
 """
 
-from __future__ import annotations
-
 import importlib
 import importlib.metadata
 import importlib.util

@@ -1,7 +1,5 @@
 """Calls that communicate: those that Python makes by mpi4py counted, and any refused where none may be."""
 
-from __future__ import annotations
-
 import contextlib
 import sys
 from collections import Counter

@@ -6,8 +6,6 @@ Each trial adds independent errors of 1 % to the eight constants of a composite,
 from them, as `feti-homog fit` does; the intervals should cover the truth in 95 +- 3 % of the trials.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -7,8 +7,6 @@ that error relative to the estimate of `feti_homog.case.cell_sizes`, which is to
 stiffness is that of quadratic elements after one refinement more, which err 16 times less.
 """
 
-from __future__ import annotations
-
 import argparse
 from typing import Any
 

@@ -6,8 +6,6 @@ Each kind of cell is refined several times; the constants make the logarithms of
 so that twice as much is as far off as half.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import tempfile

@@ -5,8 +5,6 @@
 Prints, for each such constant of `feti_homog/feti/thresholds.py`, the times on both sides of it.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 from time import perf_counter

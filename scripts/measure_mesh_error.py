@@ -14,8 +14,6 @@ across materials; with quadratic elements in phases that lock also true errors, 
 elements.
 """
 
-from __future__ import annotations
-
 import argparse
 import itertools
 import sys

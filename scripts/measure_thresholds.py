@@ -8,8 +8,6 @@ figures in `thresholds.py`, with --contrasts 2: `soft_mode` --fibres 16 --refine
 with --refine 2; the others --fibres 36 --refine 1 --pieces 0.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from dataclasses import fields, replace

@@ -8,8 +8,6 @@ overlap, against the degrees of freedom, on one rank.
 Once with elements of one size, once with the default of `[cell] tip_size`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from composite import STIFFNESS
 from mpi4py import MPI

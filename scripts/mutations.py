@@ -4,8 +4,6 @@
 words, or all; it ends with 1 if one survives, or if tests fail without any.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

@@ -1,7 +1,5 @@
 """The solvers that this program is measured against: each is a KSP of PETSc, made by its options alone."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

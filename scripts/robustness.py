@@ -4,8 +4,6 @@ Each line of the CSV is one cell with its three load cases; cells that the file 
 a long list can be worked off in parts.  "uncut" leaves the matrix whole and looks for soft modes none the less.
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 import sys

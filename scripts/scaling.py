@@ -10,8 +10,6 @@ A run whose report is in DIR/scaling is not made again, so that a long list can 
 the picture and the model are of all runs of the studies that are there.  Remove the folder to measure anew.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

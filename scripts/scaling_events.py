@@ -5,8 +5,6 @@ runs whose ranks each have a core; the messages are those that were counted on p
 measured between two.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import tempfile

@@ -3,8 +3,6 @@
 Rank 0 writes the report: seconds of an event, and what it takes of dual problems, iterations and exchanges.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

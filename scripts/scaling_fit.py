@@ -1,7 +1,5 @@
 """Least squares by which the scaling study finds the constants of its models."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Forecast of the cost model of the scaling study, in words."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from scaling_fit import Shares

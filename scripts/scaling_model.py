@@ -4,8 +4,6 @@ Every term is one that the program has today: a mesh and a tearing of which some
 subdomains that ranks share, coarse problems that they factor together, and messages.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from math import ceil, log2, sqrt

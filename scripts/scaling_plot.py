@@ -1,7 +1,5 @@
 """Draw the scaling study and the forecast of its model."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

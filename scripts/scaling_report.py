@@ -1,7 +1,5 @@
 """The runs of the scaling study, as tables and a CSV file."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Sequence
 from dataclasses import dataclass

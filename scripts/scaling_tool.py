@@ -4,8 +4,6 @@ The cell has fibre fraction 0.6 and gaps of 4 % of the fibres' diameter; it is c
 three unit strains are solved together.  Rank 0 writes the report.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

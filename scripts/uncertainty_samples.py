@@ -5,8 +5,6 @@
 Prints for every constant the standard deviation of first order and that of the samples, with its own sampling error.
 """
 
-from __future__ import annotations
-
 import argparse
 import copy
 import sys

@@ -1,7 +1,5 @@
 """Run parallel tests on every rank: rank 0 alone reports them, and a rank that fails does not hang the others."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections import Counter

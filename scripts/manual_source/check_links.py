@@ -3,8 +3,6 @@
 Usage: check_links.py FOLDER
 """
 
-from __future__ import annotations
-
 import sys
 from html.parser import HTMLParser
 from pathlib import Path

@@ -4,8 +4,6 @@ What would be markup in reStructuredText (|x|, *, lam_, K^-1) is text here; `nam
 other words in backticks code. Attributes that the docstring of their class describes stand there with their type.
 """
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

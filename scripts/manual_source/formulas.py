@@ -1,7 +1,5 @@
 """A Sphinx extension that reads each formula as the manual is built: MathJax would show a fault to readers alone."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

@@ -3,8 +3,6 @@
 Usage: lay_out.py FOLDER
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import sys

@@ -1,7 +1,5 @@
 """Pieces of Markdown: pages, tables, and text in which nothing is markup but `code`."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Sequence
 

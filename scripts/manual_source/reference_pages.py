@@ -1,7 +1,5 @@
 """Pages of the manual that are made from the code: commands, keys of case files, options, and what is written."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable, Iterator
 from pathlib import Path

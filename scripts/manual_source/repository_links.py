@@ -4,8 +4,6 @@ A link to a folder or module of the repository goes to its page: that of its REA
 A name in backticks as `mesh.mesh_fibres.unwrap`, which is below feti_homog, goes to its place in the API reference.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import PurePosixPath
 from typing import Any

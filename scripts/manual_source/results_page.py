@@ -1,7 +1,5 @@
 """The page on what a run and a sweep write, made from the records that the writers of the files use."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from markdown_text import code, page, table

@@ -1,7 +1,5 @@
 """A Chromium without a window and without a network, and reports of small runs."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 from contextlib import ExitStack

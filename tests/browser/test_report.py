@@ -1,7 +1,5 @@
 """report.html as a reader has it: in Chromium, from a file, with no network to fetch from."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

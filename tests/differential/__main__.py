@@ -3,8 +3,6 @@
 Exit code 1 if a relation fails, too many cases are refused, or of a relation no case of CASES or more was compared.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

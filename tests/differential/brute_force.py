@@ -4,8 +4,6 @@ It shares with the program the mesh, normals and lengths of the interfaces, and 
 those of the solver, the laws of the bonds.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -4,8 +4,6 @@ Kinds are the paths of `schema_keys`: `path[].stress` are the stresses of all po
 is not compared.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any

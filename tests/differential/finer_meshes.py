@@ -1,7 +1,5 @@
 """Estimated mesh errors against the change from a mesh to one that is refined once more."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ First each rank takes cases for itself, as it comes to them; then all ranks, if 
 together.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import traceback

@@ -1,7 +1,5 @@
 """Shear of debonded layers and loose blocks below and beyond what a linear programme lets them carry."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from support.parted_columns import Columns

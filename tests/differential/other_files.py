@@ -1,7 +1,5 @@
 """The mesh of a case in another format, and its material on cards."""
 
-from __future__ import annotations
-
 import io
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Cases whose results follow from each other: paths cut in two, loads by stress instead of strain, onsets."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Two results of one path, point by point, and where their bonds break in another order because loads tie."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path

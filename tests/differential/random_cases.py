@@ -1,7 +1,5 @@
 """Case N of a seed: its document and files, drawn alike wherever it is asked for."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

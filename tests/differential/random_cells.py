@@ -1,7 +1,5 @@
 """Random cells of every geometry: lattices, random ones, tables of any shapes, users' meshes; voids and coatings."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

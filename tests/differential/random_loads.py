@@ -1,7 +1,5 @@
 """Random bonds and loads of every analysis and plane state, in a cell whose matrix has a modulus of about one."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

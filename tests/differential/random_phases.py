@@ -1,7 +1,5 @@
 """Random materials of all forms that a plane state takes, and random cells of all geometries."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

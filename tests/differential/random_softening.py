@@ -1,7 +1,5 @@
 """Random laws that soften in place of those of brittle bonds, and strengths that differ from fibre to fibre."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from differential.random_loads import STRENGTH

@@ -1,7 +1,5 @@
 """The relations between the results of random cases, with the cases that have each and its tolerance."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

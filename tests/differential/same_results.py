@@ -1,7 +1,5 @@
 """Equal cases in other words, or solved in other ways: their results are alike."""
 
-from __future__ import annotations
-
 import contextlib
 from typing import Any
 from unittest import mock

@@ -1,7 +1,5 @@
 """A random case with its result on one rank, and how the result of the same case, found otherwise, is measured."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Equal cases in other words: in other units, in another order, with a path cut in two."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -5,8 +5,6 @@ which faces touch, and the slip of faces with friction, whose shear must obey Co
 u = (u1, u2, u3) is u* of all nodes, one for each constituent at each place of the torus.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Faults outside the case: Ctrl-C, outputs that cannot be written, a locale without the letters of a name."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """The job scripts of SLURM and PBS, with stand-ins for the schedulers: variables, indices, dependencies."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -1,7 +1,5 @@
 """The benchmark against other solvers, on small cells."""
 
-from __future__ import annotations
-
 import csv
 import re
 

@@ -1,7 +1,5 @@
 """The driver of coated fibres: composite cylinders are met, results obey every law."""
 
-from __future__ import annotations
-
 import csv
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The command line in processes of its own: run, check, plot, and their options."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

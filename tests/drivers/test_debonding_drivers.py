@@ -1,7 +1,5 @@
 """The drivers of Figures 3 to 5 run, draw, and obey the laws that need no numbers."""
 
-from __future__ import annotations
-
 import csv
 import json
 

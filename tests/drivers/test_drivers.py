@@ -1,7 +1,5 @@
 """The drivers run as in their docstrings and print what these promise."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

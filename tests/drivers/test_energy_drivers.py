@@ -1,7 +1,5 @@
 """The drivers of debonding by energy run, draw, and meet what is known exactly."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`feti-homog export` in processes of its own: cards printed and written, faults reported once."""
 
-from __future__ import annotations
-
 import pytest
 from support.card_readers import READERS
 from support.command_line import command_line

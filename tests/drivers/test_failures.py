@@ -1,7 +1,5 @@
 """Failures of jobs of the command line: exit codes, messages, no rank left waiting."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """`feti-homog fibres` in processes of its own: a cell, its table, and the results of the table."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

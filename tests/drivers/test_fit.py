@@ -1,7 +1,5 @@
 """`feti-homog check`, `fit` and `uncertainty`: one at a time in a folder; kill -9 at any moment takes no evaluation."""
 
-from __future__ import annotations
-
 import json
 
 from support.command_line import command_line

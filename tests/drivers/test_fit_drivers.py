@@ -1,7 +1,5 @@
 """The fits of the drivers return what their data were made of."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

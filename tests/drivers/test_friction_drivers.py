@@ -1,7 +1,5 @@
 """The drivers of friction run, draw, and meet what Coulomb's law requires; a cycle that is killed goes on."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

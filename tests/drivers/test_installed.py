@@ -1,7 +1,5 @@
 """The package as others install it: a wheel in a fresh environment beside PETSc, without `scripts/environment`."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

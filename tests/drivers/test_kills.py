@@ -1,7 +1,5 @@
 """kill -9 of one rank while files are written: the others end, what is there is no result yet, and --resume goes on."""
 
-from __future__ import annotations
-
 import json
 
 from support import events

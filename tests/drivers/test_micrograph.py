@@ -1,7 +1,5 @@
 """The micrograph of the repository is made, and its driver runs on a table of few fibres."""
 
-from __future__ import annotations
-
 import csv
 import re
 

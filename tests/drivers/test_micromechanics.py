@@ -1,7 +1,5 @@
 """The comparison of cells with closed estimates obeys the laws that need no numbers of its own."""
 
-from __future__ import annotations
-
 import numpy as np
 from support.command_line import assert_verified
 from support.drivers import column, driven

@@ -1,7 +1,5 @@
 """ParaView itself, where there is one: each of its three readers of XDMF sees the values of result.h5."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

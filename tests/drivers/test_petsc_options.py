@@ -1,7 +1,5 @@
 """PETSc's options on the command line: those of the table are accepted by every run, misspelt ones are refused."""
 
-from __future__ import annotations
-
 import json
 import re
 

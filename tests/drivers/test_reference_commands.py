@@ -1,7 +1,5 @@
 """`feti-homog keys`, and commands that are gone."""
 
-from __future__ import annotations
-
 import pytest
 from support.command_line import command_line
 

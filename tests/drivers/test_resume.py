@@ -1,7 +1,5 @@
 """A path that is killed at any moment goes on with --resume, and foreign checkpoints are refused."""
 
-from __future__ import annotations
-
 import json
 import os
 import random

@@ -1,7 +1,5 @@
 """`feti-homog sweep` and `collect`: finished cases are kept whatever happens, and nothing is mixed."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The drivers that are sweeps: tables, pictures, and the laws that their numbers obey."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`feti-homog sweep` and `collect` where files are damaged, the disk is full or the folder not ours."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Stiffness and onset of debonding over the porosity."""
 
-from __future__ import annotations
-
 import csv
 
 import numpy as np

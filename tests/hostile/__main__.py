@@ -3,8 +3,6 @@
 Exit code 1 if there are any.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile

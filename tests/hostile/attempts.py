@@ -1,7 +1,5 @@
 """One hostile input: its files, the command that meets it, and how that must end."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Case files and options, those of `support.hostile_inputs` among them, and sizes that a case asks for."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """Tables of fibres."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """Random damage to files of every reader but those of meshes: each is read or refused in lines, in time."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import traceback

@@ -1,7 +1,5 @@
 """Commands one after the other in one job, as a program that starts the command line; each must end in time."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

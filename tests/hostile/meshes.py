@@ -1,7 +1,5 @@
 """Meshes of other programs."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Surroundings of a process: limits, settings of the folder, rights, full disks, kills, ranks."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Folders of results and of sweeps, and what stands in the place of --out."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping

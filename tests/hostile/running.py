@@ -1,7 +1,5 @@
 """Attempts run: one after the other in one job, or each in a process of its own; and what is wrong with their ends."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

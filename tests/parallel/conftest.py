@@ -1,7 +1,5 @@
 """Fixtures of the tests under mpirun."""
 
-from __future__ import annotations
-
 import sys
 from functools import partial
 

@@ -1,7 +1,5 @@
 """The true error of cells that ask for an accuracy is below it, and, without coatings, not absurdly far below."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Errors of the mesh beyond the accuracy that a case asks for, and those of the points of paths."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

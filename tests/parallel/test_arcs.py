@@ -1,7 +1,5 @@
 """Nodes debonded from the start, at any number of ranks, bodies and pieces."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

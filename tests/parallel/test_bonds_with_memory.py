@@ -1,7 +1,5 @@
 """A law with memory: bonds whose compliance doubles at the first break and that part at the second."""
 
-from __future__ import annotations
-
 from itertools import islice
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The subdomains through their boundaries: extension, loads, kinds of operators and the default pieces."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Constants beside their bounds: a mesh that errs is remarked, what no mesh can make is a fault."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Errors that the solver's Python code raises while PETSc calls it leave the solve after PETSc has returned."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from support.torn_cells import tear

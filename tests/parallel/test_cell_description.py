@@ -1,7 +1,5 @@
 """`check` describes the solver that a run makes."""
 
-from __future__ import annotations
-
 import tomllib
 
 import pytest

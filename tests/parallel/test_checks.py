@@ -1,7 +1,5 @@
 """Checks of a result that is done: scales that do not vanish, and limits that no option lifts."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

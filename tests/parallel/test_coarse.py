@@ -1,7 +1,5 @@
 """The adaptive coarse space against dense algebra."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

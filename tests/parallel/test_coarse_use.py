@@ -1,7 +1,5 @@
 """Solutions with the adaptive coarse space, and its options."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Hexagonal cells of coated fibres in generalized plane strain against closed forms of three phases."""
 
-from __future__ import annotations
-
 import dataclasses
 from functools import cache
 

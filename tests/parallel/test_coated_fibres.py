@@ -1,7 +1,5 @@
 """Cells of coated fibres against closed forms, plain cells and elastic interfaces."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

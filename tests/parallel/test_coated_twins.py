@@ -1,7 +1,5 @@
 """Two interfaces of coated fibres that break together, or are debonded in part, against brute force."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from petsc4py import PETSc

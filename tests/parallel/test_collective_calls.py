@@ -1,7 +1,5 @@
 """Collective calls are counted by name, on every rank and only within the block, and refused in guarded sections."""
 
-from __future__ import annotations
-
 import h5py
 import numpy as np
 import pytest

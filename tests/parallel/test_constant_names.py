@@ -1,7 +1,5 @@
 """One name for each constant of a cell in space, wherever it is read or printed, and the axes of names of a ply."""
 
-from __future__ import annotations
-
 import csv
 import io
 import re

@@ -1,7 +1,5 @@
 """Debonding and contact against quadratic programming, published numbers and laws, at any number of ranks."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

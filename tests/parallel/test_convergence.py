@@ -1,7 +1,5 @@
 """L^ef against reference numbers and closed forms: errors, rates, slopes and iterations, at any number of ranks."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 The rows of the table in tests/README.md are the expected ones.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 

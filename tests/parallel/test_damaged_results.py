@@ -1,7 +1,5 @@
 """Results that are missing, damaged or foreign: one line and exit code 2; nothing is drawn or computed."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Energy: breaks dissipate the work done on the cell less the energy stored in it, whichever way it was loaded."""
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import pairwise
 

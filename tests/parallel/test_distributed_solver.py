@@ -1,7 +1,5 @@
 """Solves with sums over ranks of sparse parts."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from mpi4py import MPI

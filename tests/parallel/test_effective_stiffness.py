@@ -1,7 +1,5 @@
 """L^ef of the torn cell against a monolithic solve, closed forms and laws, at any number of ranks."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

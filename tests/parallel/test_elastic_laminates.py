@@ -4,8 +4,6 @@
 cell of width W; under E11 the stress rises in a straight line to sqrt(2 k_n G_Ic), and is none from there on.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from reference.closed_forms import lame

@@ -1,7 +1,5 @@
 """L^ef of cells of tables with ellipses: Eshelby's solution, cells turned by a right angle, laws."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Debonding by energy: onset and curve against published numbers, and the predicted release of a tip."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from types import SimpleNamespace

@@ -3,8 +3,6 @@
 They are compared with differences of the energy, published numbers and laws.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

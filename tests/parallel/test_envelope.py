@@ -1,7 +1,5 @@
 """Onsets of debonding in a plane of loads, against paths, closed forms and laws, at any number of ranks."""
 
-from __future__ import annotations
-
 import csv
 
 import numpy as np

@@ -1,7 +1,5 @@
 """All ranks raise an error that one rank finds while it makes its part of the solver."""
 
-from __future__ import annotations
-
 import pytest
 from support.torn_cells import tear
 

@@ -1,7 +1,5 @@
 """Estimated errors of the mesh where bodies are cut, against those of bodies that are not."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from mpi4py import MPI

@@ -1,7 +1,5 @@
 """Rows and objects that all ranks send to all, and multipliers that neighbours exchange."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

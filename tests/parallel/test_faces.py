@@ -1,7 +1,5 @@
 """Soft modes of bodies too large to be one eigenproblem: by the neighbourhoods of their faces."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from mpi4py import MPI

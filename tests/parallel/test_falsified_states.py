@@ -1,7 +1,5 @@
 """States with one fault each: its check rises by what was put in, no other does, and all ranks find the same."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

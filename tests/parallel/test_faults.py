@@ -6,8 +6,6 @@ otherwise; of other faults, and of meshes, those whose words begin alike.  On se
 what rank 0 finds, both commands have one of each class.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 

@@ -1,7 +1,5 @@
 """Fields of torn cells: the numbers of fibres and of the nodes on their faces, at any number of ranks and pieces."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """result.h5 holds what the ranks hand over, in the order of the ranks, however many there are."""
 
-from __future__ import annotations
-
 import resource
 from pathlib import Path
 from typing import Any

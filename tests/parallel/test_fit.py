@@ -1,7 +1,5 @@
 """Fits of cells: they return the constants from which data were made, resume, and are the same on any ranks."""
 
-from __future__ import annotations
-
 import copy
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Linear programmes that place free fibres: when one is not solved, every rank hears of it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import OptimizeResult

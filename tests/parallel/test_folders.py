@@ -1,7 +1,5 @@
 """Folders that results cannot go to are refused before the work, in one line; odd names are no hindrance."""
 
-from __future__ import annotations
-
 import json
 import os
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Paths of debonded faces with Coulomb friction: an independent prototype, a slow twin, and every law of `verify`."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

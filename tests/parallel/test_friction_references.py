@@ -1,7 +1,5 @@
 """Friction against closed forms and the slow twin: laminates, first slip, limits of mu, breaks, free fibres."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from reference.closed_forms import first_slip, lame, rubbing_bond, rubbing_laminate

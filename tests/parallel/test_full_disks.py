@@ -1,7 +1,5 @@
 """A disk that is full at any moment: one line, the exit code of a file that cannot be written, no rank left waiting."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os

@@ -1,7 +1,5 @@
 """Estimates and bounds beside a cell are those of its own interfaces and shapes, or are left out."""
 
-from __future__ import annotations
-
 import pytest
 from support.ranks import parallel_assert
 from support.spatial_cells import EPOXY, GLASS, solved

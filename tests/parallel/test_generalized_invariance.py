@@ -1,7 +1,5 @@
 """Generalized plane strain does not depend on axes, ranks, cuts, operators and coarse spaces."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from mpi4py import MPI

@@ -1,7 +1,5 @@
 """Generalized plane strain against reference numbers and rates of convergence, at any number of ranks."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

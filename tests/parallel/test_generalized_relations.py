@@ -3,8 +3,6 @@
 Where the fields of two phases are uniform, or those of layers, finite elements of any size have no error.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 All of the stiffness (6, 6) and of the thermal stress, at any number of ranks: bonded, debonded, on springs, in contact.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Cells whose voids the program meshes: against user's meshes, closed forms, other descriptions; their certificates."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Root-only calls and agreement of exceptions, at any number of ranks."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

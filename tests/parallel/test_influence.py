@@ -1,7 +1,5 @@
 """The inverse of the dual operator by influence columns, against dense algebra and the other preconditioners."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

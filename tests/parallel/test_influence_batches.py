@@ -1,7 +1,5 @@
 """Influence columns are found in batches."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from support import torn_cells

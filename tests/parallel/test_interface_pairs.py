@@ -1,7 +1,5 @@
 """Interfaces between pairs of phases: against cells in which one pair is all that there is, and on their own files."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from mpi4py import MPI

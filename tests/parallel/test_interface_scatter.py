@@ -1,7 +1,5 @@
 """Strengths that differ from fibre to fibre: against cells whose fibres have interfaces of their own."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.stats import weibull_min

@@ -1,7 +1,5 @@
 """Fields of some points of a path: those of a run that keeps all, also after an interruption and an early end."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

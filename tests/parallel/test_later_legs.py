@@ -1,7 +1,5 @@
 """Legs of a path beyond the first: no change of contact is passed over, fibres that nothing holds included."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

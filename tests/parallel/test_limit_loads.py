@@ -1,7 +1,5 @@
 """Loads beyond what debonded faces carry: paths end at the limit, by closed forms and by a linear programme."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A cell of matrix alone, one body without a bond: it is run like others, and its results obey every law."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

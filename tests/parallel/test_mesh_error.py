@@ -1,7 +1,5 @@
 """Estimated errors of the mesh against true ones, at any number of ranks."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from mpi4py import MPI

@@ -1,7 +1,5 @@
 """L^ef of cells of several phases: that of one phase where they are alike, and of the table of their fibres."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Equilibria under strains, stresses and a temperature, against the condensed cell, stiffness and compliance."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from support.generalized_phases import CRYSTAL, WOOD

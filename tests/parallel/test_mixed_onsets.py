@@ -1,7 +1,5 @@
 """Onsets of envelopes are the first events of paths of the same strains, stresses and change of temperature."""
 
-from __future__ import annotations
-
 from contextlib import contextmanager
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Paths of strains and stresses, proportional and of several legs, against brute force on the condensed cell."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from support.loaded_twins import EPOXY_GLASS, LoadedTwin, compare_paths, relative, solved

@@ -1,7 +1,5 @@
 """Lattices that are no rectangle, as rectangular cells of several fibres."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from mpi4py import MPI

@@ -1,7 +1,5 @@
 """Paths on which all layers part and close again, against the closed form of layers that touch or part."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from reference.parted_layers import PartedLayers

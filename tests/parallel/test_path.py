@@ -1,7 +1,5 @@
 """Load-induced debonding against brute force, reference numbers and laws, at any number of ranks."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Work of the loads on paths: what is not stored is lost in breaks, and without breaks nothing is."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

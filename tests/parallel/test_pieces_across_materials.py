@@ -1,7 +1,5 @@
 """Cells cut across their materials against the monolithic solve, and against whole runs of the same cells by bodies."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Energies of points: work = stored + dissipated; closed forms, published numbers, an independent twin; tips."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Any
 

@@ -1,7 +1,5 @@
 """L^ef of tables with rounded polygons: a monolithic solve, circles, a user's mesh of a square, laws."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`from feti_homog import Case, run` in a program of its own: arrays, no files, and communicators of any size."""
 
-from __future__ import annotations
-
 import h5py
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Random cells, bonds and loads against brute force, others at every number of ranks."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from support.generalized_phases import CRYSTAL, WOOD

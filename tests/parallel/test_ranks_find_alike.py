@@ -1,7 +1,5 @@
 """Results on several ranks, each with interface nodes, are those of one rank alone: every number of result.json."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 
 import numpy as np

@@ -4,8 +4,6 @@ Beside what is far stiffer a soft inclusion feels imposed displacements, so that
 stiffness, and what divides them by strengths or roots of toughness of that size does not depend on it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

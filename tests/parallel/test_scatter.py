@@ -1,7 +1,5 @@
 """Scatter by uncertain numbers: closed forms beside differences of runs, and the scatter between random cells."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Derivatives of stiffnesses against differences of whole runs, and Euler's relation, at any number of ranks."""
 
-from __future__ import annotations
-
 import copy
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Shared entities and nodes where bonds may break, against a count triangle by triangle on the whole cell."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

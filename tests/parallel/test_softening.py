@@ -1,7 +1,5 @@
 """Interfaces that soften: paths against brute force, a laminate in closed form, limits of the law."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from unittest import mock
 

@@ -1,7 +1,5 @@
 """Fields of generalized plane strain at any number of ranks: averages, third components, and every law on the files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Paths of long fibres in space: cooling, then load; axial shear; first events, and what does not depend on axes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from reference.spatial_forms import about_x3

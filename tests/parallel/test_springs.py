@@ -1,7 +1,5 @@
 """Elastic interfaces: published numbers, exact relations, quadratic programming, limits; at any number of ranks."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from mpi4py import MPI

@@ -1,7 +1,5 @@
 """Sweeps in process: against references and bounds, and the same numbers on any number of ranks."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """L^ef of cells of tables: that of the cell they are made of, and the same for any origin, unit and order of rows."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

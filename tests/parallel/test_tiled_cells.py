@@ -1,7 +1,5 @@
 """Cells that all ranks mesh together: the same mesh on any number of ranks, results, faults of one rank."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from itertools import islice
 from pathlib import Path

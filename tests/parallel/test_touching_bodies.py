@@ -3,8 +3,6 @@
 Images of pixels are compared with other solvers, with nodes moved a little, and turned.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Trace spaces of refined boundaries, and the soft modes that are found there."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from support import torn_cells

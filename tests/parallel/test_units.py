@@ -1,7 +1,5 @@
 """Every number of result.json in other units: of stress from 1e-20 to 1e20, of length from 1e-9 to 1e9."""
 
-from __future__ import annotations
-
 import pytest
 from support.dimensions import Units, differences
 from support.generalized_phases import CARBON

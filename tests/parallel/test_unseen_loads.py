@@ -1,7 +1,5 @@
 """Loads of which the active rows see rounding alone: a coated fibre that nothing holds, with phases 1000 apart."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

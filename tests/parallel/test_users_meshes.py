@@ -1,7 +1,5 @@
 """Meshes of users, whose fibres are not round, from the file to results that obey every law."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -3,8 +3,6 @@
 Those of one rank do in `tests/unit/verify/test_falsified_results.py`.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -4,8 +4,6 @@ The other readers of ParaView are not in VTK's package: `scripts/paraview_check.
 `tests/drivers/test_paraview.py` where there is a ParaView.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

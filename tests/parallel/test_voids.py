@@ -1,7 +1,5 @@
 """Cells with voids against closed forms, a monolithic solve, debonded fibres and the certificate of their files."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Whole paths of bonds that break by energy, to complete debonding, against brute force."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from reference.energy_path import SlowEnergyPath

@@ -3,8 +3,6 @@
 Bulk modulus k = lambda + mu.  Materials are tables of the case file: young and poisson.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 

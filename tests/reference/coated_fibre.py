@@ -3,8 +3,6 @@
 Springs are compliances, jump over traction: (normal, tangential, axial).  The outer radius is 1, the fibre's sqrt(c).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.optimize import brentq
 

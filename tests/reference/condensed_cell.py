@@ -5,8 +5,6 @@ temperature, the bodies store z.A z / 2 with z = (j, e): all displacements are e
 `quadratic_programme` or `spatial_programme`.  Given stresses S add -area S.e to what is minimised.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

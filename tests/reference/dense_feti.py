@@ -3,8 +3,6 @@
 It takes K and B of each subdomain from the program, nothing else.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.linalg import block_diag
 

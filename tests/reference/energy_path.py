@@ -4,8 +4,6 @@ Every state is made anew by `quadratic_programme`, and what a break releases fol
 displacements.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

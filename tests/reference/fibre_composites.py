@@ -4,8 +4,6 @@ Phases are (6, 6) compliances and (6,) expansions, x3 along the fibres, Voigt or
 1e-6/K.  The constants are (fibre: L, across: T) E_L, E_T, G_L, G_T, nu_L, nu_T, alpha_L, alpha_T of the bonded cell.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

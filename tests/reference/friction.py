@@ -9,8 +9,6 @@ pressure and -(A z)_t = f the shear force on the fibre.  On debonded nodes
 Along the fibres debonded faces slide without a force.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import clarabel

@@ -3,8 +3,6 @@
 A bond breaks at constant load, by implicit steps: its faces and all others slide from where they are.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import product
 from types import SimpleNamespace

@@ -3,8 +3,6 @@
 Layers are pairs of phase and outer radius, from within; states that stay finite at the axis begin in the first one.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.optimize import brentq
 

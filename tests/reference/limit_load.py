@@ -9,8 +9,6 @@ blocks are in balance, and the forces of each face add up to the stresses times 
 lower bound no load beyond the largest of these has an equilibrium, whatever the history.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

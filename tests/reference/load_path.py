@@ -3,8 +3,6 @@
 Tractions are nodal reactions by the arc length that each node stands for.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 

@@ -4,8 +4,6 @@ The energies are balances: what a break at constant load loses is the work of th
 is stored.  Between breaks nothing is lost.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ It shares the mesh with the program, nothing else: dense element loops, its own 
 elimination.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import splu

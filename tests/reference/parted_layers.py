@@ -6,8 +6,6 @@ with E_a = <e_a> + s_a / k, k the springs of all faces in a row; else s_a = 0 an
 <e_a>.  Shears do no work.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from reference.spatial_forms import law

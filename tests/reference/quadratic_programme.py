@@ -5,8 +5,6 @@ with contact, obey n.(u_matrix - u_fibre) >= 0: clarabel minimises the energy, a
 system with the constraints that it finds active makes the answer exact to rounding.
 """
 
-from __future__ import annotations
-
 from copy import copy
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ Voigt order 11, 22, 12 with engineering shear, stiffnesses and stresses in GPa. 
 reference composite: matrix E = 88, nu = 0.299, fibre E = 200, nu = 0.222, a fibre fraction of 0.4.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Paths of bonds that soften tooth by tooth, by brute force, in openings as Camanho and Davila have them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -3,8 +3,6 @@
 Voigt order [11, 22, 33, 23, 13, 12] with engineering shears; x3 is the axis of the fibres.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.special import comb
 

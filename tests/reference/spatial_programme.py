@@ -4,8 +4,6 @@ u = (u1, u2, u3)(x1, x2) with all six strains and a temperature as loads.  It sh
 cell with the program, nothing else; contact is found as in `quadratic_programme`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

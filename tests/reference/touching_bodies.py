@@ -4,8 +4,6 @@ Bodies part only where exactly two meet, along one line.  Shares nothing with th
 lengths are found here, in loops.
 """
 
-from __future__ import annotations
-
 from collections import Counter, defaultdict
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One SLURM for all tests of this folder."""
 
-from __future__ import annotations
-
 import signal
 from collections.abc import Iterator
 

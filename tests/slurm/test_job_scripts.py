@@ -1,7 +1,5 @@
 """The job scripts of SLURM on a real one: where they look, what they return, where their logs are, what they keep."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """A right case file, and the same with some of its words exchanged."""
 
-from __future__ import annotations
-
 BASE = """\
 [cell]
 geometry = "hexagonal"

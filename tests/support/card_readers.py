@@ -1,7 +1,5 @@
 """Readers of material cards, from the formats' manuals: the (3, 3, 3, 3) stiffness and (3, 3) expansion of a card."""
 
-from __future__ import annotations
-
 import csv
 import io
 import re

@@ -1,7 +1,5 @@
 """Cases for the tests, and the program's stages run on them without files."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Cells of circular fibres as input of the geometry."""
 
-from __future__ import annotations
-
 from feti_homog.case.cell_section import Cell
 
 

@@ -1,7 +1,5 @@
 """The cells of the tests of the adaptive coarse space."""
 
-from __future__ import annotations
-
 import numpy as np
 from mpi4py import MPI
 from reference import dense_feti

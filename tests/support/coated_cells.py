@@ -1,7 +1,5 @@
 """Meshes of square cells with one fibre in two rings, whose phases are named as a test wants them."""
 
-from __future__ import annotations
-
 import gmsh
 
 RADIUS, INNER = 0.35, 0.25

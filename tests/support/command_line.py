@@ -1,7 +1,5 @@
 """Runs of the command line for the tests of it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from feti_homog.verify.certificate import verify

@@ -1,7 +1,5 @@
 """Damage to the bytes of a file, for tests of what reads it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 # What stands in the place of a number: of the wrong kind, beyond the last, or too large.

@@ -1,7 +1,5 @@
 """Physical dimensions of a case's entries and of those of result.json, and both in other units."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

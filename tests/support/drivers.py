@@ -1,7 +1,5 @@
 """Drivers as tests run them."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

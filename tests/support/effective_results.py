@@ -3,8 +3,6 @@
 Axis 1 of the constants here is the fibre, as in the literature.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

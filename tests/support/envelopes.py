@@ -1,7 +1,5 @@
 """Envelopes of small cells, and the onsets of paths in the same cells."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Events in the checkpoint of a run that was ended."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from feti_homog.results.checkpoints import FOLDER, NAME, records

@@ -1,7 +1,5 @@
 """Edits that make one thing of a result false, and the laws that a result breaks."""
 
-from __future__ import annotations
-
 import shutil
 
 import numpy as np

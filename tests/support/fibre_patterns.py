@@ -1,7 +1,5 @@
 """Patterns of fibres whose statistics are known."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from feti_homog.microstructure.fibre_pattern import FibrePattern

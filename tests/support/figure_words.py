@@ -1,7 +1,5 @@
 """Read the labels of a picture's axes with their units, and the values that its legend names."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The four composites of the reference constants as fits: their own constants are measured, those of phases unknown."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Phases that are unlike in all directions, as tables of a case file."""
 
-from __future__ import annotations
-
 # Of different axes, so that nothing but x3 is normal to a plane of symmetry of the cell.
 WOOD = {
     "E1": 12.0, "E2": 5.0, "E3": 8.0, "nu12": 0.3, "nu13": 0.25, "nu23": 0.2, "G12": 2.5, "G13": 3.1, "G23": 1.7,

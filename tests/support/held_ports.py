@@ -1,7 +1,5 @@
 """Ports for servers that tests start, which nobody else takes before they do."""
 
-from __future__ import annotations
-
 import socket
 from contextlib import ExitStack
 from pathlib import Path

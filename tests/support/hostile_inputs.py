@@ -1,7 +1,5 @@
 """Bad inputs of the command line, each with the words that its one line must have; and meshes for some of them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from support.base_case import BASE, changed, ended, fraction

@@ -1,7 +1,5 @@
 """Programs that tests start: Python programs under mpirun, or without it."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Meshes of layers that run through the cell, normal to either axis."""
 
-from __future__ import annotations
-
 from unit.mesh.faulty_meshes import FIBRE, MATRIX, MshFile
 
 ALONG = 2

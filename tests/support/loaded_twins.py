@@ -1,7 +1,5 @@
 """Cases under mixed loads, their results, and the same cells condensed for the oracle they are checked by."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

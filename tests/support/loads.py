@@ -1,7 +1,5 @@
 """Loads of paths."""
 
-from __future__ import annotations
-
 from feti_homog.interface.loads import Load
 from feti_homog.typing import Float
 

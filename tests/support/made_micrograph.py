@@ -5,8 +5,6 @@ that it is not periodic itself: fibres whose centres are in it are listed, in um
 stage.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from feti_homog.case.cell_section import Cell

@@ -1,7 +1,5 @@
 """A table of fibres in a window, which are nearer to each other than those of random cells of that fraction."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -1,7 +1,5 @@
 """Rows of a table whose fibres a cut window moves."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from feti_homog.microstructure.cut_window import TOLERANCE

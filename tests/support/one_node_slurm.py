@@ -1,7 +1,5 @@
 """A SLURM of one node on the loopback: its files in a folder of its own, its daemons children of this process."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

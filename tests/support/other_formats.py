@@ -1,7 +1,5 @@
 """Meshes as files of gmsh, Abaqus and VTK."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

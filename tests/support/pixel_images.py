@@ -1,7 +1,5 @@
 """Images of square pixels as meshes of gmsh, two triangles or a quadrilateral a pixel: bodies touch at corners."""
 
-from __future__ import annotations
-
 import numpy as np
 from unit.mesh.faulty_meshes import Elements, MshFile
 

@@ -1,7 +1,5 @@
 """Random cells, debonded sets and strains, from a seeded generator that every rank draws from alike."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

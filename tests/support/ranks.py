@@ -1,7 +1,5 @@
 """Cells that ranks share, and assertions that all ranks agree on."""
 
-from __future__ import annotations
-
 from typing import Any
 
 # Cuts small cells such that each of two ranks owns interface nodes; uncut, the matrix alone is on rank 0.

@@ -1,7 +1,5 @@
 """A structured mesh of the unit square with a square fibre, and fields on it, as ranks hand them over."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A path of a few events on a tiny cell."""
 
-from __future__ import annotations
-
 from support.base_case import BASE
 
 PATH = (

@@ -1,7 +1,5 @@
 """Cases of generalized plane strain, their results, and the same cells for the sparse system they are checked by."""
 
-from __future__ import annotations
-
 import numpy as np
 from petsc4py import PETSc
 from reference.quadratic_programme import torus_keys

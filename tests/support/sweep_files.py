@@ -1,7 +1,5 @@
 """Small sweeps for the tests."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

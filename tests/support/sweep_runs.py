@@ -1,7 +1,5 @@
 """Sweeps by the command line, and what they leave in their folder."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from support.command_line import command_line

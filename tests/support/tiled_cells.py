@@ -1,7 +1,5 @@
 """Cells cut into small tiles."""
 
-from __future__ import annotations
-
 from functools import cache
 
 from feti_homog.mesh.fill.gmsh_mesher import begin

@@ -1,7 +1,5 @@
 """Torn cells with interfaces, and the same cells for the quadratic programme that they are checked by."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Meshes as users make them, by gmsh."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import gmsh

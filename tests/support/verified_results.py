@@ -1,7 +1,5 @@
 """Results of every kind of analysis, as the command line writes them, and falsified copies of them."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Meshes with voids: cells of the program with some fibres left out, as files that a user brings."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

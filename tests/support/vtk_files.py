@@ -1,7 +1,5 @@
 """Files of VTK's own writers."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

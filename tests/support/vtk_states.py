@@ -1,7 +1,5 @@
 """States of a file by VTK's reader of XDMF, each with its mesh and all of its arrays."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The whole coarse mesh of a case, also of one that the program tears tile by tile."""
 
-from __future__ import annotations
-
 from feti_homog.homogenization.tile_tearing import fill_tiles, place_nodes
 from feti_homog.mesh.tiles.tiling import DEFAULT_TILES
 

@@ -1,7 +1,5 @@
 """The rules of the house: imports point to floors below, importing starts nothing, modules and functions are short."""
 
-from __future__ import annotations
-
 import ast
 import re
 import subprocess

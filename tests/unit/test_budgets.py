@@ -3,8 +3,6 @@
 A feature pays for its lines: who exceeds a budget finds them in the same package.
 """
 
-from __future__ import annotations
-
 import ast
 import re
 from collections import Counter, defaultdict

@@ -1,7 +1,5 @@
 """The random cases cover the language of case files, and what compares them notices a wrong number of any kind."""
 
-from __future__ import annotations
-
 import copy
 from collections import Counter
 from pathlib import Path

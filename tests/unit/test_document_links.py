@@ -1,7 +1,5 @@
 """Links, files, modules, commands and case files of the documents exist; their recipe for a mesh works."""
 
-from __future__ import annotations
-
 import argparse
 import ast
 import re

@@ -1,7 +1,5 @@
 """Keys, options and names that the documents give are those of the code."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Iterator

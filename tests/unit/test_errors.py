@@ -1,7 +1,5 @@
 """Errors are lines of printable characters, not too long and not too many."""
 
-from __future__ import annotations
-
 import pickle
 
 from feti_homog.errors import LONGEST_LINE, MOST_FAULTS, CaseError, escaped

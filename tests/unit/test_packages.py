@@ -1,7 +1,5 @@
 """Docstrings of packages: what they import and their main entries, as the code has them."""
 
-from __future__ import annotations
-
 import ast
 import re
 

@@ -1,7 +1,5 @@
 """The reference of what is written has all that small runs write, and nothing else."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re

@@ -1,7 +1,5 @@
 """Many events on a terminal: a line a second at most, the first, the last and faults always."""
 
-from __future__ import annotations
-
 import pytest
 from mpi4py import MPI
 

@@ -1,7 +1,5 @@
 """Events of a checkpoint that F lambda confirmed, in each problem by itself."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

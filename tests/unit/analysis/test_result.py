@@ -1,7 +1,5 @@
 """Results: what is described is what is written, what is written is read again, and what is printed is short."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

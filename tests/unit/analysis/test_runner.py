@@ -1,7 +1,5 @@
 """The torn cell and the results folder after a run that ends early."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 

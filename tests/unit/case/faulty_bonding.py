@@ -1,7 +1,5 @@
 """Case files with faults of imperfect bonding, and the lines that must report them."""
 
-from __future__ import annotations
-
 from support.base_case import BASE, changed, ended
 
 

@@ -1,7 +1,5 @@
 """Case files with one fault each (or as many as stated), and the line that must report it."""
 
-from __future__ import annotations
-
 from support.base_case import BASE, MESH_CELL, RANDOM, cell, changed, ended, fraction
 from unit.case.faulty_materials import FAULTY_MATERIALS
 

@@ -1,7 +1,5 @@
 """Faulty sections [interface] of laws that soften, each with its faults."""
 
-from __future__ import annotations
-
 from unit.case.faulty_bonding import PATH, of_type
 
 SOFTENING = [

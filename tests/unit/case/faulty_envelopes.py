@@ -1,7 +1,5 @@
 """Case files with faults of envelopes, and the lines that must report them."""
 
-from __future__ import annotations
-
 from support.base_case import ended
 from unit.case.faulty_bonding import ARC, PATH, of_type
 

@@ -1,7 +1,5 @@
 """Tables of fibres with one fault each, and the line that reports it."""
 
-from __future__ import annotations
-
 HEAD = "x,y,radius\n"
 ROW = "1,2,0.5\n"
 

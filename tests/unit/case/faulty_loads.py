@@ -1,7 +1,5 @@
 """Case files with faults of loads by name, of [path] and [load], and the lines that must report them."""
 
-from __future__ import annotations
-
 from unit.case.faulty_bonding import ARC, PATH, of_type
 
 IN_SPACE = '[analysis] plane = "generalized", not "strain"'

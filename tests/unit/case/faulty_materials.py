@@ -1,7 +1,5 @@
 """Case files with a fault in their materials, and the line that must report it."""
 
-from __future__ import annotations
-
 from support.base_case import (
     AXIAL,
     BASE,

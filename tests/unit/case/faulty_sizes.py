@@ -1,7 +1,5 @@
 """Sections [cell] with a fault in the accuracy or the size of elements that they ask for."""
 
-from __future__ import annotations
-
 from support.base_case import MESH_CELL, cell
 
 # name: (content of the file, words that must stand in its faults)

@@ -1,7 +1,5 @@
 """Sections [cell] with geometry = "table", or with keys of such cells, that have one fault each."""
 
-from __future__ import annotations
-
 from support.base_case import MESH_CELL, TABLE_CELL, cell
 
 # name: (content of the file, words that must stand in its faults)

@@ -1,7 +1,5 @@
 """Case files, right and faulty."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import pickle

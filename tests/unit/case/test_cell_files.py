@@ -1,7 +1,5 @@
 """Sizes that the case and its table give."""
 
-from __future__ import annotations
-
 import pytest
 from support.base_case import BASE, MESH_CELL
 

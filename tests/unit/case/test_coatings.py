@@ -1,7 +1,5 @@
 """Coatings in a case file, and their faults."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Values that `Case.parse` takes besides those of TOML, and its lines about others."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The coarse mesh and its refinement that an accuracy chooses."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Reading tables of fibres: their dialects, and a line for each fault."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from unit.case.faulty_fibre_tables import FAULTY_TABLES, HEAD

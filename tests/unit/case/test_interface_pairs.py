@@ -1,7 +1,5 @@
 """Several sections [[interface]]: what is read, resolved and refused."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

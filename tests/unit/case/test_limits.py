@@ -1,7 +1,5 @@
 """The limits that faults name are those that are checked: each is read from the words, and tried on both sides."""
 
-from __future__ import annotations
-
 import math
 import re
 

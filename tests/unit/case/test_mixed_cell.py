@@ -1,7 +1,5 @@
 """Numbers of fibres and sizes of cells of several phases, against trying them out, and what is wrong with a mix."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 from itertools import product

@@ -1,7 +1,5 @@
 """Loads by name: what they are in full, what is free of stress, and that tables and strains are read alike."""
 
-from __future__ import annotations
-
 import tomllib
 
 import pytest

@@ -1,7 +1,5 @@
 """The reference of the case file: nothing is left out, and every key is explained."""
 
-from __future__ import annotations
-
 import pytest
 
 from feti_homog.case import reference

@@ -1,7 +1,5 @@
 """Relations between keys: conditions, the places of their faults, and documents changed at random."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Tables of fibres as other programs write them, and what is made of those that nearly fit."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Case files without faults, of all kinds, and tables [sweep]."""
 
-from __future__ import annotations
-
 from support.base_case import (
     AXIAL,
     BASE,

@@ -1,7 +1,5 @@
 """`feti-homog fibres`: the table of a cell is the cell."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Numbers on the command line: what Python alone would take for one is refused."""
 
-from __future__ import annotations
-
 import argparse
 
 import pytest

@@ -1,7 +1,5 @@
 """`feti-homog statistics`: the fibres of tables, results and cases, and what is written and printed of them."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Statistics of lattices, which are known exactly."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from pattern_statistics import SECTORS, distances, pair_directions, pair_functions, voronoi_cells

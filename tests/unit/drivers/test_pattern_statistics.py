@@ -1,7 +1,5 @@
 """Statistics of random patterns: laws, invariances, brute force and means over many of them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 

@@ -1,7 +1,5 @@
 """Refinement and assembly of one subdomain against element loops of the monolithic solve."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from reference import monolithic

@@ -1,7 +1,5 @@
 """Stresses that obey known tractions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Stresses recovered from linear elements against least squares about one vertex after the other."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial import Delaunay

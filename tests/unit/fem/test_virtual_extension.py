@@ -1,7 +1,5 @@
 """The change of the elements' energy with the places of their nodes against differences of the energy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from reference import monolithic

@@ -1,7 +1,5 @@
 """Normals along arcs: against the ellipse itself, and against straight lines."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The choice of preconditioner and coarse space from sizes and options, without MPI."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """When a Krylov method is taken to stall."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from feti_homog.feti.krylov import Stall

@@ -1,7 +1,5 @@
 """Checks are measured by the load: a strain that came out absurd is no scale, and has a remark."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Default sizes of elements at tips: as fine as the rest is accurate, and no finer than many tips allow."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Estimated memory grows with the size of a case, and ranks are recommended that it can use."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

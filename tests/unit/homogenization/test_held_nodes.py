@@ -1,7 +1,5 @@
 """Nodes that never part: remarks of a run and of `feti-homog check`, and arcs that select no other."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

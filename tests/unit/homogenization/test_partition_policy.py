@@ -1,7 +1,5 @@
 """Cells that are cut across materials, and their numbers of pieces."""
 
-from __future__ import annotations
-
 import pytest
 from mpi4py import MPI
 from support.cases import make_case

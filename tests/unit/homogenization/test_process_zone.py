@@ -1,7 +1,5 @@
 """The length along which bonds break by energy, and the warning of elements that do not resolve it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Remarks of `feti-homog check` on components that no load names."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 

@@ -1,7 +1,5 @@
 """Arcs on the interface: their tips and the nodes within them, counted by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.sparse import coo_matrix

@@ -1,7 +1,5 @@
 """Debonded arcs against a brute-force search over full turns, on angles that binary numbers hold exactly."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st

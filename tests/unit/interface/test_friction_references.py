@@ -1,7 +1,5 @@
 """The two oracles of friction, `reference.friction` and `reference.friction_path`, against each other and by hand."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

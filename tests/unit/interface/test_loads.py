@@ -1,7 +1,5 @@
 """Loads of strains and stresses, and the energies between two states under one load."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Moduli and bounds against published numbers, closed forms and random tests."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Derivatives of the laws of phases against central differences of the laws, and of the constants of composites."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

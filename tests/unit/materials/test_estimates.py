@@ -1,7 +1,5 @@
 """Estimates against exact relations, bounds, limits and cells that were solved."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Estimates of round fibres, bonded and on springs, against boundary value problems, Eshelby's tensor and cells."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

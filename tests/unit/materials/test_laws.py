@@ -1,7 +1,5 @@
 """Plane stiffness against closed forms and the three-dimensional law."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The closed forms of coated fibres that cells are held against, where they are those of plain fibres."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The names of strains in case files and results against those of the problems that are solved."""
 
-from __future__ import annotations
-
 from feti_homog.fem.problem import AXIAL, GENERALIZED, PLANE
 from feti_homog.homogenization.phase_laws import AXIAL_SHEAR, IN_PLANE
 from feti_homog.materials.voigt import SPATIAL_STRAINS, STRAINS

@@ -1,7 +1,5 @@
 """Plane states: their components are those of the problems that are solved, and of the laws of phases."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from support.cases import make_case

@@ -1,7 +1,5 @@
 """Constants of spatial stiffnesses against compliances, turned tensors and random tests."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

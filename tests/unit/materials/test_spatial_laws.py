@@ -1,7 +1,5 @@
 """Stiffness and expansion in space: fourth-order tensors, closed forms, one form of a material against others."""
 
-from __future__ import annotations
-
 import dataclasses
 import tomllib
 

@@ -1,7 +1,5 @@
 """Equivalent and principal stresses against eigenvalues and invariants of the tensor."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from feti_homog.materials import voigt

@@ -1,7 +1,5 @@
 """The tensor of a strain in Voigt order."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from feti_homog.materials.voigt import strain_tensor

@@ -1,7 +1,5 @@
 """Meshes as binary files of gmsh, in either byte order."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Meshes of 6-node triangles, and faults of their middle nodes: name -> (mesh, part of the message)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Coatings of ellipses: their areas, how nearly round ones come to discs, and rows that coatings make overlap."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from unit.mesh.test_table_ellipses import ROWS, cell_of, table

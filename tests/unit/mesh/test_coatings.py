@@ -1,7 +1,5 @@
 """Meshes of coated fibres: circles within circles, cut by the sides of the cell, thick and thin."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The order of elimination against the fill that it is for."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

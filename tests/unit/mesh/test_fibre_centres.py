@@ -1,7 +1,5 @@
 """Numbers and centres of fibres, and the curves that a user's mesh has debonded."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Voids in tables and in random cells: where they are, the mesh around them, fibres that stay as they were, faults."""
 
-from __future__ import annotations
-
 import fibre_statistics
 import numpy as np
 import pytest

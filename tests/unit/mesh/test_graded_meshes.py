@@ -5,8 +5,6 @@ Sizes as asked for, bounded growth, no more elements than that takes.
 That they are meshes at all, periodic and of good triangles, `test_gmsh_mesher.py` holds for them too.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Hollow fibres of tables: what is meshed, what is listed, faults."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Random cells of several phases: fractions, radii and gaps, and the cells of one phase among them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from unit.microstructure.test_arrangement import smallest_gap

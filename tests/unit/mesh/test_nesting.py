@@ -1,7 +1,5 @@
 """The inner one of two bodies, and the number of a coating."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Meshes of Abaqus and VTK, and sides that nearly match."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Node classes and torus edges of random periodic meshes, whose pairs are known as they are made."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pairs of places on opposite sides of a periodic cell."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from feti_homog.mesh.coarse_mesh import paired_sides

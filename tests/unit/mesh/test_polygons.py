@@ -1,7 +1,5 @@
 """Rounded polygons of tables: their outlines, gaps and meshes, what is listed of them, faults."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

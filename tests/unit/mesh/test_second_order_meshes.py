@@ -1,7 +1,5 @@
 """Meshes of 6-node triangles: their middle nodes give the curves of interfaces, their corners the coarse mesh."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from support.users_meshes import fibre_area, polar_cell

@@ -1,7 +1,5 @@
 """Cells of tables with ellipses: where nodes are, what the table's order and units do, and rows that overlap."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Vertices at which two bodies do not meet along one line, and the pinned class, in small images."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

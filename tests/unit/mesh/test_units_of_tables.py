@@ -1,7 +1,5 @@
 """A table in another unit of length has the mesh of the cell, to the last element."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Voids that cannot be: each has one line."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from support.void_cells import write_part, write_voids

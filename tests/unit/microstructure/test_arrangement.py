@@ -1,7 +1,5 @@
 """Arrangements of fibres against brute force over all pairs and images."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

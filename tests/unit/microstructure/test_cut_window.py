@@ -1,7 +1,5 @@
 """A window of a larger arrangement made periodic by the smallest moves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from support.moved_rows import moved_rows

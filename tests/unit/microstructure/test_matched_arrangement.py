@@ -1,7 +1,5 @@
 """Random cells that match a table: their distances, radii, hard cores; the keys of the case and their faults."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Cells of tables: those of the program again, the same for any origin, unit and order; and tables that are faulty."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """report.html without a browser: what is on the page, and what of a folder that has no whole result."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Files that killed writers left are removed, no others."""
 
-from __future__ import annotations
-
 from mpi4py import MPI
 
 from feti_homog.results import atomic, output_folder

@@ -1,7 +1,5 @@
 """Checkpoints: what is read is what was written, or is refused."""
 
-from __future__ import annotations
-
 import random
 from pathlib import Path
 

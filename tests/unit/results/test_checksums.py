@@ -1,7 +1,5 @@
 """A document is read as it was written, or not at all; large files are known by size and checksum."""
 
-from __future__ import annotations
-
 import json
 import zlib
 

@@ -1,7 +1,5 @@
 """The reference table of result.h5 is what the file holds."""
 
-from __future__ import annotations
-
 import h5py
 import pytest
 from mpi4py import MPI

@@ -1,7 +1,5 @@
 """Kept points of a path: the ends, those around drops of the stress, the rest evenly."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Any
 

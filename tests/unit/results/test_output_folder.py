@@ -1,7 +1,5 @@
 """The folder of the results: held by one run, and gone again if nothing was written."""
 
-from __future__ import annotations
-
 import errno
 import fcntl
 import os

@@ -1,7 +1,5 @@
 """The branch of a path that a rising load follows, its components, and which of its points are chosen."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

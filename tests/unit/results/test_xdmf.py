@@ -1,7 +1,5 @@
 """The XDMF files name data that exist, in forms that every reader takes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from xml.etree import ElementTree as ET
 

@@ -1,7 +1,5 @@
 """A change selects the tests that import what it changed, also through other modules of the tests."""
 
-from __future__ import annotations
-
 import pytest
 from changed_tests import module_name, touched
 

@@ -1,7 +1,5 @@
 """A NumPy that something else installed is found by its major version."""
 
-from __future__ import annotations
-
 import pytest
 from check_modules import numpy_fault
 

@@ -1,7 +1,5 @@
 """Ports that tests give to servers belong to one test at a time."""
 
-from __future__ import annotations
-
 import socket
 from contextlib import ExitStack
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Deliberate errors of tests/mutations.toml have one place each, and tests: `scripts/mutations.py` tries them all."""
 
-from __future__ import annotations
-
 import shlex
 import tomllib
 from pathlib import Path

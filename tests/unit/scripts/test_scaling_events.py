@@ -1,7 +1,5 @@
 """The cost model of events of a path, on made up runs and on counted calls."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """The cost model of the scaling study: from runs that were made up of known constants, it finds these again."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict, replace
 

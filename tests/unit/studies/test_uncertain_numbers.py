@@ -1,7 +1,5 @@
 """Uncertain numbers of a document: read, refused with a line, and written so that the same ones are read again."""
 
-from __future__ import annotations
-
 import tomllib
 from typing import Any
 

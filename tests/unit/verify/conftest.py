@@ -1,7 +1,5 @@
 """Results of every kind, computed once."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 

@@ -1,7 +1,5 @@
 """Stresses are those that the case asks for, relative to the load: a strain that came out is no scale of them."""
 
-from __future__ import annotations
-
 from dataclasses import make_dataclass
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Laws of bonds stand on both floors: in runs, and by formulas of their own in the checks of results."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The certificate's own plane stiffnesses, by way of three dimensions, are those of the solver's elements."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from support.verified_results import CARBON as WARM_CARBON

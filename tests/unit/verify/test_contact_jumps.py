@@ -1,7 +1,5 @@
 """A tip that a change of contact overloads breaks there, be it within a leg or where one begins."""
 
-from __future__ import annotations
-
 import itertools
 import json
 from types import SimpleNamespace

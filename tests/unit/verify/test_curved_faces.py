@@ -1,7 +1,5 @@
 """Lengths and normals of interfaces that are no circles follow from the files: right ones hold, false ones do not."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from mpi4py import MPI

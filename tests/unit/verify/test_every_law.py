@@ -1,7 +1,5 @@
 """Every law of the certificate has a result that breaks it: no check always holds, and none is never called."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

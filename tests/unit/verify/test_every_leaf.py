@@ -1,7 +1,5 @@
 """One false number of result.json, resealed, breaks a law, or the certificate says that it is not checked."""
 
-from __future__ import annotations
-
 import copy
 import json
 import re

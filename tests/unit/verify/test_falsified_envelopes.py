@@ -1,7 +1,5 @@
 """Envelopes in which one number is false break the laws that they must break."""
 
-from __future__ import annotations
-
 import pytest
 from support.falsifications import broken
 from support.verified_results import falsified

@@ -1,7 +1,5 @@
 """A copy of a result of mixed loads in which one thing is false breaks the laws that it must break."""
 
-from __future__ import annotations
-
 import pytest
 from support.falsifications import (
     attribute,

@@ -1,7 +1,5 @@
 """Results of the program are verified; a copy with one false value breaks the laws that it must break."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Sensitivities are verified from the fields; one derivative that is false breaks their law."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from mpi4py import MPI

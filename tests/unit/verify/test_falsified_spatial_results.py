@@ -1,7 +1,5 @@
 """A copy of a result of generalized plane strain in which one thing is false breaks the laws that it must break."""
 
-from __future__ import annotations
-
 import pytest
 from support.falsifications import MATRIX, attribute, broken, document, free_axial_traction, scale, shift
 from support.verified_results import falsified

@@ -4,8 +4,6 @@ The energy W = 1/2 x.A x + 1/2 k <-n.x>^2 of strains x is convex and homogeneous
 contact is; a state under any mixed load has a closed form on each side of n.x = 0.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Verification reads the loads of a case that the program goes through."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from support.verified_results import LOADS, MIXED_PATHS, document

@@ -1,7 +1,5 @@
 """The heat of an increment is that of its slips."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A folder without a result that can be read is reported in one line, whatever is wrong with it."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """Fields that follow from those of result.h5: by the independent elements and laws of `verify`, and in files of VTK."""
 
-from __future__ import annotations
-
 import shutil
 
 import h5py

@@ -1,7 +1,5 @@
 """G^T A G by its entries, against products of matrices."""
 
-from __future__ import annotations
-
 import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csr_matrix

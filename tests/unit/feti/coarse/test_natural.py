@@ -1,7 +1,5 @@
 """A thousand fibres that nothing holds: motions and gaps take memory of each for itself, not of all for all."""
 
-from __future__ import annotations
-
 import tracemalloc
 from contextlib import contextmanager
 from types import SimpleNamespace

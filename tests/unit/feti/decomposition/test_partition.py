@@ -1,7 +1,5 @@
 """Pieces and ranks: connected, balanced, and neighbours together."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Subdomains that no factorization should see."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

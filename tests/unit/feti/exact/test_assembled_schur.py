@@ -1,7 +1,5 @@
 """The factor of an assembled Schur complement: dense where it is full, by the library that options name."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from mpi4py import MPI

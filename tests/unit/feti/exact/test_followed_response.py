@@ -1,7 +1,5 @@
 """The answer and columns that follow softening, breaking and closing bonds, and others by them, in dense cells."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

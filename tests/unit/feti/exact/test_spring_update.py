@@ -1,7 +1,5 @@
 """Springs added to an inverse, against the inverse of the sum."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from mpi4py import MPI

@@ -1,7 +1,5 @@
 """Dense symmetric matrices by one of their triangles, against NumPy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Partial factorizations by CHOLMOD's own functions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.sparse import csr_matrix

@@ -1,7 +1,5 @@
 """Products with some columns of a matrix."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

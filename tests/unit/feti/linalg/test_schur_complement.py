@@ -1,7 +1,5 @@
 """Schur complements by MUMPS and CHOLMOD against dense algebra; what MUMPS cannot make is no zeros."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from petsc4py import PETSc

@@ -1,7 +1,5 @@
 """Direct solvers of one rank, and what they leave behind."""
 
-from __future__ import annotations
-
 import tracemalloc
 from pathlib import Path
 

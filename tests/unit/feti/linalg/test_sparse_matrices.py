@@ -1,7 +1,5 @@
 """Scaled sparse matrices against dense products."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import random
 

@@ -1,7 +1,5 @@
 """Kinds of boundary operators from sizes alone."""
 
-from __future__ import annotations
-
 import pytest
 
 from feti_homog.feti.operators.choice import KINDS, OperatorChoice, SubdomainSize, choose

@@ -1,7 +1,5 @@
 """Boundary operators of one subdomain against dense Schur complements by NumPy."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

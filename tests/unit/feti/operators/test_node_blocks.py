@@ -1,7 +1,5 @@
 """The inverse of active rows of block-diagonal matrices against NumPy's of the same rows, dense."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

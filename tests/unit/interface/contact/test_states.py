@@ -1,7 +1,5 @@
 """Errors of the KKT conditions: each relative to its own interface."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

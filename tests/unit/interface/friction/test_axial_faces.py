@@ -1,7 +1,5 @@
 """Faces along the fibres: free jumps are eliminated exactly, and what no face may bear is an error."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

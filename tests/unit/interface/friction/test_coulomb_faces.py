@@ -1,7 +1,5 @@
 """The statuses of debonded faces with friction against brute force over all of them, and whole paths of dense cells."""
 
-from __future__ import annotations
-
 from collections import Counter
 from itertools import product
 

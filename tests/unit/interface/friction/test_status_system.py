@@ -1,7 +1,5 @@
 """Responses that are kept up from statuses to statuses, against systems that are factored for each of them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

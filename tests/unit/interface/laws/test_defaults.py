@@ -1,7 +1,5 @@
 """Numbers along the fibres are those around them where a case gives none: one law for all shear."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

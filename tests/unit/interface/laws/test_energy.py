@@ -1,7 +1,5 @@
 """Break by the energy of springs: its closed forms, and that what uses less than 1 is a convex set."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

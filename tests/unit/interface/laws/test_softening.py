@@ -1,7 +1,5 @@
 """Cohesive laws bond by bond: published numbers, exact energies of teeth, closed forms of the branches."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

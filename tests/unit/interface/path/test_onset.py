@@ -1,7 +1,5 @@
 """The factor at which tractions t0 + f t1 break a bond: the utilisation is 1 there, and less before."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

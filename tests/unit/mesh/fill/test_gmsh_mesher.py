@@ -1,7 +1,5 @@
 """Coarse meshes by gmsh against closed forms: area, Euler characteristic, periodicity, circles, angles."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """Nodes on the lines of a cell: those of a line do not depend on the lines that are looked at with it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pickle import dumps, loads
 

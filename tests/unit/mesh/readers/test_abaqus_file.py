@@ -1,7 +1,5 @@
 """Input files of Abaqus: what they may have, and their faults."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Files of meshes that are damaged or made to harm: a mesh or faults in one line each come back, nothing else."""
 
-from __future__ import annotations
-
 import os
 import resource
 import signal

@@ -1,7 +1,5 @@
 """The reader of .msh files: every form that gmsh writes, names, faults."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A user's mesh: every fault is named, and good meshes come back as they are."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

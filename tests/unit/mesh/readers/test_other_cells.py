@@ -1,7 +1,5 @@
 """Cells that are no rectangle, or have a hole at a corner: messages name the remedy."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Quadrilaterals cut in triangles: one diagonal everywhere couples stretch and shear, alternate ones hardly."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from mpi4py import MPI

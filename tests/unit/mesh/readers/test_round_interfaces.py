@@ -1,7 +1,5 @@
 """Elliptic fibres in meshes of straight edges: found wherever they lie, and followed by refinement."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from support.users_meshes import fibre_area, polar_cell

@@ -1,7 +1,5 @@
 """Meshes as other programs write them, with names that are no phases: [cell.phases] is all that a case needs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

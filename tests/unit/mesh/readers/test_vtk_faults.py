@@ -1,7 +1,5 @@
 """Faulty and hostile files of VTK and Medit: each has its line."""
 
-from __future__ import annotations
-
 import base64
 import lzma
 import zlib

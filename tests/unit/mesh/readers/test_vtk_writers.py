@@ -1,7 +1,5 @@
 """Files as VTK's own writers make them: text, base64 and raw, compressed or not, in both byte orders, legacy files."""
 
-from __future__ import annotations
-
 import re
 from itertools import product
 

@@ -1,7 +1,5 @@
 """Numbers of triangles, estimated before a cell of ellipses is meshed."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.special import ellipe

@@ -1,7 +1,5 @@
 """Edge lengths that grow from sources."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

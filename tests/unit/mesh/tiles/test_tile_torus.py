@@ -1,7 +1,5 @@
 """The torus of tiles against that of the whole mesh, which has the same triangles in the same order."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Cells cut into tiles: meshes that join up, by the laws of the torus; where their borders run; faults."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import gmsh

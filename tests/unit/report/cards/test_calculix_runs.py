@@ -1,7 +1,5 @@
 """Cards in CalculiX: a cube of one element, under six unit stresses and warmer, has the constants of the result."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Cards read back by readers of their own: the material of the result, turned to the axes of a card."""
 
-from __future__ import annotations
-
 import csv
 import io
 

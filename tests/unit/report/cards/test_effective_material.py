@@ -1,7 +1,5 @@
 """Results that make a material, and those that are refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from support.effective_results import BORON_ALUMINIUM, COSINES, DISTINCT, changed, document, turned_stiffness

@@ -1,7 +1,5 @@
 """`feti-homog export`: from a folder to a card, and what goes wrong."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

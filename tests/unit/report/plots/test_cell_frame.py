@@ -1,7 +1,5 @@
 """Pictures of narrow and flat cells and of long names: colour bars that can be read, and words that are whole."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Displacements in pictures: the translation that is drawn, and the scale at which no triangle turns over."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

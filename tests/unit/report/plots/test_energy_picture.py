@@ -1,7 +1,5 @@
 """The stack of energies along a path, in energy.png and on the page."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The picture of an envelope: what is drawn, and what is not."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Text of pictures: legends, scales, numbers of points."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The picture of sensitivities, a heat map."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from feti_homog.report.plots import response_curves

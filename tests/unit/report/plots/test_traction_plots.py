@@ -1,7 +1,5 @@
 """Fibre numbers in pictures, and places of interface nodes along their fibres."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

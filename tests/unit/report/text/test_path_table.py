@@ -1,7 +1,5 @@
 """The line of a peak: what each of its numbers is."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """The printed tables of points: those of an envelope and of an angle."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

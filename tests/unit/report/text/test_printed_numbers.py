@@ -1,7 +1,5 @@
 """Numbers of printed tables against those that follow from the stiffness, the points of a path and the phases alone."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 

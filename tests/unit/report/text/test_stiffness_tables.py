@@ -1,7 +1,5 @@
 """Tables of constants in space have all that is computed, and nothing else."""
 
-from __future__ import annotations
-
 import pytest
 
 from feti_homog.report.text.stiffness_tables import constants

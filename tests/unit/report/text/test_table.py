@@ -1,7 +1,5 @@
 """Tables as HTML: the decimals of text, and errors however small."""
 
-from __future__ import annotations
-
 from feti_homog.report.text.stiffness_tables import moduli, stiffnesses
 from feti_homog.report.text.tables import Column, Table
 

@@ -1,7 +1,5 @@
 """Faulty fit files: a line each, with its section and key."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Least squares on closed models: estimates, intervals, and what the data do not determine."""
 
-from __future__ import annotations
-
 from math import factorial
 
 import numpy as np

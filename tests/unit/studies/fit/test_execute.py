@@ -1,7 +1,5 @@
 """Evaluations of a fit of closed forms: weights of the data, and differences of cases within the bounds."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Faults and remarks of a fit: unknowns that measured values hardly determine, and bounds far from these."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 

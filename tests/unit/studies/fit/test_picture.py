@@ -1,7 +1,5 @@
 """fit.png: residuals beside the band of 95 %, measured and computed values in their order, curves with deviations."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from matplotlib.figure import Figure

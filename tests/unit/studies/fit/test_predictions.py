@@ -1,7 +1,5 @@
 """Values of results in place of measured ones: none where nothing happened, derivatives where a law is exact."""
 
-from __future__ import annotations
-
 import copy
 
 import pytest

@@ -1,7 +1,5 @@
 """The table of a study of scatter: every number in its column, and results with their units."""
 
-from __future__ import annotations
-
 import re
 
 from feti_homog.studies.uncertainty import text

@@ -1,7 +1,5 @@
 """Statistics over realisations, and the tables and pictures of a sweep."""
 
-from __future__ import annotations
-
 import csv
 import math
 

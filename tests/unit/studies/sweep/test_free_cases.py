@@ -1,7 +1,5 @@
 """Cases of a sweep that several groups of ranks share."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 from mpi4py import MPI

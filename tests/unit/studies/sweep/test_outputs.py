@@ -1,7 +1,5 @@
 """Columns of a sweep's table: those of a state under a load and of an envelope."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Cases of a table [sweep], and the lines about faulty tables."""
 
-from __future__ import annotations
-
 import tomllib
 from itertools import pairwise
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Locks between processes, and files that are written whole or not at all."""
 
-from __future__ import annotations
-
 import csv
 import subprocess
 import sys

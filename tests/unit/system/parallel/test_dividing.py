@@ -1,7 +1,5 @@
 """Loads divided among ranks; ranges of numbers."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from feti_homog.system.parallel.dividing import balanced, even, ranges

@@ -1,7 +1,5 @@
 """Ends of jobs in which ranks raise, together or alone."""
 
-from __future__ import annotations
-
 import pytest
 
 PROGRAM = """

@@ -1,7 +1,5 @@
 """Where mpi4py, petsc4py or h5py is missing or does not fit, a line for each gives the remedy."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Splitting the command line and naming mistyped options."""
 
-from __future__ import annotations
-
 import pytest
 
 from feti_homog.feti import solver_plan, thresholds

@@ -1,7 +1,5 @@
 """Paths that can be opened for writing are accepted, others refused, as opening them shows."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

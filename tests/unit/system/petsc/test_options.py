@@ -1,7 +1,5 @@
 """Options of a case below those of the command line, and both as they were afterwards."""
 
-from __future__ import annotations
-
 import pytest
 from petsc4py import PETSc
 

@@ -1,7 +1,5 @@
 """Settings of a process, and libraries that are optional."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A lock whose file is there only while it is held excludes others, whoever removes the file when."""
 
-from __future__ import annotations
-
 import os
 import threading
 

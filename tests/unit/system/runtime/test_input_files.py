@@ -1,7 +1,5 @@
 """Files that never end, wait for a writer or are too long are refused; nothing of them is kept."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

@@ -1,7 +1,5 @@
 """Files on which a library crashes, or does not come to an end, are reported in one line."""
 
-from __future__ import annotations
-
 import os
 import signal
 

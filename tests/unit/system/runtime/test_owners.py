@@ -1,7 +1,5 @@
 """A process is recognised by its machine, its number and when it began."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

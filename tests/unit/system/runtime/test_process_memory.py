@@ -1,7 +1,5 @@
 """The peak of resident memory begins anew."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 
