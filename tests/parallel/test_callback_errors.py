@@ -5,12 +5,14 @@ import pytest
 from support.torn_cells import tear
 
 from feti_homog.errors import CaseError
-from feti_homog.feti.krylov import PrimalTest, ProjectedProblem
+from feti_homog.feti.krylov import PrimalTest
+from feti_homog.feti.operators.interface_operators import DualOperator
+from feti_homog.feti.operators.preconditioners import StiffnessScaled
 
 pytestmark = [pytest.mark.parallel, pytest.mark.quick]
 
 E11 = np.array([1.0, 0.0, 0.0])
-CALLBACKS = [(ProjectedProblem, "_product"), (ProjectedProblem, "_preconditioned"), (PrimalTest, "_judge")]
+CALLBACKS = [(DualOperator, "apply"), (StiffnessScaled, "apply"), (PrimalTest, "_judge")]
 
 
 @pytest.mark.parametrize("method", ["cg", "gmres"])

@@ -208,18 +208,17 @@ def test_a_tip_in_space_releases_what_its_break_does(comm):
         status = np.where(cell.debonded(None), OPEN, 0).astype(np.int8)
         bonds, loaded = BondState.without_memory(status), CoupledInterfaces(plane.interface, axial.interface)
         law = criterion_of(cell)
-        onset, tips = Onset.of(law, loaded, bonds), law.tips(loaded, bonds)
+        onset, here = Onset.of(law, loaded, bonds), law.in_state(loaded, bonds)
+        node = np.flatnonzero(here.number >= 0)
         energy, traction = cell_energy(plane, axial, strain, status)
         foretold = (
-            onset.utilisation(traction[tips.node], tips.node) ** 2
-            * law.fracture_toughness(traction[tips.node])
-            * tips.length
+            onset.utilisation(traction[node], node) ** 2 * law.fracture_toughness(traction[node]) * here.tips.length
         )
-        owned = [(rank, k) for rank, count in enumerate(comm.allgather(len(tips.node))) for k in range(count)]
+        owned = [(rank, k) for rank, count in enumerate(comm.allgather(len(node))) for k in range(count)]
         parallel_assert(comm, len(owned) >= 2)
         for rank, k in owned:
             broken = status.copy()
-            broken[tips.node[k : k + 1] if comm.rank == rank else []] = OPEN
+            broken[node[k : k + 1] if comm.rank == rank else []] = OPEN
             lost = energy - cell_energy(plane, axial, strain, broken)[0]
             parallel_assert(comm, comm.rank != rank or abs(foretold[k] / lost - 1) < 1e-8)
 

@@ -24,6 +24,7 @@ from feti_homog.interface.laws.strength import QuadraticStrength
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
 from feti_homog.mesh.refinement import ReferenceLattice
+from feti_homog.mesh.tiles import tile_filling
 from feti_homog.mesh.tiles.tiling import TilePolicy
 
 pytestmark = pytest.mark.parallel
@@ -152,7 +153,7 @@ def test_a_tile_that_one_rank_cannot_fill_ends_the_job_on_all(comm, monkeypatch)
         raise MeshError("[cell] gmsh cannot fill it")
 
     if comm.rank == comm.size - 1:
-        monkeypatch.setattr(tile_tearing, "fill", broken)
+        monkeypatch.setattr(tile_filling, "fill", broken)
     for mesh in (share_of, lambda case, comm: coarse_mesh(case, comm, SMALL)):
         with pytest.raises(MeshError, match="gmsh cannot fill it"):
             mesh(case_of(), comm)
