@@ -140,10 +140,10 @@ def launch(
     parser: argparse.ArgumentParser,
     argv: Sequence[str] | None = None,
 ) -> int:
-    """Run main(arguments, all ranks) as a program: its exit code, for `sys.exit`.
+    """Run `main(arguments, comm)` as a program; return its exit code for `sys.exit`.
 
-    PETSc starts with the options among `argv` (default: the process's) that have a single dash; `parser` reads the
-    others.  A FetiHomogError is printed once and gives its exit code; any other exception ends the job on all ranks.
+    PETSc reads the options in `argv` (default: the process's) with a single dash; `parser` reads the rest.  A
+    FetiHomogError is printed once and gives its exit code; any other exception ends the job on all ranks.
     """
 
     def command(words: Sequence[str], comm: Intracomm) -> int:

@@ -125,7 +125,7 @@ class AnalysisContext:
     def of(
         cls, cell: unit_cell.TornCell, progress: progress_bar.Progress, states: StateRecorder | None = None
     ) -> AnalysisContext:
-        """Make a cell's context, without checkpoint; by default without states."""
+        """Make a context without checkpoint; `states` = None records no states."""
         contact = cell.case.interface is not None and cell.case.interface.contact
         recorder = StateRecorder(cell, None, False, progress.say) if states is None else states
         checks, checkpoint = CheckRecorder(cell.solver.rtol), checkpoints.EventsInMemory(cell.comm, 0)

@@ -201,7 +201,7 @@ def _entry(
 
 def _goes_on(context: AnalysisContext, path: load_sections.LoadPath, point: path_points.Point, count: int) -> bool:
     """Return whether the path goes on after `count` points."""
-    if not point.state.converged:  # a state that does not hold decided on the next break
+    if not point.state.converged:  # an unconverged state chose the next break
         return False
     if count == path.max_events and point.load_factor < 1.0:
         context.checks.faults.append(

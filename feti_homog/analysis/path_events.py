@@ -81,7 +81,7 @@ def stored(
         "broken": np.nan if after.broken is None else after.broken,
         "stretched": after.stretched,
     }
-    distributed: checkpoints.Arrays = {"used": point.used} | _bonds_apart(after.bonds, "_after")
+    distributed: checkpoints.Arrays = {"used": point.used} | _bond_arrays(after.bonds, "_after")
     for suffix, interface, response, state in zip(
         SUFFIXES, cell.problems, responses, point.state.problems, strict=False
     ):
@@ -112,7 +112,7 @@ def restored(
     after = path_points.PathState(
         int(leg),
         position,
-        _bonds_together(event, "_after"),
+        _bond_state(event, "_after"),
         state.multipliers,
         Macroscopic(origin_strain, origin_stress),
         Macroscopic(strain, stress),
@@ -199,7 +199,7 @@ def _taken_apart(state: Equilibrium, kernel: int) -> tuple[dict[str, Any], check
         "asked": state.asked,
         "certificate": [state.certificate.get(law, np.nan) for law in KKT_LAWS],
     }
-    return numbers, {"lam": solution.lam, "jump": solution.jump} | _bonds_apart(state.bonds, "")
+    return numbers, {"lam": solution.lam, "jump": solution.jump} | _bond_arrays(state.bonds, "")
 
 
 def _put_together(event: checkpoints.Arrays, interface: contact_problem.ContactProblem, suffix: str) -> Equilibrium:
@@ -211,25 +211,25 @@ def _put_together(event: checkpoints.Arrays, interface: contact_problem.ContactP
     certificate = {law: error for law, error in errors if not np.isnan(error)}
     values, by_stress = event[f"load{suffix}"]
     load = Load(values, by_stress.astype(bool))
-    bonds = _bonds_together(event, suffix)
+    bonds = _bond_state(event, suffix)
     residual, C = float(event[f"residual{suffix}"]), interface.compliance(bonds)
     solution = DualSolution(strain, lam, jump, None if np.isnan(alpha).any() else alpha, last, reason, residual, C)
     asked = event[f"asked{suffix}"]
     return Equilibrium(load, bonds, solution, iterations, solves, free_motions, certificate, asked)
 
 
-def _bonds_apart(bonds: BondState, suffix: str) -> checkpoints.Arrays:
+def _bond_arrays(bonds: BondState, suffix: str) -> checkpoints.Arrays:
     """Return the bond state as distributed arrays with this suffix."""
     return {f"{name}{suffix}": values for name, values in vars(bonds).items() if values is not None}
 
 
-def _bonds_together(event: checkpoints.Arrays, suffix: str) -> BondState:
-    """Rebuild the bond state from the arrays that `_bonds_apart` made."""
+def _bond_state(event: checkpoints.Arrays, suffix: str) -> BondState:
+    """Rebuild the bond state from the arrays that `_bond_arrays` made."""
     return BondState(*(event.get(f"{field.name}{suffix}") for field in fields(BondState)))  # type: ignore[arg-type]
 
 
 class EventProgress:
-    """Lines about path events, and a progress bar, in a context.
+    """Context manager that prints path events and a progress bar.
 
     The first, the last and urgent lines are printed, other lines once a second at most; the bar on terminals alone.
     """

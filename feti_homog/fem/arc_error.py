@@ -119,7 +119,7 @@ def arc_energy(body: RecoveredStress, sides: ArcSides) -> Float:
 
 
 def _at(body: RecoveredStress, sides: ArcSides, place: float) -> Float:
-    """(f, m, k) recovered stresses at the place, from 0 to 1, on each side."""
+    """Return recovered stresses (f, m, k) at the fraction `place` of each side."""
     result = np.empty((len(sides.element), body.problem.strains, body.loads.shape[1]))
     for k in range(3):
         members = np.flatnonzero(sides.side == k)

@@ -156,7 +156,7 @@ class GroupedSum:
 
     @classmethod
     def of(cls, target: Int) -> GroupedSum:
-        """One sum for each value in `target`, an entry's place, in ascending order."""
+        """Group entries by `target`, the number of the sum that they join, ascending."""
         entries = np.argsort(target, axis=None, kind="stable")
         return cls(entries, np.unique(target.ravel()[entries], return_index=True)[1])
 

@@ -69,7 +69,7 @@ class RecoveredStress:
     def on(
         cls, mesh: FineMesh, L: Float, problem: Problem, u: Float, loads: Float, is_mixed: bool = False
     ) -> RecoveredStress:
-        """Recover the stress on a mesh, of which several may be joined; arguments as the attributes."""
+        """Make the stress recovery of one mesh; arguments as the attributes."""
         return cls(mesh.points, mesh.triangles, mesh.node_class, L, problem, u, loads, is_mixed)
 
     @property

@@ -1,6 +1,6 @@
 """PETSc contexts of the projected dual problem: shell matrix, shell preconditioner, convergence test.
 
-H is the preconditioner: M^-1, or H_0 of `coarse.adaptive.Balanced` with coarse displacements in equilibrium.
+H is the preconditioner: M^-1, or H_0 of `coarse.adaptive.Balanced`.
 
 A vector holds k multiplier vectors, the k values of a row side by side, so that load cases are solved together.
 Errors that the contexts raise are kept until PETSc has returned (`CallbackErrors`).

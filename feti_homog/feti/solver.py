@@ -223,7 +223,7 @@ class FetiSolver:
         return solution if solution.alpha is not None else self._jumps.completed(solution, self.d)
 
     def boundary_displacement(self, solution: DualSolution) -> Float:
-        """(boundary dofs,) u* of a solution, Eq. (34), which is of the present state or complete.  Collective."""
+        """Return u* (boundary dofs,), Eq. (34), of a complete solution or one in the present state.  Collective."""
         solution = self.completed(solution)
         assert solution.alpha is not None
         u = self._torn_displacement @ solution.strain - self.operator.displacement(solution.lam)
@@ -242,7 +242,7 @@ class FetiSolver:
     def destroy(self) -> None:
         """Free the Krylov methods and the coarse factor, after the last solve; collective.
 
-        Without this call the Krylov methods go with the solver, on each rank when it drops it.
+        Otherwise each rank frees its Krylov methods with the last reference to the solver.
         """
         self._destroy_krylov()
         self.natural.destroy()

@@ -125,9 +125,9 @@ def longest(ends: Float) -> float:
 def process_zone(case: Case) -> float | None:
     """Return the least process zone length E' G_Ic / sigma_c^2.
 
-    None unless bonds break by energy.  sigma_c = sqrt(2 k_n G_Ic), or a cohesive law's strength, in its shorter pure
-    mode.  E' is Young's modulus in the plane state, E / (1 - nu^2) in plane strain, along the most compliant axis in
-    all phases.
+    None unless bonds break by energy.  sigma_c = sqrt(2 k_n G_Ic); of cohesive laws G_Ic and sigma_c are toughness and
+    strength of the pure mode with the shorter zone.  E' is Young's modulus in the plane state, E / (1 - nu^2) in plane
+    strain, along the most compliant axis in all phases.
     """
     lengths = [1 / (2 * bond.normal_stiffness) for bond in case.interfaces if bond.toughness and bond.normal_stiffness]
     for bond in case.interfaces:

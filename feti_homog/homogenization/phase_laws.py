@@ -147,7 +147,7 @@ def strength_factors(case: Case, fibres: int) -> Float:
 class SectionValues:
     """Key values from [interface] sections `pair` (k,) at nodes (k,).
 
-    `factor` (k,), by each node's fibre, multiplies strengths, and squared toughnesses.
+    `factor` (k,) of the fibre at each node multiplies strengths, its square toughnesses.
     """
 
     bonds: Sequence[interface_section.InterfaceSection]

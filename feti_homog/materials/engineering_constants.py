@@ -162,7 +162,7 @@ def engineering_moduli(stiffness: ArrayLike) -> Moduli:
 def isotropic_part(stiffness: ArrayLike) -> tuple[float, float]:
     """Plane bulk modulus k and shear modulus mu for the isotropic stiffness nearest in the Frobenius norm.
 
-    k = (C11 + C22 + C12 + C21)/4, mu = (C11 + C22 - C12 - C21 + 4 C33)/8; both are the same in all axes.
+    k = (C11 + C22 + C12 + C21)/4, mu = (C11 + C22 - C12 - C21 + 4 C33)/8; rotating the axes changes neither.
     """
     c = np.asarray(stiffness, dtype=float)
     bulk = (c[0, 0] + c[1, 1] + c[0, 1] + c[1, 0]) / 4

@@ -128,7 +128,7 @@ class SubmeshesOfRank:
 def cut_for_ranks(
     torus: Torus, subdomain: Int, table: SubdomainTable, n_ranks: int, pinned: int
 ) -> Iterator[SubmeshesOfRank]:
-    """Yield the part of each rank in these triangles, which are in the subdomains `subdomain` (m,).
+    """Yield the submeshes of each rank; `subdomain` (m,) is the subdomain of each triangle.
 
     `pinned` is the key of the pinned class.
     """

@@ -64,7 +64,7 @@ class FibrePattern:
         return pi * fsum(self.radii * self.radii) / self.area
 
     @property
-    def nearest_side(self) -> Float:
+    def side_distance(self) -> Float:
         """(N,) distance from each centre to the window's sides; infinite in a periodic cell."""
         if self.periodic:
             return np.full(self.count, np.inf)

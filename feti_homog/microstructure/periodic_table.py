@@ -36,13 +36,13 @@ MOST_LISTED = 30  # moved fibres that are listed one by one
 def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> Arrangement:
     """Return a table's fibres, in row order, then its voids.
 
-    Periodic images are one, the first of them. In a window that is cut from something larger, fibres that overlap
-    across its border are moved apart.
+    Periodic images count as one fibre, the first row. In a cut window, fibres that overlap across its border are
+    moved apart.
 
-    A table that gives its cell's corner keeps it, if the sides avoid tangency with its discs and the corner
-    in no void (`in_voids`); a random cell's table gives that cell's mesh. Else all is shifted (`clear_shift`),
-    rounded and meshed in coordinate order, so that tables that differ by a shift, by the order of rows or
-    by units have one mesh. Outlines that are not round are rounded wherever they are.
+    The given corner of a cell stays if no side touches a disc and the corner is in no void (`in_voids`); so the
+    table of a random cell gives the mesh of that cell. Otherwise fibres are shifted (`clear_shift`), their
+    coordinates rounded and sorted: tables that differ by a shift, the order of rows or units have one mesh.
+    Coordinates of fibres that are not discs are always rounded.
 
     Raises:
         MeshError: rows lie outside, come twice, overlap or touch; a line for each fault.
@@ -239,7 +239,7 @@ def _contacts(table: FibreTable, kept: Int, outer: Outlines, size: Float, is_cut
 def _gaps(table: FibreTable, kept: Int, outer: Outlines, size: Float) -> tuple[Int, Int, Float, Float, Bool]:
     """Return the pairs of near fibres among the rows `kept` (k,).
 
-    Places in these, gaps, sums of radii, and whether they are across the border.
+    Returns (p,) indices into `kept` of both, gaps, sums of radii, and True across the border.
     """
     centres, radius = outer.centres, table.outer_radius[kept]
     first, second, vector = neighbours(centres, size, 2 * outer.longest.max() * (1 + LEAST_GAP))

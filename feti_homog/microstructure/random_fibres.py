@@ -91,7 +91,7 @@ def nearest_neighbours(pattern: FibrePattern, count: int = 3) -> NearestNeighbou
 def _weights(pattern: FibrePattern, distances: Float) -> Float:
     if pattern.periodic:
         return np.full(distances.shape, 1 / pattern.count)
-    counts = distances <= pattern.nearest_side[:, None]
+    counts = distances <= pattern.side_distance[:, None]
     d = np.where(counts, distances, 0.0)
     inner = (pattern.width - 2 * d) * (pattern.height - 2 * d)
     raw = np.where(counts & (inner > 0), 1 / np.where(inner > 0, inner, 1.0), 0.0)

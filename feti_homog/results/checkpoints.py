@@ -79,7 +79,7 @@ class EventsInMemory:
         Args:
             shared: numbers that are the same on all ranks.
             distributed: arrays, each with this rank's part.
-            light: the event is found again at once, and may be lost if the power fails.
+            light: the event is cheap to compute again; a power failure may lose it.
 
         Raises:
             FetiHomogError: the file cannot be written.

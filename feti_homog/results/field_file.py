@@ -178,7 +178,7 @@ class FieldFile:
 
 
 def _with_write_errors(path: Path, function: Callable[..., Any], *args: Any) -> Any:
-    """function(*args), its failures in words about `path`."""
+    """Return function(*args); write errors name `path`."""
     with atomic.write_errors(path):
         return function(*args)
 

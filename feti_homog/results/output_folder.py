@@ -72,8 +72,7 @@ def refuse_files_of_others(directory: Path) -> None:
     """Check that a run may write all its files to `directory`, and replace existing ones.  Call on one rank.
 
     Raises:
-        CaseError: a folder stands where a file is to be or the other way round, or a file has the name of a run's and
-            no run wrote it.
+        CaseError: a folder has the name of a file, a file the name of a folder, or no run wrote a file of that name.
     """
     if not directory.is_dir():
         return

@@ -128,9 +128,9 @@ def _mesh(grid: ET.Element, kind: dict[str, str], connectivity: Any, points: Any
 
 
 def _attributes(grid: ET.Element, file: h5py.File, state: str, arrays: Mapping[str, str], centre: str) -> None:
-    """Add the arrays of a state, each with its dataset."""
-    for name, place in arrays.items():
-        table = file[place.replace("/K/", f"/{state}/")]
+    """Add an attribute for each dataset of a state in `arrays`."""
+    for name, dataset in arrays.items():
+        table = file[dataset.replace("/K/", f"/{state}/")]
         kind = SHAPES[1 if table.ndim == 1 else table.shape[1]]
         ET.SubElement(grid, "Attribute", Name=name, AttributeType=kind, Center=centre).append(_table(table))
 

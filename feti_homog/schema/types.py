@@ -45,7 +45,7 @@ class ValueType:
 
 
 def _scatter(value: Any) -> str:
-    """Return which command takes a value with its scatter, {mean, std} or {mean, cv}; else empty."""
+    """Return a hint to `feti-homog uncertainty` for a value {mean, std} or {mean, cv}; else empty."""
     if isinstance(value, list):
         return next(filter(None, map(_scatter, value)), "")
     has_scatter = isinstance(value, dict) and set(value) in ({"mean", "std"}, {"mean", "cv"})

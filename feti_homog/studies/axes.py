@@ -172,7 +172,7 @@ def _spacing_fault(table: Mapping[str, Any], is_sampled: bool) -> str:
 
 
 def _axis(path: toml_files.TomlPath, value: Any) -> Axis:
-    """Return the axis of a list or a range without fault."""
+    """Return the sweep axis of a valid list or range."""
     if isinstance(value, list):
         return Axis(path, tuple(value))
     low, high, step, count = float(value["from"]), float(value["to"]), value.get("step"), value.get("count")

@@ -118,7 +118,7 @@ def _stored_entries(directory: Path) -> tuple[SweepCase, ...]:
 
 
 def _refuse_another(directory: Path, stored: Sequence[SweepCase], entries: Sequence[SweepCase]) -> None:
-    """Raise CaseError unless the stored cases are the first entries."""
+    """Raise CaseError unless `entries` begin with the stored cases."""
     reason = f"it has {len(stored)} cases, this file {len(entries)}" if len(stored) > len(entries) else ""
     differing = [(old, new) for old, new in zip(stored, entries, strict=False) if old != new]
     if differing:

@@ -1,7 +1,7 @@
-"""A fit: unknown constants by measured values; each evaluation is a sweep over its tests, in its own folder.
+"""Fit unknown constants to measured values; each evaluation is a sweep over its tests, in its own folder.
 
 DIR/evaluation-0001           as of a sweep: a case for each test
-DIR/differences-0001          cases at values beside an evaluation, where no derivative is exact
+DIR/differences-0001          cases for finite differences, where no derivative is exact
 DIR/fit.json, measured.csv, fit.png
 """
 
@@ -77,7 +77,7 @@ class Fit(Study):
         return slice(first, first + len(self.data_of(test)))
 
     def axes(self) -> str:
-        """Return a line on the axes that measured values may mistake for a ply's; empty without any."""
+        """Return a line on measured names that ply axes define differently; empty without any."""
         cases = self.first_cases().cases
         spatial = [datum for datum in self.data if voigt.PLANE_STATES[cases[datum.test].analysis.plane].is_spatial]
         line = engineering_constants.axes_line(name for datum in spatial for name in (datum.name, datum.strain_name))

@@ -140,7 +140,7 @@ def _check_bounds(findings: Findings, cell: DiscreteCell, bounds: Section, stiff
 
 
 def constants_of(C: Float, heat: Float | None) -> dict[str, float]:
-    """Map names to constants of a stiffness (3, 3) or (6, 6), and to expansions by a thermal stress (6,).
+    """Return constants by name from C (3, 3) or (6, 6), and expansions from the thermal stress `heat` (6,).
 
     From the strains under unit stresses: E_i, nu_ij = -eps_j / eps_i and eta_i = gamma_12 / eps_i under stress along i,
     G_ij.

@@ -129,7 +129,7 @@ def checks(
 ) -> tuple[Check, ...]:
     """List the laws with their limits for dual problems solved to `rtol`.
 
-    `mixed` is the largest lambda / mu of elements with a pressure, and the largest mu / mu of these elements.
+    mixed: largest lambda / mu of mixed elements; largest mu of all / least mu of mixed elements.
     """
     ratio, contrast = mixed[0] / LARGE_RATIO, mixed[1]
     lost, of_balance = max(1.0, ratio), max(1.0, min(ratio, contrast / LARGE_CONTRAST))

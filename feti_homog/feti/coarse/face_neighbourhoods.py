@@ -30,9 +30,9 @@ from feti_homog.typing import Bool, Float, Int
 def trace_space(
     submesh: Submesh, lattice: ReferenceLattice, problem: Problem, nodes: Int, min_dofs: int = DEFAULTS.min_trace_dofs
 ) -> csr_matrix:
-    """(cn, cm) P for n boundary nodes, sorted classes of the refined piece, with at least `min_dofs` columns if cn is.
+    """Return the prolongation P (cn, cm) to n boundary `nodes`, with cm >= min(cn, `min_dofs`).
 
-    Displacements vanish at ends of edges that are not among the nodes.
+    Nodes are sorted classes of the refined piece; edge ends missing from them have zero displacement.
     """
     vertices, inner, c = len(submesh.class_keys), lattice.intervals - 1, problem.components
     on_edge = nodes >= vertices

@@ -54,17 +54,17 @@ class JumpOperator:
 
     Attributes:
         comm: of all ranks.
-        problem: the displacements and the unit loads, which ranks without subdomains take from here.
+        problem: displacements and unit loads; ranks without subdomains need it.
         components: rows of a vector constraint.
         B: (local rows, local dofs) signed, rotated entries; a local row is one that a local dof takes part in.
         rows: global number of each local row.
         node_rows: first owned row and row count for each fine node that this rank owns.
         shared_dofs: number of displacements at nodes that subdomains share, on all ranks.
         nodes: the interface nodes that this rank owns.
-        outer_copies: local rows of interface nodes whose outer copy is on this rank, and these
-            copies, as `ConstraintLayout.outer_copies` has them.
-        copies: (local rows, 2) counts in the outer and the inner body where a row is between two bodies, else 0.
-        inside: (local rows,) the inner of these bodies, the fibre in general; else -1.
+        outer_copies: local rows of interface nodes whose outer copy is on this rank, and the copies, as
+            `ConstraintLayout.outer_copies`.
+        copies: (local rows, 2) node copies in the outer and the inner body of a row; 0 within a body.
+        inside: (local rows,) the inner body, usually the fibre; -1 within a body.
         owned: first global row of this rank and the one after its last.
         global_rows: number of rows on all ranks.
         shared: the vertices and edges that the rows belong to.

@@ -19,17 +19,16 @@ from feti_homog.typing import Array, Bool, Float, Int
 
 # Gauss points of one side of an element, on arcs that the mesh follows well.
 POINTS, WEIGHTS = roots_legendre(6)
-# (p + 1, points) parts that the nodes of a side of order p have of it: N_a, and halves of linear ones.
+# (p + 1, points) weights of the nodes of a side of order p: 1/2 if linear, N_a if quadratic.
 SHARES = {1: np.full((2, 6), 0.5), 2: np.stack([POINTS**2 - POINTS, 2 - 2 * POINTS**2, POINTS**2 + POINTS]) / 2}
 # Two sides at a node are folded onto each other if their normals add up to no more than this share of their lengths.
 FOLDED = 1e-9
 
 
 def along(ends: Float, turn: Float, place: Float) -> Float:
-    """(k, 2) dx / ds, turned or not, at places s (k,) in [0, 1] of edges, from its values at their ends (k, 2, 2).
+    """Return y = dx / ds or normals (k, 2) at `place` s (k,) in [0, 1], from their values at `ends` (k, 2, 2).
 
-    On the arc of an ellipse along which the parameter turns by `turn` (k,), it obeys y'' = -turn^2 y; where the edge is
-    straight, it is linear, for `turn` is 0.
+    On an arc of an ellipse whose parameter turns by `turn` (k,), y'' = -turn^2 y; on straight edges `turn` is 0.
     """
     sine = np.where(turn > 0, np.sin(turn), 1.0)
     of_start = np.where(turn > 0, np.sin((1 - place) * turn), 1 - place) / sine
@@ -38,16 +37,16 @@ def along(ends: Float, turn: Float, place: Float) -> Float:
 
 
 def side_lengths(ends: Float, turn: Float, low: Float, order: int, side: float) -> Float:
-    """(k, order + 1) node lengths on sides from places `low` (k,), with span `side`; arguments as in `along`."""
+    """Return tributary lengths (k, order + 1) from s = `low` (k,) to `low` + `side`; arguments as in `along`."""
     places = low[:, None] + side * (1 + POINTS) / 2
     speeds = [np.hypot(*along(ends, turn, place).T) for place in places.T]
     return np.asarray(np.stack(speeds, axis=1) * WEIGHTS @ SHARES[order].T * (side / 2))
 
 
 def breakable_pairs(submeshes: SubmeshesOfRank, table: submeshes.SubdomainTable, pairs: Int, sharers: Sharers) -> Int:
-    """(n,) the interface of the two bodies that meet there.
+    """Return the case interface (n,) between the two bodies of each shared entity.
 
-    -1 where it never parts, where a third body meets them, and where they do not meet along one line.
+    -1 where bonds never break, a third body meets them, or they meet along no line.
     """
     body, copies = table.body[sharers.sharer], sharers.copies
     outer, inner = body[sharers.pointer[:-1]], body[sharers.pointer[1:] - 1]

@@ -58,7 +58,7 @@ class BodyTies:
 
 
 class ReferenceCell:
-    """Gamma of one reference set.
+    """Response operator Gamma of the cell with the reference set A.
 
     Attributes:
         active: (owned rows,) 1 on A.

@@ -127,10 +127,10 @@ def is_direct(ksp: PETSc.KSP) -> bool:
 
 
 def solve_columns(ksp: PETSc.KSP, x: PETSc.Vec, b: PETSc.Vec, B: Float, one_by_one: int) -> Float:
-    """(own rows, k) of A^-1 B in the order of Fortran, for this rank's rows B (own rows, k).
+    """Return the rows (own rows, k) of A^-1 B on this rank, Fortran order, for its rows B (own rows, k).
 
-    `x` and `b` are work vectors. Up to so many columns, and iterative methods, one after the other. Collective where
-    the matrix is.
+    `x` and `b` are work vectors. Up to `one_by_one` columns, and all of iterative methods, are solved one by one.
+    Collective where the matrix is.
     """
     X = np.empty(B.shape, order="F")
     if B.shape[1] > one_by_one and is_direct(ksp):

@@ -24,9 +24,9 @@ from feti_homog.typing import Float
 
 
 class CoupledInterfaces:
-    """The cell's interfaces in its problems.
+    """Interfaces of a cell, which its plane and axial problems share.
 
-    Plane strains and stresses (n,) precede axial ones.
+    Strains and stresses (n,) have the plane components first, then the axial ones.
 
     Attributes:
         plane: plane problem, with contact.

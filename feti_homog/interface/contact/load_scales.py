@@ -96,7 +96,7 @@ class LoadScales:
 
     @cached_property
     def longest(self) -> Float:
-        """(k,) largest tributary length on each bond's interface.  Collective."""
+        """Return the largest tributary length (k,) around the inner body of each bond.  Collective."""
         return self.over_interface(self.solver.jump_operator.nodes.length)
 
     def bond_stress(self, loads: Float) -> Float:

@@ -207,7 +207,7 @@ class CoulombFaces(FaceSystem):
         return self._resisting(status, self.all_allowed(), load, start)
 
     def carries(self, status: Status, load: Prescribed, start: Float) -> bool:
-        """Return whether such a step exists; few pivots decide most cases."""
+        """Return whether an implicit step to `load` has admissible statuses; few pivots decide most cases."""
         search = StatusSearch(self, self.all_allowed(), load, start)
         result = search.by_pivots(self._known(status), SOLVES)
         if result is not None or search.slides_freely(self._known(status)):

@@ -129,7 +129,7 @@ class FaceSystem:
         return (self._turned(*rows) or self._system(*rows)).sign
 
     def _turned(self, free: Bool, slope: Float) -> status_system.FollowedStatuses | None:
-        """Return the followed response with these rows; None with free motions, or before it pays."""
+        """Return `FollowedStatuses` with these free rows; None with free motions, or before it pays."""
         if self._followed is None:
             if self._factored < FACTORIZATIONS:
                 return None

@@ -121,14 +121,14 @@ class BondLaw(ABC):
         return np.asarray(np.arctan2(shear, np.maximum(traction[:, 0], 0.0)))
 
     def first_factor(self, before: Float, direction: Float) -> Float | None:
-        """(p,) smallest f >= 0 at which tractions `before` + f `direction` (p, c) break, inf if none.
+        """Return the smallest f >= 0 (p,) at which `before` + f `direction` (p, c) breaks each bond; inf if none.
 
-        None without a formula.  `before` breaks nothing.
+        None without a closed form.  `before` must break no bond.
         """
         return None
 
     def crossing(self, before: Float, direction: Float, high: Float) -> Float:
-        """(p,) f at which `before` + f `direction` (p, c) break, by bisection of [0, `high`], doubled where needed."""
+        """Bisect [0, `high`] for f (p,) at which `before` + f `direction` (p, c) breaks; double `high` if needed."""
         low, high = np.zeros(len(high)), high.copy()
         for _ in range(BISECTIONS):
             below = self.share(before + high[:, None] * direction) < 1.0

@@ -55,7 +55,7 @@ class Leg(ABC):
 
     @abstractmethod
     def _go_to(self, share: float) -> None:
-        """Advance to a share of the leg in one step, with fixed bonds.  Collective."""
+        """Advance to fraction `share` of the leg in one step, with fixed bonds.  Collective."""
 
     def points(self) -> Iterator[path_points.Point]:
         """Yield the leg's points, up to a solve without convergence.  Collective."""

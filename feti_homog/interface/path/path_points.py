@@ -1,4 +1,4 @@
-"""Points of a load path, states from which it goes on, and breaks."""
+"""Load path points, states to restart from, and bond breaks."""
 
 from __future__ import annotations
 

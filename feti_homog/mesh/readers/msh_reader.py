@@ -198,7 +198,7 @@ def _lattice(plane: Float, triangles: Int32) -> list[str]:
 
 
 def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
-    """Give groups the phases that select one of their names, or else of their aliases.
+    """Rename each group to the phase that selects its name, or else its alias.
 
     Other groups keep their names. `debonded` selects curves.
 

@@ -150,7 +150,7 @@ class Loop:
 
 
 def _closed_loops(mesh: CoarseMesh, pairs: Int32, fewest: int) -> list[Loop]:
-    """Find interfaces that are simple closed curves with `fewest` edges or more, none on a side."""
+    """Find closed interfaces with `fewest` edges or more, none on a cell side."""
     if len(pairs) == 0:
         return []
     size = mesh.period

@@ -20,11 +20,11 @@ Source = tuple[Float, Float, Float]
 class SourcedSize:
     """The size h(x) = min(largest, min_k (h_k + g_k |x - x_k|)) at positions x on the torus.
 
-    A source k counts within the distance at which a length 0 that grows by MAX_GROWTH reaches the largest.
+    Source k acts within the distance `largest` / MAX_GROWTH.
 
     Attributes:
         largest: size anywhere.
-        least: no size is below it.
+        least: lower bound of h.
     """
 
     def __init__(self, sources: Sequence[Source], size: Float, largest: float, chunk: int = CHUNK) -> None:
@@ -33,13 +33,13 @@ class SourcedSize:
         self._size, self._bound, self._chunk = size, largest / MAX_GROWTH, chunk
         places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
         self._places = wrap(places, size)
-        # Where the tree finds no more, it gives the source behind the last: an infinite one.
+        # Where the tree finds no more sources, it returns their number: an infinite length.
         self._lengths, self._growths = np.append(lengths, np.inf), np.append(growths, MAX_GROWTH)
         self.least = min(largest, float(self._lengths.min()))
         self._tree = cKDTree(self._places, boxsize=size)
 
     def __call__(self, points: Float) -> Float:
-        """(n,) at points (n, 2)."""
+        """Return the edge lengths h (n,) at points (n, 2)."""
         wrapped, count, parts = wrap(points, self._size), min(NEAREST, len(self._places)), []
         for k in range(0, max(1, len(points)), self._chunk):
             some = wrapped[k : k + self._chunk]

@@ -190,7 +190,7 @@ class Regions:
 
 @dataclass(frozen=True)
 class NumberedTile:
-    """A tile with its node numbers (n,), and numbers (n,) of the nodes that stand for their classes."""
+    """A tile with its node numbers (n,), and node numbers (n,) that represent periodic classes."""
 
     nodes: Int
     classes: Int
@@ -203,7 +203,7 @@ class FilledTile:
 
     Attributes:
         number: among all tiles.
-        lines, filling: on its lines, and within.
+        lines, filling: numbered nodes on its lines; triangles and nodes within.
         first: number of its first node off the lines.
     """
 
@@ -219,7 +219,7 @@ class FilledTile:
 
 
 def tile_torus(regions: Regions, tiles: Sequence[FilledTile], all_nodes: int) -> tuple[Torus, Int]:
-    """Return the torus for the triangles in `tiles`, without voids, and the tile number (m,) of each.
+    """Return the torus of filled tiles without voids, and the tile number (m,) of each triangle.
 
     `all_nodes` counts the nodes in the cell.
     """

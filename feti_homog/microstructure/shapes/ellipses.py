@@ -148,10 +148,9 @@ class Ellipses(ConvexCurves):
 
 
 def gaps(first: Ellipses, second: Ellipses) -> tuple[Float, Float]:
-    """Return the gap (k,) between each of the first and of the second, and the direction (k,) in radians across it.
+    """Return gaps (k,) and their directions (k,), in radians, between paired ellipses.
 
-    Of convex bodies it is max_n (c_2 - c_1) . n - |F_1^T n| - |F_2^T n|: the distance where they are apart, else minus
-    the shortest way that parts them.
+    The gap is max_n (c_2 - c_1) . n - |F_1^T n| - |F_2^T n|: the distance, or minus the penetration depth.
     """
     vector = second.centres - first.centres
     one, other = first.squares, second.squares

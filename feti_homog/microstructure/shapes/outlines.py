@@ -127,9 +127,9 @@ class Shape(Protocol):
     """A shape that table rows may have, other than a disc.
 
     Attributes:
-        name: of several fibres with it.
+        name: plural name of the shape, as "ellipses".
         columns: columns that other shapes do not need.
-        sizes: columns with the lengths that are the largest; in place of the radius if that is not among them.
+        sizes: columns of the largest lengths; without "radius" they replace it.
         has_tips: whether its mesh may have nodes at debonded arc tips.
     """
 

@@ -109,7 +109,7 @@ def shade_triangles(axes: Axes, drawn: DrawnMesh, points: Array, values: Array, 
 def draw_segments(
     axes: Axes, segments: Array, colour: str, width: float, cap: Literal["butt", "round"] = "butt"
 ) -> None:
-    """Draw segments (e, 2, 2) as one path, which joins them without spots."""
+    """Draw segments (e, 2, 2) as one path, without darker joints."""
     path = Path2D(segments.reshape(-1, 2), [Path2D.MOVETO, Path2D.LINETO] * len(segments))
     lines = PathPatch(path, fill=False, edgecolor=colour, linewidth=width, capstyle=cap, snap=False)
     axes.add_artist(lines)

@@ -1,6 +1,6 @@
 """Constants in the axes of the material, and derivatives of constants, as tables.
 
-Axes 1, 2, 3 of the material, as data sheets and cards have them, are x3, along the fibres, x1, x2 of the cell.
+Material axes 1, 2, 3, as in data sheets and cards, are the cell axes x3 (the fibres), x1, x2.
 """
 
 from collections.abc import Mapping, Sequence

@@ -60,7 +60,7 @@ def value_and_error(value: float, error: float | None, form: str) -> tuple[str, 
 
 
 def with_errors(title: str, values: Mapping[str, float], errors: Mapping[str, float], abreast: int) -> Table:
-    """Return constants with mesh errors, `abreast` per line in text; in pairs ratios have six decimals."""
+    """Return a table of constants and mesh errors, `abreast` per line; ratios in pairs have six decimals."""
     rows = []
     for name, computed in values.items():
         form = ".6f" if abreast == PAIRS and name not in STRESS_MODULI else ".7g"

@@ -137,7 +137,7 @@ def almost_in_table(name: str) -> bool:
 
 
 def suggestion(name: str) -> str:
-    """Return the option of the table that a misspelt name is nearest to, or the prefixes, in words."""
+    """Return a hint: the closest option in the table, or all prefixes."""
     nearest = difflib.get_close_matches(name, TABLE, n=1)
     return f"did you mean -{nearest[0]}?" if nearest else f"prefixes: -{', -'.join(PREFIXES)}"
 
