@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from feti_homog.case import section_values as kinds
 from feti_homog.microstructure import phase_names
@@ -18,11 +18,22 @@ MOST_FIBRES = 100_000  # of a cell, and as many voids
 if TYPE_CHECKING:
     from feti_homog.microstructure import fibre_pattern, fibre_table
 
-CIRCULAR = ("square", "hexagonal", "random")
-TOUCHING = {"square": math.pi / 4, "hexagonal": math.pi / math.sqrt(12), "random": math.pi / math.sqrt(12)}
-"""Fibre fraction at which the fibres touch; of a random cell, that of the densest packing of circles."""
-FIBRES_OF = {"square": 1, "hexagonal": 2}
-"""Fibres of the lattices."""
+
+class Lattice(NamedTuple):
+    """Equal fibres in a cell of width 1: height, centres, and the fibre fraction at which fibres touch."""
+
+    height: float
+    centres: tuple[tuple[float, float], ...]
+    touching: float
+
+
+LATTICES = {
+    "square": Lattice(1.0, ((0.5, 0.5),), math.pi / 4),
+    "hexagonal": Lattice(math.sqrt(3), ((0.0, 0.0), (0.5, math.sqrt(3) / 2)), math.pi / (2 * math.sqrt(3))),
+}
+CIRCULAR = (*LATTICES, "random")
+TOUCHING = {name: lattice.touching for name, lattice in LATTICES.items()}
+TOUCHING["random"] = TOUCHING["hexagonal"]  # the densest packing of circles
 
 GEOMETRY = keys.Selector("cell", "geometry")
 ALL_CIRCULAR, RANDOM, TABLE = GEOMETRY.among(*CIRCULAR), GEOMETRY.among("random"), GEOMETRY.among("table")

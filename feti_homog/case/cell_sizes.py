@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case.cell_section import FIBRES_OF, MOST_FIBRES, Cell
+from feti_homog.case.cell_section import LATTICES, MOST_FIBRES, Cell
 from feti_homog.materials import laws, material_forms, voigt
 from feti_homog.microstructure import phase_names
 from feti_homog.schema import wording
@@ -112,14 +112,19 @@ def sized(
     return replace(cell, mesh_size=_coarsest(cell), refine=refinements[order], order=order)
 
 
+def fibres_and_height(cell: Cell) -> tuple[int, float]:
+    """Return the number of fibres and height / width of a lattice or a random cell."""
+    lattice = LATTICES.get(cell.geometry)
+    return (len(lattice.centres), lattice.height) if lattice else (sum(fibre_counts(cell).values()), 1.0)
+
+
 def _coarsest(cell: Cell) -> float:
     """mesh_size of the coarsest mesh: half the distance between as many fibres on a square lattice, in two digits."""
     if cell.table is not None:
         assert cell.table.width is not None and cell.table.height is not None
         fibres, height = len(cell.table.row), cell.table.height / cell.table.width
     else:
-        fibres = FIBRES_OF.get(cell.geometry) or sum(fibre_counts(cell).values())
-        height = sqrt(3.0) if cell.geometry == "hexagonal" else 1.0
+        fibres, height = fibres_and_height(cell)
     return min(LARGEST, float(f"{PITCH_SHARE * sqrt(height / fibres):.2g}"))
 
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.case import Case, material_sections
+from feti_homog.case import Case, cell_section, material_sections
 from feti_homog.fem import Problem, assembly, bubble, shape_functions
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
@@ -29,7 +29,6 @@ from feti_homog.materials import material_derivatives
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int32
 
-PATTERNS = ("square", "hexagonal")
 ON_CIRCLE = 1e-9  # of the radius
 IMAGES = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2)
 
@@ -222,7 +221,8 @@ def _spring_constants(case: Case) -> Iterator[tuple[str, float, tuple[list[tuple
 def _fractions(case: Case) -> Iterator[float]:
     """Yield the fibre fraction in patterns of equal, uncoated, bonded fibres."""
     cell = case.cell
-    if cell.geometry in PATTERNS and cell.coating is None and not case.interfaces and cell.fibre_fraction is not None:
+    is_bare = cell.geometry in cell_section.LATTICES and cell.coating is None and not case.interfaces
+    if is_bare and cell.fibre_fraction is not None:
         yield cell.fibre_fraction
 
 

@@ -16,9 +16,8 @@ JAMMED = 0.84
 def arrange(cell: cell_section.Cell) -> Arrangement:
     """Arrange fibres in a cell of width 1, with the fractions `cell.fractions` to rounding.
 
-    square: one disc in the middle of a 1 x 1 cell. hexagonal: 1 x sqrt(3), a disc in the middle and one at
-    the corner. random: discs in a 1 x 1 cell, see `random_arrangement`, with
-    `cell.match` see `matched_arrangement`. table: see `periodic_table.table_arrangement`.
+    Lattices stand in `LATTICES` of `cell_section`; random: discs in a 1 x 1 cell, see `random_arrangement`, with
+    `cell.match` see `matched_arrangement`; table: see `periodic_table.table_arrangement`.
 
     Raises:
         MeshError: discs touch, no arrangement is found, or the table is faulty.
@@ -29,9 +28,7 @@ def arrange(cell: cell_section.Cell) -> Arrangement:
         from feti_homog.microstructure import periodic_table
 
         return periodic_table.table_arrangement(cell.table, cell.window, cell.repair == "overlaps")
-    if cell.geometry == "square":
-        return _lattice(cell, 1.0, np.array([[0.5, 0.5]]), pi / 4)
-    return _lattice(cell, sqrt(3), np.array([[0.0, 0.0], [0.5, sqrt(3) / 2]]), pi / (2 * sqrt(3)))
+    return _lattice(cell, cell_section.LATTICES[cell.geometry])
 
 
 def listed_arrangement(cell: cell_section.Cell) -> Arrangement | None:
@@ -42,10 +39,10 @@ def listed_arrangement(cell: cell_section.Cell) -> Arrangement | None:
     return None if cell.table is None else arrange(cell)
 
 
-def _lattice(cell: cell_section.Cell, height: float, centres: Float, limit: float) -> Arrangement:
-    """Place equal discs at centres (N, 2) in a 1 x height cell; bare ones touch at the fraction `limit`."""
-    fraction = cell.fibre_fraction
-    limit /= (1 + (cell.coating or 0.0)) ** 2
+def _lattice(cell: cell_section.Cell, lattice: cell_section.Lattice) -> Arrangement:
+    """Place equal discs on a lattice."""
+    fraction, height, centres = cell.fibre_fraction, lattice.height, np.array(lattice.centres)
+    limit = lattice.touching / (1 + (cell.coating or 0.0)) ** 2
     assert fraction is not None
     if fraction >= limit:
         raise MeshError(

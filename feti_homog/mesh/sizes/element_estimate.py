@@ -56,8 +56,7 @@ class ElementEstimate:
             ovals = ellipses[~ellipses.are_round]
             length = math.fsum(ellipses.perimeters) if len(ovals) else 2 * math.pi * radius * listed.fibres
             return cls(cell, listed.fibres, radius, listed.height, length, ovals)
-        fibres = cell_section.FIBRES_OF.get(cell.geometry) or sum(cell_sizes.fibre_counts(cell).values())
-        height = math.sqrt(3.0) if cell.geometry == "hexagonal" else 1.0
+        fibres, height = cell_sizes.fibres_and_height(cell)
         radius = math.sqrt(math.fsum(cell.fractions.values()) * height / (math.pi * fibres))
         return cls(cell, fibres, radius, height, 2 * math.pi * radius * fibres, Ellipses.round(np.zeros((0, 3))))
 
@@ -74,7 +73,7 @@ class ElementEstimate:
         On both sides of interfaces with length P there are 2 P int dx / (A (h + g x)^2) = 2 P / (A g h) triangles.
         """
         cell = self.cell
-        irregular = 0 if cell.geometry in cell_section.FIBRES_OF else self.fibres
+        irregular = 0 if cell.geometry in cell_section.LATTICES else self.fibres
         count = self.height / (TRIANGLE_AREA * cell.mesh_size**2) + TRIANGLES_OF_A_FIBRE * irregular
         # Ends of long axes have the radius of curvature b^2 / a.
         short, long = np.sort(self.ovals.semi_axes, axis=1).T

@@ -11,7 +11,7 @@ import pytest
 from feti_homog.errors import CaseError
 from feti_homog.report import page
 from feti_homog.report.text.summary import answers, checks
-from feti_homog.results import result_json
+from feti_homog.results import output_folder, result_json
 
 CELL = {
     "width": 1.0, "height": 1.0, "elements": 32, "nodes": 30, "fractions": {"matrix": 0.75, "fibre": 0.25},
@@ -68,6 +68,12 @@ def envelope() -> dict[str, Any]:
     ]
     case = document("envelope")["case"] | {"envelope": {"plane": ["S22", "S12"]}}
     return document("envelope", case=case, envelope=[*rows, {"angle": 180}])
+
+
+def test_pictures_of_the_page_are_files_of_a_result() -> None:
+    """So that a run into a folder in use removes the pictures of the run before."""
+    names = {f"{name}.png" for name in page.PICTURES}
+    assert {name for name in names if not output_folder.RESULT_FILE.fullmatch(name)} == set()
 
 
 def test_the_table_of_an_envelope() -> None:
