@@ -21,13 +21,6 @@ RATIOS = ("nu_axial", "nu_transverse", "expansion_axial", "expansion_transverse"
 SECANTS = ("C11", "C33", "C44", "C66")  # of generalized plane strain where faces may touch: there are no constants
 COMMON_PANELS = ("C11", "C66")  # of generalized plane strain and plane states together
 MARKERS = ("o", "s", "^", "D", "v", "P")
-REALISATION_STYLE: dict[str, Any] = {"markersize": 3.5, "alpha": 0.4, "markeredgewidth": 0, "label": "realisations"}
-CONFIDENCE_STYLE: dict[str, Any] = {
-    "fmt": "none", "elinewidth": 1.2, "capsize": 2.5, "label": "95 % confidence of the mean",
-}  # fmt: skip
-MESH_ERROR_STYLE: dict[str, Any] = {
-    "fmt": "none", "elinewidth": 7.0, "alpha": 0.35, "zorder": 1, "label": "estimated error of the mesh",
-}  # fmt: skip
 LEGEND_HANDLE, LEGEND_CHARACTER = 0.7, 0.085  # inches of an entry: its line with the space around, a letter
 NAMES = {
     **{name: f"$C_{{{name[1:]}}}$" for name in ("C11", "C33", "C44", "C66")},
@@ -101,7 +94,8 @@ def _plot_series(axes: Axes, table: SweepTable, series: Series, name: str, style
     for x, point in zip(series.x, series.points, strict=True):
         rows = table.rows(point)
         if len(rows) > 1:
-            axes.plot([x] * len(rows), values[rows], marker, **REALISATION_STYLE, color=colour)
+            faint: dict[str, Any] = {"markersize": 3.5, "alpha": 0.4, "markeredgewidth": 0}
+            axes.plot([x] * len(rows), values[rows], marker, **faint, color=colour, label="realisations")
     pairs = [[bounds_of(each).get(name, (np.nan,) * 2) for each in table.results_of(point)] for point in series.points]
     band = np.array([np.mean(of_point, axis=0) for of_point in pairs])
     if np.isfinite(band).any():
@@ -109,9 +103,11 @@ def _plot_series(axes: Axes, table: SweepTable, series: Series, name: str, style
     mean, spread = statistics.mean[numbers], np.nan_to_num(statistics.ci95[numbers])
     axes.plot(series.x, mean, color=colour, marker=marker, markersize=4.5, linewidth=1.2, label=series.label or None)
     if spread.any():
-        axes.errorbar(series.x, mean, spread, ecolor=colour, **CONFIDENCE_STYLE)
+        label = "95 % confidence of the mean"
+        axes.errorbar(series.x, mean, spread, fmt="none", ecolor=colour, elinewidth=1.2, capsize=2.5, label=label)
     if (errors := table.statistics.get(f"{name}_mesh_error")) is not None:
-        axes.errorbar(series.x, mean, np.nan_to_num(errors.mean[numbers]), ecolor=colour, **MESH_ERROR_STYLE)
+        wide: dict[str, Any] = {"elinewidth": 7.0, "alpha": 0.35, "zorder": 1, "label": "estimated error of the mesh"}
+        axes.errorbar(series.x, mean, np.nan_to_num(errors.mean[numbers]), fmt="none", ecolor=colour, **wide)
 
 
 def _add_legend(figure: Any, panels: Sequence[Axes]) -> None:
