@@ -96,8 +96,8 @@ def _plot_series(axes: Axes, table: SweepTable, series: Series, name: str, style
         if len(rows) > 1:
             faint: dict[str, Any] = {"markersize": 3.5, "alpha": 0.4, "markeredgewidth": 0}
             axes.plot([x] * len(rows), values[rows], marker, **faint, color=colour, label="realisations")
-    pairs = [[bounds_of(each).get(name, (np.nan,) * 2) for each in table.results_of(point)] for point in series.points]
-    band = np.array([np.mean(of_point, axis=0) for of_point in pairs])
+    limits = [[bounds_of(result).get(name, (np.nan, np.nan)) for result in table.results_of(p)] for p in series.points]
+    band = np.array([np.mean(pairs, axis=0) for pairs in limits])
     if np.isfinite(band).any():
         axes.fill_between(series.x, *band.T, color="0.88", linewidth=0.0, zorder=0, label="bounds")
     mean, spread = statistics.mean[numbers], np.nan_to_num(statistics.ci95[numbers])
