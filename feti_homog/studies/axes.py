@@ -42,9 +42,8 @@ def read_points(table: Mapping[str, Any], faults: list[str]) -> tuple[list[Assig
     given_settings = {name: value for name, value in table.items() if name in names}
     settings = reader.read(sections.SweepSection, given_settings, sections.SWEEP) or sections.SweepSection()
     axes, lines = list[Axis](), reader.faults
-    for path, value in toml_files.leaves(
-        {name: value for name, value in table.items() if name not in names}, _is_value
-    ):
+    varied = {name: value for name, value in table.items() if name not in names}
+    for path, value in toml_files.leaves(varied, _is_value):
         if fault := _value_fault(path, value, "samples" in given_settings):
             lines.append(f"[{sections.SWEEP}] {wording.dotted_key(path)} = {wording.toml_value(value)}: {fault}")
         else:
@@ -63,9 +62,8 @@ def _axis_faults(axes: Sequence[Axis], settings: sections.SweepSection) -> list[
     """Faults between axes: nothing to sample, or a key twice."""
     faults = []
     if settings.samples is not None and all(axis.values for axis in axes):
-        faults.append(
-            f"[{sections.SWEEP}] samples = {settings.samples}: no key is to be sampled; expected a range {{from, to}}"
-        )
+        samples = f"[{sections.SWEEP}] samples = {settings.samples}"
+        faults.append(f"{samples}: no key is to be sampled; expected a range {{from, to}}")
     paths = [axis.path for axis in axes]
     repeated = [path for path in dict.fromkeys(paths) if paths.count(path) > 1]
     return faults + [f"[{sections.SWEEP}] {wording.dotted_key(path)}: given twice" for path in repeated]
@@ -79,11 +77,9 @@ def _count_faults(axes: Sequence[Axis], settings: sections.SweepSection) -> list
         listed = ", ".join(f"{length} of {names}" for names, length in lengths)
         faults.append(f'[{sections.SWEEP}] mode = "zip": expected as many values of each key; there are {listed}')
     cases = (prod(counts) if settings.mode == "grid" else max(counts, default=1)) * (settings.realisations or 1)
-    return faults + (
-        [f"[{sections.SWEEP}]: {cases} cases; expected at most {sections.MAX_CASES}"]
-        if cases > sections.MAX_CASES
-        else []
-    )
+    if cases > sections.MAX_CASES:
+        faults.append(f"[{sections.SWEEP}]: {cases} cases; expected at most {sections.MAX_CASES}")
+    return faults
 
 
 def _lengths(axes: Sequence[Axis], settings: sections.SweepSection) -> list[tuple[str, int]]:

@@ -64,15 +64,13 @@ def write(directory: Path, table: SweepTable) -> list[Path]:
         FetiHomogError: a file cannot be written.
     """
     rows = {"cases.csv": _case_rows(table), "statistics.csv": _statistics_rows(table)}
-    texts = {name: case_folders.csv_text(map(_cell, row) for row in table_rows) for name, table_rows in rows.items()}
+
+    def cell(value: Any) -> Any:  # nothing for None and NaN, JSON for lists and tables
+        is_nothing = value is None or (isinstance(value, float) and math.isnan(value))
+        return "" if is_nothing else json.dumps(value) if isinstance(value, list | dict) else value
+
+    texts = {name: case_folders.csv_text(map(cell, row) for row in table_rows) for name, table_rows in rows.items()}
     return [atomic.replace_text(directory / name, text) for name, text in texts.items()]
-
-
-def _cell(value: Any) -> Any:
-    """Return a value as a cell: nothing for None and NaN, JSON for lists and tables."""
-    if value is None or (isinstance(value, float) and math.isnan(value)):
-        return ""
-    return json.dumps(value) if isinstance(value, list | dict) else value
 
 
 def _case_rows(table: SweepTable) -> Iterator[list[Any]]:

@@ -36,53 +36,39 @@ def describe(case: Case, comm: MPI.Intracomm) -> str:
         part = tile_tearing.cut(case, lattice, comm, partition_policy.BY_COST)
         constraints = shared_entities.share_entities(comm, part.submeshes, part.table, part.pairs, lattice).constraints
         loads = comm.gather((len(part.submeshes.index), len(part.submeshes.member))) or []
-        options = factory.database_options()
-        return (
-            mpi_errors.on_root_only(comm, _described, case, part.summary, lattice, 2 * constraints, loads, options)
-            or ""
-        )
+        options, summary, multipliers = factory.database_options(), part.summary, 2 * constraints
 
+        def described() -> str:
+            cell, subdomains = case.cell, [count for count, _ in loads]
+            nodes = [coarse_triangles * lattice.intervals**2 // 2 for _, coarse_triangles in loads]
+            elements = summary.coarse_triangles * len(lattice.triangles)
+            plan = _plan(case, summary, multipliers, options, subdomains)
+            columns = multipliers if plan.preconditioner == "influence" else 0
+            unresolved = cell_remarks.warnings(case, summary.width, summary.interface_edge)
+            solver = plan.in_words if multipliers else "one factor of the whole cell: no multipliers, no iterations"
+            sizes = f"mesh_size = {cell.mesh_size:g}, refine = {cell.refine}, as asked for by accuracy"
+            lines = [
+                f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",
+                f"cell       {summary.width:g} x {summary.height:g}, phases {', '.join(summary.phases)}",
+                *([f"voids      {summary.voids}"] if summary.voids else []),
+                f"mesh       {summary.coarse_triangles} coarse triangles, {elements} "
+                f"elements of order {cell.order}, about {2 * sum(nodes)} degrees of freedom",
+                *([] if cell.accuracy is None else [f"sizes      {sizes}"]),
+                *_fibre_lines(case, summary),
+                f"tearing    {summary.bodies} bodies, {_subdomains(summary.subdomains)}, {multipliers} multipliers",
+                f"solver     {solver}",
+                *(
+                    f"rank {rank:<5} {_subdomains(count)}, about {2 * n} degrees of freedom"
+                    for rank, (count, n) in enumerate(zip(subdomains, nodes, strict=True))
+                ),
+                *_estimate_lines(case, summary, multipliers, nodes, subdomains, columns),
+                *(f"warning    {warning}" for warning in (*case.warnings(), *summary.warnings(), *unresolved)),
+                *(f"remark     {remark}" for remark in (*case.remarks(), *summary.remarks)),
+                "the case is valid",
+            ]
+            return "\n".join(lines)
 
-def _described(
-    case: Case,
-    summary: domain_partition.CellSummary,
-    lattice: ReferenceLattice,
-    multipliers: int,
-    loads: Sequence[tuple[int, int]],
-    options: solver_plan.SolverOptions,
-) -> str:
-    """Return the text for `describe`; `loads` has subdomains and coarse triangles of each rank."""
-    subdomains = [count for count, _ in loads]
-    nodes = [triangles * lattice.intervals**2 // 2 for _, triangles in loads]
-    elements = summary.coarse_triangles * len(lattice.triangles)
-    plan = _plan(case, summary, multipliers, options, subdomains)
-    columns = multipliers if plan.preconditioner == "influence" else 0
-    unresolved = cell_remarks.warnings(case, summary.width, summary.interface_edge)
-    solver = plan.in_words if multipliers else "one factor of the whole cell: no multipliers, no iterations"
-    lines = [
-        f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",
-        f"cell       {summary.width:g} x {summary.height:g}, phases {', '.join(summary.phases)}",
-        *([f"voids      {summary.voids}"] if summary.voids else []),
-        f"mesh       {summary.coarse_triangles} coarse triangles, {elements} "
-        f"elements of order {case.cell.order}, about {2 * sum(nodes)} degrees of freedom",
-        *(
-            [f"sizes      mesh_size = {case.cell.mesh_size:g}, refine = {case.cell.refine}, as asked for by accuracy"]
-            if case.cell.accuracy is not None
-            else []
-        ),
-        *_fibre_lines(case, summary),
-        f"tearing    {summary.bodies} bodies, {_subdomains(summary.subdomains)}, {multipliers} multipliers",
-        f"solver     {solver}",
-        *(
-            f"rank {rank:<5} {_subdomains(count)}, about {2 * n} degrees of freedom"
-            for rank, (count, n) in enumerate(zip(subdomains, nodes, strict=True))
-        ),
-        *_estimate_lines(case, summary, multipliers, nodes, subdomains, columns),
-        *(f"warning    {warning}" for warning in (*case.warnings(), *summary.warnings(), *unresolved)),
-        *(f"remark     {remark}" for remark in (*case.remarks(), *summary.remarks)),
-        "the case is valid",
-    ]
-    return "\n".join(lines)
+        return mpi_errors.on_root_only(comm, described) or ""
 
 
 def _estimate_lines(

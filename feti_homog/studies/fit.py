@@ -9,7 +9,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -95,20 +94,19 @@ class Fit(Study):
     def answer(self, evaluator: Evaluator) -> dict[str, Any]:
         if evaluator.comm.rank == 0 and not evaluator.quiet and (line := self.axes()):
             standard_streams.say(f"remark: {line}")
-        estimates = Evaluations(self, evaluator).estimate()
-        return mpi_errors.on_root(evaluator.comm, self._write, evaluator.directory, estimates)
+
+        def write(estimates: ParameterEstimates) -> dict[str, Any]:
+            from feti_homog.studies import pictures  # only a rank that draws loads Matplotlib
+
+            document = {"name": self.name, **fit_result.content(self.unknowns, self.data, estimates)}
+            atomic.replace_text(evaluator.directory / "measured.csv", fit_result.measured_csv(document))
+            pictures.draw_fit(evaluator.directory / "fit.png", document)
+            return document
+
+        return mpi_errors.on_root(evaluator.comm, write, Evaluations(self, evaluator).estimate())
 
     def text(self, document: Mapping[str, Any]) -> str:
         return fit_result.text(document)
-
-    def _write(self, directory: Path, estimates: ParameterEstimates) -> dict[str, Any]:
-        """Write measured.csv and fit.png, and return the content of fit.json.  On one rank."""
-        from feti_homog.studies import pictures  # only a rank that draws loads Matplotlib
-
-        document = {"name": self.name, **fit_result.content(self.unknowns, self.data, estimates)}
-        atomic.replace_text(directory / "measured.csv", fit_result.measured_csv(document))
-        pictures.draw_fit(directory / "fit.png", document)
-        return document
 
 
 def _set_output(document: dict[str, Any]) -> None:

@@ -34,10 +34,8 @@ def parse(values: Mapping[str, Any], folder: Path) -> Fit:
         reader.faults.append(f"[{sections.SWEEP}]: a fit has no sweep; expected [[{sections.TEST}]] for each test")
     assignments, data = reader.tests(measured, tests, {*unknowns})
     if unknowns and len(data) < len(unknowns) and not reader.faults:
-        reader.faults.append(
-            f"[{sections.UNKNOWN}]: {len(unknowns)} unknowns, {len(data)} measured values; "
-            "expected at least as many values"
-        )
+        counts = f"{len(unknowns)} unknowns, {len(data)} measured values"
+        reader.faults.append(f"[{sections.UNKNOWN}]: {counts}; expected at least as many values")
     if reader.faults:
         raise CaseError(*reader.faults)
     named = {".".join(path): unknown for path, unknown in unknowns.items()}

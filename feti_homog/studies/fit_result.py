@@ -74,13 +74,9 @@ def measured_csv(document: Mapping[str, Any]) -> str:
 def text(document: Mapping[str, Any]) -> str:
     """Return the tables of a fit for a terminal."""
     data = _labels(document["measured"])
-    heads = [
-        FIRST,
-        tables.Column("estimate"),
-        tables.Column("std"),
-        tables.Column(f"{document['confidence']:.0%} interval", 14),
-    ]
-    heads += [tables.Column("", 12), tables.Column("  determined by", -40)]
+    heads = [FIRST, tables.Column("estimate"), tables.Column("std")]
+    heads += [tables.Column(f"{document['confidence']:.0%} interval", 14), tables.Column("", 12)]
+    heads += [tables.Column("  determined by", -40)]
     rows = [_unknown_row(name, unknown, data) for name, unknown in document["unknowns"].items()]
     printed = [tables.Table("Unknowns", heads, rows, title_in_head=True)]
     rows = [[name, *map(_dash, row)] for name, row in zip(document["unknowns"], document["correlation"], strict=True)]

@@ -12,6 +12,7 @@ from feti_homog.system.runtime import records
 from feti_homog.typing import Document
 
 PHASES_OF_ONE_FIBRE = 2
+Column = result_json.DescribedColumn
 
 
 def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
@@ -132,49 +133,35 @@ def _at_point(place: str, point: Document) -> dict[str, float]:
 
 
 CASE_COLUMNS = (
-    result_json.DescribedColumn("case", "", "number of the case, from 1"),
-    result_json.DescribedColumn("folder", "", "folder of the case, below the folder of the sweep"),
-    result_json.DescribedColumn("point", "", "number of the point, from 1"),
-    result_json.DescribedColumn("realisation", "", "number of the realisation of the point, from 1"),
-    result_json.DescribedColumn("status", "", "`done`, `not converged`, `failed`, `damaged`, `running` or `waiting`"),
-    result_json.DescribedColumn("reason", "", "why there is no result"),
+    Column("case", "", "number of the case, from 1"),
+    Column("folder", "", "folder of the case, below the folder of the sweep"),
+    Column("point", "", "number of the point, from 1"),
+    Column("realisation", "", "number of the realisation of the point, from 1"),
+    Column("status", "", "`done`, `not converged`, `failed`, `damaged`, `running` or `waiting`"),
+    Column("reason", "", "why there is no result"),
 )
-INPUT_COLUMNS = (result_json.DescribedColumn("SECTION.KEY", "that of the key", "value of a key that varies"),)
+INPUT_COLUMNS = (Column("SECTION.KEY", "that of the key", "value of a key that varies"),)
 MODULI = {column.name for column in result_json.columns(engineering_constants.Moduli)}
 OUTPUT_COLUMNS = (
-    result_json.DescribedColumn("fraction_meshed", "", "share of all fibres in the meshed area"),
-    result_json.DescribedColumn(
-        "fraction_PHASE", "", "share of a phase in the meshed area, if there are more than matrix and fibre"
-    ),
-    result_json.DescribedColumn("porosity", "", "share of voids in the area of the cell, where there are some"),
-    result_json.DescribedColumn(
-        "match_distance", "", "of cells with `match`: how far they are from the table, in mean diameters"
-    ),
-    result_json.DescribedColumn("refine", "", "halvings of the mesh"),
-    result_json.DescribedColumn("elements", "", "triangles of the refined mesh"),
-    result_json.DescribedColumn(
-        "nodes", "", "nodes of the refined mesh, once for each body in each subdomain: depends on ranks"
-    ),
-    result_json.DescribedColumn("ranks", "", "MPI ranks"),
-    result_json.DescribedColumn("subdomains", "", "subdomains that the bodies are cut into"),
-    result_json.DescribedColumn("dofs", "", "degrees of freedom of all subdomains"),
-    result_json.DescribedColumn("multipliers", "", "Lagrange multipliers of the dual problem"),
-    result_json.DescribedColumn("iterations", "", "Krylov iterations of all states"),
-    result_json.DescribedColumn(
-        "Cij", records.STRESS, "entry of L^ef; beside generalized plane strain C66 is the shear modulus of all"
-    ),
-    result_json.DescribedColumn(
-        "Cij_compression", records.STRESS, "the same under minus the unit strains, with contact"
-    ),
-    result_json.DescribedColumn(
-        "thermal_Sij", f"{records.STRESS} per unit of temperature", "stress per unit of temperature at no strain"
-    ),
-    result_json.DescribedColumn(
-        "expansion_x1", "1 / temperature", "strain along x1 per unit of temperature at no stress; expansion_x2 too"
-    ),
-    result_json.DescribedColumn("expansion_STRAIN", "1 / temperature", "the same of a shear strain"),
-    result_json.DescribedColumn("anisotropy_normal", records.STRESS, "C11 - C22"),
-    result_json.DescribedColumn(
+    Column("fraction_meshed", "", "share of all fibres in the meshed area"),
+    Column("fraction_PHASE", "", "share of a phase in the meshed area, if there are more than matrix and fibre"),
+    Column("porosity", "", "share of voids in the area of the cell, where there are some"),
+    Column("match_distance", "", "of cells with `match`: how far they are from the table, in mean diameters"),
+    Column("refine", "", "halvings of the mesh"),
+    Column("elements", "", "triangles of the refined mesh"),
+    Column("nodes", "", "nodes of the refined mesh, once for each body in each subdomain: depends on ranks"),
+    Column("ranks", "", "MPI ranks"),
+    Column("subdomains", "", "subdomains that the bodies are cut into"),
+    Column("dofs", "", "degrees of freedom of all subdomains"),
+    Column("multipliers", "", "Lagrange multipliers of the dual problem"),
+    Column("iterations", "", "Krylov iterations of all states"),
+    Column("Cij", records.STRESS, "entry of L^ef; beside generalized plane strain C66 is the shear modulus of all"),
+    Column("Cij_compression", records.STRESS, "the same under minus the unit strains, with contact"),
+    Column("thermal_Sij", f"{records.STRESS} per unit of temperature", "stress per unit of temperature at no strain"),
+    Column("expansion_x1", "1 / temperature", "strain along x1 per unit of temperature at no stress; expansion_x2 too"),
+    Column("expansion_STRAIN", "1 / temperature", "the same of a shear strain"),
+    Column("anisotropy_normal", records.STRESS, "C11 - C22"),
+    Column(
         "anisotropy_shear", records.STRESS, "C33 - (C11 + C22 - 2 C12) / 4; with generalized plane strain C66 - ..."
     ),
     *result_json.columns(engineering_constants.Moduli),
@@ -184,76 +171,50 @@ OUTPUT_COLUMNS = (
         if column.name not in MODULI
     ),
     *result_json.columns(engineering_constants.TransverseIsotropy),
-    result_json.DescribedColumn(
-        "NAME_mesh_error", "that of NAME", "estimated error of an entry or constant by its mesh"
-    ),
-    result_json.DescribedColumn(
-        "energy_mesh_error", "", "estimated relative error of the strain energy, the largest under any strain"
-    ),
-    result_json.DescribedColumn("Cii_reuss", records.STRESS, "lower bound of Cii"),
-    result_json.DescribedColumn("Cii_voigt", records.STRESS, "upper bound of Cii"),
-    result_json.DescribedColumn("bulk_lower", records.STRESS, "lower bound of bulk, by Hashin and Shtrikman"),
-    result_json.DescribedColumn("bulk_upper", records.STRESS, "upper bound of bulk, by Hashin and Shtrikman"),
-    result_json.DescribedColumn("shear_lower", records.STRESS, "lower bound of shear, by Hashin and Shtrikman"),
-    result_json.DescribedColumn("shear_upper", records.STRESS, "upper bound of shear, by Hashin and Shtrikman"),
-    result_json.DescribedColumn("angle_ANGLE_Cij", records.STRESS, "entry of L^ef at an opening of that many degrees"),
-    result_json.DescribedColumn(
-        "angle_ANGLE_Sij", records.STRESS, "macroscopic stress at an opening of that many degrees"
-    ),
-    result_json.DescribedColumn(
-        "onset_load_factor", "", "load factor at which the first bond of a path breaks or softens"
-    ),
-    result_json.DescribedColumn(
-        "dissipated", records.STRESS, "energy lost to all breaks of a path, per area of the cell"
-    ),
-    result_json.DescribedColumn("work", records.STRESS, "work of the loads along a path, per area of the cell"),
-    result_json.DescribedColumn(
-        "onset_Sij", records.STRESS, "macroscopic stress where the first bond of a path breaks or softens"
-    ),
-    result_json.DescribedColumn(
-        "onset_STRAIN", "", "macroscopic strain where the first bond of a path breaks or softens"
-    ),
-    result_json.DescribedColumn(
+    Column("NAME_mesh_error", "that of NAME", "estimated error of an entry or constant by its mesh"),
+    Column("energy_mesh_error", "", "estimated relative error of the strain energy, the largest under any strain"),
+    Column("Cii_reuss", records.STRESS, "lower bound of Cii"),
+    Column("Cii_voigt", records.STRESS, "upper bound of Cii"),
+    Column("bulk_lower", records.STRESS, "lower bound of bulk, by Hashin and Shtrikman"),
+    Column("bulk_upper", records.STRESS, "upper bound of bulk, by Hashin and Shtrikman"),
+    Column("shear_lower", records.STRESS, "lower bound of shear, by Hashin and Shtrikman"),
+    Column("shear_upper", records.STRESS, "upper bound of shear, by Hashin and Shtrikman"),
+    Column("angle_ANGLE_Cij", records.STRESS, "entry of L^ef at an opening of that many degrees"),
+    Column("angle_ANGLE_Sij", records.STRESS, "macroscopic stress at an opening of that many degrees"),
+    Column("onset_load_factor", "", "load factor at which the first bond of a path breaks or softens"),
+    Column("dissipated", records.STRESS, "energy lost to all breaks of a path, per area of the cell"),
+    Column("work", records.STRESS, "work of the loads along a path, per area of the cell"),
+    Column("onset_Sij", records.STRESS, "macroscopic stress where the first bond of a path breaks or softens"),
+    Column("onset_STRAIN", "", "macroscopic strain where the first bond of a path breaks or softens"),
+    Column(
         "peak_Sij",
         records.STRESS,
         "largest in magnitude of a path, with its sign, also where it ends before it falls; of the leading strain as "
         "`peak` has it",
     ),
-    result_json.DescribedColumn(
-        "peak_STRAIN", "", "strain at the peak of the stress of the component whose strain leads"
-    ),
-    result_json.DescribedColumn("end_Sij", records.STRESS, "macroscopic stress at the end of a path"),
-    result_json.DescribedColumn("end_STRAIN", "", "macroscopic strain at the end of a path"),
-    result_json.DescribedColumn(
-        "end_STATUS", "", "interface nodes that are bonded, open or closed at the end of a path"
-    ),
-    result_json.DescribedColumn("load_STRAIN", "", "macroscopic strain under the load of analysis `load`"),
-    result_json.DescribedColumn("load_Sij", records.STRESS, "macroscopic stress under it"),
-    result_json.DescribedColumn("load_stored", records.STRESS, "elastic energy stored under it, per area of the cell"),
-    result_json.DescribedColumn("load_STATUS", "", "interface nodes that are bonded, open or closed under it"),
-    result_json.DescribedColumn(
-        "envelope_AXIS", "that of the axis", "load at onset along the first axis of an envelope"
-    ),
-    result_json.DescribedColumn(
-        "envelope_least_AXIS_AXIS", "that of the axes", "least load at onset of all directions"
-    ),
-    result_json.DescribedColumn(
-        "envelope_largest_AXIS_AXIS", "that of the axes", "largest, if every direction has one"
-    ),
-    result_json.DescribedColumn("check_LAW", "", "largest relative error of a law, as in result.json"),
-    result_json.DescribedColumn("seconds_STAGE", "s", "wall time of a stage, the largest over ranks"),
-    result_json.DescribedColumn("memory", "bytes", "peak resident memory, the largest over ranks"),
+    Column("peak_STRAIN", "", "strain at the peak of the stress of the component whose strain leads"),
+    Column("end_Sij", records.STRESS, "macroscopic stress at the end of a path"),
+    Column("end_STRAIN", "", "macroscopic strain at the end of a path"),
+    Column("end_STATUS", "", "interface nodes that are bonded, open or closed at the end of a path"),
+    Column("load_STRAIN", "", "macroscopic strain under the load of analysis `load`"),
+    Column("load_Sij", records.STRESS, "macroscopic stress under it"),
+    Column("load_stored", records.STRESS, "elastic energy stored under it, per area of the cell"),
+    Column("load_STATUS", "", "interface nodes that are bonded, open or closed under it"),
+    Column("envelope_AXIS", "that of the axis", "load at onset along the first axis of an envelope"),
+    Column("envelope_least_AXIS_AXIS", "that of the axes", "least load at onset of all directions"),
+    Column("envelope_largest_AXIS_AXIS", "that of the axes", "largest, if every direction has one"),
+    Column("check_LAW", "", "largest relative error of a law, as in result.json"),
+    Column("seconds_STAGE", "s", "wall time of a stage, the largest over ranks"),
+    Column("memory", "bytes", "peak resident memory, the largest over ranks"),
 )
 COLUMNS = (*CASE_COLUMNS, *INPUT_COLUMNS, *OUTPUT_COLUMNS)
 STATISTICS_COLUMNS = (
-    result_json.DescribedColumn("point", "", "number of the point, from 1"),
+    Column("point", "", "number of the point, from 1"),
     *INPUT_COLUMNS,
-    result_json.DescribedColumn("output", "", "name of a column of cases.csv"),
-    result_json.DescribedColumn("unit", "", "its unit"),
-    result_json.DescribedColumn("count", "", "finished realisations of the point that have it"),
-    result_json.DescribedColumn("mean", "that of the output", "mean over them"),
-    result_json.DescribedColumn("std", "that of the output", "standard deviation, from two on"),
-    result_json.DescribedColumn(
-        "ci95", "that of the output", "half the width of the 95 % confidence interval of the mean"
-    ),
+    Column("output", "", "name of a column of cases.csv"),
+    Column("unit", "", "its unit"),
+    Column("count", "", "finished realisations of the point that have it"),
+    Column("mean", "that of the output", "mean over them"),
+    Column("std", "that of the output", "standard deviation, from two on"),
+    Column("ci95", "that of the output", "half the width of the 95 % confidence interval of the mean"),
 )

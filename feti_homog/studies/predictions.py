@@ -69,10 +69,8 @@ def _values(document: path_curves.Document) -> dict[str, float]:
     if document["case"]["analysis"]["type"] == "stiffness":
         thermal = document.get("thermal_stress")
         heat = None if thermal is None else np.array(thermal)
-        return {
-            k: float(v)
-            for k, v in engineering_constants.constants(np.array(document["effective_stiffness"]), heat).items()
-        }
+        constants = engineering_constants.constants(np.array(document["effective_stiffness"]), heat)
+        return {name: float(value) for name, value in constants.items()}
     return outputs(document)
 
 
@@ -92,25 +90,23 @@ def predicted(document: path_curves.Document, data: Sequence[Datum]) -> Float:
 
 
 def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], name: str) -> Float | None:
-    """(m,) derivatives of the values by an unknown; None where the result does not give them."""
+    """(m,) derivatives of the values by an unknown; None where the result does not give them.
+
+    Constants have none by strengths, and by expansions in a plane.
+    """
     sections = path_curves.interface_sections(document)
     name = name.replace("interface.1.", "interface.") if len(sections) == 1 else name
-    if "sensitivities" in document:
-        return _of_stiffness(document["sensitivities"], data, name)
+    if (sensitivities := document.get("sensitivities")) is not None:
+        if name in sensitivities["parameters"]:
+            values = np.array(sensitivities["derivatives"])[:, sensitivities["parameters"].index(name)]
+            column = dict(zip(sensitivities["constants"], values, strict=True))
+            return np.array([column[datum.name] for datum in data])
+        section, idle = name.partition(".")[0], ("strength", "toughness")
+        is_idle = ".expansion" in name if section == "material" else section == "interface" and name.endswith(idle)
+        return np.zeros(len(data)) if is_idle else None
     key = name.removeprefix("interface.")
     exponent = _exponent(document, sections[0], key) if name != key and len(sections) == 1 else None
     return None if exponent is None else _by_scaling(document, data, exponent / float(sections[0][key]))
-
-
-def _of_stiffness(sensitivities: path_curves.Document, data: Sequence[Datum], name: str) -> Float | None:
-    """Return derivatives of constants: zero by strengths, and by expansions in a plane; None by other unknowns."""
-    if name in sensitivities["parameters"]:
-        values = np.array(sensitivities["derivatives"])[:, sensitivities["parameters"].index(name)]
-        column = dict(zip(sensitivities["constants"], values, strict=True))
-        return np.array([column[datum.name] for datum in data])
-    section, idle = name.partition(".")[0], ("strength", "toughness")
-    is_idle = ".expansion" in name if section == "material" else section == "interface" and name.endswith(idle)
-    return np.zeros(len(data)) if is_idle else None
 
 
 def _exponent(document: path_curves.Document, section: Mapping[str, Any], key: str) -> float | None:

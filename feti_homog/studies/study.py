@@ -118,36 +118,31 @@ class Study(ABC):
         case_runs.check_groups(comm, ranks_per_case)
         mpi_errors.on_root(comm, output_folder.usable, directory)
         head = {"version": __version__, "digest": mpi_errors.on_root(comm, self.digest)}
+        path = directory / self.FILE
+
+        def begin() -> None:  # the document has the study's digest from the start
+            if is_new := not path.exists():
+                with atomic.write_errors(directory):
+                    case_folders.refuse_files_of_others(directory, self.ENTRIES, self.KIND)
+            else:
+                try:
+                    stored = result_json.loads(input_files.read(path).decode("utf-8"))
+                except (OSError, ValueError) as error:
+                    raise CaseError(f"{path} is no readable {self.KIND}: {error}; move it away") from error
+                if stored.get("digest") != head["digest"]:
+                    raise CaseError(f"--out {directory} holds another {self.KIND}; choose another folder")
+            atomic.remove_unfinished(directory, self.ENTRIES)
+            if is_new:
+                atomic.replace_text(path, result_json.dumps({**head, "status": "running"}))
+
         with output_folder.held(
             directory, comm, lambda line: standard_streams.complain(line) if comm.rank == 0 else None
         ):
-            mpi_errors.on_root(comm, self._begin, directory, head)
+            mpi_errors.on_root(comm, begin)
             document = head | self.answer(Evaluator(directory, comm, ranks_per_case, retry, quiet))
-            mpi_errors.on_root_only(comm, atomic.replace_text, directory / self.FILE, result_json.dumps(document))
+            mpi_errors.on_root_only(comm, atomic.replace_text, path, result_json.dumps(document))
         if comm.rank == 0 and not quiet:
             standard_streams.say(self.text(document))
         if document.get("faults"):
             raise ConvergenceError(*document["faults"])
         return document
-
-    def _begin(self, directory: Path, head: Mapping[str, Any]) -> None:
-        """Write the study's document with its digest, unless it is there.  On one rank.
-
-        Raises:
-            CaseError: the folder has another study, or foreign files under this study's names.
-            FetiHomogError: the document cannot be written.
-        """
-        path = directory / self.FILE
-        if is_new := not path.exists():
-            with atomic.write_errors(directory):
-                case_folders.refuse_files_of_others(directory, self.ENTRIES, self.KIND)
-        else:
-            try:
-                stored = result_json.loads(input_files.read(path).decode("utf-8"))
-            except (OSError, ValueError) as error:
-                raise CaseError(f"{path} is no readable {self.KIND}: {error}; move it away") from error
-            if stored.get("digest") != head["digest"]:
-                raise CaseError(f"--out {directory} holds another {self.KIND}; choose another folder")
-        atomic.remove_unfinished(directory, self.ENTRIES)
-        if is_new:
-            atomic.replace_text(path, result_json.dumps({**head, "status": "running"}))

@@ -71,21 +71,21 @@ class ScatterStudy(Study):
     def answer(self, evaluator: Evaluator) -> dict[str, Any]:
         comm = evaluator.comm
         means = evaluator.results("means", mpi_errors.on_root(comm, self.first_cases))
-        inexact = mpi_errors.on_root(comm, self._inexact, means)
+
+        def without_derivatives() -> list[str]:
+            data = _data(means)
+            return [
+                name
+                for name in self.uncertainty.std
+                if any(exact_derivatives(document, data, name) is None for document in means)
+            ]
+
+        inexact = mpi_errors.on_root(comm, without_derivatives)
         ends = evaluator.results("differences", mpi_errors.on_root(comm, self.differing, inexact)) if inexact else []
         return mpi_errors.on_root(comm, self._content, means, inexact, ends)
 
     def text(self, document: Mapping[str, Any]) -> str:
         return text(document)
-
-    def _inexact(self, means: Documents) -> list[str]:
-        """Return the uncertain numbers by which some result has no exact derivative."""
-        data = _data(means)
-        return [
-            name
-            for name in self.uncertainty.std
-            if any(exact_derivatives(document, data, name) is None for document in means)
-        ]
 
     def _content(self, means: Documents, inexact: Sequence[str], ends: Documents) -> dict[str, Any]:
         """Return the content of uncertainty.json behind its digest."""
@@ -165,11 +165,8 @@ def is_study(values: Mapping[str, Any]) -> bool:
 def _realisations(table: object, faults: list[str]) -> int | None:
     """Return the realisations in a section [sweep], which may have nothing else."""
     if not isinstance(table, dict):
-        faults += (
-            []
-            if table is None
-            else [f"{sections.SWEEP} = {wording.toml_value(table)}: expected a section [{sections.SWEEP}]"]
-        )
+        if table is not None:
+            faults.append(f"{sections.SWEEP} = {wording.toml_value(table)}: expected a section [{sections.SWEEP}]")
         return None
     points, settings = read_points(table, faults)
     if not faults and any(points):

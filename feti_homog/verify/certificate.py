@@ -16,7 +16,7 @@ from feti_homog.verify.check_path import check_envelope, check_path
 from feti_homog.verify.check_sensitivities import check_sensitivities
 from feti_homog.verify.check_state import check_state
 from feti_homog.verify.discrete_cell import DiscreteCell
-from feti_homog.verify.findings import Check, Finding, Findings, checks, unchecked
+from feti_homog.verify.findings import Finding, Findings, checks, unchecked
 from feti_homog.verify.path_energies import check_step_heat
 from feti_homog.verify.reading import COATING, altered, opened
 
@@ -82,7 +82,7 @@ def _verified(directory: Path) -> Certificate:
         raise CaseError(f"{directory}: its files do not belong together or are incomplete: {fault}") from error
 
 
-def checks_of(cell: DiscreteCell) -> tuple[Check, ...]:
+def checks_of(cell: DiscreteCell) -> tuple[Finding, ...]:
     """List the laws of a result with their limits."""
     case, rtol = cell.files.case, float(cell.files.document["solver"].hint("rtol"))
     return checks(rtol, case["cell"]["geometry"] == "mesh", COATING in case["material"], cell.elements.contrasts)

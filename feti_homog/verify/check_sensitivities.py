@@ -13,7 +13,7 @@ from feti_homog.verify.check_loads import NAMES, SPATIAL_ORDER
 from feti_homog.verify.constitutive_law import laws, mixed_phases
 from feti_homog.verify.discrete_cell import BONDED, CLOSED, DiscreteCell
 from feti_homog.verify.elements import Elements
-from feti_homog.verify.findings import STEP, Findings, relative
+from feti_homog.verify.findings import STEP, Findings, Section, relative
 from feti_homog.verify.reading import Mesh, State
 
 STIFFNESS_STEP = 1e-5  # relative
@@ -39,14 +39,19 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
     ratios = np.array([name.endswith(".poisson") for name in names]) & (values < 0.5)
     sizes = np.where(ratios, 0.5 - values, np.where(values == 0.0, 1.0, np.abs(values)))
     direction = sizes * np.resize(WEIGHTS, len(values))
-    cases = [_moved(cell, names, values + sign * STEP * direction) for sign in (1, -1)]
     states = list(cell.files.states())
+    fixed_status = "load" not in document and document["sensitivities"].get("at_fixed_status")
+    if fixed_status:
+        states = states[: len(states) // 2]  # the second half is under minus the unit loads
+    moved = [_moved(cell, names, values + sign * STEP * direction) for sign in (1, -1)]
+    above, below = (_energies(cell, states, case) for case in moved)
+    slope = (above - below) / (2 * STEP)
     if "load" in document:
-        _check_load(findings, cell, states[0], cases, direction)
-    elif document["sensitivities"].get("at_fixed_status"):
-        _check_secants(findings, cell, states, cases, direction)
+        _check_load(findings, cell, states, slope, direction)
+    elif fixed_status:
+        _check_secants(findings, cell, states, slope, direction)
     else:
-        _check_linear(findings, cell, states, cases, direction)
+        _check_linear(findings, cell.files.document, slope, direction)
 
 
 def _parameters(cell: DiscreteCell) -> Iterator[str]:
@@ -68,9 +73,7 @@ def _places(numbers: Float) -> list[str]:
     return [f".{k + 1}" for k in range(len(numbers))] if numbers.ndim else [""]
 
 
-def _check_secants(
-    findings: Findings, cell: DiscreteCell, states: list[State], cases: list[Case], direction: Float
-) -> None:
+def _check_secants(findings: Findings, cell: DiscreteCell, states: list[State], slope: Float, direction: Float) -> None:
     """Check derivatives of contact states' energies, which are stationary, too: the diagonal of the secants.
 
     Other derivatives need fields under other loads at the same status, which no file has; only values are checked.
@@ -81,17 +84,16 @@ def _check_secants(
     entries |= {f"thermal_S{k + 1}{k + 1}": heat for k, heat in enumerate(document.get("thermal_stress", ()))}
     for name, value in zip(data["constants"], data["constant_values"], strict=True):
         findings.compare("constants", value, entries.get(name, np.inf), abs(value) or TINY, name)
-    strains, _ = _in_order(states[: len(states) // 2])  # the second half is under minus the unit loads
-    for number, state in enumerate(strains, start=1):
+    diagonals = zip(np.diag(_energies(cell, states, cell.files.case)), np.diag(slope), strict=True)
+    for number, (energy, change) in enumerate(diagonals, start=1):
         k = data["constants"].index(name := f"C{number}{number}")
-        above, below, energy = (float(_energies(cell, [state], case)[0, 0]) for case in (*cases, cell.files.case))
         terms, value = np.array(data["derivatives"][k]) * direction, data["constant_values"][k]
         scale = max(float(np.abs(terms).max()), abs(value))
-        findings.compare("sensitivities", terms.sum(), (above - below) / (2 * STEP), scale, name)
+        findings.compare("sensitivities", terms.sum(), change, scale, name)
         findings.compare("constants", value, energy, max(abs(energy), TINY), name)
 
 
-def _check_load(findings: Findings, cell: DiscreteCell, state: State, cases: list[Case], direction: Float) -> None:
+def _check_load(findings: Findings, cell: DiscreteCell, states: list[State], slope: Float, direction: Float) -> None:
     """Check strains x and stresses s under one load, the stored energy, and the derivatives of all answers.
 
     With prescribed strains g and stresses f, d(x_g.s_g - x_f.s_f) / 2 is the energy derivative at fixed fields.
@@ -113,24 +115,19 @@ def _check_load(findings: Findings, cell: DiscreteCell, state: State, cases: lis
         findings.compare("constants", rows[name][0], value, size, name)
         change = conjugate / 2 * np.array(rows[name][1]) * direction
         terms, rest = terms + sign * change, rest - change
-    if state.temperature:
+    if states[0].temperature:
         data.leaves_open("derivatives")
         return
-    energy, above, below = (_energies(cell, [state], case)[0, 0] / 2 for case in (cell.files.case, *cases))
+    energy = _energies(cell, states, cell.files.case)[0, 0] / 2
     findings.compare("constants", rows["stored"][0], energy, max(abs(energy), TINY), "stored")
     scale = max(float(np.abs(terms).max()), float(np.abs(of_stored).max()), abs(energy))
-    off = [terms.sum() - (above - below) / (2 * STEP), rest.sum()]
+    off = [terms.sum() - slope[0, 0] / 2, rest.sum()]
     findings.record("sensitivities", relative(off, scale), lambda k: ("the load", "stored")[k])
 
 
-def _check_linear(
-    findings: Findings, cell: DiscreteCell, states: list[State], cases: list[Case], direction: Float
-) -> None:
+def _check_linear(findings: Findings, document: Section, slope: Float, direction: Float) -> None:
     """Check the derivatives of all constants in a linear cell."""
-    document, data = cell.files.document, cell.files.document["sensitivities"]
-    above, below = (_energies(cell, states, case) for case in cases)
-    slope = (above - below) / (2 * STEP)
-    C, heat = np.array(document["effective_stiffness"]), document.get("thermal_stress")
+    data, C, heat = document["sensitivities"], np.array(document["effective_stiffness"]), document.get("thermal_stress")
     heat = None if heat is None else np.array(heat)
     constants, n = constants_of(C, heat), len(C)
     step = STIFFNESS_STEP * np.abs(C).max() / max(float(np.abs(slope).max()), TINY)

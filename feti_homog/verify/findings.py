@@ -12,7 +12,7 @@ checks, min(1000 rtol, 1e-4).  `rtol` is written in the result, so 1e-4 is the m
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -42,48 +42,41 @@ Place = str | Callable[[int], str]
 
 
 @dataclass(frozen=True)
-class Check:
-    """A law with its description and largest admissible relative violation."""
+class Finding:
+    """A law with its largest admissible relative violation, its largest violation, and the place of this."""
 
     name: str
     description: str
     limit: float
-
-
-@dataclass(frozen=True)
-class Finding:
-    """Largest violation of a law and its place."""
-
-    check: Check
-    violation: float
-    where: str
+    violation: float = 0.0
+    where: str = ""
 
     @property
     def holds(self) -> bool:
         """Return True if the violation is within the limit; NaN is not."""
-        return self.violation <= self.check.limit
+        return self.violation <= self.limit
 
     def line(self) -> str:
         """Return the finding as a line of the certificate."""
         verdict = "holds" if self.holds else "BROKEN"
         where = f", at {self.where}" if self.where and self.violation > 0 else ""
-        numbers = f"{self.violation:9.1e} of {self.check.limit:7.1e}"
-        return f"{self.check.name:<13} {verdict:<7} {numbers}  {self.check.description}{where}"
+        numbers = f"{self.violation:9.1e} of {self.limit:7.1e}"
+        return f"{self.name:<13} {verdict:<7} {numbers}  {self.description}{where}"
 
     @property
     def document(self) -> Mapping[str, Any]:
         """The finding for JSON; an infinite violation is null."""
         violation = self.violation if np.isfinite(self.violation) else None
-        check = {"law": self.check.name, "words": self.check.description, "limit": self.check.limit}
-        return check | {"violation": violation, "where": self.where, "holds": self.holds}
+        law = {"law": self.name, "words": self.description, "limit": self.limit}
+        return law | {"violation": violation, "where": self.where, "holds": self.holds}
 
 
 class Findings:
     """Largest violation of each law so far."""
 
-    def __init__(self, checks: Iterable[Check]) -> None:
+    def __init__(self, checks: Iterable[Finding]) -> None:
         self._checks = {check.name: check for check in checks}
-        self._worst: dict[str, tuple[float, str]] = {}
+        self._worst: dict[str, Finding] = {}
 
     def record(self, law: str, violations: ArrayLike, where: Place = "") -> None:
         """Record relative violations, a number or one or several a row; `where` names the place of row i.
@@ -96,8 +89,9 @@ class Findings:
         values = np.where(np.isnan(values), np.inf, values).reshape(len(values), -1).max(axis=1)
         worst = int(np.argmax(values))
         value = float(values[worst])
-        if law not in self._worst or value > self._worst[law][0]:
-            self._worst[law] = value, where if isinstance(where, str) else where(worst)
+        if law not in self._worst or value > self._worst[law].violation:
+            place = where if isinstance(where, str) else where(worst)
+            self._worst[law] = replace(self._checks[law], violation=value, where=place)
 
     def compare(self, law: str, value: Any, expected: Any, scale: ArrayLike, where: Place) -> None:
         """Record |value - expected| / scale; infinite if their shapes differ."""
@@ -110,7 +104,7 @@ class Findings:
 
     def worst(self) -> tuple[Finding, ...]:
         """Return the findings of all laws that apply, in order."""
-        return tuple(Finding(check, *self._worst[name]) for name, check in self._checks.items() if name in self._worst)
+        return tuple(self._worst[name] for name in self._checks if name in self._worst)
 
 
 def relative(errors: ArrayLike, scale: ArrayLike) -> Float:
@@ -126,8 +120,8 @@ def solver_limit(rtol: float) -> float:
 
 def checks(
     rtol: float, users_mesh: bool, has_coatings: bool, mixed: tuple[float, float] = (0.0, 0.0)
-) -> tuple[Check, ...]:
-    """List the laws with their limits for dual problems solved to `rtol`.
+) -> tuple[Finding, ...]:
+    """List the laws with their limits, without violations, for dual problems solved to `rtol`.
 
     mixed: largest lambda / mu of mixed elements; largest mu of all / least mu of mixed elements.
     """
@@ -178,7 +172,7 @@ def checks(
         ("sensitivities", "constants change with those of the case as in the file, relative", max(STEP, solver)),
         ("bounds", "bounds follow from fractions and materials, and the stiffness is between them", sums),
     )
-    return tuple(Check(*row) for row in rows)
+    return tuple(Finding(*row) for row in rows)
 
 
 # Why laws leave numbers alone, by a part of their names; the first that fits.

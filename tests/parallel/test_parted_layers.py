@@ -112,7 +112,7 @@ def test_a_loss_at_parting_that_is_none_is_noticed(comm, shared_path, factor):
     held = None
     if comm.rank == 0:
         findings = verify(falsified(shared_path / "out", shared_path / "copy", edit)).findings
-        held = next(finding.holds for finding in findings if finding.check.name == "energy")
+        held = next(finding.holds for finding in findings if finding.name == "energy")
     parallel_assert(comm, comm.bcast(held) == (factor == 1.0))
 
 

@@ -14,7 +14,7 @@ MATRIX = ("material", "matrix")
 
 def broken(folder):
     """Return the laws that a result breaks."""
-    return {finding.check.name for finding in verify(folder).findings if not finding.holds}
+    return {finding.name for finding in verify(folder).findings if not finding.holds}
 
 
 def check_what_is_left(kind, certificate):

@@ -109,7 +109,7 @@ def test_every_rank_of_a_launcher_has_the_verdict_and_the_first_one_prints(resul
 def test_the_command_line_tells_every_law_and_ends_with_its_verdict(result, tmp_path, capsys):
     assert main(["verify", str(result)]) == 0
     lines = capsys.readouterr().out.splitlines()
-    laws = [finding.check.name for finding in verify(result).findings]
+    laws = [finding.name for finding in verify(result).findings]
     assert [line.split("  ")[0] for line in lines[2 : 2 + len(laws)]] == laws
     assert lines[2 + len(laws) : 4 + len(laws)] == ["every law holds", "not checked:"]
     assert main(["verify", str(result), "--json"]) == 0

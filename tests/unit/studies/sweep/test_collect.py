@@ -238,17 +238,22 @@ def test_stiffnesses_in_space_fill_columns_and_are_drawn(tmp_path):
     assert_drawn(tmp_path, table, ["moduli.png"])
 
 
-def test_bounds_in_space_enclose_each_other_and_what_is_between():
-    """At any fraction the tighter ones lie between Reuss and Voigt; all meet where there is one phase."""
-    documents = [spatial_document(c, 0.0) for c in (0.2, 0.6)]
-    bounds = pictures.moduli_bounds(collected({"cell.fibre_fraction": [0.2, 0.6]}, documents, [1, 2], [1, 1]))
-    assert bounds.tight == "Hill, Hashin" and bounds.fractions[0] == 0.0
-    for rows in bounds.rows.values():
-        assert (rows[1] >= rows[0] * (1 - 1e-12)).all() and np.ptp(rows[:, 0]) < 1e-9 * rows[0, 0]
-        if len(rows) == 4:
-            assert (rows[0] <= rows[2] * (1 + 1e-12)).all() and (rows[2] <= rows[3] * (1 + 1e-12)).all()
-            assert (rows[3] <= rows[1] * (1 + 1e-12)).all()
-    assert [len(rows) for rows in bounds.rows.values()] == [4, 2, 4, 4]
+def test_bands_are_the_mean_bounds_in_the_results():
+    documents = [spatial_document(c, shift) for shift in (0.0, 1.0) for c in (0.2, 0.4)]
+    for each, low in zip(documents, (1.0, 2.0, 3.0, 6.0), strict=True):
+        each["fibre_bounds"] = {"E_axial": [low, 2 * low], "nu_axial": None}
+    table = collected({"cell.fibre_fraction": [0.2, 0.4] * 2, "cell.seed": [0, 0, 1, 1]}, documents, [1, 2] * 2, [1, 2])
+    axes = pictures.moduli_figure(table).axes
+    bands = [[band for band in panel.collections if band.get_label() == "bounds"] for panel in axes]
+    assert [len(each) for each in bands[:4]] == [1, 0, 0, 0]
+    assert {*map(tuple, bands[0][0].get_paths()[0].vertices)} == {(0.2, 2.0), (0.2, 4.0), (0.4, 4.0), (0.4, 8.0)}
+    sides = {
+        "reuss": np.eye(3),
+        "voigt": 2 * np.eye(3),
+        "hashin_shtrikman": {"bulk": [1.25, 1.5], "shear": [0.5, 0.75]},
+    }
+    found = {"C11": (1.0, 2.0), "C33": (1.0, 2.0), "bulk": [1.25, 1.5], "shear": [0.5, 0.75]}
+    assert pictures.bounds_of({"bounds": sides}) == found and pictures.bounds_of({"bounds": None}) == {}
 
 
 def test_secants_in_space_are_drawn_without_bounds(tmp_path):
@@ -257,7 +262,7 @@ def test_secants_in_space_are_drawn_without_bounds(tmp_path):
         del each["constants"], each["transversely_isotropic"]
     table = collected({"cell.fibre_fraction": [0.2, 0.4]}, documents, [1, 2], [1, 1])
     assert pictures.panels_of(table) == ("C11", "C33", "C44", "C66")
-    assert pictures.moduli_figure(table).get_suptitle().endswith("plane generalized; no bounds, for faces may touch")
+    assert pictures.moduli_figure(table).get_suptitle().endswith("plane generalized")
     assert_drawn(tmp_path, table, ["moduli.png"])
 
 
