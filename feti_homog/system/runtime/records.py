@@ -100,11 +100,6 @@ def restored(kind: type[T], document: Mapping[str, Any]) -> T:
     return kind(**values)
 
 
-def is_record(hint: Any) -> bool:
-    """Return whether a field of this type holds a record, or may."""
-    return dataclasses.is_dataclass(without_none(hint))
-
-
 def _restored_value(hint: Any, value: Any) -> Any:
     if value is None and without_none(hint) != hint:
         return None
