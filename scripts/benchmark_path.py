@@ -172,12 +172,13 @@ def run_events(
 ) -> tuple[list[float], list[int], list[int]]:
     """Seconds, Krylov iterations and dual problems of each of the first `count` events, of all if None."""
     interface = homogenization.interface
-    bonded = np.full(len(interface.nodes.row), BONDED, np.int8)
+    n = len(interface.nodes.row)
+    bonds = BondState(np.full(n, BONDED, np.int8), np.zeros((n, 0)), np.zeros(n, bool))
     found = events(
         CoupledInterfaces(interface),
         MaxStrength(STRENGTH, STRENGTH),
         [Load.strain(np.array(STRAIN))],
-        unloaded(CoupledInterfaces(interface), BondState.without_memory(bonded)),
+        unloaded(CoupledInterfaces(interface), bonds),
     )
     seconds, iterations, solves = [], [], []
     start = clock()

@@ -127,9 +127,12 @@ class BondLaw(ABC):
         """
         return None
 
-    def crossing(self, before: Float, direction: Float, high: Float) -> Float:
-        """(p,) f at which `before` + f `direction` (p, c) break, by bisection of [0, `high`], doubled where needed."""
-        low, high = np.zeros(len(high)), high.copy()
+    def crossing(self, before: Float, direction: Float, low: Float, high: Float) -> Float:
+        """(p,) f at which `before` + f `direction` (p, c) break, by bisection of [`low`, `high`].
+
+        `high` is doubled where it is too low.
+        """
+        high = high.copy()
         for _ in range(BISECTIONS):
             below = self.share(before + high[:, None] * direction) < 1.0
             if not below.any():
