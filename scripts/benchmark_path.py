@@ -98,7 +98,7 @@ def main() -> None:
     measured = measure(arguments)
     cell, (factor, solve), (ratio, worst) = measured.cell, measured.peer, measured.ratios
     peer, count = factor + solve, len(measured.events)
-    print(f"degrees of freedom          {len(cell.solver.Q)} torn, {measured.glued} glued")
+    print(f"degrees of freedom          {sum(s.n_dofs for s in cell.subdomains)} torn, {measured.glued} glued")
     print(f"torn stiffness C11          {measured.stiffness / cell.summary.area:.6g}")
     print(f"set-up                      {measured.setup:8.2f} s, {measured.setup / peer:6.2f} of the peer")
     print(f"monolithic factor and solve {peer:8.2f} s  (factor {factor:.2f}, solve {solve:.3f})")
