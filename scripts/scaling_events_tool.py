@@ -69,7 +69,7 @@ def measure(case: Case, arguments: argparse.Namespace, comm: MPI.Intracomm) -> E
     row = EventRow(
         fibres=arguments.fibres,
         ranks=comm.size,
-        dofs=comm.allreduce(len(solver.Q)),
+        dofs=comm.allreduce(sum(s.n_dofs for s in solver.subdomains)),
         events=made,
         seconds=comm.allreduce(sum(seconds), MPI.MAX) / made,
         worst=comm.allreduce(max(seconds), MPI.MAX),

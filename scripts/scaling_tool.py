@@ -131,7 +131,7 @@ def measure(case: Case, progress: StagePeaks, way: str | None) -> dict[str, Any]
         solutions = solver.solve_many(np.eye(LOADS), np.zeros((solver.rows, LOADS)))
     if solver.adaptive is None:
         raise TypeError("the study is of the adaptive coarse space")
-    own = comm.allgather(len(solver.Q))
+    own = comm.allgather(sum(s.n_dofs for s in solver.subdomains))
     report = {
         "ranks": comm.size,
         "dofs": sum(own),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -73,7 +73,7 @@ def _gathered(comm: Intracomm, part: Part) -> Part | None:
 class Result:
     """Result of a case, alike on all ranks except for `fields`.
 
-    Printed, it is a short summary; in a notebook, tables.  `schema_keys` lists all written keys.
+    Printed, it is a short summary; in a notebook, tables.  The manual lists all written keys.
 
     Attributes:
         effective_stiffness: (3, 3), in generalized plane strain (6, 6), L^ef, with stresses under the unit strains as
@@ -269,8 +269,3 @@ class Result:
         from feti_homog.report.text import summary  # notebooks alone show it
 
         return summary.notebook(self.document)
-
-
-def schema_keys() -> Iterator[records.ResultKey]:
-    """Yield result.json keys with type, unit and meaning: its reference table."""
-    return records.keys(Result)

@@ -249,7 +249,7 @@ def _solver_info(context: AnalysisContext) -> SolverInfo:
         ranks=cell.comm.size,
         bodies=plan.bodies,
         subdomains=plan.subdomains,
-        dofs=cell.sum_over_ranks(sum(len(s.Q) for s in solvers)),
+        dofs=cell.sum_over_ranks(sum(s.n_dofs for solver in solvers for s in solver.subdomains)),
         multipliers=sum(s.jump_operator.global_rows for s in solvers),
         interface_nodes=plan.interface_nodes or cell.sum_over_ranks(len(solver.jump_operator.nodes.row)),
         kernel_dim=sum(s.natural.kernel_dimension for s in solvers),

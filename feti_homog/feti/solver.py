@@ -124,11 +124,6 @@ class FetiSolver:
         return float(self.ksp.getTolerances()[0])
 
     @property
-    def Q(self) -> Float:
-        """(local dofs, v) unit loads, f = -Q E."""
-        return np.concatenate([np.zeros((0, len(self.problem.loads))), *(s.Q for s in self.subdomains)])
-
-    @property
     def condensed(self) -> CondensedLoads:
         """The unit loads on the boundaries, with the answer of the interiors to loads inside."""
         return self.interface_operators.condensed

@@ -66,7 +66,7 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
     lines, has_curve = [*torus.mesh.remarks], len(torus.mesh.debonded_edges) > 0
     if case.interface is None:
         return (*lines, *(['the curve "debonded" of the mesh is bonded: there is no [interface]'] if has_curve else []))
-    can_open = case.arcs or has_curve or phase_laws.has_springs(case) or case.section.breaks
+    can_open = any((case.arcs, has_curve, phase_laws.has_springs(case), case.section.breaks))
     if case.cell.has_own_mesh and not can_open:
         lines.append("[interface]: nothing is debonded, and no bond is elastic: the bonding is perfect")
     first, second, edge = torus.sides
@@ -75,19 +75,15 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
     kinds = ((torus.meeting[ends] > 2, "three bodies meet"), (torus.touching[ends], "two bodies meet more than once"))
     if counts := [f"at {which.sum()} {kind}" for which, kind in kinds if which.any()]:
         lines.append(f"[interface] nodes that never part: {', '.join(counts)}")
-    return (*lines, *_pinned_bond(torus))
-
-
-def _pinned_bond(torus: Torus) -> list[str]:
-    """Remark a bond at the pinned node, Eq. (15): it never parts."""
-    at = np.searchsorted(torus.class_keys, submeshes.pinned_class(torus))
-    if torus.never_part[at] or torus.meeting[at] < 2:
-        return []
-    x, y = torus.mesh.points[np.flatnonzero(torus.node_class == at)[0]]
-    return [
-        f"[interface] the node at ({x:.6g}, {y:.6g}) never parts: it holds the cell, for all nodes of the mesh are on "
-        "interfaces; use a finer mesh"
-    ]
+    # A bond at the pinned node, Eq. (15).
+    pinned = np.searchsorted(torus.class_keys, submeshes.pinned_class(torus))
+    if not torus.never_part[pinned] and torus.meeting[pinned] >= 2:
+        x, y = torus.mesh.points[np.flatnonzero(torus.node_class == pinned)[0]]
+        lines.append(
+            f"[interface] the node at ({x:.6g}, {y:.6g}) never parts: it holds the cell, for all nodes of the mesh are "
+            "on interfaces; use a finer mesh"
+        )
+    return tuple(lines)
 
 
 def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles: int) -> tuple[str, ...]:

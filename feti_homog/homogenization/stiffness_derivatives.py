@@ -13,7 +13,7 @@ mesh, at fixed nodal u - E x: exact for the mesh, wherever the nodes between the
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,8 +52,14 @@ def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response
     """Differentiate by all constants, from unit load responses by problem.  Collective."""
     case, area = cells[0].case, cells[0].summary.area
     integrals = [_integrals(cell, group) for cell, group in zip(cells, responses, strict=True)]
-    changes = [*_by_phases(cells[0], [grams for grams, _ in integrals])]
-    springs = [_stretched_springs(cell, group) for cell, group in zip(cells, responses, strict=True)]
+    changes, is_heated = list[Derivative](), "temperature" in cells[0].solver.problem.loads
+    for phase in integrals[0][0]:
+        for change in material_derivatives.law_changes(case.materials[phase], case.analysis.plane):
+            if is_heated or not change.name.startswith("expansion"):
+                pairs = zip(phase_laws.law_derivatives(case, phase, change), integrals, strict=True)
+                energies = tuple(np.einsum("ab,aibj->ij", dA, grams[phase]) / area for dA, (grams, _) in pairs)
+                changes.append(Derivative(f"material.{phase}.{change.name}", change.value, energies))
+    springs = [*map(_stretched_springs, cells, responses)]
     for name, value, places in _spring_constants(case):
         energies = tuple(
             sum((work[place] for place in of_problem), np.zeros(work.shape[2:])) / (value * area)
@@ -63,19 +69,6 @@ def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response
     for f in _fractions(case):
         changes.append(Derivative("cell.fibre_fraction", f, tuple(growth / (2 * f * area) for _, growth in integrals)))
     return changes
-
-
-def _by_phases(cell: TornCell, grams: Sequence[Mapping[str, Float]]) -> Iterator[Derivative]:
-    """Yield derivatives by phase constants, from each problem's integrals."""
-    case, is_heated = cell.case, "temperature" in cell.solver.problem.loads
-    for phase in grams[0]:
-        for change in material_derivatives.law_changes(case.materials[phase], case.analysis.plane):
-            if is_heated or not change.name.startswith("expansion"):
-                pairs = zip(
-                    phase_laws.law_derivatives(case, phase, change), (gram[phase] for gram in grams), strict=True
-                )
-                energies = tuple(np.einsum("ab,aibj->ij", dA, gram) / cell.summary.area for dA, gram in pairs)
-                yield Derivative(f"material.{phase}.{change.name}", change.value, energies)
 
 
 def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str, Float], Float]:

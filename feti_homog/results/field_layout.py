@@ -4,13 +4,10 @@ Lengths have the cell's unit, stresses the moduli's.  The file has n nodes, m el
 which each rank holds a part; nodes are torn: each body in a subdomain has its own.
 """
 
-import typing
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 from feti_homog.materials import voigt
-from feti_homog.results.field_views import GROUP_OF_STATES, SPATIAL_VIEWS, VIEWS, View
 from feti_homog.system.runtime import described, records
 from feti_homog.typing import AnyInt, Float, Float32
 
@@ -149,29 +146,6 @@ class StatePart:
         return f"{type(self).__name__}({self.label!r}, {sizes})"
 
 
-GROUPS = {"mesh": MeshPart, "fibre": FibrePart, "interface": InterfacePart, GROUP_OF_STATES: StatePart}
-
-
-@dataclass(frozen=True)
-class Item:
-    """A dataset or an attribute of result.h5; K in `path` is the number of a state, from 0."""
-
-    path: str
-    kind: str
-    shape: str
-    dtype: str
-    unit: str
-    meaning: str
-
-
-def items() -> Iterator[Item]:
-    """Yield all datasets and attributes of result.h5 in plane strain and stress: its reference table."""
-    yield from items_of(Header, "", ())
-    yield Item("/", "attribute created_by", "", "text", "", f"`{PROGRAM}`")
-    for group, part in GROUPS.items():
-        yield from items_of(part, group, VIEWS.get(group, ()))
-
-
 def tables(part: Any) -> dict[str, records.Description]:
     """Return the fields of a part that are datasets: with a row per node, element, interface node or fibre."""
     return {name: d for name, d in records.descriptions(part).items() if rows_of(d)}
@@ -186,21 +160,6 @@ def rows_of(description: records.Description) -> str:
     """Return the row kind of a dataset: `n` nodes, `m` elements, `k` interface nodes, `f` fibres; else empty."""
     first = description.shape[1:2]
     return first if first in ("n", "m", "k", "f") else ""
-
-
-def items_of(part: type, group: str, views: Iterable[View]) -> Iterator[Item]:
-    """Yield the items of a group with these views."""
-    hints = typing.get_type_hints(part)
-    for name, d in records.descriptions(part).items():
-        if rows_of(d):
-            yield Item(f"/{group}/{name}", "dataset", d.shape, d.dtype, d.unit, d.meaning)
-        else:
-            type_name = records.type_words(hints[name], d)
-            yield Item(f"/{group}", f"attribute {d.name or name}", d.shape, type_name, d.unit, d.meaning)
-    for view in views:
-        d = records.descriptions(part)[view.source]
-        shape = f"({rows_of(d)}, {view.components})" if view.components else f"({rows_of(d)},)"
-        yield Item(f"/{view.path(group)}", "dataset", shape, d.dtype, d.unit, view.words)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -226,9 +185,3 @@ class SpatialStatePart(StatePart):
     axial_jump: Float = described(
         "slip along x3: displacement of the matrix minus that of the fibre", records.LENGTH, "(k,)"
     )
-
-
-def spatial_items() -> Iterator[Item]:
-    """Yield the items of result.h5 in generalized plane strain that differ from `field_layout.items`."""
-    plane = set(items())
-    yield from (item for item in items_of(SpatialStatePart, GROUP_OF_STATES, SPATIAL_VIEWS) if item not in plane)

@@ -11,7 +11,7 @@ import math
 import os
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, get_type_hints
 
@@ -141,7 +141,7 @@ def _in_columns(kind: type) -> dict[str, records.Description]:
     """Return the record fields that fill columns: numbers, and arrays with named components."""
     hints = get_type_hints(kind)
     entry = {name: d for name, d in records.descriptions(kind).items() if d.components or not d.shape}
-    return {name: d for name, d in entry.items() if not records.is_record(hints[name])}
+    return {name: d for name, d in entry.items() if not is_dataclass(records.without_none(hints[name]))}
 
 
 def dumps(document: Mapping[str, Any]) -> str:

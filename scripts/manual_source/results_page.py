@@ -3,10 +3,9 @@
 from collections.abc import Iterable
 
 from markdown_text import code, page, table
+from record_tables import Item, items, schema_keys, spatial_items
 
-from feti_homog.analysis.result import schema_keys
 from feti_homog.analysis.result_records import AnglePoint, EnvelopePoint, LoadPoint, PathPoint
-from feti_homog.results.field_layout import Item, items, spatial_items
 from feti_homog.results.result_json import DescribedColumn, columns
 from feti_homog.studies.outputs import COLUMNS, STATISTICS_COLUMNS
 

@@ -4,6 +4,7 @@ import csv
 
 import numpy as np
 import pytest
+from support import torn_cells
 from support.envelopes import ENERGY, MAX, QUADRATIC, document, envelope, path_onset, torn
 from support.ranks import parallel_assert
 from unit.mesh.faulty_meshes import RIGHT_SIDE, grid
@@ -13,7 +14,7 @@ from feti_homog.analysis.tip_records import criterion_of
 from feti_homog.errors import CaseError
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import OPEN, BondState
+from feti_homog.interface.contact.states import OPEN
 from feti_homog.interface.path.onsets import Onset
 from feti_homog.report.plots import response_curves
 from feti_homog.results import result_json
@@ -206,7 +207,7 @@ def test_a_tip_in_space_releases_what_its_break_does(comm):
     with torn(comm, "generalized", bonds, **RANDOM) as cell:
         plane, axial = Homogenization(cell, False), Homogenization(cell.axial, False)
         status = np.where(cell.debonded(None), OPEN, 0).astype(np.int8)
-        bonds, loaded = BondState.without_memory(status), CoupledInterfaces(plane.interface, axial.interface)
+        bonds, loaded = torn_cells.bonds(status), CoupledInterfaces(plane.interface, axial.interface)
         law = criterion_of(cell)
         onset, here = Onset.of(law, loaded, bonds), law.in_state(loaded, bonds)
         node = np.flatnonzero(here.number >= 0)
@@ -227,7 +228,7 @@ def cell_energy(plane, axial, strain, status):
     """Return the energy of the cell under a strain (6,), and the tractions (k, 3)."""
     pairs = ((plane, strain[[0, 1, 5, 2]]), (axial, strain[[4, 3]]))
     found = [
-        each.respond(loads[None], BondState.without_memory(status), [np.zeros(each.cell.solver.rows)])[0]
+        each.respond(loads[None], torn_cells.bonds(status), [np.zeros(each.cell.solver.rows)])[0]
         for each, loads in pairs
     ]
     traction = np.hstack([each.interface.traction(r.state.solution) for (each, _), r in zip(pairs, found, strict=True)])
@@ -237,7 +238,7 @@ def cell_energy(plane, axial, strain, status):
 def direct_utilisation(cell, strain, temperature):
     """Return the largest utilisation of all bonds, from solves under a strain and a change of temperature."""
     plane, axial = Homogenization(cell, False), Homogenization(cell.axial, False)
-    bonds = BondState.without_memory(np.where(cell.debonded(None), OPEN, 0).astype(np.int8))
+    bonds = torn_cells.bonds(np.where(cell.debonded(None), OPEN, 0).astype(np.int8))
     pairs = ((plane, [*strain[[0, 1, 5, 2]], temperature]), (axial, strain[[4, 3]]))
     found = [
         each.interface.traction(

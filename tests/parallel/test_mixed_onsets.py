@@ -5,6 +5,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 from petsc4py import PETSc
+from support import torn_cells
 from support.cases import relative_error
 from support.ranks import PIECES, parallel_assert
 
@@ -13,7 +14,7 @@ from feti_homog.analysis.tip_records import criterion_of
 from feti_homog.homogenization import unit_cell
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import BONDED, OPEN, BondState
+from feti_homog.interface.contact.states import BONDED, OPEN
 from feti_homog.interface.loads import Load
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
@@ -87,7 +88,7 @@ def first_break(cell, axes, values, temperature):
     legs = [load(loaded.loads, of_stresses, np.zeros(6), temperature)] if temperature else []
     legs.append(load(loaded.loads, of_stresses, whole, temperature))
     status = np.where(cell.debonded(None), OPEN, BONDED).astype(np.int8)
-    points = events(loaded, criterion_of(cell, grows=True), legs, unloaded(loaded, BondState.without_memory(status)))
+    points = events(loaded, criterion_of(cell, grows=True), legs, unloaded(loaded, torn_cells.bonds(status)))
     point = next(point for point in points if point.broke)
     state = loaded.macroscopic(point.state.solutions).scaled(point.scale)
     order = [loaded.loads.index(name) for name in STRAINS]

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from manual_source.record_tables import schema_keys
 
-from feti_homog.analysis.result import Result, schema_keys
+from feti_homog.analysis.result import Result
 
 # Powers of stress, length and temperature by the words that the reference of result.json has for a unit.
 OF_UNITS = {

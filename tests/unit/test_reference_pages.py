@@ -10,13 +10,12 @@ from typing import Any
 import h5py
 import pytest
 import tomli_w
+from manual_source.record_tables import items, schema_keys, spatial_items
 from mpi4py import MPI
 
-from feti_homog.analysis.result import schema_keys
 from feti_homog.analysis.result_records import AnglePoint, EnvelopePoint, PathPoint
 from feti_homog.analysis.runner import run
 from feti_homog.case.cases import Case
-from feti_homog.results.field_layout import items, spatial_items
 from feti_homog.results.result_json import columns
 from feti_homog.studies import case_runs, collect, sweep_cases
 from feti_homog.studies.outputs import COLUMNS, OUTPUT_COLUMNS, STATISTICS_COLUMNS, outputs

@@ -44,7 +44,24 @@ class AveragedModes:
     ) -> None:
         """`V` are of each subdomain its kernel, then its soft modes, on its boundary dofs.  Collective."""
         self._blocks, self._V, self._sizes = blocks, V, [len(rows) for rows in neighbours.rows]
-        self._jumps, ends = _exchange_jumps(comm, blocks, neighbours, V)
+        counts = np.zeros(len(neighbours.rank), np.int64)
+        counts[neighbours.index] = [v.shape[1] for v in V]
+        comm.Allreduce(MPI.IN_PLACE, counts)
+        ends = np.cumsum(counts)  # of each subdomain in the cell its last coarse mode + 1
+        self._jumps: list[list[Jumps]] = [[] for _ in blocks]
+
+        def messages() -> Iterator[tuple[int, int, tuple[Int, Float]]]:
+            for i, (block, v) in enumerate(zip(blocks, V, strict=True)):
+                Z, s = block.B @ v, neighbours.index[i]
+                first = ends[s] - v.shape[1]
+                for t, common in neighbours.common[i].items():
+                    # All of its own, though a mode may open nothing.
+                    some = np.arange(v.shape[1]) if t == s else np.flatnonzero(Z[common].any(axis=0))
+                    yield i, t, (first + some, Z[np.ix_(common, some)])
+
+        neighbours.exchange(
+            messages(), lambda i, s, message: self._jumps[i].append((neighbours.common[i][s], *message))
+        )
         self.total = int(ends[-1]) if len(ends) else 0
         self._first = [int(ends[s]) - v.shape[1] for s, v in zip(neighbours.index, V, strict=True)]
         none = np.zeros(0, np.int64)
@@ -79,34 +96,6 @@ class AveragedModes:
         for first, s in zip(self._first, subdomains, strict=True):
             amplitudes[first : first + s.R.shape[1]] = np.stack([s.R[i::c].sum(axis=0) for i in range(c)], axis=1)
         return np.asarray(distributed_arrays.allreduce_sum(comm, amplitudes)[self.reaching])
-
-
-def _exchange_jumps(
-    comm: MPI.Intracomm, blocks: Sequence[SubdomainBlocks], neighbours: Neighbours, V: Sequence[Float]
-) -> tuple[list[list[Jumps]], Int]:
-    """Return the jumps on the rows of each local subdomain, and where coarse modes end.  Collective.
-
-    The ends are the last coarse mode + 1 for each subdomain in the cell.
-    """
-    counts = np.zeros(len(neighbours.rank), np.int64)
-    counts[neighbours.index] = [v.shape[1] for v in V]
-    comm.Allreduce(MPI.IN_PLACE, counts)
-    ends = np.cumsum(counts)
-
-    def messages() -> Iterator[tuple[int, int, tuple[Int, Float]]]:
-        for i, (block, v) in enumerate(zip(blocks, V, strict=True)):
-            Z, s = block.B @ v, neighbours.index[i]
-            first = ends[s] - v.shape[1]
-            for t, common in neighbours.common[i].items():
-                # All of its own, though a mode may open nothing.
-                some = np.arange(v.shape[1]) if t == s else np.flatnonzero(Z[common].any(axis=0))
-                yield i, t, (first + some, Z[np.ix_(common, some)])
-
-    received: list[list[Jumps]] = [[] for _ in blocks]
-    neighbours.exchange(
-        messages(), lambda i, sender, message: received[i].append((neighbours.common[i][sender], *message))
-    )
-    return received, ends
 
 
 def subdomain_blocks(

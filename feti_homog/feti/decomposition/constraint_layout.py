@@ -156,18 +156,6 @@ class ConstraintLayout:
         normal = along(shared.normal[entity], shared.turn[entity], self._places(entity, p))
         return np.asarray(normal / np.hypot(*normal.T)[:, None])
 
-    def _lengths(self, entity: Int, p: Int) -> Float:
-        """(i,) int N ds along the curve at fine node p, summed over its sides; half a side for linear elements."""
-        shared, order = self.shared, self.lattice.order
-        normal, turn, place = shared.normal[entity], shared.turn[entity], self._places(entity, p)
-        side, is_edge = order / self.lattice.intervals, shared.is_edge[entity]
-        in_middle = is_edge & (p % 2 == 0) & (order == 2)
-        before, after, around = (
-            side_lengths(normal, turn, place - part * side, order, side) for part in (1.0, 0.0, 0.5)
-        )
-        edge = np.where(in_middle, around[:, 1], before[:, -1] + after[:, 0])
-        return np.where(is_edge, edge, np.hypot(*normal[:, 0].T))
-
     def node_rows(self) -> tuple[Int, Int]:
         """First owned row and row count for each fine node whose rows are owned."""
         shared = self.shared
@@ -187,11 +175,23 @@ class ConstraintLayout:
             positions[offset + mesh.node_class] = mesh.points
         # Sharers are sorted inwards, so the last one is the fibre's, and it is this rank's, which owns the rows.
         copy = self.base[shared.pointer[entity + 1] - 1] + p
+        # int N ds along the curve, summed over the sides of a node; half a side for linear elements.
+        normal, turn, place, order = (
+            shared.normal[entity],
+            shared.turn[entity],
+            self._places(entity, p),
+            self.lattice.order,
+        )
+        side, in_middle = order / self.lattice.intervals, shared.is_edge[entity] & (p % 2 == 0) & (order == 2)
+        before, after, around = (
+            side_lengths(normal, turn, place - part * side, order, side) for part in (1.0, 0.0, 0.5)
+        )
+        on_edge = np.where(in_middle, around[:, 1], before[:, -1] + after[:, 0])
         return InterfaceNodes(
             row=self._owned_row[entity] + self.components * ((p + 1) * (k - 1) - 1),
             points=positions[copy],
             normal=self._normals(entity, p),
-            length=self._lengths(entity, p),
+            length=np.where(shared.is_edge[entity], on_edge, np.hypot(*normal[:, 0].T)),
             fibre=shared.fibre[entity],
             pair=shared.pair[entity],
             bodies=shared.body[np.stack([shared.pointer[entity], shared.pointer[entity + 1] - 1], axis=1)],

@@ -74,8 +74,14 @@ def interface_geometry(
     can_part = (owner == comm.rank) & (breakable_pairs(submeshes, table, pairs, sharers) >= 0)
     # The last sharer of an edge between two bodies is on the side of the fibre.
     edges = np.flatnonzero(sharers.is_edge & can_part)
-    triangle, k = _triangles_beside(submeshes, sharers.key[edges], sharers.innermost[edges])
     mesh = submeshes.whole
+    edge, subdomain_of = np.searchsorted(mesh.edge_keys, sharers.key[edges]), np.full(len(mesh.edge_keys), -1)
+    subdomain_of[edge] = sharers.innermost[edges]
+    sides = mesh.edge_class[mesh.triangle_edges]
+    triangle, k = np.nonzero(subdomain_of[sides] == submeshes.index[submeshes.member][:, None])
+    by_edge = np.argsort(sides[triangle, k])
+    place = by_edge[np.searchsorted(sides[triangle, k][by_edge], edge)]
+    triangle, k = triangle[place], k[place]
     plane = mesh.triangle_edges[triangle, k]
     normals, turns, precracked = np.zeros((n, 2, 2)), np.zeros(n), np.zeros(n, bool)
     normals[edges], turns[edges] = normal, turn = edge_normals(mesh, triangle, k)
@@ -130,19 +136,6 @@ def _sums_at_vertices(comm: MPI.Intracomm, sharers: Sharers, owner: Int, ends: I
     sequence = np.lexsort(at.T)
     np.add.at(sums, order[np.searchsorted(ordered, code[sequence])], parts[sequence])
     return sums
-
-
-def _triangles_beside(submeshes: SubmeshesOfRank, key: Int, subdomain: Int) -> tuple[Int, Int]:
-    """Return the triangle (n,) of this rank's subdomain (n,), and its edge (n,) that is the torus edge `key` (n,)."""
-    mesh = submeshes.whole
-    edge = np.searchsorted(mesh.edge_keys, key)
-    subdomain_of = np.full(len(mesh.edge_keys), -1)
-    subdomain_of[edge] = subdomain
-    edges = mesh.edge_class[mesh.triangle_edges]
-    triangle, k = np.nonzero(subdomain_of[edges] == submeshes.index[submeshes.member][:, None])
-    order = np.argsort(edges[triangle, k])
-    place = order[np.searchsorted(edges[triangle, k][order], edge)]
-    return triangle[place], k[place]
 
 
 def edge_normals(mesh: Submesh, triangle: Int, k: Int) -> tuple[Float, Float]:

@@ -64,7 +64,22 @@ def find_sharers(comm: MPI.Intracomm, submeshes: SubmeshesOfRank, table: submesh
 
     Several subdomains share each, one on this rank at least.
     """
-    code, subdomain = _to_send(submeshes)
+    mesh = submeshes.whole
+    corner, side = mesh.vertex_class[mesh.triangles], mesh.edge_class[mesh.triangle_edges]
+    one_sided = np.bincount(side.ravel(), minlength=len(mesh.edge_keys)) == 1
+    at_border = np.zeros(len(mesh.class_keys), bool)
+    at_border[mesh.vertex_class[mesh.edges[one_sided[mesh.edge_class]]]] = True
+    if mesh.pinned >= 0:
+        corner = np.where(corner == mesh.pinned, -1, corner)
+    # Codes of entities that other ranks may have, and local subdomains that have them; each pair once.
+    kinds = [
+        (entity_code(keys[local], is_edge), submeshes.index[member])
+        for is_edge, keys, (local, member) in (
+            (False, mesh.class_keys, _several(corner, submeshes.member, at_border)),
+            (True, mesh.edge_keys, _several(side, submeshes.member, one_sided)),
+        )
+    ]
+    code, subdomain = (np.concatenate(some) for some in zip(*kinds, strict=True))
     code, subdomain = distributed_arrays.exchange(comm, code // 2 % comm.size, code, subdomain)
     order = np.lexsort((subdomain, table.nesting[table.body[subdomain]], code))
     code, subdomain = code[order], subdomain[order]
@@ -81,26 +96,6 @@ def find_sharers(comm: MPI.Intracomm, submeshes: SubmeshesOfRank, table: submesh
     (sharer,) = distributed_arrays.exchange(comm, np.repeat(to, copies[entity]), subdomain[whose])
     sharers = Sharers(code // 2, code % 2 == 1, np.r_[0, np.cumsum(count)], sharer)
     return sharers.chosen(np.lexsort((sharers.key, sharers.is_edge)))
-
-
-def _to_send(submeshes: SubmeshesOfRank) -> tuple[Int, Int]:
-    """Codes of entities that other ranks may have, and local subdomains that have them; each pair once."""
-    mesh = submeshes.whole
-    corner, side = mesh.vertex_class[mesh.triangles], mesh.edge_class[mesh.triangle_edges]
-    one_sided = np.bincount(side.ravel(), minlength=len(mesh.edge_keys)) == 1
-    at_border = np.zeros(len(mesh.class_keys), bool)
-    at_border[mesh.vertex_class[mesh.edges[one_sided[mesh.edge_class]]]] = True
-    if mesh.pinned >= 0:
-        corner = np.where(corner == mesh.pinned, -1, corner)
-    kinds = [
-        (entity_code(keys[local], is_edge), submeshes.index[member])
-        for is_edge, keys, (local, member) in (
-            (False, mesh.class_keys, _several(corner, submeshes.member, at_border)),
-            (True, mesh.edge_keys, _several(side, submeshes.member, one_sided)),
-        )
-    ]
-    code, subdomain = (np.concatenate(some) for some in zip(*kinds, strict=True))
-    return code, subdomain
 
 
 def _several(keys: Int, member: Int, at_border: Bool) -> tuple[Int, Int]:

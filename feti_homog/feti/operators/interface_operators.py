@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 from petsc4py import PETSc
-from scipy.sparse import block_diag, csr_matrix
+from scipy.sparse import csr_matrix
 
 from feti_homog.errors import MeshError
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
@@ -168,12 +168,6 @@ class InterfaceOperators:
         for apply, span in zip(applied, self.slices, strict=True):
             apply(x[span], y[span])
         return y
-
-    @cached_property
-    def Kbb(self) -> csr_matrix:
-        """(n, n) boundary block of K."""
-        blocks = [s.take_stiffness()[d][:, d] for s, d in zip(self.subdomains, self.dofs, strict=True)]
-        return csr_matrix(block_diag(blocks or [csr_matrix((0, 0))]))
 
     @cached_property
     def condensed(self) -> one_subdomain.CondensedLoads:

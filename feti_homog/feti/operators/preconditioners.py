@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags
+from scipy.sparse import block_diag, csr_matrix, diags
 
 from feti_homog.feti.decomposition.jump_operator import NodeBlocks
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
@@ -113,4 +113,6 @@ class Lumped(StiffnessScaled):
     """Around the boundary blocks of K."""
 
     def __init__(self, operators: InterfaceOperators) -> None:
-        super().__init__(operators, operators.Kbb.__matmul__)
+        parts = zip(operators.subdomains, operators.dofs, strict=True)
+        blocks = [s.take_stiffness()[dofs][:, dofs] for s, dofs in parts]
+        super().__init__(operators, csr_matrix(block_diag(blocks or [csr_matrix((0, 0))])).__matmul__)

@@ -40,11 +40,6 @@ class BondState:
     gap_and_slip: Float | None = None
     sliding: Status | None = None
 
-    @classmethod
-    def without_memory(cls, status: Status) -> BondState:
-        """Return the state for bonds without internal variables."""
-        return cls(status, np.zeros((len(status), 0)), np.zeros(len(status), bool))
-
     @property
     def sliding_signs(self) -> Status:
         """(k,) `sliding`, 0 without friction."""

@@ -127,9 +127,9 @@ class BondLaw(ABC):
         """
         return None
 
-    def crossing(self, before: Float, direction: Float, high: Float) -> Float:
-        """Bisect [0, `high`] for f (p,) at which `before` + f `direction` (p, c) breaks; double `high` if needed."""
-        low, high = np.zeros(len(high)), high.copy()
+    def crossing(self, before: Float, direction: Float, low: Float, high: Float) -> Float:
+        """Bisect [`low`, `high`] for f (p,) at which `before` + f `direction` (p, c) breaks; double a low `high`."""
+        high = high.copy()
         for _ in range(BISECTIONS):
             below = self.share(before + high[:, None] * direction) < 1.0
             if not below.any():

@@ -21,7 +21,7 @@ from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.floating_bodies import FloatingBodies, shares_to_zero
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium
-from feti_homog.interface.laws.bond_law import BISECTIONS, BondLaw
+from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.path.path_points import UTILISATION_TIE
 from feti_homog.typing import Bool, Float, Int
 
@@ -73,7 +73,7 @@ class Onset:
                 np.minimum.at(first, ray[is_convex], upper[is_convex])
                 some = np.flatnonzero((lower <= first[ray] * (1.0 + UTILISATION_TIE)) | ~is_convex)
                 exact = np.full(len(used), np.inf)
-                exact[some] = bonds.at(some).crossing(start[some], along[some], upper[some])
+                exact[some] = bonds.at(some).crossing(start[some], along[some], np.zeros(len(some)), upper[some])
             factors[loaded] = exact
         return factors.reshape(n, k)
 
@@ -90,13 +90,10 @@ def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, before:
     for k in range(1, parts + 1):
         passes = bonded & (law.share(before + k / parts * step) > 1.0) & np.isinf(high)
         low, high = np.where(passes, (k - 1) / parts, low), np.where(passes, k / parts, high)
-    over = np.isfinite(high)
-    high = np.where(over, high, 1.0)
-    for _ in range(BISECTIONS if over.any() else 0):
-        middle = (low + high) / 2
-        broken = law.share(before + middle[:, None] * step) > 1.0
-        low, high = np.where(broken, low, middle), np.where(broken, middle, high)
-    return float(cell.comm.allreduce(high[over].min(initial=np.inf), MPI.MIN))
+    over = np.flatnonzero(np.isfinite(high))
+    if len(over):
+        high = law.at(over).crossing(before[over], step[over], low[over], high[over])
+    return float(cell.comm.allreduce(high.min(initial=np.inf), MPI.MIN))
 
 
 def first_change(interface: ContactProblem, state: Equilibrium, end: DualSolution) -> tuple[float, float]:

@@ -29,8 +29,14 @@ def require() -> None:
     Raises:
         LibraryError: one line for each that is missing, broken or without MPI, with the remedy.
     """
-    advice = {"mpi4py": MPI4PY, "petsc4py": petsc4py_advice(), "h5py": H5PY}
-    faults = [fault for name, remedy in advice.items() if (fault := _fault(name, remedy))]
+    faults = []
+    for name, advice in (("mpi4py", MPI4PY), ("petsc4py", petsc4py_advice()), ("h5py", H5PY)):
+        try:
+            importlib.import_module(name)
+        except ModuleNotFoundError as error:
+            faults.append(f"{error.name} is not found: {advice}")
+        except (ImportError, ValueError) as error:
+            faults.append(_unfit(name, error, advice))
     if "h5py" in sys.modules and not (h5py := sys.modules["h5py"]).get_config().mpi:
         remedy = f"import feti_homog before h5py, or {H5PY}, and remove this one"
         faults.append(f"h5py {h5py.__file__} is built without MPI: {remedy}")
@@ -68,24 +74,19 @@ def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
 
     atexit.register(end)
     if resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY:
-        _reserve_buffers()
+        import numpy as np
+        from scipy.linalg import blas
+
+        # Each BLAS has its buffers while there are addresses: OpenBLAS, which finds none later, tries for ever.
+        square = np.eye(200)
+        blas.dgemm(1.0, square @ square, square)
+        matrix = PETSc.Mat().createDense(square.shape, array=square.copy(), comm=PETSc.COMM_SELF)
+        matrix.assemble()
+        for petsc_object in (matrix.matMult(matrix), matrix):
+            petsc_object.destroy()
     options = PETSc.Options()
     if not options.hasName("options_left"):
         options.setValue("options_left", "no")
-
-
-def _reserve_buffers() -> None:
-    """Let each BLAS have its buffers while there are addresses: OpenBLAS, which finds none later, tries for ever."""
-    import numpy as np
-    from petsc4py import PETSc
-    from scipy.linalg import blas
-
-    square = np.eye(200)
-    blas.dgemm(1.0, square @ square, square)
-    matrix = PETSc.Mat().createDense(square.shape, array=square.copy(), comm=PETSc.COMM_SELF)
-    matrix.assemble()
-    for petsc_object in (matrix.matMult(matrix), matrix):
-        petsc_object.destroy()
 
 
 def petsc4py_advice(debian: Path = DEBIAN_PETSC, path: Sequence[str] = sys.path) -> str:
@@ -102,17 +103,6 @@ def petsc4py_advice(debian: Path = DEBIAN_PETSC, path: Sequence[str] = sys.path)
     newest = max(folders, key=lambda folder: [int(number) for number in re.findall(r"\d+", folder.parent.name)])
     environment = "" if DEBIAN_MODULES in path else " and make the environment with --system-site-packages"
     return f"export PETSC_DIR={newest}{environment}, or make the environment with scripts/bootstrap"
-
-
-def _fault(name: str, advice: str) -> str:
-    """Empty if the module can be imported, else fault and remedy."""
-    try:
-        importlib.import_module(name)
-    except ModuleNotFoundError as error:
-        return f"{error.name} is not found: {advice}"
-    except (ImportError, ValueError) as error:
-        return _unfit(name, error, advice)
-    return ""
 
 
 def _unfit(name: str, error: Exception, advice: str) -> str:

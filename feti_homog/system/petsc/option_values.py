@@ -150,14 +150,8 @@ RULES: dict[str, OptionRule] = {
     "feti_schur_mat_mumps_icntl_14": _integer(0, 10_000),
     "feti_schur_pc_type": ("cholesky, for what is condensed is symmetric", "cholesky".__eq__),
     "feti_schur_pc_factor_mat_solver_type": ("mumps, which alone makes Schur complements", "mumps".__eq__),
-    "feti_ksp_error_if_not_converged": (
-        "nothing: the run reports it and keeps its results",
-        lambda text: text.lower() in FALSE,
-    ),
-    "fp_trap": (
-        "nothing: numbers that are not finite are checked where they may occur",
-        lambda text: text.lower() in FALSE,
-    ),
+    "feti_ksp_error_if_not_converged": ("nothing: the run reports it and keeps its results", _is_false),
+    "fp_trap": ("nothing: numbers that are not finite are checked where they may occur", _is_false),
     **dict.fromkeys(("info", "malloc_dump", "malloc_view"), (NEW_FILE, _is_new_file)),
     "options_file": ("a file with an option of PETSc in each line", _has_options),
     "log_trace": (NEW_FILE, lambda text: not text or can_be_written(text)),

@@ -7,7 +7,7 @@ Fields without a description are not written.
 import dataclasses
 import types
 import typing
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -16,7 +16,6 @@ T = TypeVar("T")
 DESCRIPTION = "description"
 STRESS, LENGTH, SECONDS, BYTES, DEGREES = "unit of the moduli", "unit of the cell", "s", "bytes", "degrees"
 KINDS = {float: int | float, int: int, str: str, bool: bool, Mapping: Mapping}
-WORDS = {float: "number", int: "integer", str: "text", bool: "true or false"}
 
 
 @dataclass(frozen=True)
@@ -42,16 +41,6 @@ class Description:
     dtype: str = "float64"
     name: str = ""
     spatial_components: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class ResultKey:
-    """A key of a document, `path` being its place: `cell.width`, `path[].strain`, `timings.STAGE`."""
-
-    path: str
-    type: str
-    unit: str
-    meaning: str
 
 
 def described(
@@ -111,30 +100,10 @@ def restored(kind: type[T], document: Mapping[str, Any]) -> T:
     return kind(**values)
 
 
-def keys(kind: type, above: str = "") -> Iterator[ResultKey]:
-    """Yield the keys of a record's document, with the records in it."""
-    hints = typing.get_type_hints(kind)
-    for name, description in descriptions(kind).items():
-        path, hint = f"{above}{name}", _without_none(hints[name])
-        yield ResultKey(path, type_words(hint, description), description.unit, description.meaning)
-        for key, meaning in description.entries.items():
-            item = typing.get_args(hint)[1]
-            yield ResultKey(f"{path}.{key}", WORDS.get(item, "any"), description.unit, meaning)
-        if dataclasses.is_dataclass(hint):
-            yield from keys(typing.cast(type, hint), f"{path}.")
-        elif (item := _record_of_tuple(hint)) is not None:
-            yield from keys(item, f"{path}[].")
-
-
-def is_record(hint: Any) -> bool:
-    """Return whether a field of this type holds a record, or may."""
-    return dataclasses.is_dataclass(_without_none(hint))
-
-
 def _restored_value(hint: Any, value: Any) -> Any:
-    if value is None and _without_none(hint) != hint:
+    if value is None and without_none(hint) != hint:
         return None
-    hint = _without_none(hint)
+    hint = without_none(hint)
     if dataclasses.is_dataclass(hint):
         return restored(typing.cast(type, hint), value)
     origin = typing.get_origin(hint) or hint
@@ -158,28 +127,9 @@ def _require(value: Any, kind: Any) -> None:
         raise TypeError(f"{value!r:.40} is of another type than expected")
 
 
-def _without_none(hint: Any) -> Any:
-    """X of `X | None`."""
+def without_none(hint: Any) -> Any:
+    """Return X, the type in `X | None`."""
     if typing.get_origin(hint) not in (types.UnionType, typing.Union):
         return hint
     (kind,) = (part for part in typing.get_args(hint) if part is not type(None))
     return kind
-
-
-def _record_of_tuple(hint: Any) -> type | None:
-    """Return the record's class of `tuple[Record, ...]`."""
-    item = typing.get_args(hint)[0] if typing.get_origin(hint) is tuple else None
-    return item if dataclasses.is_dataclass(item) and isinstance(item, type) else None
-
-
-def type_words(hint: Any, description: Description) -> str:
-    """Return the type of a field for a reference table."""
-    if description.shape:
-        return f"numbers {description.shape}"
-    if dataclasses.is_dataclass(hint) or typing.get_origin(hint) not in (None, tuple):
-        return "table"
-    if _record_of_tuple(hint) is not None:
-        return "list of tables"
-    if typing.get_origin(hint) is tuple:
-        return f"list of {WORDS[typing.get_args(hint)[0]]}s"
-    return WORDS.get(hint, "any")

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from manual_source.record_tables import schema_keys
 
 from feti_homog import Result
 from feti_homog.analysis.cell_records import CellInfo, Checks, SolverInfo, StiffnessBounds
-from feti_homog.analysis.result import schema_keys
 from feti_homog.analysis.result_records import AnglePoint, LoadPoint, PathPoint, TipRates, Tips
 from feti_homog.materials.engineering_constants import (
     engineering_constants,

@@ -2,11 +2,11 @@
 
 import h5py
 import pytest
+from manual_source.record_tables import items, spatial_items
 from mpi4py import MPI
 from support.sample_output import in_space, sample
 
 from feti_homog.results.field_file import FieldFile
-from feti_homog.results.field_layout import items, spatial_items
 from feti_homog.system.runtime.records import LENGTH, STRESS
 
 UNITS = {LENGTH: "mm", STRESS: "GPa", "": "1", "temperature": "temperature"}  # of the sample

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support import torn_cells
 
 from feti_homog.interface.contact.coupled_interfaces import slipped
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, coulomb_errors
@@ -30,7 +31,7 @@ def test_damaged_bonds_slip_by_their_tangential_rows_alone(components, known):
     """An intact bond, a damaged one and an open face: what others of their rows open is left to the check of jumps."""
     solver = SimpleNamespace(rows=6, intact_compliance=np.ones(6), jump_operator=SimpleNamespace(components=components))
     interface = SimpleNamespace(solver=solver, nodes=SimpleNamespace(row=np.array([0, 2, 4])))
-    bonds = BondState.without_memory(np.array([BONDED, BONDED, OPEN], np.int8))
+    bonds = torn_cells.bonds(np.array([BONDED, BONDED, OPEN], np.int8))
     bonds = BondState(bonds.status, bonds.history, bonds.pressed, gap_and_slip=np.zeros((3, 2)))
     solution = SimpleNamespace(jump=np.arange(4.0, 10.0), compliance=np.array([1.0, 1.0, 5.0, 5.0, 1.0, 1.0]))
     state = SimpleNamespace(bonds=bonds, status=bonds.status, solution=solution)
@@ -53,7 +54,7 @@ def test_faces_without_friction_have_no_sign_of_slip():
     faces = SimpleNamespace(friction=np.array([0.3, 0.0, 0.3]))
     of = {"_place": np.arange(3), "_own": np.arange(3), "_damaged": np.zeros(3, bool), "faces": faces}
     cell = SimpleNamespace(**of, _jumps_of=lambda x: x)
-    bonds = BondState.without_memory(np.full(3, OPEN, np.int8))
+    bonds = torn_cells.bonds(np.full(3, OPEN, np.int8))
     found = SlidingCell.bonds(cell, bonds, np.array([FORWARD, FORWARD, STICK], np.int8), np.zeros(6))
     np.testing.assert_array_equal(found.sliding, [1, 0, 0])
     np.testing.assert_array_equal(found.status, [CLOSED] * 3)
