@@ -77,10 +77,7 @@ def _comparisons(cell: unit_cell.TornCell, fractions: Mapping[str, float]) -> di
     Estimates exist for fibres without coatings, held in the matrix by the same bonds, with springs of one radius;
     bounds for transversely isotropic phases.
     """
-    from feti_homog.materials import (
-        estimates,  # bonded cells in the plane have none
-        phase_bounds,
-    )
+    from feti_homog.materials import estimates, phase_bounds  # bonded cells in the plane have no estimates
 
     summary, case, has_springs = cell.summary, cell.case, phase_laws.has_springs(cell.case)
     matrix, *fibre_phases = summary.phases

@@ -90,10 +90,7 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     if words := missing(file):
         faults.append(f"{given}: {words}")
         return cell
-    from feti_homog.microstructure import (
-        fibre_pattern,  # loads SciPy's trees, which few cases need
-        random_fibres,
-    )
+    from feti_homog.microstructure import fibre_pattern, random_fibres  # SciPy's trees, which few cases need
 
     try:
         window = fibre_pattern.read_window(file)
