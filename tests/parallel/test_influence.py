@@ -166,6 +166,7 @@ def test_f_lambda_finds_errors_of_a_followed_answer(comm, on_active):
         solver._by_columns.record([], solver.d)
 
 
+@pytest.mark.few_ranks  # four would cut the matrix, whose pieces bear more forces: rounding is 3e-13 then
 def test_answers_stay_exact_while_few_faces_hold_a_free_fibre(comm):
     """Faces beside each other hold its place loosely, one after the other; then faces around it hold it well."""
     cell = torn_cells.tear(comm, geometry="square", mesh_size=0.2, order=2, petsc=INFLUENCE)
