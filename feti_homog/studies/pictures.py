@@ -99,7 +99,8 @@ def _plot_series(axes: Axes, table: SweepTable, series: Series, name: str, style
     limits = [[bounds_of(result).get(name, (np.nan, np.nan)) for result in table.results_of(p)] for p in series.points]
     band = np.array([np.mean(pairs, axis=0) for pairs in limits])
     if np.isfinite(band).any():
-        axes.fill_between(series.x, *band.T, color="0.88", linewidth=0.0, zorder=0, label="bounds")
+        kind = "Reuss to Voigt" if name.startswith("C") else "Hashin-Shtrikman" if name in PANELS else "Hill, Hashin"
+        axes.fill_between(series.x, *band.T, color="0.88", linewidth=0.0, zorder=0, label=kind)
     mean, spread = statistics.mean[numbers], np.nan_to_num(statistics.ci95[numbers])
     axes.plot(series.x, mean, color=colour, marker=marker, markersize=4.5, linewidth=1.2, label=series.label or None)
     if spread.any():

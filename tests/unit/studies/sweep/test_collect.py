@@ -244,7 +244,7 @@ def test_bands_are_the_mean_bounds_in_the_results():
         each["fibre_bounds"] = {"E_axial": [low, 2 * low], "nu_axial": None}
     table = collected({"cell.fibre_fraction": [0.2, 0.4] * 2, "cell.seed": [0, 0, 1, 1]}, documents, [1, 2] * 2, [1, 2])
     axes = pictures.moduli_figure(table).axes
-    bands = [[band for band in panel.collections if band.get_label() == "bounds"] for panel in axes]
+    bands = [[band for band in panel.collections if band.get_label() == "Hill, Hashin"] for panel in axes]
     assert [len(each) for each in bands[:4]] == [1, 0, 0, 0]
     assert {*map(tuple, bands[0][0].get_paths()[0].vertices)} == {(0.2, 2.0), (0.2, 4.0), (0.4, 4.0), (0.4, 8.0)}
     sides = {
