@@ -20,6 +20,7 @@ SPATIAL_PANELS = ("E_axial", "E_transverse", "G_axial", "G_transverse")  # of ge
 RATIOS = ("nu_axial", "nu_transverse", "expansion_axial", "expansion_transverse")
 SECANTS = ("C11", "C33", "C44", "C66")  # of generalized plane strain where faces may touch: there are no constants
 COMMON_PANELS = ("C11", "C66")  # of generalized plane strain and plane states together
+BANDS = {"C11": "Reuss to Voigt", "C33": "Reuss to Voigt", "bulk": "Hashin-Shtrikman", "shear": "Hashin-Shtrikman"}
 MARKERS = ("o", "s", "^", "D", "v", "P")
 LEGEND_HANDLE, LEGEND_CHARACTER = 0.7, 0.085  # inches of an entry: its line with the space around, a letter
 NAMES = {
@@ -99,8 +100,8 @@ def _plot_series(axes: Axes, table: SweepTable, series: Series, name: str, style
     limits = [[bounds_of(result).get(name, (np.nan, np.nan)) for result in table.results_of(p)] for p in series.points]
     band = np.array([np.mean(pairs, axis=0) for pairs in limits])
     if np.isfinite(band).any():
-        kind = "Reuss to Voigt" if name.startswith("C") else "Hashin-Shtrikman" if name in PANELS else "Hill, Hashin"
-        axes.fill_between(series.x, *band.T, color="0.88", linewidth=0.0, zorder=0, label=kind)
+        label = BANDS.get(name, "Hill, Hashin")
+        axes.fill_between(series.x, *band.T, color="0.88", linewidth=0.0, zorder=0, label=label)
     mean, spread = statistics.mean[numbers], np.nan_to_num(statistics.ci95[numbers])
     axes.plot(series.x, mean, color=colour, marker=marker, markersize=4.5, linewidth=1.2, label=series.label or None)
     if spread.any():

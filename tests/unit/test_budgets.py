@@ -29,11 +29,11 @@ LINES = {
     "report": 3367,
     "results": 2377,
     "schema": 423,
-    "studies": 3274,
+    "studies": 3275,
     "system": 1828,
     "verify": 3417,
 }
-FILES, TOTAL = 310, 46499
+FILES, TOTAL = 310, 46500
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 12.5, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.
