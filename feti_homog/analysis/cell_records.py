@@ -118,7 +118,7 @@ class StiffnessBounds:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sensitivities:
-    """Derivatives of n cell constants by p case constants; fixed geometry."""
+    """Derivatives of n cell constants by p constants of the case, at fixed geometry."""
 
     parameters: tuple[str, ...] = described("constants of the case, such as `material.fibre.young`")
     parameter_values: Float = described("their values, each in its unit", "", "(p,)")
@@ -134,6 +134,6 @@ class Sensitivities:
 
     @property
     def elasticities(self) -> Float:
-        """(n, p) d ln constant / d ln parameter; NaN for 0."""
+        """(n, p) d ln constant / d ln parameter; NaN for constants that are 0."""
         values = np.where(self.constant_values == 0.0, np.nan, self.constant_values)
         return np.asarray(self.derivatives * self.parameter_values / values[:, None])

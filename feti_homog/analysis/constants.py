@@ -57,7 +57,7 @@ def constants(cell: unit_cell.TornCell, secants: Mapping[str, Any]) -> dict[str,
 
 
 def stiffness_constants(stiffness: Float, thermal: Float | None) -> dict[str, Any]:
-    """Return `Result` constants from stiffness (3, 3), (6, 6), thermal stress (6,)."""
+    """Return constants from a stiffness (3, 3) or (6, 6), with the thermal stress (6,), as `Result` entries."""
     if len(stiffness) == 3:
         return {"moduli": named_constants.engineering_moduli(stiffness)}
     compliance = np.linalg.inv(stiffness)
@@ -211,7 +211,7 @@ def _note_bounds(
 def state_error(
     context: AnalysisContext, responses: Sequence[averaging.Response]
 ) -> tuple[dict[str, float], list[averaging.Response]]:
-    """Return `mesh_error`, the relative energy error, and responses with shares.
+    """Return `mesh_error`, one state's relative energy error, and its responses with element shares.
 
     Without `mesh_error` no error; without a use for shares the responses as they are.  Collective.
     """

@@ -74,7 +74,7 @@ class CellLoads:
         return [name for name, is_free in zip(self.names, masks, strict=True) if is_free]
 
     def excess(self, responses: Sequence[averaging.Response]) -> float:
-        """Return the ratio of strains to the bonded cell's.  Collective."""
+        """Return the ratio of strains under a load to strains in the bonded cell.  Collective."""
         pairs = zip((problem.interface.scales for problem in self.problems), (r.state for r in responses), strict=True)
         return max(scales.excess(state.solution.strain, state.asked) for scales, state in pairs)
 
@@ -87,7 +87,7 @@ class CellLoads:
         return phase_laws.secants(*(np.stack([sign * r.stress for r in group], axis=1) for group in groups))
 
     def means(self, responses: Sequence[averaging.Response]) -> dict[str, Float | float]:
-        """Return macroscopic `strain`, `stress` and, if a load, `temperature`."""
+        """Return macroscopic `strain` and `stress` in all problems, and `temperature` if it is a load."""
         strain = phase_laws.components(*(response.strain for response in responses))
         stress = phase_laws.components(*(response.stress for response in responses))
         heat = {"temperature": float(responses[0].strain[-1])} if "temperature" in self.names else {}
@@ -148,7 +148,7 @@ class AnalysisContext:
 
     @property
     def recovers_again(self) -> bool:
-        """True if interior factors pay, for several recoveries inside bodies."""
+        """True if displacements inside bodies are found more than once, so that interior factors pay."""
         return self.states.has_place or self.case.output.sensitivities or self.case.analysis.type == "angle"
 
     def bonds(self, opening: float | None) -> BondState:
@@ -194,7 +194,7 @@ class AnalysisContext:
         return averaging.FibreInterfaces(self.cell)
 
     def point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
-        """Return a point's debonding under the last plane strain, all iterations.  Collective."""
+        """Return the debonding of a point under the last plane strain, and all iterations.  Collective."""
         last = responses[: len(voigt.STRAINS)][-1]
         length = self.fibre_interfaces.length(last.state.status != BONDED)
         debonding = {
@@ -207,7 +207,7 @@ class AnalysisContext:
         return debonding | last.counts | {"iterations": sum(r.state.iterations for r in responses)}
 
     def loaded_point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
-        """Return a loaded point's means, energies and debonding.  Collective."""
+        """Return means, energies and debonding at a result.json point under one load.  Collective."""
         self.undetermined.append(self.loads.undetermined(responses))
         self.excess = max(self.excess, self.loads.excess(responses))
         energies = {
@@ -218,7 +218,7 @@ class AnalysisContext:
         return self.loads.means(responses) | energies | self.point(responses[:1]) | {"iterations": iterations}
 
     def remarks(self) -> list[str]:
-        """List notes, and lines on undetermined and on absurd strains."""
+        """List the notes, and a line each on undetermined and on absurd strains."""
         lines, points, label = [*self.notes], sum(map(bool, self.undetermined)), f"[{self.case.analysis.type}]"
         if names := [name for name in voigt.SPATIAL_STRAINS if any(name in free for free in self.undetermined)]:
             where = f" at {points} of {len(self.undetermined)} points" if self.case.section.is_followed else ""

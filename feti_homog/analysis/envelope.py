@@ -30,7 +30,7 @@ COSINE_ROUNDING = 1e-15
 
 @dataclass(frozen=True)
 class Rays:
-    """Macroscopic states on n rays: start plus f >= 0 times direction.
+    """Macroscopic states on n rays: a start plus f times a direction, f >= 0.
 
     Attributes:
         strain, stress: (n, m) directions.
@@ -152,7 +152,7 @@ class _Finder:
                 yield rays.at(ray, float(factor)) | place | dict(zip(self._break_names, shares, strict=True))
 
     def _unit_loads(self, strain: Float, temperature: float, names: Sequence[str]) -> Float:
-        """(n, l) unit load shares in named strains (n, m) and temperature."""
+        """(n, l) each unit load's share in strains (n, m) with these names and a temperature change."""
         column = {name: strain[:, number] for number, name in enumerate(names)}
         column["temperature"] = np.full(len(strain), temperature)
         return np.stack([column[load] for load in self._loads], axis=1)

@@ -33,7 +33,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 
 
 def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw) -> dict[str, Any]:
-    """Return `path`, a point an event (or increment), checkpointed at once.
+    """Return `path`, a point an event (or increment), each written to the checkpoint at once.
 
     `states` numbers the points with recorded fields, chosen when all points are found.
     """
@@ -80,7 +80,7 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
 
 
 def _remark_loose_fibres(context: AnalysisContext, last: path_points.Point) -> None:
-    """Remark fibres that no bond holds at last, with friction.  Collective."""
+    """Remark fibres that no bond holds in the end, if faces have friction.  Collective."""
     if context.case.has_friction and (loose := context.fibre_interfaces.loose(last.after.bonds.status)):
         names = ", ".join(map(str, loose[:NAMED_FIBRES])) + (", ..." if len(loose) > NAMED_FIBRES else "")
         fibres = f"{len(loose)} fibres ({names})" if len(loose) > 1 else f"fibre {names}"
@@ -112,7 +112,7 @@ def _events_in_checkpoint(context: AnalysisContext, law: BondLaw) -> int:
 def _points(
     context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw, stored_events: int
 ) -> Iterator[tuple[path_points.Point, tuple[path_points.Energies, float] | None, list[averaging.Response]]]:
-    """Yield points with responses: first checkpointed ones, with energies, then new ones.
+    """Yield points with responses: first from the checkpoint, with energies up to each, then new ones.
 
     Where nothing carries the stresses any more, or faces with friction cannot go on, the path ends with a fault.
 
@@ -152,7 +152,7 @@ def _points(
 
 
 def _end_of(context: AnalysisContext, responses: list[averaging.Response]) -> str:
-    """Return where a path ends: beyond its last point, with stresses."""
+    """Return where a path ends: beyond its last point, with the stresses there."""
     stress = np.asarray(context.loads.means(responses)["stress"])
     pairs = zip(voigt.voigt_names(len(stress))[1], stress, strict=True)
     large = [f", {name} {value:.6g}" for name, value in pairs if abs(value) > LEAST_STRESS * np.abs(stress).max()]
@@ -160,7 +160,7 @@ def _end_of(context: AnalysisContext, responses: list[averaging.Response]) -> st
 
 
 def _with_advice(error: NotCarriedError, place: str, path: load_sections.LoadPath) -> NotCarriedError:
-    """Return a path's last error with place, initially empty, and remedy."""
+    """Return the error that ends a path, with a remedy and `place`, empty before the first point."""
     if isinstance(error, coulomb_faces.StuckError):
         more = "" if path.method == "events" else " or more increments"
         return coulomb_faces.StuckError(f"[path]: {error}{place}; a smaller friction{more} may lead further")
@@ -219,7 +219,7 @@ def _recorded(
     document: dict[str, Any],
     last: path_points.Point,
 ) -> dict[str, Any]:
-    """Record tips and fields at kept checkpoint points and the last.  Collective.
+    """Record tips and fields at kept points, all but the last from the checkpoint.  Collective.
 
     Returns `states`, the point numbers with recorded fields.
     """
@@ -243,7 +243,7 @@ def _recorded(
 def _checked(
     context: AnalysisContext, point: path_points.Point, name: str
 ) -> tuple[path_points.Point, Sequence[averaging.Response]]:
-    """Return a point completed by F lambda; record its checks.  Collective."""
+    """Return a point completed by F lambda with its responses, and record their checks.  Collective."""
     point = replace(point, state=context.loads.interfaces.completed(point.state))
     responses = context.loads.responses(point.state, point.scale)
     for response in responses:

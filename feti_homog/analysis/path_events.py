@@ -35,7 +35,7 @@ SUFFIXES = ("", "_axial")
 
 @dataclass
 class Work:
-    """Energies per cell area to a point; breaks lose unstored work.
+    """Energies per cell area up to a point; breaks lose the work of the loads less the stored energy.
 
     Attributes:
         all_equilibria: every bond breaks at its own load, the first leg with its snap-back.
@@ -49,7 +49,7 @@ class Work:
     _largest_load: float = 0.0
 
     def arrive(self, point: path_points.Point) -> None:
-        """Add the energies on the way from the last point."""
+        """Add the energies on the way from the last point to this one."""
         # Beyond the first leg loads do not fall.
         rise = self._largest_load / self._load if self._load else 1.0
         controlled = self.load_controlled + rise**2 * point.energies.released
@@ -69,7 +69,7 @@ def stored(
     work: Work,
     cell: coupled_interfaces.CoupledInterfaces,
 ) -> tuple[dict[str, Any], checkpoints.Arrays]:
-    """Take point and responses apart: checkpoint numbers and distributed arrays.
+    """Take a point with its responses apart, into plain numbers and distributed arrays for the checkpoint.
 
     A path goes on from its last state's multipliers.
     """
@@ -98,7 +98,7 @@ def stored(
 def restored(
     event: checkpoints.Arrays, cell: coupled_interfaces.CoupledInterfaces
 ) -> tuple[path_points.Point, tuple[path_points.Energies, float]]:
-    """Rebuild the event that `stored` took apart: point, and energies before.
+    """Rebuild a point, and the energies up to it, from the event that `stored` made.
 
     A lean event has empty arrays, which `found_again` fills.
     """
@@ -144,7 +144,7 @@ def averages(event: checkpoints.Arrays, point: path_points.Point, loads: CellLoa
 def found_again(
     point: path_points.Point, cell: coupled_interfaces.CoupledInterfaces, law: BondLaw
 ) -> path_points.Point:
-    """Return a lean event's point with its equilibrium.  Collective."""
+    """Return a lean event's point with the equilibrium under its load and bonds.  Collective."""
     loads = ((problem.load.values, problem.load.by_stress) for problem in point.state.problems)
     values, by_stress = zip(*loads, strict=True)
     load = Load(np.concatenate(values), np.concatenate(by_stress))
@@ -155,7 +155,7 @@ def found_again(
 
 
 def read(context: AnalysisContext, law: BondLaw, number: int) -> tuple[checkpoints.Arrays, path_points.Point]:
-    """Read a checkpoint event and point; find missing multipliers again.  Collective."""
+    """Read a checkpoint event and its point, whose multipliers are found again if missing.  Collective."""
     event, cell = context.checkpoint.read(number), context.loads.interfaces
     point, _ = restored(event, cell)
     return event, point if checkpoints.has_multipliers(event) else found_again(point, cell, law)
@@ -261,7 +261,7 @@ class EventProgress:
             self._held_back = line
 
     def advance(self, share: float, text: str) -> None:
-        """Move the bar to a path share, with a text."""
+        """Move the bar to the share of the path at an event, with a text."""
         if self._bar is not None:
             self._bar.set_postfix_str(text, refresh=False)
             self._bar.update(max(share - self._bar.n, 0.0))

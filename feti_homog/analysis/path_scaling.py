@@ -57,7 +57,7 @@ def _scaled(old: Record, names: tuple[str, ...], factor: float) -> Record:
 
 
 def _times(value: Any, factor: float) -> Any:
-    """Return numbers multiplied, also in arrays, lists and tables."""
+    """Multiply a number, an array, or the numbers in lists and tables."""
     if isinstance(value, Mapping):
         return {name: _times(item, factor) for name, item in value.items()}
     if isinstance(value, list | tuple):

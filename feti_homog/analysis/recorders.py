@@ -83,7 +83,7 @@ class CheckRecorder:
 
 
 class StateRecorder:
-    """State recorder for a run, to file and memory, or neither.
+    """Record the states of a run in a file, in memory, or nowhere.
 
     Attributes:
         has_place: whether states go anywhere.
@@ -124,7 +124,7 @@ class StateRecorder:
         return None if self._file is None else mpi_errors.on_root(self._cell.comm, result_json.seal, self._file.path)
 
     def _write(self, write: Callable[[field_file.FieldFile], object]) -> None:
-        """Write to the file, if any; failure ends it on all ranks."""
+        """Write to the file if there is one; give it up on all ranks if that fails."""
         if self._file is not None:
             try:
                 write(self._file)

@@ -202,7 +202,7 @@ class Result:
 
     @property
     def points(self) -> dict[str, NDArray[Any]]:
-        """Return named arrays over n angle or path points, else empty.
+        """Return arrays over n angle or path points by name, empty for other analyses.
 
         `angle` or `load_factor` (n,), `strain` and `stress` (n, 3) or (n, 6), `stiffness` (n, 3, 3) or (n, 6, 6),
         `debonded_length` (n, f), `bonded`, `open`, `closed`, ... (n,); NaN where a point has no such number; no tips.
@@ -212,7 +212,7 @@ class Result:
         return {name: np.array([point.get(name, np.nan) for point in documents]) for name in names}
 
     def rising_strain(self) -> dict[str, Float]:
-        """Return named corners (v,) on a one-leg path: leading strain, all stresses.
+        """Return corners (v,) for the leading strain, first, and all stresses, by name, on a one-leg path.
 
         In a test with rising load the stress drops where bonds break, or under a given stress the strain jumps, to the
         next branch that holds.
@@ -230,7 +230,7 @@ class Result:
         return {self.peak.strain_name: columns.pop(self.peak.strain_name)} | columns
 
     def path_scaled(self, *, toughness: float) -> Result:
-        """Scale a path to another first interface toughness, s times loads.
+        """Scale a path's result to another first interface toughness and s times the loads.
 
         s = sqrt(toughness / case toughness), alike for all interfaces.  Strains and stresses are s times,
         energies s^2 times as large, at equal events and load factors: bonds break by energy on springs with given
@@ -245,7 +245,7 @@ class Result:
         return replace(changed, states=None, result_h5=None, fields=None)
 
     def first_drop(self) -> tuple[Float, int]:
-        """Return stress (3,) or (6,) after the first break, one leg.
+        """Return the stress (3,) or (6,) after a one-leg path's first break, under the breaking load.
 
         Under the breaking load; also returns the point's number on its branch.  Raises ValueError for any other result.
         """

@@ -63,7 +63,7 @@ class Tips:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TipRates:
-    """Energy release rates at arc tips, round fibres, constant strain.
+    """Energy release rates at tips of arcs on round fibres, at constant macroscopic strain.
 
     Has t pairs, each a load and a tip, by load, fibre, interface and direction.
     """

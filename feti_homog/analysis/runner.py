@@ -96,7 +96,7 @@ def _warn(context: AnalysisContext) -> None:
 
 @contextmanager
 def _torn(case: Case, comm: MPI.Intracomm, progress: progress_bar.Progress) -> Iterator[unit_cell.TornCell]:
-    """Provide the torn cell with the case's options in a block."""
+    """Provide the torn cell with the case's options set, while the block lasts."""
     PETSc.garbage_cleanup(comm)  # parallel objects of earlier cases, which all ranks free together
     process_memory.forget_peak(kept=SPARE_BYTES)
     with options_database.case_options(case.petsc):
@@ -264,7 +264,7 @@ def _solver_info(context: AnalysisContext) -> SolverInfo:
 
 
 def _write(result: Result, directory: Path, cell: unit_cell.TornCell) -> None:
-    """Write result.json, then dependent files; remove an earlier result's files."""
+    """Write result.json, then files made from it; remove an earlier result's other files."""
     mpi_errors.on_root_only(cell.comm, result_json.write, directory, result.document)
     written = {result_json.NAME}
     if result.result_h5 is not None:
@@ -285,7 +285,7 @@ def _draw(directory: Path) -> list[Path]:
 
 
 def _print_summary(result: Result, progress: progress_bar.Progress) -> None:
-    """Print the summary on rank 0, which alone loads tables.  Collective."""
+    """Print the summary on rank 0, which alone loads its tables.  Collective."""
     timings = progress.timings()
     if progress.prints:
         from feti_homog.report.text import summary

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Return `effective_stiffness`, columns stresses under unit strains, and dependent entries.
+    """Return `effective_stiffness`, with stresses under the unit strains as columns, and entries that follow from it.
 
     With contact between debonded faces also `effective_stiffness_compression`, columns -Sigma(-E); `tips` on debonded
     arcs under each load; `mesh_error`; `sensitivities` if the case asks for them.  If a temperature

@@ -39,7 +39,7 @@ def check_to_draw(directory: Path) -> None:
 
 
 def finished(directory: Path, case: Case) -> bool:
-    """Return whether a case's complete result, without checkpoint, exists.  Call on one rank.
+    """Return whether `directory` has a case's complete result and no checkpoint.  Call on one rank.
 
     Raises:
         CaseError: the result is damaged, or belongs to another case.

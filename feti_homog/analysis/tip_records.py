@@ -21,7 +21,7 @@ DIRECTION_DIGITS = 9
 
 
 def criterion_of(cell: unit_cell.TornCell, grows: bool = False) -> BondLaw:
-    """Return a cell's bond law; growing debonding makes tips.  Collective.
+    """Return a cell's bond law; debonding that `grows` makes its own tips.  Collective.
 
     Raises:
         CaseError: tips need the inverse dual operator, which the solver does not have.
@@ -39,7 +39,7 @@ def criterion_of(cell: unit_cell.TornCell, grows: bool = False) -> BondLaw:
 
 
 def tip_rates(context: AnalysisContext, responses: Sequence[averaging.Response], loads: Sequence[str]) -> TipRates:
-    """Return rates at all tips by plane load; none if bonded.  Collective."""
+    """Return rates at all tips under each load in the plane; none while all is bonded.  Collective."""
     rates = [
         (context.release_rates.of(response), load)
         for response, load in zip(responses, loads, strict=True)
@@ -90,7 +90,7 @@ def _sections(cell: unit_cell.TornCell, pair: Float | Int) -> tuple[int, ...] | 
 
 
 def bond_directions(cell: unit_cell.TornCell) -> Float:
-    """(k,) degrees, above -180, from fibre centres to rank's interface nodes.
+    """(k,) directions in degrees, above -180, from fibre centres to this rank's interface nodes.
 
     A fibre without centre has its normals' directions.
     """

@@ -251,7 +251,7 @@ def _breaks(strengths: Sequence[str], table: Any) -> bool:
 
 
 def _loads_and_outputs() -> Iterator[Rule]:
-    """Allow one form of a path, a component's strain or stress, and what analysis and plane state can give."""
+    """Yield the rules for loads, and for outputs that an analysis or a plane state lacks."""
     yield replace(needed(("path",), LOADS[0], "missing; give one", unless=LOADS), names=LOADS)
     yield exclusive(("path",), *LOADS)
     line = f"expected a table such as {{E11 = 0.01}} in {kinds.GENERALIZED.in_words('path')}"

@@ -69,7 +69,7 @@ class RecoveredStress:
     def on(
         cls, mesh: FineMesh, L: Float, problem: Problem, u: Float, loads: Float, is_mixed: bool = False
     ) -> RecoveredStress:
-        """Make the stress recovery of one mesh; arguments as the attributes."""
+        """Set up the stress recovery of one mesh; arguments are named as the attributes."""
         return cls(mesh.points, mesh.triangles, mesh.node_class, L, problem, u, loads, is_mixed)
 
     @property

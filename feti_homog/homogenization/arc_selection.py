@@ -40,7 +40,7 @@ def marks(case: Case, fibres: int) -> dict[int, list[float]]:
 
 
 def size(case: Case, estimate: element_estimate.ElementEstimate) -> float | None:
-    """Return element size at tips / cell width, or None: interface size.
+    """Return element size at tips / cell width, None for the interface size.
 
     Without `tip_size` in the case it is, with the mean radius / width R,
 
@@ -64,7 +64,7 @@ def size(case: Case, estimate: element_estimate.ElementEstimate) -> float | None
 
 @dataclass(frozen=True)
 class EstimatedNodes:
-    """(k,) unrefined interface nodes: fibres from 1, interfaces, degrees; on rank 0."""
+    """Interface nodes (k,) on rank 0, before refinement: fibres from 1, interfaces, directions in degrees."""
 
     fibre: Int
     pair: Int

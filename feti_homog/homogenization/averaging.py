@@ -173,7 +173,7 @@ class Homogenization:
     def _scaled(
         self, state: Equilibrium, scale: float, stress: Float, energy: float, u: Float, checks: dict[str, float]
     ) -> Response:
-        """Return `scale` times a state with <sigma:eps> = `energy`.  Collective."""
+        """Return the response that is `scale` times a state with <sigma:eps> = `energy`.  Collective."""
         means = scale * state.solution.strain, scale * stress
         energies = scale**2 * energy / 2, scale**2 * self._stretched(state) / 2
         errors, damage = checks | state.certificate, self.damage(state.bonds)
@@ -185,7 +185,7 @@ class Homogenization:
         return (bonds.status != BONDED).astype(float) if damage is None else damage
 
     def _rubbing(self, state: Equilibrium) -> float:
-        """Sum friction work on faces per area, not stored.  Collective."""
+        """Sum force times slip on faces with friction, per area, which is not stored.  Collective."""
         if state.bonds.gap_and_slip is None:
             return 0.0
         work = float(state.solution.lam @ state.solution.jump) - coupled_interfaces.energy_beside_springs(
@@ -228,7 +228,7 @@ class Homogenization:
 
     @cached_property
     def _strain_inside(self) -> float:
-        """Largest relative inner share in int eps*; 0 for closed meshes.  Collective."""
+        """Return the largest relative share of inner nodes in int eps*, 0 for closed meshes.  Collective."""
         inner, size = 0.0, 0.0
         for s, boundary in zip(self.cell.subdomains, self.cell.solver.interface_operators.dofs, strict=True):
             size = max(size, float(np.sqrt(s.area)))
@@ -247,7 +247,7 @@ class Homogenization:
 
 
 class FibreInterfaces:
-    """Interfaces by fibre number, f fibres; a coated fibre may have two.
+    """Interfaces of a cell's f fibres, by number; a coated fibre may have two.
 
     A node has its tributary length, debonded or not.
     """
@@ -274,7 +274,7 @@ class FibreInterfaces:
         return [int(number) for number in np.flatnonzero(is_loose) + 1]
 
     def angle(self, length: Float) -> Float:
-        """(f,) degrees by radius, else (not round, coating interface) 360 times share."""
+        """(f,) arc degrees for lengths (f,): 360 times their share if not round, or coated with an interface."""
         return np.asarray(length * self._degrees)
 
     def share(self, length: Float) -> float:

@@ -23,7 +23,7 @@ SAME_RATIO = 1e-3
 
 
 def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
-    """(phases, phases) interface numbers between phases; -1 where they never part.
+    """(phases, phases) the case's interface number between two phases; -1 where they never part.
 
     An interface without `between` lies between the matrix, the first phase, and all other phases; perfect bonding too.
     """

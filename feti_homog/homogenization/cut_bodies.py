@@ -52,7 +52,7 @@ class SharedVertices:
                 self.is_first.append(np.repeat(edge_copies[mesh][on_cut, 1] == 1, line.shape[1] - 1))
 
     def sum(self, parts: Sequence[Float]) -> list[Float]:
-        """(n, k) sums of `parts` (n, k) at shared vertices, by mesh.  Collective."""
+        """(n, k) sums over pieces for values `parts` (n, k) at each mesh's shared vertices.  Collective."""
 
         def sums(number: Int, values: Float) -> Float:
             totals = np.zeros((int(number.max(initial=-1)) + 1, values.shape[1]))
@@ -63,7 +63,7 @@ class SharedVertices:
         return _split(self._at_home(self._rows, np.concatenate([np.zeros((0, width)), *parts]), sums), self.classes)
 
     def _copies(self, rows: Sequence[Int]) -> list[Int]:
-        """(n, 2) row (n, 3) copies by mesh; 1 at the first.  Collective."""
+        """(n, 2) copy counts for each mesh's rows (n, 3), and 1 at the first copy, else 0.  Collective."""
 
         def copies(number: Int, _: Int) -> Int:
             _, first, count = np.unique(number, return_index=True, return_counts=True)
@@ -73,7 +73,7 @@ class SharedVertices:
         return _split(self._at_home(all_rows, all_rows, copies), rows)
 
     def _at_home(self, rows: Int, values: Array, combine: Callable[[Int, Array], Array]) -> Array:
-        """Call `combine` at home with rows (n, 3), values (n, k).  Collective."""
+        """Call `combine` with row numbers (n, 3) and their values (n, k), on all ranks.  Collective."""
         comm, home = self._comm, rows[:, 1:].sum(axis=1) // 2 % self._comm.size
         rows, values, source, place = distributed_arrays.exchange(
             comm, home, rows, values, np.full(len(rows), comm.rank), np.arange(len(rows))
@@ -120,7 +120,7 @@ def _border(submeshes: Sequence[Submesh], mesh: FineMesh) -> tuple[Int, Int, Int
 
 
 def border_lines(s: Submesh, mesh: FineMesh, classes: Int32) -> tuple[Int, Int, Int]:
-    """Return triangles (e,), their edges (e,) and edge classes at piece borders.
+    """Return triangles (e,) at a piece's border, their edges (e,) there, and classes (e, M + 1) along the edges.
 
     Classes (e, M + 1) run along the edges.  `classes` (t, q) are lattice node classes.
     """
@@ -136,7 +136,7 @@ def border_lines(s: Submesh, mesh: FineMesh, classes: Int32) -> tuple[Int, Int, 
 def fits_across_cuts(
     shared: SharedVertices, bodies: Sequence[stress_recovery.RecoveredStress]
 ) -> dict[int, tuple[Int, Float]]:
-    """Return vertex classes (n,) and changed fits (n, p, m k), by mesh.  Collective."""
+    """Return, by mesh, vertex classes (n,) and fits (n, p, m k) that cuts change.  Collective."""
     pieces = zip(shared.meshes, shared.classes, shared.sides, shared.is_first, strict=True)
     strips = [_Strip.of(bodies[mesh], classes, sides, first) for mesh, classes, sides, first in pieces]
     patches = _over_pieces(shared, strips, [strip.stress.patch_sums() for strip in strips])
@@ -177,7 +177,7 @@ class _Strip:
 
     @classmethod
     def of(cls, body: stress_recovery.RecoveredStress, classes: Int, cut: Int, is_first: Bool) -> _Strip:
-        """Find elements; other pieces count sides `cut` (c, 2) except first copies."""
+        """Find the elements; other pieces count the sides `cut` (c, 2) on cuts, but for the first copies."""
         is_vertex, at = np.zeros(len(body.u), bool), body.node_class[body.triangles[:, :3]]
         is_vertex[classes] = True
         for _ in range(LAYERS):
@@ -195,7 +195,7 @@ class _Strip:
         return cls(stress, is_vertex, stress.numbers[classes], sides[once], vector[once], np.unique(sides[single]))
 
     def neighbours(self, at_boundary: Bool) -> local_fits.PatchNeighbours:
-        """Return pairs from boundary vertices; shared vertices (n,) count if `at_boundary`."""
+        """Return pairs whose first is on the body boundary, as shared vertices (n,) are if `at_boundary`."""
         is_bound = np.zeros(int(self.is_vertex.sum()), bool)
         is_bound[self.bounds] = True
         is_bound[self.shared] = at_boundary
@@ -212,7 +212,7 @@ def _code(a: Int, b: Int, size: int) -> Int:
 def _over_pieces(
     shared: SharedVertices, strips: Sequence[_Strip], pairs: Sequence[tuple[Float, Float]]
 ) -> list[tuple[Float, Float]]:
-    """Add strip moments and sums (vertices, p, ..) at shared vertices.  Collective."""
+    """Add strip moments and sums (vertices, p, ..) over all pieces, at shared vertices.  Collective."""
     parts = [
         np.concatenate([a[strip.shared], b[strip.shared]], axis=2) for strip, (a, b) in zip(strips, pairs, strict=True)
     ]

@@ -42,7 +42,7 @@ VOID = -1
 
 
 class CrackExtension:
-    """Subdomain elements around points, which sum a crack extension's energy."""
+    """Elements of a subdomain around points, over which the energy of a crack extension is summed."""
 
     def __init__(self, subdomain: Subdomain, period: Float) -> None:
         """Find the elements around points; the cell has `period` (2,)."""
@@ -54,7 +54,7 @@ class CrackExtension:
         self._elements_of = csr_matrix(entries, shape=(len(mesh.points), len(mesh.triangles)))
 
     def energy_change(self, tip: Float, spoke: Float, reach: float, u: Float, E: Float) -> float:
-        """Return the energy change when a crack turns by a unit angle.
+        """Return the energy change when a tip's crack turns by a unit angle.
 
         Args:
             tip, spoke: (2,) place, and place relative to the circle centre.
@@ -105,7 +105,7 @@ class EnergyRelease:
 
     @property
     def mode_angle(self) -> Float:
-        """(t,) psi, tan^2 psi = G_II / G_I: 0 degrees opens, 90 shears."""
+        """(t,) degrees psi, tan^2 psi = G_II / G_I; 0 is opening, 90 shear."""
         roots = np.sqrt(np.maximum(self.modes, 0.0))
         return np.asarray(np.degrees(np.arctan2(roots[:, 1], roots[:, 0])))
 

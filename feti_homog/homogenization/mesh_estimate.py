@@ -112,7 +112,7 @@ def energy_errors(
 
 
 def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
-    """Return ratios of element and arc errors after `fewer` halvings.  Collective."""
+    """Return ratios of element and arc errors to errors with `fewer` halvings.  Collective."""
     order = cell.lattice.order
     if cell.summary.across and fewer:
         return SAMPLED[any(s.is_mixed for s in cell.subdomains)]
@@ -217,7 +217,7 @@ def _displacements(
 
 
 class Group(NamedTuple):
-    """Recovered stresses, arcs and (classes,) boundary displacement places in a group."""
+    """Recovered stresses and arcs of some subdomains, and (classes,) places of their boundary displacements."""
 
     stress: stress_recovery.RecoveredStress
     sides: arc_error.ArcSides
@@ -227,7 +227,7 @@ class Group(NamedTuple):
 def boundary_tractions(
     cell: TornCell, responses: Sequence[Response], groups: Sequence[Group], shared: SharedVertices | None, nested: bool
 ) -> dict[int, local_fits.KnownTractions]:
-    """Return tractions by group, where arc sides meet and at voids.  Collective.
+    """Return, by the group, tractions where two sides on arcs meet, and zero ones at voids.  Collective.
 
     They vanish at voids, else are forces over node lengths; on the mesh that has the forces, which is not `nested`,
     over side lengths, so that uniform stresses give exact tractions.

@@ -27,7 +27,7 @@ POWERS = {"strength": 1, "toughness": 2}
 
 
 def problems(case: Case) -> tuple[Problem, ...]:
-    """Return the plane problem and, if space strains load, the axial one.
+    """Return the plane problem and, if strains along the fibres are loads, the axial one.
 
     A temperature is a load if the phases have thermal expansions.
     """
@@ -54,12 +54,12 @@ def law(case: Case, phase: str, problem: Problem) -> Float:
 
 
 def is_mixed(case: Case, phase: str) -> bool:
-    """Return whether a phase's plane elements have bubble and pressure."""
+    """Return whether a phase's elements have their own bubble and pressure in the plane problem."""
     return cell_sizes.is_mixed(case.cell.order, case.material_of(phase), case.analysis.plane)
 
 
 def law_derivatives(case: Case, phase: str, change: material_derivatives.LawChange) -> tuple[Float, ...]:
-    """Differentiate `law` in the plane and, if any, the axial problem."""
+    """Differentiate `law` in the plane and, if there is one, in the axial problem."""
     problem, dC = problems(case)[0], change.stiffness
     if problem == PLANE:
         return (dC,)
@@ -89,12 +89,12 @@ def secants(plane: Float, *axial: Float) -> dict[str, Float]:
 
 
 def components(plane: Float, *axial: Float) -> Float:
-    """(3,) or in space (6,) strains or stresses, joined from all problems."""
+    """(3,) or, with an axial problem, (6,) strain or stress components from their parts in each problem."""
     return spatial_vector(plane, *axial) if axial else plane
 
 
 def spatial_vector(plane: Float | None, axial: Float | None) -> Float:
-    """(6,) from plane [11, 22, 12, 33] and axial [13, 23]; None: zero."""
+    """(6,) from numbers [11, 22, 12, 33, ...] in the plane problem and [13, 23] in the axial one; None is zero."""
     vector = np.zeros(6)
     if plane is not None:
         vector[IN_PLANE] = plane[:4]
@@ -155,7 +155,7 @@ class SectionValues:
     factor: float | Float
 
     def __call__(self, key: str, *more: str) -> float | Float:
-        """Return the first key's value, for all nodes or (k,); else inf."""
+        """Return the first value among the keys, for all nodes or (k,) at each; else inf."""
         sections = self.everywhere(key, *more)
         values = float(sections[0]) if len(sections) == 1 else sections[self.pair]
         power = POWERS.get(key.rpartition("_")[2], 0)
@@ -173,7 +173,7 @@ class SectionValues:
 
 
 def bond_law(bonds: Sequence[interface_section.InterfaceSection], pair: Int, factor: float | Float = 1.0) -> BondLaw:
-    """Return bond law at nodes (k,), see `SectionValues`; unbreakable without sections."""
+    """Return the bond law at nodes (k,), arguments as in `SectionValues`; without sections no bond breaks."""
     name = bonds[0].criterion if bonds else bond_laws.DEFAULT
     return law_class(name).of_keys(SectionValues(bonds, pair, factor))
 

@@ -19,7 +19,7 @@ POINTS, WEIGHTS = roots_legendre(6)
 
 
 class SpringSides:
-    """Element sides along springs, and all interface nodes; states change neither."""
+    """Element sides along springs, and the interface nodes of all ranks, which no state changes."""
 
     def __init__(
         self,
@@ -100,7 +100,7 @@ class SpringSides:
         return np.asarray(beyond), distributed_arrays.allreduce_sum(self._comm, lumped - on_sides - on_arcs - on_arcs.T)
 
     def _in_space(self, components: Float) -> Float:
-        """(n, 2, k) plane vectors from normal and tangent; (n, 1, k) stay."""
+        """(n, 2, k) plane vectors from components (n, 2, k) along normal and tangent; (n, 1, k) stay."""
         if components.shape[1] == 1:
             return components
         normal = self._normal

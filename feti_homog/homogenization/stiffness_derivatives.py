@@ -124,7 +124,7 @@ class _Fields:
 
     @classmethod
     def of(cls, s: UniformPart, nodes: Int32, u: Float, loads: Float) -> _Fields:
-        """Find element fields: nodes (e, a), u (e, a, c, k), loads (m, k)."""
+        """Find the fields in elements with nodes (e, a), displacements u (e, a, c, k) and loads (m, k)."""
         points, (_, a, c, k) = s.mesh.points[nodes], u.shape
         elements = bubble.Elements.of(points, s.L) if s.is_mixed else None
         g, w = shape_functions.gradients(points) if elements is None else (elements.gradients, elements.weights)
@@ -220,7 +220,7 @@ def _fractions(case: Case) -> Iterator[float]:
 
 
 def _velocity(points: Float, cell: CellSummary) -> Float:
-    """(n, 2) V = dx / d ln R at points (n, 2) while fibres grow.
+    """(n, 2) V = dx / d ln R at points (n, 2) where all fibres in a pattern grow.
 
     x - c in a fibre with centre c and radius R, falling to 0 halfway to the next fibre.
     """

@@ -45,7 +45,7 @@ def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: Part
 def place_nodes(
     case: Case, comm: MPI.Intracomm, policy: tiling.TilePolicy
 ) -> gmsh_mesher.NodedCell | CoarseMesh | None:
-    """Return a user's mesh, or noded lines with empty tiles.  Collective.
+    """Return a user's mesh, or the cell with nodes that all ranks place on its lines.  Collective.
 
     All ranks place nodes; None but on rank 0.
 
@@ -184,7 +184,7 @@ def tear_by_tiles(
 
 
 def _filled(noded: gmsh_mesher.NodedCell | None, regions: tiling.Regions, comm: MPI.Intracomm) -> tuple[Torus, Int]:
-    """Return the torus that this rank's tiles fill, and tiles (m,).  Collective."""
+    """Return the torus that the tiles of this rank fill, and the tile (m,) of each triangle.  Collective."""
     tiles = mpi_errors.on_root_only(comm, tiles_to_fill, noded) or []
     dealt = deal_tiles(tiles, [len(tile.nodes) for tile in tiles], comm)
     fillings = mpi_errors.agree(comm, fill_own, [(k, tile.tile) for k, tile in dealt])

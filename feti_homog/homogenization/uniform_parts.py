@@ -59,7 +59,7 @@ class UniformPart:
 
 
 def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterator[UniformPart]:
-    """Yield parts by subdomain, phase and body; `phase_of` (constituents,) names phases."""
+    """Yield all subdomains' parts, in each by phase and body; `phase_of` (constituents,) names phases."""
     for place, s in enumerate(subdomains):
         if s.material is None:
             yield UniformPart(place, s.submesh, s.mesh, np.arange(s.n_dofs), s.L, s.problem, s.is_mixed)
@@ -186,7 +186,7 @@ class NestedInterior:
         return cls(members, mesh, fixed, place[fixed], interior, loads)
 
     def displacement(self, u: Float, loads: Float) -> Float:
-        """(classes, c, k) u* from u (boundary dofs, k), loads (v, k)."""
+        """(classes, c, k) u* from u (boundary dofs, k) on all boundaries under the loads (v, k)."""
         problem = self.members[0].problem
         on_boundary = np.vstack([u, np.zeros((1, u.shape[1]))])[self.place]  # PINNED is the last row
         all_dofs = np.empty((len(self.fixed) + len(self.interior.dofs), u.shape[1]))

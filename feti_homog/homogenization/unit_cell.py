@@ -61,7 +61,7 @@ class TornCell:
 
     @cached_property
     def parts(self) -> list[UniformPart]:
-        """This rank's parts in one body each, numbered over ranks.  Collective when first read."""
+        """This rank's subdomain parts in one body each, numbered over all ranks.  Collective when first read."""
         phases = [self.summary.phases[k] for k in self.summary.constituent_phase.tolist()]
         parts = list(uniform_parts.parts_of(self.subdomains, phases))
         if not self.summary.across:
@@ -88,7 +88,7 @@ class TornCell:
         return np.concatenate([np.zeros(0), *(part for _, part in self.displacements(u, solution.strain))])
 
     def displacements(self, u: Float, loads: Float, keep: bool = True) -> Iterator[tuple[UniformPart, Float]]:
-        """Yield each part with its u* (dofs, k) from boundary displacements.
+        """Yield each part with its u* (dofs, k) for u (boundary dofs, k) on all boundaries and the loads (v, k).
 
         u (boundary dofs, k) on all boundaries, under the loads (v, k); `keep` stores the interior factors.
         """
@@ -99,7 +99,7 @@ class TornCell:
             yield part, extended[part.dofs]
 
     def across_bonds(self, solution: DualSolution, u: Float) -> tuple[Float, Float]:
-        """(owned rows of `jumps`,) lam and openings for displacements u.  Collective."""
+        """(owned rows of `jumps`,) lam and openings for the part displacements u.  Collective."""
         if not self.summary.across or not self.jumps.global_rows:  # without jumps there is a single part
             return solution.lam, solution.opening
         return self._forces.multipliers(u, solution.strain), self.jumps.sum(self.jumps.B @ u)
@@ -121,7 +121,7 @@ class TornCell:
 
     @cached_property
     def class_nodes(self) -> Int:
-        """(c,) a plane node for each class, part after part."""
+        """(c,) a plane node for each class in this rank's parts, one part after the other."""
         nodes, first = [np.zeros(0, np.int64)], 0
         for mesh in (part.mesh for part in self.parts):
             nodes.append(np.empty(mesh.n_classes, np.int64))

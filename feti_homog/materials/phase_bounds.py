@@ -49,7 +49,7 @@ class FibreBounds:
 
 @dataclass(frozen=True)
 class Springs:
-    """Spring stiffnesses around round fibres of one radius: traction / jump, positive; infinite where bonded.
+    """Springs around round fibres of equal radius: positive stiffnesses traction / jump, inf if bonded.
 
     Attributes:
         normal: k_n, for the opening.
@@ -72,7 +72,7 @@ class Springs:
 
 @dataclass(frozen=True)
 class Fibres:
-    """Volume fraction, constants and springs of the fibres of one phase; on springs they have one radius."""
+    """Fibres of one phase: volume fraction, constants and, around equal radii, springs."""
 
     fraction: float
     constants: engineering_constants.TransverseIsotropy
@@ -155,7 +155,7 @@ def aligned_cylinders(
     phases: Sequence[engineering_constants.TransverseIsotropy],
     surroundings: tuple[float, float, float],
 ) -> engineering_constants.TransverseIsotropy:
-    """Estimate constants: each phase is a cylinder in one reference medium k0, m0, p0, under the same far field.
+    """Estimate the constants of cylinders in a reference medium k0, m0, p0 under equal far fields.
 
     With x_i = k_i + m0 and h0 = k0 m0/(k0 + 2 m0),
 

@@ -49,12 +49,11 @@ class EventsInMemory:
     """
 
     def __init__(self, comm: MPI.Intracomm, room: int | None = WHOLE_BYTES) -> None:
-        self.comm, self.room = comm, room
-        self._events: list[bytes] = []
+        self.comm, self.room, self._events, self._bytes = comm, room, list[bytes](), 0
 
     def clear(self) -> int:
         """Forget all events; returns their number."""
-        number, self._events = len(self._events), []
+        number, self._events, self._bytes = len(self._events), [], 0
         return number
 
     def count(self) -> int:
@@ -85,8 +84,9 @@ class EventsInMemory:
             FetiHomogError: the file cannot be written.
         """
         event = {name: np.asarray(value) for name, value in {**shared, **distributed}.items()}
-        del self._events[number:]
-        self._events.append(packed(self._kept(event, self.comm.allreduce(sum(map(len, self._events))))))
+        self._bytes -= sum(map(len, self._events[number:]))
+        self._events[number:] = [packed(self._kept(event, self.comm.allreduce(self._bytes)))]
+        self._bytes += len(self._events[number])
 
     def _kept(self, event: Arrays, size: int) -> Arrays:
         """Return the arrays to keep of an event behind `size` bytes of events."""

@@ -58,7 +58,7 @@ def _targets(node: ast.stmt) -> list[str]:
 
 
 def test_packages_import_from_faces_alone():
-    """Other packages import the names in `__all__` of a package, or of one in it: modules, and a few classes."""
+    """No package imports a name of another package, or subpackage, that its `__all__` lacks."""
     faces = {
         package: set(ast.literal_eval(node.value))
         for package, path in PACKAGES.items()

@@ -176,12 +176,8 @@ class ConstraintLayout:
         # Sharers are sorted inwards, so the last one is the fibre's, and it is this rank's, which owns the rows.
         copy = self.base[shared.pointer[entity + 1] - 1] + p
         # int N ds along the curve, summed over the sides of a node; half a side for linear elements.
-        normal, turn, place, order = (
-            shared.normal[entity],
-            shared.turn[entity],
-            self._places(entity, p),
-            self.lattice.order,
-        )
+        normal, turn, place = shared.normal[entity], shared.turn[entity], self._places(entity, p)
+        order = self.lattice.order
         side, in_middle = order / self.lattice.intervals, shared.is_edge[entity] & (p % 2 == 0) & (order == 2)
         before, after, around = (
             side_lengths(normal, turn, place - part * side, order, side) for part in (1.0, 0.0, 0.5)

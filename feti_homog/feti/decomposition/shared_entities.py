@@ -43,7 +43,7 @@ def side_lengths(ends: Float, turn: Float, low: Float, order: int, side: float) 
     return np.asarray(np.stack(speeds, axis=1) * WEIGHTS @ SHARES[order].T * (side / 2))
 
 
-def breakable_pairs(submeshes: SubmeshesOfRank, table: submeshes.SubdomainTable, pairs: Int, sharers: Sharers) -> Int:
+def breakable_pairs(meshes: SubmeshesOfRank, table: submeshes.SubdomainTable, pairs: Int, sharers: Sharers) -> Int:
     """Return the case interface (n,) between the two bodies of each shared entity.
 
     -1 where bonds never break, a third body meets them, or they meet along no line.
@@ -53,14 +53,14 @@ def breakable_pairs(submeshes: SubmeshesOfRank, table: submeshes.SubdomainTable,
     third = (body != np.repeat(outer, copies)) & (body != np.repeat(inner, copies))
     thirds = np.bincount(np.repeat(np.arange(len(copies)), copies), third, len(copies))
     on_line, vertices = np.ones(len(copies), bool), np.flatnonzero(~sharers.is_edge)
-    on_line[vertices] = ~submeshes.whole.touching[np.searchsorted(submeshes.whole.class_keys, sharers.key[vertices])]
+    on_line[vertices] = ~meshes.whole.touching[np.searchsorted(meshes.whole.class_keys, sharers.key[vertices])]
     phase = table.phase
     return np.where((thirds == 0) & (outer != inner) & on_line, pairs[phase[outer], phase[inner]], -1)
 
 
 def interface_geometry(
     comm: MPI.Intracomm,
-    submeshes: SubmeshesOfRank,
+    meshes: SubmeshesOfRank,
     table: submeshes.SubdomainTable,
     pairs: Int,
     sharers: Sharers,
@@ -71,14 +71,14 @@ def interface_geometry(
     0 of other entities and where no bond may break; `pairs` and `lattice` as in `share_entities`.
     """
     n, owner = len(sharers.key), table.rank[sharers.innermost]
-    can_part = (owner == comm.rank) & (breakable_pairs(submeshes, table, pairs, sharers) >= 0)
+    can_part = (owner == comm.rank) & (breakable_pairs(meshes, table, pairs, sharers) >= 0)
     # The last sharer of an edge between two bodies is on the side of the fibre.
     edges = np.flatnonzero(sharers.is_edge & can_part)
-    mesh = submeshes.whole
+    mesh = meshes.whole
     edge, subdomain_of = np.searchsorted(mesh.edge_keys, sharers.key[edges]), np.full(len(mesh.edge_keys), -1)
     subdomain_of[edge] = sharers.innermost[edges]
     sides = mesh.edge_class[mesh.triangle_edges]
-    triangle, k = np.nonzero(subdomain_of[sides] == submeshes.index[submeshes.member][:, None])
+    triangle, k = np.nonzero(subdomain_of[sides] == meshes.index[meshes.member][:, None])
     by_edge = np.argsort(sides[triangle, k])
     place = by_edge[np.searchsorted(sides[triangle, k][by_edge], edge)]
     triangle, k = triangle[place], k[place]
@@ -97,13 +97,11 @@ def interface_geometry(
     vertices = ~sharers.is_edge
     scaled = sums[:, :2] * (sums[:, 2] / np.maximum(np.hypot(*sums[:, :2].T), 1e-300))[:, None]
     normals[vertices], precracked[vertices] = scaled[vertices, None], sums[vertices, 3] == 0
-    mpi_errors.agree(
-        comm, _check, submeshes, sharers.chosen(np.flatnonzero(can_part)), normals[can_part], sums[can_part]
-    )
+    mpi_errors.agree(comm, _check, meshes, sharers.chosen(np.flatnonzero(can_part)), normals[can_part], sums[can_part])
     return normals, turns, precracked
 
 
-def _check(submeshes: SubmeshesOfRank, sharers: Sharers, normals: Float, sums: Float) -> None:
+def _check(meshes: SubmeshesOfRank, sharers: Sharers, normals: Float, sums: Float) -> None:
     """Raise MeshError where a normal is not finite or zero, or its sides are folded onto each other.
 
     The directions of folded sides cancel; `normals` (n, 2, 2) and `sums` (n, 4) as in `interface_geometry`.
@@ -112,7 +110,7 @@ def _check(submeshes: SubmeshesOfRank, sharers: Sharers, normals: Float, sums: F
     folded = ~sharers.is_edge & ~(np.hypot(*sums[:, :2].T) > FOLDED * sums[:, 2])
     bad = np.flatnonzero(~(np.isfinite(length) & (length > 0)).all(axis=1) | folded)
     if len(bad):
-        mesh, first = submeshes.whole, bad[0]
+        mesh, first = meshes.whole, bad[0]
         keys = mesh.edge_keys[mesh.edge_class] if sharers.is_edge[first] else mesh.class_keys[mesh.vertex_class]
         plane = int(np.flatnonzero(keys == sharers.key[first])[0])
         x, y = mesh.points[mesh.edges[plane] if sharers.is_edge[first] else [plane]].mean(axis=0)
@@ -192,7 +190,7 @@ class SharedEntities(Sharers):
 
 def share_entities(
     comm: MPI.Intracomm,
-    submeshes: SubmeshesOfRank,
+    meshes: SubmeshesOfRank,
     table: submeshes.SubdomainTable,
     pairs: Int,
     lattice: ReferenceLattice,
@@ -203,11 +201,11 @@ def share_entities(
         pairs: (phases, phases) the interface of the case between two phases, -1 where they never part.
         lattice: of the coarse triangles.
     """
-    sharers = find_sharers(comm, submeshes, table)
-    geometry = list[Array](interface_geometry(comm, submeshes, table, pairs, sharers, lattice))
+    sharers = find_sharers(comm, meshes, table)
+    geometry: tuple[Array, ...] = interface_geometry(comm, meshes, table, pairs, sharers, lattice)
     if lattice.intervals == 1:
         vertices = np.flatnonzero(~sharers.is_edge)
-        sharers, geometry = sharers.chosen(vertices), [column[vertices] for column in geometry]
+        sharers, geometry = sharers.chosen(vertices), tuple(column[vertices] for column in geometry)
     nodes = np.where(sharers.is_edge, lattice.intervals - 1, 1)
     owner = table.rank[sharers.innermost]
     constraints = np.where(owner == comm.rank, nodes * (sharers.copies - 1), 0)
@@ -226,7 +224,7 @@ def share_entities(
     first, normal, turn, precracked = (column[place] for column in received)
     order = np.argsort(first)
     sharers = sharers.chosen(order)
-    pair = breakable_pairs(submeshes, table, pairs, sharers)
+    pair = breakable_pairs(meshes, table, pairs, sharers)
     return SharedEntities(
         key=sharers.key,
         is_edge=sharers.is_edge,

@@ -59,12 +59,12 @@ def entity_code(key: Int, is_edge: Bool | bool) -> Int:
     return np.asarray(2 * key + is_edge)
 
 
-def find_sharers(comm: MPI.Intracomm, submeshes: SubmeshesOfRank, table: submeshes.SubdomainTable) -> Sharers:
+def find_sharers(comm: MPI.Intracomm, meshes: SubmeshesOfRank, table: submeshes.SubdomainTable) -> Sharers:
     """Return the vertex classes, but for the pinned one, and the torus edges that subdomains share. Collective.
 
     Several subdomains share each, one on this rank at least.
     """
-    mesh = submeshes.whole
+    mesh = meshes.whole
     corner, side = mesh.vertex_class[mesh.triangles], mesh.edge_class[mesh.triangle_edges]
     one_sided = np.bincount(side.ravel(), minlength=len(mesh.edge_keys)) == 1
     at_border = np.zeros(len(mesh.class_keys), bool)
@@ -73,10 +73,10 @@ def find_sharers(comm: MPI.Intracomm, submeshes: SubmeshesOfRank, table: submesh
         corner = np.where(corner == mesh.pinned, -1, corner)
     # Codes of entities that other ranks may have, and local subdomains that have them; each pair once.
     kinds = [
-        (entity_code(keys[local], is_edge), submeshes.index[member])
+        (entity_code(keys[local], is_edge), meshes.index[member])
         for is_edge, keys, (local, member) in (
-            (False, mesh.class_keys, _several(corner, submeshes.member, at_border)),
-            (True, mesh.edge_keys, _several(side, submeshes.member, one_sided)),
+            (False, mesh.class_keys, _several(corner, meshes.member, at_border)),
+            (True, mesh.edge_keys, _several(side, meshes.member, one_sided)),
         )
     ]
     code, subdomain = (np.concatenate(some) for some in zip(*kinds, strict=True))

@@ -52,11 +52,8 @@ class ExactInverse(Preconditioner):
             CaseError: the option has no such value.
         """
         comm, jump_operator = operators.comm, operators.jump_operator
-        max_changes = (
-            thresholds.NEVER_REFACTORED_ROWS
-            if jump_operator.global_rows <= thresholds.NEVER_REFACTORED_ROWS
-            else thresholds.INFLUENCE_COLUMNS
-        )
+        is_small = jump_operator.global_rows <= thresholds.NEVER_REFACTORED_ROWS
+        max_changes = thresholds.NEVER_REFACTORED_ROWS if is_small else thresholds.INFLUENCE_COLUMNS
         max_changes = PETSc.Options("feti_").getInt("influence_columns", max_changes)
         if max_changes < 1:
             raise CaseError(f"-feti_influence_columns {max_changes}: expected a whole number above 0")

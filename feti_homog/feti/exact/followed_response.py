@@ -192,7 +192,8 @@ class FollowedResponse:
             loose = np.setdiff1d(np.arange(k), which)
             self.pins, self.answer = np.union1d(np.setdiff1d(self.pins, moved), rows[loose]), self.answer.copy()
             places = self.pins - self._first
-            self.answer[places[(places >= 0) & (places < len(self.answer))]], self.had_pins = 0.0, True
+            self.answer[places[(places >= 0) & (places < len(self.answer))]] = 0.0
+            self.had_pins = True
             # Springs of pins have C_0, as of all rows that are not active.
             if len(loose := loose[gained[loose] != 0.0]):
                 return self.soften(rows[loose], gained[loose], pivot)

@@ -245,11 +245,11 @@ class ContactProblem:
             freed = np.isin(coarse.body, coarse.body[shares - without > LEAST_SHARE_OF_MOTION])
             idle &= (abs(coarse.G[self.nodes.row]) + abs(coarse.G[self.nodes.row + 1])) @ freed > 0
             bonds = bonds.with_status(np.where(idle, OPEN, status).astype(np.int8))
-        if self._any(idle):
-            # The search found any of many places.
-            self.prepare(bonds)
-            moved, wrong = self._placed(bonds, self.solver.completed(replace(solution, alpha=None)))
-            solution = solution if self._any(wrong) else moved
+            if self._any(idle):
+                # The search found any of many places.
+                self.prepare(bonds)
+                moved, wrong = self._placed(bonds, self.solver.completed(replace(solution, alpha=None)))
+                solution = solution if self._any(wrong) else moved
         certificate = self.certificate(bonds, solution, asked)
         return Equilibrium(load, bonds, solution, iterations, solves, motions.shape[1], certificate, asked)
 
