@@ -150,6 +150,20 @@ def test_estimates_of_ratios_that_nearly_vanish_are_measured_by_one():
     assert [off for off, _ in apart(less, more)] == pytest.approx([2.8e-4] * len(names))
 
 
+def test_faces_that_touch_are_counted_unless_friction_leaves_a_fibre_free():
+    bound = {"free_motions": 0, "open": 3, "closed": 1, "friction_heat": 0.0}
+    free = {"free_motions": 3, "open": 3, "closed": 0, "friction_heat": 0.0}
+
+    def differs(point, **changes):
+        base, other = ({"path_like": [bound, {**point, **own}]} for own in ({}, changes))
+        return max(off for off, _ in apart(base, other)) == DIFFERENT
+
+    assert not differs(free, open=2, closed=1)
+    assert differs(bound, open=2, closed=2) and differs(free, free_motions=0)
+    without = {name: value for name, value in free.items() if name != "friction_heat"}
+    assert max(off for off, _ in apart({"load": without}, {"load": {**without, "open": 2}})) == DIFFERENT
+
+
 def test_contact_that_changes_as_a_leg_begins_is_not_the_end_of_the_leg_before():
     """The step from there is 1e-9 of a leg, also of one that is cut in two."""
     steps = 0.0, 1e-10, 1e-9, 1.0
