@@ -15,7 +15,7 @@ from feti_homog.case import Case
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError
 from feti_homog.studies import case_folders
 from feti_homog.studies.case_folders import LOCK_FILE, Status
-from feti_homog.studies.description import check_options
+from feti_homog.studies.first_case import check_options
 from feti_homog.studies.sweep_cases import Sweep, SweepCase
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.runtime import file_locks, standard_streams
