@@ -39,7 +39,6 @@ setup(
             "selenium>=4.20",
             "hypothesis>=6.100",
             "coverage>=7.10",
-            "radon>=6",
             "ruff>=0.4",
             "codespell>=2.4",
             "mypy>=1.8",

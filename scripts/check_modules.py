@@ -34,7 +34,6 @@ PROVIDERS = {
             "pytest",
             "hypothesis",
             "coverage",
-            "radon",
             "ruff",
             "codespell_lib",
             "mypy",

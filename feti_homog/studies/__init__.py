@@ -1,10 +1,10 @@
 """Many cases from one file: sweeps, fits of constants to measured values, and the scatter by uncertain inputs.
 
-Imports `analysis`, `case`, `feti`, `homogenization`, `materials`, `mesh`, `microstructure`, `report`, `results`,
-`schema` and `system`.  Main entries: `sweep_cases.load`, `case_runs.run_all`, `collect.collect`, `fit_file.load`,
+Imports `analysis`, `case`, `materials`, `microstructure`, `report`, `results`, `schema` and `system`.
+Main entries: `sweep_cases.load`, `case_runs.run_all`, `collect.collect`, `fit_file.load`,
 `uncertainty.load` and `study.Study`.
 """
 
 __all__ = [
-    "case_folders", "case_runs", "collect", "description", "fit_file", "sweep_cases", "sweep_table", "uncertainty",
+    "case_folders", "case_runs", "collect", "first_case", "fit_file", "sweep_cases", "sweep_table", "uncertainty",
 ]  # fmt: skip

@@ -1,5 +1,7 @@
 """Points of a sweep: axis values combined to a grid, row by row, or sampled."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -25,10 +27,22 @@ class Axis:
     ends: tuple[float, float] = (0.0, 0.0)
     log: bool = False
 
-    def at(self, shares: ArrayLike) -> list[Any]:
-        """Return the values at shares in [0, 1] of the way from the first to the second end."""
+    @classmethod
+    def of(cls, path: toml_files.TomlPath, value: Any) -> Axis:
+        """Return the axis of a valid list or range."""
+        if isinstance(value, list):
+            return cls(path, tuple(value))
+        low, high, step, count = float(value["from"]), float(value["to"]), value.get("step"), value.get("count")
+        axis = cls(path, ends=(low, high), log=value.get("scale") == "log")
+        if step is not None:
+            last = int((high - low) / step + STEP_TOLERANCE)
+            return cls(path, tuple(_rounded(low + k * step, path) for k in range(last + 1)))
+        return axis if count is None else cls(path, tuple(axis.at(np.linspace(0, 1, count))))
+
+    def at(self, fractions: ArrayLike) -> list[Any]:
+        """Return the values at fractions in [0, 1] of the way from the first end to the second."""
         low, high = np.log(self.ends) if self.log else self.ends
-        values = low + (high - low) * np.asarray(shares)
+        values = low + (high - low) * np.asarray(fractions)
         return [_rounded(value, self.path) for value in (np.exp(values) if self.log else values).tolist()]
 
 
@@ -47,31 +61,28 @@ def read_points(table: Mapping[str, Any], faults: list[str]) -> tuple[list[Assig
         if fault := _value_fault(path, value, "samples" in given_settings):
             lines.append(f"[{sections.SWEEP}] {wording.dotted_key(path)} = {wording.toml_value(value)}: {fault}")
         else:
-            axes.append(_axis(path, value))
-    lines += _axis_faults(axes, settings)
+            axes.append(Axis.of(path, value))
+    lines += _faults_between(axes, settings)
     if not axes and not lines and settings.realisations is None:
         lines.append(
             f"[{sections.SWEEP}]: nothing varies; expected keys with {sections.AXIS_EXPECTED}, or realisations"
         )
-    lines += _count_faults(axes, settings)
     faults += lines
     return ([] if lines else _combined(axes, settings)), settings
 
 
-def _axis_faults(axes: Sequence[Axis], settings: sections.SweepSection) -> list[str]:
-    """Faults between axes: nothing to sample, or a key twice."""
-    faults = []
+def _faults_between(axes: Sequence[Axis], settings: sections.SweepSection) -> list[str]:
+    """Return faults that no axis has alone: nothing to sample, a repeated key, unequal rows, too many cases."""
+    faults, paths = list[str](), [axis.path for axis in axes]
     if settings.samples is not None and all(axis.values for axis in axes):
         samples = f"[{sections.SWEEP}] samples = {settings.samples}"
         faults.append(f"{samples}: no key is to be sampled; expected a range {{from, to}}")
-    paths = [axis.path for axis in axes]
     repeated = [path for path in dict.fromkeys(paths) if paths.count(path) > 1]
-    return faults + [f"[{sections.SWEEP}] {wording.dotted_key(path)}: given twice" for path in repeated]
-
-
-def _count_faults(axes: Sequence[Axis], settings: sections.SweepSection) -> list[str]:
-    """Faults in value counts: unequal ones in rows, or too many cases."""
-    faults, lengths = [], _lengths(axes, settings)
+    faults += [f"[{sections.SWEEP}] {wording.dotted_key(path)}: given twice" for path in repeated]
+    # All sampled keys are one axis.
+    lengths = [(wording.dotted_key(axis.path), len(axis.values)) for axis in axes if axis.values]
+    sampled = [wording.dotted_key(axis.path) for axis in axes if not axis.values]
+    lengths += [(" and ".join(sampled), settings.samples)] if sampled and settings.samples else []
     counts = [length for _, length in lengths]
     if settings.mode == "zip" and len({*counts}) > 1:
         listed = ", ".join(f"{length} of {names}" for names, length in lengths)
@@ -82,37 +93,26 @@ def _count_faults(axes: Sequence[Axis], settings: sections.SweepSection) -> list
     return faults
 
 
-def _lengths(axes: Sequence[Axis], settings: sections.SweepSection) -> list[tuple[str, int]]:
-    """Return the keys of each axis in words, and its value count; sampled keys are one axis."""
-    lengths = [(wording.dotted_key(axis.path), len(axis.values)) for axis in axes if axis.values]
-    sampled = [wording.dotted_key(axis.path) for axis in axes if not axis.values]
-    return [*lengths, (" and ".join(sampled), settings.samples)] if sampled and settings.samples else lengths
-
-
 def _combined(axes: Sequence[Axis], settings: sections.SweepSection) -> list[Assignment]:
-    """Return the points on axes without fault.
+    """Return the points on valid axes.
 
-    In a grid the last key in the file runs fastest; sampled keys are one axis, the last.
+    In a grid the last key in the file runs fastest. Sampled keys are one axis, the last: a Latin hypercube, or
+    independent samples.
     """
     lists = [[{axis.path: value} for value in axis.values] for axis in axes if axis.values]
-    lists += _samples([axis for axis in axes if not axis.values], settings)
+    sampled = [axis for axis in axes if not axis.values]
+    if sampled and settings.samples is not None:
+        if settings.sampling == "latin":
+            from scipy.stats import qmc  # which takes most of a second, and few sweeps need it
+
+            fractions = qmc.LatinHypercube(len(sampled), seed=settings.seed).random(settings.samples)
+        else:
+            fractions = np.random.default_rng(settings.seed).random((settings.samples, len(sampled)))
+        columns = [axis.at(column) for axis, column in zip(sampled, fractions.T, strict=True)]
+        paths = [axis.path for axis in sampled]
+        lists.append([dict(zip(paths, row, strict=True)) for row in zip(*columns, strict=True)])
     rows = product(*lists) if settings.mode == "grid" or not lists else zip(*lists, strict=True)
     return [{path: value for part in row for path, value in part.items()} for row in rows]
-
-
-def _samples(axes: Sequence[Axis], settings: sections.SweepSection) -> list[list[Assignment]]:
-    """Return one list of sampled points, a Latin hypercube or independent; none without axes."""
-    if not axes or settings.samples is None:
-        return []
-    if settings.sampling == "latin":
-        from scipy.stats import qmc  # which takes most of a second, and few sweeps need it
-
-        shares = qmc.LatinHypercube(len(axes), seed=settings.seed).random(settings.samples)
-    else:
-        shares = np.random.default_rng(settings.seed).random((settings.samples, len(axes)))
-    paths = [axis.path for axis in axes]
-    columns = [axis.at(column) for axis, column in zip(axes, shares.T, strict=True)]
-    return [[dict(zip(paths, row, strict=True)) for row in zip(*columns, strict=True)]]
 
 
 def _is_value(path: toml_files.TomlPath, table: Mapping[str, Any]) -> bool:
@@ -132,17 +132,11 @@ def _value_fault(path: toml_files.TomlPath, value: Any, is_sampled: bool) -> str
         return f"unknown key; {wording.suggestion(path[0], names, {})}"
     if isinstance(value, list):
         return "" if value else "expected at least one value"
-    return _range_fault(value, is_sampled) if _is_range(path, value) else f"expected {sections.AXIS_EXPECTED}"
-
-
-def _range_fault(value: Mapping[str, Any], is_sampled: bool) -> str:
-    """Return the fault of a range, empty if there is none."""
-    unknown = [name for name in value if name not in sections.RANGE_KEYS]
-    if unknown:
+    if not _is_range(path, value):
+        return f"expected {sections.AXIS_EXPECTED}"
+    if unknown := [name for name in value if name not in sections.RANGE_KEYS]:
         return f"{unknown[0]}: unknown key; expected one of {', '.join(sections.RANGE_KEYS)}"
-    low: Any = value.get("from")
-    high: Any = value.get("to")
-    scale = value.get("scale", "linear")
+    low, high, scale = value.get("from"), value.get("to"), value.get("scale", "linear")
     if not (types.is_number(low) and types.is_number(high) and low < high):
         return f"expected numbers from < to{types.magnitudes_in_words([low, high])}"
     if scale not in ("linear", "log") or (scale == "log" and low <= 0):
@@ -165,18 +159,6 @@ def _spacing_fault(table: Mapping[str, Any], is_sampled: bool) -> str:
         is_valid = isinstance(count, int) and 2 <= count <= sections.MAX_CASES
         return "" if is_valid else f"expected a count from 2 to {sections.MAX_CASES}"
     return "" if is_sampled else f"expected {sections.AXIS_EXPECTED}"
-
-
-def _axis(path: toml_files.TomlPath, value: Any) -> Axis:
-    """Return the sweep axis of a valid list or range."""
-    if isinstance(value, list):
-        return Axis(path, tuple(value))
-    low, high, step, count = float(value["from"]), float(value["to"]), value.get("step"), value.get("count")
-    axis = Axis(path, ends=(low, high), log=value.get("scale") == "log")
-    if step is not None:
-        last = int((high - low) / step + STEP_TOLERANCE)
-        return Axis(path, tuple(_rounded(low + k * step, path) for k in range(last + 1)))
-    return axis if count is None else Axis(path, tuple(axis.at(np.linspace(0, 1, count))))
 
 
 def _rounded(value: float, path: toml_files.TomlPath) -> Any:

@@ -100,7 +100,8 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
     try:
         with file_locks.Lock(directory / INDEX_LOCK_FILE, timeout=INDEX_LOCK_TIMEOUT_S):
             stored = _stored_entries(directory)
-            _refuse_another(directory, stored, sweep.entries)
+            if reason := _difference(stored, sweep.entries):
+                raise CaseError(f"--out {directory} holds another sweep: {reason}; choose another folder")
             if not stored:
                 refuse_files_of_others(directory, SWEEP_ENTRIES, "sweep")
             atomic.remove_unfinished(directory, re.compile(rf"{INDEX_FILE}|{TABLE_FILE}"))
@@ -108,7 +109,12 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
                 document = {"version": __version__, "name": sweep.name, "stress_unit": sweep.stress_unit}
                 entries = [_replaced(asdict(entry), math.inf, types.INF) for entry in sweep.entries]
                 atomic.replace_text(directory / INDEX_FILE, result_json.dumps(document | {"cases": entries}))
-            atomic.replace_text(directory / TABLE_FILE, _table(sweep.entries))
+            inputs = list(dict.fromkeys(name for entry in sweep.entries for name in entry.inputs))
+            table: list[list[Any]] = [["case", "folder", "point", "realisation", *inputs]]
+            for entry in sweep.entries:
+                values = [entry.inputs.get(name, "") for name in inputs]
+                table.append([entry.number, entry.folder, entry.point, entry.realisation, *values])
+            atomic.replace_text(directory / TABLE_FILE, csv_text(table))
     except file_locks.LockHeld as error:
         raise CaseError(f"--out {directory}: {error} has been writing its list of cases for long") from error
 
@@ -117,27 +123,14 @@ def _stored_entries(directory: Path) -> tuple[SweepCase, ...]:
     return read_index(directory).entries if (directory / INDEX_FILE).exists() else ()
 
 
-def _refuse_another(directory: Path, stored: Sequence[SweepCase], entries: Sequence[SweepCase]) -> None:
-    """Raise CaseError unless `entries` begin with the stored cases."""
-    reason = f"it has {len(stored)} cases, this file {len(entries)}" if len(stored) > len(entries) else ""
-    differing = [(old, new) for old, new in zip(stored, entries, strict=False) if old != new]
-    if differing:
-        old, new = differing[0]
-        reason = f"its {old.folder} ({old.describe('')}) differs from this file ({new.describe('')})"
-        if old.inputs == new.inputs:
-            reason = f"its {old.folder} differs from this file in keys that do not vary, or in the content of a mesh"
-    if reason:
-        raise CaseError(f"--out {directory} holds another sweep: {reason}; choose another folder")
-
-
-def _table(entries: Sequence[SweepCase]) -> str:
-    """Return cases.csv before any result."""
-    names = list(dict.fromkeys(name for entry in entries for name in entry.inputs))
-    rows = (
-        [entry.number, entry.folder, entry.point, entry.realisation, *(entry.inputs.get(name, "") for name in names)]
-        for entry in entries
-    )
-    return csv_text([["case", "folder", "point", "realisation", *names], *rows])
+def _difference(stored: Sequence[SweepCase], entries: Sequence[SweepCase]) -> str:
+    """Return how cases differ from the stored ones, with which they should begin; empty if they do."""
+    for old, new in zip(stored, entries, strict=False):
+        if old != new and old.inputs == new.inputs:
+            return f"its {old.folder} differs from this file in keys that do not vary, or in the content of a mesh"
+        if old != new:
+            return f"its {old.folder} ({old.describe('')}) differs from this file ({new.describe('')})"
+    return f"it has {len(stored)} cases, this file {len(entries)}" if len(stored) > len(entries) else ""
 
 
 def csv_text(rows: Iterable[Iterable[Any]]) -> str:

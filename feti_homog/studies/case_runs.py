@@ -15,7 +15,7 @@ from feti_homog.case import Case
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError
 from feti_homog.studies import case_folders
 from feti_homog.studies.case_folders import LOCK_FILE, Status
-from feti_homog.studies.description import check_options
+from feti_homog.studies.first_case import check_options
 from feti_homog.studies.sweep_cases import Sweep, SweepCase
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.runtime import file_locks, standard_streams
@@ -55,13 +55,28 @@ def run_all(sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int,
         is_split = ranks_per_case != comm.size
         group: Any = comm.Split(comm.rank // ranks_per_case) if is_split else comm
         if retry:
-            mpi_errors.on_root_only(comm, _reset_failures, directory, sweep)
+
+            def reset_failures() -> None:
+                for entry in sweep.entries:
+                    status = case_folders.case_state(directory, entry).status
+                    if status.is_failure:
+                        case_folders.reset(directory, entry, status)
+
+            mpi_errors.on_root_only(comm, reset_failures)
         fault = _run_free_cases(CaseRunner(group, directory, False, quiet), sweep)
         faults = [fault for fault in comm.allgather(fault) if fault is not None]
         if faults:
             remark = "finished cases are kept; the same command goes on with the others"
             raise FetiHomogError(*dict.fromkeys(line for fault in faults for line in fault.faults), remark)
-    _report(sweep, directory, comm, quiet)
+    states = mpi_errors.on_root(comm, lambda: [case_folders.case_state(directory, entry) for entry in sweep.entries])
+    failed = [(entry, state) for entry, state in zip(sweep.entries, states, strict=True) if state.status.is_failure]
+    if comm.rank == 0 and not quiet:
+        done = sum(state.status is Status.DONE for state in states)
+        standard_streams.say(f"{done} of {len(states)} cases done in {directory}")
+    if failed:
+        if comm.rank == 0:
+            standard_streams.say("\n".join(case_folders.failure_lines(failed, sweep.stress_unit)))
+        raise ConvergenceError(f"{len(failed)} of {len(states)} cases failed; --retry computes them again")
 
 
 def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: bool, quiet: bool) -> None:
@@ -88,19 +103,6 @@ def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: 
         raise ConvergenceError(f"{entry.folder} ({entry.describe(sweep.stress_unit)}): {state.reason}{hint}")
 
 
-def _report(sweep: Sweep, directory: Path, comm: Intracomm, quiet: bool) -> None:
-    """Print the number of finished cases; raises ConvergenceError if some failed.  Collective."""
-    states = mpi_errors.on_root(comm, lambda: [case_folders.case_state(directory, entry) for entry in sweep.entries])
-    if comm.rank == 0 and not quiet:
-        done = sum(state.status is Status.DONE for state in states)
-        standard_streams.say(f"{done} of {len(states)} cases done in {directory}")
-    failed = [(entry, state) for entry, state in zip(sweep.entries, states, strict=True) if state.status.is_failure]
-    if failed:
-        if comm.rank == 0:
-            standard_streams.say("\n".join(case_folders.failure_lines(failed, sweep.stress_unit)))
-        raise ConvergenceError(f"{len(failed)} of {len(states)} cases failed; --retry computes them again")
-
-
 def _run_free_cases(runner: CaseRunner, sweep: Sweep) -> FetiHomogError | None:
     """Run free cases until there are none; returns the error that stopped the group.  Collective in the group.
 
@@ -121,13 +123,6 @@ def _run_free_cases(runner: CaseRunner, sweep: Sweep) -> FetiHomogError | None:
             standard_streams.complain(*error.faults)
         return error
     return None
-
-
-def _reset_failures(directory: Path, sweep: Sweep) -> None:
-    for entry in sweep.entries:
-        status = case_folders.case_state(directory, entry).status
-        if status.is_failure:
-            case_folders.reset(directory, entry, status)
 
 
 @contextmanager
@@ -180,10 +175,22 @@ class CaseRunner:
         try:
             outcome, holder = mpi_errors.on_root(self.comm, self._claim, lock, entry, case)
             if outcome is Outcome.COMPUTED:
-                start = time.perf_counter()
-                status = self._compute(entry, case)
-                seconds = time.perf_counter() - start
-                inputs = entry.describe(case.output.stress_unit)
+                start, status = time.perf_counter(), str(Status.DONE)
+                try:
+                    folder, resume = self.directory / entry.folder, case.section.is_followed
+                    runner.run(case, folder, self.comm, quiet=True, resume=resume)
+                except (CaseError, MeshError, ConvergenceError) as error:  # the case's own
+                    if not mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
+                        raise
+                    mpi_errors.on_root_only(self.comm, case_folders.write_error, self.directory, entry, error)
+                    status = f"failed ({error.faults[0]})"
+                except FetiHomogError:  # a file could not be written: the case is to be computed again
+                    if mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
+                        mpi_errors.on_root_only(
+                            self.comm, case_folders.set_aside, self.directory, entry, Status.DAMAGED
+                        )
+                    raise
+                seconds, inputs = time.perf_counter() - start, entry.describe(case.output.stress_unit)
                 self._print(f"{entry.folder} of {total}: {status}, {seconds:.2f} s; {inputs}")
             return outcome, holder
         finally:
@@ -209,21 +216,6 @@ class CaseRunner:
             case_folders.reset(self.directory, entry, state.status)
         case_folders.write_case_file(self.directory, entry, case)
         return Outcome.COMPUTED, ""
-
-    def _compute(self, entry: SweepCase, case: Case) -> str:
-        """Run a case and keep its error if it is the case's own.  Collective; returns its status in words."""
-        try:
-            runner.run(case, self.directory / entry.folder, self.comm, quiet=True, resume=case.section.is_followed)
-            return Status.DONE
-        except (CaseError, MeshError, ConvergenceError) as error:
-            if not mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
-                raise
-            mpi_errors.on_root_only(self.comm, case_folders.write_error, self.directory, entry, error)
-            return f"failed ({error.faults[0]})"
-        except FetiHomogError:  # a file could not be written: the case is to be computed again
-            if mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
-                mpi_errors.on_root_only(self.comm, case_folders.set_aside, self.directory, entry, Status.DAMAGED)
-            raise
 
     def _print(self, line: str) -> None:
         if self.comm.rank == 0 and not self.quiet:

@@ -4,7 +4,7 @@ import json
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -63,38 +63,30 @@ def write(directory: Path, table: SweepTable) -> list[Path]:
     Raises:
         FetiHomogError: a file cannot be written.
     """
-    rows = {"cases.csv": _case_rows(table), "statistics.csv": _statistics_rows(table)}
+    columns = [*table.inputs.values()]
+    for name, values in table.outputs.items():
+        is_count = name in COUNTS or name.endswith(tuple(f"_{state}" for state in point_tables.STATES))
+        columns.append([int(v) if is_count and np.isfinite(v) else v for v in values.tolist()])
+    cases: list[list[Any]] = [["case", *CASE, *table.inputs, *table.outputs]]
+    for row, _ in enumerate(table.folder):
+        progress = [getattr(table, name)[row] for name in CASE]
+        cases.append([row + 1, *progress, *(values[row] for values in columns)])
+    inputs = [name for name in table.inputs if name != "cell.seed"]
+    statistics: list[list[Any]] = [["point", *inputs, "output", "unit", *PARTS]]
+    for number, point in enumerate(table.points):
+        at_point = [point, *(table.input_of(point, name) for name in inputs)]
+        for name, of_output in table.statistics.items():
+            count, *moments = (float(getattr(of_output, part)[number]) for part in PARTS)
+            if count:
+                statistics.append([*at_point, name, tables.unit(name, table.stress_unit), int(count), *moments])
 
     def cell(value: Any) -> Any:  # nothing for None and NaN, JSON for lists and tables
         is_nothing = value is None or (isinstance(value, float) and math.isnan(value))
         return "" if is_nothing else json.dumps(value) if isinstance(value, list | dict) else value
 
-    texts = {name: case_folders.csv_text(map(cell, row) for row in table_rows) for name, table_rows in rows.items()}
-    return [atomic.replace_text(directory / name, text) for name, text in texts.items()]
-
-
-def _case_rows(table: SweepTable) -> Iterator[list[Any]]:
-    """Yield the column names, then a row for each case."""
-    yield ["case", *CASE, *table.inputs, *table.outputs]
-    columns = [*table.inputs.values()]
-    for name, values in table.outputs.items():
-        is_count = name in COUNTS or name.endswith(tuple(f"_{state}" for state in point_tables.STATES))
-        columns.append([int(v) if is_count and np.isfinite(v) else v for v in values.tolist()])
-    for row, _ in enumerate(table.folder):
-        place = (getattr(table, name)[row] for name in CASE)
-        yield [row + 1, *place, *(values[row] for values in columns)]
-
-
-def _statistics_rows(table: SweepTable) -> Iterator[list[Any]]:
-    """Yield the column names, then a row for each point and output with a result."""
-    inputs = [name for name in table.inputs if name != "cell.seed"]
-    yield ["point", *inputs, "output", "unit", *PARTS]
-    for number, point in enumerate(table.points):
-        place = [point, *(table.input_of(point, name) for name in inputs)]
-        for name, statistics in table.statistics.items():
-            count, *moments = (float(getattr(statistics, part)[number]) for part in PARTS)
-            if count:
-                yield [*place, name, tables.unit(name, table.stress_unit), int(count), *moments]
+    texts = [case_folders.csv_text(map(cell, row) for row in rows) for rows in (cases, statistics)]
+    return [atomic.replace_text(directory / f"{name}.csv", text)
+            for name, text in zip(("cases", "statistics"), texts, strict=True)]  # fmt: skip
 
 
 def _index_and_states(directory: Path) -> tuple[SweepIndex, list[CaseState]]:

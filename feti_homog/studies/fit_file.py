@@ -162,17 +162,14 @@ def _curve_rows(path: Path) -> tuple[tuple[str, str], list[tuple[float, float]]]
         cells, place = table_columns.cells_of(line, delimiter), f"{path}, line {number}"
         if fault := table_columns.row_fault(line, cells, len(heads)):
             raise CaseError(f"{place}: {fault}")
-        strain, stress = (_number(cells[k], delimiter, f"{place}: {heads[k]}") for k in strains + stresses)
-        rows.append((strain, stress))
+        values = list[float]()
+        for k in strains + stresses:
+            value = table_columns.number_of(cells[k], delimiter)
+            if value is None or not types.is_number(value):
+                raise CaseError(f"{place}: {heads[k]} = {wording.toml_value(cells[k])}: expected a number")
+            values.append(value)
+        rows.append((values[0], values[1]))
     return (heads[strains[0]], heads[stresses[0]]), rows
-
-
-def _number(word: str, delimiter: str | None, place: str) -> float:
-    """Return the number in a cell. Raises CaseError."""
-    value = table_columns.number_of(word, delimiter)
-    if value is None or not types.is_number(value):
-        raise CaseError(f"{place} = {wording.toml_value(word)}: expected a number")
-    return value
 
 
 def _case_faults(fit: Fit) -> Iterator[str]:
@@ -221,18 +218,14 @@ def _curve_faults(place: str, case: Case, points: Sequence[Datum]) -> Iterator[s
     if case.analysis.type != "path" or len(case.targets) != 1:
         yield f"{place}expected an analysis of type path, of one leg"
     elif not unknown and (leading := _rising(case.targets[0], state.components)) is not None:
-        yield from (f"{place}{fault}" for fault in _strain_faults(points, *leading))
-
-
-def _strain_faults(points: Sequence[Datum], rising: str, end: float, is_strain: bool) -> Iterator[str]:
-    """Yield faults of a curve's strains beside the leading strain, as `_rising` returns it."""
-    strains = [datum.strain or 0.0 for datum in points]
-    if rising != points[0].strain_name:
-        yield f"expected the strain that rises along the path, {rising}"
-    elif any(strain * end < 0 for strain in strains):
-        yield f"expected strains of the sign of the path, which ends at {end:g}"
-    elif is_strain and (largest := max(map(abs, strains))) > abs(end) * (1 + path_curves.SAME_LOAD):
-        yield f"a strain of {largest:g} is beyond the end of the path at {abs(end):g}"
+        rising, end, is_strain = leading
+        strains = [datum.strain or 0.0 for datum in points]
+        if rising != points[0].strain_name:
+            yield f"{place}expected the strain that rises along the path, {rising}"
+        elif any(strain * end < 0 for strain in strains):
+            yield f"{place}expected strains of the sign of the path, which ends at {end:g}"
+        elif is_strain and (largest := max(map(abs, strains))) > abs(end) * (1 + path_curves.SAME_LOAD):
+            yield f"{place}a strain of {largest:g} is beyond the end of the path at {abs(end):g}"
 
 
 def _rising(target: Mapping[str, float], components: Sequence[tuple[str, str]]) -> tuple[str, float, bool] | None:

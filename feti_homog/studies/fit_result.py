@@ -73,41 +73,32 @@ def measured_csv(document: Mapping[str, Any]) -> str:
 
 def text(document: Mapping[str, Any]) -> str:
     """Return the tables of a fit for a terminal."""
-    data = _labels(document["measured"])
+    measured, is_single = document["measured"], len({datum["test"] for datum in document["measured"]}) == 1
+    tests = ["" if is_single else f"test {datum['test']} " for datum in measured]
+    strains = ["" if d["strain"] is None else f"({d['strain_name']} = {d['strain']:g})" for d in measured]
+    data = [f"{test}{d['name']}{strain}" for test, d, strain in zip(tests, measured, strains, strict=True)]
     heads = [FIRST, tables.Column("estimate"), tables.Column("std")]
     heads += [tables.Column(f"{document['confidence']:.0%} interval", 14), tables.Column("", 12)]
     heads += [tables.Column("  determined by", -40)]
-    rows = [_unknown_row(name, unknown, data) for name, unknown in document["unknowns"].items()]
+    rows = list[list[Any]]()
+    for name, unknown in document["unknowns"].items():
+        order = np.argsort(-np.array(unknown["shares"]), kind="stable")[:3]  # the data that determine it best
+        best = [f"{data[k]} {unknown['shares'][k]:.0%}" for k in order if unknown["shares"][k] >= LEAST_SHARE]
+        bound = "" if unknown["at_bound"] is None else f"at its {unknown['at_bound']} bound; "
+        numbers = [unknown["estimate"], *map(_dash, [unknown["std"], *unknown["interval"]])]
+        rows.append([name, *numbers, f"  {bound}{', '.join(best)}"])
     printed = [tables.Table("Unknowns", heads, rows, title_in_head=True)]
     rows = [[name, *map(_dash, row)] for name, row in zip(document["unknowns"], document["correlation"], strict=True)]
     columns = [FIRST, *(tables.Column(str(k + 1), 8, ".3f") for k in range(len(rows)))]
     printed += [tables.Table("Correlation", columns, rows, title_in_head=True)] if len(rows) > 1 else []
     columns = [FIRST, *(tables.Column(name) for name in HEAD[3:6]), tables.Column("in std", 10, ".2f")]
-    rows = [[label, *(datum[n] for n in HEAD[3:])] for label, datum in zip(data, document["measured"], strict=True)]
+    rows = [[label, *(datum[n] for n in HEAD[3:])] for label, datum in zip(data, measured, strict=True)]
     printed.append(tables.Table("Measured", columns, rows, title_in_head=True))
     chance = "" if document["chance"] is None else f", as large or larger with a chance of {document['chance']:.2g}"
     squares = document["sum_of_squares"]
     total = "beyond all numbers" if squares is None else f"{squares:.4g}"
     last = f"Sum of squares {total}{chance}; {document['evaluations']} evaluations"
     return "\n\n".join(["", *("\n".join(table.lines) for table in printed), last, *_remarks(document, data)])
-
-
-def _labels(measured: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return the names of the measured values, with their strains, and their tests if there are several."""
-    is_single = len({datum["test"] for datum in measured}) == 1
-    tests = ["" if is_single else f"test {datum['test']} " for datum in measured]
-    strains = [
-        "" if datum["strain"] is None else f"({datum['strain_name']} = {datum['strain']:g})" for datum in measured
-    ]
-    return [f"{test}{datum['name']}{strain}" for test, datum, strain in zip(tests, measured, strains, strict=True)]
-
-
-def _unknown_row(name: str, unknown: Mapping[str, Any], data: Sequence[str]) -> list[Any]:
-    """Return the row of an unknown, with the three data that determine it best."""
-    order = np.argsort(-np.array(unknown["shares"]), kind="stable")[:3]
-    shares = ", ".join(f"{data[k]} {unknown['shares'][k]:.0%}" for k in order if unknown["shares"][k] >= LEAST_SHARE)
-    bound = "" if unknown["at_bound"] is None else f"at its {unknown['at_bound']} bound; "
-    return [name, unknown["estimate"], _dash(unknown["std"]), *map(_dash, unknown["interval"]), f"  {bound}{shares}"]
 
 
 def _dash(value: float | None) -> float | str:

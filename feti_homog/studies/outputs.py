@@ -1,6 +1,6 @@
 """Case outputs: numbers in result.json by their column in cases.csv; the meaning of all columns."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,13 @@ def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
 def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numbers) -> dict[str, float]:
     """Return the numbers in a result.json by column name; `numbers` as in Cij for strains in the plane."""
     solver = document["solver"]
-    values = _cell(document["cell"])
+    cell, fractions = document["cell"], document["cell"].get("fractions", {})
+    values = {"fraction_meshed": cell["fibre_fraction"], "elements": cell["elements"], "nodes": cell["nodes"]}
+    if len(fractions) > PHASES_OF_ONE_FIBRE:
+        values |= {f"fraction_{phase}": fraction for phase, fraction in fractions.items()}
+    if cell.get("porosity"):
+        values["porosity"] = cell["porosity"]
+    values |= {name: cell[name] for name in ("refine", "match_distance") if name in cell}
     values |= {name: solver[name] for name in ("ranks", "subdomains", "dofs", "multipliers")}
     values |= {"iterations": sum(solver["iterations"])} | _constants(document, numbers)
     for point in document.get("angle", ()):
@@ -42,17 +48,6 @@ def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numb
     return {name: float(value) for name, value in (values | {"memory": document["memory"]}).items()}
 
 
-def _cell(cell: Mapping[str, Any]) -> dict[str, float]:
-    """Return the numbers of the mesh."""
-    values = {"fraction_meshed": cell["fibre_fraction"], "elements": cell["elements"], "nodes": cell["nodes"]}
-    fractions = cell.get("fractions", {})
-    if len(fractions) > PHASES_OF_ONE_FIBRE:
-        values |= {f"fraction_{phase}": share for phase, share in fractions.items()}
-    if cell.get("porosity"):
-        values["porosity"] = cell["porosity"]
-    return values | {name: cell[name] for name in ("refine", "match_distance") if name in cell}
-
-
 def _constants(document: Document, numbers: Sequence[int]) -> dict[str, float]:
     """Return stiffnesses and constants, their estimated errors, and bounds."""
     values = _linear(document, numbers)
@@ -66,7 +61,11 @@ def _constants(document: Document, numbers: Sequence[int]) -> dict[str, float]:
         estimates = _linear(errors, numbers) | errors.get("constants", {})
         values |= {f"{name}_mesh_error": error for name, error in estimates.items() if name in values}
         values["energy_mesh_error"] = errors["energy"]
-    return values | _bounds(document.get("bounds") or {}, numbers)
+    if bounds := document.get("bounds"):
+        values |= {f"C{i}{i}_{side}": bounds[side][k][k] for side in ("reuss", "voigt") for k, i in enumerate(numbers)}
+        for modulus, (lower, upper) in (bounds.get("hashin_shtrikman") or {}).items():
+            values |= {f"{modulus}_lower": lower, f"{modulus}_upper": upper}
+    return values
 
 
 def _linear(section: Document, numbers: Sequence[int]) -> dict[str, float]:
@@ -85,15 +84,6 @@ def _entries(stiffness: Any, numbers: Sequence[int], suffix: str = "") -> dict[s
     """C11, C12, ... for a stiffness (6, 6), or (3, 3) with the `numbers`; none without entries."""
     rows = range(1, 7) if len(stiffness) == len(voigt.SPATIAL_STRESSES) else numbers
     return _named((f"C{i}{j}{suffix}" for i in rows for j in rows), np.ravel(stiffness).tolist())
-
-
-def _bounds(bounds: Document, numbers: Sequence[int]) -> dict[str, float]:
-    sides = {
-        f"C{i}{i}_{side}": bounds[side][k][k] for side in ("reuss", "voigt") if bounds for k, i in enumerate(numbers)
-    }
-    for modulus, pair in (bounds.get("hashin_shtrikman") or {}).items():
-        sides |= {f"{modulus}_lower": pair[0], f"{modulus}_upper": pair[1]}
-    return sides
 
 
 def _path(document: Document) -> dict[str, float]:

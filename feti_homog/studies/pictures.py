@@ -1,6 +1,6 @@
 """moduli.png of a sweep, over the fibre fraction and between bounds; fit.png, with computed and measured values."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -72,7 +72,14 @@ def moduli_figure(table: SweepTable) -> Figure:
         axes.set_axis_off()
     planes = sorted({document["case"]["analysis"]["plane"] for document in table.finished})
     picture.suptitle(f"{plot_helpers.plain(table.name)}: plane {' and '.join(planes)}", fontsize=12)
-    _add_legend(picture, list(panels)[::-1])
+    legend: dict[str, Any] = {}
+    for axes in panels[::-1]:
+        handles, labels = axes.get_legend_handles_labels()
+        legend |= dict(zip(labels, handles, strict=True))
+    if legend:
+        widest = LEGEND_HANDLE + LEGEND_CHARACTER * max(map(len, legend))
+        columns = max(1, min(len(legend), 5, int(picture.get_figwidth() / widest)))
+        picture.legend(list(legend.values()), list(legend), loc="outside lower center", ncols=columns, frameon=False)
     return picture
 
 
@@ -110,18 +117,6 @@ def _plot_series(axes: Axes, table: SweepTable, series: Series, name: str, style
     if (errors := table.statistics.get(f"{name}_mesh_error")) is not None:
         wide: dict[str, Any] = {"elinewidth": 7.0, "alpha": 0.35, "zorder": 1, "label": "estimated error of the mesh"}
         axes.errorbar(series.x, mean, np.nan_to_num(errors.mean[numbers]), fmt="none", ecolor=colour, **wide)
-
-
-def _add_legend(figure: Any, panels: Sequence[Axes]) -> None:
-    """Add one legend below for all panels."""
-    entries: dict[str, Any] = {}
-    for axes in panels:
-        handles, labels = axes.get_legend_handles_labels()
-        entries |= dict(zip(labels, handles, strict=True))
-    if entries:
-        widest = LEGEND_HANDLE + LEGEND_CHARACTER * max(map(len, entries))
-        columns = max(1, min(len(entries), 5, int(figure.get_figwidth() / widest)))
-        figure.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=columns, frameon=False)
 
 
 Rows = list[Mapping[str, Any]]

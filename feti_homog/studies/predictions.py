@@ -106,7 +106,21 @@ def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], nam
         return np.zeros(len(data)) if is_idle else None
     key = name.removeprefix("interface.")
     exponent = _exponent(document, sections[0], key) if name != key and len(sections) == 1 else None
-    return None if exponent is None else _by_scaling(document, data, exponent / float(sections[0][key]))
+    if exponent is None:
+        return None
+    # S(E; s R) = s S(E / s; R), unless a value depends on the end of the load.
+    relative, numbers, derivatives = exponent / float(sections[0][key]), _values(document), list[float]()
+    for datum in data:
+        if datum.strain is not None:
+            value, slope = _on_curve(document, datum)
+            derivatives.append((value - abs(datum.strain) * slope) * relative)
+            continue
+        mark, _, component = datum.name.partition("_")
+        is_peak = mark == "peak" and numbers[datum.name] != numbers[f"end_{component}"]
+        if not (mark in ("onset", "envelope") or is_peak):
+            return None
+        derivatives.append(numbers[datum.name] * relative)
+    return np.array(derivatives)
 
 
 def _exponent(document: path_curves.Document, section: Mapping[str, Any], key: str) -> float | None:
@@ -124,22 +138,6 @@ def _exponent(document: path_curves.Document, section: Mapping[str, Any], key: s
         return 0.5
     strengths = [name for name in law.limits if math.isfinite(float(section.get(name) or "inf"))]
     return 1.0 if strengths == [key] else None
-
-
-def _by_scaling(document: path_curves.Document, data: Sequence[Datum], share: float) -> Float | None:
-    """Return the derivatives along S(E; s R) = s S(E / s; R), unless a value depends on the end of the load."""
-    values, derivatives = _values(document), []
-    for datum in data:
-        if datum.strain is not None:
-            value, slope = _on_curve(document, datum)
-            derivatives.append((value - abs(datum.strain) * slope) * share)
-            continue
-        place, _, component = datum.name.partition("_")
-        is_peak = place == "peak" and values[datum.name] != values[f"end_{component}"]
-        if not (place in ("onset", "envelope") or is_peak):
-            return None
-        derivatives.append(values[datum.name] * share)
-    return np.array(derivatives)
 
 
 def _on_curve(document: path_curves.Document, datum: Datum) -> tuple[float, float]:

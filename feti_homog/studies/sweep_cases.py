@@ -158,24 +158,17 @@ def case_documents(
     if realisations is not None and "cell.seed" in keys:
         faults.append(f"[{sections.SWEEP}] realisations: excludes cell.seed, the first of which is that of [cell]")
     faults += [f"[{section}] {key}: given twice" for key in dict.fromkeys(keys) if keys.count(key) > 1]
-    return [] if faults else _in_order(points, documents, realisations)
-
-
-def _in_order(
-    points: Sequence[Assignment], documents: Sequence[dict[str, Any]], realisations: int | None
-) -> list[tuple[SweepCase, dict[str, Any]]]:
-    """Return the cases; seeds of realisations count up from the seed in [cell], unless it is faulty."""
     ordered = list[tuple[SweepCase, dict[str, Any]]]()
-    for realisation in range(1, (realisations or 1) + 1):
-        for point, (assignment, document) in enumerate(zip(points, documents, strict=True), start=1):
-            inputs, varied = _inputs(assignment), document
+    for realisation in range(1, (realisations or 1) + 1) if not faults else ():
+        for number, (point, document) in enumerate(zip(points, documents, strict=True), start=1):
+            inputs, varied = _inputs(point), document
             if realisations is not None and _is_random(document):
-                first = document["cell"].get("seed", 0)
+                first = document["cell"].get("seed", 0)  # seeds count up from it, unless it is faulty
                 inputs["cell.seed"] = first + realisation - 1 if isinstance(first, int) else first
                 varied = document | {"cell": document["cell"] | {"seed": inputs["cell.seed"]}}
             elif realisation > 1:
                 continue
-            ordered.append((SweepCase(len(ordered) + 1, point, realisation, inputs, ""), varied))
+            ordered.append((SweepCase(len(ordered) + 1, number, realisation, inputs, ""), varied))
     return ordered
 
 

@@ -148,19 +148,17 @@ def series_over(table: SweepTable, key: str) -> list[Series]:
     A key that varies along with it, one value to one, makes no other series.
     """
     points = [p for p in table.points if table.results_of(p) and table.input_of(p, key) is not None]
-    along = [name for name in table.inputs if _follows(table, points, name, key)]
+    along = list[str]()
+    for name in table.inputs:
+        pairs = {(repr(table.input_of(point, key)), repr(table.input_of(point, name))) for point in points}
+        if len(pairs) == len({value for value, _ in pairs}):
+            along.append(name)
     labels = {point: table.label(point, along) for point in points}
     series = []
     for label in dict.fromkeys(labels.values()):
         rising = sorted((float(table.input_of(point, key)), point) for point in points if labels[point] == label)
         series.append(Series(label, [point for _, point in rising], np.array([x for x, _ in rising])))
     return series
-
-
-def _follows(table: SweepTable, points: Sequence[int], name: str, key: str) -> bool:
-    """Return whether an input has one value for each value of the key."""
-    pairs = {(repr(table.input_of(point, key)), repr(table.input_of(point, name))) for point in points}
-    return len(pairs) == len({value for value, _ in pairs})
 
 
 def varies(table: SweepTable, key: str) -> bool:

@@ -116,35 +116,24 @@ def _means(
         return value
     if "mean" not in value:
         return {name: _means(item, (*path, name), given, faults) for name, item in value.items()}
-    deviation = _deviation(value)
+    deviation, is_entry = 0.0, path[-3:-2] == (STIFFNESS,)
+    if value.keys() in ({"mean", "std"}, {"mean", "cv"}) and all(map(types.is_number, value.values())):
+        deviation = float(value["std"] if "std" in value else value["cv"] * abs(value["mean"]))
     if len(path) == 1:
         faults.append(f"{path[0]} = {wording.toml_value(value)}: expected no number")
-    elif deviation is None:
+    elif not deviation > 0:
         faults.append(f"[{wording.dotted_key(path[:-1])}] {path[-1]} = {wording.toml_value(value)}: {EXPECTED}")
     else:
-        entry = (_named(path), deviation)
-        # A pair of entries of a symmetric stiffness is one number.
-        given += [entry] if entry[0] == path or entry not in given else []
+        # A pair of entries of a symmetric stiffness is one number, Cij as for its derivatives.
+        entry = ((*path[:-2], "C" + "".join(sorted(path[-2:]))) if is_entry else path, deviation)
+        given += [] if is_entry and entry in given else [entry]
     return value["mean"]
-
-
-def _named(path: toml_files.TomlPath) -> toml_files.TomlPath:
-    """Return the path to a stiffness row and column by entry name, as for its derivatives."""
-    return (*path[:-2], "C" + "".join(sorted(path[-2:]))) if path[-3:-2] == (STIFFNESS,) else path
 
 
 def _in_lists(path: toml_files.TomlPath) -> toml_files.TomlPath:
     """Return the path to a stiffness entry Cij with its row and column."""
     result = re.fullmatch(r"C([1-6])([1-6])", path[-1]) if path[-2:-1] == (STIFFNESS,) else None
     return path if result is None else (*path[:-1], *result.groups())
-
-
-def _deviation(value: Mapping[str, Any]) -> float | None:
-    """Return the standard deviation from {mean, std} or {mean, cv}; None if it is faulty."""
-    if value.keys() not in ({"mean", "std"}, {"mean", "cv"}) or not all(map(types.is_number, value.values())):
-        return None
-    spread = value["std"] if "std" in value else value["cv"] * abs(value["mean"])
-    return float(spread) if spread > 0 else None
 
 
 def number_at(document: Mapping[str, Any], path: toml_files.TomlPath) -> float | None:

@@ -90,7 +90,7 @@ class ScatterStudy(Study):
     def _content(self, means: Documents, inexact: Sequence[str], ends: Documents) -> dict[str, Any]:
         """Return the content of uncertainty.json behind its digest."""
         data, uncertainty, count = _data([*means, *ends]), self.uncertainty, len(means)
-        values = _values(means, data)
+        values, mesh_errors = _values(means, data), [constant_tables.mesh_errors(document) for document in means]
         sides = _values(ends, data).reshape(count, len(inexact), 2, len(data))
         slopes = np.zeros((count, len(data), len(uncertainty.std)))
         for k, (name, std) in enumerate(uncertainty.std.items()):
@@ -103,6 +103,11 @@ class ScatterStudy(Study):
         errors = slopes.std(axis=0, ddof=1) / count**0.5 if count > 1 else None
         deviations, shares = uncertainty.propagated(J)
         of_cells = values.std(axis=0, ddof=1) if count > 1 else np.zeros(len(data))
+
+        def mean_error(name: str) -> float | None:
+            estimates = [errors.get(name) for errors in mesh_errors]
+            return None if None in estimates else float(np.mean(np.array(estimates, float)))
+
         return {
             "status": "done",
             "name": self.name,
@@ -117,7 +122,7 @@ class ScatterStudy(Study):
             "results": [
                 {"name": datum.name, "value": float(values[:, k].mean()), "std_inputs": float(deviations[k]),
                  "std_cells": float(of_cells[k]) if count > 1 else None,
-                 "std": float(np.hypot(deviations[k], of_cells[k])), "mesh_error": _mesh_error(means, datum.name),
+                 "std": float(np.hypot(deviations[k], of_cells[k])), "mesh_error": mean_error(datum.name),
                  "derivatives": J[k].tolist(), "derivative_errors": None if errors is None else errors[k].tolist(),
                  "shares": shares[k].tolist()}
                 for k, datum in enumerate(data)
@@ -133,7 +138,13 @@ def load(path: Path) -> ScatterStudy:
 def parse(values: Mapping[str, Any], folder: Path) -> ScatterStudy:
     """Return the study of nested dictionaries. Raises CaseError as `load`."""
     document, faults = {"name": "case", **toml_files.to_document(values)}, list[str]()
-    realisations = _realisations(document.pop(sections.SWEEP, None), faults)
+    table, settings = document.pop(sections.SWEEP, None), sections.SweepSection()
+    if isinstance(table, dict):
+        points, settings = read_points(table, faults)
+        if not faults and any(points):
+            faults.append(f"[{sections.SWEEP}]: expected realisations alone")
+    elif table is not None:
+        faults.append(f"{sections.SWEEP} = {wording.toml_value(table)}: expected a section [{sections.SWEEP}]")
     uncertainty = read_uncertainty(document, faults)
     output = document.setdefault("output", {})
     if not isinstance(output, dict):
@@ -150,7 +161,7 @@ def parse(values: Mapping[str, Any], folder: Path) -> ScatterStudy:
     ):
         output["sensitivities"] = True
     means = {name: number_at(document, _path(name)) or 0.0 for name in uncertainty.std}
-    study = ScatterStudy(document, folder, uncertainty, means, realisations)
+    study = ScatterStudy(document, folder, uncertainty, means, settings.realisations)
     if faults := [*_faults_of_ends(study)]:
         raise CaseError(*faults)
     return study
@@ -160,18 +171,6 @@ def is_study(values: Mapping[str, Any]) -> bool:
     """Return whether a document has uncertain numbers."""
     document = toml_files.to_document(values)
     return sections.UNCERTAINTY in document or bool(read_uncertainty(document, []).std)
-
-
-def _realisations(table: object, faults: list[str]) -> int | None:
-    """Return the realisations in a section [sweep], which may have nothing else."""
-    if not isinstance(table, dict):
-        if table is not None:
-            faults.append(f"{sections.SWEEP} = {wording.toml_value(table)}: expected a section [{sections.SWEEP}]")
-        return None
-    points, settings = read_points(table, faults)
-    if not faults and any(points):
-        faults.append(f"[{sections.SWEEP}]: expected realisations alone")
-    return settings.realisations
 
 
 def _faults_of_ends(study: ScatterStudy) -> Iterator[str]:
@@ -203,19 +202,17 @@ def _values(documents: Documents, data: Sequence[Datum]) -> Float:
     return np.array([[values[datum.name] for datum in data] for values in named], float)
 
 
-def _mesh_error(documents: Documents, name: str) -> float | None:
-    """Return the mean estimated error of a constant; None without an estimate."""
-    errors = [constant_tables.mesh_errors(document).get(name) for document in documents]
-    return None if None in errors else float(np.mean(np.array(errors, float)))
-
-
 def text(document: Mapping[str, Any]) -> str:
     """Return the table with results, their scatter and each input's share, and remarks on noisy slopes."""
     inputs, of_cells = document["parameters"], {"+- cells": "std_cells", "+- both": "std"}
     heads = {"value": "value", "+- inputs": "std_inputs", **(of_cells if document["cells"] > 1 else {})}
     heads["+- mesh"] = "mesh_error"
     results, labels = _scattered(document), [number["name"].removeprefix("material.") for number in inputs]
-    rows = [_row(result, document.get("stress_unit", ""), [*heads.values()]) for result in results]
+    rows = list[list[Any]]()
+    for result in results:
+        numbers = ["-" if result[key] is None else result[key] for key in heads.values()]
+        name = tables.with_unit(result["name"], document.get("stress_unit", ""))
+        rows.append([name, *numbers, *(100 * fraction for fraction in result["shares"])])
     columns = [tables.Column("", -max([18, *(len(row[0]) for row in rows)]) - 2), *map(tables.Column, heads)]
     columns += [tables.Column(label, max(12, len(label) + 2), ".1f") for label in labels]
     title = "Scatter by uncertain numbers (std), and their shares of its variance (%)"
@@ -223,21 +220,16 @@ def text(document: Mapping[str, Any]) -> str:
     differing = ", ".join(number["name"] for number in inputs if number["by"] == "differences")
     lines = ["", *lines, f"By differences of runs: {differing or 'none'}"]
     for k, number in enumerate(inputs):
-        if noisy := ", ".join(_noisy(results, k)):
-            lines.append(f"Standard error over the cells above half of the slope by {number['name']}: {noisy}")
+        noisy = [
+            result["name"]
+            for result in results
+            if (errors := result["derivative_errors"]) and errors[k] > NOISY * abs(result["derivatives"][k])
+        ]
+        if noisy:
+            lines.append(
+                f"Standard error over the cells above half of the slope by {number['name']}: {', '.join(noisy)}"
+            )
     return "\n".join(lines)
-
-
-def _row(result: Mapping[str, Any], stress_unit: str, keys: Sequence[str]) -> list[Any]:
-    numbers = ("-" if result[key] is None else result[key] for key in keys)
-    return [tables.with_unit(result["name"], stress_unit), *numbers, *(100 * share for share in result["shares"])]
-
-
-def _noisy(results: Documents, k: int) -> Iterator[str]:
-    """Yield results whose slope by input k random cells hardly determine."""
-    for result in results:
-        if result["derivative_errors"] and result["derivative_errors"][k] > NOISY * abs(result["derivatives"][k]):
-            yield result["name"]
 
 
 def _scattered(document: Mapping[str, Any]) -> list[Mapping[str, Any]]:

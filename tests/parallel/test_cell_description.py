@@ -6,9 +6,9 @@ import pytest
 from support.base_case import changed
 
 from feti_homog import Case, CaseError, run
+from feti_homog.analysis.description import describe
 from feti_homog.homogenization.partition_policy import BY_COST
 from feti_homog.homogenization.unit_cell import tear
-from feti_homog.studies.description import describe
 from feti_homog.system.petsc.options_database import case_options
 from feti_homog.system.runtime.progress_bar import Progress
 

@@ -12,9 +12,9 @@ from support.pixel_images import pixel_mesh
 from unit.mesh.test_touching import BRANCHES, TWO_FIBRES
 
 from feti_homog import Case, run
+from feti_homog.analysis.description import describe
 from feti_homog.errors import CaseError
 from feti_homog.homogenization.unit_cell import assemble_subdomains
-from feti_homog.studies.description import describe
 from feti_homog.system.runtime.progress_bar import Progress
 
 TOUCHES = "[interface] nodes that never part: at 1 two bodies meet more than once"

@@ -8,10 +8,10 @@ from mpi4py import MPI
 from support.whole_meshes import coarse_mesh
 from unit.mesh.faulty_meshes import grid
 
+from feti_homog.analysis.description import describe
 from feti_homog.case import cases
 from feti_homog.homogenization import cell_remarks
 from feti_homog.mesh.coarse_mesh import interface_edges
-from feti_homog.studies.description import describe
 
 # Glass and epoxy in MPa and micrometres, G_Ic = 2 J/m2, fibres of 7.5 micrometres: Tavara and others, Eng. Anal. Bound.
 # Elem. 35 (2011) 207. k_n = 2025 has the strength 90 MPa and the length 0.77 micrometres.

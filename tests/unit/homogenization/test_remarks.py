@@ -10,9 +10,9 @@ from unit.case.valid_cases import VALID_CASES
 from unit.mesh.faulty_meshes import RIGHT_SIDE, grid
 
 from feti_homog import run
+from feti_homog.analysis.description import describe
 from feti_homog.case.cases import Case
 from feti_homog.homogenization.cell_remarks import table_remarks
-from feti_homog.studies.description import describe
 
 
 @pytest.mark.parametrize(
