@@ -21,7 +21,7 @@ from feti_homog.mesh.sizes.graded_size import MeshSizes
 from feti_homog.mesh.tiles.tile_filling import Filling, Tile, arc_edges, fill
 from feti_homog.mesh.tiles.tiling import DEFAULT_TILES, Regions, TilePolicy, Tiling, cut, is_tiled, tiling
 from feti_homog.microstructure import Arrangement, phase_names
-from feti_homog.microstructure.shapes import Discs, Ellipses
+from feti_homog.microstructure.shapes import Conics
 from feti_homog.typing import Int, Int32
 
 # Radius / width of the cell above which positions on a circle differ by more than rounding.
@@ -34,8 +34,7 @@ def generate(
 ) -> CoarseMesh:
     """Return the mesh that `begin` begins, all of it made here."""
     begun = begin(cell, listed_arrangement(cell), marks, policy)
-    noded = begun.with_nodes() if isinstance(begun, UnmeshedCell) else begun
-    return noded if isinstance(noded, CoarseMesh) else noded.filled()
+    return begun if isinstance(begun, CoarseMesh) else begun.with_nodes().filled()
 
 
 def begin(
@@ -43,10 +42,10 @@ def begin(
     listed: Arrangement | None,
     marks: Mapping[int, Sequence[float]] = NO_MARKS,
     policy: TilePolicy = DEFAULT_TILES,
-) -> UnmeshedCell | NodedCell | CoarseMesh:
+) -> UnmeshedCell | CoarseMesh:
     """Begin the periodic coarse mesh for a square, hexagonal or random cell, or a table.
 
-    Round fibres give the bare lines, ellipses all but the triangles, polygons the whole mesh.
+    Round fibres and ellipses give the bare lines, polygons the whole mesh.
 
     Elements have about the size mesh_size * width, on circles interface_size * width. All is made at the width 1 and
     then scaled, so that cells alike in shape have one mesh at all sizes.
@@ -74,19 +73,14 @@ def begin(
             f"{arrangement.radii.min():.2g}; expected at least {SMALLEST_RADIUS} of the width of the cell"
         )
     scale = arrangement_scale(cell, arrangement)
-    if isinstance(arrangement.outlines, Discs):
-        cell_of_discs = UnmeshedCell.of(arrangement, sizes, marks, scale, policy)
-        field = cell_of_discs.bare.field
-        element_estimate.refuse_many(field.at, field.least, arrangement.size, limit)
-        return cell_of_discs
-    if isinstance(arrangement.outlines, Ellipses):
-        from feti_homog.mesh.outline import elliptic_outline  # discs, the common case, do without
+    if not isinstance(arrangement.outlines, Conics):
+        from feti_homog.mesh.fill.shape_mesher import mesh_outlines  # with a reader of meshes
 
-        lines = elliptic_outline.outline(arrangement, arrangement.outlines, sizes, marks)
-        return NodedCell.of(arrangement, lines, sizes, None, scale)
-    from feti_homog.mesh.fill.shape_mesher import mesh_outlines  # with a reader of meshes
-
-    return mesh_outlines(arrangement, sizes, scale)
+        return mesh_outlines(arrangement, sizes, scale)
+    unmeshed = UnmeshedCell.of(arrangement, sizes, marks, scale, policy)
+    field = unmeshed.bare.field
+    element_estimate.refuse_many(field.at, field.least, arrangement.size, limit)
+    return unmeshed
 
 
 def arrangement_scale(cell: cell_section.Cell, arrangement: Arrangement) -> float:
@@ -114,7 +108,7 @@ def _refuse_extremes(estimate: element_estimate.ElementEstimate, sizes: MeshSize
 
 @dataclass(frozen=True)
 class UnmeshedCell:
-    """A cell with round fibres before its lines have nodes.
+    """A cell with discs or ellipses before its lines have nodes.
 
     Attributes:
         arrangement: where discs are.
@@ -139,7 +133,7 @@ class UnmeshedCell:
         scale: float = 1.0,
         policy: TilePolicy = DEFAULT_TILES,
     ) -> UnmeshedCell:
-        """Return the bare lines of round discs, and their tiles; see `gmsh_mesher.begin`."""
+        """Return the bare lines, and their tiles; see `gmsh_mesher.begin`."""
         tiles = tiling(arrangement, sizes.largest, marks, policy)
         if tiles is None:
             bare = BareOutline.of(arrangement, sizes, marks)

@@ -1,33 +1,43 @@
-"""The lines of a cell with round fibres, cut where they meet; all ranks place their nodes afterwards."""
+"""The lines of a cell with discs and ellipses, cut where they meet; all ranks place their nodes afterwards."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import pairwise
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.mesh.outline.bridges import Bridges, OnCircles
-from feti_homog.mesh.outline.lines import MATRIX, WHOLE, Arcs, Curves, EdgeSamples, Sampling, Segments, Stations
+from feti_homog.mesh.outline.lines import (
+    MATRIX,
+    OUTSIDE,
+    WHOLE,
+    Arcs,
+    Curves,
+    EdgeSamples,
+    Lines,
+    Sampling,
+    Segments,
+    Stations,
+)
 from feti_homog.mesh.outline.outline import (
     SAME_PLACE,
     Numbering,
     Outline,
     arcs_within,
     crossings,
-    disc_at,
+    curve_at,
     images,
+    on_curves,
     on_side,
-    side_curves,
     tip_vertices,
     vertex_angles,
 )
 from feti_homog.mesh.sizes.graded_size import MeshSizes, SizeField, circle_size, size_field
 from feti_homog.microstructure import Arrangement
-from feti_homog.microstructure.shapes import Ellipses, on_circle
+from feti_homog.microstructure.shapes import Conics, Discs, Ellipses
 from feti_homog.system.parallel import dividing
 from feti_homog.typing import Bool, Float, Int
 
@@ -42,7 +52,7 @@ LineStations = tuple[Stations, Stations]
 class SizedLines:
     """Lines that get nodes one by one, so that ranks may share them."""
 
-    arcs: Arcs
+    arcs: Lines
     bridges: Segments
     sampling: Sampling
 
@@ -81,19 +91,17 @@ class BareOutline:
 
     Attributes:
         size: (2,) width and height.
-        circles, disc, around: (k, 3), (k,), (k,) as `outline.images` finds them.
-        places: along each axis the vertices on the sides.
+        curves, disc, around: k outlines, (k,), (k,) as `outline.images` finds them.
         vertices: (v, 2) line ends.
-        circle: (a,) that each arc is on.
+        circle: (a,) the curve of each arc.
         lines: arcs, then bridges.
         field: the size of edges.
     """
 
     size: Float
-    circles: Float
+    curves: Conics
     disc: Int
     around: Int
-    places: list[Float]
     vertices: Float
     circle: Int
     lines: SizedLines
@@ -111,35 +119,40 @@ class BareOutline:
         """Lines whose nodes are to be at distances of at most `sizes`, closer in narrow passages.
 
         `marks` maps a curve to angles in degrees, measured at its centre, that become nodes: curve k is the outer one
-        of fibre k, and ~k that within its coating. The bridges are the last curves.
+        of fibre k, and ~k that within its coating. The bridges, between discs, are the last curves.
         """
         size = arrangement.size
-        circles, disc, around = images(arrangement)
-        places = [crossings(circles, axis, size) for axis in (0, 1)]
+        curves, disc, around = images(arrangement)
         sides = ((axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis]))
-        border = np.concatenate([on_side(places[axis], axis, level) for axis, level in sides])
-        curve = np.where(around == MATRIX, disc, ~disc)
-        angles = vertex_angles(circles, curve, border, marks)
-        # Vertices within coatings are as far from each other as those on the circle around, which they face, unless
+        border = np.concatenate([on_side(crossings(curves, axis, size), axis, level) for axis, level in sides])
+        name = np.where(around == MATRIX, disc, ~disc)
+        crossing = on_curves(curves, border)
+        angles = vertex_angles(curves, name, crossing, marks)
+        border = np.unique(border, axis=0)
+        (circle, *_), ends, away = _arcs(curves, border, angles, size)
+        # Vertices within coatings are as far from each other as those on the curve around, which they face, unless
         # marked.
-        sparse = (around != MATRIX) & ~np.isin(curve, list(marks))
-        border_once = np.unique(border, axis=0)
-        outer = np.concatenate([border_once, _arcs(circles, border, angles, size, ~sparse)[1]])
+        sparse = (around != MATRIX) & ~np.isin(name, list(marks))
+        outer = np.concatenate([border, ends[away & ~sparse[circle]]])
         # Ends of bridges are where there is room for them, and make nothing finer.
         angles = tuple(np.concatenate(parts) for parts in zip(angles, bridges.on_circles, strict=True))
-        (circle, start, stop), ends = _arcs(circles, border, angles, size, np.ones(len(circles), bool))
-        vertices = np.concatenate([border_once, ends])
+        (circle, start, stop), ends, away = _arcs(curves, border, angles, size)
+        vertices = np.concatenate([border, ends[away]])
+        tips = tip_vertices(arrangement, marks, vertices)
+        arcs: Lines
+        if isinstance(curves, Discs):
+            field = size_field(arrangement, sizes, outer, tips)
+            first = np.unique(arrangement.shells[1], return_index=True)[1]
+            caps = circle_size(arrangement, sizes.interface)[first[disc] + (around != MATRIX)]
+            arcs = Arcs(curves.circles[circle], start, stop - start, caps[circle])
+            straight = _segments(curves, bridges, caps, field)
+        else:
+            from feti_homog.mesh.outline import elliptic_outline  # discs, the common case, do without
 
-        def at(fibre: Int, within: Bool, angle: Float) -> Float:
-            radii = np.where(within, arrangement.radii[fibre], arrangement.outer_radii[fibre])
-            return on_circle(np.column_stack([arrangement.centres[fibre], radii]), angle)
-
-        field = size_field(arrangement, sizes, outer, tip_vertices(arrangement, marks, vertices, at))
-        first = np.unique(arrangement.shells[1], return_index=True)[1]
-        caps = circle_size(arrangement, sizes.interface)[first[disc] + (around != MATRIX)]
-        arcs = Arcs(circles[circle], start, stop - start, caps[circle])
-        lines = SizedLines(arcs, _segments(circles, bridges, caps, field), sampling)
-        return cls(size, circles, disc, around, places, vertices, circle, lines, field)
+            field = elliptic_outline.size_field(arrangement, sizes, outer, tips, curves[crossing[0]], crossing[1])
+            arcs = elliptic_outline.EllipticArcs.of(curves[circle], start, stop, sizes.interface)
+            straight = Segments(*np.zeros((3, 0, 2)))
+        return cls(size, curves, disc, around, vertices, circle, SizedLines(arcs, straight, sampling), field)
 
     def stations(self) -> LineStations:
         """Return where the nodes of its lines are, all found here.
@@ -155,44 +168,66 @@ class BareOutline:
         Raises:
             MeshError: the sides would have more than the sampling allows.
         """
-        find, numbering, sampling = partial(disc_at, self.circles), Numbering(self.vertices), self.lines.sampling
-        curves = [
-            side_curves(axis, self.places[axis], find, self.around, self.size, self.field, numbering, sampling)
-            for axis in (0, 1)
-        ]
-        arcs, bridges = stations
+        numbering, (arcs, bridges) = Numbering(self.vertices), stations
+        curves = [self._sides(axis, numbering) for axis in (0, 1)]
         node = numbering.along(self.lines.arcs.points(arcs.line, arcs.share), arcs.first)
         curves.append(Curves(node, arcs.first, self.circle, self.circle, self.around[self.circle]))
         if len(self.lines.bridges):
             node = numbering.along(self.lines.bridges.points(bridges.line, bridges.share), bridges.first)
             straight = np.full(len(self.lines.bridges), MATRIX)
             curves.append(Curves(node, bridges.first, straight, straight, straight))
-        ellipses = Ellipses.round(self.circles)
+        ellipses = Ellipses(self.curves.centres, self.curves.frames)
         return Outline(numbering.points(), Curves.joined(curves), ellipses, self.disc, self.around)
+
+    def _sides(self, axis: int, numbering: Numbering) -> Curves:
+        """Return the pieces of both sides along `axis`, with the same nodes."""
+        places = crossings(self.curves, axis, self.size)
+        begin, span = places[:-1], np.diff(places)
+        longest = np.full((len(span), 2), self.field.base.largest)
+        pieces = Segments(on_side(begin, axis, 0.0), on_side(span, axis, 0.0), longest)
+        samples = EdgeSamples.of(self.field, pieces, self.lines.sampling.side)
+        parts = []
+        for level, low in ((0.0, True), (self.size[1 - axis], False)):
+            inside = curve_at(self.curves, on_side(begin + span / 2, axis, level))
+            # A chord has two edges or more: a triangle with two arc edges beside it could not be flipped. From one
+            # circle of a coating to the other it is no chord.
+            into = np.where(inside == MATRIX, MATRIX, self.around[inside])
+            crosses = np.zeros(len(inside), bool)
+            crosses[:-1] |= into[1:] == inside[:-1]
+            crosses[1:] |= into[:-1] == inside[1:]
+            fewest = np.where((inside == MATRIX) | crosses, 1, 2)
+            stations = samples.stations(fewest, self.lines.sampling.most_nodes)
+            piece, first = stations.line, stations.first
+            along = begin[piece] + span[piece] * stations.share
+            along[first[:-1]], along[first[1:] - 1] = begin, places[1:]
+            node = numbering.along(on_side(along, axis, level), first)
+            if low != (axis == 0):
+                # Counter-clockwise around the cell: along the coordinate at the bottom and at the right.
+                node = node[(first[:-1] + first[1:] - 1)[piece] - np.arange(len(node))]
+            straight, beyond = np.full(len(span), MATRIX), np.full(len(span), OUTSIDE)
+            parts.append(Curves(node, first, straight, inside, beyond))
+        return Curves.joined(parts)
 
 
 def _arcs(
-    circles: Float, border: Float, vertices: OnCircles, size: Float, chosen: Bool
-) -> tuple[tuple[Int, Float, Float], Float]:
-    """Return the arcs by `arcs_within`, and the points (v, 2) at which arcs on `chosen` (k,) circles begin.
-
-    Points on the border, near its points (b, 2), are left out.
-    """
-    arcs = arcs_within(len(circles), *vertices, lambda of, angle: on_circle(circles[of], angle), size)
-    ends, same = on_circle(circles[arcs[0]], arcs[1]), SAME_PLACE * size.max()
+    curves: Conics, border: Float, vertices: OnCircles, size: Float
+) -> tuple[tuple[Int, Float, Float], Float, Bool]:
+    """Return the arcs by `arcs_within`, the points (a, 2) at which they begin, and which are not in `border` (b, 2)."""
+    arcs = arcs_within(curves, vertices, size)
+    ends, same = curves[arcs[0]].points(arcs[1]), SAME_PLACE * size.max()
     away = np.all((ends > same) & (ends < size - same), axis=1)
     close = np.flatnonzero(~away)
     away[close] = cKDTree(border).query(ends[close])[0] > same
-    return arcs, ends[away & chosen[arcs[0]]]
+    return arcs, ends, away
 
 
-def _segments(circles: Float, bridges: Bridges, caps: Float, field: SizeField) -> Segments:
-    """Return the bridges between circles, on which edges are at most `caps` (k,).
+def _segments(curves: Discs, bridges: Bridges, caps: Float, field: SizeField) -> Segments:
+    """Return the bridges between discs, on whose circles edges are at most `caps` (k,).
 
     Where elements are not graded, edges are no longer than the sizes at both ends, interpolated: so gmsh does it across
     the matrix.
     """
-    begin, end = (on_circle(circles[bridges.ends[:, k]], bridges.angle + k * np.pi) for k in (0, 1))
+    begin, end = (curves[bridges.ends[:, k]].points(bridges.angle + k * np.pi) for k in (0, 1))
     longest = np.full((len(begin), 2), field.base.largest)
     if field.graded is None:
         longest = np.stack(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
 
@@ -170,17 +169,15 @@ class SizeField:
 
     Attributes:
         base, graded: these sizes.
-        least_graded: the second is nowhere below it.
     """
 
     base: SourcedSize
-    graded: Callable[[Float], Float] | None = None
-    least_graded: float = np.inf
+    graded: FromLines | None = None
 
     @property
     def least(self) -> float:
         """Size below which there is none."""
-        return min(self.base.least, self.least_graded)
+        return self.base.least if self.graded is None else min(self.base.least, self.graded.least)
 
     @property
     def step(self) -> float:
@@ -205,9 +202,9 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
     """
     size, largest, (shells, disc) = arrangement.size, sizes.largest, arrangement.shells
     circles, caps = np.column_stack([shells.centres, shells.radii]), circle_size(arrangement, largest)
-    outer = np.unique(disc, return_index=True)[1]
+    first = np.unique(disc, return_index=True)[1]
     sources = [
-        _between_fibres(circles[outer], size, caps[outer], largest),
+        _between_fibres(circles[first], size, caps[first], largest),
         _at_sides(circles, size, caps, largest),
         _at_corners(circles, size, caps),
         at_vertices(vertices, size, largest),
@@ -215,52 +212,64 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
     base = SourcedSize(sources, size, largest)
     if not sizes.are_graded(arrangement):
         return SizeField(base)
-    lines = _FromLines.of(arrangement, sizes, tips)
-    return SizeField(base, lines, min(sizes.tip, float(lines.caps.min())))
+    # Points h_i apart on the outer circles find the nearest disc.
+    lengths, outer = sizes.on_circles(arrangement), circles[first]
+    counts = np.ceil(2 * np.pi * outer[:, 2] / lengths).astype(int)
+    disc = np.repeat(np.arange(len(counts)), counts)
+    angle = 2 * np.pi * (np.arange(len(disc)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[disc]
+    points = on_circle(outer[disc], angle)
+    return SizeField(base, FromLines.of(size, points, disc, lengths, sizes.tip, tips, outer))
 
 
 @dataclass(frozen=True)
-class _FromLines:
+class FromLines:
     """h_i + g d and h_t + g max(0, d - h_t) as in `size_field`, whichever is smaller.
-
-    Points h_i apart on the circles find the nearest disc.
 
     Attributes:
         size: (2,) width and height.
-        circles: (N, 3) outer circle by disc.
-        caps: (N,) h_i.
-        tip: h_t.
-        near_tips: tree of the tips.
-        spokes, disc: tree of the points on circles, and their discs (s,).
+        points, owner: tree of points on curves, and the curve (s,) of each.
+        lengths: (k,) h_i of each curve.
+        tip, tips: h_t, and a tree of the tips.
+        circles: (k, 3) from which d is measured; None if it is the distance to the points.
     """
 
     size: Float
-    circles: Float
-    caps: Float
+    points: cKDTree
+    owner: Int
+    lengths: Float
     tip: float
-    near_tips: cKDTree
-    spokes: cKDTree
-    disc: Int
+    tips: cKDTree
+    circles: Float | None
 
     @classmethod
-    def of(cls, arrangement: Arrangement, sizes: MeshSizes, tips: Float) -> _FromLines:
-        """Make the sizes of a cell."""
-        size, caps = arrangement.size, sizes.on_circles(arrangement)
-        radii = arrangement.outer_radii
-        counts = np.ceil(2 * np.pi * radii / caps).astype(int)
-        disc = np.repeat(np.arange(len(counts)), counts)
-        angle = 2 * np.pi * (np.arange(len(disc)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[disc]
-        circles = np.column_stack([arrangement.centres, radii])
-        spokes = cKDTree(wrap(on_circle(circles[disc], angle), size), boxsize=size)
-        near_tips = cKDTree(wrap(tips.reshape(-1, 2), size), boxsize=size)
-        return cls(size, circles, caps, sizes.tip, near_tips, spokes, disc)
+    def of(
+        cls,
+        size: Float,
+        points: Float,
+        owner: Int,
+        lengths: Float,
+        tip: float,
+        tips: Float,
+        circles: Float | None = None,
+    ) -> FromLines:
+        """Return the sizes by points (s, 2) on curves, and tips (t, 2)."""
+        near, near_tips = (cKDTree(wrap(places.reshape(-1, 2), size), boxsize=size) for places in (points, tips))
+        return cls(size, near, owner, lengths, tip, near_tips, circles)
+
+    @property
+    def least(self) -> float:
+        """Size below which there is none."""
+        return min(self.tip, float(self.lengths.min()))
 
     def __call__(self, points: Float) -> Float:
         """(n,) at positions (n, 2) on the torus."""
         places = wrap(points, self.size)
-        nearest = self.disc[self.spokes.query(places)[1]]
-        offset = (points - self.circles[nearest, :2] + self.size / 2) % self.size - self.size / 2
-        away = np.abs(np.linalg.norm(offset, axis=1) - self.circles[nearest, 2])
+        distance, nearest = self.points.query(places)
+        curve = self.owner[nearest]
+        if self.circles is not None:
+            circles = self.circles[curve]
+            offset = (points - circles[:, :2] + self.size / 2) % self.size - self.size / 2
+            distance = np.abs(np.linalg.norm(offset, axis=1) - circles[:, 2])
         # Without tips the distance is infinite.
-        at_tips = self.tip + MAX_GROWTH * np.maximum(0.0, self.near_tips.query(places)[0] - self.tip)
-        return np.asarray(np.minimum(self.caps[nearest] + MAX_GROWTH * away, at_tips))
+        at_tips = self.tip + MAX_GROWTH * np.maximum(0.0, self.tips.query(places)[0] - self.tip)
+        return np.asarray(np.minimum(self.lengths[curve] + MAX_GROWTH * distance, at_tips))

@@ -15,7 +15,7 @@ from scipy.spatial import QhullError
 from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, edges
 from feti_homog.mesh.outline.bridges import CLEAR, Bridges, bridges, centre_lines
 from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE
-from feti_homog.mesh.outline.outline import Outline, crossings, disc_at, images, on_side
+from feti_homog.mesh.outline.outline import Outline, crossings, curve_at, images, on_side
 from feti_homog.mesh.periodic_topology import Torus, plane_edges_of
 from feti_homog.mesh.tiles.matrix_faces import MatrixTiles, beside, grid_cell, matrix_tiles
 from feti_homog.mesh.tiles.tile_filling import Filling, Tile, arc_edges
@@ -75,7 +75,9 @@ def tiling(
     if not is_tiled(arrangement, policy):
         return None
     size = arrangement.size
-    circles, disc, around = images(arrangement)
+    discs, disc, around = images(arrangement)
+    assert isinstance(discs, Discs)
+    circles = discs.circles
     outer = np.flatnonzero(around == MATRIX)
     try:
         lines = centre_lines(circles, outer)
@@ -84,7 +86,7 @@ def tiling(
     marked = [(k, np.radians(angle)) for k in outer.tolist() for angle in marks.get(int(disc[k]), ())]
     vertices = np.array([k for k, _ in marked], np.int64), np.array([angle for _, angle in marked])
     candidates = bridges(lines, size, CLEAR * arrangement.outer_radii.mean(), largest, vertices)
-    sides = _side_pieces(circles, outer, size)
+    sides = _side_pieces(discs, outer, size)
     grid = np.maximum(1, np.round(size * np.sqrt(len(arrangement.radii) / policy.discs / size.prod()))).astype(int)
     matrix = matrix_tiles(circles, outer, sides, candidates, lines, size, grid)
     if matrix is None:
@@ -101,18 +103,18 @@ def tiling(
     )
 
 
-def _side_pieces(circles: Float, outer: Int, size: Float) -> tuple[Int, Float]:
+def _side_pieces(discs: Discs, outer: Int, size: Float) -> tuple[Int, Float]:
     """Return the side pieces in the matrix, as `matrix_tiles` takes them.
 
-    `outer` (n,) are the circles that bound it.
+    `outer` (n,) are the discs that bound it.
     """
     nodes, ends = [], []
     for axis, (level, low) in product((0, 1), ((0.0, True), (1.0, False))):
-        places = crossings(circles[outer], axis, size)
+        places = crossings(discs[outer], axis, size)
         points = on_side(places, axis, level * size[1 - axis])
-        circle = disc_at(circles[outer], on_side((places[:-1] + places[1:]) / 2, axis, level * size[1 - axis]))
+        circle = curve_at(discs[outer], on_side((places[:-1] + places[1:]) / 2, axis, level * size[1 - axis]))
         node = np.where(circle == MATRIX, MATRIX, outer[circle])
-        corner = len(circles) + (points[[0, -1]] > 0) @ [1, 2]
+        corner = len(discs) + (points[[0, -1]] > 0) @ [1, 2]
         piece = np.flatnonzero(circle == MATRIX)
         around = np.concatenate([corner[:1], node, corner[1:]])
         both, where = np.stack([around[piece], around[piece + 2]], axis=1), points[piece[:, None] + [0, 1]]

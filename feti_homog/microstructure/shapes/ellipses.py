@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from feti_homog.microstructure.shapes.outlines import ColumnRange, Columns, ConvexCurves, directions, widest
+from feti_homog.microstructure.shapes.outlines import ColumnRange, Columns, ConvexCurves, directions, on_circle, widest
 from feti_homog.typing import Bool, Float, Int
 
 # Relative difference of the squares of semi-axes of a circle.
@@ -112,6 +112,21 @@ class Ellipses(ConvexCurves):
         unit = self.unit(offsets)
         return np.arctan2(unit[:, 1], unit[:, 0])
 
+    def parameter_at(self, angle: Float) -> Float:
+        """(k,) the parameter of the point that each centre sees at an angle (k,) in radians."""
+        return self.parameter(directions(angle))
+
+    def chord(self, axis: int) -> tuple[Float, Float]:
+        """Return the middles (k,) and half lengths (k,) of the chords on the coordinate `axis`, 0 for a miss.
+
+        d = x - c with the known component v obeys d . (F F^T)^-1 d = 1.
+        """
+        inverse, other = np.linalg.inv(self.squares), 1 - axis
+        v = -self.centres[:, other]
+        p, q = inverse[:, axis, axis], inverse[:, axis, other] * v
+        root = q**2 - p * (inverse[:, other, other] * v**2 - 1)
+        return self.centres[:, axis] - q / p, np.sqrt(np.maximum(root, 0.0)) / p
+
     def level(self, points: Float) -> Float:
         """(n, k) |F^-1 (x - c)| of points (n, 2): below 1 within."""
         inverse = np.linalg.inv(self.frames)
@@ -199,6 +214,11 @@ class Discs(ConvexCurves):
         return np.zeros((len(self), 1, 2))
 
     @property
+    def circles(self) -> Float:
+        """(k, 3) centre and radius."""
+        return np.column_stack([self.centres, self.radii])
+
+    @property
     def frames(self) -> Float:
         """See `Outlines`."""
         return np.asarray(self.radii[:, None, None] * np.eye(2))
@@ -217,6 +237,30 @@ class Discs(ConvexCurves):
         """See `Outlines`."""
         return replace(self, radii=self.radii + thickness)
 
+    def points(self, angle: Float) -> Float:
+        """(k, 2) the point of each at its angle (k,) in radians, which is its parameter."""
+        return on_circle(self.circles, angle)
+
+    def unit(self, offsets: Float) -> Float:
+        """(k, 2) d / r of a vector d (k, 2) for each."""
+        return np.asarray(offsets / self.radii[:, None])
+
+    def parameter(self, offsets: Float) -> Float:
+        """(k,) the angle of d (k, 2)."""
+        return np.arctan2(offsets[:, 1], offsets[:, 0])
+
+    def parameter_at(self, angle: Float) -> Float:
+        """(k,) that angle (k,)."""
+        return angle
+
+    def chord(self, axis: int) -> tuple[Float, Float]:
+        """See `Ellipses`."""
+        return self.centres[:, axis], np.sqrt(np.maximum(self.radii**2 - self.centres[:, 1 - axis] ** 2, 0.0))
+
+    def level(self, points: Float) -> Float:
+        """(n, k) |x - c| / r of points (n, 2): below 1 within."""
+        return np.asarray(np.linalg.norm(points[:, None] - self.centres, axis=2) / self.radii)
+
     def support(self, normal: Float) -> Float:
         """See `Outlines`."""
         return np.broadcast_to(self.radii.reshape(-1, *[1] * (normal.ndim - 2)), normal.shape[:-1])
@@ -230,3 +274,7 @@ class Discs(ConvexCurves):
     def distances(self, offsets: Float) -> Float:
         """See `Outlines`."""
         return np.asarray(np.abs(np.linalg.norm(offsets, axis=2) - self.radii))
+
+
+Conics = Discs | Ellipses
+"""Outlines whose meshes have nodes at debonded arc tips."""
