@@ -28,7 +28,20 @@ def arrange(cell: cell_section.Cell) -> Arrangement:
         from feti_homog.microstructure import periodic_table
 
         return periodic_table.table_arrangement(cell.table, cell.window, cell.repair == "overlaps")
-    return _lattice(cell, cell_section.LATTICES[cell.geometry])
+    lattice, fraction = cell_section.LATTICES[cell.geometry], cell.fibre_fraction
+    limit = lattice.touching / (1 + (cell.coating or 0.0)) ** 2
+    assert fraction is not None
+    if fraction >= limit:
+        raise MeshError(
+            f"[cell] fibre_fraction = {fraction:g}: the fibres of the {cell.geometry} cell touch at "
+            f"{limit:.4f}; it must be smaller"
+        )
+    count = len(lattice.centres)
+    radii = np.full(count, sqrt(fraction * lattice.height / (pi * count)))
+    coating = (cell.coating or 0.0) * radii
+    return Arrangement.of_discs(
+        1.0, lattice.height, np.array(lattice.centres), radii, (phase_names.FIBRE,) * count, coating
+    )
 
 
 def listed_arrangement(cell: cell_section.Cell) -> Arrangement | None:
@@ -37,23 +50,6 @@ def listed_arrangement(cell: cell_section.Cell) -> Arrangement | None:
     Raises as `arrange`.
     """
     return None if cell.table is None else arrange(cell)
-
-
-def _lattice(cell: cell_section.Cell, lattice: cell_section.Lattice) -> Arrangement:
-    """Place equal discs on a lattice."""
-    fraction, height, centres = cell.fibre_fraction, lattice.height, np.array(lattice.centres)
-    limit = lattice.touching / (1 + (cell.coating or 0.0)) ** 2
-    assert fraction is not None
-    if fraction >= limit:
-        raise MeshError(
-            f"[cell] fibre_fraction = {fraction:g}: the fibres of the {cell.geometry} cell touch at "
-            f"{limit:.4f}; it must be smaller"
-        )
-    radius = sqrt(fraction * height / (pi * len(centres)))
-    radii = np.full(len(centres), radius)
-    return Arrangement.of_discs(
-        1.0, height, centres, radii, (phase_names.FIBRE,) * len(centres), (cell.coating or 0.0) * radii
-    )
 
 
 def random_arrangement(

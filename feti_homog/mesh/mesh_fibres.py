@@ -32,17 +32,7 @@ def unwrap(submesh: Submesh) -> tuple[Float, bool]:
         # No two vertices are images of each other: the plane positions are unwrapped.
         return np.zeros((len(submesh.triangles), 2)), True
     part = components(len(submesh.triangles), *edge_pairs(submesh.triangle_edges))
-    shift = _part_shifts(submesh, part)[part]
-    corners = submesh.points[submesh.triangles] + shift[:, None]
-    classes = submesh.vertex_class[submesh.triangles].ravel()
-    position = np.empty((len(submesh.class_keys), 2))
-    position[classes] = corners.reshape(-1, 2)
-    closes = np.allclose(position[classes], corners.reshape(-1, 2), atol=1e-6 * submesh.period.min())
-    return shift, closes
-
-
-def _part_shifts(submesh: Submesh, part: Int) -> Float:
-    """Shift of each plane-connected part, along a spanning tree of their contacts across the cell's boundary."""
+    # The shift of each plane-connected part, along a spanning tree of their contacts across the cell's boundary.
     part_of_edge = np.empty(len(submesh.edges), np.int64)
     part_of_edge[submesh.triangle_edges] = part[:, None]
     a, b = twins(submesh.edge_class)
@@ -61,7 +51,13 @@ def _part_shifts(submesh: Submesh, part: Int) -> Float:
             if np.isnan(shifts[q, 0]):
                 shifts[q] = np.round((shifts[p] + jump) / submesh.period) * submesh.period
                 queue.append(q)
-    return shifts
+    shift = shifts[part]
+    corners = submesh.points[submesh.triangles] + shift[:, None]
+    classes = submesh.vertex_class[submesh.triangles].ravel()
+    position = np.empty((len(submesh.class_keys), 2))
+    position[classes] = corners.reshape(-1, 2)
+    closes = np.allclose(position[classes], corners.reshape(-1, 2), atol=1e-6 * submesh.period.min())
+    return shift, closes
 
 
 def fibre_circles(torus: Torus) -> Float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
 
@@ -201,25 +201,29 @@ class NodedCell:
         points = np.concatenate([lines.points, *(filling.inner for filling in fillings)])
         triangles, circle = np.concatenate(parts), np.concatenate([filling.circle for filling in fillings])
         phase, precedence = self._within
-        void = len(self.phases)
+        solid = phase[circle] < len(self.phases)
+        triangles, circle = triangles[solid], circle[solid]
+        # Nodes within voids are left out.
+        used = np.zeros(len(points), bool)
+        used[triangles] = True
+        number, points = (np.cumsum(used) - 1).astype(np.int32), points[used]
         arcs, arc_circle = arc_edges(lines.curves)
-        filled = CoarseMesh(
+        return CoarseMesh(
             width=scale * arrangement.width,
             height=scale * arrangement.height,
             points=scale * points,
-            triangles=triangles,
+            triangles=number[triangles],
             phase=phase[circle],
             phases=arrangement.phases,
             precedence=precedence[circle],
             representative=representatives(points, arrangement.width, arrangement.height),
             ellipses=lines.ellipses.scaled(scale),
-            arc_edges=arcs,
+            arc_edges=number[arcs],
             arc_circle=arc_circle,
             debonded_edges=np.zeros((0, 2), np.int32),
             centres=scale * arrangement.centres[: arrangement.fibres],
             remarks=arrangement.remarks,
         )
-        return _without_voids(filled, void) if np.any(phase == void) else filled
 
     @cached_property
     def _within(self) -> tuple[Int32, Int32]:
@@ -253,24 +257,3 @@ class NodedCell:
             phase=phase[solid][first].astype(np.int64),
             nodes=len(self.lines.points),
         )
-
-
-def _without_voids(mesh: CoarseMesh, void: int) -> CoarseMesh:
-    """Return the mesh without the triangles of the phase number `void`.
-
-    The phase has no name in it; nodes that no other triangle has are left out.
-    """
-    solid = mesh.phase != void
-    used = np.zeros(len(mesh.points), bool)
-    used[mesh.triangles[solid]] = True
-    number = (np.cumsum(used) - 1).astype(np.int32)
-    points = mesh.points[used]
-    return replace(
-        mesh,
-        points=points,
-        triangles=number[mesh.triangles[solid]],
-        phase=mesh.phase[solid],
-        precedence=mesh.precedence[solid],
-        representative=representatives(points, mesh.width, mesh.height),
-        arc_edges=number[mesh.arc_edges],
-    )

@@ -144,7 +144,7 @@ class BareOutline:
             field = size_field(arrangement, sizes, outer, tips)
             first = np.unique(arrangement.shells[1], return_index=True)[1]
             caps = circle_size(arrangement, sizes.interface)[first[disc] + (around != MATRIX)]
-            arcs = Arcs(curves.circles[circle], start, stop - start, caps[circle])
+            arcs = Arcs(curves.circles[circle], start, stop - start, np.stack([caps[circle]] * 2, axis=1))
             straight = _segments(curves, bridges, caps, field)
         else:
             from feti_homog.mesh.outline import elliptic_outline  # discs, the common case, do without

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
+from feti_homog.mesh.sizes.from_sources import CHUNK
 from feti_homog.typing import Bool, Float, Int
 
 TURN = 2 * np.pi
@@ -18,10 +19,8 @@ TURN = 2 * np.pi
 CLEAR = 0.3
 # Between two bridges on one disc, at least.
 LEAST_ANGLE = np.radians(25)
-# Lines whose neighbourhoods are looked at together.
-CHUNK = 20_000
-# Decimals in which gaps are compared, relative to the cell; ties are broken by place.
-GAP_DECIMALS = 9
+# Decimals in which gaps and centroids are compared, relative to the cell; ties are broken by place.
+PLACE_DECIMALS = 9
 
 # Circle (v,) and angle (v,) in radians of points on circles.
 OnCircles = tuple[Int, Float]
@@ -64,7 +63,7 @@ class CentreLines:
 
 
 def centre_lines(circles: Float, which: Int) -> CentreLines:
-    """Connect the centres of discs `which` (n,) among circles (k, 3)."""
+    """Connect the centres of discs `which` (n,) among circles (k, 3); clearances are known up to 1 + CLEAR."""
     centres, radii = circles[which, :2], circles[which, 2]
     corners = Delaunay(centres).simplices
     pairs = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
@@ -72,37 +71,30 @@ def centre_lines(circles: Float, which: Int) -> CentreLines:
     vector = centres[ends[:, 1]] - centres[ends[:, 0]]
     length = np.linalg.norm(vector, axis=1)
     normal = vector / length[:, None]
+    clearance = np.full(len(ends), np.inf)
+    # Discs of about one radius at a time: small ones far from a line need not be looked at.
+    classes = np.floor(np.log2(radii / radii.min())).astype(int)
+    for members in (np.flatnonzero(classes == level) for level in np.unique(classes)):
+        tree, reach = cKDTree(centres[members]), (1 + CLEAR) * radii[members].max()
+        for begin in range(0, len(ends), CHUNK):
+            some = slice(begin, begin + CHUNK)
+            close = tree.query_ball_point(centres[ends[some, 0]] + vector[some] / 2, length[some] / 2 + reach)
+            line = begin + np.repeat(np.arange(len(close)), [len(candidates) for candidates in close])
+            disc = members[np.concatenate([np.zeros(0, np.int64), *filter(len, close)]).astype(int)]
+            third = (disc[:, None] != ends[line]).all(axis=1)
+            line, disc = line[third], disc[third]
+            offset = centres[disc] - centres[ends[line, 0]]
+            share = np.clip((offset * vector[line]).sum(axis=1) / length[line] ** 2, 0, 1)
+            away = np.linalg.norm(offset - share[:, None] * vector[line], axis=1)
+            np.minimum.at(clearance, line, away / radii[disc])
     facing = centres[ends] + radii[ends][:, :, None] * np.stack([normal, -normal], axis=1)
     return CentreLines(
         ends=which[ends],
         angle=np.arctan2(normal[:, 1], normal[:, 0]),
         gap=length - radii[ends].sum(axis=1),
         facing=facing,
-        clearance=_clearance(centres, radii, ends, 1 + CLEAR),
+        clearance=clearance,
     )
-
-
-def _clearance(centres: Float, radii: Float, ends: Int, limit: float) -> Float:
-    """(e,) least distance / radius between third discs and the lines between `ends` (e, 2), if below `limit`."""
-    clearance = np.full(len(ends), np.inf)
-    # Discs of about one radius at a time: small ones far from a line need not be looked at.
-    classes = np.floor(np.log2(radii / radii.min())).astype(int)
-    for members in (np.flatnonzero(classes == level) for level in np.unique(classes)):
-        tree, reach = cKDTree(centres[members]), limit * radii[members].max()
-        for begin in range(0, len(ends), CHUNK):
-            pairs = ends[begin : begin + CHUNK]
-            start, vector = centres[pairs[:, 0]], centres[pairs[:, 1]] - centres[pairs[:, 0]]
-            length = np.linalg.norm(vector, axis=1)
-            close = tree.query_ball_point(start + vector / 2, length / 2 + reach)
-            line = np.repeat(np.arange(len(pairs)), [len(candidates) for candidates in close])
-            disc = members[np.concatenate([np.zeros(0, np.int64), *filter(len, close)]).astype(int)]
-            third = (disc[:, None] != pairs[line]).all(axis=1)
-            line, disc = line[third], disc[third]
-            offset = centres[disc] - start[line]
-            share = np.clip((offset * vector[line]).sum(axis=1) / length[line] ** 2, 0, 1)
-            away = np.linalg.norm(offset - share[:, None] * vector[line], axis=1)
-            np.minimum.at(clearance[begin : begin + CHUNK], line, away / radii[disc])
-    return clearance
 
 
 def bridges(lines: CentreLines, size: Float, margin: float, largest: float, vertices: OnCircles) -> Bridges:
@@ -118,7 +110,7 @@ def bridges(lines: CentreLines, size: Float, margin: float, largest: float, vert
     away, ends_away = (np.minimum(points, size - points) for points in (middle, lines.facing))
     inside = (ends_away.min(axis=(1, 2)) > margin) & (away.min(axis=1) > np.minimum(largest, lines.gap))
     clear = np.flatnonzero(inside & (lines.clearance > 1 + CLEAR))
-    order = np.lexsort((clear, (lines.gap[clear] / size.max()).round(GAP_DECIMALS)))
+    order = np.lexsort((clear, (lines.gap[clear] / size.max()).round(PLACE_DECIMALS)))
     candidates = Bridges(lines.ends[clear[order]], lines.angle[clear[order]])
     circle, angle = (np.concatenate(parts) for parts in zip(candidates.on_circles, vertices, strict=True))
     # Vertices come before all bridges.

@@ -15,9 +15,8 @@ from feti_homog.microstructure import Arrangement, arrangements
 from feti_homog.microstructure.shapes import Ellipses, directions, gaps
 from feti_homog.typing import Float, Int
 
-# Steps of a quarter of an ellipse between which its length is taken to be linear.
-LENGTH_STEPS = 256
-# Points of each ellipse at which its curvature, and its distance from corners, are taken.
+# Points of each ellipse at which its curvature, and its distance from corners, are taken; steps of a quarter of it
+# between which its length is taken to be linear.
 POINTS = 256
 # Edges of coatings / thickness.
 LONGEST = 10.0
@@ -30,7 +29,6 @@ class EllipticArcs(Lines):
     Attributes:
         ellipses: of each arc.
         angle, way: (a, k) parameters of places on each arc, and the lengths up to there.
-        cap: (a,) longest edge, unless the curvature asks for shorter ones.
     """
 
     ellipses: Ellipses
@@ -40,12 +38,12 @@ class EllipticArcs(Lines):
 
     @classmethod
     def of(cls, ellipses: Ellipses, start: Float, stop: Float, cap: float) -> EllipticArcs:
-        """Return arcs between parameters (a,) of ellipses (a,), all with the longest edge `cap`."""
-        share = np.linspace(0, 1, LENGTH_STEPS + 1)
+        """Return arcs between parameters (a,) of ellipses (a,), with edges of `cap` at most."""
+        share = np.linspace(0, 1, POINTS + 1)
         angle = start[:, None] + (stop - start)[:, None] * share
         places = np.stack([ellipses.points(angle[:, k]) for k in range(len(share))], axis=1)
         length = np.cumsum(np.linalg.norm(np.diff(places, axis=1), axis=2), axis=1)
-        return cls(ellipses, angle, np.column_stack([np.zeros(len(length)), length]), np.full(len(length), cap))
+        return cls(ellipses, angle, np.column_stack([np.zeros(len(length)), length]), np.full((len(length), 2), cap))
 
     @property
     def lengths(self) -> Float:
@@ -55,15 +53,11 @@ class EllipticArcs(Lines):
     def points(self, line: Int, share: Float) -> Float:
         """See `Lines`."""
         way = self.way / self.way[:, -1:]
-        after = np.clip((way[line] <= share[:, None]).sum(axis=1), 1, LENGTH_STEPS)
+        after = np.clip((way[line] <= share[:, None]).sum(axis=1), 1, POINTS)
         low, high = way[line, after - 1], way[line, after]
         part = (share - low) / (high - low)
         parameter = self.angle[line, after - 1] * (1 - part) + self.angle[line, after] * part
         return self.ellipses[line].points(parameter)
-
-    def caps(self, line: Int, share: Float) -> Float:
-        """See `Lines`."""
-        return self.cap[line]
 
 
 def size_field(

@@ -19,25 +19,15 @@ MATRIX, OUTSIDE = -1, -2
 
 
 @dataclass(frozen=True)
-class Curve:
-    """A bridge, or a piece of a side or circle from vertex to vertex, counter-clockwise around cell or disc.
+class Curves:
+    """c bridges, or pieces of sides or circles from vertex to vertex, counter-clockwise around cell or disc.
 
     Attributes:
-        nodes: (k,) node numbers, from end to end.
-        circle: the circle it lies on; MATRIX for a straight line.
-        inside: the region on its left: the disc, or the coating, within that circle, or MATRIX, or OUTSIDE.
-        outside: the region on its right: the coating within the circle around it, or MATRIX, or OUTSIDE.
+        node, first: curve k has the nodes node[first[k] : first[k + 1]], from end to end.
+        circle: (c,) the circle it lies on; MATRIX for a straight line.
+        inside: (c,) the region on its left: the disc, or the coating, within that circle, or MATRIX, or OUTSIDE.
+        outside: (c,) the region on its right: the coating within the circle around it, or MATRIX, or OUTSIDE.
     """
-
-    nodes: Int
-    circle: int
-    inside: int
-    outside: int
-
-
-@dataclass(frozen=True)
-class Curves:
-    """c curves; curve k has the nodes node[first[k] : first[k + 1]], and the other arrays (c,) are as in `Curve`."""
 
     node: Int
     first: Int
@@ -54,12 +44,6 @@ class Curves:
         counts = np.diff(self.first)
         begin = np.delete(np.arange(len(self.node)), self.first[1:] - 1)
         return self.node[begin[:, None] + [0, 1]], np.repeat(np.arange(len(self)), counts - 1)
-
-    def pieces(self) -> list[Curve]:
-        """One after the other."""
-        nodes = np.split(self.node, self.first[1:-1])
-        regions = (self.circle.tolist(), self.inside.tolist(), self.outside.tolist())
-        return [Curve(*parts) for parts in zip(nodes, *regions, strict=True)]
 
     def chosen(self, some: Int) -> Curves:
         """Return the curves `some` (k,)."""
@@ -79,7 +63,13 @@ class Curves:
 
 
 class Lines:
-    """c lines, whose attributes are arrays (c, ...)."""
+    """c lines, whose attributes are arrays (c, ...).
+
+    Attributes:
+        cap: (c, 2) longest edge at both ends, linear between them.
+    """
+
+    cap: Float
 
     @property
     def lengths(self) -> Float:
@@ -92,7 +82,8 @@ class Lines:
 
     def caps(self, line: Int, share: Float) -> Float:
         """(n,) the longest edge there."""
-        raise NotImplementedError
+        low, high = self.cap[line].T
+        return np.asarray(low + share * (high - low))
 
     def __len__(self) -> int:
         return len(self.lengths)
@@ -109,7 +100,6 @@ class Arcs(Lines):
     Attributes:
         circles: (a, 3) centre and radius.
         start, span: (a,) angle in radians at which each begins, and how far it turns.
-        cap: (a,) longest edge.
     """
 
     circles: Float
@@ -126,10 +116,6 @@ class Arcs(Lines):
         """See `Lines`."""
         return on_circle(self.circles[line], self.start[line] + self.span[line] * share)
 
-    def caps(self, line: Int, share: Float) -> Float:
-        """See `Lines`."""
-        return self.cap[line]
-
 
 @dataclass(frozen=True)
 class Segments(Lines):
@@ -137,7 +123,6 @@ class Segments(Lines):
 
     Attributes:
         begin, way: (s, 2) where each begins, and where it goes from there.
-        cap: (s, 2) longest edge at both ends, linear between them.
     """
 
     begin: Float
@@ -152,11 +137,6 @@ class Segments(Lines):
     def points(self, line: Int, share: Float) -> Float:
         """See `Lines`."""
         return np.asarray(self.begin[line] + share[:, None] * self.way[line])
-
-    def caps(self, line: Int, share: Float) -> Float:
-        """See `Lines`."""
-        low, high = self.cap[line].T
-        return np.asarray(low + share * (high - low))
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from feti_homog.typing import Float
 # Growth of the edge length per distance, at most.
 MAX_GROWTH = 0.4
 NEAREST = 16  # sources that count at a position
-# Positions whose sources are looked for at once, for the memory that this takes.
+# Positions whose neighbours are looked for at once, for the memory that this takes.
 CHUNK = 100_000
 
 # Places (k, 2), edge lengths (k,) and growths (k,).

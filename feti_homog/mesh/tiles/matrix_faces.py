@@ -10,14 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.mesh.outline.bridges import TURN, Bridges, CentreLines
+from feti_homog.mesh.outline.bridges import PLACE_DECIMALS, TURN, Bridges, CentreLines
 from feti_homog.mesh.periodic_topology import components
 from feti_homog.microstructure.shapes import on_circle
 from feti_homog.typing import Float, Int
 
 NOWHERE = -1
-# Decimals of the centroids of faces, relative to the cell.
-PLACE_DECIMALS = 9
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.coarse_mesh import areas, flip_double_arcs
-from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE, Curve, Curves
+from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE, Curves
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH
 from feti_homog.typing import Float, Int, Int32
 
@@ -25,8 +25,8 @@ DECIMALS = 12
 AREA_TOLERANCE = 1e-9
 TRIANGLE = 2  # gmsh's type of elements
 
-# Curves are numbered from 1; a negative number is a curve run backwards.
-Signed = tuple[int, Curve]
+# Corners (k, 2) of a closed line, and the tags of its gmsh lines, negative for lines run backwards.
+Loop = tuple[Float, list[int]]
 
 
 @dataclass(frozen=True)
@@ -153,64 +153,50 @@ def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int]]:
 
     Each outline edge is a line with one element, and node n is point n + 1.
     """
-    curves, geo = tile.curves.pieces(), gmsh.model.geo
+    curves, geo = tile.curves, gmsh.model.geo
     for tag, (x, y) in enumerate(tile.points.round(DECIMALS).tolist(), 1):
         geo.addPoint(x, y, 0.0, tag=tag)
-    made = [[geo.addLine(start, stop) for start, stop in pairwise((curve.nodes + 1).tolist())] for curve in curves]
-    for tag in chain.from_iterable(made):
+    nodes = np.split(curves.node, curves.first[1:-1])
+    lines = [[geo.addLine(start, stop) for start, stop in pairwise((curve + 1).tolist())] for curve in nodes]
+    for tag in chain.from_iterable(lines):
         geo.mesh.setTransfiniteCurve(tag, 2)
-
-    def add_loop(loop: list[Signed]) -> int:
-        tags = [made[tag - 1] if tag > 0 else [-line for line in reversed(made[-tag - 1])] for tag, _ in loop]
-        return int(geo.addCurveLoop(list(chain.from_iterable(tags))))
-
+    # Curves run forwards, then backwards with negative tags, and have a region on their left.
+    directed = list(zip(curves.inside.tolist(), nodes, lines, strict=True))
+    for region, curve, tags in zip(curves.outside.tolist(), nodes, lines, strict=True):
+        directed.append((region, curve[::-1], [-tag for tag in reversed(tags)]))
+    # At each vertex one curve of a region starts.
+    after = {(region, int(curve[0])): (curve, tags) for region, curve, tags in directed if region != OUTSIDE}
+    regions: dict[int, list[Loop]] = defaultdict(list)
+    while after:
+        loop, (region, node) = [], next(iter(after))
+        while (region, node) in after:
+            loop.append(after.pop((region, node)))
+            node = int(loop[-1][0][-1])
+        polygon = tile.points[np.concatenate([curve[:-1] for curve, _ in loop])]
+        regions[region].append((polygon, [tag for _, tags in loop for tag in tags]))
     surfaces, circle = [], []
-    regions = defaultdict(list)
-    for loop in _loops(curves):
-        regions[loop[0][1].inside].append(loop)
     # The matrix is last.
     for region in sorted(regions, key=lambda inside: inside == MATRIX):
-        for loops in _with_holes(regions[region], tile.points):
-            surfaces.append(geo.addPlaneSurface([add_loop(loop) for loop in loops]))
+        for outer_and_holes in _with_holes(regions[region]):
+            surfaces.append(geo.addPlaneSurface([geo.addCurveLoop(tags) for tags in outer_and_holes]))
             circle.append(region)
     geo.synchronize()
     return surfaces, circle
 
 
-def _loops(curves: list[Curve]) -> list[list[Signed]]:
-    """Chain curves that have one region on their left to loops; at each vertex one curve of a region starts.
-
-    Curves run forwards, then backwards with a negative tag.
-    """
-    lines = list(enumerate(curves, 1))
-    lines += [(-tag, Curve(curve.nodes[::-1], curve.circle, curve.outside, curve.inside)) for tag, curve in lines]
-    after = {(curve.inside, int(curve.nodes[0])): (tag, curve) for tag, curve in lines if curve.inside != OUTSIDE}
-    loops = []
-    while after:
-        loop = [after.pop(next(iter(after)))]
-        while (key := (loop[0][1].inside, int(loop[-1][1].nodes[-1]))) in after:
-            loop.append(after.pop(key))
-        loops.append(loop)
-    return loops
-
-
-def _with_holes(loops: list[list[Signed]], points: Float) -> list[list[list[Signed]]]:
-    """Group loops: each outer one is followed by the holes within it, which run clockwise."""
-    polygons = [points[np.concatenate([curve.nodes[:-1] for _, curve in loop])] for loop in loops]
-    is_hole = [_area(polygon) < 0 for polygon in polygons]
-    groups = {k: [loop] for k, loop in enumerate(loops) if not is_hole[k]}
-    for loop in (loop for loop, hole in zip(loops, is_hole, strict=True) if hole):
-        place = points[loop[0][1].nodes[0]]
+def _with_holes(loops: list[Loop]) -> list[list[list[int]]]:
+    """Group the lines of loops: an outer loop is followed by the holes within it, which run clockwise."""
+    areas = []
+    for polygon, _ in loops:
+        a, b = polygon - polygon[0], np.roll(polygon, -1, axis=0) - polygon[0]
+        areas.append(float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() / 2))
+    groups = {k: [tags] for k, (_, tags) in enumerate(loops) if areas[k] >= 0}
+    for hole in (k for k in range(len(loops)) if areas[k] < 0):
+        polygon, tags = loops[hole]
         # Of one within the other the inner is meant, which is the smaller.
-        around = groups if len(groups) == 1 else (k for k in groups if _contains(polygons[k], place))
-        groups[min(around, key=lambda k: _area(polygons[k]))].append(loop)
+        around = groups if len(groups) == 1 else (k for k in groups if _contains(loops[k][0], polygon[0]))
+        groups[min(around, key=areas.__getitem__)].append(tags)
     return list(groups.values())
-
-
-def _area(polygon: Float) -> float:
-    """Return the area of a polygon (k, 2), negative if it runs clockwise."""
-    a, b = polygon - polygon[0], np.roll(polygon, -1, axis=0) - polygon[0]
-    return float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() / 2)
 
 
 def _contains(polygon: Float, point: Float) -> bool:

@@ -131,8 +131,20 @@ def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[tuple[Int, Til
     """
     if tiles is None:
         return [(np.arange(len(cell.points)), cell)]
-    curves = cell.curves
-    left, right = _tiles_beside(lines, tiles)
+    # The tiles to the left and right of each curve, OUTSIDE beyond the sides.
+    curves, matrix = cell.curves, tiles.matrix
+    left, right = tiles.within[curves.inside], tiles.within[curves.outside]
+    is_side = curves.outside == OUTSIDE
+    left[is_side & (curves.inside == MATRIX)], right[is_side] = tiles.sides, OUTSIDE
+    arc = np.flatnonzero((curves.circle != MATRIX) & (curves.outside == MATRIX))
+    # The middle of the first edge shows where on the circle an arc is.
+    begin = curves.first[arc]
+    middle = (lines.points[curves.node[begin]] + lines.points[curves.node[begin + 1]]) / 2
+    offset = middle - lines.ellipses.centres[curves.circle[arc]]
+    angle = np.arctan2(offset[:, 1], offset[:, 0])
+    right[arc] = beside(matrix.lines, matrix.tile, matrix.alone, curves.circle[arc], angle)
+    n = len(tiles.bridges.angle)
+    left[len(curves) - n :], right[len(curves) - n :] = tiles.beside.T
     tile = np.concatenate([left, right[right != left]])
     curve = np.concatenate([np.arange(len(curves)), np.flatnonzero(right != left)])
     order = np.lexsort((curve, tile))
@@ -147,24 +159,6 @@ def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[tuple[Int, Til
         bounded = replace(mine, node=node, inside=inside, outside=outside)
         parts.append((nodes, replace(cell, points=cell.points[nodes], curves=bounded)))
     return parts
-
-
-def _tiles_beside(lines: Outline, tiles: Tiling) -> tuple[Int, Int]:
-    """Return the tiles (c,) to the left and right of curves, OUTSIDE beyond the sides."""
-    curves = lines.curves
-    left, right = tiles.within[curves.inside], tiles.within[curves.outside]
-    is_side = curves.outside == OUTSIDE
-    left[is_side & (curves.inside == MATRIX)], right[is_side] = tiles.sides, OUTSIDE
-    arc = np.flatnonzero((curves.circle != MATRIX) & (curves.outside == MATRIX))
-    # The middle of the first edge shows where on the circle an arc is.
-    begin = curves.first[arc]
-    middle = (lines.points[curves.node[begin]] + lines.points[curves.node[begin + 1]]) / 2
-    offset = middle - lines.ellipses.centres[curves.circle[arc]]
-    matrix, angle = tiles.matrix, np.arctan2(offset[:, 1], offset[:, 0])
-    right[arc] = beside(matrix.lines, matrix.tile, matrix.alone, curves.circle[arc], angle)
-    n = len(tiles.bridges.angle)
-    left[len(curves) - n :], right[len(curves) - n :] = tiles.beside.T
-    return left, right
 
 
 @dataclass(frozen=True)
