@@ -82,7 +82,7 @@ def random_arrangement(
     grown = radii + coating + clear
     ask = f"[cell] {cell_sizes.fractions_in_words(cell)} with min_gap = {gap:g} and fibres = {fibres}"
     of_all = "fraction of fibres and voids" if cell.voids else "fibre fraction"
-    if pi * np.sum(grown**2) > 0.9:
+    if pi * np.sum(grown**2) > random_fibres.DENSEST:
         raise MeshError(
             f"{ask}: random arrangements with this gap exist up to a {of_all} of at most about "
             f"{JAMMED / (1 + (cell.coating or 0.0) + gap) ** 2:.2f}; lower one of them"

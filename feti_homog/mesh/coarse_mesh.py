@@ -124,13 +124,11 @@ def flip_double_arcs(triangles: Int32, phase: Int32, arc_edges: Int32, arc_circl
     triangles = triangles.copy()
     for _ in range(8):
         bad, corner = double_arcs(triangles, arc_edges, arc_circle, nodes)
-        keys = edge_keys(edges(triangles), nodes)
-        order = np.argsort(keys, kind="stable")
-        chord = 3 * bad + corner
-        first = np.searchsorted(keys[order], keys[chord])
-        pair = np.stack([order[first], order[np.minimum(first + 1, len(keys) - 1)]])
-        other = np.where(pair[0] == chord, pair[1], pair[0])
-        flippable = (keys[other] == keys[chord]) & (phase[other // 3] == phase[bad])
+        one, twin = twins(edge_keys(edges(triangles), nodes))
+        opposite = np.full(3 * len(triangles), -1)
+        opposite[one], opposite[twin] = twin, one
+        other = opposite[3 * bad + corner]
+        flippable = (other >= 0) & (phase[other // 3] == phase[bad])
         _, unique = np.unique(other // 3, return_index=True)
         once = np.zeros(len(bad), dtype=bool)
         once[unique] = True
@@ -161,15 +159,15 @@ def double_arcs(triangles: Int32, arc_edges: Int32, arc_circle: Int32, nodes: in
 
 def interface_edges(mesh: CoarseMesh) -> Int32:
     """Return the edges (k, 2) between phases or beside voids on the torus; on sides the low copy."""
-    pairs, order = _neighbours(mesh)
+    pairs, order, alone = _neighbours(mesh)
     between = mesh.phase[order[:, 0] // 3] != mesh.phase[order[:, 1] // 3]
-    return np.concatenate([pairs[order[between, 0]], pairs[_alone(pairs, order)]])
+    return np.concatenate([pairs[order[between, 0]], pairs[alone]])
 
 
 def void_edges(mesh: CoarseMesh) -> Int32:
     """Return the edges (k, 2) beside voids, with one triangle on the torus; on sides the low copy."""
-    pairs, order = _neighbours(mesh)
-    return np.asarray(pairs[_alone(pairs, order)])
+    pairs, _, alone = _neighbours(mesh)
+    return np.asarray(pairs[alone])
 
 
 def voids(mesh: CoarseMesh) -> int:
@@ -183,24 +181,19 @@ def voids(mesh: CoarseMesh) -> int:
 
 def can_debond(mesh: CoarseMesh, pairs: Int32) -> Bool:
     """Return whether edges (k, 2) are between a fibre and the matrix on the torus; either copy on sides."""
-    low_copies, order = _neighbours(mesh)
+    low_copies, order, _ = _neighbours(mesh)
     in_matrix = mesh.phase[order // 3] == 0
     between = low_copies[order[in_matrix[:, 0] != in_matrix[:, 1], 0]]
     n = len(mesh.points)
     return np.isin(edge_keys(_low_copies(mesh, pairs), n), edge_keys(between, n))
 
 
-def _neighbours(mesh: CoarseMesh) -> tuple[Int32, Index]:
-    """Return triangle edges (3m, 2), low copies on sides, and the two places (e, 2) where an edge is shared."""
+def _neighbours(mesh: CoarseMesh) -> tuple[Int32, Index, Bool]:
+    """Return triangle edges (3m, 2), low copies on sides, which two (e, 2) are shared, and which (3m,) are not."""
     pairs = _low_copies(mesh, edges(mesh.triangles))
-    return pairs, np.stack(twins(edge_keys(pairs, len(mesh.points))), axis=1)
-
-
-def _alone(pairs: Int32, order: Index) -> Bool:
-    """Return which of the edges of `_neighbours` (3m, 2) no other triangle has."""
-    alone = np.ones(len(pairs), bool)
+    order, alone = np.stack(twins(edge_keys(pairs, len(mesh.points))), axis=1), np.ones(len(pairs), bool)
     alone[order] = False
-    return alone
+    return pairs, order, alone
 
 
 def _low_copies(mesh: CoarseMesh, pairs: Int32) -> Int32:

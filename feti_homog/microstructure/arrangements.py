@@ -18,6 +18,8 @@ from feti_homog.typing import Bool, Float, Int
 
 # Decimals in which lengths / width of the cell are compared.
 DECIMALS = 10
+# Radius / width of the cell above which positions on a circle differ by more than rounding.
+SMALLEST_RADIUS = 1e-6
 # Gaps between tangents that are looked at, and the narrowest of them / the widest.
 MOST_GAPS, NARROWEST = 4, 0.7
 # Directions of the lines that may part a place from a convex outline.

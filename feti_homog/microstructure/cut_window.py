@@ -31,14 +31,10 @@ class _Pairs:
     shift: Float
     least: Float
 
-    @property
-    def key(self) -> Float:
-        """(k, 4) keys that distinguish pairs."""
-        return np.column_stack([self.first, self.second, np.round(self.shift)])
-
     def joined(self, other: _Pairs) -> _Pairs:
         """All pairs from both, each once."""
-        keys = np.concatenate([self.key, other.key])
+        both = (self, other)
+        keys = np.concatenate([np.column_stack([pairs.first, pairs.second, np.round(pairs.shift)]) for pairs in both])
         once = np.unique(keys, axis=0, return_index=True)[1]
         least = np.concatenate([self.least, other.least])[once]
         return _Pairs(keys[once, 0].astype(np.intp), keys[once, 1].astype(np.intp), keys[once, 2:], least)
@@ -73,43 +69,31 @@ def moves(outlines: Outlines, size: Float) -> Float:
     """
     centres, radii, parting = outlines.centres, outlines.radii, outlines.parting
     reach = 3 * float(outlines.longest.max())
-    moved, gap = np.zeros_like(centres), _gap_within(centres, radii, size, reach, parting)
-    nobody = np.zeros(0, np.intp)
-    pairs = _Pairs(nobody, nobody, np.zeros((0, 2)), np.zeros(0))
-    for _ in range(MAX_STEPS):
-        near = _near(centres, moved, radii, size, gap, reach, parting)
-        present = near.vectors(centres + moved, size)
-        normal, least = parting(near.first, near.second, present)
-        short = near.where((normal * present).sum(axis=1) < (least + near.least) * (1 - TOLERANCE))
-        before, pairs = moved, pairs.joined(short)
-        moved = _least_moves(pairs, centres, moved, size, float(radii.mean()), parting)
-        if len(short.first) == 0 and np.abs(moved - before).max() < SETTLED * radii.mean():
-            return moved
-    raise MeshError("there is no room to move them apart")
-
-
-def _gap_within(centres: Float, radii: Float, size: Float, reach: float, parting: Parting) -> float:
-    """Return the smallest gap / radius sum among discs that are not across the border, within its limits."""
     first, second, vector = neighbours(centres, size, reach)
     across = np.abs(centres[second] - centres[first] - vector).max(axis=1) > TOLERANCE * radii.mean()
     normal, least = parting(first, second, vector)
-    gap = ((normal * vector).sum(axis=1) - least) / (radii[first] + radii[second])
-    return float(np.clip(gap[~across].min(initial=MOST_GAP), LEAST_GAP, MOST_GAP))
-
-
-def _near(
-    centres: Float, moved: Float, radii: Float, size: Float, gap: float, reach: float, parting: Parting
-) -> _Pairs:
-    """Pairs of different discs that are, or soon may be, nearer than they must be."""
-    present = centres + moved
-    first, second, vector = neighbours(present, size, reach)
-    apart = first != second
-    first, second, vector = first[apart], second[apart], vector[apart]
-    shift = np.round((vector - present[second] + present[first]) / size)
-    vector = centres[second] - centres[first] + shift * size
-    normal, least = parting(first, second, vector)
-    before, target = (normal * vector).sum(axis=1) - least, (radii[first] + radii[second]) * gap
-    return _Pairs(first, second, shift, np.where(shift.any(axis=1), target, np.minimum(before, target)))
+    within = (((normal * vector).sum(axis=1) - least) / (radii[first] + radii[second]))[~across]
+    gap, moved = float(np.clip(within.min(initial=MOST_GAP), LEAST_GAP, MOST_GAP)), np.zeros_like(centres)
+    nobody = np.zeros(0, np.intp)
+    pairs = _Pairs(nobody, nobody, np.zeros((0, 2)), np.zeros(0))
+    for _ in range(MAX_STEPS):
+        # Different fibres that are, or soon may be, nearer than they must be.
+        first, second, vector = neighbours(centres + moved, size, reach)
+        apart = first != second
+        first, second, vector = first[apart], second[apart], vector[apart]
+        shift = np.round((vector - (centres + moved)[second] + (centres + moved)[first]) / size)
+        vector = centres[second] - centres[first] + shift * size
+        normal, least = parting(first, second, vector)
+        before, target = (normal * vector).sum(axis=1) - least, (radii[first] + radii[second]) * gap
+        near = _Pairs(first, second, shift, np.where(shift.any(axis=1), target, np.minimum(before, target)))
+        present = near.vectors(centres + moved, size)
+        normal, least = parting(near.first, near.second, present)
+        short = near.where((normal * present).sum(axis=1) < (least + near.least) * (1 - TOLERANCE))
+        last, pairs = moved, pairs.joined(short)
+        moved = _least_moves(pairs, centres, moved, size, float(radii.mean()), parting)
+        if len(short.first) == 0 and np.abs(moved - last).max() < SETTLED * radii.mean():
+            return moved
+    raise MeshError("there is no room to move them apart")
 
 
 def _least_moves(pairs: _Pairs, centres: Float, moved: Float, size: Float, unit: float, parting: Parting) -> Float:

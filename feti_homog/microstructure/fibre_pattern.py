@@ -63,13 +63,6 @@ class FibrePattern:
         """
         return pi * fsum(self.radii * self.radii) / self.area
 
-    @property
-    def side_distance(self) -> Float:
-        """(N,) distance from each centre to the window's sides; infinite in a periodic cell."""
-        if self.periodic:
-            return np.full(self.count, np.inf)
-        return np.asarray(np.minimum(self.centres, self.size - self.centres).min(axis=1))
-
     @cached_property
     def wrapped(self) -> Float:
         """(N, 2) centres within [0, width) x [0, height)."""

@@ -127,8 +127,12 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
     read, others = table_columns.understood(words, COLUMNS)
     _check_names(words, read, others, lines[0][0], faults)
     faults.throw()
+    # Fibres begin below the names, or a first line without numbers, and below a line of units.
+    first, *others_first = [table_columns.cells_of(line, delimiter) for _, line in lines[:2]]
+    if columns is None or all(table_columns.number_of(word, delimiter) is None for word in first):
+        lines = lines[2 if others_first and table_columns.are_units(others_first[0]) else 1 :]
     rows: dict[int, dict[str, Any]] = {}
-    for number, line in _below_names(lines, columns is None, delimiter):
+    for number, line in lines:
         cells = table_columns.cells_of(line, delimiter)
         if fault := table_columns.row_fault(line, cells, len(words)):
             faults.add(number, fault)
@@ -169,14 +173,6 @@ class _Faults:
             raise CaseError(*self.lines)
 
 
-def _below_names(lines: list[tuple[int, str]], has_names: bool, delimiter: str | None) -> list[tuple[int, str]]:
-    """Return the fibre lines: without the first if it has names, or no numbers, and without a next one with units."""
-    first, *others = [table_columns.cells_of(line, delimiter) for _, line in lines[:2]]
-    if not has_names and any(table_columns.number_of(word, delimiter) is not None for word in first):
-        return lines
-    return lines[2 if others and table_columns.are_units(others[0]) else 1 :]
-
-
 def _read_sizes(comment: str, row: int, sizes: dict[str, float], faults: _Faults) -> None:
     """Add the cell sizes in a comment to `sizes`."""
     for key, word in SIZE.findall(comment):
@@ -204,14 +200,11 @@ def _check_names(
         if meant := table_columns.misspelt(word, [name for name in COLUMNS if name not in names]):
             faults.add(row, f"column {wording.toml_value(word)}: unknown; did you mean {meant}?")
     ignored = f"; not read: {', '.join(map(wording.toml_value, others))}" if others else ""
-    for name in _missing(set(names)):
-        faults.add(row, f"column {name}: missing{ignored}")
-
-
-def _missing(names: set[str]) -> list[str]:
-    """Columns that a table with these lacks: x, y, and the radius or a shape's sizes, which stand in its place."""
-    sizes = next((sizes for sizes in (("radius",), *REPLACING) if names & set(sizes)), ("radius",))
-    return [name for name in ("x", "y", *sizes) if name not in names]
+    # The radius, or the sizes of a shape in its place.
+    sizes = next((sizes for sizes in (("radius",), *REPLACING) if {*names} & {*sizes}), ("radius",))
+    for name in ("x", "y", *sizes):
+        if name not in names:
+            faults.add(row, f"column {name}: missing{ignored}")
 
 
 def _table(
@@ -251,11 +244,6 @@ def _cell_faults(cells: Mapping[str, Any]) -> Iterator[str]:
         complaint = table_columns.FIBRE_CELLS[key].complaint(cells.get(key, 1.0))
         if complaint:
             yield f"{key} = {wording.toml_value(cells[key])}: {complaint}"
-    yield from _phase_faults(cells)
-
-
-def _phase_faults(cells: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the faults in the phase of one row."""
     phase = cells.get("phase", "fibre")
     if phase == VOID:
         yield from (f"{key} = {wording.toml_value(cells[key])}: a void has none" for key in OF_FIBRES if cells.get(key))

@@ -6,7 +6,15 @@ import numpy as np
 
 from feti_homog.errors import MeshError
 from feti_homog.microstructure import cut_window
-from feti_homog.microstructure.arrangements import Arrangement, clear_shift, clearance, in_voids, neighbours
+from feti_homog.microstructure.arrangements import (
+    DECIMALS,
+    SMALLEST_RADIUS,
+    Arrangement,
+    clear_shift,
+    clearance,
+    in_voids,
+    neighbours,
+)
 from feti_homog.microstructure.fibre_table import FibreTable
 from feti_homog.microstructure.shapes.ellipses import Discs
 from feti_homog.microstructure.shapes.outlines import Outlines, directions
@@ -19,15 +27,13 @@ SAME_FIBRE = 0.01
 COMPARED = directions(np.linspace(0.0, 2 * np.pi, 24, endpoint=False))
 # Gap / mean radius of two fibres below which they touch: elements between them would be too many.
 LEAST_GAP = 1e-4
-# Radius / width of the cell above which positions on a circle differ by more than rounding.
-SMALLEST_RADIUS = 1e-6
 # Thickness / radius of the thinnest and of the thickest coating.
 COATINGS = 0.01, 1.0
 # Distance of the sides of a cell from tangency with an outline / mean radius, below which elements there are needles.
 LEAST_CLEARANCE = 1e-3
-# Decimals of coordinates / width of the cell of tables that may have any origin and unit, and of height / width: gmsh
-# may put other elements beside ellipses and polygons where the last digit of a length is another.
-TABLE_DECIMALS, HEIGHT_DECIMALS = 10, 12
+# Decimals of height / width of tables that may have any origin and unit; coordinates / width have DECIMALS: gmsh may
+# put other elements beside ellipses and polygons where the last digit of a length is another.
+HEIGHT_DECIMALS = 12
 # Overlap / radius of the smaller fibre, up to which fibres are repaired.
 REPAIRED = 0.01
 MOST_LISTED = 30  # moved fibres that are listed one by one
@@ -50,9 +56,17 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
     table, repaired = _repaired(table, window) if repairs else (table, ())
     retained, centres, moves, size = on_torus(table, window)
     order = np.argsort(table.is_void[retained], kind="stable")
-    rows, places = retained[order], (centres + moves)[order]
-    fibres = replace(
-        _nested(table, rows, places % size / size[0], float(size[1] / size[0])),
+    rows, places = retained[order], (centres + moves)[order] % size / size[0]
+    outlines, core = table.outlines[rows].per(size[0]).at(places), table.inner_radius[rows] / size[0]
+    is_hollow = core > 0
+    fibres = Arrangement(
+        width=1.0,
+        height=float(size[1] / size[0]),
+        outlines=with_parts(outlines, [(is_hollow, Discs(places[is_hollow], core[is_hollow]))]),
+        phase=tuple(table.phase[row] for row in rows),
+        coating=np.where(is_hollow, outlines.radii - core, table.coating[rows] * outlines.radii),
+        is_hollow=is_hollow,
+        row=rows,
         remarks=repaired + (_moved_fibres(table, retained, moves) if window == "cut" else ()),
     )
     shifted = clear_shift(fibres)
@@ -90,28 +104,14 @@ def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ..
     return replace(table, columns=columns), (f'[cell] repair = "overlaps": {words}',)
 
 
-def _nested(table: FibreTable, rows: Int, centres: Float, height: float) -> Arrangement:
-    """Return the rows (k,) about these centres / cell width.
-
-    A ring around each outline that has a coating or that is a void in a hollow fibre.
-    """
-    assert table.width is not None
-    outlines, core = table.outlines[rows].per(table.width).at(centres), table.inner_radius[rows] / table.width
-    radii, is_hollow = outlines.radii, core > 0
-    coating = np.where(is_hollow, radii - core, table.coating[rows] * radii)
-    inner = with_parts(outlines, [(is_hollow, Discs(centres[is_hollow], core[is_hollow]))])
-    phase = tuple(table.phase[row] for row in rows)
-    return Arrangement(1.0, height, inner, phase, coating, is_hollow, row=rows)
-
-
 def _rounded(arrangement: Arrangement) -> Arrangement:
-    """Return the arrangement with coordinates to TABLE_DECIMALS, 0 on either side, in a cell of HEIGHT_DECIMALS."""
-    outlines, least = arrangement.outlines.rounded(TABLE_DECIMALS), 10.0**-TABLE_DECIMALS
+    """Return the arrangement with coordinates to DECIMALS, 0 on either side, in a cell of HEIGHT_DECIMALS."""
+    outlines, least = arrangement.outlines.rounded(DECIMALS), 10.0**-DECIMALS
     return replace(
         arrangement,
         height=round(arrangement.height, HEIGHT_DECIMALS),
         outlines=outlines.at(np.where(outlines.centres >= arrangement.size - least, 0.0, outlines.centres)),
-        coating=arrangement.coating.round(TABLE_DECIMALS),
+        coating=arrangement.coating.round(DECIMALS),
     )
 
 
@@ -141,7 +141,19 @@ def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
     retained = np.flatnonzero(first)
     centres = centres[retained]
     outer = table.outlines[retained].at(centres).grown((table.coating * table.radius)[retained])
-    _raise_faults(table, _contacts(table, retained, outer, size, is_cut))
+    # Fibres that overlap or touch, in a cut window only within it.
+    one, other, gap, together, across = _gaps(table, retained, outer, size)
+    bad = np.flatnonzero((gap < LEAST_GAP * together / 2) & ~(across & is_cut))
+    for k in bad[np.unique(np.stack([one[bad], other[bad]]), axis=1, return_index=True)[1]].tolist():
+        i, j = table.row[retained[one[k]]], table.row[retained[other[k]]]
+        who = f"rows {i} and {j}" if i != j else f"row {i} and its image"
+        what = f"overlap by {-gap[k]:.3g}" if gap[k] < -LEAST_GAP * together[k] / 2 else "touch"
+        least = REPAIRED * min(table.radius[retained[[one[k], other[k]]]])
+        hint = '; repair = "overlaps" makes them smaller' if -gap[k] < least else ""
+        faults.append(f"{who}: {what}{' across the border' if across[k] else ''}{hint}")
+    if across[bad].any():
+        faults.append('fibres meet across the border: give the right width and height, or window = "cut"')
+    _raise_faults(table, faults)
     if not is_cut:
         return retained, centres, np.zeros_like(centres), size
     try:
@@ -214,26 +226,6 @@ def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool
     is_first = np.ones(len(radius), bool)
     is_first[np.maximum(first, second)] = is_cut
     return is_first, faults
-
-
-def _contacts(table: FibreTable, kept: Int, outer: Outlines, size: Float, is_cut: bool) -> list[str]:
-    """Faults of fibres, the rows `kept` (k,) with their coatings, that overlap or touch.
-
-    In a cut window only within it.
-    """
-    first, second, gap, together, across = _gaps(table, kept, outer, size)
-    bad = np.flatnonzero((gap < LEAST_GAP * together / 2) & ~(across & is_cut))
-    faults = []
-    for k in bad[np.unique(np.stack([first[bad], second[bad]]), axis=1, return_index=True)[1]].tolist():
-        i, j = table.row[kept[first[k]]], table.row[kept[second[k]]]
-        who = f"rows {i} and {j}" if i != j else f"row {i} and its image"
-        what = f"overlap by {-gap[k]:.3g}" if gap[k] < -LEAST_GAP * together[k] / 2 else "touch"
-        least = REPAIRED * min(table.radius[kept[[first[k], second[k]]]])
-        hint = '; repair = "overlaps" makes them smaller' if -gap[k] < least else ""
-        faults.append(f"{who}: {what}{' across the border' if across[k] else ''}{hint}")
-    if (across[bad]).any():
-        faults.append('fibres meet across the border: give the right width and height, or window = "cut"')
-    return faults
 
 
 def _gaps(table: FibreTable, kept: Int, outer: Outlines, size: Float) -> tuple[Int, Int, Float, Float, Bool]:

@@ -85,18 +85,15 @@ def nearest_neighbours(pattern: FibrePattern, count: int = 3) -> NearestNeighbou
         distances[:, :known] = result[:, 1:]  # the first is the fibre itself
         vectors = candidates[which[:, 1:]] - candidates[: pattern.count, None]
         directions[:, :known] = np.degrees(np.arctan2(vectors[..., 1], vectors[..., 0])) % 360
-    return NearestNeighbours(distances, directions, _weights(pattern, distances))
-
-
-def _weights(pattern: FibrePattern, distances: Float) -> Float:
     if pattern.periodic:
-        return np.full(distances.shape, 1 / pattern.count)
-    counts = distances <= pattern.side_distance[:, None]
+        return NearestNeighbours(distances, directions, np.full(distances.shape, 1 / pattern.count))
+    to_side = np.minimum(pattern.centres, pattern.size - pattern.centres).min(axis=1)
+    counts = distances <= to_side[:, None]
     d = np.where(counts, distances, 0.0)
     inner = (pattern.width - 2 * d) * (pattern.height - 2 * d)
     raw = np.where(counts & (inner > 0), 1 / np.where(inner > 0, inner, 1.0), 0.0)
     total = raw.sum(axis=0)
-    return np.asarray(raw / np.where(total > 0, total, 1.0))
+    return NearestNeighbours(distances, directions, raw / np.where(total > 0, total, 1.0))
 
 
 def knows_neighbours(measured: FibrePattern) -> bool:

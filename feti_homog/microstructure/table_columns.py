@@ -46,27 +46,23 @@ def lines_of(path: Path) -> Iterator[tuple[int, str, str]]:
     Raises:
         CaseError: the file cannot be read, or is no text.
     """
-    has_begun = False
-    for number, line in enumerate(_text(path).splitlines(), 1):
-        contents, _, comment = line.partition("#")
-        is_empty = not contents.strip(EMPTY) or (not has_begun and SEPARATOR.fullmatch(contents.strip()) is not None)
-        has_begun = has_begun or not is_empty
-        yield number, "" if is_empty else contents, comment
-
-
-def _text(path: Path) -> str:
     try:
         content = input_files.read(path, MAX_BYTES)
     except OSError as error:
         raise CaseError(f"{path}: cannot be read: {error.strerror}") from error
     try:
-        return content.decode("utf-8-sig")
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        place = error.start
-    try:
-        return content.translate(UNITS_OF_EXCEL).decode()
-    except UnicodeDecodeError as error:
-        raise CaseError(f"{path.name}: expected text in UTF-8; it has other bytes at {place}") from error
+        try:
+            text = content.translate(UNITS_OF_EXCEL).decode()
+        except UnicodeDecodeError as other:
+            raise CaseError(f"{path.name}: expected text in UTF-8; it has other bytes at {error.start}") from other
+    has_begun = False
+    for number, line in enumerate(text.splitlines(), 1):
+        contents, _, comment = line.partition("#")
+        is_empty = not contents.strip(EMPTY) or (not has_begun and SEPARATOR.fullmatch(contents.strip()) is not None)
+        has_begun = has_begun or not is_empty
+        yield number, "" if is_empty else contents, comment
 
 
 def delimiter_of(line: str) -> str | None:
@@ -97,14 +93,6 @@ CENTRES = ("{}c", "{}_c", "c{}", "center_{}", "centre_{}", "centroid_{}", "{}_ce
 EQUIVALENT_DIAMETERS = ("equivdiameter", "equivalent_diameter", "equivalent_diameter_area")
 
 
-def _radius_of_area(area: float) -> float:
-    return math.copysign(math.sqrt(abs(area) / math.pi), area)
-
-
-def _same(value: float) -> float:
-    return value
-
-
 def _half(value: float) -> float:
     return value / 2
 
@@ -112,14 +100,14 @@ def _half(value: float) -> float:
 # Other names of columns, those before first, and what makes the column of their values. Major and Minor are ImageJ's
 # axes of ellipses, whose areas are of no more use; MATLAB's Centroid_1 is x, centroid-0 of scikit-image its row, y.
 OTHERS: tuple[tuple[tuple[str, ...], str, Callable[[float], float]], ...] = (
-    (("xm", *(word.format("x") for word in CENTRES), "centroid_1", "centroid-1"), "x", _same),
-    (("ym", *(word.format("y") for word in CENTRES), "centroid_2", "centroid-0"), "y", _same),
+    (("xm", *(word.format("x") for word in CENTRES), "centroid_1", "centroid-1"), "x", float),
+    (("ym", *(word.format("y") for word in CENTRES), "centroid_2", "centroid-0"), "y", float),
     (("major", MATLABS_AXIS), "a", _half),
     (("minor", "minoraxislength"), "b", _half),
-    (("r", "rad", "fibre_radius", "fiber_radius", "radii"), "radius", _same),
+    (("r", "rad", "fibre_radius", "fiber_radius", "radii"), "radius", float),
     (("diameter", "diam", "d", "fibre_diameter", "fiber_diameter", *EQUIVALENT_DIAMETERS), "radius", _half),
-    (("area",), "radius", _radius_of_area),
-    (("material", "type"), "phase", _same),
+    (("area",), "radius", lambda area: math.copysign(math.sqrt(abs(area) / math.pi), area)),
+    (("material", "type"), "phase", float),
 )
 
 
@@ -146,18 +134,15 @@ def _bare(word: str) -> str:
     return UNIT.sub("", word).strip().lower()
 
 
-def _bare_names(words: Sequence[str]) -> list[str]:
-    """Return bare names; MATLAB's orientation is an angle; other programs' are in radians, or from another axis."""
-    bare = list(map(_bare, words))
-    return ["angle" if name == "orientation" else name for name in bare] if MATLABS_AXIS in bare else bare
-
-
 def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceColumn], list[str]]:
     """Return the columns in a name line that are `known`, in any case, and the other words."""
-    bare = _bare_names(words)
+    bare = list(map(_bare, words))
+    if MATLABS_AXIS in bare:
+        # MATLAB's orientation is an angle; other programs' are in radians, or from another axis.
+        bare = ["angle" if name == "orientation" else name for name in bare]
     # An angle is measured as a picture is seen, for coordinates whose y points down.
     values: dict[str, Callable[[float], float]] = {"angle": operator.neg} if AXES_OF_PICTURES & set(bare) else {}
-    columns = [SourceColumn(place, name, values.get(name, _same)) for place, name in enumerate(bare) if name in known]
+    columns = [SourceColumn(place, name, values.get(name, float)) for place, name in enumerate(bare) if name in known]
     for others, name, value in OTHERS:
         given = {column.name for column in columns}
         if {name, INSTEAD.get(name, name)}.isdisjoint(given):

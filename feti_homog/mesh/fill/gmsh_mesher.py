@@ -20,12 +20,10 @@ from feti_homog.mesh.sizes import element_estimate
 from feti_homog.mesh.sizes.graded_size import MeshSizes
 from feti_homog.mesh.tiles.tile_filling import Filling, Tile, arc_edges, fill
 from feti_homog.mesh.tiles.tiling import DEFAULT_TILES, Regions, TilePolicy, Tiling, cut, is_tiled, tiling
-from feti_homog.microstructure import Arrangement, phase_names
+from feti_homog.microstructure import Arrangement, arrangements, phase_names
 from feti_homog.microstructure.shapes import Conics
 from feti_homog.typing import Int, Int32
 
-# Radius / width of the cell above which positions on a circle differ by more than rounding.
-SMALLEST_RADIUS = 1e-6
 NO_MARKS: Mapping[int, Sequence[float]] = MappingProxyType({})
 
 
@@ -66,11 +64,11 @@ def begin(
     _refuse_extremes(estimate, sizes, sum(map(len, marks.values())), limit)
     arrangement = arrange(cell) if listed is None else listed
     smallest = int(arrangement.radii.argmin())
-    if arrangement.radii[smallest] < SMALLEST_RADIUS * arrangement.width:
+    if arrangement.radii[smallest] < arrangements.SMALLEST_RADIUS * arrangement.width:
         asked = cell_sizes.fractions_in_words(cell) if cell.fractions else 'geometry = "table"'
         raise MeshError(
             f"[cell] {asked}: a {'void' if arrangement.is_void[smallest] else 'fibre'} has a radius of "
-            f"{arrangement.radii.min():.2g}; expected at least {SMALLEST_RADIUS} of the width of the cell"
+            f"{arrangement.radii.min():.2g}; expected at least {arrangements.SMALLEST_RADIUS} of the width of the cell"
         )
     scale = arrangement_scale(cell, arrangement)
     if not isinstance(arrangement.outlines, Conics):
@@ -153,7 +151,8 @@ class UnmeshedCell:
             MeshError: the lines would have too many.
         """
         lines = self.bare.outline(self.bare.stations() if stations is None else stations)
-        return NodedCell.of(self.arrangement, lines, self.sizes, self.tiles, self.scale)
+        cell = Tile(lines.points, lines.curves, self.sizes.largest, self.sizes.are_graded(self.arrangement))
+        return NodedCell(self.arrangement, lines, tuple(cut(lines, cell, self.tiles)), self.scale)
 
 
 @dataclass(frozen=True)
@@ -171,14 +170,6 @@ class NodedCell:
     lines: Outline
     parts: tuple[tuple[Int, Tile], ...]
     scale: float
-
-    @classmethod
-    def of(
-        cls, arrangement: Arrangement, lines: Outline, sizes: MeshSizes, tiles: Tiling | None, scale: float
-    ) -> NodedCell:
-        """Return the cell of an arrangement with this outline, cut into tiles."""
-        cell = Tile(lines.points, lines.curves, sizes.largest, sizes.are_graded(arrangement))
-        return cls(arrangement, lines, tuple(cut(lines, cell, tiles)), scale)
 
     @property
     def phases(self) -> tuple[str, ...]:

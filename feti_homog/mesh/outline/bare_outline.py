@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -24,7 +24,6 @@ from feti_homog.mesh.outline.lines import (
 )
 from feti_homog.mesh.outline.outline import (
     SAME_PLACE,
-    Numbering,
     Outline,
     arcs_within,
     crossings,
@@ -168,25 +167,34 @@ class BareOutline:
         Raises:
             MeshError: the sides would have more than the sampling allows.
         """
-        numbering, (arcs, bridges) = Numbering(self.vertices), stations
-        curves = [self._sides(axis, numbering) for axis in (0, 1)]
-        node = numbering.along(self.lines.arcs.points(arcs.line, arcs.share), arcs.first)
-        curves.append(Curves(node, arcs.first, self.circle, self.circle, self.around[self.circle]))
-        if len(self.lines.bridges):
-            node = numbering.along(self.lines.bridges.points(bridges.line, bridges.share), bridges.first)
-            straight = np.full(len(self.lines.bridges), MATRIX)
-            curves.append(Curves(node, bridges.first, straight, straight, straight))
+        arcs, bridges = stations
+        circle, straight = self.circle, np.full(len(self.lines.bridges), MATRIX)
+        parts = [*self._sides(0), *self._sides(1)]
+        for lines, placed, regions in (
+            (self.lines.arcs, arcs, (circle, circle, self.around[circle])),
+            (self.lines.bridges, bridges, (straight, straight, straight)),
+        ):
+            curves = Curves(np.arange(len(placed.share)), placed.first, *regions)
+            parts.append((lines.points(placed.line, placed.share), curves))
+        begin = np.cumsum([0, *(len(points) for points, _ in parts)])
+        place = np.concatenate([curves.node + first for (_, curves), first in zip(parts, begin, strict=False)])
+        points, curves = np.concatenate([points for points, _ in parts]), Curves.joined([curves for _, curves in parts])
+        # Vertices, found by position, have the first numbers, and then the nodes between.
+        is_end = np.zeros(len(points), bool)
+        is_end[curves.first[:-1]] = is_end[curves.first[1:] - 1] = True
+        number = np.cumsum(~is_end) - 1 + len(self.vertices)
+        number[is_end] = cKDTree(self.vertices).query(points[is_end])[1]
         ellipses = Ellipses(self.curves.centres, self.curves.frames)
-        return Outline(numbering.points(), Curves.joined(curves), ellipses, self.disc, self.around)
+        nodes = np.concatenate([self.vertices, points[~is_end]])
+        return Outline(nodes, replace(curves, node=number[place]), ellipses, self.disc, self.around)
 
-    def _sides(self, axis: int, numbering: Numbering) -> Curves:
-        """Return the pieces of both sides along `axis`, with the same nodes."""
+    def _sides(self, axis: int) -> Iterator[tuple[Float, Curves]]:
+        """Yield the nodes (n, 2) on both sides along `axis`, the same ones, and the pieces through them."""
         places = crossings(self.curves, axis, self.size)
         begin, span = places[:-1], np.diff(places)
         longest = np.full((len(span), 2), self.field.base.largest)
         pieces = Segments(on_side(begin, axis, 0.0), on_side(span, axis, 0.0), longest)
         samples = EdgeSamples.of(self.field, pieces, self.lines.sampling.side)
-        parts = []
         for level, low in ((0.0, True), (self.size[1 - axis], False)):
             inside = curve_at(self.curves, on_side(begin + span / 2, axis, level))
             # A chord has two edges or more: a triangle with two arc edges beside it could not be flipped. From one
@@ -198,15 +206,13 @@ class BareOutline:
             fewest = np.where((inside == MATRIX) | crosses, 1, 2)
             stations = samples.stations(fewest, self.lines.sampling.most_nodes)
             piece, first = stations.line, stations.first
-            along = begin[piece] + span[piece] * stations.share
+            along, node = begin[piece] + span[piece] * stations.share, np.arange(len(piece))
             along[first[:-1]], along[first[1:] - 1] = begin, places[1:]
-            node = numbering.along(on_side(along, axis, level), first)
             if low != (axis == 0):
                 # Counter-clockwise around the cell: along the coordinate at the bottom and at the right.
-                node = node[(first[:-1] + first[1:] - 1)[piece] - np.arange(len(node))]
+                node = (first[:-1] + first[1:] - 1)[piece] - node
             straight, beyond = np.full(len(span), MATRIX), np.full(len(span), OUTSIDE)
-            parts.append(Curves(node, first, straight, inside, beyond))
-        return Curves.joined(parts)
+            yield on_side(along, axis, level), Curves(node, first, straight, inside, beyond)
 
 
 def _arcs(

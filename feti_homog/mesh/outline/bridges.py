@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
-from feti_homog.mesh.sizes.from_sources import CHUNK
-from feti_homog.typing import Bool, Float, Int
+from feti_homog.mesh.sizes.from_sources import CHUNK, wrap
+from feti_homog.typing import Float, Int
 
 TURN = 2 * np.pi
 # Bridges stay away from third discs by this part of their radii, and their ends from sides by that of the mean radius.
@@ -37,10 +37,6 @@ class Bridges:
     def on_circles(self) -> OnCircles:
         """Return where all of them begin, and then where all end."""
         return self.ends.T.ravel(), np.concatenate([self.angle, self.angle + np.pi]) % TURN
-
-    def chosen(self, some: Bool) -> Bridges:
-        """Return the bridges where the mask (b,) is true."""
-        return Bridges(self.ends[some], self.angle[some])
 
 
 @dataclass(frozen=True)
@@ -116,7 +112,10 @@ def bridges(lines: CentreLines, size: Float, margin: float, largest: float, vert
     # Vertices come before all bridges.
     first, count = len(vertices[0]), len(order)
     rank = np.concatenate([first + np.arange(count), first + np.arange(count), np.arange(first)])
-    better, worse = _too_near(circle, angle % TURN, rank)
+    # Pairs of points on one circle within LEAST_ANGLE; circles are farther apart than that.
+    places = wrap(np.column_stack([circle, angle]), np.array([np.inf, TURN]))
+    near = cKDTree(places, boxsize=[0, TURN]).query_pairs(LEAST_ANGLE, output_type="ndarray")
+    better, worse = np.sort(rank[near], axis=1).T
     # All vertices stay, however near each other; each rank that stays, best first, excludes the worse ones near it.
     better, worse = better[worse >= first], worse[worse >= first]
     stays, open_ = np.zeros(first + count, bool), np.ones(first + count, bool)
@@ -128,22 +127,4 @@ def bridges(lines: CentreLines, size: Float, margin: float, largest: float, vert
         stays |= free
         open_ &= ~free
         open_[worse[free[better]]] = False
-    return candidates.chosen(stays[first:])
-
-
-def _too_near(circle: Int, angle: Float, rank: Int) -> tuple[Int, Int]:
-    """Find points on one circle within LEAST_ANGLE: two arrays with their ranks, the better one first."""
-    order = np.lexsort((angle, circle))
-    circle, angle, rank = circle[order], angle[order], rank[order]
-    first = np.flatnonzero(np.diff(circle, prepend=-1) != 0)
-    counts = np.diff(first, append=len(circle))
-    begin, count = np.repeat(first, counts), np.repeat(counts, counts)
-    better, worse = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
-    for step in range(1, int(counts.max(initial=0))):
-        after = begin + (np.arange(len(circle)) - begin + step) % count
-        close = ((angle[after] - angle) % TURN < LEAST_ANGLE) & (step < count)
-        if not close.any():
-            break
-        better.append(np.minimum(rank[close], rank[after][close]))
-        worse.append(np.maximum(rank[close], rank[after][close]))
-    return np.concatenate(better), np.concatenate(worse)
+    return Bridges(candidates.ends[stays[first:]], candidates.angle[stays[first:]])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 
@@ -100,7 +101,7 @@ def size_field(
     sources = [
         (points, caps, np.full(len(points), MAX_GROWTH)),
         _between(ellipses[np.sort(np.unique(disc, return_index=True)[1])], size, largest),
-        _beside_sides(ellipses, size, largest),
+        *_beside_sides(ellipses, size, largest),
         (crossings, np.minimum(sharp, largest), np.full(len(crossings), MAX_GROWTH)),
         (np.stack([nearest, np.zeros(2)]), np.full(2, to_corner), np.full(2, MAX_GROWTH)),
         graded_size.at_vertices(vertices, size, largest),
@@ -127,9 +128,8 @@ def _between(ellipses: Ellipses, size: Float, largest: float) -> Source:
     return places, np.tile(length[narrow], 2), np.tile(growth[narrow], 2)
 
 
-def _beside_sides(ellipses: Ellipses, size: Float, largest: float) -> Source:
+def _beside_sides(ellipses: Ellipses, size: Float, largest: float) -> Iterator[Source]:
     """Points where an ellipse comes near a side or hardly crosses it: extreme point and foot on the side."""
-    sources: list[Source] = []
     for axis, sign in product((0, 1), (-1.0, 1.0)):
         normal = np.zeros((len(ellipses), 2))
         normal[:, axis] = sign
@@ -140,6 +140,4 @@ def _beside_sides(ellipses: Ellipses, size: Float, largest: float) -> Source:
         length = graded_size.PASSAGE_EDGE * width
         narrow = length < largest
         growth = graded_size.passage_growth(width, 1 / ellipses.bend(normal))
-        sources += [(place[narrow], length[narrow], growth[narrow]) for place in (extreme, foot)]
-    places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
-    return places, lengths, growths
+        yield from ((places[narrow], length[narrow], growth[narrow]) for places in (extreme, foot))

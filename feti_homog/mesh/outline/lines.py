@@ -16,6 +16,7 @@ from feti_homog.typing import Float, Int
 
 # Regions beside a curve that are no disc or coating.
 MATRIX, OUTSIDE = -1, -2
+SAMPLES_OF_AN_EDGE = 3
 
 
 @dataclass(frozen=True)
@@ -214,15 +215,18 @@ class EdgeSamples:
 
     @classmethod
     def of(cls, field: SizeField, lines: Lines, fewest: int) -> EdgeSamples:
-        """Take samples at `fewest` equidistant positions, and between them where the field asks for more."""
+        """Take samples at `fewest` equidistant positions, and between them where sizes are graded.
+
+        There each edge has SAMPLES_OF_AN_EDGE or more.
+        """
         lengths = lines.lengths
         count = len(lengths)
         line, share = np.repeat(np.arange(count), fewest), np.tile(np.linspace(0, 1, fewest), count)
         sizes = np.minimum(field.at(lines.points(line, share)), lines.caps(line, share))
         while True:
             way = np.diff(share) * lengths[line[:-1]]
-            wide = (np.diff(line) == 0) & (way > field.step * np.minimum(sizes[:-1], sizes[1:]))
-            if not wide.any():
+            wide = (np.diff(line) == 0) & (way > 1 / SAMPLES_OF_AN_EDGE * np.minimum(sizes[:-1], sizes[1:]))
+            if field.graded is None or not wide.any():
                 break
             at = np.flatnonzero(wide) + 1
             between, middle = (share[at - 1] + share[at]) / 2, line[at]

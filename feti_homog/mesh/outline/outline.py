@@ -17,7 +17,6 @@ from feti_homog.typing import Bool, Float, Int
 SAME_PLACE = 1e-9
 # A mark nearer than this many radians to another vertex of its circle is that vertex.
 MERGED = np.radians(0.05)
-QUARTER = TURN / 4
 
 
 @dataclass(frozen=True)
@@ -42,32 +41,6 @@ class Outline:
     def is_coating(self) -> Bool:
         """(k,) which circles have a coating within."""
         return np.isin(np.arange(len(self.around)), self.around)
-
-
-class Numbering:
-    """Number nodes: first the vertices (v, 2), found by position, then the nodes between."""
-
-    def __init__(self, vertices: Float) -> None:
-        self.vertices = vertices
-        self._tree = cKDTree(vertices)
-        self._between: list[Float] = []
-        self._count = len(vertices)
-
-    def along(self, points: Float, first: Int) -> Int:
-        """Assign numbers (n,) to the nodes `points` (n, 2) of curves from first[:-1] on, whose ends are vertices."""
-        is_end = np.zeros(len(points), bool)
-        is_end[first[:-1]] = is_end[first[1:] - 1] = True
-        number = np.empty(len(points), np.int64)
-        number[is_end] = self._tree.query(points[is_end])[1]
-        between = np.count_nonzero(~is_end)
-        number[~is_end] = np.arange(self._count, self._count + between)
-        self._count += between
-        self._between.append(points[~is_end])
-        return number
-
-    def points(self) -> Float:
-        """Positions (n, 2) of all nodes by number."""
-        return np.concatenate([self.vertices, *self._between])
 
 
 def images(arrangement: Arrangement) -> tuple[Conics, Int, Int]:
@@ -115,7 +88,9 @@ def curve_at(curves: Conics, points: Float) -> Int:
     close = np.flatnonzero(np.linalg.norm(beyond, axis=1) < curves.longest)
     if not len(close):
         return np.full(len(points), MATRIX)
-    holds = curves[close].level(points) < 1
+    offsets = (points[:, None] - curves.centres[close]).reshape(-1, 2)
+    levels = np.linalg.norm(curves[np.tile(close, len(points))].unit(offsets), axis=1)
+    holds = levels.reshape(len(points), len(close)) < 1
     return np.where(holds.any(axis=1), close[np.where(holds, curves.radii[close], np.inf).argmin(axis=1)], MATRIX)
 
 
@@ -160,7 +135,7 @@ def arcs_within(curves: Conics, vertices: OnCircles, size: Float) -> tuple[Int, 
     after = np.append(angle[1:], 0.0)
     after[np.append(is_first[1:], True)] = angle[is_first] + TURN
     span = after - angle
-    parts = np.maximum(1, np.ceil(span / QUARTER - SAME_PLACE)).astype(int)
+    parts = np.maximum(1, np.ceil(span / (TURN / 4) - SAME_PLACE)).astype(int)
     begin = np.repeat(np.arange(len(parts)), parts)
     part = np.arange(len(begin)) - np.repeat(np.cumsum(parts) - parts, parts)
     whose, first, last = curve[begin], *(angle[begin] + (span[begin] * k / parts[begin]) for k in (part, part + 1))

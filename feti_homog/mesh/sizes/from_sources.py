@@ -27,10 +27,15 @@ class SourcedSize:
         least: lower bound of h.
     """
 
-    def __init__(self, sources: Sequence[Source], size: Float, largest: float, chunk: int = CHUNK) -> None:
-        """Prepare sources on the torus with periods `size` (2,); `chunk` positions are looked at together."""
+    def __init__(
+        self, sources: Sequence[Source], size: Float, largest: float, chunk: int = CHUNK, nearest: int = NEAREST
+    ) -> None:
+        """Prepare sources on the torus with periods `size` (2,), of which the `nearest` count at a position.
+
+        `chunk` positions are looked at together.
+        """
         self.largest = largest
-        self._size, self._bound, self._chunk = size, largest / MAX_GROWTH, chunk
+        self._size, self._bound, self._chunk, self._nearest = size, largest / MAX_GROWTH, chunk, nearest
         places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
         self._places = wrap(places, size)
         # Where the tree finds no more sources, it returns their number: an infinite length.
@@ -40,7 +45,7 @@ class SourcedSize:
 
     def __call__(self, points: Float) -> Float:
         """Return the edge lengths h (n,) at points (n, 2)."""
-        wrapped, count, parts = wrap(points, self._size), min(NEAREST, len(self._places)), []
+        wrapped, count, parts = wrap(points, self._size), min(self._nearest, len(self._places)), []
         for k in range(0, max(1, len(points)), self._chunk):
             some = wrapped[k : k + self._chunk]
             distance, nearest = self._tree.query(some, k=count, distance_upper_bound=self._bound)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 
@@ -12,7 +13,7 @@ from feti_homog.case import cell_section
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, Source, SourcedSize, wrap
 from feti_homog.microstructure import Arrangement, arrangements
 from feti_homog.microstructure.shapes import on_circle
-from feti_homog.typing import Bool, Float, Int
+from feti_homog.typing import Float, Int
 
 # Edges around a fibre, at least.
 MIN_EDGES_AROUND = 16
@@ -38,7 +39,7 @@ def coating_size(arrangement: Arrangement) -> Float:
     return np.asarray(np.sqrt(arrangement.coating * arrangement.radii))
 
 
-def _between_fibres(circles: Float, size: Float, caps: Float, largest: float) -> Source:
+def _between_fibres(circles: Float, size: Float, caps: Float, largest: float) -> Iterator[Source]:
     """Facing points on neighbouring fibres; edges there suit the gap and the other fibre's edges."""
     centres, radii = circles[:, :2], circles[:, 2]
     first, second, vector = arrangements.neighbours(centres, size, 2 * radii.max() + largest)
@@ -46,14 +47,11 @@ def _between_fibres(circles: Float, size: Float, caps: Float, largest: float) ->
     gap = distance - radii[first] - radii[second]
     normal = vector / distance[:, None]
     growth = passage_growth(gap, 1 / radii[first] + 1 / radii[second])
-    places, lengths, growths = [], [], []
     for one, other, sign in ((first, second, 1.0), (second, first, -1.0)):
         length = np.minimum(PASSAGE_EDGE * gap, caps[other] + MAX_GROWTH * gap)
         narrow = length < caps[one]
-        places.append((centres[one] + sign * radii[one, None] * normal)[narrow])
-        lengths.append(length[narrow])
-        growths.append(growth[narrow])
-    return np.concatenate(places), np.concatenate(lengths), np.concatenate(growths)
+        places = centres[one] + sign * radii[one, None] * normal
+        yield places[narrow], length[narrow], growth[narrow]
 
 
 def passage_growth(width: Float, curvature: Float) -> Float:
@@ -61,10 +59,9 @@ def passage_growth(width: Float, curvature: Float) -> Float:
     return np.asarray(np.minimum(MAX_GROWTH, np.sqrt((4 - 2 * PASSAGE_EDGE) * 2 * width * curvature)))
 
 
-def _at_sides(circles: Float, size: Float, caps: Float, largest: float) -> Source:
+def _at_sides(circles: Float, size: Float, caps: Float, largest: float) -> Iterator[Source]:
     """Find where a circle comes near a side or hardly crosses it: extreme point, foot on the side, crossings."""
     centres, radii = circles[:, :2] % size, circles[:, 2]
-    sources: list[Source] = []
     for axis, sign in product((0, 1), (-1.0, 1.0)):
         distance = centres[:, axis] if sign < 0 else size[axis] - centres[:, axis]
         extreme, foot = centres.copy(), centres.copy()
@@ -73,36 +70,15 @@ def _at_sides(circles: Float, size: Float, caps: Float, largest: float) -> Sourc
         width = np.abs(distance - radii)
         growth = passage_growth(width, 1 / radii)
         length = np.minimum(PASSAGE_EDGE * width, caps + MAX_GROWTH * width)
-        sources += [
-            _where(length < caps, extreme, length, growth),
-            _where(length < largest, foot, length, growth),
-        ]
+        for places, narrow in ((extreme, length < caps), (foot, length < largest)):
+            yield places[narrow], length[narrow], growth[narrow]
         angle = np.arccos(np.minimum(distance / radii, 1.0))
         length = angle * radii / WEDGE
+        sharp = (length < caps) & (angle > 0)
         for turn in (-1.0, 1.0):
-            crossing = foot.copy()
-            crossing[:, 1 - axis] += turn * radii * np.sin(angle)
-            sharp = (length < caps) & (angle > 0)
-            sources.append(_where(sharp, crossing, length, np.full(len(radii), MAX_GROWTH)))
-    places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
-    return places, lengths, growths
-
-
-def _where(chosen: Bool, *source: Float) -> Source:
-    """Return the chosen rows of places, lengths and growths."""
-    places, lengths, growths = (part[chosen] for part in source)
-    return places, lengths, growths
-
-
-def _at_corners(circles: Float, size: Float, caps: Float) -> Source:
-    """Find where a circle passes near the corner: the corner and the nearest point on the circle."""
-    offset = (circles[:, :2] + size / 2) % size - size / 2
-    distance = np.linalg.norm(offset, axis=1)
-    length = PASSAGE_EDGE * np.abs(distance - circles[:, 2])
-    close = length < caps
-    facing = offset[close] * (1 - circles[close, 2] / distance[close])[:, None]
-    places = np.concatenate([facing, np.zeros_like(facing)])
-    return places, np.tile(length[close], 2), np.full(len(places), MAX_GROWTH)
+            crossing = foot[sharp]
+            crossing[:, 1 - axis] += (turn * radii * np.sin(angle))[sharp]
+            yield crossing, length[sharp], np.full(len(crossing), MAX_GROWTH)
 
 
 def at_vertices(vertices: Float, size: Float, largest: float) -> Source:
@@ -117,8 +93,6 @@ def at_vertices(vertices: Float, size: Float, largest: float) -> Source:
     return places, distance[:, 1], np.full(len(places), MAX_GROWTH)
 
 
-# Samples of a size on a line for each of its edges, where the size is graded.
-SAMPLES_OF_AN_EDGE = 3
 # Size of edges on a circle / largest size, below which elements grow from it: between tiny discs far apart, gmsh would
 # interpolate the sizes on their circles.
 FINE_CIRCLE = 0.1
@@ -137,11 +111,6 @@ class MeshSizes:
     largest: float
     interface: float
     tip: float
-
-    @classmethod
-    def uniform(cls, largest: float) -> MeshSizes:
-        """One size for all."""
-        return cls(largest, largest, largest)
 
     @classmethod
     def of(cls, cell: cell_section.Cell, has_tips: bool) -> MeshSizes:
@@ -179,11 +148,6 @@ class SizeField:
         """Size below which there is none."""
         return self.base.least if self.graded is None else min(self.base.least, self.graded.least)
 
-    @property
-    def step(self) -> float:
-        """Distance of positions on a line between which it may be interpolated / size."""
-        return np.inf if self.graded is None else 1 / SAMPLES_OF_AN_EDGE
-
     def at(self, points: Float) -> Float:
         """Sizes (n,) at positions (n, 2)."""
         sizes = self.base(points)
@@ -203,10 +167,17 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
     size, largest, (shells, disc) = arrangement.size, sizes.largest, arrangement.shells
     circles, caps = np.column_stack([shells.centres, shells.radii]), circle_size(arrangement, largest)
     first = np.unique(disc, return_index=True)[1]
+    # Where a circle passes near the corner: the corner and the nearest point on the circle.
+    offset = (circles[:, :2] + size / 2) % size - size / 2
+    distance = np.linalg.norm(offset, axis=1)
+    length = PASSAGE_EDGE * np.abs(distance - circles[:, 2])
+    close = length < caps
+    facing = offset[close] * (1 - circles[close, 2] / distance[close])[:, None]
+    corners = np.concatenate([facing, np.zeros_like(facing)])
     sources = [
-        _between_fibres(circles[first], size, caps[first], largest),
-        _at_sides(circles, size, caps, largest),
-        _at_corners(circles, size, caps),
+        *_between_fibres(circles[first], size, caps[first], largest),
+        *_at_sides(circles, size, caps, largest),
+        (corners, np.tile(length[close], 2), np.full(len(corners), MAX_GROWTH)),
         at_vertices(vertices, size, largest),
     ]
     base = SourcedSize(sources, size, largest)

@@ -47,12 +47,6 @@ class HalfLines:
         angle = np.arctan2(offset[:, 1], offset[:, 0]) % TURN
         return cls(node, angle, start, (np.arange(len(node)) + len(nodes)) % len(node))
 
-    def chosen(self, some: Int) -> HalfLines:
-        """Return the half-lines `some` (k,), both halves of each line."""
-        place = np.full(len(self.node), NOWHERE)
-        place[some] = np.arange(len(some))
-        return HalfLines(self.node[some], self.angle[some], self.start[some], place[self.twin[some]])
-
     def faces(self) -> tuple[Int, Int]:
         """Return the half-line (h,) that follows each around the face on its left, and the face number (h,)."""
         order = np.lexsort((self.angle, self.node))

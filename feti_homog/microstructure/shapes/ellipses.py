@@ -53,7 +53,7 @@ class Ellipses(ConvexCurves):
     @property
     def extents(self) -> Float:
         """See `Outlines`."""
-        return np.repeat(self.reach[:, :, None], 2, axis=2)
+        return np.repeat(np.linalg.norm(self.frames, axis=2)[:, :, None], 2, axis=2)
 
     def grown(self, thickness: Float) -> Ellipses:
         """Ellipses whose semi-axes are longer by `thickness` (k,)."""
@@ -64,11 +64,6 @@ class Ellipses(ConvexCurves):
     def squares(self) -> Float:
         """(k, 2, 2) F F^T, which determine an ellipse but for its place."""
         return np.asarray(self.frames @ self.frames.transpose(0, 2, 1))
-
-    @property
-    def reach(self) -> Float:
-        """(k, 2) how far they reach from their centres along x and y."""
-        return np.asarray(np.linalg.norm(self.frames, axis=2))
 
     @property
     def are_round(self) -> Bool:
@@ -126,11 +121,6 @@ class Ellipses(ConvexCurves):
         p, q = inverse[:, axis, axis], inverse[:, axis, other] * v
         root = q**2 - p * (inverse[:, other, other] * v**2 - 1)
         return self.centres[:, axis] - q / p, np.sqrt(np.maximum(root, 0.0)) / p
-
-    def level(self, points: Float) -> Float:
-        """(n, k) |F^-1 (x - c)| of points (n, 2): below 1 within."""
-        inverse = np.linalg.inv(self.frames)
-        return np.asarray(np.linalg.norm(np.einsum("kij,nkj->nki", inverse, points[:, None] - self.centres), axis=2))
 
     def support(self, normal: Float) -> Float:
         """(k, ...) |F^T n| for unit vectors n (k, ..., 2), as in `Outlines`."""
@@ -256,10 +246,6 @@ class Discs(ConvexCurves):
     def chord(self, axis: int) -> tuple[Float, Float]:
         """See `Ellipses`."""
         return self.centres[:, axis], np.sqrt(np.maximum(self.radii**2 - self.centres[:, 1 - axis] ** 2, 0.0))
-
-    def level(self, points: Float) -> Float:
-        """(n, k) |x - c| / r of points (n, 2): below 1 within."""
-        return np.asarray(np.linalg.norm(points[:, None] - self.centres, axis=2) / self.radii)
 
     def support(self, normal: Float) -> Float:
         """See `Outlines`."""

@@ -39,10 +39,8 @@ def have_both_sizes(rows: Columns) -> Bool:
 
 def outlines_of(rows: Columns) -> Outlines:
     """Return the outlines (N,) of rows without faults, without coatings, in the table's unit."""
-    centres, radius = (
-        np.column_stack([rows["x"], rows["y"]]),
-        np.where(np.isnan(rows["radius"]), rows["a"], rows["radius"]),
-    )
+    centres = np.column_stack([rows["x"], rows["y"]])
+    radius = np.where(np.isnan(rows["radius"]), rows["a"], rows["radius"])
     parts: list[tuple[Bool, Outlines]] = []
     for shape in SHAPES:
         own = shape.given(rows)

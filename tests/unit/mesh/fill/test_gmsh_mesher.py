@@ -166,7 +166,7 @@ def test_mesh_is_reproducible():
 def test_the_last_bits_of_the_outline_do_not_change_the_mesh(name, seed):
     """Take the last bits as another machine may give them."""
     case, chance = CELLS[name], np.random.default_rng(seed)
-    sizes = MeshSizes.uniform(case.mesh_size)
+    sizes = MeshSizes(*[case.mesh_size] * 3)
     bare = BareOutline.of(arrange(case), sizes, {})
     lines = bare.outline(bare.stations())
     tile = Tile(lines.points, lines.curves, sizes.largest, False)
