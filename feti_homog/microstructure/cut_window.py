@@ -15,7 +15,7 @@ from feti_homog.typing import Float, Int
 
 # Gap / sum of the radii of fibres across the border, at least and at most.
 LEAST_GAP, MOST_GAP = 0.01, 0.05
-# Overlap / sum of the radii that counts as none, and what distances are made larger by to come below it.
+# Overlap / sum of the radii that counts as none; distances are made larger by it.
 TOLERANCE = 1e-6
 # Moves differ from the smallest ones by less than this, / mean radius.
 SETTLED = 1e-4
@@ -32,7 +32,7 @@ class _Pairs:
     least: Float
 
     def joined(self, other: _Pairs) -> _Pairs:
-        """All pairs from both, each once."""
+        """Return all pairs from both, each once."""
         both = (self, other)
         keys = np.concatenate([np.column_stack([pairs.first, pairs.second, np.round(pairs.shift)]) for pairs in both])
         once = np.unique(keys, axis=0, return_index=True)[1]
@@ -43,7 +43,7 @@ class _Pairs:
         return _Pairs(self.first[chosen], self.second[chosen], self.shift[chosen], self.least[chosen])
 
     def vectors(self, centres: Float, size: Float) -> Float:
-        """(k, 2) from the first fibres to the second."""
+        """Return the vectors (k, 2) from the first fibres to the second."""
         return np.asarray(centres[self.second] - centres[self.first] + self.shift * size)
 
 
@@ -52,17 +52,15 @@ Parting = Callable[[Int, Int, Float], tuple[Float, Float]]
 
 
 def moves(outlines: Outlines, size: Float) -> Float:
-    """(N, 2) the moves d that part outlines which overlap across the torus border.
+    """Return the moves d (N, 2) that part outlines overlapping across the torus border.
 
-    The torus periods are `size` (2,).
+    The torus has the periods `size` (2,). The moves are a local minimum of sum |d|^2 such that no gap becomes less than
+    the smallest gap within the border. Gaps are relative to the sum of the radii, and the smallest one is taken between
+    LEAST_GAP and MOST_GAP. Each step replaces the distances |v| >= r by n . v >= r, with the present directions n;
+    since n . v <= |v|, its solution keeps the distances.
 
-    They are a local minimum of sum |d|^2 such that no gap across the border is less than the smallest one within, and
-    no gap within becomes less than that, all relative to the sum of the radii and that gap between LEAST_GAP and
-    MOST_GAP. Each step solves it with the distances |v| >= r replaced by n . v >= r, n the present directions; since
-    n . v <= |v|, its solution keeps the distances.
-
-    For other outlines, with radii of equal-area discs, n is the direction of the largest n . v - r, where r is the
-    reach of both along n, and that is the gap.
+    Outlines that are no discs have radii of equal-area discs; n is the direction of the largest n . v - r, the gap,
+    where r is the reach of both along n.
 
     Raises:
         MeshError: there is no room.
@@ -97,7 +95,9 @@ def moves(outlines: Outlines, size: Float) -> Float:
 
 
 def _least_moves(pairs: _Pairs, centres: Float, moved: Float, size: Float, unit: float, parting: Parting) -> Float:
-    """(N, 2) the d of least sum |d|^2 with n . (v + d_second - d_first) >= r for all pairs, n their present directions.
+    """Return the d (N, 2) of least sum |d|^2 that keep all pairs apart.
+
+    They have n . (v + d_second - d_first) >= r, with the present directions n.
 
     By non-negative least squares: C. L. Lawson, R. J. Hanson, Solving Least Squares Problems, 1974, chapter 23.
     """

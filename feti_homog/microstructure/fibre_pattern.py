@@ -70,7 +70,7 @@ class FibrePattern:
         return np.asarray(np.where(inside < self.size, inside, 0.0))
 
     def images(self, reach: float) -> tuple[Float, Int]:
-        """(m, 2) the centres, first the N in the rectangle, then their images nearer to it than `reach`; owners."""
+        """Return centres (m, 2), first the N in the rectangle, then images within `reach`; owners."""
         own = np.arange(self.count)
         if not self.periodic:
             return self.centres, own
@@ -82,7 +82,7 @@ class FibrePattern:
 
 
 def read_window(path: Path, size: tuple[float, float] | None = None) -> FibrePattern:
-    """Return a table's fibres, at least two, in a window with this width and height.
+    """Read the fibres, at least two, in a window with this width and height.
 
     Without these, the window is the one in the table; ellipses count as discs with the same centres and areas.
 
@@ -92,7 +92,8 @@ def read_window(path: Path, size: tuple[float, float] | None = None) -> FibrePat
         CaseError: the table is faulty, or its size unknown; a fibre has its centre outside the window, or is there
             twice.
     """
-    table = read_table(path).solid
+    table = read_table(path)
+    table = table.rows(np.flatnonzero(~table.is_void))
     width, height = size or (table.width, table.height)
     if width is None or height is None:
         raise CaseError(

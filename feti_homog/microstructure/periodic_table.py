@@ -5,19 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from feti_homog.errors import MeshError
-from feti_homog.microstructure import cut_window
-from feti_homog.microstructure.arrangements import (
-    DECIMALS,
-    SMALLEST_RADIUS,
-    Arrangement,
-    clear_shift,
-    clearance,
-    in_voids,
-    neighbours,
-)
+from feti_homog.microstructure import Arrangement, arrangements, cut_window
 from feti_homog.microstructure.fibre_table import FibreTable
-from feti_homog.microstructure.shapes.ellipses import Discs
-from feti_homog.microstructure.shapes.outlines import Outlines, directions
+from feti_homog.microstructure.shapes import Discs, Outlines, directions
 from feti_homog.microstructure.shapes.shapes import SHAPES, with_parts
 from feti_homog.typing import Bool, Float, Int
 
@@ -31,8 +21,8 @@ LEAST_GAP = 1e-4
 COATINGS = 0.01, 1.0
 # Distance of the sides of a cell from tangency with an outline / mean radius, below which elements there are needles.
 LEAST_CLEARANCE = 1e-3
-# Decimals of height / width of tables that may have any origin and unit; coordinates / width have DECIMALS: gmsh may
-# put other elements beside ellipses and polygons where the last digit of a length is another.
+# Decimals of height / width of tables that may have any origin and unit; coordinates have `arrangements.DECIMALS`. gmsh
+# may put other elements beside ellipses and polygons where the last digit of a length is another.
 HEIGHT_DECIMALS = 12
 # Overlap / radius of the smaller fibre, up to which fibres are repaired.
 REPAIRED = 0.01
@@ -40,7 +30,7 @@ MOST_LISTED = 30  # moved fibres that are listed one by one
 
 
 def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> Arrangement:
-    """Return a table's fibres, in row order, then its voids.
+    """Arrange a table's fibres, in row order, then its voids.
 
     Periodic images count as one fibre, the first row. In a cut window, fibres that overlap across its border are
     moved apart.
@@ -69,17 +59,17 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
         row=rows,
         remarks=repaired + (_moved_fibres(table, retained, moves) if window == "cut" else ()),
     )
-    shifted = clear_shift(fibres)
+    shifted = arrangements.clear_shift(fibres)
     is_placed = table.left is not None and table.bottom is not None
-    clear = min(LEAST_CLEARANCE * float(fibres.radii.mean()), clearance(shifted))
-    if not is_placed or clearance(fibres) < clear or in_voids(fibres, np.zeros((1, 2))).all():
+    clear = min(LEAST_CLEARANCE * float(fibres.radii.mean()), arrangements.clearance(shifted))
+    if not is_placed or arrangements.clearance(fibres) < clear or arrangements.in_voids(fibres, np.zeros((1, 2))).all():
         rounded = _rounded(shifted)
         return replace(rounded, mesh_order=np.lexsort((rounded.centres[:, 1], rounded.centres[:, 0])))
     return fibres if isinstance(fibres.outlines, Discs) else _rounded(fibres)
 
 
 def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ...]]:
-    """Return the table without slight overlaps, and its repaired rows in one line.
+    """Shrink fibres that overlap slightly; return the table, and a remark with their rows.
 
     Fibres that touch or overlap by up to REPAIRED of a radius shrink until they part.
     """
@@ -105,18 +95,21 @@ def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ..
 
 
 def _rounded(arrangement: Arrangement) -> Arrangement:
-    """Return the arrangement with coordinates to DECIMALS, 0 on either side, in a cell of HEIGHT_DECIMALS."""
-    outlines, least = arrangement.outlines.rounded(DECIMALS), 10.0**-DECIMALS
+    """Round the lengths of an arrangement to `arrangements.DECIMALS`, and its height to HEIGHT_DECIMALS.
+
+    Centres on the right or upper side move to 0.
+    """
+    outlines, least = arrangement.outlines.rounded(arrangements.DECIMALS), 10.0**-arrangements.DECIMALS
     return replace(
         arrangement,
         height=round(arrangement.height, HEIGHT_DECIMALS),
         outlines=outlines.at(np.where(outlines.centres >= arrangement.size - least, 0.0, outlines.centres)),
-        coating=arrangement.coating.round(DECIMALS),
+        coating=arrangement.coating.round(arrangements.DECIMALS),
     )
 
 
 def _moved_fibres(table: FibreTable, kept: Int, moves: Float) -> tuple[str, ...]:
-    """List the rows of `kept` (k,) that a cut window moves by these vectors (k, 2), and how far, in one line."""
+    """List the rows of `kept` (k,) that a cut window moves (k, 2), and how far, in one line."""
     distance = np.linalg.norm(moves, axis=1)
     moved = distance > cut_window.TOLERANCE * table.radius.mean()
     rows, far = table.row[kept[moved]], distance[moved]
@@ -127,7 +120,7 @@ def _moved_fibres(table: FibreTable, kept: Int, moves: Float) -> tuple[str, ...]
 
 
 def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
-    """Rows (k,) that are fibres, where they are (k, 2) in the cell, their moves (k, 2), and the cell's size (2,).
+    """Return the rows (k,), centres (k, 2) and moves (k, 2) of fibres, and the cell size (2,).
 
     Raises as `table_arrangement`.
     """
@@ -164,14 +157,14 @@ def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
 
 
 def fibre_rows(table: FibreTable, window: str) -> Int:
-    """(fibres,) places in the table where its cell's fibres are, by fibre number."""
+    """Return the index (fibres,) in the table of each fibre of its cell."""
     size = np.array([table.width, table.height], float)
     first, _ = _without_images(table, table.centres - _corner(table), size, window == "cut")
     return np.flatnonzero(first & ~table.is_void)
 
 
 def _corner(table: FibreTable) -> Float:
-    """(2,) the cell's lower left corner; the lowest centre coordinates if the table gives none."""
+    """Return the cell's lower left corner (2,), by default the lowest coordinates."""
     given = np.array([table.left, table.bottom], float)
     return np.where(np.isnan(given), table.centres.min(axis=0), given)
 
@@ -182,7 +175,7 @@ def _raise_faults(table: FibreTable, faults: list[str]) -> None:
 
 
 def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> list[str]:
-    """Faults of fibres that are no part of the cell, or too large or too small for it.
+    """List faults of fibres that are no part of the cell, or too large or too small for it.
 
     Discs reach into a periodic cell; in a cut window the centres are within.
     """
@@ -196,8 +189,8 @@ def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> li
         for k in np.flatnonzero(over > (SAME_FIBRE * radius if is_cut else (1 + SAME_FIBRE) * reach)).tolist():
             value = table.centres[k, axis]
             faults.append(f"row {table.row[k]}: {'xy'[axis]} = {value:g}: lies outside the cell, of {name} {width:g}")
-    for k in np.flatnonzero((2 * radius >= size.min()) | (radius < SMALLEST_RADIUS * size[0])).tolist():
-        limits = f"from {SMALLEST_RADIUS * size[0]:g} to below {size.min() / 2:g} in this cell"
+    for k in np.flatnonzero((2 * radius >= size.min()) | (radius < arrangements.SMALLEST_RADIUS * size[0])).tolist():
+        limits = f"from {arrangements.SMALLEST_RADIUS * size[0]:g} to below {size.min() / 2:g} in this cell"
         faults.append(f"row {table.row[k]}: {names[column[k]]} = {radius[k]:g}: expected {limits}")
     least, most = COATINGS
     bad = np.flatnonzero((table.coating > 0) & ((table.coating < least) | (table.coating > most)))
@@ -206,8 +199,8 @@ def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> li
 
 
 def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> tuple[Bool, list[str]]:
-    """(N,) which rows are the first of their fibre, and faults of rows at one place that are not one fibre."""
-    first, second, vector = neighbours(centres, size, SAME_FIBRE * table.radius.max())
+    """Return which rows (N,) are the first of their fibre, and faults of the other rows."""
+    first, second, vector = arrangements.neighbours(centres, size, SAME_FIBRE * table.radius.max())
     radius, strength, apart = table.radius, table.strength, np.linalg.norm(vector, axis=1)
     smaller = np.minimum(radius[first], radius[second])
     near = (first != second) & (apart < SAME_FIBRE * smaller)
@@ -229,12 +222,12 @@ def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool
 
 
 def _gaps(table: FibreTable, kept: Int, outer: Outlines, size: Float) -> tuple[Int, Int, Float, Float, Bool]:
-    """Return the pairs of near fibres among the rows `kept` (k,).
+    """Find the pairs of near fibres among the rows `kept` (k,).
 
     Returns (p,) indices into `kept` of both, gaps, sums of radii, and True across the border.
     """
     centres, radius = outer.centres, table.outer_radius[kept]
-    first, second, vector = neighbours(centres, size, 2 * outer.longest.max() * (1 + LEAST_GAP))
+    first, second, vector = arrangements.neighbours(centres, size, 2 * outer.longest.max() * (1 + LEAST_GAP))
     normal, reach = outer.parting(first, second, vector)
     gap = (normal * vector).sum(axis=1) - reach
     across = np.linalg.norm(centres[second] - centres[first] - vector, axis=1) > SAME_FIBRE * radius[first]

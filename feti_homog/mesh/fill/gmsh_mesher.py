@@ -1,4 +1,4 @@
-"""The coarse periodic mesh of a generated cell: bare lines, nodes on them, tiles; filled."""
+"""The coarse periodic mesh of a generated cell: its lines, nodes on the lines, tiles, triangles."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from feti_homog.case import cell_section, cell_sizes
 from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange, listed_arrangement
 from feti_homog.mesh.coarse_mesh import CoarseMesh, representatives
-from feti_homog.mesh.outline.bare_outline import BareOutline, LineStations
-from feti_homog.mesh.outline.lines import IN_TILES
+from feti_homog.mesh.outline.bare_outline import BareOutline
+from feti_homog.mesh.outline.lines import LineStations
 from feti_homog.mesh.outline.outline import Outline
 from feti_homog.mesh.sizes import element_estimate
 from feti_homog.mesh.sizes.graded_size import MeshSizes
@@ -30,7 +30,7 @@ NO_MARKS: Mapping[int, Sequence[float]] = MappingProxyType({})
 def generate(
     cell: cell_section.Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS, policy: TilePolicy = DEFAULT_TILES
 ) -> CoarseMesh:
-    """Return the mesh that `begin` begins, all of it made here."""
+    """Mesh a generated cell on this rank."""
     begun = begin(cell, listed_arrangement(cell), marks, policy)
     return begun if isinstance(begun, CoarseMesh) else begun.with_nodes().filled()
 
@@ -45,14 +45,14 @@ def begin(
 
     Round fibres and ellipses give the bare lines, polygons the whole mesh.
 
-    Elements have about the size mesh_size * width, on circles interface_size * width. All is made at the width 1 and
-    then scaled, so that cells alike in shape have one mesh at all sizes.
+    Elements have about the size mesh_size * width, on circles interface_size * width. The mesh has the width 1 until it
+    is scaled, so that cells of one shape have one mesh at all sizes.
 
     Args:
         listed: a table's arrangement, see `listed_arrangement`.
         marks: maps a curve (`BareOutline.of`) to angles in degrees, measured at its centre, where the mesh gets nodes:
-            debond tips. A mark within MERGED from another mark, or from where the circle crosses the cell's boundary,
-            is moved there.
+            debond tips. A mark moves to another mark, or to a crossing of the circle with the cell's boundary, that is
+            within MERGED.
 
     Raises:
         MeshError: the fibres cannot be arranged, or there would be too many elements.
@@ -82,7 +82,7 @@ def begin(
 
 
 def arrangement_scale(cell: cell_section.Cell, arrangement: Arrangement) -> float:
-    """Return lengths in the cell / lengths in the arrangement."""
+    """Return the ratio of lengths in the cell and in the arrangement."""
     if cell.fibre_radius is not None:
         return float(cell.fibre_radius / arrangement.radii[: arrangement.fibres].mean())
     width = cell_sizes.mixed_width(cell) if cell.table is None else cell.table.width
@@ -90,7 +90,7 @@ def arrangement_scale(cell: cell_section.Cell, arrangement: Arrangement) -> floa
 
 
 def _refuse_extremes(estimate: element_estimate.ElementEstimate, sizes: MeshSizes, tips: int, limit: int) -> None:
-    """Raise MeshError for a cell that would take hours to mesh, before it is begun."""
+    """Raise MeshError for a cell that would take hours to mesh."""
     cell, around = estimate.cell, min(sizes.interface, estimate.interface_size)
     at_tips = tips * element_estimate.triangles_of_a_tip(max(1.0, around / sizes.tip))
     count = estimate.triangles + at_tips
@@ -109,8 +109,8 @@ class UnmeshedCell:
     """A cell with discs or ellipses before its lines have nodes.
 
     Attributes:
-        arrangement: where discs are.
-        bare: its lines.
+        arrangement: the fibres.
+        bare: the lines.
         sizes: element sizes.
         tiles: the tiling that will cut it; None if it is filled at once.
         scale: as in `NodedCell`.
@@ -131,21 +131,18 @@ class UnmeshedCell:
         scale: float = 1.0,
         policy: TilePolicy = DEFAULT_TILES,
     ) -> UnmeshedCell:
-        """Return the bare lines, and their tiles; see `gmsh_mesher.begin`."""
+        """Make the bare lines of a cell, and its tiles; see `begin`."""
         tiles = tiling(arrangement, sizes.largest, marks, policy)
-        if tiles is None:
-            bare = BareOutline.of(arrangement, sizes, marks)
-        else:
-            bare = BareOutline.of(arrangement, sizes, marks, tiles.bridges, IN_TILES)
+        bare = BareOutline.of(arrangement, sizes, marks, None if tiles is None else tiles.bridges)
         return cls(arrangement, bare, sizes, tiles, scale)
 
     @property
     def phases(self) -> tuple[str, ...]:
-        """Return the phase names, the matrix first."""
+        """The phase names, the matrix first."""
         return self.arrangement.phases
 
     def with_nodes(self, stations: LineStations | None = None) -> NodedCell:
-        """Return the cell with these nodes on its lines, by default all placed here.
+        """Put nodes on the lines of the cell, by default all placed on this rank.
 
         Raises:
             MeshError: the lines would have too many.
@@ -160,8 +157,8 @@ class NodedCell:
     """A cell with nodes on its lines, before triangles are made.
 
     Attributes:
-        arrangement: where discs are.
-        lines: its outline.
+        arrangement: the fibres.
+        lines: the outline.
         parts: tiles to fill, each with its node numbers (n,) in the outline.
         scale: lengths in the mesh / lengths in the arrangement.
     """
@@ -173,15 +170,15 @@ class NodedCell:
 
     @property
     def phases(self) -> tuple[str, ...]:
-        """Return the phase names, the matrix first."""
+        """The phase names, the matrix first."""
         return self.arrangement.phases
 
     def filled(self) -> CoarseMesh:
-        """Return the mesh, all tiles filled here."""
+        """Fill all tiles on this rank, and return the mesh."""
         return self.mesh([fill(tile) for _, tile in self.parts])
 
     def mesh(self, fillings: Sequence[Filling]) -> CoarseMesh:
-        """Return the mesh of which these are the filled tiles, in their order."""
+        """Join the filled tiles, in the order of `parts`, to a mesh."""
         arrangement, lines, scale = self.arrangement, self.lines, self.scale
         # Nodes of the outline come first, and then of one tile after the other.
         count, parts = len(lines.points), []
@@ -218,7 +215,7 @@ class NodedCell:
 
     @cached_property
     def _within(self) -> tuple[Int32, Int32]:
-        """(k + 1,) the phase next within each circle, and the precedence, as in `CoarseMesh`.
+        """The phase (k + 1,) next within each circle, and the precedence (k + 1,).
 
         Voids have a phase number behind all others; the last entry is the matrix.
         """
@@ -232,7 +229,7 @@ class NodedCell:
 
     @cached_property
     def regions(self) -> Regions:
-        """The cell's regions.  The matrix around round fibres is one: the plane without discs, which do not touch."""
+        """The cell's regions; the matrix around discs, which do not touch, is one region."""
         phase, precedence = self._within
         solid = phase < len(self.phases)
         _, first, constituent = np.unique(precedence[solid], return_index=True, return_inverse=True)

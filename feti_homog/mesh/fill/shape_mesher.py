@@ -20,7 +20,7 @@ from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, SourcedSize, wrap
 from feti_homog.mesh.sizes.graded_size import MIN_EDGES_AROUND, PASSAGE_EDGE, MeshSizes
 from feti_homog.mesh.tiles.tile_filling import gmsh_session
 from feti_homog.microstructure import Arrangement, phase_names
-from feti_homog.microstructure.shapes import Outlines, convex_sums
+from feti_homog.microstructure.shapes import convex_sums
 from feti_homog.typing import Float
 
 # Distance from a line / size of the cell within which curves lie on it.
@@ -39,7 +39,7 @@ LEAST = 1e-5
 
 
 def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> CoarseMesh:
-    """Return the mesh that `gmsh_mesher.begin` begins, for fibres with any convex outlines.
+    """Mesh a cell whose fibres have any convex outlines; see `gmsh_mesher.begin`.
 
     Raises:
         MeshError: it would have too many elements.
@@ -80,28 +80,29 @@ def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> C
 
 
 def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
-    """Add the surfaces within the cell to physical groups by phase; return their precedence, 0 in the matrix."""
+    """Add the surfaces in the cell to groups by phase; return their precedence, 0 in the matrix."""
     occ, size, outer, inner = gmsh.model.occ, arrangement.size, arrangement.outer, arrangement.outlines
+    assert isinstance(outer, convex_sums.ConvexSums) and isinstance(inner, convex_sums.ConvexSums)
     rectangle = (2, occ.addRectangle(0.0, 0.0, 0.0, *size.tolist()))
-    order = range(len(outer)) if arrangement.mesh_order is None else arrangement.mesh_order.tolist()
-    low, high = (outer.centres + sign * outer.extents[:, :, side] for side, sign in ((0, -1), (1, 1)))
+    steps = np.array(list(product((-1, 0, 1), repeat=2)))
+    image, shift = np.repeat(arrangement.order, len(steps)), np.tile(steps, (len(outer), 1)) * size
+    low, high = outer.centres - outer.extents[:, :, 0], outer.centres + outer.extents[:, :, 1]
+    inside = np.all((high[image] + shift > 0) & (low[image] + shift < size), axis=1)
     # Images that reach into the cell, each from without.
     added, disc, ring = [], list[int](), list[bool]()
-    for number, step in product(order, product((-1, 0, 1), repeat=2)):
-        shift = np.array(step) * size
-        if np.all((high[number] + shift > 0) & (low[number] + shift < size)):
-            for is_ring in (True, False) if arrangement.coated[number] else (False,):
-                added.append((2, _add_shape(gmsh, outer if is_ring else inner, number, shift)))
-                disc.append(number)
-                ring.append(is_ring)
+    for number, step in zip(image[inside].tolist(), shift[inside], strict=True):
+        for is_ring in (True, False) if arrangement.coated[number] else (False,):
+            added.append((2, _add_shape(gmsh, outer if is_ring else inner, number, step)))
+            disc.append(number)
+            ring.append(is_ring)
     _, parts = occ.fragment([rectangle], added)
     occ.synchronize()
     number_of, phase = dict.fromkeys(parts[0], 0), dict.fromkeys(parts[0], phase_names.MATRIX)
     numbers = arrangement.precedence(np.array(disc), np.array(ring))
     for pieces, entry, is_ring, precedence in zip(parts[1:], disc, ring, numbers, strict=True):
-        inside = set(pieces) & set(number_of)
-        number_of |= dict.fromkeys(inside, int(precedence))
-        phase |= dict.fromkeys(inside, arrangement.within[is_ring][entry])
+        within = set(pieces) & set(number_of)
+        number_of |= dict.fromkeys(within, int(precedence))
+        phase |= dict.fromkeys(within, arrangement.within[is_ring][entry])
     outside = {piece for pieces in parts for piece in pieces} - set(number_of)
     voids = {piece for piece, name in phase.items() if name == phase_names.VOID}
     occ.remove(sorted(outside | voids), recursive=True)
@@ -111,8 +112,8 @@ def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
     return {tag: entry for (_, tag), entry in number_of.items()}
 
 
-def _add_shape(gmsh: ModuleType, shapes: Outlines, number: int, shift: Float) -> int:
-    """Return the plane surface of one shape, moved: an ellipse, or a polygon with a margin around."""
+def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int, shift: Float) -> int:
+    """Add the surface of a moved ellipse, or of a polygon with a margin; return its tag."""
     occ, (x, y) = gmsh.model.occ, (shapes.centres[number] + shift).tolist()
     frame, core = shapes.frames[number], shapes.cores[number]
     rounding, b = np.linalg.norm(frame, axis=0).tolist()
@@ -126,7 +127,7 @@ def _add_shape(gmsh: ModuleType, shapes: Outlines, number: int, shift: Float) ->
     def point(place: Float) -> int:
         return int(occ.addPoint(*place.tolist(), 0.0))
 
-    # They run counter-clockwise.
+    # Corners run counter-clockwise.
     corners = core[np.sort(np.unique(core.round(14), axis=0, return_index=True)[1])] + [x, y]
     following = np.roll(corners, -1, axis=0)
     along = (following - corners) / np.linalg.norm(following - corners, axis=1, keepdims=True)
@@ -148,7 +149,7 @@ def _add_shape(gmsh: ModuleType, shapes: Outlines, number: int, shift: Float) ->
 
 
 def _set_sizes(gmsh: ModuleType, path: Path, size: Float, field: SourcedSize) -> None:
-    """Let gmsh interpolate sizes on a grid, by way of a file."""
+    """Let gmsh interpolate the sizes on a grid, through a file."""
     counts = np.clip(np.ceil(size / field.least), FEWEST_CELLS, MOST_CELLS).astype(np.int32) + 1
     x, y = (np.linspace(0.0, width, count) for width, count in zip(size, counts, strict=True))
     values = field(np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2))
@@ -162,10 +163,10 @@ def _set_sizes(gmsh: ModuleType, path: Path, size: Float, field: SourcedSize) ->
 
 
 def _size_field(arrangement: Arrangement, sizes: MeshSizes) -> SourcedSize:
-    """Return the element sizes h = min_k h_k + g |x - x_k| over points x_k on all outlines.
+    """Return the size field h = min_k h_k + g |x - x_k| over points x_k on all outlines.
 
-    h_k is at most the interface size, the size that suits the curvature, and PASSAGE_EDGE times the distance to the
-    next outline or to a cell side that the outline faces there.
+    h_k is at most the interface size, a part of the circle with the curvature there, and PASSAGE_EDGE times the
+    distance to the next outline or to a cell side that the outline faces.
     """
     size, shapes = arrangement.size, arrangement.outer
     assert isinstance(shapes, convex_sums.ConvexSums)

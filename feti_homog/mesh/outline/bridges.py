@@ -28,20 +28,20 @@ OnCircles = tuple[Int, Float]
 
 @dataclass(frozen=True)
 class Bridges:
-    """b lines from disc ends[:, 0] to disc ends[:, 1], which is in the direction `angle` (b,) from it."""
+    """Lines (b,) between discs `ends` (b, 2), the second in the direction `angle` (b,)."""
 
     ends: Int
     angle: Float
 
     @property
     def on_circles(self) -> OnCircles:
-        """Return where all of them begin, and then where all end."""
+        """The points at which bridges begin, then the points at which they end."""
         return self.ends.T.ravel(), np.concatenate([self.angle, self.angle + np.pi]) % TURN
 
 
 @dataclass(frozen=True)
 class CentreLines:
-    """Edges in Delaunay's triangulation between disc centres.
+    """Edges of the Delaunay triangulation of the disc centres.
 
     Attributes:
         ends: (e, 2) discs.
@@ -59,7 +59,7 @@ class CentreLines:
 
 
 def centre_lines(circles: Float, which: Int) -> CentreLines:
-    """Connect the centres of discs `which` (n,) among circles (k, 3); clearances are known up to 1 + CLEAR."""
+    """Connect the centres of discs `which` (n,); clearances are exact up to 1 + CLEAR."""
     centres, radii = circles[which, :2], circles[which, 2]
     corners = Delaunay(centres).simplices
     pairs = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
@@ -94,13 +94,11 @@ def centre_lines(circles: Float, which: Int) -> CentreLines:
 
 
 def bridges(lines: CentreLines, size: Float, margin: float, largest: float, vertices: OnCircles) -> Bridges:
-    """Choose bridges on centre lines, clear of third discs and cell sides.
+    """Choose bridges among the centre lines, clear of third discs and cell sides.
 
-    They are LEAST_ANGLE from each other and from the `vertices` that circles have; if two are too near, the shorter one
-    stays.
-
-    Their ends are `margin` away from the sides, and their middles one `largest` edge, or their length: beside a side
-    there would be no room for good triangles.
+    Bridges on one disc are LEAST_ANGLE from each other and from its `vertices`; of two that are too near, the shorter
+    one stays. Their ends are `margin` away from the sides, and their middles by a `largest` edge or their length: good
+    triangles beside a side need room.
     """
     middle = lines.facing.mean(axis=1)
     away, ends_away = (np.minimum(points, size - points) for points in (middle, lines.facing))

@@ -39,7 +39,7 @@ class EllipticArcs(Lines):
 
     @classmethod
     def of(cls, ellipses: Ellipses, start: Float, stop: Float, cap: float) -> EllipticArcs:
-        """Return arcs between parameters (a,) of ellipses (a,), with edges of `cap` at most."""
+        """Return arcs between parameters (a,) of ellipses (a,), with edges of at most `cap`."""
         share = np.linspace(0, 1, POINTS + 1)
         angle = start[:, None] + (stop - start)[:, None] * share
         places = np.stack([ellipses.points(angle[:, k]) for k in range(len(share))], axis=1)
@@ -69,7 +69,7 @@ def size_field(
     crossed: Ellipses,
     crossings: Float,
 ) -> graded_size.SizeField:
-    """Return the size field as `graded_size.size_field`, for ellipses.
+    """Return the size field of a cell with ellipses; see `graded_size.size_field`.
 
     Cell sides meet the ellipses `crossed` (c,) at `crossings` (c, 2). There edges suit the length R phi, with the angle
     phi between side and ellipse, and the radius of curvature R.
@@ -78,8 +78,7 @@ def size_field(
     assert isinstance(inner, Ellipses)
     shells, disc = arrangement.shells
     # In mesh order: that of rows does not matter.
-    rank = np.arange(len(inner)) if arrangement.mesh_order is None else np.argsort(arrangement.mesh_order)
-    order = np.argsort(rank[disc], kind="stable")
+    order = np.argsort(np.argsort(arrangement.order)[disc], kind="stable")
     ellipses, disc = Ellipses(shells.centres, shells.frames)[order], disc[order]
     angle, which = np.tile(np.linspace(0, 2 * np.pi, POINTS, endpoint=False), len(ellipses)), np.arange(len(ellipses))
     around = np.repeat(which, POINTS)
@@ -115,7 +114,7 @@ def size_field(
 
 
 def _between(ellipses: Ellipses, size: Float, largest: float) -> Source:
-    """Facing points of near fibres, with the edges that suit their gap."""
+    """Return the facing points of near fibres as sources of sizes."""
     first, second, vector = arrangements.neighbours(ellipses.centres, size, 2 * ellipses.longest.max() + largest)
     one = ellipses[first]
     other = Ellipses(one.centres + vector, ellipses.frames[second])
@@ -129,7 +128,7 @@ def _between(ellipses: Ellipses, size: Float, largest: float) -> Source:
 
 
 def _beside_sides(ellipses: Ellipses, size: Float, largest: float) -> Iterator[Source]:
-    """Points where an ellipse comes near a side or hardly crosses it: extreme point and foot on the side."""
+    """Yield as sources where ellipses come near a side: extreme points and their feet."""
     for axis, sign in product((0, 1), (-1.0, 1.0)):
         normal = np.zeros((len(ellipses), 2))
         normal[:, axis] = sign

@@ -44,14 +44,13 @@ class Outline:
 
 
 def images(arrangement: Arrangement) -> tuple[Conics, Int, Int]:
-    """Return the outlines (k,) that reach into the cell, their fibres (k,), and the outlines around them (k,).
+    """Find the outlines (k,) in the cell, their fibres (k,), and the outlines around (k,).
 
     Periodic images are listed separately, fibre by fibre and image by image, each from without.
     """
     size, outlines, outer = arrangement.size, arrangement.outlines, arrangement.outer
     steps = np.array(list(product((-1, 0, 1), repeat=2)))
-    order = np.arange(len(outlines)) if arrangement.mesh_order is None else arrangement.mesh_order
-    fibre = np.repeat(order, len(steps))
+    fibre = np.repeat(arrangement.order, len(steps))
     centres = outlines.centres[fibre] + np.tile(steps, (len(outlines), 1)) * size
     outside = np.abs(centres - np.clip(centres, 0, size))
     if isinstance(outlines, Discs):
@@ -69,21 +68,21 @@ def images(arrangement: Arrangement) -> tuple[Conics, Int, Int]:
 
 
 def crossings(curves: Conics, axis: int, size: Float) -> Float:
-    """Sorted coordinates along `axis` on the side at 0: corners and crossings with curves."""
+    """Sort the coordinates of corners and crossings of curves on the side at 0 along `axis`."""
     middle, half = curves.chord(axis)
     crossing = np.concatenate([middle - half, middle + half])[np.tile(half > 0, 2)]
     return np.concatenate([[0.0], np.sort(crossing[(crossing > 0) & (crossing < size[axis])]), [size[axis]]])
 
 
 def on_side(places: Float, axis: int, level: float) -> Float:
-    """Points (k, 2) on the side along `axis` at the given level of the other coordinate."""
+    """Return points (k, 2) on a side along `axis`, with the other coordinate `level`."""
     points = np.full((len(places), 2), level)
     points[:, axis] = places
     return points
 
 
 def curve_at(curves: Conics, points: Float) -> Int:
-    """Return the smallest closed curve (k,) around each point on a line, or MATRIX."""
+    """Find the smallest closed curve (k,) around each point of a line, or MATRIX."""
     beyond = curves.centres - np.clip(curves.centres, points.min(axis=0), points.max(axis=0))
     close = np.flatnonzero(np.linalg.norm(beyond, axis=1) < curves.longest)
     if not len(close):
@@ -95,7 +94,7 @@ def curve_at(curves: Conics, points: Float) -> Int:
 
 
 def on_curves(curves: Conics, points: Float) -> tuple[Int, Float]:
-    """Find the curves (c,) on which `points` (n, 2) lie, and those points (c, 2), curve by curve."""
+    """Find the curves (c,) on which points lie, and these points (c, 2)."""
     close = cKDTree(points).query_ball_point(curves.centres, curves.longest * (1 + SAME_PLACE))
     number = np.repeat(np.arange(len(curves)), [len(candidates) for candidates in close])
     points = points[np.concatenate([np.zeros(0, np.int64), *filter(len, close)]).astype(int)]
@@ -107,7 +106,7 @@ def on_curves(curves: Conics, points: Float) -> tuple[Int, Float]:
 def vertex_angles(
     curves: Conics, name: Int, crossing: tuple[Int, Float], marks: Mapping[int, Sequence[float]]
 ) -> OnCircles:
-    """Curve (v,) and parameter (v,) in [0, 2 pi) of all vertices: crossings with sides as `on_curves`, and marks.
+    """Return the curves (v,) and parameters (v,) in [0, 2 pi) of crossings and marks.
 
     `marks` have angles in degrees by the names (k,) of the curves.
     """
@@ -123,7 +122,7 @@ def vertex_angles(
 
 
 def arcs_within(curves: Conics, vertices: OnCircles, size: Float) -> tuple[Int, Float, Float]:
-    """Divide curves into arcs within the cell, at most a quarter turn each: curve, start and stop parameter (a,).
+    """Divide curves into arcs of a quarter turn or less in the cell: curve, start, stop (a,).
 
     Curves without vertices get one at 0.
     """

@@ -1,4 +1,4 @@
-"""Edge lengths that grow with the distance from places where they are known."""
+"""Edge lengths that grow with the distance from sources with given lengths."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ from feti_homog.typing import Float
 # Growth of the edge length per distance, at most.
 MAX_GROWTH = 0.4
 NEAREST = 16  # sources that count at a position
-# Positions whose neighbours are looked for at once, for the memory that this takes.
+# Positions in one query of a tree, which bounds its memory.
 CHUNK = 100_000
 
 # Places (k, 2), edge lengths (k,) and growths (k,).
@@ -18,7 +18,7 @@ Source = tuple[Float, Float, Float]
 
 
 class SourcedSize:
-    """The size h(x) = min(largest, min_k (h_k + g_k |x - x_k|)) at positions x on the torus.
+    """The size h(x) = min(largest, min_k (h_k + g_k |x - x_k|)) on the torus.
 
     Source k acts within the distance `largest` / MAX_GROWTH.
 
@@ -30,9 +30,9 @@ class SourcedSize:
     def __init__(
         self, sources: Sequence[Source], size: Float, largest: float, chunk: int = CHUNK, nearest: int = NEAREST
     ) -> None:
-        """Prepare sources on the torus with periods `size` (2,), of which the `nearest` count at a position.
+        """Prepare sources on the torus with periods `size` (2,).
 
-        `chunk` positions are looked at together.
+        The `nearest` sources count at a position; a query has `chunk` positions.
         """
         self.largest = largest
         self._size, self._bound, self._chunk, self._nearest = size, largest / MAX_GROWTH, chunk, nearest
@@ -55,6 +55,6 @@ class SourcedSize:
 
 
 def wrap(points: Float, size: Float) -> Float:
-    """Positions (n, 2) on the torus, in [0, size)."""
+    """Wrap positions (n, 2) into the cell [0, size)."""
     wrapped = points % size
     return np.where(wrapped >= size, 0.0, wrapped)

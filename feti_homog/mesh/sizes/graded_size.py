@@ -24,7 +24,7 @@ WEDGE = 3
 
 
 def circle_size(arrangement: Arrangement, largest: float) -> Float:
-    """Largest edge length (k,) on an arrangement's circles, such that each has MIN_EDGES_AROUND edges or more.
+    """Return the longest edge (k,) on each circle, for MIN_EDGES_AROUND edges or more.
 
     Edges on a coating with thickness t on the radius a have at most sqrt(t a): then they are t / 8 away from their
     arcs, and elements across the coating do not turn over when their edges are bent.
@@ -35,12 +35,12 @@ def circle_size(arrangement: Arrangement, largest: float) -> Float:
 
 
 def coating_size(arrangement: Arrangement) -> Float:
-    """sqrt(t a) (N,) for a coating with thickness t on a disc with radius a."""
+    """Return sqrt(t a) (N,) for coatings of thickness t on discs of radius a."""
     return np.asarray(np.sqrt(arrangement.coating * arrangement.radii))
 
 
 def _between_fibres(circles: Float, size: Float, caps: Float, largest: float) -> Iterator[Source]:
-    """Facing points on neighbouring fibres; edges there suit the gap and the other fibre's edges."""
+    """Yield facing points of fibres as sources, by the gap and the other fibre's edges."""
     centres, radii = circles[:, :2], circles[:, 2]
     first, second, vector = arrangements.neighbours(centres, size, 2 * radii.max() + largest)
     distance = np.linalg.norm(vector, axis=1)
@@ -55,12 +55,12 @@ def _between_fibres(circles: Float, size: Float, caps: Float, largest: float) ->
 
 
 def passage_growth(width: Float, curvature: Float) -> Float:
-    """Growth with which edges stay below twice the width w + c s^2 / 2 in a passage with curvature c."""
+    """Return the growth of edges below twice the width w + c s^2 / 2 of a passage."""
     return np.asarray(np.minimum(MAX_GROWTH, np.sqrt((4 - 2 * PASSAGE_EDGE) * 2 * width * curvature)))
 
 
 def _at_sides(circles: Float, size: Float, caps: Float, largest: float) -> Iterator[Source]:
-    """Find where a circle comes near a side or hardly crosses it: extreme point, foot on the side, crossings."""
+    """Yield as sources where circles come near a side: extreme points, feet, crossings."""
     centres, radii = circles[:, :2] % size, circles[:, 2]
     for axis, sign in product((0, 1), (-1.0, 1.0)):
         distance = centres[:, axis] if sign < 0 else size[axis] - centres[:, axis]
@@ -82,7 +82,7 @@ def _at_sides(circles: Float, size: Float, caps: Float, largest: float) -> Itera
 
 
 def at_vertices(vertices: Float, size: Float, largest: float) -> Source:
-    """Vertices, once on the torus, with the distance to the nearest other one."""
+    """Return the vertices, once on the torus, as sources by the distance to the next."""
     places = wrap(vertices, size)
     tree = cKDTree(places, boxsize=size)
     same = tree.query_pairs(1e-9 * size.max(), output_type="ndarray")
@@ -100,7 +100,7 @@ FINE_CIRCLE = 0.1
 
 @dataclass(frozen=True)
 class MeshSizes:
-    """Edge lengths that a mesh is asked for, at most; each no larger than the one before.
+    """The largest edge lengths of a mesh; each is at most the one before.
 
     Attributes:
         largest: anywhere.
@@ -114,7 +114,7 @@ class MeshSizes:
 
     @classmethod
     def of(cls, cell: cell_section.Cell, has_tips: bool) -> MeshSizes:
-        """Return the sizes that a cell with width 1 is asked for."""
+        """Return the sizes that a case asks for, in a cell of width 1."""
         interface = cell.mesh_size if cell.interface_size is None else cell.interface_size
         return cls(cell.mesh_size, interface, interface if cell.tip_size is None or not has_tips else cell.tip_size)
 
@@ -126,7 +126,7 @@ class MeshSizes:
         return bool(min(self.tip, self.on_circles(arrangement).min()) < self.largest)
 
     def on_circles(self, arrangement: Arrangement) -> Float:
-        """(N,) on the circles of each disc."""
+        """Return the sizes (N,) on the circles of each disc."""
         sizes = np.where(arrangement.coated, np.minimum(self.interface, coating_size(arrangement)), self.interface)
         around = 2 * np.pi * arrangement.radii / MIN_EDGES_AROUND
         return np.where(around < FINE_CIRCLE * self.largest, np.minimum(sizes, around), sizes)
@@ -134,7 +134,7 @@ class MeshSizes:
 
 @dataclass(frozen=True)
 class SizeField:
-    """The edge size on a cell's lines: the smaller one among two sizes, the second of which grows along lines.
+    """The edge size on a cell's lines: the smaller one of a base and a graded size.
 
     Attributes:
         base, graded: these sizes.
@@ -145,17 +145,17 @@ class SizeField:
 
     @property
     def least(self) -> float:
-        """Size below which there is none."""
+        """A lower bound of the sizes."""
         return self.base.least if self.graded is None else min(self.base.least, self.graded.least)
 
     def at(self, points: Float) -> Float:
-        """Sizes (n,) at positions (n, 2)."""
+        """Return the sizes (n,) at positions (n, 2)."""
         sizes = self.base(points)
         return sizes if self.graded is None else np.minimum(sizes, self.graded(points))
 
 
 def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips: Float) -> SizeField:
-    """Return the edge size at positions on the torus, by passages and vertices, and smaller near discs and tips.
+    """Return the edge size on the torus, by passages, vertices, discs and tips.
 
     The sources (x_k, h_k) are the two faces of each narrow passage between two fibres, or between a fibre and
     a side or corner of the cell, with h_k proportional to its width, and the `vertices` (v, 2) that the mesh
@@ -194,7 +194,7 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
 
 @dataclass(frozen=True)
 class FromLines:
-    """h_i + g d and h_t + g max(0, d - h_t) as in `size_field`, whichever is smaller.
+    """The smaller one of h_i + g d and h_t + g max(0, d - h_t), see `size_field`.
 
     Attributes:
         size: (2,) width and height.
@@ -223,17 +223,17 @@ class FromLines:
         tips: Float,
         circles: Float | None = None,
     ) -> FromLines:
-        """Return the sizes by points (s, 2) on curves, and tips (t, 2)."""
+        """Make the sizes from points (s, 2) on curves, and from tips (t, 2)."""
         near, near_tips = (cKDTree(wrap(places.reshape(-1, 2), size), boxsize=size) for places in (points, tips))
         return cls(size, near, owner, lengths, tip, near_tips, circles)
 
     @property
     def least(self) -> float:
-        """Size below which there is none."""
+        """A lower bound of the sizes."""
         return min(self.tip, float(self.lengths.min()))
 
     def __call__(self, points: Float) -> Float:
-        """(n,) at positions (n, 2) on the torus."""
+        """Return the sizes (n,) at positions (n, 2) on the torus."""
         places = wrap(points, self.size)
         distance, nearest = self.points.query(places)
         curve = self.owner[nearest]

@@ -4,7 +4,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import chain, pairwise
+from itertools import pairwise
 from types import ModuleType
 
 import numpy as np
@@ -31,7 +31,7 @@ Loop = tuple[Float, list[int]]
 
 @dataclass(frozen=True)
 class Tile:
-    """Regions in an outline that are filled at once.
+    """Regions of an outline that gmsh fills together.
 
     Attributes:
         points: (n, 2) nodes on the lines.
@@ -63,7 +63,7 @@ class Filling:
 
 @contextmanager
 def gmsh_session() -> Iterator[ModuleType]:
-    """gmsh, initialised, silent, with fixed options and an empty model; finalised at the end."""
+    """Initialise gmsh, silent, with fixed options and an empty model; finalise it at the end."""
     import gmsh
 
     gmsh.initialize(readConfigFiles=False, interruptible=False)
@@ -83,7 +83,7 @@ def gmsh_session() -> Iterator[ModuleType]:
 
 
 def fill(tile: Tile) -> Filling:
-    """Return the triangles of a tile; as few as possible have two edges on one circle.
+    """Fill a tile; as few triangles as possible have two edges on one circle.
 
     Raises:
         MeshError: gmsh cannot fill it.
@@ -142,14 +142,14 @@ def _unfilled(tile: Tile, why: str) -> MeshError:
 
 
 def arc_edges(curves: Curves) -> tuple[Int32, Int32]:
-    """Edges (a, 2) on circles, and their circles (a,)."""
+    """Return the edges (a, 2) on circles, and their circles (a,)."""
     pairs, curve = curves.edges
     circle = curves.circle[curve]
     return pairs[circle != MATRIX].astype(np.int32), circle[circle != MATRIX].astype(np.int32)
 
 
 def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int]]:
-    """Add plane surfaces for fibres, coatings and matrix; their tags, and the circle next around each or MATRIX.
+    """Add the surfaces of all regions; return their tags, and the circle around each or MATRIX.
 
     Each outline edge is a line with one element, and node n is point n + 1.
     """
@@ -157,13 +157,13 @@ def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int]]:
     for tag, (x, y) in enumerate(tile.points.round(DECIMALS).tolist(), 1):
         geo.addPoint(x, y, 0.0, tag=tag)
     nodes = np.split(curves.node, curves.first[1:-1])
-    lines = [[geo.addLine(start, stop) for start, stop in pairwise((curve + 1).tolist())] for curve in nodes]
-    for tag in chain.from_iterable(lines):
+    lines = [np.array([geo.addLine(*ends) for ends in pairwise((curve + 1).tolist())]) for curve in nodes]
+    for tag in np.concatenate(lines).tolist():
         geo.mesh.setTransfiniteCurve(tag, 2)
     # Curves run forwards, then backwards with negative tags, and have a region on their left.
     directed = list(zip(curves.inside.tolist(), nodes, lines, strict=True))
     for region, curve, tags in zip(curves.outside.tolist(), nodes, lines, strict=True):
-        directed.append((region, curve[::-1], [-tag for tag in reversed(tags)]))
+        directed.append((region, curve[::-1], -tags[::-1]))
     # At each vertex one curve of a region starts.
     after = {(region, int(curve[0])): (curve, tags) for region, curve, tags in directed if region != OUTSIDE}
     regions: dict[int, list[Loop]] = defaultdict(list)
@@ -173,7 +173,7 @@ def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int]]:
             loop.append(after.pop((region, node)))
             node = int(loop[-1][0][-1])
         polygon = tile.points[np.concatenate([curve[:-1] for curve, _ in loop])]
-        regions[region].append((polygon, [tag for _, tags in loop for tag in tags]))
+        regions[region].append((polygon, np.concatenate([tags for _, tags in loop]).tolist()))
     surfaces, circle = [], []
     # The matrix is last.
     for region in sorted(regions, key=lambda inside: inside == MATRIX):
@@ -185,7 +185,7 @@ def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int]]:
 
 
 def _with_holes(loops: list[Loop]) -> list[list[list[int]]]:
-    """Group the lines of loops: an outer loop is followed by the holes within it, which run clockwise."""
+    """Group the tags of loops: an outer loop, then its holes, which run clockwise."""
     areas = []
     for polygon, _ in loops:
         a, b = polygon - polygon[0], np.roll(polygon, -1, axis=0) - polygon[0]
@@ -200,7 +200,7 @@ def _with_holes(loops: list[Loop]) -> list[list[list[int]]]:
 
 
 def _contains(polygon: Float, point: Float) -> bool:
-    """Return whether a polygon (k, 2) contains a point, by counting the edges to its right."""
+    """Return whether a polygon (k, 2) contains a point, by counting crossings."""
     a, b = polygon - point, np.roll(polygon, -1, axis=0) - point
     crossing = (a[:, 1] > 0) != (b[:, 1] > 0)
     rise = np.where(crossing, b[:, 1] - a[:, 1], 1.0)

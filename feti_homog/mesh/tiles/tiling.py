@@ -26,7 +26,7 @@ from feti_homog.typing import Array, Float, Int, Int32
 
 @dataclass(frozen=True)
 class TilePolicy:
-    """Which cells are cut into tiles, and into how many.
+    """The cells that are cut into tiles, and the number of tiles.
 
     Attributes:
         least_discs: cells with fewer are filled at once.
@@ -61,14 +61,14 @@ class Tiling:
 
 
 def is_tiled(arrangement: Arrangement, policy: TilePolicy) -> bool:
-    """Return whether it is large and has round discs only."""
+    """Return whether an arrangement is large and has round discs only."""
     return len(arrangement.phase) >= policy.least_discs and isinstance(arrangement.outlines, Discs)
 
 
 def tiling(
     arrangement: Arrangement, largest: float, marks: Mapping[int, Sequence[float]], policy: TilePolicy
 ) -> Tiling | None:
-    """Tile a large cell with round fibres; None for others, and where there is no room for bridges.
+    """Tile a large cell with round fibres; None for others, or without room for bridges.
 
     `largest` is the element size, and `marks` are as in `BareOutline.of`.
     """
@@ -104,9 +104,9 @@ def tiling(
 
 
 def _side_pieces(discs: Discs, outer: Int, size: Float) -> tuple[Int, Float]:
-    """Return the side pieces in the matrix, as `matrix_tiles` takes them.
+    """Return the side pieces in the matrix, for `matrix_tiles`.
 
-    `outer` (n,) are the discs that bound it.
+    `outer` (n,) are the discs that bound the matrix.
     """
     nodes, ends = [], []
     for axis, (level, low) in product((0, 1), ((0.0, True), (1.0, False))):
@@ -125,9 +125,9 @@ def _side_pieces(discs: Discs, outer: Int, size: Float) -> tuple[Int, Float]:
 
 
 def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[tuple[Int, Tile]]:
-    """Cut a cell with the outline `lines` into tiles, each with its node numbers (n,).
+    """Cut a cell with the outline `lines` into tiles with their node numbers (n,).
 
-    The cell as it is without a tiling.
+    Without a tiling the cell is one tile.
     """
     if tiles is None:
         return [(np.arange(len(cell.points)), cell)]
@@ -186,7 +186,7 @@ class Regions:
 
 @dataclass(frozen=True)
 class NumberedTile:
-    """A tile with its node numbers (n,), and node numbers (n,) that represent periodic classes."""
+    """A tile with node numbers (n,), and with representatives (n,) of periodic classes."""
 
     nodes: Int
     classes: Int
@@ -210,12 +210,12 @@ class FilledTile:
 
     @property
     def inner(self) -> Int:
-        """(k,) numbers of the nodes that are not on lines."""
+        """(k,) numbers of the nodes off the lines."""
         return self.first + np.arange(len(self.filling.inner))
 
 
 def tile_torus(regions: Regions, tiles: Sequence[FilledTile], all_nodes: int) -> tuple[Torus, Int]:
-    """Return the torus of filled tiles without voids, and the tile number (m,) of each triangle.
+    """Return the torus of filled tiles, without voids, and the tile (m,) of each triangle.
 
     `all_nodes` counts the nodes in the cell.
     """
@@ -257,7 +257,7 @@ def tile_torus(regions: Regions, tiles: Sequence[FilledTile], all_nodes: int) ->
 
 
 def _arcs(tiles: Sequence[FilledTile], number: Int, triangles: Int32) -> tuple[Int32, Int]:
-    """Find edges (a, 2) of triangles on circles, and the circles (a,); node k has the number number[k]."""
+    """Find the edges (a, 2) of triangles on circles, and their circles; node k is number[k]."""
     arcs = [arc_edges(filled.lines.tile.curves) for filled in tiles]
     circle = _all([circles for _, circles in arcs])
     ends = _all([filled.lines.nodes[pairs] for filled, (pairs, _) in zip(tiles, arcs, strict=True)], 2)
@@ -271,5 +271,5 @@ def _arcs(tiles: Sequence[FilledTile], number: Int, triangles: Int32) -> tuple[I
 
 
 def _all(parts: Sequence[Array], width: int | None = None, kind: type = int) -> Array:
-    """Concatenate rows; without parts, no rows of `width` numbers."""
+    """Concatenate rows; without parts there are no rows of `width` numbers."""
     return np.concatenate([np.zeros((0,) if width is None else (0, width), kind), *parts])

@@ -19,12 +19,12 @@ REPLACING = tuple(shape.sizes for shape in SHAPES if "radius" not in shape.sizes
 
 
 def given_shapes(rows: Columns, has_tips: bool) -> list[Shape]:
-    """Return the shapes that some rows have and whose meshes may, or may not, have nodes at tips."""
+    """Return the shapes of some rows whose meshes have, or do not have, nodes at tips."""
     return [shape for shape in SHAPES if shape.has_tips == has_tips and shape.given(rows).any()]
 
 
 def columns_without_tips(rows: Columns) -> dict[str, Float]:
-    """Columns (N,) for rows with such shapes, NaN in other rows; none without such rows."""
+    """Return columns (N,) of shapes without tips, NaN in other rows; none without such rows."""
     shapes = given_shapes(rows, has_tips=False)
     own = np.logical_or.reduce([np.zeros(len(rows["x"]), bool), *(shape.given(rows) for shape in shapes)])
     names = {name for shape in shapes for name in (*shape.sizes, *shape.columns, "angle")}
@@ -32,13 +32,13 @@ def columns_without_tips(rows: Columns) -> dict[str, Float]:
 
 
 def have_both_sizes(rows: Columns) -> Bool:
-    """(N,) which rows have a radius and also lengths that stand in its place."""
+    """Return which rows (N,) have a radius and also lengths in place of it."""
     others = [~np.isnan(rows[sizes[0]]) for sizes in REPLACING]
     return np.asarray(~np.isnan(rows["radius"]) & np.logical_or.reduce(others))
 
 
 def outlines_of(rows: Columns) -> Outlines:
-    """Return the outlines (N,) of rows without faults, without coatings, in the table's unit."""
+    """Return the outlines (N,), without coatings, of rows without faults."""
     centres = np.column_stack([rows["x"], rows["y"]])
     radius = np.where(np.isnan(rows["radius"]), rows["a"], rows["radius"])
     parts: list[tuple[Bool, Outlines]] = []
@@ -50,9 +50,9 @@ def outlines_of(rows: Columns) -> Outlines:
 
 
 def with_parts(outlines: Outlines, parts: Sequence[tuple[Bool, Outlines]]) -> Outlines:
-    """Return the outlines, with the rows (N,) of each part replaced.
+    """Replace the outlines in the rows (N,) of each part.
 
-    Discs, ellipses or sums, if need be.
+    Returns discs or ellipses where these suffice, else sums.
     """
     parts = [(own, part) for own, part in parts if own.any()]
     if not parts:
@@ -70,11 +70,11 @@ def with_parts(outlines: Outlines, parts: Sequence[tuple[Bool, Outlines]]) -> Ou
 
 
 def elliptic(outlines: Outlines) -> Ellipses:
-    """Ellipses, and for other outlines equal-area discs."""
+    """Replace outlines that are no ellipses by equal-area discs."""
     has_core = outlines.cores.any(axis=(1, 2))[:, None, None]
     return Ellipses(outlines.centres, np.where(has_core, outlines.radii[:, None, None] * np.eye(2), outlines.frames))
 
 
 def _padded(cores: Float, corners: int) -> Float:
-    """Cores (k, m, 2) with so many corners, the last one repeated."""
+    """Repeat the last corners of cores (k, m, 2) up to this number of corners."""
     return np.pad(cores, ((0, 0), (0, corners - cores.shape[1]), (0, 0)), mode="edge")
