@@ -77,7 +77,7 @@ def begin(
         return mesh_outlines(arrangement, sizes, scale)
     unmeshed = UnmeshedCell.of(arrangement, sizes, marks, scale, policy)
     field = unmeshed.bare.field
-    element_estimate.refuse_many(field.at, field.least, arrangement.size, limit)
+    element_estimate.refuse_many(field, field.least, arrangement.size, limit)
     return unmeshed
 
 
@@ -147,7 +147,7 @@ class UnmeshedCell:
         Raises:
             MeshError: the lines would have too many.
         """
-        lines = self.bare.outline(self.bare.stations() if stations is None else stations)
+        lines = self.bare.outline(stations or self.bare.lines.stations(self.bare.field))
         cell = Tile(lines.points, lines.curves, self.sizes.largest, self.sizes.are_graded(self.arrangement))
         return NodedCell(self.arrangement, lines, tuple(cut(lines, cell, self.tiles)), self.scale)
 

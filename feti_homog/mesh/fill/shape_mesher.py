@@ -16,8 +16,7 @@ from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.readers.gmsh_file import MshContent, raw_mesh
 from feti_homog.mesh.readers.msh_reader import made
 from feti_homog.mesh.sizes.element_estimate import refuse_many
-from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, SourcedSize, wrap
-from feti_homog.mesh.sizes.graded_size import MIN_EDGES_AROUND, PASSAGE_EDGE, MeshSizes
+from feti_homog.mesh.sizes.graded_size import MAX_GROWTH, MIN_EDGES_AROUND, PASSAGE_EDGE, MeshSizes, SizeField, wrap
 from feti_homog.mesh.tiles.tile_filling import gmsh_session
 from feti_homog.microstructure import Arrangement, phase_names
 from feti_homog.microstructure.shapes import convex_sums
@@ -148,7 +147,7 @@ def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int, sh
     return int(occ.addPlaneSurface([occ.addCurveLoop(lines)]))
 
 
-def _set_sizes(gmsh: ModuleType, path: Path, size: Float, field: SourcedSize) -> None:
+def _set_sizes(gmsh: ModuleType, path: Path, size: Float, field: SizeField) -> None:
     """Let gmsh interpolate the sizes on a grid, through a file."""
     counts = np.clip(np.ceil(size / field.least), FEWEST_CELLS, MOST_CELLS).astype(np.int32) + 1
     x, y = (np.linspace(0.0, width, count) for width, count in zip(size, counts, strict=True))
@@ -162,7 +161,7 @@ def _set_sizes(gmsh: ModuleType, path: Path, size: Float, field: SourcedSize) ->
     gmsh.model.mesh.field.setAsBackgroundMesh(structured)
 
 
-def _size_field(arrangement: Arrangement, sizes: MeshSizes) -> SourcedSize:
+def _size_field(arrangement: Arrangement, sizes: MeshSizes) -> SizeField:
     """Return the size field h = min_k h_k + g |x - x_k| over points x_k on all outlines.
 
     h_k is at most the interface size, a part of the circle with the curvature there, and PASSAGE_EDGE times the
@@ -191,4 +190,4 @@ def _size_field(arrangement: Arrangement, sizes: MeshSizes) -> SourcedSize:
         length = np.where(faces, np.minimum(length, PASSAGE_EDGE * away), length)
     length = np.maximum(length, LEAST * size.max())
     growth = np.full(len(places), MAX_GROWTH)
-    return SourcedSize([(places, length, growth)], size, sizes.largest, nearest=NEAREST)
+    return SizeField([(places, length, growth)], size, sizes.largest, nearest=NEAREST)

@@ -90,14 +90,6 @@ class BareOutline:
             straight = Segments(*np.zeros((3, 0, 2)))
         return cls(size, curves, disc, around, vertices, circle, SizedLines(arcs, straight, sampling), field)
 
-    def stations(self) -> LineStations:
-        """Place all nodes of the arcs and bridges on this rank.
-
-        Raises:
-            MeshError: there would be more than the sampling allows.
-        """
-        return self.lines.stations(self.field)
-
     def outline(self, stations: LineStations) -> Outline:
         """Return the outline with these nodes; opposite sides have the same nodes.
 
@@ -129,7 +121,7 @@ class BareOutline:
         """Yield the nodes (n, 2), the same on both sides along `axis`, and their curves."""
         places = outline.crossings(self.curves, axis, self.size)
         begin, span = places[:-1], np.diff(places)
-        longest = np.full((len(span), 2), self.field.base.largest)
+        longest = np.full((len(span), 2), self.field.largest)
         pieces = Segments(outline.on_side(begin, axis, 0.0), outline.on_side(span, axis, 0.0), longest)
         sampling = self.lines.sampling
         for level, low in ((0.0, True), (self.size[1 - axis], False)):
@@ -171,9 +163,9 @@ def _segments(curves: Discs, bridges: Bridges, caps: Float, field: SizeField) ->
     the matrix.
     """
     begin, end = (curves[bridges.ends[:, k]].points(bridges.angle + k * np.pi) for k in (0, 1))
-    longest = np.full((len(begin), 2), field.base.largest)
+    longest = np.full((len(begin), 2), field.largest)
     if field.graded is None:
         longest = np.stack(
-            [np.minimum(field.at(at), caps[bridges.ends[:, k]]) for k, at in enumerate((begin, end))], axis=1
+            [np.minimum(field(at), caps[bridges.ends[:, k]]) for k, at in enumerate((begin, end))], axis=1
         )
     return Segments(begin, end - begin, longest)

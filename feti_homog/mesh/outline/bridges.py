@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
-from feti_homog.mesh.sizes.from_sources import CHUNK, wrap
+from feti_homog.mesh.sizes.graded_size import CHUNK, wrap
 from feti_homog.typing import Float, Int
 
 TURN = 2 * np.pi

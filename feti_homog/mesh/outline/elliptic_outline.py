@@ -11,7 +11,7 @@ import numpy as np
 from feti_homog.mesh.outline.bridges import TURN
 from feti_homog.mesh.outline.lines import Lines
 from feti_homog.mesh.sizes import graded_size
-from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, Source, SourcedSize
+from feti_homog.mesh.sizes.graded_size import MAX_GROWTH, Source
 from feti_homog.microstructure import Arrangement, arrangements
 from feti_homog.microstructure.shapes import Ellipses, directions, gaps
 from feti_homog.typing import Float, Int
@@ -105,12 +105,10 @@ def size_field(
         (np.stack([nearest, np.zeros(2)]), np.full(2, to_corner), np.full(2, MAX_GROWTH)),
         graded_size.at_vertices(vertices, size, largest),
     ]
-    base = SourcedSize(sources, size, largest)
-    if not sizes.are_graded(arrangement):
-        return graded_size.SizeField(base)
-    return graded_size.SizeField(
-        base, graded_size.FromLines.of(size, points, np.arange(len(points)), lengths, sizes.tip, tips)
-    )
+    lines = None
+    if sizes.are_graded(arrangement):
+        lines = graded_size.FromLines.of(size, points, np.arange(len(points)), lengths, sizes.tip, tips)
+    return graded_size.SizeField(sources, size, largest, lines)
 
 
 def _between(ellipses: Ellipses, size: Float, largest: float) -> Source:

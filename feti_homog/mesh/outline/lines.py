@@ -212,7 +212,7 @@ def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges:
     lengths = lines.lengths
     line, samples = np.repeat(np.arange(len(lengths)), least_samples), np.linspace(0, 1, least_samples)
     samples = np.tile(samples, len(lengths))
-    sizes = np.minimum(field.at(lines.points(line, samples)), lines.caps(line, samples))
+    sizes = np.minimum(field(lines.points(line, samples)), lines.caps(line, samples))
     while field.graded is not None:
         way = np.diff(samples) * lengths[line[:-1]]
         wide = (np.diff(line) == 0) & (way > 1 / SAMPLES_OF_AN_EDGE * np.minimum(sizes[:-1], sizes[1:]))
@@ -220,7 +220,7 @@ def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges:
             break
         at = np.flatnonzero(wide) + 1
         middle, of = (samples[at - 1] + samples[at]) / 2, line[at]
-        more = np.minimum(field.at(lines.points(of, middle)), lines.caps(of, middle))
+        more = np.minimum(field(lines.points(of, middle)), lines.caps(of, middle))
         line, samples, sizes = (np.insert(*x) for x in ((line, at, of), (samples, at, middle), (sizes, at, more)))
     density, begin = lengths[line] / sizes, np.searchsorted(line, np.arange(len(lengths) + 1))
     # int ds / h from the beginning of each line, by the trapezoidal rule.

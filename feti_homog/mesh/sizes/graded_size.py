@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -10,17 +10,31 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.case import cell_section
-from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, Source, SourcedSize, wrap
 from feti_homog.microstructure import Arrangement, arrangements
 from feti_homog.microstructure.shapes import on_circle
 from feti_homog.typing import Float, Int
 
+# Growth of the edge length per distance, at most.
+MAX_GROWTH = 0.4
+NEAREST = 16  # sources that count at a position
+# Positions in one query of a tree, which bounds its memory.
+CHUNK = 100_000
 # Edges around a fibre, at least.
 MIN_EDGES_AROUND = 16
 # Edge length in a narrow passage, relative to its width.
 PASSAGE_EDGE = 1.5
 # Angle between a circle and a side that it crosses, relative to the turn of the circle along an edge there.
 WEDGE = 3
+
+
+# Places (k, 2), edge lengths (k,) and growths (k,).
+Source = tuple[Float, Float, Float]
+
+
+def wrap(points: Float, size: Float) -> Float:
+    """Wrap positions (n, 2) into the cell [0, size)."""
+    wrapped = points % size
+    return np.where(wrapped >= size, 0.0, wrapped)
 
 
 def circle_size(arrangement: Arrangement, largest: float) -> Float:
@@ -132,25 +146,47 @@ class MeshSizes:
         return np.where(around < FINE_CIRCLE * self.largest, np.minimum(sizes, around), sizes)
 
 
-@dataclass(frozen=True)
 class SizeField:
-    """The edge size on a cell's lines: the smaller one of a base and a graded size.
+    """The size h(x) = min(largest, min_k (h_k + g_k |x - x_k|)) on the torus, or a graded size if less.
+
+    Source k acts within the distance `largest` / MAX_GROWTH.
 
     Attributes:
-        base, graded: these sizes.
+        largest: size anywhere.
+        graded: the size that grows with the distance from lines; None if elements are not graded.
+        least: lower bound of the sizes.
     """
 
-    base: SourcedSize
-    graded: FromLines | None = None
+    def __init__(
+        self,
+        sources: Sequence[Source],
+        size: Float,
+        largest: float,
+        graded: FromLines | None = None,
+        chunk: int = CHUNK,
+        nearest: int = NEAREST,
+    ) -> None:
+        """Prepare sources on the torus with periods `size` (2,).
 
-    @property
-    def least(self) -> float:
-        """A lower bound of the sizes."""
-        return self.base.least if self.graded is None else min(self.base.least, self.graded.least)
+        The `nearest` sources count at a position; a query has `chunk` positions.
+        """
+        self.largest, self.graded = largest, graded
+        self._size, self._bound, self._chunk, self._nearest = size, largest / MAX_GROWTH, chunk, nearest
+        places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
+        # Where the tree finds no more sources, it returns their number: an infinite length.
+        self._lengths, self._growths = np.append(lengths, np.inf), np.append(growths, MAX_GROWTH)
+        self.least = min(largest, float(self._lengths.min()), np.inf if graded is None else graded.least)
+        self._tree = cKDTree(wrap(places, size), boxsize=size)
 
-    def at(self, points: Float) -> Float:
-        """Return the sizes (n,) at positions (n, 2)."""
-        sizes = self.base(points)
+    def __call__(self, points: Float) -> Float:
+        """Return the sizes (n,) at points (n, 2)."""
+        wrapped, count, parts = wrap(points, self._size), min(self._nearest, self._tree.n), []
+        for k in range(0, max(1, len(points)), self._chunk):
+            some = wrapped[k : k + self._chunk]
+            distance, nearest = self._tree.query(some, k=count, distance_upper_bound=self._bound)
+            sizes = (self._lengths[nearest] + self._growths[nearest] * distance).reshape(len(some), count)
+            parts.append(np.minimum(self.largest, sizes.min(axis=1)))
+        sizes = np.concatenate(parts)
         return sizes if self.graded is None else np.minimum(sizes, self.graded(points))
 
 
@@ -180,16 +216,15 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
         (corners, np.tile(length[close], 2), np.full(len(corners), MAX_GROWTH)),
         at_vertices(vertices, size, largest),
     ]
-    base = SourcedSize(sources, size, largest)
     if not sizes.are_graded(arrangement):
-        return SizeField(base)
+        return SizeField(sources, size, largest)
     # Points h_i apart on the outer circles find the nearest disc.
     lengths, outer = sizes.on_circles(arrangement), circles[first]
     counts = np.ceil(2 * np.pi * outer[:, 2] / lengths).astype(int)
     disc = np.repeat(np.arange(len(counts)), counts)
     angle = 2 * np.pi * (np.arange(len(disc)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[disc]
     points = on_circle(outer[disc], angle)
-    return SizeField(base, FromLines.of(size, points, disc, lengths, sizes.tip, tips, outer))
+    return SizeField(sources, size, largest, FromLines.of(size, points, disc, lengths, sizes.tip, tips, outer))
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import numpy as np
 from feti_homog.errors import MeshError
 from feti_homog.mesh.coarse_mesh import areas, flip_double_arcs
 from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE, Curves
-from feti_homog.mesh.sizes.from_sources import MAX_GROWTH
+from feti_homog.mesh.sizes.graded_size import MAX_GROWTH
 from feti_homog.typing import Float, Int, Int32
 
 # gmsh's algorithms. The first makes the better triangles of one size, but leaves a disc with thousands of nodes on its
