@@ -60,8 +60,19 @@ def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> C
             gmsh.model.mesh.setPeriodic(1, sides[1], sides[0], moved.ravel().tolist())
         for option in ("MeshSizeFromPoints", "MeshSizeExtendFromBoundary"):
             gmsh.option.setNumber(f"Mesh.{option}", 0)
+        # gmsh interpolates sizes on a grid, which it reads from a file.
+        size, structured = arrangement.size, gmsh.model.mesh.field.add("Structured")
+        counts = np.clip(np.ceil(size / field.least), FEWEST_CELLS, MOST_CELLS).astype(np.int32) + 1
+        x, y = (np.linspace(0.0, width, count) for width, count in zip(size, counts, strict=True))
+        values = field(np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2))
+        spacing = np.append(size / (counts - 1), 1.0)
         with TemporaryDirectory() as folder:
-            _set_sizes(gmsh, Path(folder) / "sizes", arrangement.size, field)
+            path = Path(folder) / "sizes"
+            with path.open("wb") as stream:
+                for part in (np.zeros(3), spacing, np.append(counts, 2).astype(np.int32), np.repeat(values, 2)):
+                    part.tofile(stream)
+            gmsh.model.mesh.field.setString(structured, "FileName", str(path))
+            gmsh.model.mesh.field.setAsBackgroundMesh(structured)
             gmsh.model.mesh.generate(2)
             gmsh.model.mesh.setOrder(2)
             raw = raw_mesh(MshContent.of(gmsh))
@@ -145,20 +156,6 @@ def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int, sh
         centre, places = point(corner), [stops[k], *middle, onward]
         lines += [occ.addCircleArc(begin, centre, end) for begin, end in pairwise(places)]
     return int(occ.addPlaneSurface([occ.addCurveLoop(lines)]))
-
-
-def _set_sizes(gmsh: ModuleType, path: Path, size: Float, field: SizeField) -> None:
-    """Let gmsh interpolate the sizes on a grid, through a file."""
-    counts = np.clip(np.ceil(size / field.least), FEWEST_CELLS, MOST_CELLS).astype(np.int32) + 1
-    x, y = (np.linspace(0.0, width, count) for width, count in zip(size, counts, strict=True))
-    values = field(np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2))
-    spacing = np.append(size / (counts - 1), 1.0)
-    with path.open("wb") as stream:
-        for part in (np.zeros(3), spacing, np.append(counts, 2).astype(np.int32), np.repeat(values, 2)):
-            part.tofile(stream)
-    structured = gmsh.model.mesh.field.add("Structured")
-    gmsh.model.mesh.field.setString(structured, "FileName", str(path))
-    gmsh.model.mesh.field.setAsBackgroundMesh(structured)
 
 
 def _size_field(arrangement: Arrangement, sizes: MeshSizes) -> SizeField:

@@ -13,12 +13,9 @@ from feti_homog.mesh.outline.lines import Lines
 from feti_homog.mesh.sizes import graded_size
 from feti_homog.mesh.sizes.graded_size import MAX_GROWTH, Source
 from feti_homog.microstructure import Arrangement, arrangements
-from feti_homog.microstructure.shapes import Ellipses, directions, gaps
+from feti_homog.microstructure.shapes import Ellipses, convex_sums, directions, gaps
 from feti_homog.typing import Float, Int
 
-# Points of each ellipse at which its curvature, and its distance from corners, are taken; steps of a quarter of it
-# between which its length is taken to be linear.
-POINTS = 256
 # Edges of coatings / thickness.
 LONGEST = 10.0
 
@@ -40,7 +37,7 @@ class EllipticArcs(Lines):
     @classmethod
     def of(cls, ellipses: Ellipses, start: Float, stop: Float, cap: float) -> EllipticArcs:
         """Return arcs between parameters (a,) of ellipses (a,), with edges of at most `cap`."""
-        share = np.linspace(0, 1, POINTS + 1)
+        share = np.linspace(0, 1, convex_sums.POINTS + 1)
         angle = start[:, None] + (stop - start)[:, None] * share
         places = np.stack([ellipses.points(angle[:, k]) for k in range(len(share))], axis=1)
         length = np.cumsum(np.linalg.norm(np.diff(places, axis=1), axis=2), axis=1)
@@ -54,7 +51,7 @@ class EllipticArcs(Lines):
     def points(self, line: Int, share: Float) -> Float:
         """See `Lines`."""
         way = self.way / self.way[:, -1:]
-        after = np.clip((way[line] <= share[:, None]).sum(axis=1), 1, POINTS)
+        after = np.clip((way[line] <= share[:, None]).sum(axis=1), 1, convex_sums.POINTS)
         low, high = way[line, after - 1], way[line, after]
         part = (share - low) / (high - low)
         parameter = self.angle[line, after - 1] * (1 - part) + self.angle[line, after] * part
@@ -80,8 +77,8 @@ def size_field(
     # In mesh order: that of rows does not matter.
     order = np.argsort(np.argsort(arrangement.order)[disc], kind="stable")
     ellipses, disc = Ellipses(shells.centres, shells.frames)[order], disc[order]
-    angle, which = np.tile(np.linspace(0, 2 * np.pi, POINTS, endpoint=False), len(ellipses)), np.arange(len(ellipses))
-    around = np.repeat(which, POINTS)
+    angle = np.tile(np.linspace(0, 2 * np.pi, convex_sums.POINTS, endpoint=False), len(ellipses))
+    around = np.repeat(np.arange(len(ellipses)), convex_sums.POINTS)
     points, normal = ellipses[around].points(angle), ellipses[around].normal(angle)
     # Edges on either side of coatings: as on circles, sqrt(t R), with the thickness and the radius of curvature there,
     # but not longer than in the thinnest coatings around circles.
@@ -107,7 +104,7 @@ def size_field(
     ]
     lines = None
     if sizes.are_graded(arrangement):
-        lines = graded_size.FromLines.of(size, points, np.arange(len(points)), lengths, sizes.tip, tips)
+        lines = graded_size.FromLines(size, points, np.arange(len(points)), lengths, sizes.tip, tips)
     return graded_size.SizeField(sources, size, largest, lines)
 
 

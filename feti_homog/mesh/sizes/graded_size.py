@@ -224,58 +224,43 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
     disc = np.repeat(np.arange(len(counts)), counts)
     angle = 2 * np.pi * (np.arange(len(disc)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[disc]
     points = on_circle(outer[disc], angle)
-    return SizeField(sources, size, largest, FromLines.of(size, points, disc, lengths, sizes.tip, tips, outer))
+    return SizeField(sources, size, largest, FromLines(size, points, disc, lengths, sizes.tip, tips, outer))
 
 
-@dataclass(frozen=True)
 class FromLines:
     """The smaller one of h_i + g d and h_t + g max(0, d - h_t), see `size_field`.
 
     Attributes:
-        size: (2,) width and height.
-        points, owner: tree of points on curves, and the curve (s,) of each.
-        lengths: (k,) h_i of each curve.
-        tip, tips: h_t, and a tree of the tips.
-        circles: (k, 3) from which d is measured; None if it is the distance to the points.
+        least: lower bound of the sizes.
     """
 
-    size: Float
-    points: cKDTree
-    owner: Int
-    lengths: Float
-    tip: float
-    tips: cKDTree
-    circles: Float | None
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         size: Float,
         points: Float,
-        owner: Int,
+        curve: Int,
         lengths: Float,
         tip: float,
         tips: Float,
         circles: Float | None = None,
-    ) -> FromLines:
-        """Make the sizes from points (s, 2) on curves, and from tips (t, 2)."""
-        near, near_tips = (cKDTree(wrap(places.reshape(-1, 2), size), boxsize=size) for places in (points, tips))
-        return cls(size, near, owner, lengths, tip, near_tips, circles)
+    ) -> None:
+        """Take the lengths h_i (k,) of curves, their `points` (s, 2), and h_t with the `tips` (t, 2).
 
-    @property
-    def least(self) -> float:
-        """A lower bound of the sizes."""
-        return min(self.tip, float(self.lengths.min()))
+        d is measured from the circles (k, 3) of the curves (s,) of points, or without circles from the points.
+        """
+        self._size, self._curve, self._lengths, self._tip, self._circles = size, curve, lengths, tip, circles
+        self._points, self._tips = (cKDTree(wrap(x.reshape(-1, 2), size), boxsize=size) for x in (points, tips))
+        self.least = min(tip, float(lengths.min()))
 
     def __call__(self, points: Float) -> Float:
         """Return the sizes (n,) at positions (n, 2) on the torus."""
-        places = wrap(points, self.size)
-        distance, nearest = self.points.query(places)
-        curve = self.owner[nearest]
-        if self.circles is not None:
-            circles = self.circles[curve]
-            offset = (points - circles[:, :2] + self.size / 2) % self.size - self.size / 2
+        places = wrap(points, self._size)
+        distance, nearest = self._points.query(places)
+        curve = self._curve[nearest]
+        if self._circles is not None:
+            circles = self._circles[curve]
+            offset = (points - circles[:, :2] + self._size / 2) % self._size - self._size / 2
             distance = np.abs(np.linalg.norm(offset, axis=1) - circles[:, 2])
         # Without tips the distance is infinite.
-        at_tips = self.tip + MAX_GROWTH * np.maximum(0.0, self.tips.query(places)[0] - self.tip)
-        return np.asarray(np.minimum(self.lengths[curve] + MAX_GROWTH * distance, at_tips))
+        at_tips = self._tip + MAX_GROWTH * np.maximum(0.0, self._tips.query(places)[0] - self._tip)
+        return np.asarray(np.minimum(self._lengths[curve] + MAX_GROWTH * distance, at_tips))

@@ -23,7 +23,6 @@ FRONTAL_DELAUNAY, DELAUNAY = 6, 5
 DECIMALS = 12
 # Of the area of triangles against that of the part of the cell that they fill, relative.
 AREA_TOLERANCE = 1e-9
-TRIANGLE = 2  # gmsh's type of elements
 
 # Corners (k, 2) of a closed line, and the tags of its gmsh lines, negative for lines run backwards.
 Loop = tuple[Float, list[int]]
@@ -108,7 +107,8 @@ def fill(tile: Tile) -> Filling:
         except Exception as error:  # gmsh has no other
             raise _unfilled(tile, str(error)) from error
         tags, coordinates, _ = gmsh.model.mesh.getNodes()
-        elements = [gmsh.model.mesh.getElementsByType(TRIANGLE, surface)[1] for surface in surfaces]
+        triangle = gmsh.model.mesh.getElementType("Triangle", 1)
+        elements = [gmsh.model.mesh.getElementsByType(triangle, surface)[1] for surface in surfaces]
     order = np.argsort(tags)
     points = coordinates.reshape(-1, 3)[order, :2]
     points[: len(tile.points)] = tile.points

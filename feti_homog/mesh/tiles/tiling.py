@@ -49,14 +49,12 @@ class Tiling:
         bridges: on tile borders.
         beside: (b, 2) the tiles to the left and right of each bridge.
         matrix: its faces with their tiles.
-        sides: (s,) the tile beside each side piece in the matrix, in the outline's order.
         within: (k,) the tile within each circle; all images of a disc are in one.
     """
 
     bridges: Bridges
     beside: Int
     matrix: MatrixTiles
-    sides: Int
     within: Int
 
 
@@ -91,14 +89,13 @@ def tiling(
     matrix = matrix_tiles(circles, outer, sides, candidates, lines, size, grid)
     if matrix is None:
         return None
-    half, n_sides = matrix.lines, len(sides[0])
-    bridge = np.arange(n_sides, len(half.node) // 2)
+    half = matrix.lines
+    bridge = np.arange(len(sides[0]), len(half.node) // 2)
     bridge = bridge[matrix.tile[bridge] != matrix.tile[half.twin[bridge]]]
     return Tiling(
         bridges=Bridges(np.stack([half.node[bridge], half.node[half.twin[bridge]]], axis=1), half.angle[bridge]),
         beside=np.stack([matrix.tile[bridge], matrix.tile[half.twin[bridge]]], axis=1),
         matrix=matrix,
-        sides=matrix.tile[:n_sides],
         within=grid_cell(np.mod(arrangement.centres, size), size, grid)[disc],
     )
 
@@ -135,7 +132,8 @@ def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[tuple[Int, Til
     curves, matrix = cell.curves, tiles.matrix
     left, right = tiles.within[curves.inside], tiles.within[curves.outside]
     is_side = curves.outside == OUTSIDE
-    left[is_side & (curves.inside == MATRIX)], right[is_side] = tiles.sides, OUTSIDE
+    pieces = np.flatnonzero(is_side & (curves.inside == MATRIX))
+    left[pieces], right[is_side] = matrix.tile[: len(pieces)], OUTSIDE
     arc = np.flatnonzero((curves.circle != MATRIX) & (curves.outside == MATRIX))
     # The middle of the first edge shows where on the circle an arc is.
     begin = curves.first[arc]

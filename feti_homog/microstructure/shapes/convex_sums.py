@@ -12,7 +12,7 @@ from feti_homog.microstructure.shapes.ellipses import Ellipses
 from feti_homog.microstructure.shapes.outlines import ColumnRange, Columns, ConvexCurves, directions, widest
 from feti_homog.typing import Bool, Float, Int
 
-# Points of each outline from which distances are taken.
+# Points of each outline from which distances, curvatures and lengths are taken.
 POINTS = 256
 # The fewest and the most sides.
 SIDES = 3, 12
