@@ -102,8 +102,9 @@ class Arrangement:
     @property
     def within(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Phases within each outline (N,), and in the ring around it if there is one (N,)."""
-        both = list(zip(self.phase, self.is_hollow.tolist(), strict=True))
-        return tuple(VOID if void else own for own, void in both), tuple(own if void else COATING for own, void in both)
+        pairs = list(zip(self.phase, self.is_hollow.tolist(), strict=True))
+        rings = tuple(name if is_hollow else COATING for name, is_hollow in pairs)
+        return tuple(VOID if is_hollow else name for name, is_hollow in pairs), rings
 
     def precedence(self, fibre: Int, is_ring: Bool) -> Int:
         """Return numbers (k,) from 1 for the rings of fibres (k,), or for their insides.
@@ -146,9 +147,9 @@ class Arrangement:
     def shells(self) -> tuple[Outlines, Int]:
         """All outlines (k,) and their fibres (k,): of each the outer outline, then the one within a ring."""
         coated = np.flatnonzero(self.coated)
-        own = np.concatenate([np.arange(len(self.phase)), coated])
-        order = np.argsort(own, kind="stable")
-        return self.outer.joined(self.outlines[coated])[order], own[order]
+        fibre = np.concatenate([np.arange(len(self.phase)), coated])
+        order = np.argsort(fibre, kind="stable")
+        return self.outer.joined(self.outlines[coated])[order], fibre[order]
 
 
 def clearance(arrangement: Arrangement) -> float:
@@ -193,10 +194,10 @@ def in_voids(arrangement: Arrangement, corners: Float) -> Bool:
     if isinstance(arrangement.outlines, convex_sums.ConvexSums):
         voids = arrangement.outlines[arrangement.is_void | arrangement.is_hollow]
         away = _away(voids, corners, arrangement.size)
-        corner, own = np.nonzero((np.abs(away) < voids.extents.max(axis=2)).all(axis=2))
+        corner, void = np.nonzero((np.abs(away) < voids.extents.max(axis=2)).all(axis=2))
         normal = directions(np.linspace(0.0, 2 * np.pi, NORMALS, endpoint=False))
-        reach = voids[own].support(np.broadcast_to(normal, (len(own), *normal.shape)))
-        result[corner[(-away[corner, own] @ normal.T < reach).all(axis=1)]] = True
+        reach = voids[void].support(np.broadcast_to(normal, (len(void), *normal.shape)))
+        result[corner[(-away[corner, void] @ normal.T < reach).all(axis=1)]] = True
     return result
 
 

@@ -72,13 +72,13 @@ def moves(outlines: Outlines, size: Float) -> Float:
     normal, least = parting(first, second, vector)
     within = (((normal * vector).sum(axis=1) - least) / (radii[first] + radii[second]))[~across]
     gap, moved = float(np.clip(within.min(initial=MOST_GAP), LEAST_GAP, MOST_GAP)), np.zeros_like(centres)
-    nobody = np.zeros(0, np.intp)
-    pairs = _Pairs(nobody, nobody, np.zeros((0, 2)), np.zeros(0))
+    empty = np.zeros(0, np.intp)
+    pairs = _Pairs(empty, empty, np.zeros((0, 2)), np.zeros(0))
     for _ in range(MAX_STEPS):
         # Different fibres that are, or soon may be, nearer than they must be.
         first, second, vector = neighbours(centres + moved, size, reach)
-        apart = first != second
-        first, second, vector = first[apart], second[apart], vector[apart]
+        differ = first != second
+        first, second, vector = first[differ], second[differ], vector[differ]
         shift = np.round((vector - (centres + moved)[second] + (centres + moved)[first]) / size)
         vector = centres[second] - centres[first] + shift * size
         normal, least = parting(first, second, vector)
@@ -105,9 +105,9 @@ def _least_moves(pairs: _Pairs, centres: Float, moved: Float, size: Float, unit:
     if len(pairs.first) == 0:
         return result
     normal, reach = parting(pairs.first, pairs.second, pairs.vectors(centres + moved, size))
-    own, place = np.unique(np.concatenate([pairs.first, pairs.second]), return_inverse=True)
+    fibres, place = np.unique(np.concatenate([pairs.first, pairs.second]), return_inverse=True)
     rows, count = np.arange(len(normal)), len(normal)
-    matrix = np.zeros((2 * len(own) + 1, count))
+    matrix = np.zeros((2 * len(fibres) + 1, count))
     for axis in (0, 1):
         matrix[2 * place[:count] + axis, rows] -= normal[:, axis]
         matrix[2 * place[count:] + axis, rows] += normal[:, axis]
@@ -118,5 +118,5 @@ def _least_moves(pairs: _Pairs, centres: Float, moved: Float, size: Float, unit:
     residual = matrix @ nnls(matrix, target, maxiter=100 * count)[0] - target
     if abs(residual[-1]) < TOLERANCE:
         raise MeshError("there is no room to move them apart")
-    result[own] = (-residual[:-1] / residual[-1]).reshape(-1, 2) * unit
+    result[fibres] = (-residual[:-1] / residual[-1]).reshape(-1, 2) * unit
     return result

@@ -71,14 +71,14 @@ class FibrePattern:
 
     def images(self, reach: float) -> tuple[Float, Int]:
         """Return centres (m, 2), first the N in the rectangle, then images within `reach`; owners."""
-        own = np.arange(self.count)
+        number = np.arange(self.count)
         if not self.periodic:
-            return self.centres, own
+            return self.centres, number
         steps = [range(-n, n + 1) for n in (ceil(reach / length) for length in self.size)]
         shifts = np.array([step for step in product(*steps) if any(step)], dtype=float).reshape(-1, 2) * self.size
         result = self.wrapped + shifts[:, None]
         shift, owner = np.nonzero(np.all((result > -reach) & (result < self.size + reach), axis=2))
-        return np.concatenate([self.wrapped, result[shift, owner]]), np.concatenate([own, owner])
+        return np.concatenate([self.wrapped, result[shift, owner]]), np.concatenate([number, owner])
 
 
 def read_window(path: Path, size: tuple[float, float] | None = None) -> FibrePattern:

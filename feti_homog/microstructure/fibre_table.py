@@ -119,8 +119,8 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
         raise CaseError(*faults.lines, f"{name}: no rows; expected a line of names such as x, y, radius, then fibres")
     delimiter = table_columns.delimiter_of(lines[0][1])
     words = table_columns.cells_of(lines[0][1], delimiter) if columns is None else list(columns)
-    read, others = table_columns.understood(words, COLUMNS)
-    _check_names(words, read, others, lines[0][0], faults)
+    read, unread = table_columns.understood(words, COLUMNS)
+    _check_names(words, read, unread, lines[0][0], faults)
     faults.throw()
     rows: dict[int, dict[str, Any]] = {}
     for number, line in _below_names(lines, columns is None, delimiter):
@@ -129,7 +129,7 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
             faults.add(number, fault)
         else:
             rows[number] = {c.name: c.read(cells[c.place], delimiter) for c in read if cells[c.place]}
-    remarks = (f"[cell] {name}: not read: {', '.join(map(wording.toml_value, others))}",) if others else ()
+    remarks = (f"[cell] {name}: not read: {', '.join(map(wording.toml_value, unread))}",) if unread else ()
     return replace(_table(name, rows, {column.name for column in read}, sizes, faults), remarks=remarks)
 
 
@@ -166,10 +166,10 @@ class _Faults:
 
 def _below_names(lines: list[tuple[int, str]], has_names: bool, delimiter: str | None) -> list[tuple[int, str]]:
     """Return the fibre lines: without the first if it has names, or no numbers, and without a next one with units."""
-    first, *others = [table_columns.cells_of(line, delimiter) for _, line in lines[:2]]
+    first, *following = [table_columns.cells_of(line, delimiter) for _, line in lines[:2]]
     if not has_names and any(table_columns.number_of(word, delimiter) is not None for word in first):
         return lines
-    return lines[2 if others and table_columns.are_units(others[0]) else 1 :]
+    return lines[2 if following and table_columns.are_units(following[0]) else 1 :]
 
 
 def _read_sizes(comment: str, row: int, sizes: dict[str, float], faults: _Faults) -> None:
@@ -184,7 +184,7 @@ def _read_sizes(comment: str, row: int, sizes: dict[str, float], faults: _Faults
 
 
 def _check_names(
-    words: Sequence[str], read: Sequence[table_columns.SourceColumn], others: Sequence[str], row: int, faults: _Faults
+    words: Sequence[str], read: Sequence[table_columns.SourceColumn], unread: Sequence[str], row: int, faults: _Faults
 ) -> None:
     """Add the faults in a name line: no known name, doubled, misspelt or missing names."""
     names = [column.name for column in read]
@@ -195,10 +195,10 @@ def _check_names(
         faults.throw()
     for name in dict.fromkeys(name for name in names if names.count(name) > 1):
         faults.add(row, f"column {name}: there are two of it")
-    for word in others:
+    for word in unread:
         if meant := table_columns.misspelt(word, [name for name in COLUMNS if name not in names]):
             faults.add(row, f"column {wording.toml_value(word)}: unknown; did you mean {meant}?")
-    ignored = f"; not read: {', '.join(map(wording.toml_value, others))}" if others else ""
+    ignored = f"; not read: {', '.join(map(wording.toml_value, unread))}" if unread else ""
     # The radius, or the sizes of a shape in its place.
     sizes = next((sizes for sizes in (("radius",), *REPLACING) if {*names} & {*sizes}), ("radius",))
     for name in ("x", "y", *sizes):

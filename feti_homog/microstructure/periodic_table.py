@@ -82,12 +82,12 @@ def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ..
     smaller = np.minimum(table.radius[retained][first], table.radius[retained][second])
     near = (gap < least) & (gap > -REPAIRED * smaller) & ~(across & (window == "cut"))
     share = np.zeros(len(table.row))
-    for own in (first[near], second[near]):
-        sizes = np.stack([table.columns[name][retained[own]] for name in ("radius", "a", "b")])
-        np.maximum.at(share, retained[own], (least - gap)[near] / np.nanmin(sizes, axis=0))
+    for fibre in (first[near], second[near]):
+        sizes = np.stack([table.columns[name][retained[fibre]] for name in ("radius", "a", "b")])
+        np.maximum.at(share, retained[fibre], (least - gap)[near] / np.nanmin(sizes, axis=0))
     names = {"radius", *(name for shape in SHAPES for name in shape.sizes if name != "sides")}
     # A little more than enough, for the gap is compared with the radii that are left.
-    columns = {name: own * (1 - 0.51 * share) if name in names else own for name, own in table.columns.items()}
+    columns = {name: values * (1 - 0.51 * share) if name in names else values for name, values in table.columns.items()}
     rows = table.row[share > 0]
     listed = f"rows {', '.join(map(str, rows[:MOST_LISTED]))}{', ...' if len(rows) > MOST_LISTED else ''}"
     words = f"{listed} are smaller by up to {100 * 0.51 * share.max():.2g} %" if len(rows) else "nothing to repair"
@@ -112,10 +112,10 @@ def _moved_fibres(table: FibreTable, kept: Int, moves: Float) -> tuple[str, ...]
     """List the rows of `kept` (k,) that a cut window moves (k, 2), and how far, in one line."""
     distance = np.linalg.norm(moves, axis=1)
     moved = distance > cut_window.TOLERANCE * table.radius.mean()
-    rows, far = table.row[kept[moved]], distance[moved]
-    listed = [f"row {rows[k]} by {far[k]:.3g}" for k in np.argsort(-far, kind="stable")[:MOST_LISTED]]
-    rest = [f"and {len(rows) - MOST_LISTED} others by less"] if len(rows) > MOST_LISTED else []
-    which = f": {', '.join(listed + rest)}" if listed else ""
+    rows, length = table.row[kept[moved]], distance[moved]
+    listed = [f"row {rows[k]} by {length[k]:.3g}" for k in np.argsort(-length, kind="stable")[:MOST_LISTED]]
+    remainder = [f"and {len(rows) - MOST_LISTED} others by less"] if len(rows) > MOST_LISTED else []
+    which = f": {', '.join(listed + remainder)}" if listed else ""
     return (f'[cell] window = "cut": {len(rows)} of {len(table.row)} fibres moved{which}',)
 
 
@@ -201,9 +201,9 @@ def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> li
 def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> tuple[Bool, list[str]]:
     """Return which rows (N,) are the first of their fibre, and faults of the other rows."""
     first, second, vector = arrangements.neighbours(centres, size, SAME_FIBRE * table.radius.max())
-    radius, strength, apart = table.radius, table.strength, np.linalg.norm(vector, axis=1)
+    radius, strength, distance = table.radius, table.strength, np.linalg.norm(vector, axis=1)
     smaller = np.minimum(radius[first], radius[second])
-    near = (first != second) & (apart < SAME_FIBRE * smaller)
+    near = (first != second) & (distance < SAME_FIBRE * smaller)
     first, second, vector = first[near], second[near], vector[near]
     in_place = np.linalg.norm(centres[second] - centres[first] - vector, axis=1) < SAME_FIBRE * radius[first]
     reach = table.outlines.support(np.broadcast_to(COMPARED, (len(radius), *COMPARED.shape)))

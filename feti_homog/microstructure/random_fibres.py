@@ -78,13 +78,13 @@ def nearest_neighbours(pattern: FibrePattern, count: int = 3) -> NearestNeighbou
         away, _ = cKDTree(pattern.wrapped, boxsize=pattern.size).query(pattern.wrapped, count + 1)
         reach = min(reach, away.max()) * (1 + 1e-9)
     candidates, _ = pattern.images(float(reach))
-    known = min(count, len(candidates) - 1)
+    columns = min(count, len(candidates) - 1)
     distances, directions = np.full((pattern.count, count), np.inf), np.full((pattern.count, count), np.nan)
-    if known:
-        result, which = cKDTree(candidates).query(candidates[: pattern.count], known + 1)
-        distances[:, :known] = result[:, 1:]  # the first is the fibre itself
+    if columns:
+        result, which = cKDTree(candidates).query(candidates[: pattern.count], columns + 1)
+        distances[:, :columns] = result[:, 1:]  # the first is the fibre itself
         vectors = candidates[which[:, 1:]] - candidates[: pattern.count, None]
-        directions[:, :known] = np.degrees(np.arctan2(vectors[..., 1], vectors[..., 0])) % 360
+        directions[:, :columns] = np.degrees(np.arctan2(vectors[..., 1], vectors[..., 0])) % 360
     if pattern.periodic:
         return NearestNeighbours(distances, directions, np.full(distances.shape, 1 / pattern.count))
     to_side = np.minimum(pattern.centres, pattern.size - pattern.centres).min(axis=1)
@@ -116,8 +116,8 @@ def match_distance(pattern: FibrePattern, wanted: Float) -> float:
     Returns the root mean square difference between the sorted distances, in mean diameters. This is the quadratic
     Wasserstein distance of the distributions, over both neighbours.
     """
-    own = nearest_neighbours(pattern, SHELLS).distances / (2 * pattern.mean_radius)
-    return sqrt(_mean_square(own, wanted))
+    near = nearest_neighbours(pattern, SHELLS).distances / (2 * pattern.mean_radius)
+    return sqrt(_mean_square(near, wanted))
 
 
 def matched(pattern: FibrePattern, gap: float, wanted: Float, generator: np.random.Generator) -> Float:

@@ -79,7 +79,7 @@ class ConvexSums(ConvexCurves):
         """Return distances as in `Outlines`, from POINTS points or more."""
         points, _, which = self.at(np.zeros_like(self.centres)).boundary(POINTS)
         first = np.flatnonzero(np.diff(which, prepend=-1))
-        each = [np.minimum.reduceat(np.linalg.norm(own[which] - points, axis=1), first) for own in offsets]
+        each = [np.minimum.reduceat(np.linalg.norm(vectors[which] - points, axis=1), first) for vectors in offsets]
         return np.stack(each)
 
     def facing(self, normal: Float) -> Float:

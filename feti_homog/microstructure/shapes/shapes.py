@@ -26,9 +26,9 @@ def given_shapes(rows: Columns, has_tips: bool) -> list[Shape]:
 def columns_without_tips(rows: Columns) -> dict[str, Float]:
     """Return columns (N,) of shapes without tips, NaN in other rows; none without such rows."""
     shapes = given_shapes(rows, has_tips=False)
-    own = np.logical_or.reduce([np.zeros(len(rows["x"]), bool), *(shape.given(rows) for shape in shapes)])
+    mask = np.logical_or.reduce([np.zeros(len(rows["x"]), bool), *(shape.given(rows) for shape in shapes)])
     names = {name for shape in shapes for name in (*shape.sizes, *shape.columns, "angle")}
-    return {name: np.where(own, values, np.nan) for name, values in rows.items() if name in names}
+    return {name: np.where(mask, values, np.nan) for name, values in rows.items() if name in names}
 
 
 def have_both_sizes(rows: Columns) -> Bool:
@@ -43,9 +43,9 @@ def outlines_of(rows: Columns) -> Outlines:
     radius = np.where(np.isnan(rows["radius"]), rows["a"], rows["radius"])
     parts: list[tuple[Bool, Outlines]] = []
     for shape in SHAPES:
-        own = shape.given(rows)
-        if own.any():
-            parts.append((own, shape.outlines({name: values[own] for name, values in rows.items()}, centres[own])))
+        mask = shape.given(rows)
+        if mask.any():
+            parts.append((mask, shape.outlines({name: values[mask] for name, values in rows.items()}, centres[mask])))
     return with_parts(Discs(centres, radius), parts)
 
 
@@ -54,18 +54,18 @@ def with_parts(outlines: Outlines, parts: Sequence[tuple[Bool, Outlines]]) -> Ou
 
     Returns discs or ellipses where these suffice, else sums.
     """
-    parts = [(own, part) for own, part in parts if own.any()]
+    parts = [(mask, part) for mask, part in parts if mask.any()]
     if not parts:
         return outlines
     if all(isinstance(each, Discs) for each in (outlines, *(part for _, part in parts))):
         radii = outlines.radii.copy()
-        for own, part in parts:
-            radii[own] = part.radii
+        for mask, part in parts:
+            radii[mask] = part.radii
         return Discs(outlines.centres, radii)
     most = max(part.cores.shape[1] for part in (outlines, *(part for _, part in parts)))
     frames, cores = outlines.frames.copy(), _padded(outlines.cores, most)
-    for own, part in parts:
-        frames[own], cores[own] = part.frames, _padded(part.cores, most)
+    for mask, part in parts:
+        frames[mask], cores[mask] = part.frames, _padded(part.cores, most)
     return Ellipses(outlines.centres, frames) if most == 1 else ConvexSums(outlines.centres, cores, frames)
 
 
