@@ -160,7 +160,7 @@ def seconds_alone(case: Case, policy: TilePolicy) -> float:
     unmeshed = begin_mesh(case, policy)
     assert isinstance(unmeshed, UnmeshedCell)
     begun = time.perf_counter()
-    stations = unmeshed.bare.stations()
+    stations = unmeshed.bare.lines.stations(unmeshed.bare.field)
     placed = time.perf_counter()
     noded = unmeshed.with_nodes(stations)
     if len(noded.parts) == 1:

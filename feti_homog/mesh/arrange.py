@@ -14,10 +14,10 @@ JAMMED = 0.84
 
 
 def arrange(cell: cell_section.Cell) -> Arrangement:
-    """Arrange fibres in a cell of width 1, with the fractions `cell.fractions` to rounding.
+    """Arrange fibres in a cell of width 1, with exact fractions `cell.fractions`.
 
-    Lattices stand in `LATTICES` of `cell_section`; random: discs in a 1 x 1 cell, see `random_arrangement`, with
-    `cell.match` see `matched_arrangement`; table: see `periodic_table.table_arrangement`.
+    A lattice comes from `cell_section.LATTICES`, a random cell from `random_arrangement` or, with `cell.match`, from
+    `matched_arrangement`, and a table from `periodic_table.table_arrangement`.
 
     Raises:
         MeshError: discs touch, no arrangement is found, or the table is faulty.
@@ -28,20 +28,7 @@ def arrange(cell: cell_section.Cell) -> Arrangement:
         from feti_homog.microstructure import periodic_table
 
         return periodic_table.table_arrangement(cell.table, cell.window, cell.repair == "overlaps")
-    return _lattice(cell, cell_section.LATTICES[cell.geometry])
-
-
-def listed_arrangement(cell: cell_section.Cell) -> Arrangement | None:
-    """Arrange a table; None for other cells, which may be too large to be arranged.
-
-    Raises as `arrange`.
-    """
-    return None if cell.table is None else arrange(cell)
-
-
-def _lattice(cell: cell_section.Cell, lattice: cell_section.Lattice) -> Arrangement:
-    """Place equal discs on a lattice."""
-    fraction, height, centres = cell.fibre_fraction, lattice.height, np.array(lattice.centres)
+    lattice, fraction = cell_section.LATTICES[cell.geometry], cell.fibre_fraction
     limit = lattice.touching / (1 + (cell.coating or 0.0)) ** 2
     assert fraction is not None
     if fraction >= limit:
@@ -49,24 +36,32 @@ def _lattice(cell: cell_section.Cell, lattice: cell_section.Lattice) -> Arrangem
             f"[cell] fibre_fraction = {fraction:g}: the fibres of the {cell.geometry} cell touch at "
             f"{limit:.4f}; it must be smaller"
         )
-    radius = sqrt(fraction * height / (pi * len(centres)))
-    radii = np.full(len(centres), radius)
+    count = len(lattice.centres)
+    radii = np.full(count, sqrt(fraction * lattice.height / (pi * count)))
+    coating = (cell.coating or 0.0) * radii
     return Arrangement.of_discs(
-        1.0, height, centres, radii, (phase_names.FIBRE,) * len(centres), (cell.coating or 0.0) * radii
+        1.0, lattice.height, np.array(lattice.centres), radii, (phase_names.FIBRE,) * count, coating
     )
+
+
+def listed_arrangement(cell: cell_section.Cell) -> Arrangement | None:
+    """Arrange the fibres of a table; return None for other cells, which may be large.
+
+    Raises as `arrange`.
+    """
+    return None if cell.table is None else arrange(cell)
 
 
 def random_arrangement(
     cell: cell_section.Cell, max_steps: int | None = None, max_attempts: int | None = None
 ) -> Arrangement:
-    """Place discs at random on the unit torus, alike on every machine for one case.
+    """Place discs at random on the unit torus, alike on every machine.
 
-    Radii are uniform in mean * (1 - s, 1 + s), s = `radius_spread`, and scaled to the phase fractions; voids
-    are all alike. Any two discs, coatings and images included, are at least `min_gap` mean fibre diameters
-    apart. Random centres are moved down the gradient of the overlap energy 1/2 sum max(0, R_i + R_j - |x_i - x_j|)^2 of
-    the discs grown by half the gap until it is zero; when that has not come after `max_steps`, it starts again from
-    other centres, up to `max_attempts` times (default: 10 for few fibres, 3 for many). Last, all is shifted
-    (`clear_shift`).
+    Radii are uniform in mean * (1 - s, 1 + s), s = `radius_spread`, and scaled to the phase fractions; all voids are
+    alike. Any two discs, with their coatings and images, are at least `min_gap` mean fibre diameters apart. For discs
+    grown by half the gap, a descent from random centres makes the overlap energy
+    1/2 sum max(0, R_i + R_j - |x_i - x_j|)^2 zero. After `max_steps` it starts again from other centres, up to
+    `max_attempts` times (default: 10 for few fibres, 3 for many). Last, `clear_shift` moves the arrangement.
 
     Raises:
         MeshError: no arrangement is found.
@@ -86,7 +81,7 @@ def random_arrangement(
     grown = radii + coating + clear
     ask = f"[cell] {cell_sizes.fractions_in_words(cell)} with min_gap = {gap:g} and fibres = {fibres}"
     of_all = "fraction of fibres and voids" if cell.voids else "fibre fraction"
-    if pi * np.sum(grown**2) > 0.9:
+    if pi * np.sum(grown**2) > random_fibres.DENSEST:
         raise MeshError(
             f"{ask}: random arrangements with this gap exist up to a {of_all} of at most about "
             f"{JAMMED / (1 + (cell.coating or 0.0) + gap) ** 2:.2f}; lower one of them"
@@ -106,7 +101,7 @@ def random_arrangement(
 
 
 def _with_voids(cell: cell_section.Cell, radii: Float, coating: Float) -> tuple[Float, Float]:
-    """Append the voids to radii and coatings."""
+    """Append the void radii to the radii, and zeros to the coatings."""
     count = cell_sizes.void_count(cell, float(radii.mean()))
     if not count:
         return radii, coating
@@ -120,12 +115,11 @@ def _with_voids(cell: cell_section.Cell, radii: Float, coating: Float) -> tuple[
 
 
 def matched_arrangement(cell: cell_section.Cell) -> Arrangement:
-    """Place discs at random on the unit torus, with the neighbours in a measured window.
+    """Place discs at random, with the neighbour distances of a measured window.
 
-    The radii are quantiles of the window `cell.matched`, dealt at random and scaled to the fraction. Centres
-    are placed as in other random cells, `min_gap` mean diameters apart, and then moved one by one until the
-    distances of the nearest and the second neighbours are distributed as in the table (`random_fibres.matched`). The
-    gap is between coatings, if there are any.
+    The radii are quantiles of the window `cell.matched`, dealt at random and scaled to the fraction. The first centres
+    are random and `min_gap` mean diameters apart, between coatings if there are any. `random_fibres.matched` then moves
+    one fibre after the other, until the distances of the two nearest neighbours are distributed as in the table.
 
     Raises:
         MeshError: no arrangement is found.

@@ -12,7 +12,7 @@ from feti_homog.typing import Bool, Float, Index, Int, Int32
 
 
 def paired_sides(points: Float, period: Float) -> Iterator[tuple[int, Int, Int]]:
-    """Yield the pairs of points that differ by a period: on matching sides the i-th along each.
+    """Yield the pairs of points that differ by one period.
 
     Args:
         points: (n, 2) nodes or edge middles; on sides they are exactly at 0 or at the period.
@@ -30,7 +30,7 @@ def paired_sides(points: Float, period: Float) -> Iterator[tuple[int, Int, Int]]
 
 @dataclass(frozen=True)
 class CoarseMesh:
-    """Conforming periodic mesh: straight triangles on the cell [0, width] x [0, height]; on rank 0 only.
+    """A conforming periodic mesh of straight triangles, on rank 0 only.
 
     Attributes:
         width, height: cell periods.
@@ -79,32 +79,32 @@ class CoarseMesh:
 
 
 def areas(points: Float, triangles: Int32) -> Float:
-    """Signed areas (m,) of triangles, positive counter-clockwise."""
+    """Compute the signed areas (m,) of triangles, positive counter-clockwise."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
     u, v = b - a, c - a
     return np.asarray(0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]))
 
 
 def edges(triangles: Int32) -> Int32:
-    """Directed edges (3m, 2): row 3 t + i is edge i in triangle t, opposite to corner i."""
+    """List the directed edges (3m, 2); edge 3 t + i is opposite to corner i of triangle t."""
     return triangles[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2)
 
 
 def edge_keys(pairs: Int32, nodes: int) -> Int:
-    """One integer for each undirected edge (k, 2) of a mesh with that many nodes."""
+    """Give each undirected edge (k, 2) of a mesh with `nodes` nodes an integer."""
     ordered = np.sort(pairs, axis=1).astype(np.int64)
     return ordered[:, 0] * nodes + ordered[:, 1]
 
 
 def twins(keys: Int) -> tuple[Int, Int]:
-    """Return the places of equal keys (n,), each with the next: two arrays, by ascending key."""
+    """Find pairs of equal keys (n,), each with the next: two index arrays, by key."""
     order = np.argsort(keys, kind="stable")
     same = np.flatnonzero(keys[order][1:] == keys[order][:-1])
     return order[same], order[same + 1]
 
 
 def representatives(points: Float, width: float, height: float) -> Int32:
-    """Return the class representative (n,) for each node in a mesh whose sides match exactly.
+    """Return the node (n,) that represents each node's class; sides match exactly.
 
     Nodes at x = width are represented by their partners at x = 0, at y = height by partners at y = 0, and all four
     corners by the origin.
@@ -118,19 +118,17 @@ def representatives(points: Float, width: float, height: float) -> Int32:
 def flip_double_arcs(triangles: Int32, phase: Int32, arc_edges: Int32, arc_circle: Int32, nodes: int) -> Int32:
     """Flip edges until as few triangles (m, 3) as possible have two edges on one circle.
 
-    Such a triangle would have an angle of 180 degrees once its edges follow the circle. Its third edge, a
-    chord, is exchanged for the other diagonal between the two triangles beside it, in a few rounds.
+    Such a triangle would have an angle of 180 degrees once its edges follow the circle. A few rounds exchange its third
+    edge, a chord, for the other diagonal of the two triangles beside the chord.
     """
     triangles = triangles.copy()
     for _ in range(8):
         bad, corner = double_arcs(triangles, arc_edges, arc_circle, nodes)
-        keys = edge_keys(edges(triangles), nodes)
-        order = np.argsort(keys, kind="stable")
-        chord = 3 * bad + corner
-        first = np.searchsorted(keys[order], keys[chord])
-        pair = np.stack([order[first], order[np.minimum(first + 1, len(keys) - 1)]])
-        other = np.where(pair[0] == chord, pair[1], pair[0])
-        flippable = (keys[other] == keys[chord]) & (phase[other // 3] == phase[bad])
+        one, twin = twins(edge_keys(edges(triangles), nodes))
+        opposite = np.full(3 * len(triangles), -1)
+        opposite[one], opposite[twin] = twin, one
+        other = opposite[3 * bad + corner]
+        flippable = (other >= 0) & (phase[other // 3] == phase[bad])
         _, unique = np.unique(other // 3, return_index=True)
         once = np.zeros(len(bad), dtype=bool)
         once[unique] = True
@@ -146,7 +144,7 @@ def flip_double_arcs(triangles: Int32, phase: Int32, arc_edges: Int32, arc_circl
 
 
 def double_arcs(triangles: Int32, arc_edges: Int32, arc_circle: Int32, nodes: int) -> tuple[Int32, Int32]:
-    """Triangles with two edges on the same circle, and the corner that these two edges share."""
+    """Find triangles with two edges on one circle, and the corner between these."""
     if len(arc_edges) == 0:
         return np.zeros(0, np.int32), np.zeros(0, np.int32)
     keys = edge_keys(arc_edges, nodes)
@@ -160,16 +158,16 @@ def double_arcs(triangles: Int32, arc_edges: Int32, arc_circle: Int32, nodes: in
 
 
 def interface_edges(mesh: CoarseMesh) -> Int32:
-    """Return the edges (k, 2) between phases or beside voids on the torus; on sides the low copy."""
-    pairs, order = _neighbours(mesh)
+    """Find the edges (k, 2) between phases or beside voids; on sides the lower copy."""
+    pairs, order, alone = _neighbours(mesh)
     between = mesh.phase[order[:, 0] // 3] != mesh.phase[order[:, 1] // 3]
-    return np.concatenate([pairs[order[between, 0]], pairs[_alone(pairs, order)]])
+    return np.concatenate([pairs[order[between, 0]], pairs[alone]])
 
 
 def void_edges(mesh: CoarseMesh) -> Int32:
-    """Return the edges (k, 2) beside voids, with one triangle on the torus; on sides the low copy."""
-    pairs, order = _neighbours(mesh)
-    return np.asarray(pairs[_alone(pairs, order)])
+    """Find the edges (k, 2) beside voids, with one triangle; on sides the lower copy."""
+    pairs, _, alone = _neighbours(mesh)
+    return np.asarray(pairs[alone])
 
 
 def voids(mesh: CoarseMesh) -> int:
@@ -182,29 +180,24 @@ def voids(mesh: CoarseMesh) -> int:
 
 
 def can_debond(mesh: CoarseMesh, pairs: Int32) -> Bool:
-    """Return whether edges (k, 2) are between a fibre and the matrix on the torus; either copy on sides."""
-    low_copies, order = _neighbours(mesh)
+    """Return whether edges (k, 2), on sides either copy, lie between fibre and matrix."""
+    low_copies, order, _ = _neighbours(mesh)
     in_matrix = mesh.phase[order // 3] == 0
     between = low_copies[order[in_matrix[:, 0] != in_matrix[:, 1], 0]]
     n = len(mesh.points)
     return np.isin(edge_keys(_low_copies(mesh, pairs), n), edge_keys(between, n))
 
 
-def _neighbours(mesh: CoarseMesh) -> tuple[Int32, Index]:
-    """Return triangle edges (3m, 2), low copies on sides, and the two places (e, 2) where an edge is shared."""
+def _neighbours(mesh: CoarseMesh) -> tuple[Int32, Index, Bool]:
+    """Return triangle edges (3m, 2), on sides the lower copy, their pairs (e, 2), and which are alone (3m,)."""
     pairs = _low_copies(mesh, edges(mesh.triangles))
-    return pairs, np.stack(twins(edge_keys(pairs, len(mesh.points))), axis=1)
-
-
-def _alone(pairs: Int32, order: Index) -> Bool:
-    """Return which of the edges of `_neighbours` (3m, 2) no other triangle has."""
-    alone = np.ones(len(pairs), bool)
+    order, alone = np.stack(twins(edge_keys(pairs, len(mesh.points))), axis=1), np.ones(len(pairs), bool)
     alone[order] = False
-    return alone
+    return pairs, order, alone
 
 
 def _low_copies(mesh: CoarseMesh, pairs: Int32) -> Int32:
-    """Move edges (k, 2) on the right or upper side to the opposite one."""
+    """Move edges (k, 2) on the right or upper side to the opposite side."""
     for axis, low, high in paired_sides(mesh.points, mesh.period):
         partner = np.zeros(len(mesh.points), dtype=np.int32)
         partner[high] = low

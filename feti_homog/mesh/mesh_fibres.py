@@ -13,17 +13,17 @@ from feti_homog.mesh.submeshes import Submesh, cut_bodies
 from feti_homog.microstructure import phase_names
 from feti_homog.typing import Bool, Float, Int
 
-# Relative to the longer semi-axis: curves with centres nearer than this are images of one, or one within another.
+# Largest distance between the centres of nested curves, or of images of one curve / longer semi-axis.
 SAME_CENTRE = 1e-9
-# Relative to the longer semi-axis: coatings whose thicknesses along both differ by less are of one.
+# Largest difference of a coating's thicknesses along both semi-axes / longer semi-axis.
 SAME_LENGTH = 1e-6
 
 
 def unwrap(submesh: Submesh) -> tuple[Float, bool]:
-    """Shift of each coarse triangle to its unwrapped position, and whether the walk closes.
+    """Unwrap a submesh from the torus by walking through its triangles.
 
-    The walk closes when every class has one unwrapped position; then (and only then) the subdomain can
-    rotate.  A piece that winds around the torus cannot.
+    The walk closes if every class has one unwrapped position. Then, and only then, the subdomain can rotate; a piece
+    that winds around the torus cannot.
 
     Returns:
         (t, 2) shifts, whole periods; true if the subdomain is contractible.
@@ -32,17 +32,7 @@ def unwrap(submesh: Submesh) -> tuple[Float, bool]:
         # No two vertices are images of each other: the plane positions are unwrapped.
         return np.zeros((len(submesh.triangles), 2)), True
     part = components(len(submesh.triangles), *edge_pairs(submesh.triangle_edges))
-    shift = _part_shifts(submesh, part)[part]
-    corners = submesh.points[submesh.triangles] + shift[:, None]
-    classes = submesh.vertex_class[submesh.triangles].ravel()
-    position = np.empty((len(submesh.class_keys), 2))
-    position[classes] = corners.reshape(-1, 2)
-    closes = np.allclose(position[classes], corners.reshape(-1, 2), atol=1e-6 * submesh.period.min())
-    return shift, closes
-
-
-def _part_shifts(submesh: Submesh, part: Int) -> Float:
-    """Shift of each plane-connected part, along a spanning tree of their contacts across the cell's boundary."""
+    # The shift of each plane-connected part, along a spanning tree of their contacts across the cell's boundary.
     part_of_edge = np.empty(len(submesh.edges), np.int64)
     part_of_edge[submesh.triangle_edges] = part[:, None]
     a, b = twins(submesh.edge_class)
@@ -61,14 +51,20 @@ def _part_shifts(submesh: Submesh, part: Int) -> Float:
             if np.isnan(shifts[q, 0]):
                 shifts[q] = np.round((shifts[p] + jump) / submesh.period) * submesh.period
                 queue.append(q)
-    return shifts
+    shift = shifts[part]
+    corners = submesh.points[submesh.triangles] + shift[:, None]
+    classes = submesh.vertex_class[submesh.triangles].ravel()
+    position = np.empty((len(submesh.class_keys), 2))
+    position[classes] = corners.reshape(-1, 2)
+    closes = np.allclose(position[classes], corners.reshape(-1, 2), atol=1e-6 * submesh.period.min())
+    return shift, closes
 
 
 def fibre_circles(torus: Torus) -> Float:
-    """(constituents, 3) centre and radius of each fibre's circle, for coatings the outer one; any image.
+    """Return the centre, any image, and radius (constituents, 3) of each outer circle.
 
-    A fibre that is not round has its area's centre, or the one that the mesh has, and the radius NaN.
-    NaN for the matrix, and for a fibre that winds around the torus, which has no centre.
+    A fibre that is not round has the radius NaN, and the centre of the mesh's list or else of its area. The matrix, and
+    a fibre that winds around the torus, have no centre: NaN.
     """
     bodies, edge, is_round = _outer_edges(torus)
     circles = np.full((len(torus.constituent_phase), 3), np.nan)
@@ -89,7 +85,7 @@ def fibre_circles(torus: Torus) -> Float:
 
 
 def fibre_frames(torus: Torus) -> Float:
-    """(constituents, 2, 2) frame F of the ellipse c + F p, |p| = 1, around each fibre, for coatings the outer one.
+    """Return the frame F (constituents, 2, 2) of the outer ellipse c + F p, |p| = 1, of each fibre.
 
     NaN for the matrix, and for fibres whose boundary is not on ellipses about one centre.
     """
@@ -100,7 +96,10 @@ def fibre_frames(torus: Torus) -> Float:
 
 
 def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
-    """Find fibres (k,) with ellipses about one centre, an edge (k,) on the largest, and whether all are round (k,)."""
+    """Find the fibres (k,) whose boundaries are ellipses about one centre.
+
+    Also returns an edge (k,) on the largest ellipse of each, and whether all of them are round (k,).
+    """
     one, other, between = torus.sides
     border = torus.at_void.copy()
     border[between] = torus.constituent[one] != torus.constituent[other]
@@ -119,7 +118,7 @@ def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
 
 
 def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
-    """(constituents,) the fibre number, from 1, for coatings of the coated fibre, 0 in the matrix; which are fibres.
+    """Assign numbers (constituents,) from 1 to fibres and coatings, 0 to the matrix; tell which are fibres.
 
     A coating around several fibres has their lowest number; one that coats none is a fibre itself.
     """
@@ -137,11 +136,10 @@ def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
 
 
 def coating_thickness(numbers: Int, is_fibre: Bool, semi_axes: Float) -> Float:
-    """(fibres,) by how much coatings make both semi-axes longer, 0 without one.
+    """Return the coating thickness (fibres,), which both semi-axes gain, 0 without one.
 
-    Arguments are `fibre_numbers` and the semi-axes (constituents, 2), of discs the radius twice.
-
-    NaN where fibre or coating is neither round nor an ellipse, and where their semi-axes differ by two lengths.
+    Arguments are the results of `fibre_numbers`, and semi-axes (constituents, 2). The thickness is NaN where a fibre or
+    coating is neither round nor an ellipse, and where both semi-axes gain different lengths.
     """
     coats, fibres = np.flatnonzero((numbers > 0) & ~is_fibre), np.flatnonzero(is_fibre)
     thickness, coated = np.zeros(len(fibres)), numbers[coats] - 1

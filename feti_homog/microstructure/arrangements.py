@@ -11,13 +11,13 @@ from scipy.spatial import cKDTree
 
 from feti_homog.errors import MeshError
 from feti_homog.microstructure.phase_names import COATING, MATRIX, VOID
-from feti_homog.microstructure.shapes.convex_sums import ConvexSums
-from feti_homog.microstructure.shapes.ellipses import Discs
-from feti_homog.microstructure.shapes.outlines import Outlines, directions
+from feti_homog.microstructure.shapes import Discs, Outlines, convex_sums, directions
 from feti_homog.typing import Bool, Float, Int
 
 # Decimals in which lengths / width of the cell are compared.
 DECIMALS = 10
+# Radius / width of the cell above which positions on a circle differ by more than rounding.
+SMALLEST_RADIUS = 1e-6
 # Gaps between tangents that are looked at, and the narrowest of them / the widest.
 MOST_GAPS, NARROWEST = 4, 0.7
 # Directions of the lines that may part a place from a convex outline.
@@ -35,7 +35,7 @@ class Arrangement:
     """N fibres and voids on the torus with periods `width`, `height`; none touch.
 
     Attributes:
-        outlines: of them, without the rings around some. Fibre k + 1 in a case is number k; voids come after fibres.
+        outlines: without rings. Fibre k + 1 in a case is number k; voids come after fibres.
         phase: (N,) phase of each.
         coating: (N,) ring thickness around each outline, 0 without one.
         is_hollow: (N,) which are voids within rings of the fibre's own phase; other rings are coatings.
@@ -64,7 +64,7 @@ class Arrangement:
         phase: tuple[str, ...],
         coating: Float | float = 0.0,
     ) -> Arrangement:
-        """Discs with centres (N, 2), radii (N,) with coatings (N,)."""
+        """Arrange discs with centres (N, 2), radii (N,) and coatings (N,)."""
         thickness = np.broadcast_to(coating, radii.shape).astype(float)
         return cls(width, height, Discs(centres, radii), phase, thickness, np.zeros(len(radii), bool))
 
@@ -102,15 +102,21 @@ class Arrangement:
     @property
     def within(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Phases within each outline (N,), and in the ring around it if there is one (N,)."""
-        both = list(zip(self.phase, self.is_hollow.tolist(), strict=True))
-        return tuple(VOID if void else own for own, void in both), tuple(own if void else COATING for own, void in both)
+        pairs = list(zip(self.phase, self.is_hollow.tolist(), strict=True))
+        rings = tuple(name if is_hollow else COATING for name, is_hollow in pairs)
+        return tuple(VOID if is_hollow else name for name, is_hollow in pairs), rings
 
     def precedence(self, fibre: Int, is_ring: Bool) -> Int:
-        """(k,) numbers from 1 for the rings of fibres (k,), or for their insides.
+        """Return numbers (k,) from 1 for the rings of fibres (k,), or for their insides.
 
         Coatings come behind all fibres, in the same order.
         """
         return np.asarray(fibre + 1 + np.where(is_ring & ~self.is_hollow[fibre], self.fibres, 0))
+
+    @property
+    def order(self) -> Int:
+        """(N,) numbers in meshing order."""
+        return np.arange(len(self.phase)) if self.mesh_order is None else self.mesh_order
 
     @property
     def fibres(self) -> int:
@@ -141,26 +147,24 @@ class Arrangement:
     def shells(self) -> tuple[Outlines, Int]:
         """All outlines (k,) and their fibres (k,): of each the outer outline, then the one within a ring."""
         coated = np.flatnonzero(self.coated)
-        own = np.concatenate([np.arange(len(self.phase)), coated])
-        order = np.argsort(own, kind="stable")
-        return self.outer.joined(self.outlines[coated])[order], own[order]
+        fibre = np.concatenate([np.arange(len(self.phase)), coated])
+        order = np.argsort(fibre, kind="stable")
+        return self.outer.joined(self.outlines[coated])[order], fibre[order]
 
 
 def clearance(arrangement: Arrangement) -> float:
-    """Distance from the cell's sides to the nearest position at which they would touch an outline."""
+    """Return the distance of the cell's sides from tangency with an outline."""
     touching = _tangents(arrangement) / arrangement.size[:, None]
     return float(np.abs((touching - np.round(touching)) * arrangement.width).min())
 
 
 def clear_shift(arrangement: Arrangement) -> Arrangement:
-    """Return the arrangement moved as a whole.
+    """Shift an arrangement such that the cell's sides are tangent to no outline.
 
-    The cell's boundary then avoids tangency with the outlines.
-
-    Along each axis the candidates are the middles of the widest gaps between the positions where a boundary
-    line touches an outline; among their combinations the one whose corner is farthest from an outline is taken. In
-    cells with a symmetry, as any two discs have, several are as good but for rounding: it is the first of them, so that
-    the choice does not hang on the unit of length. Corners in voids are left out (`in_voids`).
+    Along each axis the candidates are the middles of the widest gaps between positions of tangency. Of their
+    combinations the corner farthest from an outline is chosen. In cells with a symmetry, as any two discs have, several
+    corners are equal but for rounding: the first one is chosen, so that the unit of length does not matter. Corners in
+    voids are left out (`in_voids`).
     """
     size, outlines = arrangement.size, arrangement.shells[0]
     for narrowest in (NARROWEST, 0.0):
@@ -182,31 +186,34 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
 
 
 def in_voids(arrangement: Arrangement, corners: Float) -> Bool:
-    """(n,) which corners (n, 2) are in voids, for cells with polygons; other meshes need no node at a corner."""
+    """Return which corners (n, 2) are in voids, for cells with polygons.
+
+    Other meshes need no node at a corner.
+    """
     result = np.zeros(len(corners), bool)
-    if isinstance(arrangement.outlines, ConvexSums):
+    if isinstance(arrangement.outlines, convex_sums.ConvexSums):
         voids = arrangement.outlines[arrangement.is_void | arrangement.is_hollow]
         away = _away(voids, corners, arrangement.size)
-        corner, own = np.nonzero((np.abs(away) < voids.extents.max(axis=2)).all(axis=2))
+        corner, void = np.nonzero((np.abs(away) < voids.extents.max(axis=2)).all(axis=2))
         normal = directions(np.linspace(0.0, 2 * np.pi, NORMALS, endpoint=False))
-        reach = voids[own].support(np.broadcast_to(normal, (len(own), *normal.shape)))
-        result[corner[(-away[corner, own] @ normal.T < reach).all(axis=1)]] = True
+        reach = voids[void].support(np.broadcast_to(normal, (len(void), *normal.shape)))
+        result[corner[(-away[corner, void] @ normal.T < reach).all(axis=1)]] = True
     return result
 
 
 def _away(outlines: Outlines, places: Float, size: Float) -> Float:
-    """(n, k, 2) vectors from places (n, 2) to the nearest image of each outline's centre."""
+    """Return vectors (n, k, 2) from places (n, 2) to the nearest images of the centres."""
     return np.asarray((outlines.centres - places[:, None] + size / 2) % size - size / 2)
 
 
 def _tangents(arrangement: Arrangement) -> Float:
-    """(k, 2, 2) where lines across each axis touch each outline, on either side."""
+    """Return where lines across each axis touch each outline (k, 2, 2), on either side."""
     outlines, _ = arrangement.shells
     return np.asarray(outlines.centres[:, :, None] + outlines.extents * [-1.0, 1.0])
 
 
 def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Float]:
-    """All pairs i <= j nearer than `reach`, and the vectors (k, 2) from i to that image of j.
+    """Find all pairs i <= j nearer than `reach`, and vectors (k, 2) to that image of j.
 
     Images of one disc are pairs i = j; each image pair comes once or, where i = j, from both ends.
 
@@ -219,7 +226,7 @@ def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Flo
     step, near = np.nonzero(is_near.all(axis=2))
     place, who = np.concatenate([inside, images[step, near]]), np.concatenate([np.arange(len(centres)), near])
     if len(place) ** 2 >= 2 * MOST_PAIRS and reach > 0:
-        # A place has about 2 pi times as many neighbours as are in its square with diagonal `reach`.
+        # A place has about 2 pi times as many neighbours as its square with diagonal `reach` contains.
         column, row = np.floor(place * (np.sqrt(2) / reach)).astype(np.int64).T
         _, crowd = np.unique(column * 2**32 + row, return_counts=True)
         if (count := np.pi * float((crowd.astype(float) ** 2).sum())) > MOST_PAIRS:

@@ -15,7 +15,7 @@ from feti_homog.typing import Float, Int
 
 # Gap / sum of the radii of fibres across the border, at least and at most.
 LEAST_GAP, MOST_GAP = 0.01, 0.05
-# Overlap / sum of the radii that counts as none, and what distances are made larger by to come below it.
+# Overlap / sum of the radii that counts as none; distances are made larger by it.
 TOLERANCE = 1e-6
 # Moves differ from the smallest ones by less than this, / mean radius.
 SETTLED = 1e-4
@@ -31,14 +31,10 @@ class _Pairs:
     shift: Float
     least: Float
 
-    @property
-    def key(self) -> Float:
-        """(k, 4) keys that distinguish pairs."""
-        return np.column_stack([self.first, self.second, np.round(self.shift)])
-
     def joined(self, other: _Pairs) -> _Pairs:
-        """All pairs from both, each once."""
-        keys = np.concatenate([self.key, other.key])
+        """Return all pairs from both, each once."""
+        both = (self, other)
+        keys = np.concatenate([np.column_stack([pairs.first, pairs.second, np.round(pairs.shift)]) for pairs in both])
         once = np.unique(keys, axis=0, return_index=True)[1]
         least = np.concatenate([self.least, other.least])[once]
         return _Pairs(keys[once, 0].astype(np.intp), keys[once, 1].astype(np.intp), keys[once, 2:], least)
@@ -47,7 +43,7 @@ class _Pairs:
         return _Pairs(self.first[chosen], self.second[chosen], self.shift[chosen], self.least[chosen])
 
     def vectors(self, centres: Float, size: Float) -> Float:
-        """(k, 2) from the first fibres to the second."""
+        """Return the vectors (k, 2) from the first fibres to the second."""
         return np.asarray(centres[self.second] - centres[self.first] + self.shift * size)
 
 
@@ -56,64 +52,52 @@ Parting = Callable[[Int, Int, Float], tuple[Float, Float]]
 
 
 def moves(outlines: Outlines, size: Float) -> Float:
-    """(N, 2) the moves d that part outlines which overlap across the torus border.
+    """Return the moves d (N, 2) that part outlines overlapping across the torus border.
 
-    The torus periods are `size` (2,).
+    The torus has the periods `size` (2,). The moves are a local minimum of sum |d|^2 such that no gap becomes less than
+    the smallest gap within the border. Gaps are relative to the sum of the radii, and the smallest one is taken between
+    LEAST_GAP and MOST_GAP. Each step replaces the distances |v| >= r by n . v >= r, with the present directions n;
+    since n . v <= |v|, its solution keeps the distances.
 
-    They are a local minimum of sum |d|^2 such that no gap across the border is less than the smallest one within, and
-    no gap within becomes less than that, all relative to the sum of the radii and that gap between LEAST_GAP and
-    MOST_GAP. Each step solves it with the distances |v| >= r replaced by n . v >= r, n the present directions; since
-    n . v <= |v|, its solution keeps the distances.
-
-    For other outlines, with radii of equal-area discs, n is the direction of the largest n . v - r, where r is the
-    reach of both along n, and that is the gap.
+    Outlines that are no discs have radii of equal-area discs; n is the direction of the largest n . v - r, the gap,
+    where r is the reach of both along n.
 
     Raises:
         MeshError: there is no room.
     """
     centres, radii, parting = outlines.centres, outlines.radii, outlines.parting
     reach = 3 * float(outlines.longest.max())
-    moved, gap = np.zeros_like(centres), _gap_within(centres, radii, size, reach, parting)
-    nobody = np.zeros(0, np.intp)
-    pairs = _Pairs(nobody, nobody, np.zeros((0, 2)), np.zeros(0))
+    first, second, vector = neighbours(centres, size, reach)
+    across = np.abs(centres[second] - centres[first] - vector).max(axis=1) > TOLERANCE * radii.mean()
+    normal, least = parting(first, second, vector)
+    within = (((normal * vector).sum(axis=1) - least) / (radii[first] + radii[second]))[~across]
+    gap, moved = float(np.clip(within.min(initial=MOST_GAP), LEAST_GAP, MOST_GAP)), np.zeros_like(centres)
+    empty = np.zeros(0, np.intp)
+    pairs = _Pairs(empty, empty, np.zeros((0, 2)), np.zeros(0))
     for _ in range(MAX_STEPS):
-        near = _near(centres, moved, radii, size, gap, reach, parting)
+        # Different fibres that are, or soon may be, nearer than they must be.
+        first, second, vector = neighbours(centres + moved, size, reach)
+        differ = first != second
+        first, second, vector = first[differ], second[differ], vector[differ]
+        shift = np.round((vector - (centres + moved)[second] + (centres + moved)[first]) / size)
+        vector = centres[second] - centres[first] + shift * size
+        normal, least = parting(first, second, vector)
+        before, target = (normal * vector).sum(axis=1) - least, (radii[first] + radii[second]) * gap
+        near = _Pairs(first, second, shift, np.where(shift.any(axis=1), target, np.minimum(before, target)))
         present = near.vectors(centres + moved, size)
         normal, least = parting(near.first, near.second, present)
         short = near.where((normal * present).sum(axis=1) < (least + near.least) * (1 - TOLERANCE))
-        before, pairs = moved, pairs.joined(short)
+        last, pairs = moved, pairs.joined(short)
         moved = _least_moves(pairs, centres, moved, size, float(radii.mean()), parting)
-        if len(short.first) == 0 and np.abs(moved - before).max() < SETTLED * radii.mean():
+        if len(short.first) == 0 and np.abs(moved - last).max() < SETTLED * radii.mean():
             return moved
     raise MeshError("there is no room to move them apart")
 
 
-def _gap_within(centres: Float, radii: Float, size: Float, reach: float, parting: Parting) -> float:
-    """Return the smallest gap / radius sum among discs that are not across the border, within its limits."""
-    first, second, vector = neighbours(centres, size, reach)
-    across = np.abs(centres[second] - centres[first] - vector).max(axis=1) > TOLERANCE * radii.mean()
-    normal, least = parting(first, second, vector)
-    gap = ((normal * vector).sum(axis=1) - least) / (radii[first] + radii[second])
-    return float(np.clip(gap[~across].min(initial=MOST_GAP), LEAST_GAP, MOST_GAP))
-
-
-def _near(
-    centres: Float, moved: Float, radii: Float, size: Float, gap: float, reach: float, parting: Parting
-) -> _Pairs:
-    """Pairs of different discs that are, or soon may be, nearer than they must be."""
-    present = centres + moved
-    first, second, vector = neighbours(present, size, reach)
-    apart = first != second
-    first, second, vector = first[apart], second[apart], vector[apart]
-    shift = np.round((vector - present[second] + present[first]) / size)
-    vector = centres[second] - centres[first] + shift * size
-    normal, least = parting(first, second, vector)
-    before, target = (normal * vector).sum(axis=1) - least, (radii[first] + radii[second]) * gap
-    return _Pairs(first, second, shift, np.where(shift.any(axis=1), target, np.minimum(before, target)))
-
-
 def _least_moves(pairs: _Pairs, centres: Float, moved: Float, size: Float, unit: float, parting: Parting) -> Float:
-    """(N, 2) the d of least sum |d|^2 with n . (v + d_second - d_first) >= r for all pairs, n their present directions.
+    """Return the d (N, 2) of least sum |d|^2 that keep all pairs apart.
+
+    They have n . (v + d_second - d_first) >= r, with the present directions n.
 
     By non-negative least squares: C. L. Lawson, R. J. Hanson, Solving Least Squares Problems, 1974, chapter 23.
     """
@@ -121,9 +105,9 @@ def _least_moves(pairs: _Pairs, centres: Float, moved: Float, size: Float, unit:
     if len(pairs.first) == 0:
         return result
     normal, reach = parting(pairs.first, pairs.second, pairs.vectors(centres + moved, size))
-    own, place = np.unique(np.concatenate([pairs.first, pairs.second]), return_inverse=True)
+    fibres, place = np.unique(np.concatenate([pairs.first, pairs.second]), return_inverse=True)
     rows, count = np.arange(len(normal)), len(normal)
-    matrix = np.zeros((2 * len(own) + 1, count))
+    matrix = np.zeros((2 * len(fibres) + 1, count))
     for axis in (0, 1):
         matrix[2 * place[:count] + axis, rows] -= normal[:, axis]
         matrix[2 * place[count:] + axis, rows] += normal[:, axis]
@@ -134,5 +118,5 @@ def _least_moves(pairs: _Pairs, centres: Float, moved: Float, size: Float, unit:
     residual = matrix @ nnls(matrix, target, maxiter=100 * count)[0] - target
     if abs(residual[-1]) < TOLERANCE:
         raise MeshError("there is no room to move them apart")
-    result[own] = (-residual[:-1] / residual[-1]).reshape(-1, 2) * unit
+    result[fibres] = (-residual[:-1] / residual[-1]).reshape(-1, 2) * unit
     return result

@@ -63,13 +63,6 @@ class FibrePattern:
         """
         return pi * fsum(self.radii * self.radii) / self.area
 
-    @property
-    def side_distance(self) -> Float:
-        """(N,) distance from each centre to the window's sides; infinite in a periodic cell."""
-        if self.periodic:
-            return np.full(self.count, np.inf)
-        return np.asarray(np.minimum(self.centres, self.size - self.centres).min(axis=1))
-
     @cached_property
     def wrapped(self) -> Float:
         """(N, 2) centres within [0, width) x [0, height)."""
@@ -77,19 +70,19 @@ class FibrePattern:
         return np.asarray(np.where(inside < self.size, inside, 0.0))
 
     def images(self, reach: float) -> tuple[Float, Int]:
-        """(m, 2) the centres, first the N in the rectangle, then their images nearer to it than `reach`; owners."""
-        own = np.arange(self.count)
+        """Return centres (m, 2), first the N in the rectangle, then images within `reach`; owners."""
+        number = np.arange(self.count)
         if not self.periodic:
-            return self.centres, own
+            return self.centres, number
         steps = [range(-n, n + 1) for n in (ceil(reach / length) for length in self.size)]
         shifts = np.array([step for step in product(*steps) if any(step)], dtype=float).reshape(-1, 2) * self.size
         result = self.wrapped + shifts[:, None]
         shift, owner = np.nonzero(np.all((result > -reach) & (result < self.size + reach), axis=2))
-        return np.concatenate([self.wrapped, result[shift, owner]]), np.concatenate([own, owner])
+        return np.concatenate([self.wrapped, result[shift, owner]]), np.concatenate([number, owner])
 
 
 def read_window(path: Path, size: tuple[float, float] | None = None) -> FibrePattern:
-    """Return a table's fibres, at least two, in a window with this width and height.
+    """Read the fibres, at least two, in a window with this width and height.
 
     Without these, the window is the one in the table; ellipses count as discs with the same centres and areas.
 
@@ -99,7 +92,8 @@ def read_window(path: Path, size: tuple[float, float] | None = None) -> FibrePat
         CaseError: the table is faulty, or its size unknown; a fibre has its centre outside the window, or is there
             twice.
     """
-    table = read_table(path).solid
+    table = read_table(path)
+    table = table.rows(np.flatnonzero(~table.is_void))
     width, height = size or (table.width, table.height)
     if width is None or height is None:
         raise CaseError(

@@ -86,11 +86,6 @@ class FibreTable:
         """(N,) which rows are voids."""
         return np.array([name == VOID for name in self.phase], bool)
 
-    @property
-    def solid(self) -> FibreTable:
-        """The table without its voids."""
-        return self.rows(np.flatnonzero(~self.is_void))
-
     def rows(self, kept: Int) -> FibreTable:
         """Return the table with the rows `kept` (k,)."""
         columns = {name: values[kept] for name, values in self.columns.items()}
@@ -103,12 +98,12 @@ class FibreTable:
 
 
 def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
-    """Return the table in a text file, which is not judged as a whole: fibres may overlap.
+    """Read the table in a text file; fibres may overlap.
 
-    A name line comes first, in whose place `columns` has them: x, y, radius (or a, b), and phase, coating, angle
-    if there are any, or other names that `understood` takes; then a line for each fibre. Columns are parted by commas,
-    semicolons, tabs or else by spaces; without commas between columns, decimals may have them. What follows "#" is
-    a comment; "# width = 120, height = 80" has the cell size, and "left" and "bottom" have its corner.
+    The first line, or `columns`, has the names: x, y, radius (or a, b), then phase, coating, angle and other names that
+    `understood` takes. Each fibre has a line. Commas, semicolons, tabs or else spaces divide columns; without commas
+    between columns, decimals may have them. "#" begins a comment; "# width = 120, height = 80" has the cell size, and
+    "left" and "bottom" have its corner.
 
     Raises:
         CaseError: the table is faulty; a line for each fault, with its line in the file.
@@ -124,8 +119,8 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
         raise CaseError(*faults.lines, f"{name}: no rows; expected a line of names such as x, y, radius, then fibres")
     delimiter = table_columns.delimiter_of(lines[0][1])
     words = table_columns.cells_of(lines[0][1], delimiter) if columns is None else list(columns)
-    read, others = table_columns.understood(words, COLUMNS)
-    _check_names(words, read, others, lines[0][0], faults)
+    read, unread = table_columns.understood(words, COLUMNS)
+    _check_names(words, read, unread, lines[0][0], faults)
     faults.throw()
     rows: dict[int, dict[str, Any]] = {}
     for number, line in _below_names(lines, columns is None, delimiter):
@@ -134,12 +129,12 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
             faults.add(number, fault)
         else:
             rows[number] = {c.name: c.read(cells[c.place], delimiter) for c in read if cells[c.place]}
-    remarks = (f"[cell] {name}: not read: {', '.join(map(wording.toml_value, others))}",) if others else ()
+    remarks = (f"[cell] {name}: not read: {', '.join(map(wording.toml_value, unread))}",) if unread else ()
     return replace(_table(name, rows, {column.name for column in read}, sizes, faults), remarks=remarks)
 
 
 def table_of(entries: Sequence[Mapping[str, Any]], name: str) -> FibreTable:
-    """Return the table from a fibre list with the same keys as columns have; its faults count its rows from 1.
+    """Return the table of a fibre list, whose keys are columns; faults count rows from 1.
 
     Raises:
         CaseError: the list is faulty; a line for each fault.
@@ -154,7 +149,7 @@ def table_of(entries: Sequence[Mapping[str, Any]], name: str) -> FibreTable:
 
 
 class _Faults:
-    """Gathers a table's faults, each with the row that has it."""
+    """The faults of a table, each with its row."""
 
     def __init__(self, name: str) -> None:
         self.lines: list[str] = []
@@ -171,10 +166,10 @@ class _Faults:
 
 def _below_names(lines: list[tuple[int, str]], has_names: bool, delimiter: str | None) -> list[tuple[int, str]]:
     """Return the fibre lines: without the first if it has names, or no numbers, and without a next one with units."""
-    first, *others = [table_columns.cells_of(line, delimiter) for _, line in lines[:2]]
+    first, *following = [table_columns.cells_of(line, delimiter) for _, line in lines[:2]]
     if not has_names and any(table_columns.number_of(word, delimiter) is not None for word in first):
         return lines
-    return lines[2 if others and table_columns.are_units(others[0]) else 1 :]
+    return lines[2 if following and table_columns.are_units(following[0]) else 1 :]
 
 
 def _read_sizes(comment: str, row: int, sizes: dict[str, float], faults: _Faults) -> None:
@@ -189,9 +184,9 @@ def _read_sizes(comment: str, row: int, sizes: dict[str, float], faults: _Faults
 
 
 def _check_names(
-    words: Sequence[str], read: Sequence[table_columns.SourceColumn], others: Sequence[str], row: int, faults: _Faults
+    words: Sequence[str], read: Sequence[table_columns.SourceColumn], unread: Sequence[str], row: int, faults: _Faults
 ) -> None:
-    """Add the faults in a name line: none that is known, some twice, misspelt or missing."""
+    """Add the faults in a name line: no known name, doubled, misspelt or missing names."""
     names = [column.name for column in read]
     if not names:
         given = wording.toml_value(", ".join(words))
@@ -200,24 +195,21 @@ def _check_names(
         faults.throw()
     for name in dict.fromkeys(name for name in names if names.count(name) > 1):
         faults.add(row, f"column {name}: there are two of it")
-    for word in others:
+    for word in unread:
         if meant := table_columns.misspelt(word, [name for name in COLUMNS if name not in names]):
             faults.add(row, f"column {wording.toml_value(word)}: unknown; did you mean {meant}?")
-    ignored = f"; not read: {', '.join(map(wording.toml_value, others))}" if others else ""
-    for name in _missing(set(names)):
-        faults.add(row, f"column {name}: missing{ignored}")
-
-
-def _missing(names: set[str]) -> list[str]:
-    """Columns that a table with these lacks: x, y, and the radius or a shape's sizes, which stand in its place."""
-    sizes = next((sizes for sizes in (("radius",), *REPLACING) if names & set(sizes)), ("radius",))
-    return [name for name in ("x", "y", *sizes) if name not in names]
+    ignored = f"; not read: {', '.join(map(wording.toml_value, unread))}" if unread else ""
+    # The radius, or the sizes of a shape in its place.
+    sizes = next((sizes for sizes in (("radius",), *REPLACING) if {*names} & {*sizes}), ("radius",))
+    for name in ("x", "y", *sizes):
+        if name not in names:
+            faults.add(row, f"column {name}: missing{ignored}")
 
 
 def _table(
     name: str, rows: Mapping[int, Mapping[str, Any]], names: set[str], sizes: Mapping[str, float], faults: _Faults
 ) -> FibreTable:
-    """Return the table with rows whose cells are numbers, or texts where they are faulty."""
+    """Return the table of rows whose cells are numbers, or texts if they are faulty."""
     for row, cells in rows.items():
         for words in _cell_faults(cells):
             faults.add(row, words)
@@ -242,7 +234,7 @@ def _table(
 
 
 def _cell_faults(cells: Mapping[str, Any]) -> Iterator[str]:
-    """Yield one row's faults."""
+    """Yield the faults of one row."""
     has_size = any(set(sizes) <= cells.keys() for sizes in REPLACING)
     for key in ("x", "y", *([] if has_size else ["radius"])):
         if key not in cells:
@@ -251,11 +243,6 @@ def _cell_faults(cells: Mapping[str, Any]) -> Iterator[str]:
         complaint = table_columns.FIBRE_CELLS[key].complaint(cells.get(key, 1.0))
         if complaint:
             yield f"{key} = {wording.toml_value(cells[key])}: {complaint}"
-    yield from _phase_faults(cells)
-
-
-def _phase_faults(cells: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the faults in the phase of one row."""
     phase = cells.get("phase", "fibre")
     if phase == VOID:
         yield from (f"{key} = {wording.toml_value(cells[key])}: a void has none" for key in OF_FIBRES if cells.get(key))

@@ -5,11 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from feti_homog.errors import MeshError
-from feti_homog.microstructure import cut_window
-from feti_homog.microstructure.arrangements import Arrangement, clear_shift, clearance, in_voids, neighbours
+from feti_homog.microstructure import Arrangement, arrangements, cut_window
 from feti_homog.microstructure.fibre_table import FibreTable
-from feti_homog.microstructure.shapes.ellipses import Discs
-from feti_homog.microstructure.shapes.outlines import Outlines, directions
+from feti_homog.microstructure.shapes import Discs, Outlines, directions
 from feti_homog.microstructure.shapes.shapes import SHAPES, with_parts
 from feti_homog.typing import Bool, Float, Int
 
@@ -19,22 +17,20 @@ SAME_FIBRE = 0.01
 COMPARED = directions(np.linspace(0.0, 2 * np.pi, 24, endpoint=False))
 # Gap / mean radius of two fibres below which they touch: elements between them would be too many.
 LEAST_GAP = 1e-4
-# Radius / width of the cell above which positions on a circle differ by more than rounding.
-SMALLEST_RADIUS = 1e-6
 # Thickness / radius of the thinnest and of the thickest coating.
 COATINGS = 0.01, 1.0
 # Distance of the sides of a cell from tangency with an outline / mean radius, below which elements there are needles.
 LEAST_CLEARANCE = 1e-3
-# Decimals of coordinates / width of the cell of tables that may have any origin and unit, and of height / width: gmsh
+# Decimals of height / width of tables that may have any origin and unit; coordinates have `arrangements.DECIMALS`. gmsh
 # may put other elements beside ellipses and polygons where the last digit of a length is another.
-TABLE_DECIMALS, HEIGHT_DECIMALS = 10, 12
+HEIGHT_DECIMALS = 12
 # Overlap / radius of the smaller fibre, up to which fibres are repaired.
 REPAIRED = 0.01
 MOST_LISTED = 30  # moved fibres that are listed one by one
 
 
 def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> Arrangement:
-    """Return a table's fibres, in row order, then its voids.
+    """Arrange a table's fibres, in row order, then its voids.
 
     Periodic images count as one fibre, the first row. In a cut window, fibres that overlap across its border are
     moved apart.
@@ -50,22 +46,30 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
     table, repaired = _repaired(table, window) if repairs else (table, ())
     retained, centres, moves, size = on_torus(table, window)
     order = np.argsort(table.is_void[retained], kind="stable")
-    rows, places = retained[order], (centres + moves)[order]
-    fibres = replace(
-        _nested(table, rows, places % size / size[0], float(size[1] / size[0])),
+    rows, places = retained[order], (centres + moves)[order] % size / size[0]
+    outlines, core = table.outlines[rows].per(size[0]).at(places), table.inner_radius[rows] / size[0]
+    is_hollow = core > 0
+    fibres = Arrangement(
+        width=1.0,
+        height=float(size[1] / size[0]),
+        outlines=with_parts(outlines, [(is_hollow, Discs(places[is_hollow], core[is_hollow]))]),
+        phase=tuple(table.phase[row] for row in rows),
+        coating=np.where(is_hollow, outlines.radii - core, table.coating[rows] * outlines.radii),
+        is_hollow=is_hollow,
+        row=rows,
         remarks=repaired + (_moved_fibres(table, retained, moves) if window == "cut" else ()),
     )
-    shifted = clear_shift(fibres)
+    shifted = arrangements.clear_shift(fibres)
     is_placed = table.left is not None and table.bottom is not None
-    clear = min(LEAST_CLEARANCE * float(fibres.radii.mean()), clearance(shifted))
-    if not is_placed or clearance(fibres) < clear or in_voids(fibres, np.zeros((1, 2))).all():
+    clear = min(LEAST_CLEARANCE * float(fibres.radii.mean()), arrangements.clearance(shifted))
+    if not is_placed or arrangements.clearance(fibres) < clear or arrangements.in_voids(fibres, np.zeros((1, 2))).all():
         rounded = _rounded(shifted)
         return replace(rounded, mesh_order=np.lexsort((rounded.centres[:, 1], rounded.centres[:, 0])))
     return fibres if isinstance(fibres.outlines, Discs) else _rounded(fibres)
 
 
 def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ...]]:
-    """Return the table without slight overlaps, and its repaired rows in one line.
+    """Shrink fibres that overlap slightly; return the table, and a remark with their rows.
 
     Fibres that touch or overlap by up to REPAIRED of a radius shrink until they part.
     """
@@ -78,56 +82,45 @@ def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ..
     smaller = np.minimum(table.radius[retained][first], table.radius[retained][second])
     near = (gap < least) & (gap > -REPAIRED * smaller) & ~(across & (window == "cut"))
     share = np.zeros(len(table.row))
-    for own in (first[near], second[near]):
-        sizes = np.stack([table.columns[name][retained[own]] for name in ("radius", "a", "b")])
-        np.maximum.at(share, retained[own], (least - gap)[near] / np.nanmin(sizes, axis=0))
+    for fibre in (first[near], second[near]):
+        sizes = np.stack([table.columns[name][retained[fibre]] for name in ("radius", "a", "b")])
+        np.maximum.at(share, retained[fibre], (least - gap)[near] / np.nanmin(sizes, axis=0))
     names = {"radius", *(name for shape in SHAPES for name in shape.sizes if name != "sides")}
     # A little more than enough, for the gap is compared with the radii that are left.
-    columns = {name: own * (1 - 0.51 * share) if name in names else own for name, own in table.columns.items()}
+    columns = {name: values * (1 - 0.51 * share) if name in names else values for name, values in table.columns.items()}
     rows = table.row[share > 0]
     listed = f"rows {', '.join(map(str, rows[:MOST_LISTED]))}{', ...' if len(rows) > MOST_LISTED else ''}"
     words = f"{listed} are smaller by up to {100 * 0.51 * share.max():.2g} %" if len(rows) else "nothing to repair"
     return replace(table, columns=columns), (f'[cell] repair = "overlaps": {words}',)
 
 
-def _nested(table: FibreTable, rows: Int, centres: Float, height: float) -> Arrangement:
-    """Return the rows (k,) about these centres / cell width.
-
-    A ring around each outline that has a coating or that is a void in a hollow fibre.
-    """
-    assert table.width is not None
-    outlines, core = table.outlines[rows].per(table.width).at(centres), table.inner_radius[rows] / table.width
-    radii, is_hollow = outlines.radii, core > 0
-    coating = np.where(is_hollow, radii - core, table.coating[rows] * radii)
-    inner = with_parts(outlines, [(is_hollow, Discs(centres[is_hollow], core[is_hollow]))])
-    phase = tuple(table.phase[row] for row in rows)
-    return Arrangement(1.0, height, inner, phase, coating, is_hollow, row=rows)
-
-
 def _rounded(arrangement: Arrangement) -> Arrangement:
-    """Return the arrangement with coordinates to TABLE_DECIMALS, 0 on either side, in a cell of HEIGHT_DECIMALS."""
-    outlines, least = arrangement.outlines.rounded(TABLE_DECIMALS), 10.0**-TABLE_DECIMALS
+    """Round the lengths of an arrangement to `arrangements.DECIMALS`, and its height to HEIGHT_DECIMALS.
+
+    Centres on the right or upper side move to 0.
+    """
+    outlines, least = arrangement.outlines.rounded(arrangements.DECIMALS), 10.0**-arrangements.DECIMALS
     return replace(
         arrangement,
         height=round(arrangement.height, HEIGHT_DECIMALS),
         outlines=outlines.at(np.where(outlines.centres >= arrangement.size - least, 0.0, outlines.centres)),
-        coating=arrangement.coating.round(TABLE_DECIMALS),
+        coating=arrangement.coating.round(arrangements.DECIMALS),
     )
 
 
 def _moved_fibres(table: FibreTable, kept: Int, moves: Float) -> tuple[str, ...]:
-    """List the rows of `kept` (k,) that a cut window moves by these vectors (k, 2), and how far, in one line."""
+    """List the rows of `kept` (k,) that a cut window moves (k, 2), and how far, in one line."""
     distance = np.linalg.norm(moves, axis=1)
     moved = distance > cut_window.TOLERANCE * table.radius.mean()
-    rows, far = table.row[kept[moved]], distance[moved]
-    listed = [f"row {rows[k]} by {far[k]:.3g}" for k in np.argsort(-far, kind="stable")[:MOST_LISTED]]
-    rest = [f"and {len(rows) - MOST_LISTED} others by less"] if len(rows) > MOST_LISTED else []
-    which = f": {', '.join(listed + rest)}" if listed else ""
+    rows, length = table.row[kept[moved]], distance[moved]
+    listed = [f"row {rows[k]} by {length[k]:.3g}" for k in np.argsort(-length, kind="stable")[:MOST_LISTED]]
+    remainder = [f"and {len(rows) - MOST_LISTED} others by less"] if len(rows) > MOST_LISTED else []
+    which = f": {', '.join(listed + remainder)}" if listed else ""
     return (f'[cell] window = "cut": {len(rows)} of {len(table.row)} fibres moved{which}',)
 
 
 def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
-    """Rows (k,) that are fibres, where they are (k, 2) in the cell, their moves (k, 2), and the cell's size (2,).
+    """Return the rows (k,), centres (k, 2) and moves (k, 2) of fibres, and the cell size (2,).
 
     Raises as `table_arrangement`.
     """
@@ -141,7 +134,19 @@ def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
     retained = np.flatnonzero(first)
     centres = centres[retained]
     outer = table.outlines[retained].at(centres).grown((table.coating * table.radius)[retained])
-    _raise_faults(table, _contacts(table, retained, outer, size, is_cut))
+    # Fibres that overlap or touch, in a cut window only within it.
+    one, other, gap, together, across = _gaps(table, retained, outer, size)
+    bad = np.flatnonzero((gap < LEAST_GAP * together / 2) & ~(across & is_cut))
+    for k in bad[np.unique(np.stack([one[bad], other[bad]]), axis=1, return_index=True)[1]].tolist():
+        i, j = table.row[retained[one[k]]], table.row[retained[other[k]]]
+        who = f"rows {i} and {j}" if i != j else f"row {i} and its image"
+        what = f"overlap by {-gap[k]:.3g}" if gap[k] < -LEAST_GAP * together[k] / 2 else "touch"
+        least = REPAIRED * min(table.radius[retained[[one[k], other[k]]]])
+        hint = '; repair = "overlaps" makes them smaller' if -gap[k] < least else ""
+        faults.append(f"{who}: {what}{' across the border' if across[k] else ''}{hint}")
+    if across[bad].any():
+        faults.append('fibres meet across the border: give the right width and height, or window = "cut"')
+    _raise_faults(table, faults)
     if not is_cut:
         return retained, centres, np.zeros_like(centres), size
     try:
@@ -152,14 +157,14 @@ def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
 
 
 def fibre_rows(table: FibreTable, window: str) -> Int:
-    """(fibres,) places in the table where its cell's fibres are, by fibre number."""
+    """Return the index (fibres,) in the table of each fibre of its cell."""
     size = np.array([table.width, table.height], float)
     first, _ = _without_images(table, table.centres - _corner(table), size, window == "cut")
     return np.flatnonzero(first & ~table.is_void)
 
 
 def _corner(table: FibreTable) -> Float:
-    """(2,) the cell's lower left corner; the lowest centre coordinates if the table gives none."""
+    """Return the cell's lower left corner (2,), by default the lowest coordinates."""
     given = np.array([table.left, table.bottom], float)
     return np.where(np.isnan(given), table.centres.min(axis=0), given)
 
@@ -170,7 +175,7 @@ def _raise_faults(table: FibreTable, faults: list[str]) -> None:
 
 
 def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> list[str]:
-    """Faults of fibres that are no part of the cell, or too large or too small for it.
+    """List faults of fibres that are no part of the cell, or too large or too small for it.
 
     Discs reach into a periodic cell; in a cut window the centres are within.
     """
@@ -184,8 +189,8 @@ def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> li
         for k in np.flatnonzero(over > (SAME_FIBRE * radius if is_cut else (1 + SAME_FIBRE) * reach)).tolist():
             value = table.centres[k, axis]
             faults.append(f"row {table.row[k]}: {'xy'[axis]} = {value:g}: lies outside the cell, of {name} {width:g}")
-    for k in np.flatnonzero((2 * radius >= size.min()) | (radius < SMALLEST_RADIUS * size[0])).tolist():
-        limits = f"from {SMALLEST_RADIUS * size[0]:g} to below {size.min() / 2:g} in this cell"
+    for k in np.flatnonzero((2 * radius >= size.min()) | (radius < arrangements.SMALLEST_RADIUS * size[0])).tolist():
+        limits = f"from {arrangements.SMALLEST_RADIUS * size[0]:g} to below {size.min() / 2:g} in this cell"
         faults.append(f"row {table.row[k]}: {names[column[k]]} = {radius[k]:g}: expected {limits}")
     least, most = COATINGS
     bad = np.flatnonzero((table.coating > 0) & ((table.coating < least) | (table.coating > most)))
@@ -194,11 +199,11 @@ def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> li
 
 
 def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> tuple[Bool, list[str]]:
-    """(N,) which rows are the first of their fibre, and faults of rows at one place that are not one fibre."""
-    first, second, vector = neighbours(centres, size, SAME_FIBRE * table.radius.max())
-    radius, strength, apart = table.radius, table.strength, np.linalg.norm(vector, axis=1)
+    """Return which rows (N,) are the first of their fibre, and faults of the other rows."""
+    first, second, vector = arrangements.neighbours(centres, size, SAME_FIBRE * table.radius.max())
+    radius, strength, distance = table.radius, table.strength, np.linalg.norm(vector, axis=1)
     smaller = np.minimum(radius[first], radius[second])
-    near = (first != second) & (apart < SAME_FIBRE * smaller)
+    near = (first != second) & (distance < SAME_FIBRE * smaller)
     first, second, vector = first[near], second[near], vector[near]
     in_place = np.linalg.norm(centres[second] - centres[first] - vector, axis=1) < SAME_FIBRE * radius[first]
     reach = table.outlines.support(np.broadcast_to(COMPARED, (len(radius), *COMPARED.shape)))
@@ -216,33 +221,13 @@ def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool
     return is_first, faults
 
 
-def _contacts(table: FibreTable, kept: Int, outer: Outlines, size: Float, is_cut: bool) -> list[str]:
-    """Faults of fibres, the rows `kept` (k,) with their coatings, that overlap or touch.
-
-    In a cut window only within it.
-    """
-    first, second, gap, together, across = _gaps(table, kept, outer, size)
-    bad = np.flatnonzero((gap < LEAST_GAP * together / 2) & ~(across & is_cut))
-    faults = []
-    for k in bad[np.unique(np.stack([first[bad], second[bad]]), axis=1, return_index=True)[1]].tolist():
-        i, j = table.row[kept[first[k]]], table.row[kept[second[k]]]
-        who = f"rows {i} and {j}" if i != j else f"row {i} and its image"
-        what = f"overlap by {-gap[k]:.3g}" if gap[k] < -LEAST_GAP * together[k] / 2 else "touch"
-        least = REPAIRED * min(table.radius[kept[[first[k], second[k]]]])
-        hint = '; repair = "overlaps" makes them smaller' if -gap[k] < least else ""
-        faults.append(f"{who}: {what}{' across the border' if across[k] else ''}{hint}")
-    if (across[bad]).any():
-        faults.append('fibres meet across the border: give the right width and height, or window = "cut"')
-    return faults
-
-
 def _gaps(table: FibreTable, kept: Int, outer: Outlines, size: Float) -> tuple[Int, Int, Float, Float, Bool]:
-    """Return the pairs of near fibres among the rows `kept` (k,).
+    """Find the pairs of near fibres among the rows `kept` (k,).
 
     Returns (p,) indices into `kept` of both, gaps, sums of radii, and True across the border.
     """
     centres, radius = outer.centres, table.outer_radius[kept]
-    first, second, vector = neighbours(centres, size, 2 * outer.longest.max() * (1 + LEAST_GAP))
+    first, second, vector = arrangements.neighbours(centres, size, 2 * outer.longest.max() * (1 + LEAST_GAP))
     normal, reach = outer.parting(first, second, vector)
     gap = (normal * vector).sum(axis=1) - reach
     across = np.linalg.norm(centres[second] - centres[first] - vector, axis=1) > SAME_FIBRE * radius[first]

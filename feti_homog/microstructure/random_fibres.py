@@ -18,9 +18,9 @@ SHELLS = 2
 MOVES_OF_A_FIBRE, MOST_MOVES = 100, 40_000
 # A distance of distributions, in mean diameters, at which no more moves are tried.
 CLOSE = 0.002
-# Relative excess of the radii that push over those that must not overlap: the descent ends in finite time.
+# Relative excess of the radii that push, with which the descent ends in finite time.
 RADIUS_EXCESS = 1e-3
-# Steps of the descent after which an arrangement counts as jammed; found ones take less than 200.
+# Steps of the descent after which an arrangement counts as jammed; others take less than 200.
 MAX_STEPS = 2000
 ATTEMPTS = 3
 # Area fraction of discs grown by half the gap above which there are no random patterns.
@@ -57,9 +57,9 @@ class NearestNeighbours:
         return np.where(self.weights.any(axis=0), np.sqrt((self.weights * counted**2).sum(axis=0)), np.nan)
 
     def quantiles(self, levels: Float, column: int) -> Float:
-        """(m,) the least distances d with F(d) >= levels (m,), F the weighted distribution of one column.
+        """Return the least distances d (m,) of one column with F(d) >= levels (m,).
 
-        Raises ValueError if none of its distances counts.
+        F is the weighted distribution. Raises ValueError if none of its distances counts.
         """
         order = np.argsort(self.distances[:, column], kind="stable")
         order = order[self.weights[order, column] > 0]
@@ -71,32 +71,29 @@ class NearestNeighbours:
 
 
 def nearest_neighbours(pattern: FibrePattern, count: int = 3) -> NearestNeighbours:
-    """Return each fibre's neighbours; in a periodic cell images count, also its own."""
+    """Find each fibre's neighbours; in a periodic cell images count, also its own."""
     # Within `reach` each fibre in a periodic cell has so many neighbours.
     reach = (count + 1) // 2 * pattern.size.min()
     if pattern.periodic and pattern.count > count:
         away, _ = cKDTree(pattern.wrapped, boxsize=pattern.size).query(pattern.wrapped, count + 1)
         reach = min(reach, away.max()) * (1 + 1e-9)
     candidates, _ = pattern.images(float(reach))
-    known = min(count, len(candidates) - 1)
+    columns = min(count, len(candidates) - 1)
     distances, directions = np.full((pattern.count, count), np.inf), np.full((pattern.count, count), np.nan)
-    if known:
-        result, which = cKDTree(candidates).query(candidates[: pattern.count], known + 1)
-        distances[:, :known] = result[:, 1:]  # the first is the fibre itself
+    if columns:
+        result, which = cKDTree(candidates).query(candidates[: pattern.count], columns + 1)
+        distances[:, :columns] = result[:, 1:]  # the first is the fibre itself
         vectors = candidates[which[:, 1:]] - candidates[: pattern.count, None]
-        directions[:, :known] = np.degrees(np.arctan2(vectors[..., 1], vectors[..., 0])) % 360
-    return NearestNeighbours(distances, directions, _weights(pattern, distances))
-
-
-def _weights(pattern: FibrePattern, distances: Float) -> Float:
+        directions[:, :columns] = np.degrees(np.arctan2(vectors[..., 1], vectors[..., 0])) % 360
     if pattern.periodic:
-        return np.full(distances.shape, 1 / pattern.count)
-    counts = distances <= pattern.side_distance[:, None]
+        return NearestNeighbours(distances, directions, np.full(distances.shape, 1 / pattern.count))
+    to_side = np.minimum(pattern.centres, pattern.size - pattern.centres).min(axis=1)
+    counts = distances <= to_side[:, None]
     d = np.where(counts, distances, 0.0)
     inner = (pattern.width - 2 * d) * (pattern.height - 2 * d)
     raw = np.where(counts & (inner > 0), 1 / np.where(inner > 0, inner, 1.0), 0.0)
     total = raw.sum(axis=0)
-    return np.asarray(raw / np.where(total > 0, total, 1.0))
+    return NearestNeighbours(distances, directions, raw / np.where(total > 0, total, 1.0))
 
 
 def knows_neighbours(measured: FibrePattern) -> bool:
@@ -105,29 +102,30 @@ def knows_neighbours(measured: FibrePattern) -> bool:
 
 
 def wanted_distances(measured: FibrePattern, count: int) -> Float:
-    """(count, SHELLS) quantiles at the levels (i + 1/2) / count of the nearest and the second distances of a pattern.
+    """Return the quantiles (count, SHELLS) of a pattern's neighbour distances.
 
-    In its mean diameters.  Raises ValueError if a window is too small for them.
+    Their levels are (i + 1/2) / count, and their unit is the mean diameter. Raises ValueError if a window is too small.
     """
     near, levels = nearest_neighbours(measured, SHELLS), (np.arange(count) + 0.5) / count
     return np.stack([near.quantiles(levels, k) for k in range(SHELLS)], axis=1) / (2 * measured.mean_radius)
 
 
 def match_distance(pattern: FibrePattern, wanted: Float) -> float:
-    """Root mean square difference between the sorted distances in a periodic pattern and `wanted` (N, SHELLS).
+    """Compare the neighbour distances of a periodic pattern with `wanted` (N, SHELLS).
 
-    Both are in mean diameters.  It is the quadratic Wasserstein distance of the distributions, over both neighbours.
+    Returns the root mean square difference between the sorted distances, in mean diameters. This is the quadratic
+    Wasserstein distance of the distributions, over both neighbours.
     """
-    own = nearest_neighbours(pattern, SHELLS).distances / (2 * pattern.mean_radius)
-    return sqrt(_mean_square(own, wanted))
+    near = nearest_neighbours(pattern, SHELLS).distances / (2 * pattern.mean_radius)
+    return sqrt(_mean_square(near, wanted))
 
 
 def matched(pattern: FibrePattern, gap: float, wanted: Float, generator: np.random.Generator) -> Float:
-    """Fibre centres (N, 2) in a periodic pattern, moved such that `match_distance` to `wanted` falls.
+    """Move the fibres of a periodic pattern such that `match_distance` to `wanted` falls.
 
-    One fibre after the other, drawn at random, is moved to a place drawn about its own, near or far, if it keeps `gap`
-    to all others there and the distance of the distributions does not grow.  Sums are made one term after the other, so
-    that every machine takes the same moves.  N is at least 3.
+    Returns their centres (N, 2), N at least 3. One random fibre after the other moves to a random place around it, near
+    or far, if it keeps `gap` to all other fibres there and the distance of the distributions does not grow. Sums are
+    made one term after the other, so that every machine takes the same moves.
     """
     count, size = pattern.count, pattern.size
     centres, target = pattern.wrapped.copy(), wanted * (2 * pattern.mean_radius)
@@ -158,14 +156,14 @@ def matched(pattern: FibrePattern, gap: float, wanted: Float, generator: np.rand
 
 
 def _distances(places: Float, centres: Float, size: Float) -> Float:
-    """(m, N) from places (m, 2) to the nearest images of centres (N, 2)."""
+    """Return distances (m, N) from places (m, 2) to the nearest images of centres (N, 2)."""
     x, y = (np.abs(places[:, None, axis] - centres[:, axis]) for axis in (0, 1))
     x, y = np.minimum(x, size[0] - x), np.minimum(y, size[1] - y)
     return np.asarray(np.sqrt(x * x + y * y))
 
 
 def _two_nearest(centres: Float, fibres: Int, size: Float) -> tuple[Float, Int]:
-    """Distances (m, 2) from these fibres (m,) to the two nearest others, and which these are."""
+    """Find the two nearest neighbours of fibres (m,): distances (m, 2), then numbers (m, 2)."""
     away = _distances(centres[fibres], centres, size)
     rows = np.arange(len(fibres))
     away[rows, fibres] = np.inf
@@ -177,16 +175,17 @@ def _two_nearest(centres: Float, fibres: Int, size: Float) -> tuple[Float, Int]:
 
 
 def _mean_square(distances: Float, wanted: Float) -> float:
-    """Mean square difference of distances (N, SHELLS), each column sorted, from the target."""
+    """Return the mean square difference of sorted distances (N, SHELLS) from the target."""
     difference = np.sort(distances, axis=0) - wanted
     return float(np.cumsum(difference * difference)[-1]) / wanted.size
 
 
 def relax(centres: Float, radii: Float, max_steps: int, size: tuple[float, float] = (1.0, 1.0)) -> tuple[Float, float]:
-    """Centres (N, 2) moved until discs on the torus with periods `size` do not overlap, and the clearance reached.
+    """Move centres (N, 2) until discs on the torus `size` do not overlap.
 
-    The clearance is the smallest ratio of distance to radius sum; at least 1 is success. Heavy-ball descent
-    x += 0.25 f + 0.9 dx: no reductions over the discs, so that every machine gets the same numbers.
+    Returns the centres and the clearance, the smallest ratio of distance to radius sum; at least 1 is success. The
+    heavy-ball descent x += 0.25 f + 0.9 dx has no reductions over the discs, so that every machine gets the same
+    numbers.
     """
     periods, target = np.array(size), radii * (1 + RADIUS_EXCESS)
     step, clearance = np.zeros_like(centres), 0.0
@@ -204,14 +203,17 @@ def relax(centres: Float, radii: Float, max_steps: int, size: tuple[float, float
 
 
 def _sum_at(rows: Int, vectors: Float, count: int) -> Float:
-    """Return sums (count, 2) over each row's vectors (k, 2), added one after the other."""
+    """Sum the vectors (k, 2) of each row (count, 2), one after the other."""
     return np.stack([np.bincount(rows, vectors[:, axis], count) for axis in (0, 1)], axis=1)
 
 
 def placed(
     pattern: FibrePattern, gap: float, generator: np.random.Generator, max_steps: int = MAX_STEPS
 ) -> FibrePattern:
-    """Return the same fibres at random places at least `gap` from each other. Raises MeshError if none are found."""
+    """Place the same fibres at random, at least `gap` from each other.
+
+    Raises MeshError if no places are found.
+    """
     grown = pattern.radii + gap / 2
     attempts = ATTEMPTS if np.pi * np.sum(grown**2) < DENSEST * pattern.area else 0
     for _ in range(attempts):
@@ -224,6 +226,6 @@ def placed(
 
 
 def distance_of(window: FibrePattern, width: float, height: float, centres: Float, radii: Float) -> float:
-    """Return how far a periodic cell with these fibres is from the window that it matches, in mean diameters."""
+    """Return the distance, in mean diameters, of a cell's pattern from the window it matches."""
     pattern = FibrePattern(width, height, centres, radii, periodic=True)
     return match_distance(pattern, wanted_distances(window, pattern.count))

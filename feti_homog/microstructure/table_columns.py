@@ -5,7 +5,6 @@ Columns have units in brackets, diameters, areas and axes of ellipses.
 
 import difflib
 import math
-import operator
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -41,32 +40,28 @@ UNITS_OF_EXCEL = bytes.maketrans(b"\xb5\xb0\xb2", b"uo2")
 
 
 def lines_of(path: Path) -> Iterator[tuple[int, str, str]]:
-    """Yield each line's number, its cells, empty if it has none, and the comment behind "#".
+    """Yield each line's number, its cells, empty without any, and the comment behind "#".
 
     Raises:
         CaseError: the file cannot be read, or is no text.
     """
-    has_begun = False
-    for number, line in enumerate(_text(path).splitlines(), 1):
-        contents, _, comment = line.partition("#")
-        is_empty = not contents.strip(EMPTY) or (not has_begun and SEPARATOR.fullmatch(contents.strip()) is not None)
-        has_begun = has_begun or not is_empty
-        yield number, "" if is_empty else contents, comment
-
-
-def _text(path: Path) -> str:
     try:
         content = input_files.read(path, MAX_BYTES)
     except OSError as error:
         raise CaseError(f"{path}: cannot be read: {error.strerror}") from error
     try:
-        return content.decode("utf-8-sig")
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        place = error.start
-    try:
-        return content.translate(UNITS_OF_EXCEL).decode()
-    except UnicodeDecodeError as error:
-        raise CaseError(f"{path.name}: expected text in UTF-8; it has other bytes at {place}") from error
+        try:
+            text = content.translate(UNITS_OF_EXCEL).decode()
+        except UnicodeDecodeError as other:
+            raise CaseError(f"{path.name}: expected text in UTF-8; it has other bytes at {error.start}") from other
+    has_begun = False
+    for number, line in enumerate(text.splitlines(), 1):
+        contents, _, comment = line.partition("#")
+        is_empty = not contents.strip(EMPTY) or (not has_begun and SEPARATOR.fullmatch(contents.strip()) is not None)
+        has_begun = has_begun or not is_empty
+        yield number, "" if is_empty else contents, comment
 
 
 def delimiter_of(line: str) -> str | None:
@@ -80,7 +75,7 @@ def cells_of(line: str, delimiter: str | None) -> list[str]:
 
 
 def row_fault(line: str, cells: Sequence[str], count: int) -> str:
-    """Return the fault in a row whose cells are not as many as the names are; empty if it has none."""
+    """Return the fault of a row with more or fewer cells than names; empty without one."""
     if line.count('"') % 2:
         return "a quotation mark is not closed"
     return "" if len(cells) == count else f"has {len(cells)} columns; expected {count}, as there are names"
@@ -97,14 +92,6 @@ CENTRES = ("{}c", "{}_c", "c{}", "center_{}", "centre_{}", "centroid_{}", "{}_ce
 EQUIVALENT_DIAMETERS = ("equivdiameter", "equivalent_diameter", "equivalent_diameter_area")
 
 
-def _radius_of_area(area: float) -> float:
-    return math.copysign(math.sqrt(abs(area) / math.pi), area)
-
-
-def _same(value: float) -> float:
-    return value
-
-
 def _half(value: float) -> float:
     return value / 2
 
@@ -112,14 +99,14 @@ def _half(value: float) -> float:
 # Other names of columns, those before first, and what makes the column of their values. Major and Minor are ImageJ's
 # axes of ellipses, whose areas are of no more use; MATLAB's Centroid_1 is x, centroid-0 of scikit-image its row, y.
 OTHERS: tuple[tuple[tuple[str, ...], str, Callable[[float], float]], ...] = (
-    (("xm", *(word.format("x") for word in CENTRES), "centroid_1", "centroid-1"), "x", _same),
-    (("ym", *(word.format("y") for word in CENTRES), "centroid_2", "centroid-0"), "y", _same),
+    (("xm", *(word.format("x") for word in CENTRES), "centroid_1", "centroid-1"), "x", float),
+    (("ym", *(word.format("y") for word in CENTRES), "centroid_2", "centroid-0"), "y", float),
     (("major", MATLABS_AXIS), "a", _half),
     (("minor", "minoraxislength"), "b", _half),
-    (("r", "rad", "fibre_radius", "fiber_radius", "radii"), "radius", _same),
+    (("r", "rad", "fibre_radius", "fiber_radius", "radii"), "radius", float),
     (("diameter", "diam", "d", "fibre_diameter", "fiber_diameter", *EQUIVALENT_DIAMETERS), "radius", _half),
-    (("area",), "radius", _radius_of_area),
-    (("material", "type"), "phase", _same),
+    (("area",), "radius", lambda area: math.copysign(math.sqrt(abs(area) / math.pi), area)),
+    (("material", "type"), "phase", float),
 )
 
 
@@ -129,14 +116,14 @@ INSTEAD = {"radius": "a"}
 
 @dataclass(frozen=True)
 class SourceColumn:
-    """A column that is read: its place in the rows, its name, and the conversion of its numbers."""
+    """A column of the file: its place in the rows, its name, and the conversion of its numbers."""
 
     place: int
     name: str
     value: Callable[[float], float]
 
     def read(self, word: str, delimiter: str | None) -> float | str:
-        """Return a cell's value: a number, or its text if it is none."""
+        """Return a cell's number, or its text if it is no number."""
         number = None if self.name == "phase" else number_of(word, delimiter)
         return word if number is None else self.value(number)
 
@@ -146,18 +133,17 @@ def _bare(word: str) -> str:
     return UNIT.sub("", word).strip().lower()
 
 
-def _bare_names(words: Sequence[str]) -> list[str]:
-    """Return bare names; MATLAB's orientation is an angle; other programs' are in radians, or from another axis."""
-    bare = list(map(_bare, words))
-    return ["angle" if name == "orientation" else name for name in bare] if MATLABS_AXIS in bare else bare
-
-
 def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceColumn], list[str]]:
-    """Return the columns in a name line that are `known`, in any case, and the other words."""
-    bare = _bare_names(words)
+    """Find the `known` columns in a name line, in any case, and the other words."""
+    bare = list(map(_bare, words))
+    if MATLABS_AXIS in bare:
+        # MATLAB's orientation is an angle; other programs' are in radians, or from another axis.
+        bare = ["angle" if name == "orientation" else name for name in bare]
     # An angle is measured as a picture is seen, for coordinates whose y points down.
-    values: dict[str, Callable[[float], float]] = {"angle": operator.neg} if AXES_OF_PICTURES & set(bare) else {}
-    columns = [SourceColumn(place, name, values.get(name, _same)) for place, name in enumerate(bare) if name in known]
+    values: dict[str, Callable[[float], float]] = (
+        {"angle": lambda value: -value} if AXES_OF_PICTURES & set(bare) else {}
+    )
+    columns = [SourceColumn(place, name, values.get(name, float)) for place, name in enumerate(bare) if name in known]
     for others, name, value in OTHERS:
         given = {column.name for column in columns}
         if {name, INSTEAD.get(name, name)}.isdisjoint(given):
@@ -167,18 +153,18 @@ def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceC
 
 
 def are_units(words: Sequence[str]) -> bool:
-    """Return whether a line has units alone, which some programs write below the names."""
+    """Return whether a line has units alone, as some programs write below the names."""
     return bool(set(words) - {"", "-"}) and all(ROW_UNIT.fullmatch(word) for word in words if word)
 
 
 def misspelt(word: str, missing: Sequence[str]) -> str:
-    """Return the `missing` column whose name a word nearly is; empty if there is none."""
+    """Find the `missing` column whose name a word nearly is; empty without one."""
     near = difflib.get_close_matches(_bare(word), missing, n=1, cutoff=0.75)
     return near[0] if near else ""
 
 
 def number_of(word: str, delimiter: str | None) -> float | None:
-    """Return the number that a word is, with a decimal comma where commas do not part columns; None if it is none."""
+    """Return the number of a word, also with a decimal comma; None without one."""
     try:
         value = float(word if delimiter == "," else word.replace(",", "."))
     except ValueError:

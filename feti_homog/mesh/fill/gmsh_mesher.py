@@ -1,9 +1,9 @@
-"""The coarse periodic mesh of a generated cell: bare lines, nodes on them, tiles; filled."""
+"""The coarse periodic mesh of a generated cell: its lines, nodes on the lines, tiles, triangles."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
 
@@ -13,29 +13,26 @@ from feti_homog.case import cell_section, cell_sizes
 from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange, listed_arrangement
 from feti_homog.mesh.coarse_mesh import CoarseMesh, representatives
-from feti_homog.mesh.outline.bare_outline import BareOutline, LineStations
-from feti_homog.mesh.outline.lines import IN_TILES
+from feti_homog.mesh.outline.bare_outline import BareOutline
+from feti_homog.mesh.outline.lines import LineStations
 from feti_homog.mesh.outline.outline import Outline
 from feti_homog.mesh.sizes import element_estimate
 from feti_homog.mesh.sizes.graded_size import MeshSizes
 from feti_homog.mesh.tiles.tile_filling import Filling, Tile, arc_edges, fill
 from feti_homog.mesh.tiles.tiling import DEFAULT_TILES, Regions, TilePolicy, Tiling, cut, is_tiled, tiling
-from feti_homog.microstructure import Arrangement, phase_names
-from feti_homog.microstructure.shapes import Discs, Ellipses
+from feti_homog.microstructure import Arrangement, arrangements, phase_names
+from feti_homog.microstructure.shapes import Conics
 from feti_homog.typing import Int, Int32
 
-# Radius / width of the cell above which positions on a circle differ by more than rounding.
-SMALLEST_RADIUS = 1e-6
 NO_MARKS: Mapping[int, Sequence[float]] = MappingProxyType({})
 
 
 def generate(
     cell: cell_section.Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS, policy: TilePolicy = DEFAULT_TILES
 ) -> CoarseMesh:
-    """Return the mesh that `begin` begins, all of it made here."""
+    """Mesh a generated cell on this rank."""
     begun = begin(cell, listed_arrangement(cell), marks, policy)
-    noded = begun.with_nodes() if isinstance(begun, UnmeshedCell) else begun
-    return noded if isinstance(noded, CoarseMesh) else noded.filled()
+    return begun if isinstance(begun, CoarseMesh) else begun.with_nodes().filled()
 
 
 def begin(
@@ -43,19 +40,19 @@ def begin(
     listed: Arrangement | None,
     marks: Mapping[int, Sequence[float]] = NO_MARKS,
     policy: TilePolicy = DEFAULT_TILES,
-) -> UnmeshedCell | NodedCell | CoarseMesh:
+) -> UnmeshedCell | CoarseMesh:
     """Begin the periodic coarse mesh for a square, hexagonal or random cell, or a table.
 
-    Round fibres give the bare lines, ellipses all but the triangles, polygons the whole mesh.
+    Round fibres and ellipses give the bare lines, polygons the whole mesh.
 
-    Elements have about the size mesh_size * width, on circles interface_size * width. All is made at the width 1 and
-    then scaled, so that cells alike in shape have one mesh at all sizes.
+    Elements have about the size mesh_size * width, on circles interface_size * width. The mesh has the width 1 until it
+    is scaled, so that cells of one shape have one mesh at all sizes.
 
     Args:
         listed: a table's arrangement, see `listed_arrangement`.
         marks: maps a curve (`BareOutline.of`) to angles in degrees, measured at its centre, where the mesh gets nodes:
-            debond tips. A mark within MERGED from another mark, or from where the circle crosses the cell's boundary,
-            is moved there.
+            debond tips. A mark moves to another mark, or to a crossing of the circle with the cell's boundary, that is
+            within MERGED.
 
     Raises:
         MeshError: the fibres cannot be arranged, or there would be too many elements.
@@ -67,30 +64,25 @@ def begin(
     _refuse_extremes(estimate, sizes, sum(map(len, marks.values())), limit)
     arrangement = arrange(cell) if listed is None else listed
     smallest = int(arrangement.radii.argmin())
-    if arrangement.radii[smallest] < SMALLEST_RADIUS * arrangement.width:
+    if arrangement.radii[smallest] < arrangements.SMALLEST_RADIUS * arrangement.width:
         asked = cell_sizes.fractions_in_words(cell) if cell.fractions else 'geometry = "table"'
         raise MeshError(
             f"[cell] {asked}: a {'void' if arrangement.is_void[smallest] else 'fibre'} has a radius of "
-            f"{arrangement.radii.min():.2g}; expected at least {SMALLEST_RADIUS} of the width of the cell"
+            f"{arrangement.radii.min():.2g}; expected at least {arrangements.SMALLEST_RADIUS} of the width of the cell"
         )
     scale = arrangement_scale(cell, arrangement)
-    if isinstance(arrangement.outlines, Discs):
-        cell_of_discs = UnmeshedCell.of(arrangement, sizes, marks, scale, policy)
-        field = cell_of_discs.bare.field
-        element_estimate.refuse_many(field.at, field.least, arrangement.size, limit)
-        return cell_of_discs
-    if isinstance(arrangement.outlines, Ellipses):
-        from feti_homog.mesh.outline import elliptic_outline  # discs, the common case, do without
+    if not isinstance(arrangement.outlines, Conics):
+        from feti_homog.mesh.fill.shape_mesher import mesh_outlines  # with a reader of meshes
 
-        lines = elliptic_outline.outline(arrangement, arrangement.outlines, sizes, marks)
-        return NodedCell.of(arrangement, lines, sizes, None, scale)
-    from feti_homog.mesh.fill.shape_mesher import mesh_outlines  # with a reader of meshes
-
-    return mesh_outlines(arrangement, sizes, scale)
+        return mesh_outlines(arrangement, sizes, scale)
+    unmeshed = UnmeshedCell.of(arrangement, sizes, marks, scale, policy)
+    field = unmeshed.bare.field
+    element_estimate.refuse_many(field, field.least, arrangement.size, limit)
+    return unmeshed
 
 
 def arrangement_scale(cell: cell_section.Cell, arrangement: Arrangement) -> float:
-    """Return lengths in the cell / lengths in the arrangement."""
+    """Return the ratio of lengths in the cell and in the arrangement."""
     if cell.fibre_radius is not None:
         return float(cell.fibre_radius / arrangement.radii[: arrangement.fibres].mean())
     width = cell_sizes.mixed_width(cell) if cell.table is None else cell.table.width
@@ -98,7 +90,7 @@ def arrangement_scale(cell: cell_section.Cell, arrangement: Arrangement) -> floa
 
 
 def _refuse_extremes(estimate: element_estimate.ElementEstimate, sizes: MeshSizes, tips: int, limit: int) -> None:
-    """Raise MeshError for a cell that would take hours to mesh, before it is begun."""
+    """Raise MeshError for a cell that would take hours to mesh."""
     cell, around = estimate.cell, min(sizes.interface, estimate.interface_size)
     at_tips = tips * element_estimate.triangles_of_a_tip(max(1.0, around / sizes.tip))
     count = estimate.triangles + at_tips
@@ -114,11 +106,11 @@ def _refuse_extremes(estimate: element_estimate.ElementEstimate, sizes: MeshSize
 
 @dataclass(frozen=True)
 class UnmeshedCell:
-    """A cell with round fibres before its lines have nodes.
+    """A cell with discs or ellipses before its lines have nodes.
 
     Attributes:
-        arrangement: where discs are.
-        bare: its lines.
+        arrangement: the fibres.
+        bare: the lines.
         sizes: element sizes.
         tiles: the tiling that will cut it; None if it is filled at once.
         scale: as in `NodedCell`.
@@ -139,27 +131,25 @@ class UnmeshedCell:
         scale: float = 1.0,
         policy: TilePolicy = DEFAULT_TILES,
     ) -> UnmeshedCell:
-        """Return the bare lines of round discs, and their tiles; see `gmsh_mesher.begin`."""
+        """Make the bare lines of a cell, and its tiles; see `begin`."""
         tiles = tiling(arrangement, sizes.largest, marks, policy)
-        if tiles is None:
-            bare = BareOutline.of(arrangement, sizes, marks)
-        else:
-            bare = BareOutline.of(arrangement, sizes, marks, tiles.bridges, IN_TILES)
+        bare = BareOutline.of(arrangement, sizes, marks, None if tiles is None else tiles.bridges)
         return cls(arrangement, bare, sizes, tiles, scale)
 
     @property
     def phases(self) -> tuple[str, ...]:
-        """Return the phase names, the matrix first."""
+        """The phase names, the matrix first."""
         return self.arrangement.phases
 
     def with_nodes(self, stations: LineStations | None = None) -> NodedCell:
-        """Return the cell with these nodes on its lines, by default all placed here.
+        """Put nodes on the lines of the cell, by default all placed on this rank.
 
         Raises:
             MeshError: the lines would have too many.
         """
-        lines = self.bare.outline(self.bare.stations() if stations is None else stations)
-        return NodedCell.of(self.arrangement, lines, self.sizes, self.tiles, self.scale)
+        lines = self.bare.outline(stations or self.bare.lines.stations(self.bare.field))
+        cell = Tile(lines.points, lines.curves, self.sizes.largest, self.sizes.are_graded(self.arrangement))
+        return NodedCell(self.arrangement, lines, tuple(cut(lines, cell, self.tiles)), self.scale)
 
 
 @dataclass(frozen=True)
@@ -167,8 +157,8 @@ class NodedCell:
     """A cell with nodes on its lines, before triangles are made.
 
     Attributes:
-        arrangement: where discs are.
-        lines: its outline.
+        arrangement: the fibres.
+        lines: the outline.
         parts: tiles to fill, each with its node numbers (n,) in the outline.
         scale: lengths in the mesh / lengths in the arrangement.
     """
@@ -178,25 +168,17 @@ class NodedCell:
     parts: tuple[tuple[Int, Tile], ...]
     scale: float
 
-    @classmethod
-    def of(
-        cls, arrangement: Arrangement, lines: Outline, sizes: MeshSizes, tiles: Tiling | None, scale: float
-    ) -> NodedCell:
-        """Return the cell of an arrangement with this outline, cut into tiles."""
-        cell = Tile(lines.points, lines.curves, sizes.largest, sizes.are_graded(arrangement))
-        return cls(arrangement, lines, tuple(cut(lines, cell, tiles)), scale)
-
     @property
     def phases(self) -> tuple[str, ...]:
-        """Return the phase names, the matrix first."""
+        """The phase names, the matrix first."""
         return self.arrangement.phases
 
     def filled(self) -> CoarseMesh:
-        """Return the mesh, all tiles filled here."""
+        """Fill all tiles on this rank, and return the mesh."""
         return self.mesh([fill(tile) for _, tile in self.parts])
 
     def mesh(self, fillings: Sequence[Filling]) -> CoarseMesh:
-        """Return the mesh of which these are the filled tiles, in their order."""
+        """Join the filled tiles, in the order of `parts`, to a mesh."""
         arrangement, lines, scale = self.arrangement, self.lines, self.scale
         # Nodes of the outline come first, and then of one tile after the other.
         count, parts = len(lines.points), []
@@ -207,29 +189,33 @@ class NodedCell:
         points = np.concatenate([lines.points, *(filling.inner for filling in fillings)])
         triangles, circle = np.concatenate(parts), np.concatenate([filling.circle for filling in fillings])
         phase, precedence = self._within
-        void = len(self.phases)
+        solid = phase[circle] < len(self.phases)
+        triangles, circle = triangles[solid], circle[solid]
+        # Nodes within voids are left out.
+        used = np.zeros(len(points), bool)
+        used[triangles] = True
+        number, points = (np.cumsum(used) - 1).astype(np.int32), points[used]
         arcs, arc_circle = arc_edges(lines.curves)
-        filled = CoarseMesh(
+        return CoarseMesh(
             width=scale * arrangement.width,
             height=scale * arrangement.height,
             points=scale * points,
-            triangles=triangles,
+            triangles=number[triangles],
             phase=phase[circle],
             phases=arrangement.phases,
             precedence=precedence[circle],
             representative=representatives(points, arrangement.width, arrangement.height),
             ellipses=lines.ellipses.scaled(scale),
-            arc_edges=arcs,
+            arc_edges=number[arcs],
             arc_circle=arc_circle,
             debonded_edges=np.zeros((0, 2), np.int32),
             centres=scale * arrangement.centres[: arrangement.fibres],
             remarks=arrangement.remarks,
         )
-        return _without_voids(filled, void) if np.any(phase == void) else filled
 
     @cached_property
     def _within(self) -> tuple[Int32, Int32]:
-        """(k + 1,) the phase next within each circle, and the precedence, as in `CoarseMesh`.
+        """The phase (k + 1,) next within each circle, and the precedence (k + 1,).
 
         Voids have a phase number behind all others; the last entry is the matrix.
         """
@@ -243,7 +229,7 @@ class NodedCell:
 
     @cached_property
     def regions(self) -> Regions:
-        """The cell's regions.  The matrix around round fibres is one: the plane without discs, which do not touch."""
+        """The cell's regions; the matrix around discs, which do not touch, is one region."""
         phase, precedence = self._within
         solid = phase < len(self.phases)
         _, first, constituent = np.unique(precedence[solid], return_index=True, return_inverse=True)
@@ -259,24 +245,3 @@ class NodedCell:
             phase=phase[solid][first].astype(np.int64),
             nodes=len(self.lines.points),
         )
-
-
-def _without_voids(mesh: CoarseMesh, void: int) -> CoarseMesh:
-    """Return the mesh without the triangles of the phase number `void`.
-
-    The phase has no name in it; nodes that no other triangle has are left out.
-    """
-    solid = mesh.phase != void
-    used = np.zeros(len(mesh.points), bool)
-    used[mesh.triangles[solid]] = True
-    number = (np.cumsum(used) - 1).astype(np.int32)
-    points = mesh.points[used]
-    return replace(
-        mesh,
-        points=points,
-        triangles=number[mesh.triangles[solid]],
-        phase=mesh.phase[solid],
-        precedence=mesh.precedence[solid],
-        representative=representatives(points, mesh.width, mesh.height),
-        arc_edges=number[mesh.arc_edges],
-    )

@@ -3,7 +3,6 @@
 Middle nodes on second-order edges define the curves, as in users' meshes.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise, product
 from pathlib import Path
@@ -17,11 +16,10 @@ from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.readers.gmsh_file import MshContent, raw_mesh
 from feti_homog.mesh.readers.msh_reader import made
 from feti_homog.mesh.sizes.element_estimate import refuse_many
-from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, wrap
-from feti_homog.mesh.sizes.graded_size import MIN_EDGES_AROUND, PASSAGE_EDGE, MeshSizes
+from feti_homog.mesh.sizes.graded_size import MAX_GROWTH, MIN_EDGES_AROUND, PASSAGE_EDGE, MeshSizes, SizeField, wrap
 from feti_homog.mesh.tiles.tile_filling import gmsh_session
 from feti_homog.microstructure import Arrangement, phase_names
-from feti_homog.microstructure.shapes import Outlines, convex_sums
+from feti_homog.microstructure.shapes import convex_sums
 from feti_homog.typing import Float
 
 # Distance from a line / size of the cell within which curves lie on it.
@@ -33,23 +31,20 @@ FEWEST_CELLS, MOST_CELLS = 32, 1000
 
 # Edges of coatings / thickness; cosine of the angle between normals of outlines and sides that face each other.
 COATING_EDGE, FACING = 2.0, 0.9
-# Sources of sizes that are looked at for each point.
+# Sources of sizes that count at a position.
 NEAREST = 12
 # Smallest size / size of the cell.
 LEAST = 1e-5
 
-Surface = tuple[int, int]
-SizeAt = Callable[[Float], Float]
-
 
 def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> CoarseMesh:
-    """Return the mesh that `gmsh_mesher.begin` begins, for fibres with any convex outlines.
+    """Mesh a cell whose fibres have any convex outlines; see `gmsh_mesher.begin`.
 
     Raises:
         MeshError: it would have too many elements.
     """
-    smallest, size_at = _sizes_at(arrangement, sizes)
-    refuse_many(size_at, smallest, arrangement.size)
+    field = _size_field(arrangement, sizes)
+    refuse_many(field, field.least, arrangement.size)
     with gmsh_session() as gmsh:
         number = _add_surfaces(gmsh, arrangement)
         # Curves on the right and upper side have the nodes on the left and lower one.
@@ -65,8 +60,19 @@ def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> C
             gmsh.model.mesh.setPeriodic(1, sides[1], sides[0], moved.ravel().tolist())
         for option in ("MeshSizeFromPoints", "MeshSizeExtendFromBoundary"):
             gmsh.option.setNumber(f"Mesh.{option}", 0)
+        # gmsh interpolates sizes on a grid, which it reads from a file.
+        size, structured = arrangement.size, gmsh.model.mesh.field.add("Structured")
+        counts = np.clip(np.ceil(size / field.least), FEWEST_CELLS, MOST_CELLS).astype(np.int32) + 1
+        x, y = (np.linspace(0.0, width, count) for width, count in zip(size, counts, strict=True))
+        values = field(np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2))
+        spacing = np.append(size / (counts - 1), 1.0)
         with TemporaryDirectory() as folder:
-            _set_sizes(gmsh, Path(folder) / "sizes", arrangement, smallest, size_at)
+            path = Path(folder) / "sizes"
+            with path.open("wb") as stream:
+                for part in (np.zeros(3), spacing, np.append(counts, 2).astype(np.int32), np.repeat(values, 2)):
+                    part.tofile(stream)
+            gmsh.model.mesh.field.setString(structured, "FileName", str(path))
+            gmsh.model.mesh.field.setAsBackgroundMesh(structured)
             gmsh.model.mesh.generate(2)
             gmsh.model.mesh.setOrder(2)
             raw = raw_mesh(MshContent.of(gmsh))
@@ -84,79 +90,62 @@ def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> C
 
 
 def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
-    """Add the surfaces within the cell to physical groups by phase; return their precedence, 0 in the matrix."""
-    occ = gmsh.model.occ
-    rectangle = (2, occ.addRectangle(0.0, 0.0, 0.0, arrangement.width, arrangement.height))
-    added, disc, ring = _add_outlines(gmsh, arrangement)
+    """Add the surfaces in the cell to groups by phase; return their precedence, 0 in the matrix."""
+    occ, size, outer, inner = gmsh.model.occ, arrangement.size, arrangement.outer, arrangement.outlines
+    assert isinstance(outer, convex_sums.ConvexSums) and isinstance(inner, convex_sums.ConvexSums)
+    rectangle = (2, occ.addRectangle(0.0, 0.0, 0.0, *size.tolist()))
+    steps = np.array(list(product((-1, 0, 1), repeat=2)))
+    image, shift = np.repeat(arrangement.order, len(steps)), np.tile(steps, (len(outer), 1)) * size
+    low, high = outer.centres - outer.extents[:, :, 0], outer.centres + outer.extents[:, :, 1]
+    inside = np.all((high[image] + shift > 0) & (low[image] + shift < size), axis=1)
+    # Images that reach into the cell, each from without.
+    added, disc, ring = [], list[int](), list[bool]()
+    for number, step in zip(image[inside].tolist(), shift[inside], strict=True):
+        for is_ring in (True, False) if arrangement.coated[number] else (False,):
+            added.append((2, _add_shape(gmsh, outer if is_ring else inner, number, step)))
+            disc.append(number)
+            ring.append(is_ring)
     _, parts = occ.fragment([rectangle], added)
     occ.synchronize()
-    number, phase = dict.fromkeys(parts[0], 0), dict.fromkeys(parts[0], phase_names.MATRIX)
+    number_of, phase = dict.fromkeys(parts[0], 0), dict.fromkeys(parts[0], phase_names.MATRIX)
     numbers = arrangement.precedence(np.array(disc), np.array(ring))
     for pieces, entry, is_ring, precedence in zip(parts[1:], disc, ring, numbers, strict=True):
-        inside = set(pieces) & set(number)
-        number |= dict.fromkeys(inside, int(precedence))
-        phase |= dict.fromkeys(inside, arrangement.within[is_ring][entry])
-    outside = {piece for pieces in parts for piece in pieces} - set(number)
+        within = set(pieces) & set(number_of)
+        number_of |= dict.fromkeys(within, int(precedence))
+        phase |= dict.fromkeys(within, arrangement.within[is_ring][entry])
+    outside = {piece for pieces in parts for piece in pieces} - set(number_of)
     voids = {piece for piece, name in phase.items() if name == phase_names.VOID}
     occ.remove(sorted(outside | voids), recursive=True)
     occ.synchronize()
     for name in sorted(set(phase.values()) - {phase_names.VOID}):
         gmsh.model.addPhysicalGroup(2, sorted(tag for (_, tag), entry in phase.items() if entry == name), name=name)
-    return {tag: entry for (_, tag), entry in number.items()}
-
-
-def _add_outlines(gmsh: ModuleType, arrangement: Arrangement) -> tuple[list[Surface], list[int], list[bool]]:
-    """Add surfaces for images that reach into the cell, outer ones first; their discs, and whether one is within."""
-    size, outer, inner = arrangement.size, _sums(arrangement.outer), _sums(arrangement.outlines)
-    order = range(len(outer)) if arrangement.mesh_order is None else arrangement.mesh_order.tolist()
-    low, high = (outer.centres + sign * outer.extents[:, :, side] for side, sign in ((0, -1), (1, 1)))
-    added, disc, ring = list[Surface](), list[int](), list[bool]()
-    for number, step in product(order, product((-1, 0, 1), repeat=2)):
-        shift = np.array(step) * size
-        if np.all((high[number] + shift > 0) & (low[number] + shift < size)):
-            kinds = (True, False) if arrangement.coated[number] else (False,)
-            for is_ring in kinds:
-                added.append((2, _add_shape(gmsh, outer if is_ring else inner, number, shift)))
-                disc.append(number)
-                ring.append(is_ring)
-    return added, disc, ring
-
-
-def _sums(outlines: Outlines) -> convex_sums.ConvexSums:
-    """Return the outlines as sums of polygons and ellipses."""
-    return convex_sums.ConvexSums(outlines.centres, outlines.cores, outlines.frames)
+    return {tag: entry for (_, tag), entry in number_of.items()}
 
 
 def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int, shift: Float) -> int:
-    """Return the plane surface of one shape, moved."""
+    """Add the surface of a moved ellipse, or of a polygon with a margin; return its tag."""
     occ, (x, y) = gmsh.model.occ, (shapes.centres[number] + shift).tolist()
     frame, core = shapes.frames[number], shapes.cores[number]
-    a, b = np.linalg.norm(frame, axis=0).tolist()
-    if np.abs(core).max() <= ROUND * max(a, b):
-        longer = 0 if a >= b else 1
-        surface = occ.addDisk(x, y, 0.0, max(a, b), min(a, b))
+    rounding, b = np.linalg.norm(frame, axis=0).tolist()
+    if np.abs(core).max() <= ROUND * max(rounding, b):
+        longer = 0 if rounding >= b else 1
+        surface = occ.addDisk(x, y, 0.0, max(rounding, b), min(rounding, b))
         turn = float(np.arctan2(frame[1, longer], frame[0, longer]))
         occ.rotate([(2, surface)], x, y, 0.0, 0.0, 0.0, 1.0, turn)
         return int(surface)
-    corners = core[np.sort(np.unique(core.round(14), axis=0, return_index=True)[1])] + [x, y]
-    return int(occ.addPlaneSurface([occ.addCurveLoop(_rounded_lines(occ, corners, a))]))
-
-
-def _rounded_lines(occ: ModuleType, corners: Float, rounding: float) -> list[int]:
-    """Return the straight sides and the arcs of a polygon with a margin around.
-
-    Its corners (n, 2) run counter-clockwise.
-    """
-    following = np.roll(corners, -1, axis=0)
-    along = (following - corners) / np.linalg.norm(following - corners, axis=1, keepdims=True)
-    outward = np.column_stack([along[:, 1], -along[:, 0]]) * rounding
 
     def point(place: Float) -> int:
         return int(occ.addPoint(*place.tolist(), 0.0))
 
+    # Corners run counter-clockwise.
+    corners = core[np.sort(np.unique(core.round(14), axis=0, return_index=True)[1])] + [x, y]
+    following = np.roll(corners, -1, axis=0)
+    along = (following - corners) / np.linalg.norm(following - corners, axis=1, keepdims=True)
     if rounding == 0.0:
         tags = [point(corner) for corner in corners]
-        return [occ.addLine(*ends) for ends in zip(tags, tags[1:] + tags[:1], strict=True)]
+        lines = [occ.addLine(*ends) for ends in zip(tags, tags[1:] + tags[:1], strict=True)]
+        return int(occ.addPlaneSurface([occ.addCurveLoop(lines)]))
+    outward = np.column_stack([along[:, 1], -along[:, 0]]) * rounding
     starts, stops = ([point(place) for place in ends + outward] for ends in (corners, following))
     lines = []
     for k, corner in enumerate(following):
@@ -166,33 +155,17 @@ def _rounded_lines(occ: ModuleType, corners: Float, rounding: float) -> list[int
         middle = [] if len(corners) > 2 else [point(corner + rounding * along[k])]
         centre, places = point(corner), [stops[k], *middle, onward]
         lines += [occ.addCircleArc(begin, centre, end) for begin, end in pairwise(places)]
-    return lines
+    return int(occ.addPlaneSurface([occ.addCurveLoop(lines)]))
 
 
-def _set_sizes(gmsh: ModuleType, path: Path, arrangement: Arrangement, smallest: float, size_at: SizeAt) -> None:
-    """Let gmsh interpolate sizes, none below `smallest`, on a grid, by way of a file."""
-    size = arrangement.size
-    counts = np.clip(np.ceil(size / smallest), FEWEST_CELLS, MOST_CELLS).astype(np.int32) + 1
-    x, y = (np.linspace(0.0, width, count) for width, count in zip(size, counts, strict=True))
-    values = size_at(np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2))
-    spacing = np.append(size / (counts - 1), 1.0)
-    with path.open("wb") as stream:
-        for part in (np.zeros(3), spacing, np.append(counts, 2).astype(np.int32), np.repeat(values, 2)):
-            part.tofile(stream)
-    field = gmsh.model.mesh.field.add("Structured")
-    gmsh.model.mesh.field.setString(field, "FileName", str(path))
-    gmsh.model.mesh.field.setAsBackgroundMesh(field)
+def _size_field(arrangement: Arrangement, sizes: MeshSizes) -> SizeField:
+    """Return the size field h = min_k h_k + g |x - x_k| over points x_k on all outlines.
 
-
-def _sizes_at(arrangement: Arrangement, sizes: MeshSizes) -> tuple[float, SizeAt]:
-    """Return the least size of elements, and the sizes at positions (n, 2).
-
-    h = min_k h_k + g |x - x_k| over points x_k on all outlines.
-
-    h_k is at most the interface size, the size that suits the curvature, and PASSAGE_EDGE times the distance to the
-    next outline or to a cell side that the outline faces there.
+    h_k is at most the interface size, a part of the circle with the curvature there, and PASSAGE_EDGE times the
+    distance to the next outline or to a cell side that the outline faces.
     """
-    size, shapes = arrangement.size, _sums(arrangement.outer)
+    size, shapes = arrangement.size, arrangement.outer
+    assert isinstance(shapes, convex_sums.ConvexSums)
     places, normal, shape = shapes.boundary(convex_sums.POINTS)
     rounds = np.linalg.norm(shapes.frames, axis=1).min(axis=1)
     rounds = np.where(rounds > 0, rounds, np.inf)
@@ -213,10 +186,5 @@ def _sizes_at(arrangement: Arrangement, sizes: MeshSizes) -> tuple[float, SizeAt
         faces = np.abs(normal[:, axis]) > FACING
         length = np.where(faces, np.minimum(length, PASSAGE_EDGE * away), length)
     length = np.maximum(length, LEAST * size.max())
-    tree, nearest = cKDTree(wrap(places, size), boxsize=size), min(NEAREST, len(places))
-
-    def at(positions: Float) -> Float:
-        distance, which = tree.query(wrap(positions, size), nearest)
-        return np.asarray(np.minimum(sizes.largest, (length[which] + MAX_GROWTH * distance).min(axis=1)))
-
-    return float(length.min()), at
+    growth = np.full(len(places), MAX_GROWTH)
+    return SizeField([(places, length, growth)], size, sizes.largest, nearest=NEAREST)

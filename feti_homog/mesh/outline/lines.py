@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Self
 
 import numpy as np
@@ -16,28 +17,19 @@ from feti_homog.typing import Float, Int
 
 # Regions beside a curve that are no disc or coating.
 MATRIX, OUTSIDE = -1, -2
-
-
-@dataclass(frozen=True)
-class Curve:
-    """A bridge, or a piece of a side or circle from vertex to vertex, counter-clockwise around cell or disc.
-
-    Attributes:
-        nodes: (k,) node numbers, from end to end.
-        circle: the circle it lies on; MATRIX for a straight line.
-        inside: the region on its left: the disc, or the coating, within that circle, or MATRIX, or OUTSIDE.
-        outside: the region on its right: the coating within the circle around it, or MATRIX, or OUTSIDE.
-    """
-
-    nodes: Int
-    circle: int
-    inside: int
-    outside: int
+SAMPLES_OF_AN_EDGE = 3
 
 
 @dataclass(frozen=True)
 class Curves:
-    """c curves; curve k has the nodes node[first[k] : first[k + 1]], and the other arrays (c,) are as in `Curve`."""
+    """Bridges, and pieces of sides or circles, counter-clockwise around cell or disc.
+
+    Attributes:
+        node, first: curve k has the nodes node[first[k] : first[k + 1]], from end to end.
+        circle: (c,) the circle it lies on; MATRIX for a straight line.
+        inside: (c,) the region on its left: the disc, or the coating, within that circle, or MATRIX, or OUTSIDE.
+        outside: (c,) the region on its right: the coating within the circle around it, or MATRIX, or OUTSIDE.
+    """
 
     node: Int
     first: Int
@@ -55,21 +47,15 @@ class Curves:
         begin = np.delete(np.arange(len(self.node)), self.first[1:] - 1)
         return self.node[begin[:, None] + [0, 1]], np.repeat(np.arange(len(self)), counts - 1)
 
-    def pieces(self) -> list[Curve]:
-        """One after the other."""
-        nodes = np.split(self.node, self.first[1:-1])
-        regions = (self.circle.tolist(), self.inside.tolist(), self.outside.tolist())
-        return [Curve(*parts) for parts in zip(nodes, *regions, strict=True)]
-
     def chosen(self, some: Int) -> Curves:
-        """Return the curves `some` (k,)."""
+        """Return the curves of the indices `some` (k,)."""
         counts = np.diff(self.first)[some]
         node, first = self.node[dividing.ranges(self.first[some], counts)], np.concatenate([[0], np.cumsum(counts)])
         return Curves(node, first, self.circle[some], self.inside[some], self.outside[some])
 
     @classmethod
     def joined(cls, parts: Sequence[Curves]) -> Curves:
-        """Join curves, one part after the other."""
+        """Concatenate curves, part after part."""
         counts = np.concatenate([np.diff(part.first) for part in parts])
         return cls(
             np.concatenate([part.node for part in parts]),
@@ -79,26 +65,33 @@ class Curves:
 
 
 class Lines:
-    """c lines, whose attributes are arrays (c, ...)."""
+    """c lines, whose attributes are arrays (c, ...).
+
+    Attributes:
+        cap: (c, 2) longest edge at both ends, linear between them.
+    """
+
+    cap: Float
 
     @property
     def lengths(self) -> Float:
-        """(c,) of each."""
+        """(c,) length of each line."""
         raise NotImplementedError
 
     def points(self, line: Int, share: Float) -> Float:
-        """(n, 2) on lines (n,) at these shares (n,) of their lengths."""
+        """Return the points (n, 2) at these fractions (n,) of lines (n,)."""
         raise NotImplementedError
 
     def caps(self, line: Int, share: Float) -> Float:
-        """(n,) the longest edge there."""
-        raise NotImplementedError
+        """Return the longest edge (n,) at these fractions (n,) of lines (n,)."""
+        low, high = self.cap[line].T
+        return np.asarray(low + share * (high - low))
 
     def __len__(self) -> int:
         return len(self.lengths)
 
     def chosen(self, some: slice) -> Self:
-        """Return some of them."""
+        """Return the lines of a slice."""
         return type(self)(**{name: values[some] for name, values in vars(self).items()})
 
 
@@ -109,7 +102,6 @@ class Arcs(Lines):
     Attributes:
         circles: (a, 3) centre and radius.
         start, span: (a,) angle in radians at which each begins, and how far it turns.
-        cap: (a,) longest edge.
     """
 
     circles: Float
@@ -126,10 +118,6 @@ class Arcs(Lines):
         """See `Lines`."""
         return on_circle(self.circles[line], self.start[line] + self.span[line] * share)
 
-    def caps(self, line: Int, share: Float) -> Float:
-        """See `Lines`."""
-        return self.cap[line]
-
 
 @dataclass(frozen=True)
 class Segments(Lines):
@@ -137,7 +125,6 @@ class Segments(Lines):
 
     Attributes:
         begin, way: (s, 2) where each begins, and where it goes from there.
-        cap: (s, 2) longest edge at both ends, linear between them.
     """
 
     begin: Float
@@ -153,15 +140,10 @@ class Segments(Lines):
         """See `Lines`."""
         return np.asarray(self.begin[line] + share[:, None] * self.way[line])
 
-    def caps(self, line: Int, share: Float) -> Float:
-        """See `Lines`."""
-        low, high = self.cap[line].T
-        return np.asarray(low + share * (high - low))
-
 
 @dataclass(frozen=True)
 class Sampling:
-    """Numbers of samples of sizes.
+    """Numbers of positions at which edge sizes are sampled.
 
     Attributes:
         arc, side, bridge: positions along an arc, a piece of a side and a bridge.
@@ -194,12 +176,12 @@ class Stations:
 
     @property
     def line(self) -> Int:
-        """(n,) the line that each is on."""
+        """(n,) line of each node."""
         return np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
 
     @classmethod
     def joined(cls, parts: Sequence[Stations], limit: int) -> Stations:
-        """Return the nodes of all lines, part after part.
+        """Concatenate the nodes of lines, part after part.
 
         Raises:
             MeshError: they have more than `limit` edges together.
@@ -218,65 +200,92 @@ def _refuse_many(edges: float, limit: int) -> None:
         )
 
 
-@dataclass(frozen=True)
-class EdgeSamples:
-    """The edge size h sampled along c lines, each by itself.
+def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges: Int, limit: int) -> Stations:
+    """Place nodes equidistant in ds / h, with `least_edges` (c,) edges or more on each line.
 
-    Attributes:
-        share: (n,) part of the line's length; line k has the samples from first[k] up to first[k + 1].
-        density: (n,) ds / h.
-        first: (c + 1,)
+    The size h is sampled along each line by itself, at `least_samples` equidistant positions, and where it is graded,
+    at SAMPLES_OF_AN_EDGE or more for each edge.
+
+    Raises:
+        MeshError: there would be more than `limit`.
     """
+    lengths = lines.lengths
+    line, samples = np.repeat(np.arange(len(lengths)), least_samples), np.linspace(0, 1, least_samples)
+    samples = np.tile(samples, len(lengths))
+    sizes = np.minimum(field(lines.points(line, samples)), lines.caps(line, samples))
+    while field.graded is not None:
+        way = np.diff(samples) * lengths[line[:-1]]
+        wide = (np.diff(line) == 0) & (way > 1 / SAMPLES_OF_AN_EDGE * np.minimum(sizes[:-1], sizes[1:]))
+        if not wide.any():
+            break
+        at = np.flatnonzero(wide) + 1
+        middle, of = (samples[at - 1] + samples[at]) / 2, line[at]
+        more = np.minimum(field(lines.points(of, middle)), lines.caps(of, middle))
+        line, samples, sizes = (np.insert(*x) for x in ((line, at, of), (samples, at, middle), (sizes, at, more)))
+    density, begin = lengths[line] / sizes, np.searchsorted(line, np.arange(len(lengths) + 1))
+    # int ds / h from the beginning of each line, by the trapezoidal rule.
+    measure, counts, last = np.zeros(len(samples)), np.diff(begin), begin[1:] - 1
+    for count in np.unique(counts):
+        rows = begin[:-1][counts == count, None] + np.arange(count)
+        d, s = density[rows], samples[rows]
+        measure[rows[:, 1:]] = np.cumsum((d[:, 1:] + d[:, :-1]) / 2 * np.diff(s, axis=1), axis=1)
+    total = measure[last]
+    _refuse_many(float(total.sum()), limit)
+    edges = np.maximum(np.ceil(total - 1e-6).astype(int), least_edges)
+    first = np.concatenate([[0], np.cumsum(edges + 1)])
+    line = np.repeat(np.arange(len(edges)), edges + 1)
+    target = (np.arange(first[-1]) - first[line]) * (total / edges)[line]
+    target[first[1:] - 1] = total
+    # Linear between samples, of all lines in one ascending row, 1 apart; the rounding of large sums may miss an
+    # interval by one.
+    shift = np.concatenate([[0.0], np.cumsum(total + 1)])[: len(last)]
+    row = measure + np.repeat(shift, counts)
+    j = np.searchsorted(row, target + shift[line], side="right") - 1
+    j = np.clip(j, begin[line], last[line] - 1)
+    j = np.maximum(j - (measure[j] > target), begin[line])
+    j = np.minimum(j + (measure[j + 1] <= target), last[line] - 1)
+    slope = (samples[j + 1] - samples[j]) / (measure[j + 1] - measure[j])
+    share = np.where(target == total[line], 1.0, slope * (target - measure[j]) + samples[j])
+    return Stations(share, first, float(total.sum()))
 
-    share: Float
-    density: Float
-    first: Int
 
-    @classmethod
-    def of(cls, field: SizeField, lines: Lines, fewest: int) -> EdgeSamples:
-        """Take samples at `fewest` equidistant positions, and between them where the field asks for more."""
-        lengths = lines.lengths
-        count = len(lengths)
-        line, share = np.repeat(np.arange(count), fewest), np.tile(np.linspace(0, 1, fewest), count)
-        sizes = np.minimum(field.at(lines.points(line, share)), lines.caps(line, share))
-        while True:
-            way = np.diff(share) * lengths[line[:-1]]
-            wide = (np.diff(line) == 0) & (way > field.step * np.minimum(sizes[:-1], sizes[1:]))
-            if not wide.any():
-                break
-            at = np.flatnonzero(wide) + 1
-            between, middle = (share[at - 1] + share[at]) / 2, line[at]
-            more = np.minimum(field.at(lines.points(middle, between)), lines.caps(middle, between))
-            line, share, sizes = (np.insert(*x) for x in ((line, at, middle), (share, at, between), (sizes, at, more)))
-        return cls(share, lengths[line] / sizes, np.searchsorted(line, np.arange(count + 1)))
+# Nodes of the arcs, and of the bridges.
+LineStations = tuple[Stations, Stations]
 
-    def stations(self, fewest: Int, limit: int) -> Stations:
-        """Nodes equidistant in ds / h, so that lines have `fewest` (c,) edges or more.
+
+@dataclass(frozen=True)
+class SizedLines:
+    """Lines whose nodes do not depend on other lines, so that ranks may share them."""
+
+    arcs: Lines
+    bridges: Segments
+    sampling: Sampling
+
+    def parts(self, count: int) -> list[SizedLines]:
+        """Divide the lines, in order, into `count` parts of equal numbers."""
+        arcs, bridges = (pairwise(dividing.even(len(lines), count)) for lines in (self.arcs, self.bridges))
+        return [
+            SizedLines(self.arcs.chosen(slice(*arcs_part)), self.bridges.chosen(slice(*bridges_part)), self.sampling)
+            for arcs_part, bridges_part in zip(arcs, bridges, strict=True)
+        ]
+
+    def stations(self, field: SizeField) -> LineStations:
+        """Place the nodes on these lines.
 
         Raises:
-            MeshError: there would be more than `limit`.
+            MeshError: there would be more than the sampling allows.
         """
-        # int ds / h from the beginning of each line, by the trapezoidal rule.
-        measure, counts, last = np.zeros(len(self.share)), np.diff(self.first), self.first[1:] - 1
-        for count in np.unique(counts):
-            rows = self.first[:-1][counts == count, None] + np.arange(count)
-            d, s = self.density[rows], self.share[rows]
-            measure[rows[:, 1:]] = np.cumsum((d[:, 1:] + d[:, :-1]) / 2 * np.diff(s, axis=1), axis=1)
-        total = measure[last]
-        _refuse_many(float(total.sum()), limit)
-        edges = np.maximum(np.ceil(total - 1e-6).astype(int), fewest)
-        first = np.concatenate([[0], np.cumsum(edges + 1)])
-        line = np.repeat(np.arange(len(edges)), edges + 1)
-        target = (np.arange(first[-1]) - first[line]) * (total / edges)[line]
-        target[first[1:] - 1] = total
-        # Linear between samples, of all lines in one ascending row, 1 apart; the rounding of large sums may miss an
-        # interval by one.
-        shift = np.concatenate([[0.0], np.cumsum(total + 1)])[: len(last)]
-        row = measure + np.repeat(shift, counts)
-        j = np.searchsorted(row, target + shift[line], side="right") - 1
-        j = np.clip(j, self.first[line], last[line] - 1)
-        j = np.maximum(j - (measure[j] > target), self.first[line])
-        j = np.minimum(j + (measure[j + 1] <= target), last[line] - 1)
-        slope = (self.share[j + 1] - self.share[j]) / (measure[j + 1] - measure[j])
-        share = np.where(target == total[line], 1.0, slope * (target - measure[j]) + self.share[j])
-        return Stations(share, first, float(total.sum()))
+        sampling, (arcs, bridges) = self.sampling, (np.ones(len(x), np.int64) for x in (self.arcs, self.bridges))
+        return (
+            place_nodes(field, self.arcs, sampling.arc, arcs, sampling.most_nodes),
+            place_nodes(field, self.bridges, sampling.bridge, bridges, sampling.most_nodes),
+        )
+
+    def joined(self, parts: Sequence[LineStations]) -> LineStations:
+        """Join the nodes of all parts.
+
+        Raises:
+            MeshError: they are more than the sampling allows.
+        """
+        arcs, bridges = (Stations.joined(stations, self.sampling.most_nodes) for stations in zip(*parts, strict=True))
+        return arcs, bridges

@@ -1,4 +1,4 @@
-"""About how many triangles a mesh will have, before it is made."""
+"""Estimates of the number of triangles before a mesh is made."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ import numpy as np
 
 from feti_homog.case import cell_section, cell_sizes
 from feti_homog.errors import MeshError
-from feti_homog.mesh.sizes.from_sources import MAX_GROWTH
-from feti_homog.mesh.sizes.graded_size import MIN_EDGES_AROUND
+from feti_homog.mesh.sizes.graded_size import MAX_GROWTH, MIN_EDGES_AROUND
 from feti_homog.microstructure import Arrangement
 from feti_homog.microstructure.shapes import Ellipses, shapes
 from feti_homog.typing import Float
@@ -30,7 +29,7 @@ POSITIONS = 200
 
 @dataclass(frozen=True)
 class ElementEstimate:
-    """A cell with width 1 before it is meshed and, but for tables, before its fibres are arranged.
+    """A cell of width 1 before it is meshed; only the fibres of a table are arranged.
 
     Attributes:
         cell: with its element sizes.
@@ -85,10 +84,10 @@ class ElementEstimate:
 
 
 def refuse_many(size_at: Callable[[Float], Float], smallest: float, period: Float, limit: int = MAX_TRIANGLES) -> None:
-    """Refuse a cell of the periods (2,) with too many elements int dA / (A h^2), by sizes h at positions (n, 2).
+    """Refuse a cell of periods (2,) whose sizes need too many elements int dA / (A h^2).
 
-    Sizes know narrow gaps and thin coatings, `ElementEstimate` only the numbers in the case. They are not summed where
-    `smallest`, which no h is below, bounds the number by `limit`.
+    The sizes h(x) know narrow gaps and thin coatings, `ElementEstimate` only the numbers in the case. They are not
+    summed where their lower bound `smallest` keeps the number below `limit`.
 
     Raises:
         MeshError: they are more than `limit`.
@@ -106,15 +105,15 @@ def refuse_many(size_at: Callable[[Float], Float], smallest: float, period: Floa
 
 
 def triangles_of_a_tip(ratio: np.float64 | float) -> float:
-    """Return how many triangles a tip adds where elements are smaller by `ratio` than around.
+    """Return the number of triangles that elements smaller by `ratio` add at a tip.
 
-    int 2 pi r dr / (A (h + g r)^2) up to the radius where h + g r is the size around, less as many as it has anyway.
+    int 2 pi r dr / (A (h + g r)^2) up to the radius where h + g r is the size around, less the triangles of that size.
     """
     within = 2 * (np.log(ratio) + 1 / ratio - 1) - (1 - 1 / ratio) ** 2
     return float(math.pi / (TRIANGLE_AREA * MAX_GROWTH**2) * within)
 
 
 def ratio_at_a_tip(count: float) -> float:
-    """Return how much smaller elements at a tip may be than around, to add no more triangles than `count`."""
+    """Return the size ratio at a tip that adds `count` triangles."""
     counts = [triangles_of_a_tip(ratio) for ratio in RATIOS]
     return float(np.interp(count, counts, RATIOS))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -10,11 +10,15 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.case import cell_section
-from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, Source, SourcedSize, wrap
 from feti_homog.microstructure import Arrangement, arrangements
 from feti_homog.microstructure.shapes import on_circle
-from feti_homog.typing import Bool, Float, Int
+from feti_homog.typing import Float, Int
 
+# Growth of the edge length per distance, at most.
+MAX_GROWTH = 0.4
+NEAREST = 16  # sources that count at a position
+# Positions in one query of a tree, which bounds its memory.
+CHUNK = 100_000
 # Edges around a fibre, at least.
 MIN_EDGES_AROUND = 16
 # Edge length in a narrow passage, relative to its width.
@@ -23,8 +27,18 @@ PASSAGE_EDGE = 1.5
 WEDGE = 3
 
 
+# Places (k, 2), edge lengths (k,) and growths (k,).
+Source = tuple[Float, Float, Float]
+
+
+def wrap(points: Float, size: Float) -> Float:
+    """Wrap positions (n, 2) into the cell [0, size)."""
+    wrapped = points % size
+    return np.where(wrapped >= size, 0.0, wrapped)
+
+
 def circle_size(arrangement: Arrangement, largest: float) -> Float:
-    """Largest edge length (k,) on an arrangement's circles, such that each has MIN_EDGES_AROUND edges or more.
+    """Return the longest edge (k,) on each circle, for MIN_EDGES_AROUND edges or more.
 
     Edges on a coating with thickness t on the radius a have at most sqrt(t a): then they are t / 8 away from their
     arcs, and elements across the coating do not turn over when their edges are bent.
@@ -35,37 +49,33 @@ def circle_size(arrangement: Arrangement, largest: float) -> Float:
 
 
 def coating_size(arrangement: Arrangement) -> Float:
-    """sqrt(t a) (N,) for a coating with thickness t on a disc with radius a."""
+    """Return sqrt(t a) (N,) for coatings of thickness t on discs of radius a."""
     return np.asarray(np.sqrt(arrangement.coating * arrangement.radii))
 
 
-def _between_fibres(circles: Float, size: Float, caps: Float, largest: float) -> Source:
-    """Facing points on neighbouring fibres; edges there suit the gap and the other fibre's edges."""
+def _between_fibres(circles: Float, size: Float, caps: Float, largest: float) -> Iterator[Source]:
+    """Yield facing points of fibres as sources, by the gap and the other fibre's edges."""
     centres, radii = circles[:, :2], circles[:, 2]
     first, second, vector = arrangements.neighbours(centres, size, 2 * radii.max() + largest)
     distance = np.linalg.norm(vector, axis=1)
     gap = distance - radii[first] - radii[second]
     normal = vector / distance[:, None]
     growth = passage_growth(gap, 1 / radii[first] + 1 / radii[second])
-    places, lengths, growths = [], [], []
     for one, other, sign in ((first, second, 1.0), (second, first, -1.0)):
         length = np.minimum(PASSAGE_EDGE * gap, caps[other] + MAX_GROWTH * gap)
         narrow = length < caps[one]
-        places.append((centres[one] + sign * radii[one, None] * normal)[narrow])
-        lengths.append(length[narrow])
-        growths.append(growth[narrow])
-    return np.concatenate(places), np.concatenate(lengths), np.concatenate(growths)
+        places = centres[one] + sign * radii[one, None] * normal
+        yield places[narrow], length[narrow], growth[narrow]
 
 
 def passage_growth(width: Float, curvature: Float) -> Float:
-    """Growth with which edges stay below twice the width w + c s^2 / 2 in a passage with curvature c."""
+    """Return the growth of edges below twice the width w + c s^2 / 2 of a passage."""
     return np.asarray(np.minimum(MAX_GROWTH, np.sqrt((4 - 2 * PASSAGE_EDGE) * 2 * width * curvature)))
 
 
-def _at_sides(circles: Float, size: Float, caps: Float, largest: float) -> Source:
-    """Find where a circle comes near a side or hardly crosses it: extreme point, foot on the side, crossings."""
+def _at_sides(circles: Float, size: Float, caps: Float, largest: float) -> Iterator[Source]:
+    """Yield as sources where circles come near a side: extreme points, feet, crossings."""
     centres, radii = circles[:, :2] % size, circles[:, 2]
-    sources: list[Source] = []
     for axis, sign in product((0, 1), (-1.0, 1.0)):
         distance = centres[:, axis] if sign < 0 else size[axis] - centres[:, axis]
         extreme, foot = centres.copy(), centres.copy()
@@ -74,40 +84,19 @@ def _at_sides(circles: Float, size: Float, caps: Float, largest: float) -> Sourc
         width = np.abs(distance - radii)
         growth = passage_growth(width, 1 / radii)
         length = np.minimum(PASSAGE_EDGE * width, caps + MAX_GROWTH * width)
-        sources += [
-            _where(length < caps, extreme, length, growth),
-            _where(length < largest, foot, length, growth),
-        ]
+        for places, narrow in ((extreme, length < caps), (foot, length < largest)):
+            yield places[narrow], length[narrow], growth[narrow]
         angle = np.arccos(np.minimum(distance / radii, 1.0))
         length = angle * radii / WEDGE
+        sharp = (length < caps) & (angle > 0)
         for turn in (-1.0, 1.0):
-            crossing = foot.copy()
-            crossing[:, 1 - axis] += turn * radii * np.sin(angle)
-            sharp = (length < caps) & (angle > 0)
-            sources.append(_where(sharp, crossing, length, np.full(len(radii), MAX_GROWTH)))
-    places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
-    return places, lengths, growths
-
-
-def _where(chosen: Bool, *source: Float) -> Source:
-    """Return the chosen rows of places, lengths and growths."""
-    places, lengths, growths = (part[chosen] for part in source)
-    return places, lengths, growths
-
-
-def _at_corners(circles: Float, size: Float, caps: Float) -> Source:
-    """Find where a circle passes near the corner: the corner and the nearest point on the circle."""
-    offset = (circles[:, :2] + size / 2) % size - size / 2
-    distance = np.linalg.norm(offset, axis=1)
-    length = PASSAGE_EDGE * np.abs(distance - circles[:, 2])
-    close = length < caps
-    facing = offset[close] * (1 - circles[close, 2] / distance[close])[:, None]
-    places = np.concatenate([facing, np.zeros_like(facing)])
-    return places, np.tile(length[close], 2), np.full(len(places), MAX_GROWTH)
+            crossing = foot[sharp]
+            crossing[:, 1 - axis] += (turn * radii * np.sin(angle))[sharp]
+            yield crossing, length[sharp], np.full(len(crossing), MAX_GROWTH)
 
 
 def at_vertices(vertices: Float, size: Float, largest: float) -> Source:
-    """Vertices, once on the torus, with the distance to the nearest other one."""
+    """Return the vertices, once on the torus, as sources by the distance to the next."""
     places = wrap(vertices, size)
     tree = cKDTree(places, boxsize=size)
     same = tree.query_pairs(1e-9 * size.max(), output_type="ndarray")
@@ -118,8 +107,6 @@ def at_vertices(vertices: Float, size: Float, largest: float) -> Source:
     return places, distance[:, 1], np.full(len(places), MAX_GROWTH)
 
 
-# Samples of a size on a line for each of its edges, where the size is graded.
-SAMPLES_OF_AN_EDGE = 3
 # Size of edges on a circle / largest size, below which elements grow from it: between tiny discs far apart, gmsh would
 # interpolate the sizes on their circles.
 FINE_CIRCLE = 0.1
@@ -127,7 +114,7 @@ FINE_CIRCLE = 0.1
 
 @dataclass(frozen=True)
 class MeshSizes:
-    """Edge lengths that a mesh is asked for, at most; each no larger than the one before.
+    """The largest edge lengths of a mesh; each is at most the one before.
 
     Attributes:
         largest: anywhere.
@@ -140,13 +127,8 @@ class MeshSizes:
     tip: float
 
     @classmethod
-    def uniform(cls, largest: float) -> MeshSizes:
-        """One size for all."""
-        return cls(largest, largest, largest)
-
-    @classmethod
     def of(cls, cell: cell_section.Cell, has_tips: bool) -> MeshSizes:
-        """Return the sizes that a cell with width 1 is asked for."""
+        """Return the sizes that a case asks for, in a cell of width 1."""
         interface = cell.mesh_size if cell.interface_size is None else cell.interface_size
         return cls(cell.mesh_size, interface, interface if cell.tip_size is None or not has_tips else cell.tip_size)
 
@@ -158,43 +140,58 @@ class MeshSizes:
         return bool(min(self.tip, self.on_circles(arrangement).min()) < self.largest)
 
     def on_circles(self, arrangement: Arrangement) -> Float:
-        """(N,) on the circles of each disc."""
+        """Return the sizes (N,) on the circles of each disc."""
         sizes = np.where(arrangement.coated, np.minimum(self.interface, coating_size(arrangement)), self.interface)
         around = 2 * np.pi * arrangement.radii / MIN_EDGES_AROUND
         return np.where(around < FINE_CIRCLE * self.largest, np.minimum(sizes, around), sizes)
 
 
-@dataclass(frozen=True)
 class SizeField:
-    """The edge size on a cell's lines: the smaller one among two sizes, the second of which grows along lines.
+    """The size h(x) = min(largest, min_k (h_k + g_k |x - x_k|)) on the torus, or a graded size if less.
+
+    Source k acts within the distance `largest` / MAX_GROWTH.
 
     Attributes:
-        base, graded: these sizes.
-        least_graded: the second is nowhere below it.
+        largest: size anywhere.
+        graded: the size that grows with the distance from lines; None if elements are not graded.
+        least: lower bound of the sizes.
     """
 
-    base: SourcedSize
-    graded: Callable[[Float], Float] | None = None
-    least_graded: float = np.inf
+    def __init__(
+        self,
+        sources: Sequence[Source],
+        size: Float,
+        largest: float,
+        graded: FromLines | None = None,
+        chunk: int = CHUNK,
+        nearest: int = NEAREST,
+    ) -> None:
+        """Prepare sources on the torus with periods `size` (2,).
 
-    @property
-    def least(self) -> float:
-        """Size below which there is none."""
-        return min(self.base.least, self.least_graded)
+        The `nearest` sources count at a position; a query has `chunk` positions.
+        """
+        self.largest, self.graded = largest, graded
+        self._size, self._bound, self._chunk, self._nearest = size, largest / MAX_GROWTH, chunk, nearest
+        places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
+        # Where the tree finds no more sources, it returns their number: an infinite length.
+        self._lengths, self._growths = np.append(lengths, np.inf), np.append(growths, MAX_GROWTH)
+        self.least = min(largest, float(self._lengths.min()), np.inf if graded is None else graded.least)
+        self._tree = cKDTree(wrap(places, size), boxsize=size)
 
-    @property
-    def step(self) -> float:
-        """Distance of positions on a line between which it may be interpolated / size."""
-        return np.inf if self.graded is None else 1 / SAMPLES_OF_AN_EDGE
-
-    def at(self, points: Float) -> Float:
-        """Sizes (n,) at positions (n, 2)."""
-        sizes = self.base(points)
+    def __call__(self, points: Float) -> Float:
+        """Return the sizes (n,) at points (n, 2)."""
+        wrapped, count, parts = wrap(points, self._size), min(self._nearest, self._tree.n), []
+        for k in range(0, max(1, len(points)), self._chunk):
+            some = wrapped[k : k + self._chunk]
+            distance, nearest = self._tree.query(some, k=count, distance_upper_bound=self._bound)
+            sizes = (self._lengths[nearest] + self._growths[nearest] * distance).reshape(len(some), count)
+            parts.append(np.minimum(self.largest, sizes.min(axis=1)))
+        sizes = np.concatenate(parts)
         return sizes if self.graded is None else np.minimum(sizes, self.graded(points))
 
 
 def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips: Float) -> SizeField:
-    """Return the edge size at positions on the torus, by passages and vertices, and smaller near discs and tips.
+    """Return the edge size on the torus, by passages, vertices, discs and tips.
 
     The sources (x_k, h_k) are the two faces of each narrow passage between two fibres, or between a fibre and
     a side or corner of the cell, with h_k proportional to its width, and the `vertices` (v, 2) that the mesh
@@ -205,62 +202,65 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
     """
     size, largest, (shells, disc) = arrangement.size, sizes.largest, arrangement.shells
     circles, caps = np.column_stack([shells.centres, shells.radii]), circle_size(arrangement, largest)
-    outer = np.unique(disc, return_index=True)[1]
+    first = np.unique(disc, return_index=True)[1]
+    # Where a circle passes near the corner: the corner and the nearest point on the circle.
+    offset = (circles[:, :2] + size / 2) % size - size / 2
+    distance = np.linalg.norm(offset, axis=1)
+    length = PASSAGE_EDGE * np.abs(distance - circles[:, 2])
+    close = length < caps
+    facing = offset[close] * (1 - circles[close, 2] / distance[close])[:, None]
+    corners = np.concatenate([facing, np.zeros_like(facing)])
     sources = [
-        _between_fibres(circles[outer], size, caps[outer], largest),
-        _at_sides(circles, size, caps, largest),
-        _at_corners(circles, size, caps),
+        *_between_fibres(circles[first], size, caps[first], largest),
+        *_at_sides(circles, size, caps, largest),
+        (corners, np.tile(length[close], 2), np.full(len(corners), MAX_GROWTH)),
         at_vertices(vertices, size, largest),
     ]
-    base = SourcedSize(sources, size, largest)
     if not sizes.are_graded(arrangement):
-        return SizeField(base)
-    lines = _FromLines.of(arrangement, sizes, tips)
-    return SizeField(base, lines, min(sizes.tip, float(lines.caps.min())))
+        return SizeField(sources, size, largest)
+    # Points h_i apart on the outer circles find the nearest disc.
+    lengths, outer = sizes.on_circles(arrangement), circles[first]
+    counts = np.ceil(2 * np.pi * outer[:, 2] / lengths).astype(int)
+    disc = np.repeat(np.arange(len(counts)), counts)
+    angle = 2 * np.pi * (np.arange(len(disc)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[disc]
+    points = on_circle(outer[disc], angle)
+    return SizeField(sources, size, largest, FromLines(size, points, disc, lengths, sizes.tip, tips, outer))
 
 
-@dataclass(frozen=True)
-class _FromLines:
-    """h_i + g d and h_t + g max(0, d - h_t) as in `size_field`, whichever is smaller.
-
-    Points h_i apart on the circles find the nearest disc.
+class FromLines:
+    """The smaller one of h_i + g d and h_t + g max(0, d - h_t), see `size_field`.
 
     Attributes:
-        size: (2,) width and height.
-        circles: (N, 3) outer circle by disc.
-        caps: (N,) h_i.
-        tip: h_t.
-        near_tips: tree of the tips.
-        spokes, disc: tree of the points on circles, and their discs (s,).
+        least: lower bound of the sizes.
     """
 
-    size: Float
-    circles: Float
-    caps: Float
-    tip: float
-    near_tips: cKDTree
-    spokes: cKDTree
-    disc: Int
+    def __init__(
+        self,
+        size: Float,
+        points: Float,
+        curve: Int,
+        lengths: Float,
+        tip: float,
+        tips: Float,
+        circles: Float | None = None,
+    ) -> None:
+        """Take the lengths h_i (k,) of curves, their `points` (s, 2), and h_t with the `tips` (t, 2).
 
-    @classmethod
-    def of(cls, arrangement: Arrangement, sizes: MeshSizes, tips: Float) -> _FromLines:
-        """Make the sizes of a cell."""
-        size, caps = arrangement.size, sizes.on_circles(arrangement)
-        radii = arrangement.outer_radii
-        counts = np.ceil(2 * np.pi * radii / caps).astype(int)
-        disc = np.repeat(np.arange(len(counts)), counts)
-        angle = 2 * np.pi * (np.arange(len(disc)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[disc]
-        circles = np.column_stack([arrangement.centres, radii])
-        spokes = cKDTree(wrap(on_circle(circles[disc], angle), size), boxsize=size)
-        near_tips = cKDTree(wrap(tips.reshape(-1, 2), size), boxsize=size)
-        return cls(size, circles, caps, sizes.tip, near_tips, spokes, disc)
+        d is measured from the circles (k, 3) of the curves (s,) of points, or without circles from the points.
+        """
+        self._size, self._curve, self._lengths, self._tip, self._circles = size, curve, lengths, tip, circles
+        self._points, self._tips = (cKDTree(wrap(x.reshape(-1, 2), size), boxsize=size) for x in (points, tips))
+        self.least = min(tip, float(lengths.min()))
 
     def __call__(self, points: Float) -> Float:
-        """(n,) at positions (n, 2) on the torus."""
-        places = wrap(points, self.size)
-        nearest = self.disc[self.spokes.query(places)[1]]
-        offset = (points - self.circles[nearest, :2] + self.size / 2) % self.size - self.size / 2
-        away = np.abs(np.linalg.norm(offset, axis=1) - self.circles[nearest, 2])
+        """Return the sizes (n,) at positions (n, 2) on the torus."""
+        places = wrap(points, self._size)
+        distance, nearest = self._points.query(places)
+        curve = self._curve[nearest]
+        if self._circles is not None:
+            circles = self._circles[curve]
+            offset = (points - circles[:, :2] + self._size / 2) % self._size - self._size / 2
+            distance = np.abs(np.linalg.norm(offset, axis=1) - circles[:, 2])
         # Without tips the distance is infinite.
-        at_tips = self.tip + MAX_GROWTH * np.maximum(0.0, self.near_tips.query(places)[0] - self.tip)
-        return np.asarray(np.minimum(self.caps[nearest] + MAX_GROWTH * away, at_tips))
+        at_tips = self._tip + MAX_GROWTH * np.maximum(0.0, self._tips.query(places)[0] - self._tip)
+        return np.asarray(np.minimum(self._lengths[curve] + MAX_GROWTH * distance, at_tips))

@@ -10,19 +10,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.mesh.outline.bridges import TURN, Bridges, CentreLines
+from feti_homog.mesh.outline.bridges import PLACE_DECIMALS, TURN, Bridges, CentreLines
 from feti_homog.mesh.periodic_topology import components
 from feti_homog.microstructure.shapes import on_circle
 from feti_homog.typing import Float, Int
 
 NOWHERE = -1
-# Decimals of the centroids of faces, relative to the cell.
-PLACE_DECIMALS = 9
 
 
 @dataclass(frozen=True)
 class HalfLines:
-    """h half-lines, in pairs: number k and its other half twin[k].
+    """Half-lines (h,) in pairs: number k and its other half twin[k].
 
     Attributes:
         node: (h,) that it begins at.
@@ -38,7 +36,7 @@ class HalfLines:
 
     @classmethod
     def of(cls, nodes: Int, centres: Float, starts: Float) -> HalfLines:
-        """Halve lines between `nodes` (l, 2), from starts[:, 0] to starts[:, 1] (l, 2, 2).
+        """Halve the lines between `nodes` (l, 2), from starts[:, 0] to starts[:, 1] (l, 2, 2).
 
         The nodes have these centres (n, 2); halves from the second node come last.
         """
@@ -49,14 +47,8 @@ class HalfLines:
         angle = np.arctan2(offset[:, 1], offset[:, 0]) % TURN
         return cls(node, angle, start, (np.arange(len(node)) + len(nodes)) % len(node))
 
-    def chosen(self, some: Int) -> HalfLines:
-        """Return the half-lines `some` (k,), both halves of each line."""
-        place = np.full(len(self.node), NOWHERE)
-        place[some] = np.arange(len(some))
-        return HalfLines(self.node[some], self.angle[some], self.start[some], place[self.twin[some]])
-
     def faces(self) -> tuple[Int, Int]:
-        """Return the half-line (h,) that follows each around the face on its left, and the face number (h,)."""
+        """Return the half-line (h,) after each one around the face on its left, and that face (h,)."""
         order = np.lexsort((self.angle, self.node))
         place = np.empty_like(order)
         place[order] = np.arange(len(order))
@@ -86,7 +78,7 @@ class MatrixTiles:
 def beside(lines: HalfLines, label: Int, alone: Int, disc: Int, angle: Float) -> Int:
     """Return the matrix label (k,) beside discs (k,) at angles (k,).
 
-    The half-line clockwise from there has it among the labels (h,), or the disc if it is `alone` (n,).
+    The next half-line clockwise has the label among `label` (h,), a disc without half-lines among `alone` (n,).
     """
     order = np.lexsort((lines.angle, lines.node))
     node, at = lines.node[order], lines.angle[order]
@@ -106,9 +98,9 @@ def matrix_tiles(
     size: Float,
     grid: Int,
 ) -> MatrixTiles | None:
-    """Deal the faces to the cells of a grid (2,) by their centroids.
+    """Deal the matrix faces to the cells of a grid (2,) by their centroids.
 
-    None if some disc or group that bridges do not join to the sides has no face.
+    None if a disc, or a group of discs without bridges to the sides, has no face.
 
     Args:
         circles: (k, 3).
@@ -142,14 +134,14 @@ def matrix_tiles(
 
 
 def grid_cell(points: Float, size: Float, grid: Int) -> Int:
-    """Return the grid cell (k,) that contains each point, for a grid (2,) over [0, size]."""
+    """Find the cell (k,) of a grid (2,) over [0, size] that contains each point."""
     share = (points / size).round(PLACE_DECIMALS)
     column, row = np.clip((share * grid).astype(np.int64), 0, grid - 1).T
     return np.asarray(column * grid[1] + row)
 
 
 def _areas_and_moments(half: HalfLines, after: Int, loop: Int) -> tuple[Float, Float]:
-    """Areas (l,) and first moments (l, 2) of the polygons around which the half-lines run."""
+    """Compute the areas (l,) and first moments (l, 2) of loops of half-lines."""
     end = half.start[half.twin]
     a, b = np.concatenate([half.start, end]), np.concatenate([end, half.start[after]])
     cross, loop = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], np.concatenate([loop, loop])
@@ -159,7 +151,7 @@ def _areas_and_moments(half: HalfLines, after: Int, loop: Int) -> tuple[Float, F
 
 
 def _faces_of_loops(half: HalfLines, loop: Int, alone: Int, lines: CentreLines, count: int, size: Float) -> Int:
-    """(count,) the face of each loop, and of each lone disc.
+    """Return the face (count,) of each loop, and then of each lone disc.
 
     A centre line crosses no bridge, for both are edges in one triangulation. So, in the cell and away from third
     discs, there is one face along it.

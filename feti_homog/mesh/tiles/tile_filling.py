@@ -4,15 +4,15 @@ from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import chain, pairwise
+from itertools import pairwise
 from types import ModuleType
 
 import numpy as np
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.coarse_mesh import areas, flip_double_arcs
-from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE, Curve, Curves
-from feti_homog.mesh.sizes.from_sources import MAX_GROWTH
+from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE, Curves
+from feti_homog.mesh.sizes.graded_size import MAX_GROWTH
 from feti_homog.typing import Float, Int, Int32
 
 # gmsh's algorithms. The first makes the better triangles of one size, but leaves a disc with thousands of nodes on its
@@ -23,15 +23,14 @@ FRONTAL_DELAUNAY, DELAUNAY = 6, 5
 DECIMALS = 12
 # Of the area of triangles against that of the part of the cell that they fill, relative.
 AREA_TOLERANCE = 1e-9
-TRIANGLE = 2  # gmsh's type of elements
 
-# Curves are numbered from 1; a negative number is a curve run backwards.
-Signed = tuple[int, Curve]
+# Corners (k, 2) of a closed line, and the tags of its gmsh lines, negative for lines run backwards.
+Loop = tuple[Float, list[int]]
 
 
 @dataclass(frozen=True)
 class Tile:
-    """Regions in an outline that are filled at once.
+    """Regions of an outline that gmsh fills together.
 
     Attributes:
         points: (n, 2) nodes on the lines.
@@ -63,7 +62,7 @@ class Filling:
 
 @contextmanager
 def gmsh_session() -> Iterator[ModuleType]:
-    """gmsh, initialised, silent, with fixed options and an empty model; finalised at the end."""
+    """Initialise gmsh, silent, with fixed options and an empty model; finalise it at the end."""
     import gmsh
 
     gmsh.initialize(readConfigFiles=False, interruptible=False)
@@ -83,7 +82,7 @@ def gmsh_session() -> Iterator[ModuleType]:
 
 
 def fill(tile: Tile) -> Filling:
-    """Return the triangles of a tile; as few as possible have two edges on one circle.
+    """Fill a tile; as few triangles as possible have two edges on one circle.
 
     Raises:
         MeshError: gmsh cannot fill it.
@@ -108,7 +107,8 @@ def fill(tile: Tile) -> Filling:
         except Exception as error:  # gmsh has no other
             raise _unfilled(tile, str(error)) from error
         tags, coordinates, _ = gmsh.model.mesh.getNodes()
-        elements = [gmsh.model.mesh.getElementsByType(TRIANGLE, surface)[1] for surface in surfaces]
+        triangle = gmsh.model.mesh.getElementType("Triangle", 1)
+        elements = [gmsh.model.mesh.getElementsByType(triangle, surface)[1] for surface in surfaces]
     order = np.argsort(tags)
     points = coordinates.reshape(-1, 3)[order, :2]
     points[: len(tile.points)] = tile.points
@@ -142,79 +142,65 @@ def _unfilled(tile: Tile, why: str) -> MeshError:
 
 
 def arc_edges(curves: Curves) -> tuple[Int32, Int32]:
-    """Edges (a, 2) on circles, and their circles (a,)."""
+    """Return the edges (a, 2) on circles, and their circles (a,)."""
     pairs, curve = curves.edges
     circle = curves.circle[curve]
     return pairs[circle != MATRIX].astype(np.int32), circle[circle != MATRIX].astype(np.int32)
 
 
 def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int]]:
-    """Add plane surfaces for fibres, coatings and matrix; their tags, and the circle next around each or MATRIX.
+    """Add the surfaces of all regions; return their tags, and the circle around each or MATRIX.
 
     Each outline edge is a line with one element, and node n is point n + 1.
     """
-    curves, geo = tile.curves.pieces(), gmsh.model.geo
+    curves, geo = tile.curves, gmsh.model.geo
     for tag, (x, y) in enumerate(tile.points.round(DECIMALS).tolist(), 1):
         geo.addPoint(x, y, 0.0, tag=tag)
-    made = [[geo.addLine(start, stop) for start, stop in pairwise((curve.nodes + 1).tolist())] for curve in curves]
-    for tag in chain.from_iterable(made):
+    nodes = np.split(curves.node, curves.first[1:-1])
+    lines = [np.array([geo.addLine(*ends) for ends in pairwise((curve + 1).tolist())]) for curve in nodes]
+    for tag in np.concatenate(lines).tolist():
         geo.mesh.setTransfiniteCurve(tag, 2)
-
-    def add_loop(loop: list[Signed]) -> int:
-        tags = [made[tag - 1] if tag > 0 else [-line for line in reversed(made[-tag - 1])] for tag, _ in loop]
-        return int(geo.addCurveLoop(list(chain.from_iterable(tags))))
-
+    # Curves run forwards, then backwards with negative tags, and have a region on their left.
+    directed = list(zip(curves.inside.tolist(), nodes, lines, strict=True))
+    for region, curve, tags in zip(curves.outside.tolist(), nodes, lines, strict=True):
+        directed.append((region, curve[::-1], -tags[::-1]))
+    # At each vertex one curve of a region starts.
+    after = {(region, int(curve[0])): (curve, tags) for region, curve, tags in directed if region != OUTSIDE}
+    regions: dict[int, list[Loop]] = defaultdict(list)
+    while after:
+        loop, (region, node) = [], next(iter(after))
+        while (region, node) in after:
+            loop.append(after.pop((region, node)))
+            node = int(loop[-1][0][-1])
+        polygon = tile.points[np.concatenate([curve[:-1] for curve, _ in loop])]
+        regions[region].append((polygon, np.concatenate([tags for _, tags in loop]).tolist()))
     surfaces, circle = [], []
-    regions = defaultdict(list)
-    for loop in _loops(curves):
-        regions[loop[0][1].inside].append(loop)
     # The matrix is last.
     for region in sorted(regions, key=lambda inside: inside == MATRIX):
-        for loops in _with_holes(regions[region], tile.points):
-            surfaces.append(geo.addPlaneSurface([add_loop(loop) for loop in loops]))
+        for outer_and_holes in _with_holes(regions[region]):
+            surfaces.append(geo.addPlaneSurface([geo.addCurveLoop(tags) for tags in outer_and_holes]))
             circle.append(region)
     geo.synchronize()
     return surfaces, circle
 
 
-def _loops(curves: list[Curve]) -> list[list[Signed]]:
-    """Chain curves that have one region on their left to loops; at each vertex one curve of a region starts.
-
-    Curves run forwards, then backwards with a negative tag.
-    """
-    lines = list(enumerate(curves, 1))
-    lines += [(-tag, Curve(curve.nodes[::-1], curve.circle, curve.outside, curve.inside)) for tag, curve in lines]
-    after = {(curve.inside, int(curve.nodes[0])): (tag, curve) for tag, curve in lines if curve.inside != OUTSIDE}
-    loops = []
-    while after:
-        loop = [after.pop(next(iter(after)))]
-        while (key := (loop[0][1].inside, int(loop[-1][1].nodes[-1]))) in after:
-            loop.append(after.pop(key))
-        loops.append(loop)
-    return loops
-
-
-def _with_holes(loops: list[list[Signed]], points: Float) -> list[list[list[Signed]]]:
-    """Group loops: each outer one is followed by the holes within it, which run clockwise."""
-    polygons = [points[np.concatenate([curve.nodes[:-1] for _, curve in loop])] for loop in loops]
-    is_hole = [_area(polygon) < 0 for polygon in polygons]
-    groups = {k: [loop] for k, loop in enumerate(loops) if not is_hole[k]}
-    for loop in (loop for loop, hole in zip(loops, is_hole, strict=True) if hole):
-        place = points[loop[0][1].nodes[0]]
+def _with_holes(loops: list[Loop]) -> list[list[list[int]]]:
+    """Group the tags of loops: an outer loop, then its holes, which run clockwise."""
+    areas = []
+    for polygon, _ in loops:
+        a, b = polygon - polygon[0], np.roll(polygon, -1, axis=0) - polygon[0]
+        areas.append(float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() / 2))
+    groups = {k: [tags] for k, (_, tags) in enumerate(loops) if areas[k] >= 0}
+    for hole in (k for k in range(len(loops)) if areas[k] < 0):
+        polygon, tags = loops[hole]
         # Of one within the other the inner is meant, which is the smaller.
-        around = groups if len(groups) == 1 else (k for k in groups if _contains(polygons[k], place))
-        groups[min(around, key=lambda k: _area(polygons[k]))].append(loop)
+        around = groups if len(groups) == 1 else (k for k in groups if _contains(loops[k][0], polygon[0]))
+        groups[min(around, key=areas.__getitem__)].append(tags)
     return list(groups.values())
 
 
-def _area(polygon: Float) -> float:
-    """Return the area of a polygon (k, 2), negative if it runs clockwise."""
-    a, b = polygon - polygon[0], np.roll(polygon, -1, axis=0) - polygon[0]
-    return float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() / 2)
-
-
 def _contains(polygon: Float, point: Float) -> bool:
-    """Return whether a polygon (k, 2) contains a point, by counting the edges to its right."""
+    """Return whether a polygon (k, 2) contains a point, by counting crossings."""
     a, b = polygon - point, np.roll(polygon, -1, axis=0) - point
     crossing = (a[:, 1] > 0) != (b[:, 1] > 0)
     rise = np.where(crossing, b[:, 1] - a[:, 1], 1.0)

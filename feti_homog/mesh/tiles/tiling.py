@@ -15,7 +15,7 @@ from scipy.spatial import QhullError
 from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, edges
 from feti_homog.mesh.outline.bridges import CLEAR, Bridges, bridges, centre_lines
 from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE
-from feti_homog.mesh.outline.outline import Outline, crossings, disc_at, images, on_side
+from feti_homog.mesh.outline.outline import Outline, crossings, curve_at, images, on_side
 from feti_homog.mesh.periodic_topology import Torus, plane_edges_of
 from feti_homog.mesh.tiles.matrix_faces import MatrixTiles, beside, grid_cell, matrix_tiles
 from feti_homog.mesh.tiles.tile_filling import Filling, Tile, arc_edges
@@ -26,7 +26,7 @@ from feti_homog.typing import Array, Float, Int, Int32
 
 @dataclass(frozen=True)
 class TilePolicy:
-    """Which cells are cut into tiles, and into how many.
+    """The cells that are cut into tiles, and the number of tiles.
 
     Attributes:
         least_discs: cells with fewer are filled at once.
@@ -49,33 +49,33 @@ class Tiling:
         bridges: on tile borders.
         beside: (b, 2) the tiles to the left and right of each bridge.
         matrix: its faces with their tiles.
-        sides: (s,) the tile beside each side piece in the matrix, in the outline's order.
         within: (k,) the tile within each circle; all images of a disc are in one.
     """
 
     bridges: Bridges
     beside: Int
     matrix: MatrixTiles
-    sides: Int
     within: Int
 
 
 def is_tiled(arrangement: Arrangement, policy: TilePolicy) -> bool:
-    """Return whether it is large and has round discs only."""
+    """Return whether an arrangement is large and has round discs only."""
     return len(arrangement.phase) >= policy.least_discs and isinstance(arrangement.outlines, Discs)
 
 
 def tiling(
     arrangement: Arrangement, largest: float, marks: Mapping[int, Sequence[float]], policy: TilePolicy
 ) -> Tiling | None:
-    """Tile a large cell with round fibres; None for others, and where there is no room for bridges.
+    """Tile a large cell with round fibres; None for others, or without room for bridges.
 
     `largest` is the element size, and `marks` are as in `BareOutline.of`.
     """
     if not is_tiled(arrangement, policy):
         return None
     size = arrangement.size
-    circles, disc, around = images(arrangement)
+    discs, disc, around = images(arrangement)
+    assert isinstance(discs, Discs)
+    circles = discs.circles
     outer = np.flatnonzero(around == MATRIX)
     try:
         lines = centre_lines(circles, outer)
@@ -84,35 +84,34 @@ def tiling(
     marked = [(k, np.radians(angle)) for k in outer.tolist() for angle in marks.get(int(disc[k]), ())]
     vertices = np.array([k for k, _ in marked], np.int64), np.array([angle for _, angle in marked])
     candidates = bridges(lines, size, CLEAR * arrangement.outer_radii.mean(), largest, vertices)
-    sides = _side_pieces(circles, outer, size)
+    sides = _side_pieces(discs, outer, size)
     grid = np.maximum(1, np.round(size * np.sqrt(len(arrangement.radii) / policy.discs / size.prod()))).astype(int)
     matrix = matrix_tiles(circles, outer, sides, candidates, lines, size, grid)
     if matrix is None:
         return None
-    half, n_sides = matrix.lines, len(sides[0])
-    bridge = np.arange(n_sides, len(half.node) // 2)
+    half = matrix.lines
+    bridge = np.arange(len(sides[0]), len(half.node) // 2)
     bridge = bridge[matrix.tile[bridge] != matrix.tile[half.twin[bridge]]]
     return Tiling(
         bridges=Bridges(np.stack([half.node[bridge], half.node[half.twin[bridge]]], axis=1), half.angle[bridge]),
         beside=np.stack([matrix.tile[bridge], matrix.tile[half.twin[bridge]]], axis=1),
         matrix=matrix,
-        sides=matrix.tile[:n_sides],
         within=grid_cell(np.mod(arrangement.centres, size), size, grid)[disc],
     )
 
 
-def _side_pieces(circles: Float, outer: Int, size: Float) -> tuple[Int, Float]:
-    """Return the side pieces in the matrix, as `matrix_tiles` takes them.
+def _side_pieces(discs: Discs, outer: Int, size: Float) -> tuple[Int, Float]:
+    """Return the side pieces in the matrix, for `matrix_tiles`.
 
-    `outer` (n,) are the circles that bound it.
+    `outer` (n,) are the discs that bound the matrix.
     """
     nodes, ends = [], []
     for axis, (level, low) in product((0, 1), ((0.0, True), (1.0, False))):
-        places = crossings(circles[outer], axis, size)
+        places = crossings(discs[outer], axis, size)
         points = on_side(places, axis, level * size[1 - axis])
-        circle = disc_at(circles[outer], on_side((places[:-1] + places[1:]) / 2, axis, level * size[1 - axis]))
+        circle = curve_at(discs[outer], on_side((places[:-1] + places[1:]) / 2, axis, level * size[1 - axis]))
         node = np.where(circle == MATRIX, MATRIX, outer[circle])
-        corner = len(circles) + (points[[0, -1]] > 0) @ [1, 2]
+        corner = len(discs) + (points[[0, -1]] > 0) @ [1, 2]
         piece = np.flatnonzero(circle == MATRIX)
         around = np.concatenate([corner[:1], node, corner[1:]])
         both, where = np.stack([around[piece], around[piece + 2]], axis=1), points[piece[:, None] + [0, 1]]
@@ -123,14 +122,27 @@ def _side_pieces(circles: Float, outer: Int, size: Float) -> tuple[Int, Float]:
 
 
 def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[tuple[Int, Tile]]:
-    """Cut a cell with the outline `lines` into tiles, each with its node numbers (n,).
+    """Cut a cell with the outline `lines` into tiles with their node numbers (n,).
 
-    The cell as it is without a tiling.
+    Without a tiling the cell is one tile.
     """
     if tiles is None:
         return [(np.arange(len(cell.points)), cell)]
-    curves = cell.curves
-    left, right = _tiles_beside(lines, tiles)
+    # The tiles to the left and right of each curve, OUTSIDE beyond the sides.
+    curves, matrix = cell.curves, tiles.matrix
+    left, right = tiles.within[curves.inside], tiles.within[curves.outside]
+    is_side = curves.outside == OUTSIDE
+    pieces = np.flatnonzero(is_side & (curves.inside == MATRIX))
+    left[pieces], right[is_side] = matrix.tile[: len(pieces)], OUTSIDE
+    arc = np.flatnonzero((curves.circle != MATRIX) & (curves.outside == MATRIX))
+    # The middle of the first edge shows where on the circle an arc is.
+    begin = curves.first[arc]
+    middle = (lines.points[curves.node[begin]] + lines.points[curves.node[begin + 1]]) / 2
+    offset = middle - lines.ellipses.centres[curves.circle[arc]]
+    angle = np.arctan2(offset[:, 1], offset[:, 0])
+    right[arc] = beside(matrix.lines, matrix.tile, matrix.alone, curves.circle[arc], angle)
+    n = len(tiles.bridges.angle)
+    left[len(curves) - n :], right[len(curves) - n :] = tiles.beside.T
     tile = np.concatenate([left, right[right != left]])
     curve = np.concatenate([np.arange(len(curves)), np.flatnonzero(right != left)])
     order = np.lexsort((curve, tile))
@@ -145,24 +157,6 @@ def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[tuple[Int, Til
         bounded = replace(mine, node=node, inside=inside, outside=outside)
         parts.append((nodes, replace(cell, points=cell.points[nodes], curves=bounded)))
     return parts
-
-
-def _tiles_beside(lines: Outline, tiles: Tiling) -> tuple[Int, Int]:
-    """Return the tiles (c,) to the left and right of curves, OUTSIDE beyond the sides."""
-    curves = lines.curves
-    left, right = tiles.within[curves.inside], tiles.within[curves.outside]
-    is_side = curves.outside == OUTSIDE
-    left[is_side & (curves.inside == MATRIX)], right[is_side] = tiles.sides, OUTSIDE
-    arc = np.flatnonzero((curves.circle != MATRIX) & (curves.outside == MATRIX))
-    # The middle of the first edge shows where on the circle an arc is.
-    begin = curves.first[arc]
-    middle = (lines.points[curves.node[begin]] + lines.points[curves.node[begin + 1]]) / 2
-    offset = middle - lines.ellipses.centres[curves.circle[arc]]
-    matrix, angle = tiles.matrix, np.arctan2(offset[:, 1], offset[:, 0])
-    right[arc] = beside(matrix.lines, matrix.tile, matrix.alone, curves.circle[arc], angle)
-    n = len(tiles.bridges.angle)
-    left[len(curves) - n :], right[len(curves) - n :] = tiles.beside.T
-    return left, right
 
 
 @dataclass(frozen=True)
@@ -190,7 +184,7 @@ class Regions:
 
 @dataclass(frozen=True)
 class NumberedTile:
-    """A tile with its node numbers (n,), and node numbers (n,) that represent periodic classes."""
+    """A tile with node numbers (n,), and with representatives (n,) of periodic classes."""
 
     nodes: Int
     classes: Int
@@ -214,12 +208,12 @@ class FilledTile:
 
     @property
     def inner(self) -> Int:
-        """(k,) numbers of the nodes that are not on lines."""
+        """(k,) numbers of the nodes off the lines."""
         return self.first + np.arange(len(self.filling.inner))
 
 
 def tile_torus(regions: Regions, tiles: Sequence[FilledTile], all_nodes: int) -> tuple[Torus, Int]:
-    """Return the torus of filled tiles without voids, and the tile number (m,) of each triangle.
+    """Return the torus of filled tiles, without voids, and the tile (m,) of each triangle.
 
     `all_nodes` counts the nodes in the cell.
     """
@@ -261,7 +255,7 @@ def tile_torus(regions: Regions, tiles: Sequence[FilledTile], all_nodes: int) ->
 
 
 def _arcs(tiles: Sequence[FilledTile], number: Int, triangles: Int32) -> tuple[Int32, Int]:
-    """Find edges (a, 2) of triangles on circles, and the circles (a,); node k has the number number[k]."""
+    """Find the edges (a, 2) of triangles on circles, and their circles; node k is number[k]."""
     arcs = [arc_edges(filled.lines.tile.curves) for filled in tiles]
     circle = _all([circles for _, circles in arcs])
     ends = _all([filled.lines.nodes[pairs] for filled, (pairs, _) in zip(tiles, arcs, strict=True)], 2)
@@ -275,5 +269,5 @@ def _arcs(tiles: Sequence[FilledTile], number: Int, triangles: Int32) -> tuple[I
 
 
 def _all(parts: Sequence[Array], width: int | None = None, kind: type = int) -> Array:
-    """Concatenate rows; without parts, no rows of `width` numbers."""
+    """Concatenate rows; without parts there are no rows of `width` numbers."""
     return np.concatenate([np.zeros((0,) if width is None else (0, width), kind), *parts])

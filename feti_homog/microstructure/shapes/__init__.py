@@ -3,7 +3,7 @@
 Imports nothing.  Main entries: `outlines.Outlines`, `shapes.SHAPES`.
 """
 
-from feti_homog.microstructure.shapes.ellipses import Discs, Ellipses, gaps
+from feti_homog.microstructure.shapes.ellipses import Conics, Discs, Ellipses, gaps
 from feti_homog.microstructure.shapes.outlines import Outlines, directions, on_circle
 
-__all__ = ["Discs", "Ellipses", "Outlines", "convex_sums", "directions", "gaps", "on_circle", "shapes"]
+__all__ = ["Conics", "Discs", "Ellipses", "Outlines", "convex_sums", "directions", "gaps", "on_circle", "shapes"]

@@ -12,7 +12,7 @@ from feti_homog.microstructure.shapes.ellipses import Ellipses
 from feti_homog.microstructure.shapes.outlines import ColumnRange, Columns, ConvexCurves, directions, widest
 from feti_homog.typing import Bool, Float, Int
 
-# Points of each outline from which distances are taken.
+# Points of each outline from which distances, curvatures and lengths are taken.
 POINTS = 256
 # The fewest and the most sides.
 SIDES = 3, 12
@@ -60,12 +60,12 @@ class ConvexSums(ConvexCurves):
         return replace(self, frames=frames)
 
     def support(self, normal: Float) -> Float:
-        """(k, ...) max_v v . n + |F^T n| for unit vectors n (k, ..., 2), as in `Outlines`."""
+        """Return max_v v . n + |F^T n| (k, ...) for unit vectors n (k, ..., 2), as in `Outlines`."""
         core = np.einsum("kmi,k...i->k...m", self.cores, normal).max(axis=-1)
         return np.asarray(core + np.linalg.norm(np.einsum("kij,k...i->k...j", self.frames, normal), axis=-1))
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Gaps as in `Outlines`: of convex bodies max_n v . n - h_1(n) - h_2(-n) with their supports h."""
+        """Maximise v . n - h_1(n) - h_2(-n), h the supports of both, as in `Outlines`."""
         one, other = self[first], self[second]
 
         def gap(angle: Float) -> Float:
@@ -76,14 +76,14 @@ class ConvexSums(ConvexCurves):
         return normal, one.support(normal) + other.support(-normal)
 
     def distances(self, offsets: Float) -> Float:
-        """Distances as in `Outlines`, of POINTS points or more."""
+        """Return distances as in `Outlines`, from POINTS points or more."""
         points, _, which = self.at(np.zeros_like(self.centres)).boundary(POINTS)
         first = np.flatnonzero(np.diff(which, prepend=-1))
-        each = [np.minimum.reduceat(np.linalg.norm(own[which] - points, axis=1), first) for own in offsets]
+        each = [np.minimum.reduceat(np.linalg.norm(vectors[which] - points, axis=1), first) for vectors in offsets]
         return np.stack(each)
 
     def facing(self, normal: Float) -> Float:
-        """(k, q, 2) a point of each whose outward normal is n (k, q, 2)."""
+        """Return points (k, q, 2) whose outward normals are n (k, q, 2)."""
         corner = np.einsum("kmi,kqi->kqm", self.cores, normal).argmax(axis=2)
         turned = np.einsum("kij,kqi->kqj", self.frames, normal)
         length = np.linalg.norm(turned, axis=2, keepdims=True)
@@ -92,10 +92,9 @@ class ConvexSums(ConvexCurves):
         return np.asarray(self.centres[:, None] + core + round_part)
 
     def boundary(self, count: int) -> tuple[Float, Float, Int]:
-        """(q, 2) points all around the shapes, (q, 2) unit normals there and (q,) which shape has them.
+        """Return points (q, 2) all around, their unit normals (q, 2), and their shapes (q,).
 
-        They lie at `count` even normals, and between them where these are farther apart than 1 / count of the
-        circumference.
+        The points have `count` even normals; on straight sides they are at most 1 / count of the circumference apart.
         """
         normal = directions(np.linspace(0, 2 * np.pi, count, endpoint=False))
         points = self.facing(np.broadcast_to(normal, (len(self), count, 2)))
@@ -122,7 +121,7 @@ class PolygonalRows:
     columns = MappingProxyType({"sides": ColumnRange(0.0, least=0.0), "corner": ColumnRange(0.0, least=0.0)})
 
     def given(self, rows: Columns) -> Bool:
-        """(N,) which rows have it."""
+        """Return which rows (N,) have sides."""
         return np.asarray(rows["sides"] != 0)
 
     def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:

@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from feti_homog.microstructure.shapes.outlines import ColumnRange, Columns, ConvexCurves, directions, widest
+from feti_homog.microstructure.shapes.outlines import ColumnRange, Columns, ConvexCurves, directions, on_circle, widest
 from feti_homog.typing import Bool, Float, Int
 
 # Relative difference of the squares of semi-axes of a circle.
@@ -25,14 +25,14 @@ class Ellipses(ConvexCurves):
 
     @classmethod
     def of(cls, centres: Float, a: Float, b: Float, angle: Float) -> Ellipses:
-        """Return the ellipses with semi-axes a, b (k,), the first at `angle` (k,) in degrees from x."""
+        """Return ellipses with semi-axes a, b (k,), the first at `angle` (k,) in degrees."""
         cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
         axes = np.stack([np.stack([cosine, sine], axis=1), np.stack([-sine, cosine], axis=1)], axis=2)
         return cls(centres, axes * np.stack([a, b], axis=1)[:, None])
 
     @classmethod
     def round(cls, circles: Float) -> Ellipses:
-        """Return the circles with centre and radius (k, 3)."""
+        """Return the circles (k, 3) of centre and radius as ellipses."""
         return cls(circles[:, :2], circles[:, 2, None, None] * np.eye(2))
 
     @property
@@ -53,10 +53,10 @@ class Ellipses(ConvexCurves):
     @property
     def extents(self) -> Float:
         """See `Outlines`."""
-        return np.repeat(self.reach[:, :, None], 2, axis=2)
+        return np.repeat(np.linalg.norm(self.frames, axis=2)[:, :, None], 2, axis=2)
 
     def grown(self, thickness: Float) -> Ellipses:
-        """Ellipses whose semi-axes are longer by `thickness` (k,)."""
+        """Return ellipses whose semi-axes are longer by `thickness` (k,)."""
         lengths = np.linalg.norm(self.frames, axis=1)
         return Ellipses(self.centres, self.frames * (1 + thickness[:, None] / lengths)[:, None])
 
@@ -64,11 +64,6 @@ class Ellipses(ConvexCurves):
     def squares(self) -> Float:
         """(k, 2, 2) F F^T, which determine an ellipse but for its place."""
         return np.asarray(self.frames @ self.frames.transpose(0, 2, 1))
-
-    @property
-    def reach(self) -> Float:
-        """(k, 2) how far they reach from their centres along x and y."""
-        return np.asarray(np.linalg.norm(self.frames, axis=2))
 
     @property
     def are_round(self) -> Bool:
@@ -100,25 +95,37 @@ class Ellipses(ConvexCurves):
         return np.asarray(self.semi_axes.max(axis=1))
 
     def points(self, angle: Float) -> Float:
-        """(k, 2) the point c + F (cos t, sin t) of each at its parameter t (k,)."""
+        """Return the points (k, 2) c + F (cos t, sin t) at parameters t (k,)."""
         return np.asarray(self.centres + np.einsum("kij,kj->ki", self.frames, directions(angle)))
 
     def unit(self, offsets: Float) -> Float:
-        """(k, 2) F^-1 d of a vector d (k, 2) for each."""
+        """Return F^-1 d (k, 2) of vectors d (k, 2)."""
         return np.asarray(np.linalg.solve(self.frames, offsets[:, :, None])[:, :, 0])
 
     def parameter(self, offsets: Float) -> Float:
-        """(k,) the parameter at which the ray from each centre along d (k, 2) meets the ellipse."""
+        """Return the parameters (k,) at which rays from the centres along d (k, 2) meet ellipses."""
         unit = self.unit(offsets)
         return np.arctan2(unit[:, 1], unit[:, 0])
 
-    def level(self, points: Float) -> Float:
-        """(n, k) |F^-1 (x - c)| of points (n, 2): below 1 within."""
-        inverse = np.linalg.inv(self.frames)
-        return np.asarray(np.linalg.norm(np.einsum("kij,nkj->nki", inverse, points[:, None] - self.centres), axis=2))
+    def parameter_at(self, angle: Float) -> Float:
+        """Return the parameters (k,) of points that centres see at angles (k,) in radians."""
+        return self.parameter(directions(angle))
+
+    def chord(self, axis: int) -> tuple[Float, Float]:
+        """Return the middles (k,) and half lengths (k,) of chords on the coordinate `axis`.
+
+        A miss has the half length 0.
+
+        d = x - c with the known component v obeys d . (F F^T)^-1 d = 1.
+        """
+        inverse, other = np.linalg.inv(self.squares), 1 - axis
+        v = -self.centres[:, other]
+        p, q = inverse[:, axis, axis], inverse[:, axis, other] * v
+        root = q**2 - p * (inverse[:, other, other] * v**2 - 1)
+        return self.centres[:, axis] - q / p, np.sqrt(np.maximum(root, 0.0)) / p
 
     def support(self, normal: Float) -> Float:
-        """(k, ...) |F^T n| for unit vectors n (k, ..., 2), as in `Outlines`."""
+        """Return |F^T n| (k, ...) for unit vectors n (k, ..., 2), as in `Outlines`."""
         return np.asarray(np.linalg.norm(np.einsum("kij,k...i->k...j", self.frames, normal), axis=-1))
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
@@ -128,27 +135,27 @@ class Ellipses(ConvexCurves):
         return normal, one.support(normal) + other.support(normal)
 
     def distances(self, offsets: Float) -> Float:
-        """Distances as in `Outlines`: ||F^-1 d| - 1| times the mean radius."""
+        """Return ||F^-1 d| - 1| times the mean radius, as in `Outlines`."""
         unit = np.einsum("kij,nkj->nki", np.linalg.inv(self.frames), offsets)
         return np.asarray(np.abs(np.linalg.norm(unit, axis=2) - 1) * self.radii)
 
     def facing(self, normal: Float) -> Float:
-        """(k, 2) the point of each whose outward normal is n (k, 2)."""
+        """Return the points (k, 2) whose outward normals are n (k, 2)."""
         along = np.einsum("kij,kj->ki", self.squares, normal)
         return np.asarray(self.centres + along / self.support(normal)[:, None])
 
     def bend(self, normal: Float) -> Float:
-        """(k,) the radius of curvature det(F)^2 / |F^T n|^3 at the point whose normal is n (k, 2)."""
+        """Return the radii of curvature det(F)^2 / |F^T n|^3 (k,) at normals n (k, 2)."""
         return np.asarray(np.linalg.det(self.frames) ** 2 / self.support(normal) ** 3)
 
     def normal(self, angle: Float) -> Float:
-        """(k, 2) the outward unit normal of each at its parameter (k,)."""
+        """Return the outward unit normals (k, 2) at parameters (k,)."""
         across = np.einsum("kji,kj->ki", np.linalg.inv(self.frames), directions(angle))
         return np.asarray(across / np.linalg.norm(across, axis=1)[:, None])
 
 
 def gaps(first: Ellipses, second: Ellipses) -> tuple[Float, Float]:
-    """Return gaps (k,) and their directions (k,), in radians, between paired ellipses.
+    """Return the gaps (k,) between paired ellipses, and their directions (k,) in radians.
 
     The gap is max_n (c_2 - c_1) . n - |F_1^T n| - |F_2^T n|: the distance, or minus the penetration depth.
     """
@@ -172,7 +179,7 @@ class EllipticRows:
     )
 
     def given(self, rows: Columns) -> Bool:
-        """(N,) which rows have it."""
+        """Return which rows (N,) have two different semi-axes."""
         return np.asarray(~np.isnan(rows["a"]) & (rows["a"] != rows["b"]))
 
     def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:
@@ -199,6 +206,11 @@ class Discs(ConvexCurves):
         return np.zeros((len(self), 1, 2))
 
     @property
+    def circles(self) -> Float:
+        """(k, 3) centre and radius."""
+        return np.column_stack([self.centres, self.radii])
+
+    @property
     def frames(self) -> Float:
         """See `Outlines`."""
         return np.asarray(self.radii[:, None, None] * np.eye(2))
@@ -217,12 +229,32 @@ class Discs(ConvexCurves):
         """See `Outlines`."""
         return replace(self, radii=self.radii + thickness)
 
+    def points(self, angle: Float) -> Float:
+        """Return the points (k, 2) at angles (k,) in radians, which are their parameters."""
+        return on_circle(self.circles, angle)
+
+    def unit(self, offsets: Float) -> Float:
+        """Return d / r (k, 2) of vectors d (k, 2)."""
+        return np.asarray(offsets / self.radii[:, None])
+
+    def parameter(self, offsets: Float) -> Float:
+        """Return the angles (k,) of d (k, 2)."""
+        return np.arctan2(offsets[:, 1], offsets[:, 0])
+
+    def parameter_at(self, angle: Float) -> Float:
+        """Return these angles (k,)."""
+        return angle
+
+    def chord(self, axis: int) -> tuple[Float, Float]:
+        """See `Ellipses`."""
+        return self.centres[:, axis], np.sqrt(np.maximum(self.radii**2 - self.centres[:, 1 - axis] ** 2, 0.0))
+
     def support(self, normal: Float) -> Float:
         """See `Outlines`."""
         return np.broadcast_to(self.radii.reshape(-1, *[1] * (normal.ndim - 2)), normal.shape[:-1])
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Gaps as in `Outlines`: along the vectors, or along x where that is 0."""
+        """Return gaps as in `Outlines`, along the vectors, or along x where these are 0."""
         length = np.linalg.norm(vector, axis=1)
         normal = np.where(length[:, None] > 0, vector / np.maximum(length, 1e-300)[:, None], [1.0, 0.0])
         return normal, self.radii[first] + self.radii[second]
@@ -230,3 +262,7 @@ class Discs(ConvexCurves):
     def distances(self, offsets: Float) -> Float:
         """See `Outlines`."""
         return np.asarray(np.abs(np.linalg.norm(offsets, axis=2) - self.radii))
+
+
+Conics = Discs | Ellipses
+"""Outlines whose meshes have nodes at debonded arc tips."""

@@ -47,31 +47,31 @@ class Outlines(Protocol):
     def __getitem__(self, rows: Int | Bool) -> Self: ...
 
     def at(self, centres: Float) -> Self:
-        """Outlines with the same shapes about other centres (k, 2)."""
+        """Return outlines with the same shapes about other centres (k, 2)."""
 
     def per(self, unit: float) -> Self:
-        """Shapes, and centres, with all lengths divided by a unit."""
+        """Divide all lengths, and the centres, by a unit."""
 
     def rounded(self, decimals: int) -> Self:
-        """Outlines with coordinates to so many decimals."""
+        """Round the coordinates to `decimals`."""
 
     def grown(self, thickness: Float) -> Self:
-        """Outlines around these with rings of that `thickness` (k,)."""
+        """Return the outlines with rings of this `thickness` (k,) around them."""
 
     def joined(self, others: Self) -> Self:
         """Return these outlines, then the others."""
 
     def support(self, normal: Float) -> Float:
-        """(k, ...) reach from the centre along unit vectors n (k, ..., 2)."""
+        """Return the reach (k, ...) from the centre along unit vectors n (k, ..., 2)."""
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Return normals n (p, 2) of the lines that best separate pairs (p,), (p,), and their reach r (p,) along n.
+        """Return normals n (p, 2) that best part pairs (p,), and the reach r (p,) along n.
 
         v (p, 2) are the vectors from first to second; the gap, negative if they overlap, is n . v - r.
         """
 
     def distances(self, offsets: Float) -> Float:
-        """(n, k) distance from each outline of points at these vectors (n, k, 2) from its centre.
+        """Return distances (n, k) from the outlines to points at vectors (n, k, 2) from centres.
 
         Approximate unless the outline is round.
         """
@@ -79,7 +79,7 @@ class Outlines(Protocol):
 
 @dataclass(frozen=True)
 class ConvexCurves:
-    """Curves about the centres (k, 2), given by the rows of all fields: common base for `Outlines` of any shape."""
+    """Curves about the centres (k, 2): the common base of all `Outlines`."""
 
     centres: Float
 
@@ -98,7 +98,7 @@ class ConvexCurves:
         return self._each(lambda array: array / unit)
 
     def scaled(self, factor: float) -> Self:
-        """All lengths multiplied."""
+        """Multiply all lengths by a factor."""
         return self._each(lambda array: factor * array)
 
     def rounded(self, decimals: int) -> Self:
@@ -116,7 +116,7 @@ class ConvexCurves:
 
 
 class ColumnRange(NamedTuple):
-    """A number column: an empty cell's value, and the bound that numbers keep or do not reach."""
+    """A column of numbers: the value of an empty cell, and the bounds of numbers."""
 
     empty: float
     least: float = -np.inf
@@ -146,22 +146,22 @@ class Shape(Protocol):
     def has_tips(self) -> bool: ...
 
     def given(self, rows: Columns) -> Bool:
-        """(N,) which rows have it."""
+        """Return which rows (N,) have this shape."""
 
     def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:
-        """Faults in rows that have it or seem to: which rows (N,), and the words."""
+        """Yield faults of rows that have this shape or seem to: which rows (N,), and the words."""
 
     def outlines(self, rows: Columns, centres: Float) -> Outlines:
         """Return the outlines for rows (k,) with the shape, about centres (k, 2)."""
 
 
 def directions(angle: Float) -> Float:
-    """(..., 2) unit vectors at angles in radians."""
+    """Return unit vectors (..., 2) at angles in radians."""
     return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
 def on_circle(circles: Float, angle: Float) -> Float:
-    """Points (..., 2) on circles (..., 3), centre and radius, at angles in radians."""
+    """Return points (..., 2) on circles (..., 3) of centre and radius, at angles in radians."""
     return np.asarray(circles[..., :2] + circles[..., 2:] * directions(angle))
 
 

@@ -19,64 +19,62 @@ REPLACING = tuple(shape.sizes for shape in SHAPES if "radius" not in shape.sizes
 
 
 def given_shapes(rows: Columns, has_tips: bool) -> list[Shape]:
-    """Return the shapes that some rows have and whose meshes may, or may not, have nodes at tips."""
+    """Return the shapes of some rows whose meshes have, or do not have, nodes at tips."""
     return [shape for shape in SHAPES if shape.has_tips == has_tips and shape.given(rows).any()]
 
 
 def columns_without_tips(rows: Columns) -> dict[str, Float]:
-    """Columns (N,) for rows with such shapes, NaN in other rows; none without such rows."""
+    """Return columns (N,) of shapes without tips, NaN in other rows; none without such rows."""
     shapes = given_shapes(rows, has_tips=False)
-    own = np.logical_or.reduce([np.zeros(len(rows["x"]), bool), *(shape.given(rows) for shape in shapes)])
+    mask = np.logical_or.reduce([np.zeros(len(rows["x"]), bool), *(shape.given(rows) for shape in shapes)])
     names = {name for shape in shapes for name in (*shape.sizes, *shape.columns, "angle")}
-    return {name: np.where(own, values, np.nan) for name, values in rows.items() if name in names}
+    return {name: np.where(mask, values, np.nan) for name, values in rows.items() if name in names}
 
 
 def have_both_sizes(rows: Columns) -> Bool:
-    """(N,) which rows have a radius and also lengths that stand in its place."""
+    """Return which rows (N,) have a radius and also lengths in place of it."""
     others = [~np.isnan(rows[sizes[0]]) for sizes in REPLACING]
     return np.asarray(~np.isnan(rows["radius"]) & np.logical_or.reduce(others))
 
 
 def outlines_of(rows: Columns) -> Outlines:
-    """Return the outlines (N,) of rows without faults, without coatings, in the table's unit."""
-    centres, radius = (
-        np.column_stack([rows["x"], rows["y"]]),
-        np.where(np.isnan(rows["radius"]), rows["a"], rows["radius"]),
-    )
+    """Return the outlines (N,), without coatings, of rows without faults."""
+    centres = np.column_stack([rows["x"], rows["y"]])
+    radius = np.where(np.isnan(rows["radius"]), rows["a"], rows["radius"])
     parts: list[tuple[Bool, Outlines]] = []
     for shape in SHAPES:
-        own = shape.given(rows)
-        if own.any():
-            parts.append((own, shape.outlines({name: values[own] for name, values in rows.items()}, centres[own])))
+        mask = shape.given(rows)
+        if mask.any():
+            parts.append((mask, shape.outlines({name: values[mask] for name, values in rows.items()}, centres[mask])))
     return with_parts(Discs(centres, radius), parts)
 
 
 def with_parts(outlines: Outlines, parts: Sequence[tuple[Bool, Outlines]]) -> Outlines:
-    """Return the outlines, with the rows (N,) of each part replaced.
+    """Replace the outlines in the rows (N,) of each part.
 
-    Discs, ellipses or sums, if need be.
+    Returns discs or ellipses where these suffice, else sums.
     """
-    parts = [(own, part) for own, part in parts if own.any()]
+    parts = [(mask, part) for mask, part in parts if mask.any()]
     if not parts:
         return outlines
     if all(isinstance(each, Discs) for each in (outlines, *(part for _, part in parts))):
         radii = outlines.radii.copy()
-        for own, part in parts:
-            radii[own] = part.radii
+        for mask, part in parts:
+            radii[mask] = part.radii
         return Discs(outlines.centres, radii)
     most = max(part.cores.shape[1] for part in (outlines, *(part for _, part in parts)))
     frames, cores = outlines.frames.copy(), _padded(outlines.cores, most)
-    for own, part in parts:
-        frames[own], cores[own] = part.frames, _padded(part.cores, most)
+    for mask, part in parts:
+        frames[mask], cores[mask] = part.frames, _padded(part.cores, most)
     return Ellipses(outlines.centres, frames) if most == 1 else ConvexSums(outlines.centres, cores, frames)
 
 
 def elliptic(outlines: Outlines) -> Ellipses:
-    """Ellipses, and for other outlines equal-area discs."""
+    """Replace outlines that are no ellipses by equal-area discs."""
     has_core = outlines.cores.any(axis=(1, 2))[:, None, None]
     return Ellipses(outlines.centres, np.where(has_core, outlines.radii[:, None, None] * np.eye(2), outlines.frames))
 
 
 def _padded(cores: Float, corners: int) -> Float:
-    """Cores (k, m, 2) with so many corners, the last one repeated."""
+    """Repeat the last corners of cores (k, m, 2) up to this number of corners."""
     return np.pad(cores, ((0, 0), (0, corners - cores.shape[1]), (0, 0)), mode="edge")

@@ -62,7 +62,7 @@ def test_sides_may_cut_coatings_anywhere():
     """Through the coating alone, the fibre, the corner of the cell: what is cut is one body on the torus."""
     for at in ([0.27, 0.4], [0.2, 0.05], [0.1, 0.1], [0.0, 0.0], [0.26, 0.5]):
         discs = Arrangement.of_discs(1.0, 1.0, np.array([at]), np.array([0.25]), ("fibre",), coating=np.array([0.05]))
-        torus = Torus.of(UnmeshedCell.of(discs, MeshSizes.uniform(0.1)).with_nodes().filled())
+        torus = Torus.of(UnmeshedCell.of(discs, MeshSizes(0.1, 0.1, 0.1)).with_nodes().filled())
         share = np.bincount(torus.mesh.phase, areas(torus.mesh.points, torus.mesh.triangles))
         assert torus.constituent_phase.tolist() == [0, 1, 2]
         assert share.sum() == pytest.approx(1.0) and share[1:] == pytest.approx([0.196, 0.0864], rel=0.05)
@@ -71,7 +71,7 @@ def test_sides_may_cut_coatings_anywhere():
 def test_bare_and_coated_fibres_go_together():
     centres, radii = np.array([[0.25, 0.3], [0.75, 0.7]]), np.array([0.1, 0.2])
     discs = Arrangement.of_discs(1.0, 1.0, centres, radii, ("glass", "carbon"), coating=np.array([0.0, 0.02]))
-    mesh = UnmeshedCell.of(discs, MeshSizes.uniform(0.1)).with_nodes().filled()
+    mesh = UnmeshedCell.of(discs, MeshSizes(0.1, 0.1, 0.1)).with_nodes().filled()
     assert mesh.phases == ("matrix", "glass", "carbon", "coating")
     assert Torus.of(mesh).constituent_phase.tolist() == [0, 1, 2, 3]
 

@@ -16,8 +16,7 @@ from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.sizes import element_estimate
-from feti_homog.mesh.sizes.from_sources import MAX_GROWTH
-from feti_homog.mesh.sizes.graded_size import MIN_EDGES_AROUND
+from feti_homog.mesh.sizes.graded_size import MAX_GROWTH, MIN_EDGES_AROUND
 
 pytestmark = pytest.mark.slow
 

@@ -158,7 +158,7 @@ def test_a_core_of_two_corners_is_a_stadium():
     area = np.pi * radius**2 + 2 * radius * np.linalg.norm(ends[0] - ends[1])
     assert np.pi * outlines.radii**2 == pytest.approx(area)
     arrangement = Arrangement(1.0, 1.0, outlines, ("fibre",), np.zeros(1), np.zeros(1, bool))
-    mesh = mesh_outlines(arrangement, MeshSizes.uniform(0.03), 1.0)
+    mesh = mesh_outlines(arrangement, MeshSizes(0.03, 0.03, 0.03), 1.0)
     assert areas(mesh.points, mesh.triangles)[mesh.precedence == 1].sum() == pytest.approx(area, rel=4e-3)
 
 
@@ -170,7 +170,7 @@ def test_corners_of_cells_are_in_no_void(radius, place):
     arrangement = arrange(replace(case.cell, table=replace(case.cell.table, **place)))
     void = arrangement.centres[arrangement.is_void]
     assert np.linalg.norm((void + 0.5) % 1.0 - 0.5, axis=1) > radius
-    mesh = mesh_outlines(arrangement, MeshSizes.uniform(0.05), 1.0)
+    mesh = mesh_outlines(arrangement, MeshSizes(0.05, 0.05, 0.05), 1.0)
     assert areas(mesh.points, mesh.triangles).sum() == pytest.approx(1.0 - np.pi * radius**2, rel=5e-3)
     assert voids(mesh) == 1
 

@@ -166,9 +166,9 @@ def test_mesh_is_reproducible():
 def test_the_last_bits_of_the_outline_do_not_change_the_mesh(name, seed):
     """Take the last bits as another machine may give them."""
     case, chance = CELLS[name], np.random.default_rng(seed)
-    sizes = MeshSizes.uniform(case.mesh_size)
+    sizes = MeshSizes(*[case.mesh_size] * 3)
     bare = BareOutline.of(arrange(case), sizes, {})
-    lines = bare.outline(bare.stations())
+    lines = bare.outline(bare.lines.stations(bare.field))
     tile = Tile(lines.points, lines.curves, sizes.largest, False)
     ends = lines.points + chance.choice([-1.0, 1.0], lines.points.shape)
     here, elsewhere = fill(tile), fill(replace(tile, points=np.nextafter(lines.points, ends)))

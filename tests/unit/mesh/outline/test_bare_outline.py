@@ -26,14 +26,15 @@ def test_nodes_are_the_same_in_parts(name, count):
         sum(len(getattr(part, kind)) for part in parts) for kind in ("arcs", "bridges")
     ]
     found = bare.lines.joined([part.stations(field) for part in parts])
-    for mine, whole in zip(found, bare.stations(), strict=True):
+    for mine, whole in zip(found, bare.lines.stations(bare.field), strict=True):
         assert len(whole.share) > 0
         assert np.array_equal(mine.share, whole.share) and np.array_equal(mine.first, whole.first)
         assert mine.edges == pytest.approx(whole.edges, rel=1e-12)
 
 
 def test_stations_go_from_end_to_end():
-    stations = bare_of("dense").stations()[0]
+    bare = bare_of("dense")
+    stations = bare.lines.stations(bare.field)[0]
     begin, end = stations.first[:-1], stations.first[1:] - 1
     assert not stations.share[begin].any() and (stations.share[end] == 1).all()
     inner = np.diff(stations.line) == 0

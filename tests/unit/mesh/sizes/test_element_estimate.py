@@ -35,7 +35,7 @@ def test_no_size_is_below_the_least(coating):
         field = size_field(arrangement, sizes, np.zeros((1, 2)), np.array([[0.55, 0.4]]))
         places = np.random.default_rng(1).random((20_000, 2)) * arrangement.size
         # Tips and narrow passages are points.
-        assert field.least <= field.at(places).min() < 10 * field.least
+        assert field.least <= field(places).min() < 10 * field.least
         refuse_many(lambda _: pytest.fail("sizes are summed"), field.least, arrangement.size, 10**9)
         with pytest.raises(MeshError, match="elements before refine"):
-            refuse_many(field.at, field.least, arrangement.size, 100)
+            refuse_many(field, field.least, arrangement.size, 100)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, SourcedSize
+from feti_homog.mesh.sizes.graded_size import MAX_GROWTH, SizeField
 
 SIZE = np.array([1.0, 0.8])
 LARGEST = 0.04
@@ -31,4 +31,4 @@ def test_sizes_are_those_of_the_formula(count):
     points = 2 * np.random.default_rng(2).random((500, 2)) - 0.5
     expected = brute_force(some, points)
     assert expected.min() < 0.9 * LARGEST or count == 1
-    np.testing.assert_allclose(SourcedSize([some], SIZE, LARGEST, chunk=200)(points), expected, rtol=1e-13)
+    np.testing.assert_allclose(SizeField([some], SIZE, LARGEST, chunk=200)(points), expected, rtol=1e-13)
