@@ -1,7 +1,7 @@
 """Read the triangles and the lines of an Abaqus input file (.inp)."""
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -13,7 +13,6 @@ from feti_homog.mesh.readers.abaqus_keywords import REFUSED, KeywordBlock, block
 from feti_homog.mesh.readers.raw_mesh import Block, RawMesh, assembled
 from feti_homog.schema import wording
 from feti_homog.system.runtime import input_files
-from feti_homog.typing import Int
 
 # Types of elements, and the numbers of nodes that they may have: lines; quadrilaterals, which are cut in two;
 # triangles, among them rigid ones.
@@ -48,7 +47,7 @@ def load(path: Path) -> RawMesh:
             raise MeshError(f"line {block.number}, *{block.word}: {error}") from None
     if faults := content.faults():
         raise MeshError(*faults)
-    return _raw(content)
+    return content.raw_mesh()
 
 
 @dataclass
@@ -127,23 +126,22 @@ class _Content:
                 self.sets.setdefault((BY_ELEMENTS, block.parameters["ELSET"]), set()).add(tag)
 
     def _take_set(self, block: KeywordBlock) -> None:
+        """Take the members of a set: numbers, names of sets or, with GENERATE, a range by steps of one or the third."""
         members = self.sets.setdefault((BY_SET, block.parameter("ELSET")), set())
         for row in block.rows:
-            for part in self._range(row) if "GENERATE" in block.parameters else self._parts(row):
+            parts: Iterable[Collection[int]] = (
+                {_integer(word)} if word.isdecimal() else self.members(name_of(word)) for word in row if word
+            )
+            if "GENERATE" in block.parameters:
+                first, last, step = [*map(_integer, row), 1][:3] if len(row) in (2, 3) else (0, 0, 0)
+                if step < 1 or last < first:
+                    raise ValueError(f"{', '.join(row)}: expected the first element, the last and a step of at least 1")
+                parts = [range(first, last + 1, step)]
+            for part in parts:
                 self.budget -= len(part)
                 if self.budget < 0:
                     raise ValueError("its sets have more members than a file of this length can have elements")
                 members.update(part)
-
-    def _range(self, row: list[str]) -> Iterator[range]:
-        """Yield the numbers from the first to the last, in steps by the third or one."""
-        first, last, step = [*map(_integer, row), 1][:3] if len(row) in (2, 3) else (0, 0, 0)
-        if step < 1 or last < first:
-            raise ValueError(f"{', '.join(row)}: expected the first element, the last and a step of at least 1")
-        yield range(first, last + 1, step)
-
-    def _parts(self, row: list[str]) -> Iterator[set[int]]:
-        return ({_integer(word)} if word.isdecimal() else self.members(name_of(word)) for word in row if word)
 
     def members(self, name: str) -> set[int]:
         """Return the elements of a set, however it was made."""
@@ -151,24 +149,6 @@ class _Content:
         if not levels:
             raise ValueError(f'there is no element set "{name}"')
         return set().union(*levels)
-
-    def labels(self) -> dict[int, tuple[str, ...]]:
-        """Return the names of the sets from which each element has its phase."""
-        labels: dict[int, tuple[str, ...]] = {}
-        for level in (BY_ELEMENTS, BY_SET, BY_SECTION):
-            labels |= _names_of((name, members) for (priority, name), members in self.sets.items() if priority == level)
-        return labels
-
-    def curves(self) -> dict[str, Int]:
-        """Return the nodes (d, 2) at the ends of the lines in each set that has no triangles."""
-        labels = self.labels()
-        with_triangles = {name for tag in self.triangles for name in labels.get(tag, ())}
-        ends: dict[str, list[list[int]]] = {}
-        for tag, nodes in self.lines.items():
-            for name in labels.get(tag, ()):
-                if name not in with_triangles:
-                    ends.setdefault(name, []).append([nodes[0], nodes[-1]])
-        return {name: np.array(pairs, np.int64) for name, pairs in ends.items()}
 
     def faults(self) -> list[str]:
         """List the lack of triangles, unknown nodes, sections of unknown sets."""
@@ -180,25 +160,34 @@ class _Content:
         unknown = (name for name in self.materials if name not in named)
         return faults + [f'a section names the element set "{name}": there is none' for name in unknown]
 
-
-def _raw(content: _Content) -> RawMesh:
-    made_of = [(material, content.members(name)) for name, material in content.materials.items()]
-    # Sets that sections name have the phases, unless only the materials of the sections have their names.
-    by_material = "matrix" in content.materials.values() and "matrix" not in content.materials
-    for name, (material, members) in zip(content.materials, made_of, strict=True):
-        content.sets.setdefault((BY_SECTION, material if by_material else name), set()).update(members)
-    labels = content.labels()
-    all_names = _names_of(made_of + [(name, members) for (_, name), members in content.sets.items()])
-    names_of = {tag: (labels.get(tag, ()), all_names.get(tag, ())) for tag in content.triangles}
-    place = {names: k for k, names in enumerate(dict.fromkeys(names_of.values()))}
-    groups, aliases = zip(*place, strict=True)
-    parts = []
-    for count in sorted(set(map(len, content.triangles.values()))):
-        triangles = {tag: nodes for tag, nodes in content.triangles.items() if len(nodes) == count}
-        group = np.array([place[names_of[tag]] for tag in triangles])
-        parts.append(Block(np.array([*triangles]), np.array([*triangles.values()]), group))
-    numbers, points = np.fromiter(content.nodes, np.int64), np.array(list(content.nodes.values()))
-    return assembled(numbers, points, parts, groups, content.curves(), ("element set", "element set"), aliases)
+    def raw_mesh(self) -> RawMesh:
+        """Return the triangles by the names of their sets, and the lines in sets that have no triangles."""
+        made_of = [(material, self.members(name)) for name, material in self.materials.items()]
+        # Sets that sections name have the phases, unless only the materials of the sections have their names.
+        by_material = "matrix" in self.materials.values() and "matrix" not in self.materials
+        for name, (material, members) in zip(self.materials, made_of, strict=True):
+            self.sets.setdefault((BY_SECTION, material if by_material else name), set()).update(members)
+        labels: dict[int, tuple[str, ...]] = {}
+        for level in (BY_ELEMENTS, BY_SET, BY_SECTION):
+            labels |= _names_of((name, members) for (priority, name), members in self.sets.items() if priority == level)
+        names = _names_of(made_of + [(name, members) for (_, name), members in self.sets.items()])
+        names_of = {tag: (labels.get(tag, ()), names.get(tag, ())) for tag in self.triangles}
+        place = {pair: k for k, pair in enumerate(dict.fromkeys(names_of.values()))}
+        parts = []
+        for count in sorted(set(map(len, self.triangles.values()))):
+            triangles = {tag: nodes for tag, nodes in self.triangles.items() if len(nodes) == count}
+            group = np.array([place[names_of[tag]] for tag in triangles])
+            parts.append(Block(np.array([*triangles]), np.array([*triangles.values()]), group))
+        groups, aliases = zip(*place, strict=True)
+        with_triangles = {name for group in groups for name in group}
+        ends: dict[str, list[list[int]]] = {}
+        for tag, nodes in self.lines.items():
+            for name in labels.get(tag, ()):
+                if name not in with_triangles:
+                    ends.setdefault(name, []).append([nodes[0], nodes[-1]])
+        curves = {name: np.array(pairs, np.int64) for name, pairs in ends.items()}
+        numbers, points = np.fromiter(self.nodes, np.int64), np.array(list(self.nodes.values()))
+        return assembled(numbers, points, parts, groups, curves, ("element set", "element set"), aliases)
 
 
 def _names_of(sets: Iterable[tuple[str, set[int]]]) -> dict[int, tuple[str, ...]]:
