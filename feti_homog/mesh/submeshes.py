@@ -88,13 +88,6 @@ class SubdomainTable:
         return cls(body, rank, torus.nesting, torus.constituent_phase, across)
 
 
-def cut(torus: Torus, subdomain: Int) -> Iterator[Submesh]:
-    """Cut the coarse cell into its subdomains; `subdomain` (m,) numbers each triangle's, from 0 without gaps."""
-    table = SubdomainTable.of(torus, subdomain, np.zeros(subdomain.max() + 1, np.int64))
-    for rank in cut_for_ranks(torus, subdomain, table, 1, pinned_class(torus)):
-        yield from rank.cut()
-
-
 @dataclass(frozen=True)
 class SubmeshesOfRank:
     """One rank's subdomains before it cuts them apart.

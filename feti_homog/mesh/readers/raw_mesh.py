@@ -34,11 +34,6 @@ class MiddleNodes:
     tags: Int
     points: Float
 
-    @classmethod
-    def none(cls) -> MiddleNodes:
-        """Return the empty list, for triangles of three nodes."""
-        return cls(np.zeros((0, 2), np.int32), np.zeros(0, np.int64), np.zeros((0, 3)))
-
     def between(self, pairs: Int32) -> Float:
         """(p, 2) the middle node between each pair (p, 2) of corners; NaN where there is none."""
         nodes = int(max(self.edges.max(initial=0), pairs.max(initial=0))) + 1
@@ -125,11 +120,6 @@ class Block:
     nodes: Int
     group: Int
 
-    @property
-    def corners(self) -> Int:
-        """(m, 3) or (m, 4)."""
-        return self.nodes[:, : 3 if self.nodes.shape[1] in (3, 6) else 4]
-
 
 def assembled(
     node_tags: Int,
@@ -152,12 +142,12 @@ def assembled(
     edges, middles = [np.zeros((0, 2), np.int64)], [np.zeros(0, np.int64)]
     triangles, quads = list[tuple[Int, Int, Int]](), list[tuple[Int, Int, Int]]()
     for block in blocks:
-        count = block.corners.shape[1]
-        bent = block.nodes[:, count : 2 * count]
+        count = 3 if block.nodes.shape[1] in (3, 6) else 4
+        corners, bent = block.nodes[:, :count], block.nodes[:, count : 2 * count]
         if bent.size:
-            edges.append(np.stack([block.corners, np.roll(block.corners, -1, axis=1)], axis=2).reshape(-1, 2))
+            edges.append(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2))
             middles.append(bent.ravel())
-        (triangles if count == 3 else quads).append((block.tags, block.corners, block.group))
+        (triangles if count == 3 else quads).append((block.tags, corners, block.group))
     if quads:
         numbers, corners, group = (np.concatenate(parts) for parts in zip(*quads, strict=True))
         halves = tags[in_triangles(np.searchsorted(tags, corners), points)].reshape(-1, 3)
