@@ -1,7 +1,7 @@
 """Read the triangles and the lines of an Abaqus input file (.inp)."""
 
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -13,6 +13,7 @@ from feti_homog.mesh.readers.abaqus_keywords import REFUSED, KeywordBlock, block
 from feti_homog.mesh.readers.raw_mesh import Block, RawMesh, assembled
 from feti_homog.schema import wording
 from feti_homog.system.runtime import input_files
+from feti_homog.typing import Int
 
 # Types of elements, and the numbers of nodes that they may have: lines; quadrilaterals, which are cut in two;
 # triangles, among them rigid ones.
@@ -179,15 +180,19 @@ class _Content:
             group = np.array([place[names_of[tag]] for tag in triangles])
             parts.append(Block(np.array([*triangles]), np.array([*triangles.values()]), group))
         groups, aliases = zip(*place, strict=True)
-        with_triangles = {name for group in groups for name in group}
+        numbers, points = np.fromiter(self.nodes, np.int64), np.array(list(self.nodes.values()))
+        curves = self._curves(labels)
+        return assembled(numbers, points, parts, groups, curves, ("element set", "element set"), aliases)
+
+    def _curves(self, labels: Mapping[int, tuple[str, ...]]) -> dict[str, Int]:
+        """Return the nodes (d, 2) at the ends of the lines in each set that has no triangles."""
+        with_triangles = {name for tag in self.triangles for name in labels.get(tag, ())}
         ends: dict[str, list[list[int]]] = {}
         for tag, nodes in self.lines.items():
             for name in labels.get(tag, ()):
                 if name not in with_triangles:
                     ends.setdefault(name, []).append([nodes[0], nodes[-1]])
-        curves = {name: np.array(pairs, np.int64) for name, pairs in ends.items()}
-        numbers, points = np.fromiter(self.nodes, np.int64), np.array(list(self.nodes.values()))
-        return assembled(numbers, points, parts, groups, curves, ("element set", "element set"), aliases)
+        return {name: np.array(pairs, np.int64) for name, pairs in ends.items()}
 
 
 def _names_of(sets: Iterable[tuple[str, set[int]]]) -> dict[int, tuple[str, ...]]:

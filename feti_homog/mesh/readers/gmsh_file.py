@@ -119,26 +119,15 @@ def load(path: Path) -> RawMesh:
 
 def raw_mesh(content: MshContent) -> RawMesh:
     """Return the triangles, and the lines of physical curves; MeshError if there are other elements."""
-    elements, none, faults = content.elements, np.zeros((0, 2), np.int64), []
-    numbers = np.concatenate([none[:, 0], *(tags for tags, *_ in elements.values())])
-    for kind, ordered in (("node", np.sort(content.tags)), ("element", np.sort(numbers))):
-        twice = np.unique(ordered[1:][ordered[1:] == ordered[:-1]])
-        if len(twice):
-            faults.append(f"{kind} {first_of(map(str, twice), len(twice))}: the number is there twice")
-    if faults := faults or _other_kinds(content):
+    if faults := _faults(content):
         raise MeshError(*faults)
-    named = {name for (dimension, _), name in content.names.items() if dimension == 1}
-    curves = dict.fromkeys(named & {DEBONDED}, none)
-    for group, line in sorted({(group, k) for (d, k), groups in content.groups.items() if d == 1 for group in groups}):
-        name = content.name(1, group)
-        parts = [nodes[entity == line, :2] for _, nodes, entity in (elements[k] for k in LINES if k in elements)]
-        curves[name] = np.concatenate([curves.get(name, none), *parts])
+    elements, curves = content.elements, _curves(content)
     if not len(curves.get(DEBONDED, (0,))):
         raise MeshError(f'no lines in the physical curve "{DEBONDED}"')
     blocks, groups = list[Block](), list[tuple[int, ...]]()
-    for tags, nodes, entity in (elements[kind] for kind in TRIANGLES if kind in elements):
+    for numbers, nodes, entity in (elements[kind] for kind in TRIANGLES if kind in elements):
         entities = np.unique(entity)
-        blocks.append(Block(tags, nodes, len(groups) + np.searchsorted(entities, entity)))
+        blocks.append(Block(numbers, nodes, len(groups) + np.searchsorted(entities, entity)))
         groups += [content.groups.get((2, number), ()) for number in entities.tolist()]
     names, aliases = (
         [tuple(map(name, group)) for group in groups] for name in (partial(content.name, 2), "number {}".format)
@@ -230,11 +219,15 @@ def _merged(gmsh: ModuleType, path: Path) -> MshContent:
     return MshContent.of(gmsh)
 
 
-def _other_kinds(content: MshContent) -> list[str]:
-    """List elements that are neither triangles nor quadrilaterals of first or second order, and the lack of these."""
-    faults = []
+def _faults(content: MshContent) -> list[str]:
+    """List numbers that are there twice; else elements of other kinds than can be used, and the lack of triangles."""
+    numbers, faults = np.concatenate([np.zeros(0, np.int64), *(tags for tags, *_ in content.elements.values())]), []
+    for name, ordered in (("node", np.sort(content.tags)), ("element", np.sort(numbers))):
+        twice = np.unique(ordered[1:][ordered[1:] == ordered[:-1]])
+        if len(twice):
+            faults.append(f"{name} {first_of(map(str, twice), len(twice))}: the number is there twice")
     kinds = sorted({*content.elements} - {POINT, *LINES})
-    for kind in (kind for kind in kinds if kind not in TRIANGLES):
+    for kind in (kind for kind in kinds if kind not in TRIANGLES and not faults):
         numbers, nodes, _ = content.elements[kind]
         centre = content.points[np.isin(content.tags, nodes[0])].mean(axis=0)
         faults.append(
@@ -242,6 +235,19 @@ def _other_kinds(content: MshContent) -> list[str]:
             "triangles of three or six nodes, quadrilaterals of four, eight or nine and lines of two or three can be "
             "used (mesh the surfaces only, with Mesh.ElementOrder = 1 or 2)"
         )
-    if not kinds:
+    if not kinds and not faults:
         faults.append("no triangles in it: mesh the surfaces and put them in physical surfaces before saving")
     return faults
+
+
+def _curves(content: MshContent) -> dict[str, Int]:
+    """Return the nodes (d, 2) at the ends of the lines in each physical curve, DEBONDED if it is named."""
+    none, lines = np.zeros((0, 2), np.int64), [content.elements[kind] for kind in LINES if kind in content.elements]
+    named = {name for (dimension, _), name in content.names.items() if dimension == 1}
+    curves = dict.fromkeys(named & {DEBONDED}, none)
+    entities = {(group, number) for (d, number), groups in content.groups.items() if d == 1 for group in groups}
+    for group, number in sorted(entities):
+        name = content.name(1, group)
+        ends = [nodes[entity == number, :2] for _, nodes, entity in lines]
+        curves[name] = np.concatenate([curves.get(name, none), *ends])
+    return curves

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
 
@@ -224,7 +225,7 @@ def _key(name: str | int) -> str:
 
 def unknown_phases(mesh: RawMesh) -> list[str]:
     """List physical surfaces whose name is not a phase, and a missing matrix."""
-    names = list(dict.fromkeys(name for group in mesh.groups for name in group))
+    names = list(dict.fromkeys(chain.from_iterable(mesh.groups)))
     has_matrix = "matrix" in names
     expected = 'expected "matrix", "fibre", "glass", ... of letters, digits, _ and -, "fibre:2"'
     # Without a matrix all groups are named anew, and numbers need no further word.
@@ -261,8 +262,7 @@ def known_names(mesh: RawMesh, of_curves: bool = False) -> str:
 
 
 def _names(mesh: RawMesh, of_curves: bool) -> list[str]:
-    named = list(mesh.curves) if of_curves else [name for group in (*mesh.groups, *mesh.aliases) for name in group]
-    return list(dict.fromkeys(named))
+    return list(dict.fromkeys(mesh.curves if of_curves else chain(*mesh.groups, *mesh.aliases)))
 
 
 def _as_selected(name: str) -> str:

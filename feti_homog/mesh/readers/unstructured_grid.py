@@ -77,29 +77,30 @@ def mesh_of(grid: Grid) -> RawMesh:
         raise MeshError(*faults)
     grid, data = _in_common_types(grid), grid.data
     whole = [k for k, values in data.items() if k != DEBONDED and values.ndim == 1 and values.dtype.kind in "iu"]
-    names = [name for name in (PHASE, *NUMBERS) if name in data] or (whole if len(whole) == 1 else [""])
-    name = names[0]
+    name = next((name for name in (PHASE, *NUMBERS) if name in data), whole[0] if len(whole) == 1 else "")
     if faults := _other_cells(grid) + _unnumbered(grid, name):
         raise MeshError(*faults)
-    has_phases, groups = name == PHASE, np.ravel(data[name]).astype(np.int64)
+    has_phases, groups, blocks = name == PHASE, np.ravel(data[name]).astype(np.int64), []
     values = np.unique(groups[np.isin(grid.types, [*TRIANGLES])])
-    cells_of = {count: np.flatnonzero(grid.types == kind) for kind, count in TRIANGLES.items()}
-    blocks = [
-        Block(grid.first + cells, grid.nodes_of(cells, count), np.searchsorted(values, groups[cells]))
-        for count, cells in cells_of.items()
-        if len(cells)
-    ]
+    for kind, count in TRIANGLES.items():
+        cells = np.flatnonzero(grid.types == kind)
+        if len(cells):
+            group = np.searchsorted(values, groups[cells])
+            blocks.append(Block(grid.first + cells, grid.nodes_of(cells, count), group))
     aliases = [(f"number {k}",) for k in values.tolist()]
-    phases = [(("matrix", "fibre")[k] if k < 2 else f"fibre:{k}",) for k in values.tolist()]
-    lines = np.flatnonzero(np.isin(grid.types, [*LINES]))
-    is_debonded = np.ravel(data[DEBONDED])[lines] != 0 if DEBONDED in data else np.zeros(len(lines), bool)
-    curve, ends = np.where(is_debonded, -1, 0 if has_phases else groups[lines]), grid.nodes_of(lines, 2)
-    curves = {
-        DEBONDED if k < 0 else "line" if has_phases else f"number {k}": ends[curve == k]
-        for k in np.unique(curve).tolist()
-    }
-    tags, containers = grid.first + np.arange(len(grid.points)), (f"value of {name}", "cells")
-    return assembled(tags, grid.points, blocks, phases if has_phases else aliases, curves, containers, aliases)
+    phases = [({0: "matrix", 1: "fibre"}.get(k, f"fibre:{k}"),) for k in values.tolist()]
+    names, containers = (phases if has_phases else aliases), (f"value of {name}", "cells")
+    tags = grid.first + np.arange(len(grid.points))
+    return assembled(tags, grid.points, blocks, names, _curves(grid, groups, has_phases), containers, aliases)
+
+
+def _curves(grid: Grid, groups: Int, has_phases: bool) -> dict[str, Int]:
+    """Return the end nodes (d, 2) of the lines in each curve."""
+    cells = np.flatnonzero(np.isin(grid.types, [*LINES]))
+    marks = np.ravel(grid.data.get(DEBONDED, np.zeros(len(grid.types))))[cells]
+    number, ends = np.where(marks != 0, -1, 0 if has_phases else groups[cells]), grid.nodes_of(cells, 2)
+    names = {k: "line" if has_phases else f"number {k}" for k in np.unique(number).tolist()} | {-1: DEBONDED}
+    return {names[k]: ends[number == k] for k in np.unique(number).tolist()}
 
 
 def _misfits(grid: Grid) -> list[str]:

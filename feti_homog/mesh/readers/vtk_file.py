@@ -66,7 +66,7 @@ def load(path: Path) -> RawMesh:
     grid = Grid(np.zeros((0, 3)), none, none, none, data)
     while words := file.line():
         section, words = words[0].upper(), [*words[1:], *[""] * 4]
-        if section in ("DATASET", "POINTS", "CELLS", "CELL_TYPES") and section in sections:
+        if section in sections & {"DATASET", "POINTS", "CELLS", "CELL_TYPES"}:
             file.refuse(f"{section}: it is there twice")
         sections.add(section)
         match section:

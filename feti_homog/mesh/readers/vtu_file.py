@@ -54,12 +54,10 @@ def load(path: Path) -> RawMesh:
     points, types, counts = (
         np.concatenate([getattr(piece, name) for piece in pieces]) for name in ("points", "types", "counts")
     )
-    tables = [piece.data for piece in pieces if len(piece.types)]
-    data: dict[str, Numbers] = {}
-    for name in dict.fromkeys(name for table in tables for name in table):
-        if not all(name in table for table in tables):
-            raise MeshError(f"cell data {name}: missing in one of {len(tables)} pieces")
-        data[name] = np.concatenate([table[name] for table in tables])
+    tables = [piece.data for piece in pieces if len(piece.types)] or [{}]
+    if lost := set[str]().union(*tables) - set(tables[0]).intersection(*tables):
+        raise MeshError(f"cell data {min(lost)}: missing in one of {len(tables)} pieces")
+    data = {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
     return mesh_of(Grid(points, types, nodes, counts, data))
 
 
