@@ -36,14 +36,10 @@ class MiddleNodes:
 
     def between(self, pairs: Int32) -> Float:
         """(p, 2) the middle node between each pair (p, 2) of corners; NaN where there is none."""
-        nodes = int(max(self.edges.max(initial=0), pairs.max(initial=0))) + 1
-        keys, first = np.unique(edge_keys(self.edges, nodes), return_index=True)
-        sought = edge_keys(pairs, nodes)
-        middle = np.full((len(pairs), 2), np.nan)
-        if len(keys):
-            place = np.minimum(np.searchsorted(keys, sought), len(keys) - 1)
-            exists = keys[place] == sought
-            middle[exists] = self.points[first[place[exists]], :2]
+        nodes, middle = int(max(self.edges.max(initial=0), pairs.max(initial=0))) + 1, np.full((len(pairs), 2), np.nan)
+        keys = edge_keys(self.edges, nodes), edge_keys(pairs, nodes)
+        _, number, place = np.intersect1d(*keys, return_indices=True)
+        middle[place] = self.points[number, :2]
         return middle
 
 
