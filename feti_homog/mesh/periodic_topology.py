@@ -84,7 +84,7 @@ class Torus:
 
     @cached_property
     def debonded(self) -> Bool:
-        """(torus edges,) which are debonded from the start."""
+        """Mask (torus edges,) of the edges that are debonded from the start."""
         debonded = np.zeros(len(self.edge_keys), bool)
         debonded[self.torus_edge[self.plane_edges(self.mesh.debonded_edges)]] = True
         return debonded
@@ -116,13 +116,13 @@ class Torus:
 
     @cached_property
     def edge_ends(self) -> Int:
-        """(torus edges, 2) classes of the ends of each."""
+        """Classes (torus edges, 2) at the ends of each edge."""
         plane = np.unique(self.torus_edge, return_index=True)[1]
         return np.asarray(self.node_class[self.edges[plane]])
 
     @cached_property
     def meeting(self) -> Int:
-        """(classes,) number of the constituents that meet in each."""
+        """Number (classes,) of the constituents that meet in each class."""
         corner, n = self.node_class[self.mesh.triangles], int(self.constituent.max(initial=0)) + 1
         pairs = np.unique(corner * n + self.constituent[:, None])
         return np.bincount(pairs // n, minlength=len(self.class_keys))
@@ -177,7 +177,7 @@ class Torus:
 
     @cached_property
     def nesting(self) -> Int:
-        """(constituents,) places from the outermost to the innermost.
+        """Ranks (constituents,) from the outermost to the innermost.
 
         By the number of constituents between it and the matrix, a coating before the fibre within, and then by number.
         """
@@ -189,7 +189,7 @@ class Torus:
         return places_by_depth(depth, phase, self.mesh.phases)
 
     def plane_parts(self) -> Int:
-        """(m,) constituents cut by the cell's boundary, as the paper's Fig. 2a does (`bodies = "plane"`)."""
+        """Cut the constituents (m,) at the cell's boundary, as in the paper's Fig. 2a (`bodies = "plane"`)."""
         one, other = edge_pairs(self.triangle_edges)
         same = self.constituent[one] == self.constituent[other]
         label = components(len(self.constituent), one[same], other[same])
@@ -197,7 +197,7 @@ class Torus:
 
 
 def places_by_depth(depth: Float | Int, phase: Int, phases: tuple[str, ...]) -> Int:
-    """(n,) places from the outermost to the innermost constituent, by depths (n,) in the matrix.
+    """Rank n constituents from the outermost to the innermost, by depths (n,) in the matrix.
 
     A coating is before the fibre within, and then they go by number; `phase` (n,) are phase numbers.
     """
@@ -218,7 +218,7 @@ def components(n: int, one: Int, other: Int) -> Int:
 
 
 def present(numbers: Int | Int32, size: int) -> tuple[Int, Int]:
-    """(k,) the numbers, below `size`, that are present, ascending, and the place of each among them."""
+    """Return the distinct numbers (k,), all below `size`, ascending, and the index of each entry in them."""
     if numbers.size < FEW * size:
         members, place = np.unique(numbers, return_inverse=True)
         return np.asarray(members), np.asarray(place.reshape(numbers.shape))
@@ -239,7 +239,7 @@ def renumber(label: Int, order: Int) -> Int:
 
 
 def plane_edges_of(mesh: CoarseMesh) -> tuple[Int, Int]:
-    """Return `edges` (e, 2) and `triangle_edges` (m, 3), as in `Torus`."""
+    """Find the plane edges: `edges` (e, 2) and `triangle_edges` (m, 3), as in `Torus`."""
     ends = np.stack([mesh.triangles, np.roll(mesh.triangles, -1, axis=1)], axis=2).reshape(-1, 2)
     keys, which = np.unique(edge_keys(ends, len(mesh.points)), return_inverse=True)
     edges = np.stack(np.divmod(keys, len(mesh.points)), axis=1)

@@ -1,4 +1,4 @@
-"""Uniform refinement of one subdomain, on its own rank and without communication, and its elimination order.
+"""Refine one subdomain uniformly, on its rank without communication, and order its nodes for elimination.
 
 Each coarse triangle carries a lattice with M = order * 2**refine intervals a side.  A fine node is a coarse
 vertex, the p-th lattice node of a coarse edge, or interior to a coarse triangle; so its identity (on the
@@ -22,7 +22,7 @@ from feti_homog.mesh.periodic_topology import edge_pairs
 from feti_homog.mesh.submeshes import Submesh
 from feti_homog.typing import Bool, Float, Int, Int32
 
-# Share of the triangles of a part by which a cut may be off the middle.
+# Fraction of a part's triangles by which a cut may be off the middle.
 OFF_THE_MIDDLE = 0.1
 # Intervals a side from which on the nodes inside a coarse triangle are ordered likewise: below, they are few.
 MANY_INTERVALS = 8
@@ -78,18 +78,18 @@ class ReferenceLattice:
         return (self.intervals // self.order).bit_length() - 1
 
     def coarser(self, fewer: int = 1) -> ReferenceLattice:
-        """Return the lattice of fewer halvings."""
+        """Return the lattice with `fewer` halvings less."""
         return ReferenceLattice.of(self.halvings - fewer, self.order)
 
     def within(self, finer: ReferenceLattice) -> Int:
-        """(q,) place of its nodes in a lattice with more halvings."""
+        """Positions (q,) of the nodes of this lattice in a finer lattice."""
         number = np.empty((finer.intervals + 1,) * 2, np.int64)
         number[finer.nodes[:, 1], finer.nodes[:, 2]] = np.arange(len(finer.nodes))
         _, i, j = (finer.intervals // self.intervals * self.nodes).T
         return np.asarray(number[i, j])
 
     def number(self, vertices: Int, edges: Int, backwards: Bool, n_vertices: int, n_edges: int) -> Int:
-        """(t, q) node numbers: vertices first, then M - 1 nodes an edge along its direction, then interiors."""
+        """Node numbers (t, q): vertices, then M - 1 nodes per edge along its direction, then interiors."""
         inner = self.intervals - 1
         p = np.arange(inner)
         along = np.where(backwards[..., None], inner - 1 - p, p)
@@ -121,7 +121,7 @@ class FineMesh:
 
     @property
     def triangles(self) -> Int32:
-        """(m, 3 or 6) plane nodes of the elements; vertices, then mid-edge nodes 01, 12, 20."""
+        """Plane nodes (m, 3 or 6) of the elements: vertices, then mid-edge nodes 01, 12, 20."""
         elements = self.lattice.triangles
         return self.nodes[:, elements].reshape(-1, elements.shape[1])
 
@@ -166,7 +166,7 @@ def refine(submesh: Submesh, lattice: ReferenceLattice) -> FineMesh:
 
 
 def joined(meshes: Sequence[FineMesh]) -> FineMesh:
-    """Return meshes of one lattice as one, one after the other, with no node in common."""
+    """Concatenate meshes with the same lattice; they share no nodes."""
     nodes = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
     classes = np.cumsum([0, *(mesh.n_classes for mesh in meshes)])
     return FineMesh(
@@ -185,7 +185,7 @@ def edge_node(n_classes: int, edge: Int, position: Int, lattice: ReferenceLattic
 
 
 def elimination_order(mesh: FineMesh) -> Int:
-    """(c,) node classes in elimination order."""
+    """Return the node classes (c,) in elimination order."""
     lattice = mesh.lattice
     inside = np.arange(len(lattice.nodes))
     if lattice.intervals >= MANY_INTERVALS:
@@ -195,9 +195,9 @@ def elimination_order(mesh: FineMesh) -> Int:
 
 
 def _dissected(centres: Float, nodes: Int | Int32, inside: Int) -> Int:
-    """(n,) nodes in order, for triangles with `centres` (t, 2) and `nodes` (t, q), corners first.
+    """Return nodes (n,) in order, for triangles with `centres` (t, 2) and `nodes` (t, q), corners first.
 
-    Nodes in a single triangle are ordered by their places `inside` (q,).
+    Nodes in a single triangle are ordered by `inside` (q,).
     """
     size = int(nodes.max()) + 1
     leaf = _halved(centres, edge_pairs(edge_keys(edges(np.asarray(nodes[:, :3], np.int32)), size)))
@@ -211,7 +211,7 @@ def _dissected(centres: Float, nodes: Int | Int32, inside: Int) -> Int:
 
 
 def _halved(centres: Float, neighbours: tuple[Int, Int]) -> Int:
-    """(t,) leaf number for each triangle in a binary tree whose parts are halved; some leaves are empty.
+    """Bisect the triangles recursively; return leaf numbers (t,) of a binary tree, some of which are empty.
 
     A part is cut along x or y where fewer sides between `neighbours` are crossed, nearly in its middle.
     """

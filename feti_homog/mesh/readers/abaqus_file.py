@@ -109,7 +109,7 @@ class _Content:
             self.nodes[number] = [*map(_real, place[:3]), 0.0, 0.0][:3]
 
     def _take_elements(self, block: KeywordBlock) -> None:
-        """Take elements, whose type gives the numbers of nodes that they may have."""
+        """Read elements and check their node counts against their type."""
         kind = block.parameters.get("TYPE", "").upper()
         counts = next((sizes for pattern, sizes in SIZES.items() if re.fullmatch(pattern, kind)), ())
         if not counts:
@@ -127,7 +127,7 @@ class _Content:
                 self.sets.setdefault((BY_ELEMENTS, block.parameters["ELSET"]), set()).add(tag)
 
     def _take_set(self, block: KeywordBlock) -> None:
-        """Take the members of a set: numbers, names of sets or, with GENERATE, a range by steps of one or the third."""
+        """Read the members of a set: numbers, names of sets or, with GENERATE, ranges with a step (default 1)."""
         members = self.sets.setdefault((BY_SET, block.parameter("ELSET")), set())
         for row in block.rows:
             parts: Iterable[Collection[int]] = (
@@ -145,14 +145,14 @@ class _Content:
                 members.update(part)
 
     def members(self, name: str) -> set[int]:
-        """Return the elements of a set, however it was made."""
+        """Return the elements of a set: by section, by *ELSET or by *ELEMENT."""
         levels = [self.sets[level, name] for level in (BY_SECTION, BY_SET, BY_ELEMENTS) if (level, name) in self.sets]
         if not levels:
             raise ValueError(f'there is no element set "{name}"')
         return set().union(*levels)
 
     def faults(self) -> list[str]:
-        """List the lack of triangles, unknown nodes, sections of unknown sets."""
+        """List missing triangles, unknown nodes and sections with unknown sets."""
         faults = [] if self.triangles else ["no triangles in it"]
         elements = self.triangles | self.lines
         lost = ((tag, node) for tag, nodes in elements.items() for node in nodes if node not in self.nodes)
@@ -162,7 +162,7 @@ class _Content:
         return faults + [f'a section names the element set "{name}": there is none' for name in unknown]
 
     def raw_mesh(self) -> RawMesh:
-        """Return the triangles by the names of their sets, and the lines in sets that have no triangles."""
+        """Group the triangles by the names of their sets, and add the line sets."""
         made_of = [(material, self.members(name)) for name, material in self.materials.items()]
         # Sets that sections name have the phases, unless only the materials of the sections have their names.
         by_material = "matrix" in self.materials.values() and "matrix" not in self.materials
@@ -185,7 +185,7 @@ class _Content:
         return assembled(numbers, points, parts, groups, curves, ("element set", "element set"), aliases)
 
     def _curves(self, labels: Mapping[int, tuple[str, ...]]) -> dict[str, Int]:
-        """Return the nodes (d, 2) at the ends of the lines in each set that has no triangles."""
+        """Return the end nodes (d, 2) of the lines in each set without triangles."""
         with_triangles = {name for tag in self.triangles for name in labels.get(tag, ())}
         ends: dict[str, list[list[int]]] = {}
         for tag, nodes in self.lines.items():
@@ -196,7 +196,7 @@ class _Content:
 
 
 def _names_of(sets: Iterable[tuple[str, set[int]]]) -> dict[int, tuple[str, ...]]:
-    """Return the names, each once, of the sets that each element is in."""
+    """Return the set names of each element, without repetition."""
     names: dict[int, dict[str, None]] = {}
     for name, members in sets:
         for tag in members:
@@ -205,14 +205,14 @@ def _names_of(sets: Iterable[tuple[str, set[int]]]) -> dict[int, tuple[str, ...]
 
 
 def _integer(word: str) -> int:
-    """Return the whole number that a word is; ValueError if it is none."""
+    """Convert a word into a whole number; ValueError for other words."""
     if not re.fullmatch(r"[+-]?[0-9]{1,15}", word):
         raise ValueError(f"{wording.toml_value(word)}: expected a whole number of at most 15 digits")
     return int(word)
 
 
 def _real(word: str) -> float:
-    """Return the number that a word is; ValueError if it is none."""
+    """Convert a word into a real number; ValueError for other words."""
     try:
         if "_" not in word and word.isascii():
             return float(word.upper().replace("D", "E"))  # 1.0D+00 is Fortran's

@@ -1,4 +1,4 @@
-"""Blocks of an Abaqus input file, and which of its keywords make a mesh."""
+"""Split an Abaqus input file into keyword blocks, and recognize the keywords that make a mesh."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class KeywordBlock:
 
     @classmethod
     def begun(cls, number: int, line: str) -> KeywordBlock:
-        """Return the block of a keyword line: *ELEMENT, TYPE=CPE3 has the parameter TYPE.
+        """Begin the block of a keyword line: *ELEMENT, TYPE=CPE3 has the parameter TYPE.
 
         Raises:
             MeshError: the keyword is unknown, or a parameter that is not read may matter.
@@ -93,7 +93,7 @@ class KeywordBlock:
         return cls(number, word, keyword, parameters)
 
     def parameter(self, name: str) -> str:
-        """Return a parameter; a fault if it is missing."""
+        """Return a parameter; ValueError if it is missing."""
         if name not in self.parameters:
             raise ValueError(f"no {name}")
         return self.parameters[name]
@@ -126,7 +126,7 @@ def blocks(text: str) -> Iterator[KeywordBlock]:
 
 
 def resolved(word: str) -> str:
-    """Return the full keyword of a word, empty if the keyword makes no nodes or elements.
+    """Complete an abbreviated keyword; empty if it makes no nodes or elements.
 
     Blanks and capitals do not matter. A keyword may be abbreviated if no other one begins in the same way.
 
@@ -146,6 +146,6 @@ def resolved(word: str) -> str:
 
 
 def name_of(word: str) -> str:
-    """Return a name in lower case unless it is quoted."""
+    """Convert a name to lower case unless it is quoted."""
     word = word.strip()
     return word[1:-1] if word[:1] == '"' else word.lower()

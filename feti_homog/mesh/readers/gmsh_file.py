@@ -63,7 +63,7 @@ class MshContent:
 
     @classmethod
     def of(cls, gmsh: ModuleType) -> MshContent:
-        """Return gmsh's model."""
+        """Copy the mesh of gmsh's current model."""
         model = gmsh.model
         tags, points, _ = model.mesh.getNodes()
         groups, blocks = {}, defaultdict[int, list[Elements]](list)
@@ -86,7 +86,7 @@ class MshContent:
 
 
 def load(path: Path) -> RawMesh:
-    """Read the triangles of a file; only their kind and their numbers are checked.
+    """Read the triangles of a .msh file and check their kind and numbers only.
 
     Raises:
         OSError: it cannot be read.
@@ -118,7 +118,7 @@ def load(path: Path) -> RawMesh:
 
 
 def raw_mesh(content: MshContent) -> RawMesh:
-    """Return the triangles, and the lines of physical curves; MeshError if there are other elements."""
+    """Convert content into triangles and curves; MeshError if it has other elements."""
     if faults := _faults(content):
         raise MeshError(*faults)
     elements, curves = content.elements, _curves(content)
@@ -136,7 +136,7 @@ def raw_mesh(content: MshContent) -> RawMesh:
 
 
 def _sections(content: bytes) -> dict[str, bytes]:
-    """Return the text of each section that makes the mesh, from the end of its first line on."""
+    """Split a file into sections: their text behind the first line, by name."""
     start = content[:4096].lstrip()
     if start.startswith(b"$NOD"):
         raise MeshError("format 1 of gmsh: save it in format 2.2 or 4.1")
@@ -165,7 +165,7 @@ def _sections(content: bytes) -> dict[str, bytes]:
 
 
 def _announced(sections: Mapping[str, bytes]) -> int:
-    """Return the announced number of elements; in text each has a line, for gmsh passes over more."""
+    """Return the announced number of elements, and check the lines, of which gmsh would skip some."""
     head = sections["MeshFormat"]
     version, *rest = head.split()[:3]
     number = float(version) if re.fullmatch(rb"[0-9]\.?[0-9]{0,9}", version) else 0.0
@@ -220,7 +220,7 @@ def _merged(gmsh: ModuleType, path: Path) -> MshContent:
 
 
 def _faults(content: MshContent) -> list[str]:
-    """List numbers that are there twice; else elements of other kinds than can be used, and the lack of triangles."""
+    """List repeated numbers; if there are none, unusable elements and missing triangles."""
     numbers, faults = np.concatenate([np.zeros(0, np.int64), *(tags for tags, *_ in content.elements.values())]), []
     for name, ordered in (("node", np.sort(content.tags)), ("element", np.sort(numbers))):
         twice = np.unique(ordered[1:][ordered[1:] == ordered[:-1]])
@@ -241,7 +241,7 @@ def _faults(content: MshContent) -> list[str]:
 
 
 def _curves(content: MshContent) -> dict[str, Int]:
-    """Return the nodes (d, 2) at the ends of the lines in each physical curve, DEBONDED if it is named."""
+    """Return the end nodes (d, 2) of the lines in each physical curve; DEBONDED may be empty."""
     none, lines = np.zeros((0, 2), np.int64), [content.elements[kind] for kind in LINES if kind in content.elements]
     named = {name for (dimension, _), name in content.names.items() if dimension == 1}
     curves = dict.fromkeys(named & {DEBONDED}, none)

@@ -1,4 +1,4 @@
-"""A user's mesh: read from a file, its phases named, moved onto a rectangle, checked, made into a coarse mesh."""
+"""Read a user's mesh: name its phases, move it onto a rectangle, check it, and make a coarse mesh of it."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -40,7 +40,7 @@ UPRIGHT, FILLED = 1e-2, 0.4
 
 
 def read_cell(cell: cell_section.Cell) -> CoarseMesh:
-    """Return the user's mesh of a cell, repaired as the case asks for. Raises as `read`."""
+    """Read the user's mesh of a cell, with the repair that the case selects. Raises as `read`."""
     assert cell.file is not None
     snap = cell.snap_tolerance if cell.repair == "snap" else None
     return read(cell.file, snap, cell.phases or {}, bool(cell.voids))
@@ -78,7 +78,7 @@ def read(
 
 
 def made(raw: RawMesh, path: str, has_voids: bool = True) -> CoarseMesh:
-    """Return the coarse mesh of triangles in phases; `path` names them in faults. Raises as `read`."""
+    """Check a raw mesh and make it a coarse mesh; faults begin with `path`. Raises as `read`."""
     _refuse(path, mesh_checks.not_planar(raw), mesh_checks.flat(raw), mesh_checks.duplicate_nodes(raw))
     # All counter-clockwise; middle nodes are those of edges, whichever way these run.
     clockwise = areas(raw.points[:, :2], raw.triangles) < 0
@@ -125,13 +125,13 @@ def made(raw: RawMesh, path: str, has_voids: bool = True) -> CoarseMesh:
 
 
 def _refuse(path: str, *faults: Sequence[str]) -> None:
-    """Raise MeshError if there are faults."""
+    """Raise MeshError with all faults, if there are any."""
     if lines := [f"{path}: {fault}" for kind in faults for fault in kind]:
         raise MeshError(*lines)
 
 
 def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
-    """Move the outer nodes onto a rectangle's sides, opposite each other; also how far, at most.
+    """Move the outer nodes onto a rectangle's sides, opposite each other; also return the largest move.
 
     A side lies at the median among nodes within `tolerance`, relative to the width, from the outermost. Partners, each
     other's nearest within the tolerance along the side, both move to the middle between them, but for corners. On
@@ -169,7 +169,7 @@ def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
 
 
 def _lattice(plane: Float, triangles: Int32) -> list[str]:
-    """Return the fault if triangles fill a parallelogram or a hexagon."""
+    """Report a cell that is a parallelogram or a hexagon."""
     hull = ConvexHull(plane)
     corners = plane[hull.vertices]
     before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
@@ -214,12 +214,12 @@ def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
 
 
 def _selecting(names: tuple[str, ...], phase_of: Mapping[str, str]) -> tuple[str, ...]:
-    """Return the phases that select one of the names, each once."""
+    """Return the phases that select any of the names, without repetition."""
     return tuple(dict.fromkeys(phase_of[_key(name)] for name in names if _key(name) in phase_of))
 
 
 def _key(name: str | int) -> str:
-    """Return a name, or the number of a nameless group, such that capitals do not matter."""
+    """Convert a name, or the number of a nameless group, for comparison without case."""
     return (f"number {name}" if isinstance(name, int) else name).casefold()
 
 
@@ -266,5 +266,5 @@ def _names(mesh: RawMesh, of_curves: bool) -> list[str]:
 
 
 def _as_selected(name: str) -> str:
-    """Return the name or number of a group as a case file has it."""
+    """Write the name or number of a group as in a case file."""
     return name.removeprefix("number ") if NUMBER.fullmatch(name) else wording.toml_value(name)

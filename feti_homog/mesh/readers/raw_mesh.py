@@ -1,4 +1,4 @@
-"""Triangles of three and six nodes, as a file has them, put together as one mesh; quadrilaterals are cut in two."""
+"""Assemble the triangles of a file, with three or six nodes, as one mesh; quadrilaterals are cut in two."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class MiddleNodes:
     points: Float
 
     def between(self, pairs: Int32) -> Float:
-        """(p, 2) the middle node between each pair (p, 2) of corners; NaN where there is none."""
+        """Middle node (p, 2) between each pair (p, 2) of corners; NaN where none exists."""
         nodes, middle = int(max(self.edges.max(initial=0), pairs.max(initial=0))) + 1, np.full((len(pairs), 2), np.nan)
         keys = edge_keys(self.edges, nodes), edge_keys(pairs, nodes)
         _, number, place = np.intersect1d(*keys, return_indices=True)
@@ -73,30 +73,30 @@ class RawMesh:
 
     @property
     def debonded(self) -> Int:
-        """(d, 2) node tags of the ends of the lines in the curve DEBONDED."""
+        """End node tags (d, 2) of the lines in the curve DEBONDED."""
         return self.curves.get(DEBONDED, np.zeros((0, 2), np.int64))
 
     def node(self, number: int) -> str:
-        """Return a node in words."""
+        """Describe a node in words."""
         return f"node {self.node_tags[number]} {at(self.points[number])}"
 
     def element(self, number: int) -> str:
-        """Return an element in words, with the position of its centre."""
+        """Describe an element in words, with the position of its centre."""
         centre = self.points[self.triangles[number]].mean(axis=0)
         return f"element {self.element_tags[number]} at {at(centre)}"
 
     def edge(self, pair: Iterable[int]) -> str:
-        """Return an edge in words."""
+        """Describe an edge in words."""
         return "the edge between " + " and ".join(self.node(int(end)) for end in pair)
 
 
 def at(point: Float) -> str:
-    """Return a position in words, (x, y)."""
+    """Write a position as (x, y)."""
     return f"({point[0]:.9g}, {point[1]:.9g})"
 
 
 def first_of(names: Iterable[str], total: int, shown: int = 3) -> str:
-    """Return the first few names and how many more there are."""
+    """List the first few names and count the remaining names."""
     listed = ", ".join(name for name, _ in zip(names, range(shown), strict=False))
     return listed if total <= shown else f"{listed} and {total - shown} more"
 
@@ -126,7 +126,7 @@ def assembled(
     containers: tuple[str, str] = ("physical surface", "physical curve"),
     aliases: Sequence[tuple[str, ...]] = (),
 ) -> RawMesh:
-    """Return the mesh of blocks, one at least, with the corner nodes that they use.
+    """Assemble blocks, at least one, and the corner nodes that they use.
 
     Args:
         node_tags, points: (n,) and (n, 3) numbers and positions of all nodes in the file.

@@ -30,7 +30,7 @@ STRAIGHT = 1e-5
 
 
 def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
-    """Return the mesh with the round interfaces as circles, their nodes moved onto them exactly.
+    """Replace round interfaces by circles, and move their nodes onto these exactly.
 
     A closed interface between two phases is a circle if all its nodes are within ROUNDNESS_TOLERANCE radii of one,
     there are at least MIN_CIRCLE_EDGES edges, none on a side of the cell or longer than the radius, and no corner of
@@ -73,7 +73,7 @@ def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
 
 
 def with_ellipses(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
-    """Return the mesh whose elliptic interfaces follow their ellipses, where they are no circles.
+    """Replace elliptic interfaces by ellipses, where they are no circles.
 
     A closed interface between two phases is an ellipse if all its nodes are within ROUNDNESS_TOLERANCE of one, and it
     has at least MIN_ELLIPSE_EDGES edges, none on a side of the cell, none that spans more than one radian of its
@@ -100,7 +100,7 @@ def with_ellipses(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
 
 
 def with_bent_edges(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
-    """Return the mesh whose interface edges follow the circle through their ends and their middle node.
+    """Bend interface edges to the circle through their ends and middle node.
 
     Edges on circles stay there, and so do straight ones, whose middle node is within STRAIGHT of the chord.
     Edges are flipped where a triangle has two on one curve, which has no corner there.
@@ -126,7 +126,7 @@ def with_bent_edges(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
 
 
 def _with_arcs(mesh: CoarseMesh, ellipses: Ellipses, arcs: list[Int32]) -> CoarseMesh:
-    """Return the mesh with more ellipses, and the edges (a, 2) on each."""
+    """Add ellipses, and the edges (a, 2) on each, to the mesh."""
     number = np.repeat(np.arange(len(arcs)), np.array([len(pairs) for pairs in arcs], np.intp))
     return replace(
         mesh,
@@ -172,7 +172,7 @@ def _closed_loops(mesh: CoarseMesh, pairs: Int32, fewest: int) -> Iterator[tuple
 
 
 def _fit_circle(places: Float, longest: float) -> Float | None:
-    """Centre and radius (3,) of the circle through a closed chain of places (k, 2).
+    """Fit a circle, centre and radius (3,), to a closed chain of positions (k, 2).
 
     None if not round, or with edges longer than `longest` radii.
     """
@@ -192,7 +192,7 @@ def _fit_circle(places: Float, longest: float) -> Float | None:
 
 
 def _moved(points: Float, places: Float, circle: Float, size: Float) -> Float | None:
-    """Move points (k, 2) onto the circle, along the side they are on; None if impossible."""
+    """Move points (k, 2) onto the circle, side nodes along their side; None if impossible."""
     centres = circle[:2] - np.round((places - points) / size) * size
     spokes = points - centres
     moved: Float = centres + circle[2] * spokes / np.linalg.norm(spokes, axis=1)[:, None]
@@ -212,7 +212,7 @@ def _moved(points: Float, places: Float, circle: Float, size: Float) -> Float | 
 
 
 def _follow(ellipse: Ellipses, ends: Float, bends: Float) -> bool:
-    """Return whether edges may follow the one ellipse.
+    """Return whether edges may follow the single ellipse.
 
     Their ends are (k, 2, 2) and their middle nodes (k, 2), NaN if there are none.
     """
@@ -226,7 +226,7 @@ def _follow(ellipse: Ellipses, ends: Float, bends: Float) -> bool:
 
 
 def fit_ellipse(places: Float) -> Ellipses | None:
-    """Return the ellipse through a closed chain of places (k, 2) in order.
+    """Fit an ellipse to a closed chain of positions (k, 2) in order.
 
     None if they are on none or too far apart.
 

@@ -1,4 +1,4 @@
-"""Points and cells with VTK's types and cell data, as VTK and Medit files have them."""
+"""Convert a grid with VTK's cell types and cell data, read from VTK or Medit files, into triangles and lines."""
 
 import re
 import warnings
@@ -64,7 +64,7 @@ class Grid:
 
 
 def mesh_of(grid: Grid) -> RawMesh:
-    """Return the triangles and the lines of a grid.
+    """Convert a grid into triangles and lines.
 
     Its cell data `phase` are 0 in the matrix, 1 in phase fibre, k in fibre:k; in their place groups come from one of
     NUMBERS, or from the only cell data of whole numbers. Cell data `debonded`, if there are any, are 1 on lines
@@ -104,7 +104,7 @@ def _curves(grid: Grid, groups: Int, has_phases: bool) -> dict[str, Int]:
 
 
 def _misfits(grid: Grid) -> list[str]:
-    """List arrays whose lengths do not fit the cells, and nodes that do not exist."""
+    """List arrays with wrong lengths, and nodes that do not exist."""
     count, last = len(grid.types), len(grid.points) + grid.first - 1
     if len(grid.counts) != count or np.any(grid.counts < 0) or grid.counts.sum() != len(grid.nodes):
         return ["the cells and their nodes do not belong together: the file is damaged"]
@@ -117,7 +117,7 @@ def _misfits(grid: Grid) -> list[str]:
 
 
 def _in_common_types(grid: Grid) -> Grid:
-    """Return the grid with polygons of three and four nodes and pixels as triangles and quadrilaterals."""
+    """Convert pixels and polygons with three or four nodes into triangles and quadrilaterals."""
     counts, types, nodes = grid.counts, grid.types.copy(), grid.nodes.copy()
     for count, kind in ((3, 5), (4, 9)):
         types[(types == POLYGON) & (counts == count)] = kind
@@ -129,7 +129,7 @@ def _in_common_types(grid: Grid) -> Grid:
 
 
 def _other_cells(grid: Grid) -> list[str]:
-    """List cells with other types, cells with a wrong node count, and the lack of triangles."""
+    """List unusable cell types, wrong node counts, and missing triangles."""
     usable, counts, faults = TRIANGLES | LINES, grid.counts, []
     for kind in np.unique(grid.types).tolist():
         cells = np.flatnonzero(grid.types == kind)
@@ -147,7 +147,7 @@ def _other_cells(grid: Grid) -> list[str]:
 
 
 def _unnumbered(grid: Grid, name: str) -> list[str]:
-    """List the lack of phases, and values in the cell data `name` that are no phase numbers."""
+    """List missing phases, and values of the cell data `name` that are no phase numbers."""
     if not name:
         expected = "expected 0 in the matrix, 1 in phase fibre, 2 in fibre:2, ..."
         return [f"no cell data named {PHASE}, but {', '.join(grid.data) or 'none'}: {expected}"]

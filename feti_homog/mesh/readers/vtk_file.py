@@ -1,6 +1,6 @@
-"""Legacy VTK files (.vtk), text or binary, up to version 5.1, and Medit's mesh files (.mesh).
+"""Read legacy VTK files (.vtk), text or binary, up to version 5.1, and Medit's mesh files (.mesh).
 
-FreeFEM, Netgen, Gmsh and MMG write the latter.
+FreeFEM, Netgen, Gmsh and MMG write Medit's files.
 """
 
 from __future__ import annotations
@@ -90,14 +90,14 @@ def load(path: Path) -> RawMesh:
 
 
 def _cells(file: Scanner, count: int, size: int) -> tuple[Int, Int]:
-    """Take the nodes of cells: behind their offsets or, before version 5, each behind their number."""
+    """Read the cells: nodes behind all offsets or, before version 5, rows of a node count and nodes."""
     if file.follows("OFFSETS"):
         offsets = file.take(count, "".join(file.line()[1:2])).astype(np.int64)
         if not file.follows("CONNECTIVITY"):
             file.refuse("CELLS: expected CONNECTIVITY behind OFFSETS")
         return file.take(size, "".join(file.line()[1:2])).astype(np.int64), np.diff(offsets)
     rows = file.take(size, "int").astype(np.int64)
-    # Cells begin at the entries that are met from the first one on, each as far behind the last as that has nodes.
+    # A row begins behind the nodes of the row before: follow these links from entry 0.
     onward = np.clip(np.arange(size) + 1 + rows, 0, size)
     graph = csr_array((np.ones(size), onward, np.append(np.arange(size + 1), size)), shape=(size + 1, size + 1))
     starts = breadth_first_order(graph, 0, return_predecessors=False)
@@ -106,7 +106,7 @@ def _cells(file: Scanner, count: int, size: int) -> tuple[Int, Int]:
 
 
 def _arrays(file: Scanner, section: str, words: list[str], length: int) -> Iterator[tuple[str, Numbers, int]]:
-    """Take numbers of `length` points or cells, and colours of tables; yield names, values and numbers per entry."""
+    """Read arrays of `length` points or cells; yield name, values and width of each, but skip tables."""
     byte = "unsigned_char" if file.is_binary else "float"
     if section == "FIELD":
         for _ in range(min(file.count(words[1]), len(file.content))):
@@ -166,13 +166,13 @@ def load_medit(path: Path) -> RawMesh:
 
 
 class Scanner:
-    """Take lines, words and arrays of a file; binary arrays have the most significant byte first."""
+    """Read lines, words and arrays of a file; binary arrays are big-endian."""
 
     def __init__(self, content: bytes) -> None:
         self.content, self.place, self.is_binary = content.removeprefix(codecs.BOM_UTF8), 0, False
 
     def line(self) -> list[str]:
-        """Take the words in the next line that has any, past METADATA up to an empty line; none at the file's end."""
+        """Read the words of the next line that is not blank, behind any METADATA block; empty at the end."""
         words = list[str]()
         while not words and self.place < len(self.content):
             start, self.place = self.place, self.content.find(b"\n", self.place) + 1 or len(self.content)
@@ -183,7 +183,7 @@ class Scanner:
         return words
 
     def word(self) -> str:
-        """Take the next word; empty at the end of the file."""
+        """Read the next word; empty at the end of the file."""
         match = WORD.search(self.content, self.place)
         self.place = len(self.content) if match is None else match.end()
         return "" if match is None else match[0].decode(errors="replace")
@@ -194,13 +194,13 @@ class Scanner:
         return match is not None and match[0].upper() == word.encode()
 
     def count(self, word: str) -> int:
-        """Return the number of values that a word announces."""
+        """Convert a word into a number of values."""
         if not re.fullmatch("[0-9]{1,15}", word):
             self.refuse(f"{wording.toml_value(word)}: expected a number of values")
         return int(word)
 
     def take(self, count: int, name: str) -> Numbers:
-        """Take (count,) numbers of VTK's type `name`."""
+        """Read an array (count,) of VTK's type `name`."""
         if name.lower() not in TYPES:
             self.refuse(f"{wording.toml_value(name)}: expected a type of numbers, such as int or double")
         kind = TYPES[name.lower()]
@@ -224,6 +224,6 @@ class Scanner:
         return values
 
     def refuse(self, fault: str) -> NoReturn:
-        """Raise MeshError with the line that has been reached."""
+        """Raise MeshError with the number of the current line."""
         line = self.content[: self.place].rstrip().count(b"\n") + 1
         raise MeshError(fault if self.is_binary else f"line {line}: {fault}")

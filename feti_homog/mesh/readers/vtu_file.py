@@ -62,7 +62,7 @@ def load(path: Path) -> RawMesh:
 
 
 def _children(element: ElementTree.Element, name: str, tags: Mapping[str, int]) -> dict[str, list[Any]]:
-    """Return an element's children by their tags; MeshError if others are there or required ones missing."""
+    """Return an element's children by tag; MeshError for unknown and missing children."""
     children: dict[str, list[Any]] = {tag: element.findall(tag) for tag in tags}
     other = [child.tag for child in element if child.tag not in tags]
     expected = f"expected {' and '.join(tags)}"
@@ -76,7 +76,7 @@ def _children(element: ElementTree.Element, name: str, tags: Mapping[str, int]) 
 
 
 def _piece(piece: ElementTree.Element, arrays: _Arrays) -> Grid:
-    """Return the points, cells and cell data of a piece."""
+    """Read the points, cells and cell data of a piece."""
     children = _children(piece, "Piece", {"Points": 1, "Cells": 1, "CellData": 0, "PointData": 0})
     counts = []
     for name in ("NumberOfPoints", "NumberOfCells"):
@@ -99,7 +99,7 @@ def _piece(piece: ElementTree.Element, arrays: _Arrays) -> Grid:
 
 
 class _Arrays:
-    """Arrays of a file, read as its root says; `budget` bytes may be decompressed."""
+    """Decode arrays in the form that the root declares; at most `budget` bytes are decompressed."""
 
     def __init__(self, root: ElementTree.Element, appended: bytes, budget: int) -> None:
         kind, compressor = root.get("type"), root.get("compressor", "")
@@ -122,7 +122,7 @@ class _Arrays:
         self.starts = [*sorted(starts), len(appended)]
 
     def of(self, section: ElementTree.Element) -> dict[str, Numbers]:
-        """Return the number arrays in a section by their names: (k,), or a row for each tuple."""
+        """Read the numeric arrays of a section by name: (k,), or a row for each tuple."""
         arrays = {}
         for array in section.iter("DataArray"):
             name, kind = array.get("Name") or "Points", TYPES.get(array.get("type", ""))
@@ -161,7 +161,7 @@ class _Arrays:
         return int(word)
 
     def _unpacked(self, data: bytes) -> bytes:
-        """Return data behind their length, or behind the lengths of compressed blocks; an error if broken off."""
+        """Unpack data behind a header with their length or block lengths; ValueError or IndexError if cut off."""
         size = self.header.itemsize
         header = np.frombuffer(data, self.header, len(data) // size)
         count = int(header[0])
