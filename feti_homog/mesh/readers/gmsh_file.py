@@ -12,7 +12,6 @@ import re
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import ModuleType
@@ -129,9 +128,8 @@ def raw_mesh(content: MshContent) -> RawMesh:
         entities = np.unique(entity)
         blocks.append(Block(numbers, nodes, len(groups) + np.searchsorted(entities, entity)))
         groups += [content.groups.get((2, number), ()) for number in entities.tolist()]
-    names, aliases = (
-        [tuple(map(name, group)) for group in groups] for name in (partial(content.name, 2), "number {}".format)
-    )
+    names = [tuple(content.name(2, number) for number in group) for group in groups]
+    aliases = [tuple(map("number {}".format, group)) for group in groups]
     return assembled(content.tags, content.points, blocks, names, curves, aliases=aliases)
 
 

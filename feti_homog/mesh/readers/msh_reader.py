@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 from scipy.spatial import ConvexHull, cKDTree
@@ -43,12 +42,10 @@ def read_cell(cell: cell_section.Cell) -> CoarseMesh:
     """Read the user's mesh of a cell, with the repair that the case selects. Raises as `read`."""
     assert cell.file is not None
     snap = cell.snap_tolerance if cell.repair == "snap" else None
-    return read(cell.file, snap, cell.phases or {}, bool(cell.voids))
+    return read(cell.file, snap, cell.phases, bool(cell.voids))
 
 
-def read(
-    path: Path, snap: float | None = None, phases: Selectors = MappingProxyType({}), has_voids: bool = False
-) -> CoarseMesh:
+def read(path: Path, snap: float | None = None, phases: Selectors | None = None, has_voids: bool = False) -> CoarseMesh:
     """Read the coarse mesh from a file that one of the LOADERS reads, moved to [0, width] x [0, height].
 
     It consists of triangles with three or six nodes, in either sense, in physical surfaces "matrix", "fibre", "glass",
@@ -64,7 +61,7 @@ def read(
     """
     moved = 0.0
     try:
-        raw = with_phases(LOADERS[path.suffix](path), phases)
+        raw = with_phases(LOADERS[path.suffix](path), phases or {})
     except OSError as error:
         raise MeshError(f"{path}: cannot be read: {error.strerror}") from None
     except MeshError as error:
