@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from feti_homog.mesh.coarse_mesh import CoarseMesh, paired_sides, twins
+from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, representatives, twins
 from feti_homog.microstructure import phase_names
 from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.typing import Bool, Float, Int, Int32
@@ -30,7 +30,7 @@ class Torus:
     Attributes:
         mesh: the plane mesh.
         node_class: (n,) by plane node.
-        edges: (e, 2) plane edges, each from its lexicographically lower to its upper end.
+        edges: (e, 2) plane edges by ascending nodes, each from its lexicographically lower to its upper end.
         triangle_edges: (m, 3) plane edge from vertex k to vertex k + 1 (mod 3).
         torus_edge: (e,) by plane edge.
         constituent: (m,) by triangle; matrix constituents come first.
@@ -55,10 +55,8 @@ class Torus:
         """Identify the periodic images of `mesh` and find its constituents."""
         node_class = np.unique(mesh.representative, return_inverse=True)[1]
         edges, triangle_edges = plane_edges_of(mesh)
-        same = np.arange(len(edges))
-        for _, low, high in paired_sides(mesh.points[edges].mean(axis=1), mesh.period):
-            same[high] = low
-        torus_edge = np.unique(same, return_inverse=True)[1]
+        low_edge = representatives(mesh.points[edges].mean(axis=1), mesh.width, mesh.height)
+        torus_edge = np.unique(low_edge, return_inverse=True)[1]
         one, other = edge_pairs(torus_edge[triangle_edges])
         same = mesh.phase[one] == mesh.phase[other]
         label = components(len(mesh.triangles), one[same], other[same])
@@ -86,7 +84,7 @@ class Torus:
 
     @cached_property
     def debonded(self) -> Bool:
-        """(torus edges,) which are debonded from the start."""
+        """Mask (torus edges,) of the edges that are debonded from the start."""
         debonded = np.zeros(len(self.edge_keys), bool)
         debonded[self.torus_edge[self.plane_edges(self.mesh.debonded_edges)]] = True
         return debonded
@@ -118,13 +116,13 @@ class Torus:
 
     @cached_property
     def edge_ends(self) -> Int:
-        """(torus edges, 2) classes of the ends of each."""
+        """Classes (torus edges, 2) at the ends of each edge."""
         plane = np.unique(self.torus_edge, return_index=True)[1]
         return np.asarray(self.node_class[self.edges[plane]])
 
     @cached_property
     def meeting(self) -> Int:
-        """(classes,) number of the constituents that meet in each."""
+        """Number (classes,) of the constituents that meet in each class."""
         corner, n = self.node_class[self.mesh.triangles], int(self.constituent.max(initial=0)) + 1
         pairs = np.unique(corner * n + self.constituent[:, None])
         return np.bincount(pairs // n, minlength=len(self.class_keys))
@@ -169,10 +167,7 @@ class Torus:
     def plane_edges(self, pairs: Int32) -> Int:
         """(k,) plane edge between each pair (k, 2) of plane nodes."""
         n = len(self.mesh.points)
-        key = np.sort(self.edges, axis=1) @ [n, 1]
-        order = np.argsort(key)
-        place = np.searchsorted(key[order], np.sort(pairs.astype(np.int64), axis=1) @ [n, 1])
-        return np.asarray(order[place])
+        return np.asarray(np.searchsorted(np.sort(self.edges, axis=1) @ [n, 1], edge_keys(pairs, n)))
 
     @cached_property
     def constituent_phase(self) -> Int:
@@ -182,7 +177,7 @@ class Torus:
 
     @cached_property
     def nesting(self) -> Int:
-        """(constituents,) places from the outermost to the innermost.
+        """Ranks (constituents,) from the outermost to the innermost.
 
         By the number of constituents between it and the matrix, a coating before the fibre within, and then by number.
         """
@@ -194,7 +189,7 @@ class Torus:
         return places_by_depth(depth, phase, self.mesh.phases)
 
     def plane_parts(self) -> Int:
-        """(m,) constituents cut by the cell's boundary, as the paper's Fig. 2a does (`bodies = "plane"`)."""
+        """Cut the constituents (m,) at the cell's boundary, as in the paper's Fig. 2a (`bodies = "plane"`)."""
         one, other = edge_pairs(self.triangle_edges)
         same = self.constituent[one] == self.constituent[other]
         label = components(len(self.constituent), one[same], other[same])
@@ -202,7 +197,7 @@ class Torus:
 
 
 def places_by_depth(depth: Float | Int, phase: Int, phases: tuple[str, ...]) -> Int:
-    """(n,) places from the outermost to the innermost constituent, by depths (n,) in the matrix.
+    """Rank n constituents from the outermost to the innermost, by depths (n,) in the matrix.
 
     A coating is before the fibre within, and then they go by number; `phase` (n,) are phase numbers.
     """
@@ -223,7 +218,7 @@ def components(n: int, one: Int, other: Int) -> Int:
 
 
 def present(numbers: Int | Int32, size: int) -> tuple[Int, Int]:
-    """(k,) the numbers, below `size`, that are present, ascending, and the place of each among them."""
+    """Return the distinct numbers (k,), all below `size`, ascending, and the index of each entry in them."""
     if numbers.size < FEW * size:
         members, place = np.unique(numbers, return_inverse=True)
         return np.asarray(members), np.asarray(place.reshape(numbers.shape))
@@ -244,12 +239,10 @@ def renumber(label: Int, order: Int) -> Int:
 
 
 def plane_edges_of(mesh: CoarseMesh) -> tuple[Int, Int]:
-    """Return `edges` (e, 2) and `triangle_edges` (m, 3), as in `Torus`."""
-    triangles = mesh.triangles.astype(np.int64)
-    ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
-    n = len(mesh.points)
-    keys, which = np.unique(ends.min(axis=1) * n + ends.max(axis=1), return_inverse=True)
-    edges = np.stack([keys // n, keys % n], axis=1)
+    """Find the plane edges: `edges` (e, 2) and `triangle_edges` (m, 3), as in `Torus`."""
+    ends = np.stack([mesh.triangles, np.roll(mesh.triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+    keys, which = np.unique(edge_keys(ends, len(mesh.points)), return_inverse=True)
+    edges = np.stack(np.divmod(keys, len(mesh.points)), axis=1)
     (xa, ya), (xb, yb) = mesh.points[edges[:, 0]].T, mesh.points[edges[:, 1]].T
     backwards = (xa > xb) | ((xa == xb) & (ya > yb))
     edges[backwards] = edges[backwards, ::-1]

@@ -1,4 +1,4 @@
-"""Uniform refinement of one subdomain, on its own rank and without communication, and its elimination order.
+"""Refine one subdomain uniformly, on its rank without communication, and order its nodes for elimination.
 
 Each coarse triangle carries a lattice with M = order * 2**refine intervals a side.  A fine node is a coarse
 vertex, the p-th lattice node of a coarse edge, or interior to a coarse triangle; so its identity (on the
@@ -22,7 +22,7 @@ from feti_homog.mesh.periodic_topology import edge_pairs
 from feti_homog.mesh.submeshes import Submesh
 from feti_homog.typing import Bool, Float, Int, Int32
 
-# Share of the triangles of a part by which a cut may be off the middle.
+# Fraction of a part's triangles by which a cut may be off the middle.
 OFF_THE_MIDDLE = 0.1
 # Intervals a side from which on the nodes inside a coarse triangle are ordered likewise: below, they are few.
 MANY_INTERVALS = 8
@@ -78,18 +78,18 @@ class ReferenceLattice:
         return (self.intervals // self.order).bit_length() - 1
 
     def coarser(self, fewer: int = 1) -> ReferenceLattice:
-        """Return the lattice of fewer halvings."""
+        """Return the lattice with `fewer` halvings less."""
         return ReferenceLattice.of(self.halvings - fewer, self.order)
 
     def within(self, finer: ReferenceLattice) -> Int:
-        """(q,) place of its nodes in a lattice with more halvings."""
+        """Positions (q,) of the nodes of this lattice in a finer lattice."""
         number = np.empty((finer.intervals + 1,) * 2, np.int64)
         number[finer.nodes[:, 1], finer.nodes[:, 2]] = np.arange(len(finer.nodes))
         _, i, j = (finer.intervals // self.intervals * self.nodes).T
         return np.asarray(number[i, j])
 
     def number(self, vertices: Int, edges: Int, backwards: Bool, n_vertices: int, n_edges: int) -> Int:
-        """(t, q) node numbers: vertices first, then M - 1 nodes an edge along its direction, then interiors."""
+        """Node numbers (t, q): vertices, then M - 1 nodes per edge along its direction, then interiors."""
         inner = self.intervals - 1
         p = np.arange(inner)
         along = np.where(backwards[..., None], inner - 1 - p, p)
@@ -121,28 +121,52 @@ class FineMesh:
 
     @property
     def triangles(self) -> Int32:
-        """(m, 3 or 6) plane nodes of the elements; vertices, then mid-edge nodes 01, 12, 20."""
+        """Plane nodes (m, 3 or 6) of the elements: vertices, then mid-edge nodes 01, 12, 20."""
         elements = self.lattice.triangles
         return self.nodes[:, elements].reshape(-1, elements.shape[1])
 
 
 def refine(submesh: Submesh, lattice: ReferenceLattice) -> FineMesh:
-    """Refine the subdomain; new nodes on circles and ellipses lie on them."""
+    """Refine the subdomain; new nodes on circles and ellipses lie on them.
+
+    x = sum_k b_k x_k + sum_edges (1 - b_o)^2 delta(s): delta is the arc's distance from its chord at
+    s = b_b / (b_a + b_b), b_o the coordinate of the vertex opposite.  Mid-edge nodes of quadratic
+    elements are midpoints except on the arcs, so only elements at an arc are curved.
+    """
     edges, back, inner = submesh.triangle_edges, submesh.backwards, lattice.intervals - 1
     plane = lattice.number(submesh.triangles, edges, back, len(submesh.points), len(submesh.edges)).astype(np.int32)
     n_classes, n_edges = len(submesh.class_keys), len(submesh.edge_keys)
     torus = lattice.number(submesh.vertex_class[submesh.triangles], submesh.edge_class[edges], back, n_classes, n_edges)
-    n = len(submesh.points) + len(submesh.edges) * inner + len(plane) * (len(lattice.nodes) - 3 - 3 * inner)
+    interior = len(plane) * (len(lattice.nodes) - 3 - 3 * inner)
+    n = len(submesh.points) + len(submesh.edges) * inner + interior
     points, node_class = np.empty((n, 2)), np.empty(n, np.int32)
-    points[plane] = _positions(submesh, lattice)
     node_class[plane] = torus
-    c = n_classes + n_edges * inner + n - len(submesh.points) - len(submesh.edges) * inner
-    curved = (submesh.turns[edges] > 0).any(axis=1)
-    return FineMesh(points, plane, curved, node_class, c, lattice)
+    b, on_arc = lattice.nodes / lattice.intervals, submesh.turns[edges] > 0
+    x = b @ submesh.points[submesh.triangles]
+    for k in range(3):
+        curved = np.flatnonzero(on_arc[:, k])
+        edge = edges[curved, k]
+        a, c = (submesh.points[submesh.triangles[curved, end % 3], None] for end in (k, k + 1))
+        span = 1 - b[:, (k + 2) % 3]
+        s = np.divide(b[:, (k + 1) % 3], span, out=np.zeros_like(span), where=span > 0)
+        centre, turn = submesh.circles[edge, None, :2], submesh.turns[edge, None]
+        # Points that cut the arc in the ratio s of its parameters: an affine map takes the arc of a circle, where
+        # spokes have these weights, to the arc of an ellipse.
+        weight_a, weight_c = np.sin((1 - s) * turn)[..., None], np.sin(s * turn)[..., None]
+        arc = centre + (weight_a * (a - centre) + weight_c * (c - centre)) / np.sin(turn)[..., None]
+        x[curved] += span[:, None] ** 2 * (arc - (a + s[None, :, None] * (c - a)))
+    if lattice.order == 2:
+        corners, middles = lattice.triangles[:, :3], lattice.triangles[:, 3:]
+        midway = (x[:, corners] + x[:, np.roll(corners, -1, axis=1)]) / 2
+        on_edge = lattice.nodes[middles][..., [2, 0, 1]] == 0
+        is_bent = (on_arc[:, None, None, :] & on_edge).any(axis=3)
+        x[:, middles] = np.where(is_bent[..., None], x[:, middles], midway)
+    points[plane] = x
+    return FineMesh(points, plane, on_arc.any(axis=1), node_class, n_classes + n_edges * inner + interior, lattice)
 
 
 def joined(meshes: Sequence[FineMesh]) -> FineMesh:
-    """Return meshes of one lattice as one, one after the other, with no node in common."""
+    """Concatenate meshes with the same lattice; they share no nodes."""
     nodes = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
     classes = np.cumsum([0, *(mesh.n_classes for mesh in meshes)])
     return FineMesh(
@@ -160,39 +184,8 @@ def edge_node(n_classes: int, edge: Int, position: Int, lattice: ReferenceLattic
     return n_classes + edge * (lattice.intervals - 1) + position - 1
 
 
-def _positions(submesh: Submesh, lattice: ReferenceLattice) -> Float:
-    """(t, q, 2) lattice nodes of each coarse triangle, bent towards its curved edges.
-
-    x = sum_k b_k x_k + sum_edges (1 - b_o)^2 delta(s): delta is the arc's distance from its chord at
-    s = b_b / (b_a + b_b), b_o the coordinate of the vertex opposite.  Mid-edge nodes of quadratic
-    elements are midpoints except on the arcs, so only elements at an arc are curved.
-    """
-    b = lattice.nodes / lattice.intervals
-    x = b @ submesh.points[submesh.triangles]
-    for k in range(3):
-        edge = submesh.triangle_edges[:, k]
-        curved = np.flatnonzero(submesh.turns[edge] > 0)
-        a, c = (submesh.points[submesh.triangles[curved, end % 3], None] for end in (k, k + 1))
-        span = 1 - b[:, (k + 2) % 3]
-        s = np.divide(b[:, (k + 1) % 3], span, out=np.zeros_like(span), where=span > 0)
-        centre, turn = submesh.circles[edge[curved], None, :2], submesh.turns[edge[curved], None]
-        # Points that cut the arc in the ratio s of its parameters: an affine map takes the arc of a circle, where
-        # spokes have these weights, to the arc of an ellipse.
-        weight_a, weight_c = np.sin((1 - s) * turn)[..., None], np.sin(s * turn)[..., None]
-        arc = centre + (weight_a * (a - centre) + weight_c * (c - centre)) / np.sin(turn)[..., None]
-        x[curved] += span[:, None] ** 2 * (arc - (a + s[None, :, None] * (c - a)))
-    if lattice.order == 2:
-        # Mid-edge nodes are midway between their vertices, save on arcs.
-        corners, middles = lattice.triangles[:, :3], lattice.triangles[:, 3:]
-        midway = (x[:, corners] + x[:, np.roll(corners, -1, axis=1)]) / 2
-        on_edge = lattice.nodes[middles][..., [2, 0, 1]] == 0
-        on_arc = ((submesh.turns[submesh.triangle_edges] > 0)[:, None, None, :] & on_edge).any(axis=3)
-        x[:, middles] = np.where(on_arc[..., None], x[:, middles], midway)
-    return x
-
-
 def elimination_order(mesh: FineMesh) -> Int:
-    """(c,) node classes in elimination order."""
+    """Return the node classes (c,) in elimination order."""
     lattice = mesh.lattice
     inside = np.arange(len(lattice.nodes))
     if lattice.intervals >= MANY_INTERVALS:
@@ -202,14 +195,12 @@ def elimination_order(mesh: FineMesh) -> Int:
 
 
 def _dissected(centres: Float, nodes: Int | Int32, inside: Int) -> Int:
-    """(n,) nodes in order, for triangles with `centres` (t, 2) and `nodes` (t, q), corners first.
+    """Return nodes (n,) in order, for triangles with `centres` (t, 2) and `nodes` (t, q), corners first.
 
-    Nodes in a single triangle are ordered by their places `inside` (q,).
+    Nodes in a single triangle are ordered by `inside` (q,).
     """
-    size, leaf = (
-        int(nodes.max()) + 1,
-        _halved(centres, edge_pairs(edge_keys(edges(np.asarray(nodes[:, :3], np.int32)), int(nodes.max()) + 1))),
-    )
+    size = int(nodes.max()) + 1
+    leaf = _halved(centres, edge_pairs(edge_keys(edges(np.asarray(nodes[:, :3], np.int32)), size)))
     by_leaf = np.argsort(leaf)
     of_leaf, node = np.repeat(leaf[by_leaf], nodes.shape[1]), nodes[by_leaf].ravel()
     first, last, place = np.empty((3, size), np.int64)
@@ -220,42 +211,37 @@ def _dissected(centres: Float, nodes: Int | Int32, inside: Int) -> Int:
 
 
 def _halved(centres: Float, neighbours: tuple[Int, Int]) -> Int:
-    """(t,) leaf number for each triangle in a binary tree whose parts are halved; some leaves are empty."""
+    """Bisect the triangles recursively; return leaf numbers (t,) of a binary tree, some of which are empty.
+
+    A part is cut along x or y where fewer sides between `neighbours` are crossed, nearly in its middle.
+    """
     t, first = len(centres), np.array([0, len(centres)])
-    order = np.arange(t)
     by_coordinate = [np.argsort(x, kind="stable") for x in centres.T]
-    part = np.zeros(t, np.int64)
+    order, part, rank = np.arange(t), np.zeros(t, np.int64), np.empty(t, np.int64)
     while (size := np.diff(first)).max() > 1:
         of_place = np.repeat(np.arange(len(size)), size)
         part[order] = of_place
-        cuts = [_cut(along[np.argsort(part[along], kind="stable")], part, first, neighbours) for along in by_coordinate]
-        (order_x, at_x, crossed_x), (order_y, at_y, crossed_y) = cuts
-        by_y = crossed_y < crossed_x
+        within = part[neighbours[0]] == part[neighbours[1]]
+        offset = np.abs(np.arange(t) - np.repeat((first[:-1] + first[1:]) / 2, size))
+        middle = np.flatnonzero(offset <= np.repeat(np.maximum(OFF_THE_MIDDLE * size, 0.5), size))
+        cuts = []
+        for along in by_coordinate:
+            # One part after the other; sides are crossed at the places between their two triangles.
+            along = along[np.argsort(part[along], kind="stable")]
+            rank[along] = np.arange(t)
+            one, other = (rank[side][within] for side in neighbours)
+            begin, end = np.minimum(one, other) + 1, np.maximum(one, other) + 1
+            crossed = np.cumsum(np.bincount(begin, minlength=t + 1) - np.bincount(end, minlength=t + 1))[:t]
+            cost = crossed[middle] + offset[middle] / t
+            best = np.lexsort((cost, of_place[middle]))
+            best = best[np.minimum(np.searchsorted(of_place[middle], np.arange(len(size))), len(best) - 1)]
+            cuts.append((along, middle[best], cost[best]))
+        (order_x, at_x, cost_x), (order_y, at_y, cost_y) = cuts
+        by_y = (cost_y < cost_x) & (size > 1)
         order = np.where(by_y[of_place], order_y, order_x)
         halves = np.empty(2 * len(first) - 1, np.int64)
-        halves[::2], halves[1::2] = first, np.where(by_y, at_y, at_x)
+        halves[::2], halves[1::2] = first, np.where(size < 2, first[1:], np.where(by_y, at_y, at_x))
         first = halves
     leaf = np.empty(t, np.int64)
     leaf[order] = np.repeat(np.arange(len(first) - 1), np.diff(first))
     return leaf
-
-
-def _cut(order: Int, part: Int, first: Int, neighbours: tuple[Int, Int]) -> tuple[Int, Int, Float]:
-    """Return the triangle order, the place where it cuts each part, and how many sides are crossed.
-
-    `order` (t,) has one `part` after the other, which begin at `first`.
-    """
-    t, size = len(order), np.diff(first)
-    place = np.empty(t, np.int64)
-    place[order] = np.arange(t)
-    one, other = (place[side] for side in neighbours)
-    within = part[neighbours[0]] == part[neighbours[1]]
-    begin, end = np.minimum(one, other)[within] + 1, np.maximum(one, other)[within] + 1
-    crossed = np.cumsum(np.bincount(begin, minlength=t + 1) - np.bincount(end, minlength=t + 1))[:t]
-    offset = np.abs(np.arange(t) - np.repeat((first[:-1] + first[1:]) / 2, size))
-    middle = np.flatnonzero(offset <= np.repeat(np.maximum(OFF_THE_MIDDLE * size, 0.5), size))
-    cost = crossed[middle] + offset[middle] / t
-    sought = np.lexsort((cost, part[order[middle]]))
-    best = sought[np.minimum(np.searchsorted(part[order[middle]], np.arange(len(size))), len(sought) - 1)]
-    alone = size < 2
-    return order, np.where(alone, first[1:], middle[best]), np.where(alone, 0.0, cost[best])

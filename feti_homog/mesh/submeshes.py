@@ -1,4 +1,4 @@
-"""The coarse share of one subdomain: all that a rank needs to refine it by itself."""
+"""Cut the coarse mesh into subdomains, with all data that a rank needs to refine them by itself."""
 
 from __future__ import annotations
 
@@ -88,13 +88,6 @@ class SubdomainTable:
         return cls(body, rank, torus.nesting, torus.constituent_phase, across)
 
 
-def cut(torus: Torus, subdomain: Int) -> Iterator[Submesh]:
-    """Cut the coarse cell into its subdomains; `subdomain` (m,) numbers each triangle's, from 0 without gaps."""
-    table = SubdomainTable.of(torus, subdomain, np.zeros(subdomain.max() + 1, np.int64))
-    for rank in cut_for_ranks(torus, subdomain, table, 1, pinned_class(torus)):
-        yield from rank.cut()
-
-
 @dataclass(frozen=True)
 class SubmeshesOfRank:
     """One rank's subdomains before it cuts them apart.
@@ -113,11 +106,11 @@ class SubmeshesOfRank:
 
     @property
     def loads(self) -> Int:
-        """Coarse triangles of each."""
+        """Number of coarse triangles in each subdomain."""
         return np.bincount(self.member, minlength=len(self.index))
 
     def cut(self) -> list[Submesh]:
-        """Return the subdomains."""
+        """Cut the subdomains apart."""
         order = np.argsort(self.member, kind="stable")
         members = np.split(order, np.cumsum(self.loads))[:-1]
         pieces = [part(self.whole, triangles) for triangles in members]
@@ -147,7 +140,7 @@ def cut_for_ranks(
 
 
 def cut_bodies(torus: Torus, members: Int) -> Iterator[Submesh]:
-    """Yield the triangles `members` (m,) as a submesh for each constituent that has some; none is pinned."""
+    """Yield the triangles `members` (m,) as one submesh per constituent; none is pinned."""
     order = members[np.argsort(torus.constituent[members], kind="stable")]
     ends = np.flatnonzero(np.diff(torus.constituent[order])) + 1
     everything = _whole(torus, -1)
@@ -156,7 +149,7 @@ def cut_bodies(torus: Torus, members: Int) -> Iterator[Submesh]:
 
 
 def part(submesh: Submesh, members: Int) -> Submesh:
-    """Return the coarse triangles `members` (m,) of a submesh, as a submesh of its own."""
+    """Restrict a submesh to the coarse triangles `members` (m,)."""
     vertices, triangles = present(submesh.triangles[members], len(submesh.points))
     edges, triangle_edges = present(submesh.triangle_edges[members], len(submesh.edges))
     classes, vertex_class = present(submesh.vertex_class[vertices], len(submesh.class_keys))
@@ -210,7 +203,7 @@ def pinning(torus: Torus, unfit: Int) -> list[tuple[int, float, int]]:
 
 
 def _whole(torus: Torus, pinned: int) -> Submesh:
-    """Return all triangles as one submesh, without body and phase; `pinned` is the pinned class key."""
+    """Make one submesh of all triangles, without body and phase; `pinned` is the pinned class key."""
     mesh = torus.mesh
     pinned_here = np.flatnonzero(torus.class_keys == pinned)
     return Submesh(
@@ -238,7 +231,7 @@ def _whole(torus: Torus, pinned: int) -> Submesh:
 
 
 def joined(parts: Sequence[SubmeshesOfRank]) -> SubmeshesOfRank:
-    """Join subdomains, each of which is in one part."""
+    """Join the subdomains of all parts, in ascending order."""
     index = _all(parts, "index")
     order = np.argsort(index)
     phase = [name for part in parts for name in part.phase]
@@ -278,7 +271,7 @@ def joined_meshes(meshes: list[Submesh]) -> Submesh:
 
 
 def _all(parts: Sequence[object], name: str) -> Array:
-    """Concatenate the arrays of that name of all parts."""
+    """Concatenate the arrays `name` of all parts."""
     return np.concatenate([getattr(part, name) for part in parts])
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice, refine
-from feti_homog.mesh.submeshes import cut
+from support.subdomains import cut
 
 
 def polar_cell(

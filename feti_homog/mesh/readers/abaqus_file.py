@@ -1,7 +1,7 @@
 """Read the triangles and the lines of an Abaqus input file (.inp)."""
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -48,7 +48,7 @@ def load(path: Path) -> RawMesh:
             raise MeshError(f"line {block.number}, *{block.word}: {error}") from None
     if faults := content.faults():
         raise MeshError(*faults)
-    return _raw(content)
+    return content.raw_mesh()
 
 
 @dataclass
@@ -109,7 +109,7 @@ class _Content:
             self.nodes[number] = [*map(_real, place[:3]), 0.0, 0.0][:3]
 
     def _take_elements(self, block: KeywordBlock) -> None:
-        """Take elements, whose type gives the numbers of nodes that they may have."""
+        """Read elements and check their node counts against their type."""
         kind = block.parameters.get("TYPE", "").upper()
         counts = next((sizes for pattern, sizes in SIZES.items() if re.fullmatch(pattern, kind)), ())
         if not counts:
@@ -127,51 +127,32 @@ class _Content:
                 self.sets.setdefault((BY_ELEMENTS, block.parameters["ELSET"]), set()).add(tag)
 
     def _take_set(self, block: KeywordBlock) -> None:
+        """Read the members of a set: numbers, names of sets or, with GENERATE, ranges with a step (default 1)."""
         members = self.sets.setdefault((BY_SET, block.parameter("ELSET")), set())
         for row in block.rows:
-            for part in self._range(row) if "GENERATE" in block.parameters else self._parts(row):
+            parts: Iterable[Collection[int]] = (
+                {_integer(word)} if word.isdecimal() else self.members(name_of(word)) for word in row if word
+            )
+            if "GENERATE" in block.parameters:
+                first, last, step = [*map(_integer, row), 1][:3] if len(row) in (2, 3) else (0, 0, 0)
+                if step < 1 or last < first:
+                    raise ValueError(f"{', '.join(row)}: expected the first element, the last and a step of at least 1")
+                parts = [range(first, last + 1, step)]
+            for part in parts:
                 self.budget -= len(part)
                 if self.budget < 0:
                     raise ValueError("its sets have more members than a file of this length can have elements")
                 members.update(part)
 
-    def _range(self, row: list[str]) -> Iterator[range]:
-        """Yield the numbers from the first to the last, in steps by the third or one."""
-        first, last, step = [*map(_integer, row), 1][:3] if len(row) in (2, 3) else (0, 0, 0)
-        if step < 1 or last < first:
-            raise ValueError(f"{', '.join(row)}: expected the first element, the last and a step of at least 1")
-        yield range(first, last + 1, step)
-
-    def _parts(self, row: list[str]) -> Iterator[set[int]]:
-        return ({_integer(word)} if word.isdecimal() else self.members(name_of(word)) for word in row if word)
-
     def members(self, name: str) -> set[int]:
-        """Return the elements of a set, however it was made."""
+        """Return the elements of a set: by section, by *ELSET or by *ELEMENT."""
         levels = [self.sets[level, name] for level in (BY_SECTION, BY_SET, BY_ELEMENTS) if (level, name) in self.sets]
         if not levels:
             raise ValueError(f'there is no element set "{name}"')
         return set().union(*levels)
 
-    def labels(self) -> dict[int, tuple[str, ...]]:
-        """Return the names of the sets from which each element has its phase."""
-        labels: dict[int, tuple[str, ...]] = {}
-        for level in (BY_ELEMENTS, BY_SET, BY_SECTION):
-            labels |= _names_of((name, members) for (priority, name), members in self.sets.items() if priority == level)
-        return labels
-
-    def curves(self) -> dict[str, Int]:
-        """Return the nodes (d, 2) at the ends of the lines in each set that has no triangles."""
-        labels = self.labels()
-        with_triangles = {name for tag in self.triangles for name in labels.get(tag, ())}
-        ends: dict[str, list[list[int]]] = {}
-        for tag, nodes in self.lines.items():
-            for name in labels.get(tag, ()):
-                if name not in with_triangles:
-                    ends.setdefault(name, []).append([nodes[0], nodes[-1]])
-        return {name: np.array(pairs, np.int64) for name, pairs in ends.items()}
-
     def faults(self) -> list[str]:
-        """List the lack of triangles, unknown nodes, sections of unknown sets."""
+        """List missing triangles, unknown nodes and sections with unknown sets."""
         faults = [] if self.triangles else ["no triangles in it"]
         elements = self.triangles | self.lines
         lost = ((tag, node) for tag, nodes in elements.items() for node in nodes if node not in self.nodes)
@@ -180,29 +161,42 @@ class _Content:
         unknown = (name for name in self.materials if name not in named)
         return faults + [f'a section names the element set "{name}": there is none' for name in unknown]
 
+    def raw_mesh(self) -> RawMesh:
+        """Group the triangles by the names of their sets, and add the line sets."""
+        made_of = [(material, self.members(name)) for name, material in self.materials.items()]
+        # Sets that sections name have the phases, unless only the materials of the sections have their names.
+        by_material = "matrix" in self.materials.values() and "matrix" not in self.materials
+        for name, (material, members) in zip(self.materials, made_of, strict=True):
+            self.sets.setdefault((BY_SECTION, material if by_material else name), set()).update(members)
+        labels: dict[int, tuple[str, ...]] = {}
+        for level in (BY_ELEMENTS, BY_SET, BY_SECTION):
+            labels |= _names_of((name, members) for (priority, name), members in self.sets.items() if priority == level)
+        names = _names_of(made_of + [(name, members) for (_, name), members in self.sets.items()])
+        names_of = {tag: (labels.get(tag, ()), names.get(tag, ())) for tag in self.triangles}
+        place = {pair: k for k, pair in enumerate(dict.fromkeys(names_of.values()))}
+        parts = []
+        for count in sorted(set(map(len, self.triangles.values()))):
+            triangles = {tag: nodes for tag, nodes in self.triangles.items() if len(nodes) == count}
+            group = np.array([place[names_of[tag]] for tag in triangles])
+            parts.append(Block(np.array([*triangles]), np.array([*triangles.values()]), group))
+        groups, aliases = zip(*place, strict=True)
+        numbers, points = np.fromiter(self.nodes, np.int64), np.array(list(self.nodes.values()))
+        curves = self._curves(labels)
+        return assembled(numbers, points, parts, groups, curves, ("element set", "element set"), aliases)
 
-def _raw(content: _Content) -> RawMesh:
-    made_of = [(material, content.members(name)) for name, material in content.materials.items()]
-    # Sets that sections name have the phases, unless only the materials of the sections have their names.
-    by_material = "matrix" in content.materials.values() and "matrix" not in content.materials
-    for name, (material, members) in zip(content.materials, made_of, strict=True):
-        content.sets.setdefault((BY_SECTION, material if by_material else name), set()).update(members)
-    labels = content.labels()
-    all_names = _names_of(made_of + [(name, members) for (_, name), members in content.sets.items()])
-    names_of = {tag: (labels.get(tag, ()), all_names.get(tag, ())) for tag in content.triangles}
-    place = {names: k for k, names in enumerate(dict.fromkeys(names_of.values()))}
-    groups, aliases = zip(*place, strict=True)
-    parts = []
-    for count in sorted(set(map(len, content.triangles.values()))):
-        triangles = {tag: nodes for tag, nodes in content.triangles.items() if len(nodes) == count}
-        group = np.array([place[names_of[tag]] for tag in triangles])
-        parts.append(Block(np.array([*triangles]), np.array([*triangles.values()]), group))
-    numbers, points = np.fromiter(content.nodes, np.int64), np.array(list(content.nodes.values()))
-    return assembled(numbers, points, parts, groups, content.curves(), ("element set", "element set"), aliases)
+    def _curves(self, labels: Mapping[int, tuple[str, ...]]) -> dict[str, Int]:
+        """Return the end nodes (d, 2) of the lines in each set without triangles."""
+        with_triangles = {name for tag in self.triangles for name in labels.get(tag, ())}
+        ends: dict[str, list[list[int]]] = {}
+        for tag, nodes in self.lines.items():
+            for name in labels.get(tag, ()):
+                if name not in with_triangles:
+                    ends.setdefault(name, []).append([nodes[0], nodes[-1]])
+        return {name: np.array(pairs, np.int64) for name, pairs in ends.items()}
 
 
 def _names_of(sets: Iterable[tuple[str, set[int]]]) -> dict[int, tuple[str, ...]]:
-    """Return the names, each once, of the sets that each element is in."""
+    """Return the set names of each element, without repetition."""
     names: dict[int, dict[str, None]] = {}
     for name, members in sets:
         for tag in members:
@@ -211,14 +205,14 @@ def _names_of(sets: Iterable[tuple[str, set[int]]]) -> dict[int, tuple[str, ...]
 
 
 def _integer(word: str) -> int:
-    """Return the whole number that a word is; ValueError if it is none."""
+    """Convert a word into a whole number; ValueError for other words."""
     if not re.fullmatch(r"[+-]?[0-9]{1,15}", word):
         raise ValueError(f"{wording.toml_value(word)}: expected a whole number of at most 15 digits")
     return int(word)
 
 
 def _real(word: str) -> float:
-    """Return the number that a word is; ValueError if it is none."""
+    """Convert a word into a real number; ValueError for other words."""
     try:
         if "_" not in word and word.isascii():
             return float(word.upper().replace("D", "E"))  # 1.0D+00 is Fortran's

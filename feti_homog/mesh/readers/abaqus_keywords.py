@@ -1,9 +1,9 @@
-"""Blocks of an Abaqus input file, and which of its keywords make a mesh."""
+"""Split an Abaqus input file into keyword blocks, and recognize the keywords that make a mesh."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from feti_homog.errors import MeshError
@@ -70,16 +70,30 @@ class KeywordBlock:
 
     @classmethod
     def begun(cls, number: int, line: str) -> KeywordBlock:
-        """Return the block of a keyword line: *ELEMENT, TYPE=CPE3 has the parameter TYPE."""
+        """Begin the block of a keyword line: *ELEMENT, TYPE=CPE3 has the parameter TYPE.
+
+        Raises:
+            MeshError: the keyword is unknown, or a parameter that is not read may matter.
+        """
         word, *rest = (part.strip() for part in line[1:].split(","))
         try:
             keyword = resolved(word)
-            return cls(number, word, keyword, _parameters(keyword, filter(None, rest)))
         except ValueError as error:
             raise MeshError(f"line {number}, *{word}: {error}") from None
+        names = OF_SECTIONS if keyword.endswith("SECTION") else READ.get(keyword) or ()
+        parameters = {}
+        for part in filter(None, rest):
+            name, _, value = part.partition("=")
+            name = name.strip().upper()
+            longer = [full for full in names if full.startswith(name)]
+            parameters[longer[0] if len(longer) == 1 and name not in names else name] = name_of(value)
+        if READ.get(keyword) and (unread := [name for name in parameters if name not in names]):
+            fault = f"its parameter {wording.toml_value(unread[0])} is not read"
+            raise MeshError(f"line {number}, *{word}: {fault}: write nodes and elements out without it")
+        return cls(number, word, keyword, parameters)
 
     def parameter(self, name: str) -> str:
-        """Return a parameter; a fault if it is missing."""
+        """Return a parameter; ValueError if it is missing."""
         if name not in self.parameters:
             raise ValueError(f"no {name}")
         return self.parameters[name]
@@ -112,7 +126,7 @@ def blocks(text: str) -> Iterator[KeywordBlock]:
 
 
 def resolved(word: str) -> str:
-    """Return the full keyword of a word, empty if the keyword makes no nodes or elements.
+    """Complete an abbreviated keyword; empty if it makes no nodes or elements.
 
     Blanks and capitals do not matter. A keyword may be abbreviated if no other one begins in the same way.
 
@@ -131,23 +145,7 @@ def resolved(word: str) -> str:
     return keywords.pop()
 
 
-def _parameters(keyword: str, parts: Iterable[str]) -> dict[str, str]:
-    """Return a keyword's parameters by their full names; ValueError if an unread one may matter."""
-    names = OF_SECTIONS if keyword.endswith("SECTION") else READ.get(keyword) or ()
-    values = {}
-    for word in parts:
-        name, _, value = word.partition("=")
-        name = name.strip().upper()
-        longer = [full for full in names if full.startswith(name)]
-        values[longer[0] if len(longer) == 1 and name not in names else name] = name_of(value)
-    if READ.get(keyword) and (unread := [name for name in values if name not in names]):
-        raise ValueError(
-            f"its parameter {wording.toml_value(unread[0])} is not read: write nodes and elements out without it"
-        )
-    return values
-
-
 def name_of(word: str) -> str:
-    """Return a name in lower case unless it is quoted."""
+    """Convert a name to lower case unless it is quoted."""
     word = word.strip()
     return word[1:-1] if word[:1] == '"' else word.lower()

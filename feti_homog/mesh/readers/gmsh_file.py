@@ -12,7 +12,6 @@ import re
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import ModuleType
@@ -63,7 +62,7 @@ class MshContent:
 
     @classmethod
     def of(cls, gmsh: ModuleType) -> MshContent:
-        """Return gmsh's model."""
+        """Copy the mesh of gmsh's current model."""
         model = gmsh.model
         tags, points, _ = model.mesh.getNodes()
         groups, blocks = {}, defaultdict[int, list[Elements]](list)
@@ -86,7 +85,7 @@ class MshContent:
 
 
 def load(path: Path) -> RawMesh:
-    """Read the triangles of a file; only their kind and their numbers are checked.
+    """Read the triangles of a .msh file and check their kind and numbers only.
 
     Raises:
         OSError: it cannot be read.
@@ -107,14 +106,21 @@ def load(path: Path) -> RawMesh:
     read = sum(len(numbers) for numbers, *_ in content.elements.values())
     if read != count:
         raise MeshError(f"$Elements: {count} elements are announced, and {read} are there, each with its own number")
-    return raw_mesh(replace(content, names=_names(sections.get("PhysicalNames", b"\n0"))))
+    text = sections.get("PhysicalNames", b"\n0")
+    entries = NAME.findall(text)
+    if text.split(maxsplit=1)[:1] != [str(len(entries)).encode()]:
+        raise MeshError(f"$PhysicalNames: {len(entries)} names, and not as many as its first line announces")
+    names = {(int(dimension), int(number)): name.decode(errors="replace") for dimension, number, name in entries}
+    if len(names) < len(entries):
+        raise MeshError("$PhysicalNames: one of the numbers has two names")
+    return raw_mesh(replace(content, names=names))
 
 
 def raw_mesh(content: MshContent) -> RawMesh:
-    """Return the triangles and curves; MeshError if there are other elements."""
-    elements, curves = content.elements, _curves(content)
-    if faults := _misnumbered(content) or _other_kinds(content):
+    """Convert content into triangles and curves; MeshError if it has other elements."""
+    if faults := _faults(content):
         raise MeshError(*faults)
+    elements, curves = content.elements, _curves(content)
     if not len(curves.get(DEBONDED, (0,))):
         raise MeshError(f'no lines in the physical curve "{DEBONDED}"')
     blocks, groups = list[Block](), list[tuple[int, ...]]()
@@ -122,14 +128,13 @@ def raw_mesh(content: MshContent) -> RawMesh:
         entities = np.unique(entity)
         blocks.append(Block(numbers, nodes, len(groups) + np.searchsorted(entities, entity)))
         groups += [content.groups.get((2, number), ()) for number in entities.tolist()]
-    names, aliases = (
-        [tuple(map(name, group)) for group in groups] for name in (partial(content.name, 2), "number {}".format)
-    )
+    names = [tuple(content.name(2, number) for number in group) for group in groups]
+    aliases = [tuple(map("number {}".format, group)) for group in groups]
     return assembled(content.tags, content.points, blocks, names, curves, aliases=aliases)
 
 
 def _sections(content: bytes) -> dict[str, bytes]:
-    """Return the text of each section that makes the mesh, from the end of its first line on."""
+    """Split a file into sections: their text behind the first line, by name."""
     start = content[:4096].lstrip()
     if start.startswith(b"$NOD"):
         raise MeshError("format 1 of gmsh: save it in format 2.2 or 4.1")
@@ -157,8 +162,9 @@ def _sections(content: bytes) -> dict[str, bytes]:
     return sections
 
 
-def _form(head: bytes) -> tuple[bool, str]:
-    """Return whether elements stand in blocks, from version 4 on, and the byte order; none of text."""
+def _announced(sections: Mapping[str, bytes]) -> int:
+    """Return the announced number of elements, and check the lines, of which gmsh would skip some."""
+    head = sections["MeshFormat"]
     version, *rest = head.split()[:3]
     number = float(version) if re.fullmatch(rb"[0-9]\.?[0-9]{0,9}", version) else 0.0
     if number not in VERSIONS:
@@ -167,35 +173,20 @@ def _form(head: bytes) -> tuple[bool, str]:
         )
     if rest not in ([b"0", b"8"], [b"1", b"8"]):
         raise MeshError("$MeshFormat: expected 0 8 behind the version of text and 1 8 of binary files")
-    return number >= 4, "" if rest[0] == b"0" else ">" if b"\n\0\0\0\1" in head else "<"
-
-
-def _announced(sections: Mapping[str, bytes]) -> int:
-    """Return the announced number of elements; in text each has a line, for gmsh passes over more."""
-    has_blocks, order = _form(sections["MeshFormat"])
     if "Elements" not in sections:
         return 0
-    text = sections["Elements"]
-    if order and has_blocks:
+    text, has_blocks, is_binary = sections["Elements"], number >= 4, rest[0] == b"1"
+    if is_binary and has_blocks:
+        order = ">" if b"\n\0\0\0\1" in head else "<"
         return int(np.frombuffer(text[1:17].ljust(16, b"\0"), f"{order}u8")[1])
     counts = re.match(rb"\s*(\d{1,15})\s+(\d{1,15})" if has_blocks else rb"\s*(\d{1,15})(?=\s)", text + b"\n")
     if counts is None:
         raise MeshError("$Elements: expected the number of elements at its beginning")
     expected = 1 + sum(map(int, counts.groups()))
-    lines = expected if order else sum(not line.isspace() for line in io.BytesIO(text))
+    lines = expected if is_binary else sum(not line.isspace() for line in io.BytesIO(text))
     if lines != expected:
         raise MeshError(f"$Elements: {lines} lines, and its counts announce {expected}, one for each element")
     return int(counts.groups()[-1])
-
-
-def _names(text: bytes) -> dict[tuple[int, int], str]:
-    entries = NAME.findall(text)
-    if text.split(maxsplit=1)[:1] != [str(len(entries)).encode()]:
-        raise MeshError(f"$PhysicalNames: {len(entries)} names, and not as many as its first line announces")
-    names = {(int(dimension), int(number)): name.decode(errors="replace") for dimension, number, name in entries}
-    if len(names) < len(entries):
-        raise MeshError("$PhysicalNames: one of the numbers has two names")
-    return names
 
 
 def _read_by_gmsh(path: Path) -> MshContent:
@@ -226,22 +217,15 @@ def _merged(gmsh: ModuleType, path: Path) -> MshContent:
     return MshContent.of(gmsh)
 
 
-def _misnumbered(content: MshContent) -> list[str]:
-    """List numbers that are there twice."""
-    numbers = np.concatenate([np.zeros(0, np.int64), *(tag for tag, _, _ in content.elements.values())])
-    faults = []
+def _faults(content: MshContent) -> list[str]:
+    """List repeated numbers; if there are none, unusable elements and missing triangles."""
+    numbers, faults = np.concatenate([np.zeros(0, np.int64), *(tags for tags, *_ in content.elements.values())]), []
     for name, ordered in (("node", np.sort(content.tags)), ("element", np.sort(numbers))):
         twice = np.unique(ordered[1:][ordered[1:] == ordered[:-1]])
         if len(twice):
             faults.append(f"{name} {first_of(map(str, twice), len(twice))}: the number is there twice")
-    return faults
-
-
-def _other_kinds(content: MshContent) -> list[str]:
-    """List elements that are neither triangles nor quadrilaterals of first or second order, and the lack of these."""
-    faults = []
     kinds = sorted({*content.elements} - {POINT, *LINES})
-    for kind in (kind for kind in kinds if kind not in TRIANGLES):
+    for kind in (kind for kind in kinds if kind not in TRIANGLES and not faults):
         numbers, nodes, _ = content.elements[kind]
         centre = content.points[np.isin(content.tags, nodes[0])].mean(axis=0)
         faults.append(
@@ -249,19 +233,19 @@ def _other_kinds(content: MshContent) -> list[str]:
             "triangles of three or six nodes, quadrilaterals of four, eight or nine and lines of two or three can be "
             "used (mesh the surfaces only, with Mesh.ElementOrder = 1 or 2)"
         )
-    if not kinds:
+    if not kinds and not faults:
         faults.append("no triangles in it: mesh the surfaces and put them in physical surfaces before saving")
     return faults
 
 
 def _curves(content: MshContent) -> dict[str, Int]:
-    """Return the nodes (d, 2) at the ends of the lines in each physical curve, DEBONDED if it is named."""
-    entities = {(group, key[1]) for key, groups in content.groups.items() if key[0] == 1 for group in groups}
-    named = (name for (dimension, _), name in content.names.items() if dimension == 1 and name == DEBONDED)
-    curves = {name: np.zeros((0, 2), np.int64) for name in named}
-    for group, entity in sorted(entities):
+    """Return the end nodes (d, 2) of the lines in each physical curve; DEBONDED may be empty."""
+    none, lines = np.zeros((0, 2), np.int64), [content.elements[kind] for kind in LINES if kind in content.elements]
+    named = {name for (dimension, _), name in content.names.items() if dimension == 1}
+    curves = dict.fromkeys(named & {DEBONDED}, none)
+    entities = {(group, number) for (d, number), groups in content.groups.items() if d == 1 for group in groups}
+    for group, number in sorted(entities):
         name = content.name(1, group)
-        curves.setdefault(name, np.zeros((0, 2), np.int64))
-        for _, nodes, entities_of in (content.elements[kind] for kind in LINES if kind in content.elements):
-            curves[name] = np.concatenate([curves[name], nodes[entities_of == entity, :2]])
+        ends = [nodes[entity == number, :2] for _, nodes, entity in lines]
+        curves[name] = np.concatenate([curves.get(name, none), *ends])
     return curves

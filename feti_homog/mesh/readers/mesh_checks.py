@@ -1,4 +1,4 @@
-"""Checks for users' meshes: each function finds one kind of fault and names the first offenders."""
+"""Check users' meshes: each function finds one kind of fault and names the first offenders."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -29,7 +29,7 @@ ROUNDING = 1e-6
 
 
 def _listed(before: str, items: Sequence[Any] | Int | Int32, name: Callable[..., str], after: str = "") -> list[str]:
-    """Return one fault that names the first few items; no fault without items."""
+    """Make one fault that names the first few items; none without items."""
     return [f"{before}{first_of(map(name, items), len(items))}{after}"] if len(items) else []
 
 
@@ -46,7 +46,7 @@ def unlabelled(mesh: RawMesh) -> list[str]:
 
 
 def not_finite(mesh: RawMesh) -> list[str]:
-    """List nodes whose coordinates are not numbers, or no lengths to compute with."""
+    """List nodes whose coordinates are not finite, or report an extreme cell size."""
     bad = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
     if len(bad):
         return _listed("", bad, mesh.node, ": coordinates are not finite")
@@ -125,7 +125,7 @@ def middle_nodes(mesh: RawMesh) -> list[str]:
 
 
 def overlapping(mesh: RawMesh) -> list[str]:
-    """List edges of more than two triangles, or of two on the same side."""
+    """List edges with more than two triangles, or with two on the same side."""
     pairs = edges(mesh.triangles)
     _, first, where, number = np.unique(
         edge_keys(pairs, len(mesh.points)), return_index=True, return_inverse=True, return_counts=True
@@ -139,7 +139,7 @@ def overlapping(mesh: RawMesh) -> list[str]:
 
 
 def hanging_nodes(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
-    """List nodes within edges that one triangle has and that are not on the cell's boundary.
+    """List nodes that lie within inner edges with a single triangle.
 
     `plane` (n, 2) are positions with the lower left corner at the origin, nodes on sides exactly there.
     """
@@ -175,14 +175,14 @@ def missing_corners(plane: Float, origin: Float, size: Float) -> list[str]:
 
 
 def too_large(plane: Float, triangles: Int32, size: Float) -> list[str]:
-    """Return the fault of triangles that add up to more than the rectangle."""
+    """Report triangles whose total area exceeds the rectangle."""
     total, cell = abs(areas(plane, triangles).sum()), size.prod()
     overlap = f"the elements overlap: their area is {total:.9g}, that of the cell {cell:.9g}"
     return [overlap] if total > (1 + ROUNDING) * cell else []
 
 
 def unrefined_sides(plane: Float, size: Float) -> list[str]:
-    """Name sides without a node between their corners: there an element would be its own neighbour."""
+    """Name sides without inner nodes, where an element would be its own neighbour."""
     levels = {SIDES[axis, side]: (axis, side * size[axis]) for axis, side in SIDES}
     bare = [name for name, (axis, level) in levels.items() if np.count_nonzero(plane[:, axis] == level) < 3]
     return [f"no node between the corners of the {', '.join(bare)} side: expected one at least"] if bare else []
@@ -196,20 +196,20 @@ def stray_lines(mesh: RawMesh) -> list[str]:
 
 
 def cannot_debond(mesh: RawMesh, pairs: Int32, fit: Bool) -> list[str]:
-    """List debonded lines (d, 2) that are not edges between a fibre and the matrix, as `fit` (d,) are."""
+    """List the debonded lines (d, 2) that are no fibre-matrix edges; `fit` (d,) marks such edges."""
     fault = f'lines in the {mesh.curve_container} "{DEBONDED}" that are not between a fibre and the matrix: '
     return _listed(fault, pairs[~fit], mesh.edge)
 
 
 def unused_curves(mesh: RawMesh) -> tuple[str, ...]:
-    """List the curves that are not DEBONDED, in one line."""
+    """List all curves but DEBONDED, in one line."""
     names = [f'"{name}"' for name in mesh.curves if name != DEBONDED]
     advice = f'not used; lines that are debonded from the start belong in "{DEBONDED}"'
     return tuple(_listed(f"{mesh.curve_container} ", names, str, f": {advice}"))
 
 
 def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
-    """List nodes on a side without a partner at the same place of the opposite one."""
+    """List side nodes without a partner on the opposite side."""
     faults = []
     for axis, side in SIDES:
         nodes, partners = (np.flatnonzero(plane[:, axis] == k * size[axis]) for k in (side, 1 - side))
@@ -230,7 +230,7 @@ def _no_partner(axis: int, side: int) -> str:
 
 
 def unmatched_sides(raw: RawMesh, mesh: CoarseMesh) -> list[str]:
-    """List edges on a side whose image on the opposite side is no edge: a void lies along the side."""
+    """List side edges without an image on the opposite side: a void lies along the side."""
     pairs, faults = edges(mesh.triangles), []
     for axis, side in SIDES:
         levels = (k * mesh.period[axis] for k in (side, 1 - side))
@@ -245,7 +245,7 @@ def unmatched_sides(raw: RawMesh, mesh: CoarseMesh) -> list[str]:
 
 
 def islands(raw: RawMesh, mesh: CoarseMesh) -> list[str]:
-    """List parts of the mesh that share no edge with the largest: nothing would hold them."""
+    """List mesh parts that share no edge with the largest part, which would float."""
     part = components(len(mesh.triangles), *edge_pairs(Torus.of(mesh).triangle_torus_edges))
     loose = np.flatnonzero(part != np.bincount(part).argmax())
     first = loose[np.unique(part[loose], return_index=True)[1]]
@@ -253,7 +253,7 @@ def islands(raw: RawMesh, mesh: CoarseMesh) -> list[str]:
 
 
 def void_faults(raw: RawMesh, mesh: CoarseMesh, has_voids: bool) -> list[str]:
-    """List holes where no voids are expected, voids without an area or that touch, and uncovered parts."""
+    """List unexpected holes, voids without an area, touching voids, and uncovered area."""
     pairs, empty = void_edges(mesh), 1.0 - areas(mesh.points, mesh.triangles).sum() / mesh.period.prod()
     if len(pairs) == 0:
         return [f"the elements leave {empty:.3g} of the cell uncovered"] if empty > ROUNDING else []

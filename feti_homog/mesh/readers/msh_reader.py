@@ -1,10 +1,10 @@
-"""A user's mesh: read from a file, its phases named, moved onto a rectangle, checked, made into a coarse mesh."""
+"""Read a user's mesh: name its phases, move it onto a rectangle, check it, and make a coarse mesh of it."""
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 from scipy.spatial import ConvexHull, cKDTree
@@ -19,7 +19,7 @@ from feti_homog.mesh.readers.round_interfaces import with_bent_edges, with_circl
 from feti_homog.microstructure import phase_names
 from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.schema import wording
-from feti_homog.typing import Float, Int, Int32
+from feti_homog.typing import Float, Int32
 
 LOADERS = {
     ".msh": gmsh_file.load,
@@ -39,15 +39,13 @@ UPRIGHT, FILLED = 1e-2, 0.4
 
 
 def read_cell(cell: cell_section.Cell) -> CoarseMesh:
-    """Return the user's mesh of a cell, repaired as the case asks for. Raises as `read`."""
+    """Read the user's mesh of a cell, with the repair that the case selects. Raises as `read`."""
     assert cell.file is not None
     snap = cell.snap_tolerance if cell.repair == "snap" else None
-    return read(cell.file, snap, cell.phases or {}, bool(cell.voids))
+    return read(cell.file, snap, cell.phases, bool(cell.voids))
 
 
-def read(
-    path: Path, snap: float | None = None, phases: Selectors = MappingProxyType({}), has_voids: bool = False
-) -> CoarseMesh:
+def read(path: Path, snap: float | None = None, phases: Selectors | None = None, has_voids: bool = False) -> CoarseMesh:
     """Read the coarse mesh from a file that one of the LOADERS reads, moved to [0, width] x [0, height].
 
     It consists of triangles with three or six nodes, in either sense, in physical surfaces "matrix", "fibre", "glass",
@@ -63,7 +61,7 @@ def read(
     """
     moved = 0.0
     try:
-        raw = with_phases(LOADERS[path.suffix](path), phases)
+        raw = with_phases(LOADERS[path.suffix](path), phases or {})
     except OSError as error:
         raise MeshError(f"{path}: cannot be read: {error.strerror}") from None
     except MeshError as error:
@@ -77,7 +75,7 @@ def read(
 
 
 def made(raw: RawMesh, path: str, has_voids: bool = True) -> CoarseMesh:
-    """Return the coarse mesh of triangles in phases; `path` names them in faults. Raises as `read`."""
+    """Check a raw mesh and make it a coarse mesh; faults begin with `path`. Raises as `read`."""
     _refuse(path, mesh_checks.not_planar(raw), mesh_checks.flat(raw), mesh_checks.duplicate_nodes(raw))
     # All counter-clockwise; middle nodes are those of edges, whichever way these run.
     clockwise = areas(raw.points[:, :2], raw.triangles) < 0
@@ -95,7 +93,23 @@ def made(raw: RawMesh, path: str, has_voids: bool = True) -> CoarseMesh:
     _refuse(path, mesh_checks.not_periodic(raw, plane, size), mesh_checks.unrefined_sides(plane, size))
     for axis, low, high in paired_sides(plane, size):
         plane[high, 1 - axis] = plane[low, 1 - axis]
-    mesh = _coarse_mesh(raw, plane, size)
+    names, (width, height) = [group[0] for group in raw.groups], size.tolist()
+    phases = ("matrix", *sorted(set(names) - {"matrix"}))
+    phase = np.array([phases.index(name) for name in names], np.int32)[raw.group]
+    mesh = CoarseMesh(
+        width=width,
+        height=height,
+        points=plane,
+        triangles=raw.triangles,
+        phase=phase,
+        phases=phases,
+        precedence=phase,
+        representative=representatives(plane, width, height),
+        ellipses=Ellipses.round(np.zeros((0, 3))),
+        arc_edges=np.zeros((0, 2), np.int32),
+        arc_circle=np.zeros(0, np.int32),
+        debonded_edges=np.searchsorted(raw.node_tags, raw.debonded).astype(np.int32),
+    )
     _refuse(path, mesh_checks.unmatched_sides(raw, mesh))
     _refuse(path, mesh_checks.islands(raw, mesh), mesh_checks.void_faults(raw, mesh, has_voids))
     _refuse(path, mesh_checks.cannot_debond(raw, mesh.debonded_edges, can_debond(mesh, mesh.debonded_edges)))
@@ -108,40 +122,18 @@ def made(raw: RawMesh, path: str, has_voids: bool = True) -> CoarseMesh:
 
 
 def _refuse(path: str, *faults: Sequence[str]) -> None:
-    """Raise MeshError if there are faults."""
+    """Raise MeshError with all faults, if there are any."""
     if lines := [f"{path}: {fault}" for kind in faults for fault in kind]:
         raise MeshError(*lines)
 
 
-def _coarse_mesh(raw: RawMesh, plane: Float, size: Float) -> CoarseMesh:
-    """Return a checked mesh without circles."""
-    names = [group[0] for group in raw.groups]
-    phases = ("matrix", *sorted(set(names) - {"matrix"}))
-    number = np.array([phases.index(name) for name in names], np.int32)
-    width, height = size.tolist()
-    return CoarseMesh(
-        width=width,
-        height=height,
-        points=plane,
-        triangles=raw.triangles,
-        phase=number[raw.group],
-        phases=phases,
-        precedence=number[raw.group],
-        representative=representatives(plane, width, height),
-        ellipses=Ellipses.round(np.zeros((0, 3))),
-        arc_edges=np.zeros((0, 2), np.int32),
-        arc_circle=np.zeros(0, np.int32),
-        debonded_edges=np.searchsorted(raw.node_tags, raw.debonded).astype(np.int32),
-    )
-
-
 def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
-    """Move the outer nodes onto a rectangle's sides, opposite each other; also how far, at most.
+    """Move the outer nodes onto a rectangle's sides, opposite each other; also return the largest move.
 
     A side lies at the median among nodes within `tolerance`, relative to the width, from the outermost. Partners, each
-    other's nearest within the tolerance along the side, both move to the middle between them. On sides, middle nodes
-    in second-order triangles are then midway between the ends of their edges. Nodes that are farther stay where they
-    are, for the checks to report.
+    other's nearest within the tolerance along the side, both move to the middle between them, but for corners. On
+    sides, middle nodes in second-order triangles are then midway between the ends of their edges. Nodes that are
+    farther stay where they are, for the checks to report.
     """
     plane = raw.points[:, :2].copy()
     pairs = edges(raw.triangles)
@@ -158,7 +150,14 @@ def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
             plane[side, axis] = np.median(plane[side, axis])
             sides[axis, extreme is np.max] = side
     for axis in (0, 1):
-        _match(plane, sides[axis, False], sides[axis, True], 1 - axis, reach)
+        low, high, along = sides[axis, False], sides[axis, True], plane[:, 1 - axis]
+        away, to_high = cKDTree(along[high, None]).query(along[low, None])
+        to_low = cKDTree(along[low, None]).query(along[high, None])[1]
+        mutual = (to_low[to_high] == np.arange(len(low))) & (away <= reach)
+        corners = along.min(), along.max()
+        mutual &= ~np.isin(along[low], corners) & ~np.isin(along[high[to_high]], corners)
+        a, b = low[mutual], high[to_high[mutual]]
+        along[a] = along[b] = (along[a] + along[b]) / 2
     moved = float(np.linalg.norm(plane - raw.points[:, :2], axis=1).max())
     points, middles = np.column_stack([plane, raw.points[:, 2]]), raw.middles
     on_side = np.any([np.isin(middles.edges, side).all(axis=1) for side in sides.values()], axis=0)
@@ -166,19 +165,8 @@ def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
     return replace(raw, points=points, middles=replace(middles, points=straight)), moved
 
 
-def _match(plane: Float, low: Int, high: Int, along: int, reach: float) -> None:
-    """Move partners on two opposite sides to the middle between them, along the sides; corners stay."""
-    trees = [cKDTree(plane[side, along, None]) for side in (low, high)]
-    (away, to_high), (_, to_low) = trees[1].query(plane[low, along, None]), trees[0].query(plane[high, along, None])
-    ends = plane[:, along].min(), plane[:, along].max()
-    inner = ~np.isin(plane[low, along], ends) & ~np.isin(plane[high[to_high], along], ends)
-    mutual = (to_low[to_high] == np.arange(len(low))) & (away <= reach) & inner
-    a, b = low[mutual], high[to_high[mutual]]
-    plane[a, along] = plane[b, along] = (plane[a, along] + plane[b, along]) / 2
-
-
 def _lattice(plane: Float, triangles: Int32) -> list[str]:
-    """Return the fault if triangles fill a parallelogram or a hexagon."""
+    """Report a cell that is a parallelogram or a hexagon."""
     hull = ConvexHull(plane)
     corners = plane[hull.vertices]
     before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
@@ -205,8 +193,14 @@ def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
     Raises:
         MeshError: a name or number that no element has; one line for each.
     """
-    pairs = [(phase, name) for phase, selected in phases.items() for name in selected]
-    if faults := _unknown_names(mesh, pairs):
+    pairs, faults = [(phase, name) for phase, selected in phases.items() for name in selected], []
+    for phase, name in pairs:
+        of_curves = phase == DEBONDED
+        if _key(name) not in map(_key, _names(mesh, of_curves)):
+            selected = f"[cell.phases] {wording.toml_key(phase)} = {wording.toml_value(name)}"
+            kind = "lines" if of_curves else "elements"
+            faults.append(f"{selected}: no {kind} of that name; {known_names(mesh, of_curves)}")
+    if faults:
         raise MeshError(*faults)
     phase_of = {_key(name): phase for phase, name in pairs if phase != DEBONDED}
     lines = set(map(_key, phases.get(DEBONDED, ())))
@@ -216,31 +210,19 @@ def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
     return replace(mesh, groups=groups, curves=curves)
 
 
-def _unknown_names(mesh: RawMesh, pairs: Iterable[tuple[str, str | int]]) -> list[str]:
-    """List names and numbers that no element has, or no line."""
-    faults = []
-    for phase, name in pairs:
-        of_curves = phase == DEBONDED
-        if _key(name) not in map(_key, _names(mesh, of_curves)):
-            selected = f"[cell.phases] {wording.toml_key(phase)} = {wording.toml_value(name)}"
-            kind = "lines" if of_curves else "elements"
-            faults.append(f"{selected}: no {kind} of that name; {known_names(mesh, of_curves)}")
-    return faults
-
-
 def _selecting(names: tuple[str, ...], phase_of: Mapping[str, str]) -> tuple[str, ...]:
-    """Return the phases that select one of the names, each once."""
+    """Return the phases that select any of the names, without repetition."""
     return tuple(dict.fromkeys(phase_of[_key(name)] for name in names if _key(name) in phase_of))
 
 
 def _key(name: str | int) -> str:
-    """Return a name, or the number of a nameless group, such that capitals do not matter."""
+    """Convert a name, or the number of a nameless group, for comparison without case."""
     return (f"number {name}" if isinstance(name, int) else name).casefold()
 
 
 def unknown_phases(mesh: RawMesh) -> list[str]:
     """List physical surfaces whose name is not a phase, and a missing matrix."""
-    names = list(dict.fromkeys(name for group in mesh.groups for name in group))
+    names = list(dict.fromkeys(chain.from_iterable(mesh.groups)))
     has_matrix = "matrix" in names
     expected = 'expected "matrix", "fibre", "glass", ... of letters, digits, _ and -, "fibre:2"'
     # Without a matrix all groups are named anew, and numbers need no further word.
@@ -251,28 +233,23 @@ def unknown_phases(mesh: RawMesh) -> list[str]:
     ]
     if not has_matrix:
         faults.append(f'no {mesh.container} is named "matrix"')
-    if faults:
-        faults[-1] += f"; {known_names(mesh)}{_way_out(mesh)}"
-    return faults
-
-
-def _way_out(mesh: RawMesh) -> str:
-    """Propose the two largest groups for [cell.phases], with all shares of the area."""
+    if not faults:
+        return []
+    faults[-1] += f"; {known_names(mesh)}"
+    # Propose the two largest groups for [cell.phases].
     shares: dict[str, float] = {}
     with np.errstate(all="ignore"):  # coordinates are judged later
         sizes = np.bincount(mesh.group, np.abs(areas(mesh.points[:, :2], mesh.triangles)), len(mesh.groups))
-        for names, percent in zip(mesh.groups, 100 * sizes / sizes.sum(), strict=True):
-            if names and names[0] != phase_names.VOID:
-                shares[names[0]] = shares.get(names[0], 0.0) + percent
-    if not shares:
-        return ""
-    order = sorted(shares, key=lambda name: -shares[name])
-    entries = ", ".join(
-        f"{phase} = {_as_selected(name)}" for phase, name in zip(("matrix", "fibre"), order, strict=False)
-    )
-    named = first_of((f"{_as_selected(name)}: {share:.3g} %" for name, share in shares.items()), len(shares), 20)
-    matrix = _as_selected(order[0])
-    return f". If {matrix} is the matrix, add to [cell]: phases = {{{entries}}}. Shares of the area: {named}"
+        for group, percent in zip(mesh.groups, 100 * sizes / sizes.sum(), strict=True):
+            if group and group[0] != phase_names.VOID:
+                shares[group[0]] = shares.get(group[0], 0.0) + percent
+    if shares:
+        largest = [_as_selected(name) for name in sorted(shares, key=lambda name: -shares[name])]
+        entries = ", ".join(f"{phase} = {name}" for phase, name in zip(("matrix", "fibre"), largest, strict=False))
+        listed = first_of((f"{_as_selected(name)}: {share:.3g} %" for name, share in shares.items()), len(shares), 20)
+        faults[-1] += f". If {largest[0]} is the matrix, add to [cell]: phases = {{{entries}}}. "
+        faults[-1] += f"Shares of the area: {listed}"
+    return faults
 
 
 def known_names(mesh: RawMesh, of_curves: bool = False) -> str:
@@ -282,10 +259,9 @@ def known_names(mesh: RawMesh, of_curves: bool = False) -> str:
 
 
 def _names(mesh: RawMesh, of_curves: bool) -> list[str]:
-    named = list(mesh.curves) if of_curves else [name for group in (*mesh.groups, *mesh.aliases) for name in group]
-    return list(dict.fromkeys(named))
+    return list(dict.fromkeys(mesh.curves if of_curves else chain(*mesh.groups, *mesh.aliases)))
 
 
 def _as_selected(name: str) -> str:
-    """Return the name or number of a group as a case file has it."""
+    """Write the name or number of a group as in a case file."""
     return name.removeprefix("number ") if NUMBER.fullmatch(name) else wording.toml_value(name)

@@ -1,4 +1,4 @@
-"""Triangles of three and six nodes, as a file has them, put together as one mesh; quadrilaterals are cut in two."""
+"""Assemble the triangles of a file, with three or six nodes, as one mesh; quadrilaterals are cut in two."""
 
 from __future__ import annotations
 
@@ -34,21 +34,12 @@ class MiddleNodes:
     tags: Int
     points: Float
 
-    @classmethod
-    def none(cls) -> MiddleNodes:
-        """Return the empty list, for triangles of three nodes."""
-        return cls(np.zeros((0, 2), np.int32), np.zeros(0, np.int64), np.zeros((0, 3)))
-
     def between(self, pairs: Int32) -> Float:
-        """(p, 2) the middle node between each pair (p, 2) of corners; NaN where there is none."""
-        nodes = int(max(self.edges.max(initial=0), pairs.max(initial=0))) + 1
-        keys, first = np.unique(edge_keys(self.edges, nodes), return_index=True)
-        sought = edge_keys(pairs, nodes)
-        middle = np.full((len(pairs), 2), np.nan)
-        if len(keys):
-            place = np.minimum(np.searchsorted(keys, sought), len(keys) - 1)
-            exists = keys[place] == sought
-            middle[exists] = self.points[first[place[exists]], :2]
+        """Middle node (p, 2) between each pair (p, 2) of corners; NaN where none exists."""
+        nodes, middle = int(max(self.edges.max(initial=0), pairs.max(initial=0))) + 1, np.full((len(pairs), 2), np.nan)
+        keys = edge_keys(self.edges, nodes), edge_keys(pairs, nodes)
+        _, number, place = np.intersect1d(*keys, return_indices=True)
+        middle[place] = self.points[number, :2]
         return middle
 
 
@@ -82,30 +73,30 @@ class RawMesh:
 
     @property
     def debonded(self) -> Int:
-        """(d, 2) node tags of the ends of the lines in the curve DEBONDED."""
+        """End node tags (d, 2) of the lines in the curve DEBONDED."""
         return self.curves.get(DEBONDED, np.zeros((0, 2), np.int64))
 
     def node(self, number: int) -> str:
-        """Return a node in words."""
+        """Describe a node in words."""
         return f"node {self.node_tags[number]} {at(self.points[number])}"
 
     def element(self, number: int) -> str:
-        """Return an element in words, with the position of its centre."""
+        """Describe an element in words, with the position of its centre."""
         centre = self.points[self.triangles[number]].mean(axis=0)
         return f"element {self.element_tags[number]} at {at(centre)}"
 
     def edge(self, pair: Iterable[int]) -> str:
-        """Return an edge in words."""
+        """Describe an edge in words."""
         return "the edge between " + " and ".join(self.node(int(end)) for end in pair)
 
 
 def at(point: Float) -> str:
-    """Return a position in words, (x, y)."""
+    """Write a position as (x, y)."""
     return f"({point[0]:.9g}, {point[1]:.9g})"
 
 
 def first_of(names: Iterable[str], total: int, shown: int = 3) -> str:
-    """Return the first few names and how many more there are."""
+    """List the first few names and count the remaining names."""
     listed = ", ".join(name for name, _ in zip(names, range(shown), strict=False))
     return listed if total <= shown else f"{listed} and {total - shown} more"
 
@@ -125,11 +116,6 @@ class Block:
     nodes: Int
     group: Int
 
-    @property
-    def corners(self) -> Int:
-        """(m, 3) or (m, 4)."""
-        return self.nodes[:, : 3 if self.nodes.shape[1] in (3, 6) else 4]
-
 
 def assembled(
     node_tags: Int,
@@ -140,7 +126,7 @@ def assembled(
     containers: tuple[str, str] = ("physical surface", "physical curve"),
     aliases: Sequence[tuple[str, ...]] = (),
 ) -> RawMesh:
-    """Return the mesh of blocks, one at least, with the corner nodes that they use.
+    """Assemble blocks, at least one, and the corner nodes that they use.
 
     Args:
         node_tags, points: (n,) and (n, 3) numbers and positions of all nodes in the file.
@@ -152,12 +138,12 @@ def assembled(
     edges, middles = [np.zeros((0, 2), np.int64)], [np.zeros(0, np.int64)]
     triangles, quads = list[tuple[Int, Int, Int]](), list[tuple[Int, Int, Int]]()
     for block in blocks:
-        count = block.corners.shape[1]
-        bent = block.nodes[:, count : 2 * count]
+        count = 3 if block.nodes.shape[1] in (3, 6) else 4
+        corners, bent = block.nodes[:, :count], block.nodes[:, count : 2 * count]
         if bent.size:
-            edges.append(np.stack([block.corners, np.roll(block.corners, -1, axis=1)], axis=2).reshape(-1, 2))
+            edges.append(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2))
             middles.append(bent.ravel())
-        (triangles if count == 3 else quads).append((block.tags, block.corners, block.group))
+        (triangles if count == 3 else quads).append((block.tags, corners, block.group))
     if quads:
         numbers, corners, group = (np.concatenate(parts) for parts in zip(*quads, strict=True))
         halves = tags[in_triangles(np.searchsorted(tags, corners), points)].reshape(-1, 3)

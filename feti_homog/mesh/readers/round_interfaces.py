@@ -1,6 +1,7 @@
 """Curves along users' interfaces: circles and ellipses, closed on the torus, and arcs through middle nodes."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -29,7 +30,7 @@ STRAIGHT = 1e-5
 
 
 def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
-    """Return the mesh with the round interfaces as circles, their nodes moved onto them exactly.
+    """Replace round interfaces by circles, and move their nodes onto these exactly.
 
     A closed interface between two phases is a circle if all its nodes are within ROUNDNESS_TOLERANCE radii of one,
     there are at least MIN_CIRCLE_EDGES edges, none on a side of the cell or longer than the radius, and no corner of
@@ -40,16 +41,16 @@ def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     fewest, longest = (MIN_BENT_EDGES, LONGEST_BENT_EDGE) if has_middles else (MIN_CIRCLE_EDGES, 1.0)
     bends = middles.between(pairs)
     points, circles, arcs = mesh.points.copy(), [], []
-    for loop in _closed_loops(mesh, pairs, fewest):
-        circle = _fit_circle(loop.places, longest)
-        moved = None if circle is None else _moved(mesh.points[loop.classes], loop.places, circle, mesh.period)
+    for classes, places, loop in _closed_loops(mesh, pairs, fewest):
+        circle = _fit_circle(places, longest)
+        moved = None if circle is None else _moved(mesh.points[classes], places, circle, mesh.period)
         if circle is None or moved is None:
             continue
-        images = [(np.append(circle[:2] - step, circle[2]), edges) for step, edges in loop.images]
+        images = [(np.append(circle[:2] - step, circle[2]), edges) for step, edges in loop]
         away = [np.hypot(*(bends[edges] - image[:2]).T) / image[2] - 1 for image, edges in images]
         if has_middles and not np.all(np.abs(np.concatenate(away)) <= ROUNDNESS_TOLERANCE):
             continue
-        points[loop.classes] = moved
+        points[classes] = moved
         circles += [image for image, _ in images]
         arcs += [pairs[edges] for _, edges in images]
     # Copies follow their representatives; those on high sides stay there.
@@ -72,7 +73,7 @@ def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
 
 
 def with_ellipses(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
-    """Return the mesh whose elliptic interfaces follow their ellipses, where they are no circles.
+    """Replace elliptic interfaces by ellipses, where they are no circles.
 
     A closed interface between two phases is an ellipse if all its nodes are within ROUNDNESS_TOLERANCE of one, and it
     has at least MIN_ELLIPSE_EDGES edges, none on a side of the cell, none that spans more than one radian of its
@@ -82,11 +83,11 @@ def with_ellipses(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     pairs, nodes = interface_edges(mesh), len(mesh.points)
     pairs = pairs[~np.isin(edge_keys(pairs, nodes), edge_keys(mesh.arc_edges, nodes))]
     bends, ellipses, arcs = middles.between(pairs), list[Ellipses](), list[Int32]()
-    for loop in _closed_loops(mesh, pairs, MIN_ELLIPSE_EDGES):
-        ellipse = fit_ellipse(loop.places)
+    for _, places, loop in _closed_loops(mesh, pairs, MIN_ELLIPSE_EDGES):
+        ellipse = fit_ellipse(places)
         if ellipse is None:
             continue
-        images = [(ellipse.at(ellipse.centres - step), edges) for step, edges in loop.images]
+        images = [(ellipse.at(ellipse.centres - step), edges) for step, edges in loop]
         if all(_follow(image, mesh.points[pairs[edges]], bends[edges]) for image, edges in images):
             ellipses += [image for image, _ in images]
             arcs += [pairs[edges] for _, edges in images]
@@ -99,7 +100,7 @@ def with_ellipses(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
 
 
 def with_bent_edges(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
-    """Return the mesh whose interface edges follow the circle through their ends and their middle node.
+    """Bend interface edges to the circle through their ends and middle node.
 
     Edges on circles stay there, and so do straight ones, whose middle node is within STRAIGHT of the chord.
     Edges are flipped where a triangle has two on one curve, which has no corner there.
@@ -125,7 +126,7 @@ def with_bent_edges(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
 
 
 def _with_arcs(mesh: CoarseMesh, ellipses: Ellipses, arcs: list[Int32]) -> CoarseMesh:
-    """Return the mesh with more ellipses, and the edges (a, 2) on each."""
+    """Add ellipses, and the edges (a, 2) on each, to the mesh."""
     number = np.repeat(np.arange(len(arcs)), np.array([len(pairs) for pairs in arcs], np.intp))
     return replace(
         mesh,
@@ -135,24 +136,15 @@ def _with_arcs(mesh: CoarseMesh, ellipses: Ellipses, arcs: list[Int32]) -> Coars
     )
 
 
-@dataclass(frozen=True)
-class Loop:
-    """A closed interface that is contractible on the torus.
+def _closed_loops(mesh: CoarseMesh, pairs: Int32, fewest: int) -> Iterator[tuple[Int, Float, list[tuple[Float, Int]]]]:
+    """Yield closed interfaces with `fewest` edges or more, none on a cell side, that are contractible on the torus.
 
-    Attributes:
-        classes, places: (k,) its node classes in order, and (k, 2) their unwrapped places.
-        images: its distance (2,) from each of its images in the plane, and the numbers of the interface edges there.
+    Yields:
+        Node classes (k,) in order, their unwrapped positions (k, 2), and the distance (2,) from each image in the
+        plane with the numbers of the interface edges there.
     """
-
-    classes: Int
-    places: Float
-    images: list[tuple[Float, Int]]
-
-
-def _closed_loops(mesh: CoarseMesh, pairs: Int32, fewest: int) -> list[Loop]:
-    """Find closed interfaces with `fewest` edges or more, none on a cell side."""
     if len(pairs) == 0:
-        return []
+        return
     size = mesh.period
     classes, ends = np.unique(mesh.representative[pairs], return_inverse=True)
     ends = ends.reshape(-1, 2)
@@ -166,7 +158,6 @@ def _closed_loops(mesh: CoarseMesh, pairs: Int32, fewest: int) -> list[Loop]:
     on_side = np.any(np.all(mesh.points[pairs] == 0, axis=1) | np.all(mesh.points[pairs] == size, axis=1), axis=1)
     branching |= np.bincount(part[ends[:, 0]], on_side, len(branching)) > 0
     _, first, number = np.unique(part, return_index=True, return_counts=True)
-    loops = []
     for start in first[~branching & (number >= fewest)].tolist():
         order, _ = depth_first_order(graph, start, directed=False)
         hops = np.stack([np.asarray(step[order, np.roll(order, -1)]).ravel() for step in steps], axis=1)
@@ -177,12 +168,11 @@ def _closed_loops(mesh: CoarseMesh, pairs: Int32, fewest: int) -> list[Loop]:
             away = np.round((places[place] - mesh.points[pairs[members, 0]]) / size)
             distinct, which = np.unique(away, axis=0, return_inverse=True)
             images = [(step * size, members[which.ravel() == k]) for k, step in enumerate(distinct)]
-            loops.append(Loop(classes[order], places, images))
-    return loops
+            yield classes[order], places, images
 
 
 def _fit_circle(places: Float, longest: float) -> Float | None:
-    """Centre and radius (3,) of the circle through a closed chain of places (k, 2).
+    """Fit a circle, centre and radius (3,), to a closed chain of positions (k, 2).
 
     None if not round, or with edges longer than `longest` radii.
     """
@@ -202,7 +192,7 @@ def _fit_circle(places: Float, longest: float) -> Float | None:
 
 
 def _moved(points: Float, places: Float, circle: Float, size: Float) -> Float | None:
-    """Move points (k, 2) onto the circle, along the side they are on; None if impossible."""
+    """Move points (k, 2) onto the circle, side nodes along their side; None if impossible."""
     centres = circle[:2] - np.round((places - points) / size) * size
     spokes = points - centres
     moved: Float = centres + circle[2] * spokes / np.linalg.norm(spokes, axis=1)[:, None]
@@ -222,7 +212,7 @@ def _moved(points: Float, places: Float, circle: Float, size: Float) -> Float | 
 
 
 def _follow(ellipse: Ellipses, ends: Float, bends: Float) -> bool:
-    """Return whether edges may follow the one ellipse.
+    """Return whether edges may follow the single ellipse.
 
     Their ends are (k, 2, 2) and their middle nodes (k, 2), NaN if there are none.
     """
@@ -236,7 +226,7 @@ def _follow(ellipse: Ellipses, ends: Float, bends: Float) -> bool:
 
 
 def fit_ellipse(places: Float) -> Ellipses | None:
-    """Return the ellipse through a closed chain of places (k, 2) in order.
+    """Fit an ellipse to a closed chain of positions (k, 2) in order.
 
     None if they are on none or too far apart.
 

@@ -1,4 +1,4 @@
-"""Points and cells with VTK's types and cell data, as VTK and Medit files have them."""
+"""Convert a grid with VTK's cell types and cell data, read from VTK or Medit files, into triangles and lines."""
 
 import re
 import warnings
@@ -24,11 +24,10 @@ WRONG_WORD = {
 # Numbers of nodes by VTK's type of cell; quadrilaterals are cut in two triangles.
 TRIANGLES = {5: 3, 9: 4, 22: 6, 23: 8, 28: 9}
 LINES = {3: 2, 21: 3}
-POINTS = {1: 1}
-POLY_VERTEX, POLYGON, PIXEL = 2, 7, 8
+POINTS = (1, 2)
+POLYGON, PIXEL = 7, 8
 NAMES = {0: "empty cells", 4: "polylines", 6: "triangle strips", 7: "polygons", 10: "tetrahedra", 12: "hexahedra"}
-NAMES |= {13: "wedges", 14: "pyramids"}
-NAMES |= {34: "triangles of seven nodes", 42: "polyhedra", 69: "triangles of any order"}
+NAMES |= {13: "wedges", 14: "pyramids", 34: "triangles of seven nodes", 42: "polyhedra", 69: "triangles of any order"}
 PHASE = "phase"
 # Cell data by which other programs number materials, in the order of precedence.
 NUMBERS = (
@@ -59,56 +58,53 @@ class Grid:
     first: int = 0
 
     def nodes_of(self, cells: Int, count: int) -> Int:
-        """Return the file's numbers (k, count) of the nodes of cells (k,) with `count` nodes each."""
-        starts = np.cumsum(self.counts)[cells] - count
+        """Return the file's numbers (k, count) of the first `count` nodes in cells (k,)."""
+        starts = (np.cumsum(self.counts) - self.counts)[cells]
         return np.asarray(self.first + self.nodes[starts[:, None] + np.arange(count)], np.int64)
 
 
 def mesh_of(grid: Grid) -> RawMesh:
-    """Return the triangles and the lines of a grid.
+    """Convert a grid into triangles and lines.
 
     Its cell data `phase` are 0 in the matrix, 1 in phase fibre, k in fibre:k; in their place groups come from one of
     NUMBERS, or from the only cell data of whole numbers. Cell data `debonded`, if there are any, are 1 on lines
-    that are debonded from the start.
+    that are debonded from the start; other lines are curves by their numbers, or `line` beside phases.
 
     Raises:
         MeshError: it has other cells or no phases, or is damaged.
     """
     if faults := _misfits(grid):
         raise MeshError(*faults)
-    grid = _in_common_types(grid)
-    name = _numbers_name(grid.data)
+    grid, data = _in_common_types(grid), grid.data
+    whole = [k for k, values in data.items() if k != DEBONDED and values.ndim == 1 and values.dtype.kind in "iu"]
+    name = next((name for name in (PHASE, *NUMBERS) if name in data), whole[0] if len(whole) == 1 else "")
     if faults := _other_cells(grid) + _unnumbered(grid, name):
         raise MeshError(*faults)
-    groups = np.ravel(grid.data[name]).astype(np.int64)
-    is_triangle = np.isin(grid.types, [*TRIANGLES])
-    values, group = np.unique(groups[is_triangle], return_inverse=True)
-    place = np.zeros(len(groups), np.int64)
-    place[is_triangle] = group
-    blocks = []
+    has_phases, groups, blocks = name == PHASE, np.ravel(data[name]).astype(np.int64), []
+    values = np.unique(groups[np.isin(grid.types, [*TRIANGLES])])
     for kind, count in TRIANGLES.items():
         cells = np.flatnonzero(grid.types == kind)
         if len(cells):
-            blocks.append(Block(grid.first + cells, grid.nodes_of(cells, count), place[cells]))
+            group = np.searchsorted(values, groups[cells])
+            blocks.append(Block(grid.first + cells, grid.nodes_of(cells, count), group))
     aliases = [(f"number {k}",) for k in values.tolist()]
-    phases = [(("matrix", "fibre")[k] if k < 2 else f"fibre:{k}",) for k in values.tolist()]
-    named, containers = (phases if name == PHASE else aliases), (f"value of {name}", "cells")
+    phases = [({0: "matrix", 1: "fibre"}.get(k, f"fibre:{k}"),) for k in values.tolist()]
+    names, containers = (phases if has_phases else aliases), (f"value of {name}", "cells")
     tags = grid.first + np.arange(len(grid.points))
-    return assembled(tags, grid.points, blocks, named, _curves(grid, groups, name == PHASE), containers, aliases)
+    return assembled(tags, grid.points, blocks, names, _curves(grid, groups, has_phases), containers, aliases)
 
 
-def _numbers_name(data: Mapping[str, Numbers]) -> str:
-    """Return the name of the cell data with element phases; empty if there are none."""
-    if named := [name for name in (PHASE, *NUMBERS) if name in data]:
-        return named[0]
-    integer = [
-        name for name, values in data.items() if name != DEBONDED and values.ndim == 1 and values.dtype.kind in "iu"
-    ]
-    return integer[0] if len(integer) == 1 else ""
+def _curves(grid: Grid, groups: Int, has_phases: bool) -> dict[str, Int]:
+    """Return the end nodes (d, 2) of the lines in each curve."""
+    cells = np.flatnonzero(np.isin(grid.types, [*LINES]))
+    marks = np.ravel(grid.data.get(DEBONDED, np.zeros(len(grid.types))))[cells]
+    number, ends = np.where(marks != 0, -1, 0 if has_phases else groups[cells]), grid.nodes_of(cells, 2)
+    names = {k: "line" if has_phases else f"number {k}" for k in np.unique(number).tolist()} | {-1: DEBONDED}
+    return {names[k]: ends[number == k] for k in np.unique(number).tolist()}
 
 
 def _misfits(grid: Grid) -> list[str]:
-    """List arrays whose lengths do not fit the cells, and nodes that do not exist."""
+    """List arrays with wrong lengths, and nodes that do not exist."""
     count, last = len(grid.types), len(grid.points) + grid.first - 1
     if len(grid.counts) != count or np.any(grid.counts < 0) or grid.counts.sum() != len(grid.nodes):
         return ["the cells and their nodes do not belong together: the file is damaged"]
@@ -121,7 +117,7 @@ def _misfits(grid: Grid) -> list[str]:
 
 
 def _in_common_types(grid: Grid) -> Grid:
-    """Return the grid with polygons of three and four nodes and pixels as triangles and quadrilaterals."""
+    """Convert pixels and polygons with three or four nodes into triangles and quadrilaterals."""
     counts, types, nodes = grid.counts, grid.types.copy(), grid.nodes.copy()
     for count, kind in ((3, 5), (4, 9)):
         types[(types == POLYGON) & (counts == count)] = kind
@@ -129,12 +125,11 @@ def _in_common_types(grid: Grid) -> Grid:
     last = np.cumsum(counts)[pixels] - 1
     nodes[last], nodes[last - 1] = nodes[last - 1], nodes[last]
     types[pixels] = 9
-    types[types == POLY_VERTEX] = 1
     return replace(grid, types=types, nodes=nodes)
 
 
 def _other_cells(grid: Grid) -> list[str]:
-    """List cells with other types, cells with a wrong node count, and the lack of triangles."""
+    """List unusable cell types, wrong node counts, and missing triangles."""
     usable, counts, faults = TRIANGLES | LINES, grid.counts, []
     for kind in np.unique(grid.types).tolist():
         cells = np.flatnonzero(grid.types == kind)
@@ -152,7 +147,7 @@ def _other_cells(grid: Grid) -> list[str]:
 
 
 def _unnumbered(grid: Grid, name: str) -> list[str]:
-    """List the lack of phases, and values in the cell data `name` that are no phase numbers."""
+    """List missing phases, and values of the cell data `name` that are no phase numbers."""
     if not name:
         expected = "expected 0 in the matrix, 1 in phase fibre, 2 in fibre:2, ..."
         return [f"no cell data named {PHASE}, but {', '.join(grid.data) or 'none'}: {expected}"]
@@ -161,25 +156,6 @@ def _unnumbered(grid: Grid, name: str) -> list[str]:
         return [f"cell data {name}: expected one value for each of {len(grid.types)} cells"]
     bad = np.ravel(values)[~np.ravel((values == np.round(values)) & (values >= 0) & (values < MOST_PHASES))]
     return [f"cell data {name} = {bad[0]:g}: expected 0, 1, 2, ... below {MOST_PHASES}"] if len(bad) else []
-
-
-def _curves(grid: Grid, groups: Int, has_phases: bool) -> dict[str, Int]:
-    """Return the end nodes (d, 2) of the lines of each curve.
-
-    Cell data `debonded` mark the curve DEBONDED; other lines are curves by their numbers, or `line` beside phases.
-    """
-    marks = np.ravel(grid.data[DEBONDED]) if DEBONDED in grid.data else np.zeros(len(grid.types))
-    curves: dict[str, Int] = {}
-    for kind, count in LINES.items():
-        cells = np.flatnonzero(grid.types == kind)
-        ends = grid.nodes_of(cells, count)[:, :2]
-        for number in np.unique(groups[cells]).tolist():
-            for is_debonded in (True, False):
-                lines = ends[(groups[cells] == number) & ((marks[cells] != 0) == is_debonded)]
-                name = DEBONDED if is_debonded else "line" if has_phases else f"number {number}"
-                if len(lines):
-                    curves[name] = np.concatenate([curves.get(name, lines[:0]), lines])
-    return curves
 
 
 class NotANumber(ValueError):

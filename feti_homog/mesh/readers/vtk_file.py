@@ -1,6 +1,6 @@
-"""Legacy VTK files (.vtk), text or binary, up to version 5.1, and Medit's mesh files (.mesh).
+"""Read legacy VTK files (.vtk), text or binary, up to version 5.1, and Medit's mesh files (.mesh).
 
-FreeFEM, Netgen, Gmsh and MMG write the latter.
+FreeFEM, Netgen, Gmsh and MMG write Medit's files.
 """
 
 from __future__ import annotations
@@ -8,6 +8,8 @@ from __future__ import annotations
 import codecs
 import re
 from collections import deque
+from collections.abc import Iterator
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import NoReturn
@@ -60,104 +62,71 @@ def load(path: Path) -> RawMesh:
     if form not in ("ASCII", "BINARY"):
         file.refuse(f"{wording.toml_value(form)}: expected ASCII or BINARY")
     file.is_binary = form == "BINARY"
-    legacy = _Legacy(file)
+    none, data, sections, are_of_cells, length = np.zeros(0, np.int64), dict[str, Numbers](), set[str](), False, 0
+    grid = Grid(np.zeros((0, 3)), none, none, none, data)
     while words := file.line():
-        legacy.take(words[0].upper(), [*words[1:], *[""] * 4])
-    nodes, counts = legacy.nodes, np.diff(legacy.offsets)
-    if legacy.rows is not None:
-        starts = chain(np.arange(len(legacy.rows)) + 1 + legacy.rows)
-        nodes, counts = np.delete(legacy.rows, starts), legacy.rows[starts]
-    return mesh_of(Grid(legacy.points, legacy.types, nodes, counts, legacy.data))
-
-
-class _Legacy:
-    """Take the sections of a file; keep points, cells, and numbers of cells."""
-
-    def __init__(self, file: Scanner) -> None:
-        self.file, self.points, self.types = file, np.zeros((0, 3)), np.zeros(0, np.int64)
-        self.data = dict[str, Numbers]()
-        self.offsets, self.nodes = np.zeros(1, np.int64), np.zeros(0, np.int64)
-        self.rows: Int | None = None
-        self.are_of_cells, self.length, self.seen = False, 0, set[str]()
-
-    def take(self, section: str, words: list[str]) -> None:
-        """Take a section, the words of whose first line follow its name."""
-        file = self.file
-        if section in ("DATASET", "POINTS", "CELLS", "CELL_TYPES") and section in self.seen:
+        section, words = words[0].upper(), [*words[1:], *[""] * 4]
+        if section in sections & {"DATASET", "POINTS", "CELLS", "CELL_TYPES"}:
             file.refuse(f"{section}: it is there twice")
-        self.seen.add(section)
+        sections.add(section)
         match section:
             case "DATASET":
                 if words[0].upper() != "UNSTRUCTURED_GRID":
                     file.refuse(f"DATASET {words[0]}: expected UNSTRUCTURED_GRID")
             case "POINTS":
-                self.points = file.take(3 * file.count(words[0]), self._type(words[1])).reshape(-1, 3).astype(float)
+                grid = replace(grid, points=file.take(3 * file.count(words[0]), words[1]).reshape(-1, 3).astype(float))
             case "CELLS":
-                self._take_cells(*map(file.count, words[:2]))
+                nodes, counts = _cells(file, *map(file.count, words[:2]))
+                grid = replace(grid, nodes=nodes, counts=counts)
             case "CELL_TYPES":
-                self.types = file.take(file.count(words[0]), "i4").astype(np.int64)
+                grid = replace(grid, types=file.take(file.count(words[0]), "int").astype(np.int64))
             case "CELL_DATA" | "POINT_DATA":
-                self.are_of_cells, self.length = section == "CELL_DATA", file.count(words[0])
-            case "FIELD":
-                self._take_arrays(min(file.count(words[1]), len(file.content)))
-            case "METADATA":
-                self._skip_metadata()
+                are_of_cells, length = section == "CELL_DATA", file.count(words[0])
             case _:
-                self._take_attribute(section, words)
+                for name, values, width in _arrays(file, section, words, length):
+                    if are_of_cells:
+                        data[unquote(name)] = values if width == 1 else values.reshape(-1, max(width, 1))
+    return mesh_of(grid)
 
-    def _take_cells(self, count: int, size: int) -> None:
-        """Take the nodes of cells: behind their offsets or, before version 5, each behind their number."""
-        if not self.file.follows("OFFSETS"):
-            self.rows = self.file.take(size, "i4").astype(np.int64)
-            return
-        self.offsets = self.file.take(count, self._type("".join(self.file.line()[1:2]))).astype(np.int64)
-        if not self.file.follows("CONNECTIVITY"):
-            self.file.refuse("CELLS: expected CONNECTIVITY behind OFFSETS")
-        self.nodes = self.file.take(size, self._type("".join(self.file.line()[1:2]))).astype(np.int64)
 
-    def _take_arrays(self, count: int) -> None:
-        """Take the arrays of a field."""
-        for _ in range(count):
-            if (words := self.file.line())[:1] == ["METADATA"]:
-                self._skip_metadata()
-                words = self.file.line()
-            name, width, length, kind = (*words, "", "", "", "")[:4]
-            values = self.file.take(self.file.count(width) * self.file.count(length), self._type(kind))
-            self._keep(name, values, int(width))
+def _cells(file: Scanner, count: int, size: int) -> tuple[Int, Int]:
+    """Read the cells: nodes behind all offsets or, before version 5, rows of a node count and nodes."""
+    if file.follows("OFFSETS"):
+        offsets = file.take(count, "".join(file.line()[1:2])).astype(np.int64)
+        if not file.follows("CONNECTIVITY"):
+            file.refuse("CELLS: expected CONNECTIVITY behind OFFSETS")
+        return file.take(size, "".join(file.line()[1:2])).astype(np.int64), np.diff(offsets)
+    rows = file.take(size, "int").astype(np.int64)
+    # A row begins behind the nodes of the row before: follow these links from entry 0.
+    onward = np.clip(np.arange(size) + 1 + rows, 0, size)
+    graph = csr_array((np.ones(size), onward, np.append(np.arange(size + 1), size)), shape=(size + 1, size + 1))
+    starts = breadth_first_order(graph, 0, return_predecessors=False)
+    starts = starts[starts < size]
+    return np.delete(rows, starts), rows[starts]
 
-    def _take_attribute(self, section: str, words: list[str]) -> None:
-        """Take numbers of points or cells, and colours of tables."""
-        file, byte = self.file, "u1" if self.file.is_binary else "f4"
-        if section == "LOOKUP_TABLE":
-            file.take(4 * file.count(words[1]), byte)
-        elif section == "COLOR_SCALARS":
-            width = file.count(words[1])
-            colours = file.take(self.length * width, byte)  # as text from 0 to 1
-            self._keep(words[0], colours if file.is_binary else np.rint(255 * colours).astype(np.int64), width)
-        elif section == "TEXTURE_COORDINATES":
-            file.take(self.length * file.count(words[1]), self._type(words[2]))
-        elif section in WIDTHS:
-            width = file.count(words[2]) if section == "SCALARS" and words[2] else WIDTHS[section]
-            if section == "SCALARS" and file.follows("LOOKUP_TABLE"):
-                file.line()
-            self._keep(words[0], file.take(self.length * width, self._type(words[1])), width)
-        else:
-            expected = "expected DATASET, POINTS, CELLS, CELL_TYPES, CELL_DATA, POINT_DATA or numbers of these"
-            file.refuse(f"{wording.toml_value(section)}: {expected}")
 
-    def _keep(self, name: str, values: Numbers, width: int) -> None:
-        if self.are_of_cells:
-            self.data[unquote(name)] = values if width == 1 else values.reshape(-1, max(width, 1))
-
-    def _skip_metadata(self) -> None:
-        """Pass over lines up to an empty one."""
-        stop = self.file.content.find(b"\n\n", self.file.place - 1)
-        self.file.place = len(self.file.content) if stop < 0 else stop + 2
-
-    def _type(self, name: str) -> str:
-        if name.lower() not in TYPES:
-            self.file.refuse(f"{wording.toml_value(name)}: expected a type of numbers, such as int or double")
-        return TYPES[name.lower()]
+def _arrays(file: Scanner, section: str, words: list[str], length: int) -> Iterator[tuple[str, Numbers, int]]:
+    """Read arrays of `length` points or cells; yield name, values and width of each, but skip tables."""
+    byte = "unsigned_char" if file.is_binary else "float"
+    if section == "FIELD":
+        for _ in range(min(file.count(words[1]), len(file.content))):
+            name, width, tuples, kind = (*file.line(), "", "", "", "")[:4]
+            yield name, file.take(file.count(width) * file.count(tuples), kind), int(width)
+    elif section == "LOOKUP_TABLE":
+        file.take(4 * file.count(words[1]), byte)
+    elif section == "COLOR_SCALARS":
+        colours = file.take(length * file.count(words[1]), byte)  # as text from 0 to 1
+        yield words[0], colours if file.is_binary else np.rint(255 * colours).astype(np.int64), int(words[1])
+    elif section == "TEXTURE_COORDINATES":
+        file.take(length * file.count(words[1]), words[2])
+    elif section in WIDTHS:
+        number = file.count(words[2]) if section == "SCALARS" and words[2] else WIDTHS[section]
+        if section == "SCALARS" and file.follows("LOOKUP_TABLE"):
+            file.line()
+        yield words[0], file.take(length * number, words[1]), number
+    else:
+        expected = "expected DATASET, POINTS, CELLS, CELL_TYPES, CELL_DATA, POINT_DATA or numbers of these"
+        file.refuse(f"{wording.toml_value(section)}: {expected}")
 
 
 def load_medit(path: Path) -> RawMesh:
@@ -168,7 +137,11 @@ def load_medit(path: Path) -> RawMesh:
         MeshError: it is damaged, or has other cells.
     """
     file = Scanner(re.sub(rb"#[^\n]*", b"", input_files.read(path)))
-    dimension = _dimension(file)
+    if file.word() != "MeshVersionFormatted":
+        file.refuse("expected MeshVersionFormatted, with which a mesh file of Medit begins")
+    file.word()
+    if file.word().upper() != "DIMENSION" or (dimension := file.count(file.word())) not in (2, 3):
+        file.refuse("expected Dimension 2 or 3")
     widths = ENTRIES | {VERTICES: dimension + 1} | dict.fromkeys(VECTORS, dimension)
     none = np.zeros(0, np.int64)
     points, cells = np.zeros((0, 3)), [(none, none, none, none)]
@@ -180,7 +153,7 @@ def load_medit(path: Path) -> RawMesh:
         if section not in widths and count:
             expected = "only triangles of three nodes, quadrilaterals of four and edges of two can be used"
             file.refuse(f"{count} {word}: {expected}")
-        rows = file.take(count * width, "i8" if section in CELLS else "f8").reshape(-1, width)
+        rows = file.take(count * width, "long" if section in CELLS else "double").reshape(-1, width)
         if section in CELLS:
             types, counts = np.full(count, CELLS[section][0]), np.full(count, width - 1)
             cells.append((types, rows[:, :-1].ravel() - 1, counts, rows[:, -1]))
@@ -192,34 +165,25 @@ def load_medit(path: Path) -> RawMesh:
     return mesh_of(Grid(points, types, nodes, counts, {"medit:ref": references}, first=1))
 
 
-def _dimension(file: Scanner) -> int:
-    """Take the head of a Medit file and return the number of coordinates."""
-    if file.word() != "MeshVersionFormatted":
-        file.refuse("expected MeshVersionFormatted, with which a mesh file of Medit begins")
-    file.word()
-    if file.word().upper() != "DIMENSION" or (dimension := file.count(file.word())) not in (2, 3):
-        file.refuse("expected Dimension 2 or 3")
-    return dimension
-
-
 class Scanner:
-    """Take lines, words and arrays of a file; binary arrays have the most significant byte first."""
+    """Read lines, words and arrays of a file; binary arrays are big-endian."""
 
     def __init__(self, content: bytes) -> None:
         self.content, self.place, self.is_binary = content.removeprefix(codecs.BOM_UTF8), 0, False
 
     def line(self) -> list[str]:
-        """Take the words in the next line that has any; none at the file's end."""
-        words, start = list[str](), self.place
-        while not words and start < len(self.content):
-            stop = self.content.find(b"\n", start)
-            self.place = len(self.content) if stop < 0 else stop + 1
+        """Read the words of the next line that is not blank, behind any METADATA block; empty at the end."""
+        words = list[str]()
+        while not words and self.place < len(self.content):
+            start, self.place = self.place, self.content.find(b"\n", self.place) + 1 or len(self.content)
             words = self.content[start : self.place].decode(errors="replace").split()
-            start = self.place
+            if words and words[0].upper() == "METADATA":
+                words, stop = [], self.content.find(b"\n\n", self.place - 1)
+                self.place = len(self.content) if stop < 0 else stop + 2
         return words
 
     def word(self) -> str:
-        """Take the next word; empty at the end of the file."""
+        """Read the next word; empty at the end of the file."""
         match = WORD.search(self.content, self.place)
         self.place = len(self.content) if match is None else match.end()
         return "" if match is None else match[0].decode(errors="replace")
@@ -230,13 +194,16 @@ class Scanner:
         return match is not None and match[0].upper() == word.encode()
 
     def count(self, word: str) -> int:
-        """Return the number of values that a word announces."""
+        """Convert a word into a number of values."""
         if not re.fullmatch("[0-9]{1,15}", word):
             self.refuse(f"{wording.toml_value(word)}: expected a number of values")
         return int(word)
 
-    def take(self, count: int, kind: str) -> Numbers:
-        """Take (count,) numbers of NumPy's type `kind`."""
+    def take(self, count: int, name: str) -> Numbers:
+        """Read an array (count,) of VTK's type `name`."""
+        if name.lower() not in TYPES:
+            self.refuse(f"{wording.toml_value(name)}: expected a type of numbers, such as int or double")
+        kind = TYPES[name.lower()]
         kind = kind if self.is_binary else "f8" if kind[0] == "f" else "i8"
         size = int(kind[1]) if self.is_binary else 1
         if count * size > len(self.content) - self.place:
@@ -257,18 +224,6 @@ class Scanner:
         return values
 
     def refuse(self, fault: str) -> NoReturn:
-        """Raise MeshError with the line that has been reached."""
+        """Raise MeshError with the number of the current line."""
         line = self.content[: self.place].rstrip().count(b"\n") + 1
         raise MeshError(fault if self.is_binary else f"line {line}: {fault}")
-
-
-def chain(following: Int) -> Int:
-    """Return the indices met from 0 on, in order.
-
-    following[i] comes after i; behind the last it is out of range.
-    """
-    size = len(following)
-    onward = np.clip(following, 0, size)
-    graph = csr_array((np.ones(size), onward, np.append(np.arange(size + 1), size)), shape=(size + 1, size + 1))
-    met = breadth_first_order(graph, 0, return_predecessors=False)
-    return np.asarray(met[met < size], np.int64)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import base64
-import binascii
 import lzma
 import re
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -19,7 +18,6 @@ from feti_homog.mesh.readers.raw_mesh import RawMesh
 from feti_homog.mesh.readers.unstructured_grid import Grid, NotANumber, Numbers, mesh_of, numbers
 from feti_homog.schema import wording
 from feti_homog.system.runtime import input_files
-from feti_homog.typing import Int
 
 TYPES = {f"{sign}Int{8 * size}": f"{kind}{size}" for sign, kind in (("", "i"), ("U", "u")) for size in (1, 2, 4, 8)}
 TYPES |= {"Float32": "f4", "Float64": "f8"}
@@ -51,29 +49,20 @@ def load(path: Path) -> RawMesh:
     (grid,) = _children(root, "VTKFile", {"UnstructuredGrid": 1, "AppendedData": 0})["UnstructuredGrid"]
     arrays = _Arrays(root, appended, max(MOST_BYTES, MOST_RATIO * size))
     pieces = [_piece(piece, arrays) for piece in _children(grid, grid.tag, {"Piece": 1, "FieldData": 0})["Piece"]]
-    return mesh_of(_joined(pieces))
-
-
-def _joined(pieces: Sequence[Grid]) -> Grid:
-    """Join the pieces of a grid."""
     first = np.cumsum([0, *(len(piece.points) for piece in pieces)])
     nodes = np.concatenate([piece.nodes + before for piece, before in zip(pieces, first, strict=False)])
     points, types, counts = (
         np.concatenate([getattr(piece, name) for piece in pieces]) for name in ("points", "types", "counts")
     )
-    return Grid(points, types, nodes, counts, _joined_data([piece.data for piece in pieces if len(piece.types)]))
-
-
-def _joined_data(data: Sequence[Mapping[str, Numbers]]) -> dict[str, Numbers]:
-    """Join cell data; MeshError if a piece lacks data of another."""
-    for name in {name for piece in data for name in piece}:
-        if not all(name in piece for piece in data):
-            raise MeshError(f"cell data {name}: missing in one of {len(data)} pieces")
-    return {name: np.concatenate([piece[name] for piece in data]) for name in data[0]} if data else {}
+    tables = [piece.data for piece in pieces if len(piece.types)] or [{}]
+    if lost := set[str]().union(*tables) - set(tables[0]).intersection(*tables):
+        raise MeshError(f"cell data {min(lost)}: missing in one of {len(tables)} pieces")
+    data = {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
+    return mesh_of(Grid(points, types, nodes, counts, data))
 
 
 def _children(element: ElementTree.Element, name: str, tags: Mapping[str, int]) -> dict[str, list[Any]]:
-    """Return an element's children by their tags; MeshError if others are there or required ones missing."""
+    """Return an element's children by tag; MeshError for unknown and missing children."""
     children: dict[str, list[Any]] = {tag: element.findall(tag) for tag in tags}
     other = [child.tag for child in element if child.tag not in tags]
     expected = f"expected {' and '.join(tags)}"
@@ -87,7 +76,7 @@ def _children(element: ElementTree.Element, name: str, tags: Mapping[str, int]) 
 
 
 def _piece(piece: ElementTree.Element, arrays: _Arrays) -> Grid:
-    """Return the points, cells and cell data of a piece."""
+    """Read the points, cells and cell data of a piece."""
     children = _children(piece, "Piece", {"Points": 1, "Cells": 1, "CellData": 0, "PointData": 0})
     counts = []
     for name in ("NumberOfPoints", "NumberOfCells"):
@@ -110,7 +99,7 @@ def _piece(piece: ElementTree.Element, arrays: _Arrays) -> Grid:
 
 
 class _Arrays:
-    """Arrays of a file, read as its root says; `budget` bytes may be decompressed."""
+    """Decode arrays in the form that the root declares; at most `budget` bytes are decompressed."""
 
     def __init__(self, root: ElementTree.Element, appended: bytes, budget: int) -> None:
         kind, compressor = root.get("type"), root.get("compressor", "")
@@ -128,13 +117,12 @@ class _Arrays:
         self.order, self.budget = ORDERS[order], budget
         self.header = np.dtype(f"{self.order}{TYPES[header]}")
         self.decompressor: Any = COMPRESSORS.get(compressor)
-        section = root.find("AppendedData")
-        self.appended, self.is_raw = appended, section is not None and section.get("encoding") == "raw"
+        self.appended, self.is_raw = appended, root.find("AppendedData[@encoding='raw']") is not None
         starts = {self._offset(array) for array in root.iter("DataArray") if array.get("format") == "appended"}
         self.starts = [*sorted(starts), len(appended)]
 
     def of(self, section: ElementTree.Element) -> dict[str, Numbers]:
-        """Return the number arrays in a section by their names: (k,), or a row for each tuple."""
+        """Read the numeric arrays of a section by name: (k,), or a row for each tuple."""
         arrays = {}
         for array in section.iter("DataArray"):
             name, kind = array.get("Name") or "Points", TYPES.get(array.get("type", ""))
@@ -145,7 +133,7 @@ class _Arrays:
                 arrays[name] = values if width == 1 else values.reshape(-1, width)
             except NotANumber as error:
                 raise MeshError(f"array {wording.toml_value(name)}: {error}") from None
-            except (ValueError, zlib.error, lzma.LZMAError, binascii.Error):
+            except (ValueError, IndexError, zlib.error, lzma.LZMAError):
                 raise MeshError(f"array {wording.toml_value(name)}: its data are damaged or broken off") from None
         return arrays
 
@@ -172,25 +160,23 @@ class _Arrays:
             )
         return int(word)
 
-    def _words(self, data: bytes, count: int) -> Int:
-        """Return the first (count,) words of a header; ValueError if it is broken off."""
-        if count * self.header.itemsize > len(data):
-            raise ValueError
-        return np.frombuffer(data, self.header, count)
-
     def _unpacked(self, data: bytes) -> bytes:
-        """Return data behind their length, or behind the lengths of compressed blocks; ValueError if broken off."""
-        (count,), start = self._words(data, 1).tolist(), self.header.itemsize
+        """Unpack data behind a header with their length or block lengths; ValueError or IndexError if cut off."""
+        size = self.header.itemsize
+        header = np.frombuffer(data, self.header, len(data) // size)
+        count = int(header[0])
         if not self.decompressor:
-            if start + count > len(data):
+            if size + count > len(data):
                 raise ValueError
-            return data[start : start + count]
-        place, unpacked = (3 + count) * start, []
-        for length in self._words(data, 3 + count).tolist()[3:] if count else []:
+            return data[size : size + count]
+        if count and len(header) < 3 + count:
+            raise ValueError
+        start, unpacked = (3 + count) * size, []
+        for length in header[3 : 3 + count].tolist():
             decompressor = self.decompressor()
-            unpacked.append(decompressor.decompress(data[place : place + length], self.budget + 1))
+            unpacked.append(decompressor.decompress(data[start : start + length], self.budget + 1))
             self.budget -= len(unpacked[-1])
-            place += length
+            start += length
             if self.budget < 0:
                 raise MeshError("its compressed data are too large for a file of its length")
             if not decompressor.eof:

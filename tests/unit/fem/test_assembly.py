@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from reference import monolithic
+from support.subdomains import cut
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.fem.assembly import assemble, element_strain
@@ -10,7 +11,6 @@ from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.mesh_fibres import unwrap
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice, refine
-from feti_homog.mesh.submeshes import cut
 
 STIFFNESS = np.array([[5.0, 1.5, 0.4], [1.5, 3.0, -0.2], [0.4, -0.2, 1.2]])
 ISOTROPIC = {nu: np.array([[1 - nu, nu, 0], [nu, 1 - nu, 0], [0, 0, 0.5 - nu]]) / (1 - 2 * nu) for nu in (0.3, 0.4999)}

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.subdomains import cut
 from unit.mesh.test_table_ellipses import ROWS, cell_of, table
 
 from feti_homog.errors import MeshError
@@ -11,7 +12,6 @@ from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice, refine
-from feti_homog.mesh.submeshes import cut
 
 COATED = [ROWS[0] | {"coating": 0.1}, ROWS[1] | {"coating": 0.05}, ROWS[2], {"x": 0.5, "y": 0.85, "radius": 0.07}]
 COATED[3] |= {"coating": 0.2}

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.subdomains import cut
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.mesh.arrange import arrange
@@ -11,7 +12,6 @@ from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice, refine
 from feti_homog.mesh.sizes.graded_size import MeshSizes
-from feti_homog.mesh.submeshes import cut
 from feti_homog.microstructure.arrangements import Arrangement
 
 CELLS = {

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.subdomains import cut
 
 from feti_homog.case.cell_files import check_shapes
 from feti_homog.case.cell_section import Cell
@@ -14,7 +15,6 @@ from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice, refine
-from feti_homog.mesh.submeshes import cut
 from feti_homog.microstructure.fibre_table import table_of
 from feti_homog.microstructure.shapes.ellipses import Ellipses, gaps
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.subdomains import cut
 from support.users_meshes import fibre_area, polar_cell
 
 from feti_homog.mesh.mesh_fibres import fibre_circles
@@ -9,7 +10,6 @@ from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers.msh_reader import read
 from feti_homog.mesh.readers.round_interfaces import fit_ellipse
 from feti_homog.mesh.refinement import ReferenceLattice, refine
-from feti_homog.mesh.submeshes import cut
 
 A, B, TURN = 0.3, 0.2, 0.4
 
