@@ -47,7 +47,7 @@ def check_mesh(findings: Findings, cell: DiscreteCell) -> None:
 
 
 def check_interface(findings: Findings, cell: DiscreteCell) -> None:
-    """Check that each place where two bodies may part, and no other, has an interface node, of their section."""
+    """Check that interface nodes stand where two bodies may part, and their sections and shapes."""
     rows, faces, at = cell.files.interface, cell.faces, "interface node {}".format
     findings.record("interface", faces.distance / cell.files.size.max(), at)
     count = np.bincount(faces.place[faces.place >= 0], minlength=cell.nodes.places)

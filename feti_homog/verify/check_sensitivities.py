@@ -197,7 +197,7 @@ def _energies(cell: DiscreteCell, states: list[State], case: Mapping[str, Any]) 
 
 
 def _grown(cell: DiscreteCell, growth: float, states: list[State]) -> tuple[Mesh, list[State]]:
-    """Return the mesh with all radii grown by this share, and the states at the same u - E x.
+    """Return the mesh with radii larger by the fraction `growth`, and the states with equal u - E x.
 
     Nodes around a fibre move with its circle, less and less to nothing halfway to the next fibre.
     """

@@ -57,7 +57,7 @@ def interface_forces(cell: DiscreteCell, state: State) -> Float:
 
 
 def _glued(cell: DiscreteCell) -> Int:
-    """(b,) equal numbers of glued torn nodes: one a place, two at interface nodes, the odd one on the fibre."""
+    """(b,) numbers that glued nodes share: one at a place, two at an interface node, the odd number on the fibre."""
     return np.asarray(2 * cell.nodes.place + ((cell.faces.row >= 0) & cell.faces.is_fibre))
 
 

@@ -64,9 +64,10 @@ def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
 
 
 def out_of_plane(case: Mapping[str, Any], phases: Sequence[str]) -> Float:
-    """(phases, 2, 3) from [S11, S22, S12] to [S33, E33]; NaN where constants leave it open.  Raises as `laws`.
+    """(phases, 2, 3) matrices from [S11, S22, S12] to [S33, E33]; NaN where the constants leave S33 or E33 open.
 
     E33 = s13 S11' + s23 S22' + s36 S12' + s33 S33 with the stresses in the material axes; one of S33, E33 is 0.
+    Raises CaseError as `laws` does.
     """
     plane, rules = case["analysis"]["plane"], []
     needed = {"young": ["poisson"], "E_transverse": ["E_axial", "nu_axial"],

@@ -203,7 +203,7 @@ class DiscreteCell:
         return strain if free is None else np.asarray(strain + np.abs(free).max(axis=0))
 
     def scales(self, strain: Float, temperature: float, slip: float = 0.0) -> Scales:
-        """Return the sizes under a load, or a faint one, and under a slip that friction holds in an unloaded cell."""
+        """Return the scales of a load and of a slip that friction holds; no scale vanishes with the load."""
         loads, longest, (width, height) = self.loads(strain, temperature), float(self.files.size.max()), self.files.size
         loads = np.asarray(loads + np.copysign(slip / longest, loads))
         corners = np.array([[width, 0.0], [0.0, height], [width, height]])

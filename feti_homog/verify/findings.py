@@ -43,7 +43,7 @@ Place = str | Callable[[int], str]
 
 @dataclass(frozen=True)
 class Finding:
-    """A law with its largest admissible relative violation, its largest violation, and the place of this."""
+    """A law with the limit of its relative violations, the largest violation, and its place."""
 
     name: str
     description: str
@@ -79,7 +79,7 @@ class Findings:
         self._worst: dict[str, Finding] = {}
 
     def record(self, law: str, violations: ArrayLike, where: Place = "") -> None:
-        """Record relative violations, a number or one or several a row; `where` names the place of row i.
+        """Record the relative violations (), (k,) or (k, n) of a law; `where` names the place of row i.
 
         Laws without any record do not apply to the result.
         """
@@ -234,7 +234,7 @@ class Section(dict[str, Any]):
         return super().get(key, default)
 
     def leaves_open(self, key: str) -> None:
-        """Count an entry as unread for good, which laws use but do not determine."""
+        """Count an entry as unread for good: laws use its value but do not determine it."""
         self.unread[self._prefix + key] = True
 
 

@@ -232,7 +232,7 @@ def _document(path: Path) -> Mapping[str, Any]:
 
 
 def _contents(document: Section, file: h5py.File, altered: tuple[str, ...]) -> ResultFiles:
-    """Read both files except the states."""
+    """Read the mesh, the interface and the fibres, and check their indices."""
     n, m = len(file["mesh/points"]), len(file["mesh/triangles"])
     k, f = len(file["interface/points"]), len(file["fibre/radius"])
     columns = 6 if file["mesh/triangles"].shape[1:] == (6,) else 3

@@ -20,7 +20,7 @@ BETWEEN_MODES = 0.25
 
 
 class Cohesive(QuadraticStrength):
-    """delta = sqrt(<delta_n>^2 + delta_s^2) reaches the next tooth."""
+    """A bond softens where delta = sqrt(<delta_n>^2 + delta_s^2) reaches the next tooth."""
 
     has_toughness: ClassVar[bool] = True
 
@@ -134,7 +134,7 @@ class Cohesive(QuadraticStrength):
 
 
 class TableLaw(Cohesive):
-    """Straight pieces."""
+    """A branch of straight pieces between the points of a table."""
 
     @property
     def _points(self) -> tuple[Float, Float]:
@@ -161,13 +161,13 @@ class TableLaw(Cohesive):
 
 
 class BilinearLaw(TableLaw):
-    """One straight piece."""
+    """A branch of one straight piece."""
 
     _points = np.array([0.0, 1.0]), np.array([1.0, 0.0])
 
 
 class ExponentialLaw(Cohesive):
-    """exp(-u)."""
+    """The branch exp(-u)."""
 
     last = -float(np.log(TAIL))
 
