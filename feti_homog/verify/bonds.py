@@ -41,7 +41,7 @@ class BondLaw(ABC):
 
     @abstractmethod
     def utilisation(self, traction: Float) -> Float:
-        """(k,) used share of the strength by tractions (k, c); compression uses none."""
+        """(k,) fraction of the strength that tractions (k, c) use; compression uses none."""
 
     @abstractmethod
     def breaks(self, traction: Float) -> dict[str, float]:
@@ -91,22 +91,22 @@ class BondLaw(ABC):
 
 
 class MaxStrength(BondLaw):
-    """The largest share of a component breaks the bond."""
+    """A bond breaks at the largest ratio of a traction component to its strength."""
 
     def utilisation(self, traction: Float) -> Float:
-        """(k,) largest share of a component."""
+        """(k,) largest ratio of a component."""
         return np.asarray(self.shares(traction).max(axis=1, initial=0.0))
 
     def breaks(self, traction: Float) -> dict[str, float]:
-        """Return the shares of the components."""
+        """Return the ratios of the components."""
         return dict(zip(("normal", "tangential", "axial"), self.shares(traction)[0].tolist(), strict=False))
 
 
 class QuadraticStrength(MaxStrength):
-    """All components together break the bond."""
+    """A bond breaks at the root of the summed squared ratios of its components."""
 
     def utilisation(self, traction: Float) -> Float:
-        """(k,) root of the summed squared shares."""
+        """(k,) root of the summed squared ratios."""
         return np.asarray(np.sqrt(np.square(self.shares(traction)).sum(axis=1)))
 
 
@@ -134,7 +134,7 @@ class SpringEnergy(BondLaw):
 
 
 def pulled(traction: Float) -> Float:
-    """(k, c) sizes of the components; compression has none."""
+    """(k, c) magnitudes of the traction components, 0 in compression."""
     return np.column_stack([np.maximum(traction[:, 0], 0.0), np.abs(traction[:, 1:])])
 
 
@@ -155,27 +155,22 @@ def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None), damag
     section = {**sections[0]} if sections else {}
     if sections and (len(sections) > 1 or (strength != 1).any()):
         pair, factor = files.interface.pair[nodes], strength[files.interface.fibre[nodes] - 1]
-        for name in NUMBERS:
+        for name, default in NUMBERS.items():
             power = 1 if name.endswith("strength") else 2 if name.endswith("toughness") else 0
-            section[name] = np.array([_number(own, name) for own in sections])[pair] * factor**power
+            numbers = [[own[key] for key in (name, default) if own.get(key) is not None] for own in sections]
+            section[name] = np.array([float((values or [np.inf])[0]) for values in numbers])[pair] * factor**power
     return law_of(section if damage is None else section | {"damage": damage[nodes]})
 
 
-def _number(section: Mapping[str, Any], name: str) -> float:
-    """Return a number of a section, or its default; inf if there is none."""
-    values = (section.get(key) for key in (name, NUMBERS[name]))
-    return float(next((value for value in values if value is not None), np.inf))
-
-
 def friction_at(files: ResultFiles, on_damage: bool = False) -> Float:
-    """(k,) friction coefficients on debonded faces, or on the damaged share of bonds."""
+    """(k,) friction coefficients on debonded faces, or on the damaged fraction of bonds."""
     key = "friction_on_damage" if on_damage else "friction"
     mu = [float(section.get("friction", 0.0)) * bool(section.get(key)) for section in files.interfaces or [{}]]
     return np.asarray(np.array(mu)[np.minimum(files.interface.pair, len(mu) - 1)])
 
 
 def rubbing_force(files: ResultFiles, state: State) -> Float:
-    """(k,) shear on the damaged share of unbroken bonds with friction, else 0.
+    """(k,) shear traction on the damaged fraction of unbroken bonds with friction, else 0.
 
     The slip is C_0 traction + g, the force is traction - g / (C - C_0).
     """
@@ -187,7 +182,7 @@ def rubbing_force(files: ResultFiles, state: State) -> Float:
 
 
 def cohesive_traction(files: ResultFiles, state: State) -> Float:
-    """(k, c) tractions without friction on the damaged share."""
+    """(k, c) tractions without friction on the damaged fraction."""
     traction = state.traction.copy()
     traction[:, 1] -= state.damage * rubbing_force(files, state)
     return traction
@@ -203,7 +198,7 @@ def energy_of_springs(files: ResultFiles, state: State) -> float:
 
 
 def pairs_of(files: ResultFiles) -> Int:
-    """(phases, phases) place of the section between two phases, -1 where bonds never part."""
+    """(phases, phases) index of the section between two phases, -1 where bonds never part."""
     pairs = np.full((len(files.phases),) * 2, -1)
     for number, section in enumerate(files.interfaces or [{}]):
         if "between" not in section:

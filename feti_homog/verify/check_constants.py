@@ -19,26 +19,43 @@ RATIOS = ("eta", "anisotropy", "deviation")
 
 
 def check_constants(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check the numbers of result.json that sum up a run."""
-    document = cell.files.document
+    """Check the numbers of result.json that sum up a run.
+
+    Thermal stresses obey reciprocity, which contact without tension breaks.
+    """
+    document, has_contact = cell.files.document, cell.files.contact
     _check_status(findings, cell)
     _check_cell(findings, cell, document["cell"])
     if "effective_stiffness" in document:
         _check_stiffness(findings, cell, document)
     for number, table in enumerate([document, *document.get("angle", ())], start=-1):
-        if "thermal_stress" in table and cell.expansions is not None:
-            of_table = [state for state in states if number < 0 or state.point == number]
-            _check_levin(findings, cell, table, of_table, f"angle[{number}].thermal_stress".removeprefix("angle[-1]."))
+        of_table = [state for state in states if number < 0 or state.point == number]
+        is_linear = not (has_contact and any((state.status != BONDED).any() for state in of_table))
+        if "thermal_stress" in table and cell.expansions is not None and is_linear:
+            thermal, place = np.array(table["thermal_stress"]), f"angle[{number}].thermal_stress"
+            for state in of_table:
+                error = relative(thermal @ state.strain + state.expanding, np.abs(thermal).max())
+                where = f"{place.removeprefix('angle[-1].')}, {state.name}"
+                findings.record("Levin", [] if state.temperature else error, where)
 
 
 def _check_stiffness(findings: Findings, cell: DiscreteCell, document: Section) -> None:
-    """Check bounds, compliance and constants of the stiffness."""
+    """Check bounds, compliance, thermal expansion and constants of the stiffness."""
     C, heat = np.array(document["effective_stiffness"]), document.get("thermal_stress")
     heat = None if heat is None else np.array(heat)
     if document.get("bounds") is not None:
         _check_bounds(findings, cell, document["bounds"], C)
     if cell.files.is_spatial:
-        _check_inverse(findings, document, C, heat)
+        # Columns that are secants of one load each have no meaningful inverse.
+        is_linear = "effective_stiffness_compression" not in document
+        findings.require("compliance", is_linear is ("compliance" in document), "compliance")
+        if "compliance" in document:
+            S = np.array(document["compliance"])
+            terms = (np.abs(S) @ np.abs(C)).max(axis=1)[:, None]  # of cancelling sums
+            findings.compare("compliance", S @ C, np.eye(6), terms, "compliance")
+        if "thermal_expansion" in document and heat is not None:
+            strains, place = -np.linalg.solve(C, heat), "thermal_expansion"
+            findings.compare("compliance", document[place], strains, np.abs(strains).max(), place)
     for section in SECTIONS & document.keys():
         constants = {} if document.get(section) is None else constants_of(C, heat)
         for name, value in (document.get(section) or {}).items():
@@ -94,33 +111,6 @@ def _check_cell(findings: Findings, cell: DiscreteCell, section: Section) -> Non
         findings.compare("tables", strength, expected, expected, "/fibre/strength at fibre {}".format)
 
 
-def _check_inverse(findings: Findings, document: Section, C: Float, heat: Float | None) -> None:
-    """Check compliance and thermal expansion."""
-    # Columns that are secants of one load each have no meaningful inverse.
-    is_linear = "effective_stiffness_compression" not in document
-    findings.require("compliance", is_linear is ("compliance" in document), "compliance")
-    if "compliance" in document:
-        S = np.array(document["compliance"])
-        terms = (np.abs(S) @ np.abs(C)).max(axis=1)[:, None]  # of cancelling sums
-        findings.compare("compliance", S @ C, np.eye(6), terms, "compliance")
-    if "thermal_expansion" in document and heat is not None:
-        strains = -np.linalg.solve(C, heat)
-        findings.compare(
-            "compliance", document["thermal_expansion"], strains, np.abs(strains).max(), "thermal_expansion"
-        )
-
-
-def _check_levin(findings: Findings, cell: DiscreteCell, table: Section, states: States, place: str) -> None:
-    """Check a thermal stress by reciprocity, which contact without tension breaks."""
-    if cell.files.contact and any((state.status != BONDED).any() for state in states):
-        return
-    thermal = np.array(table["thermal_stress"])
-    for state in states:
-        if not state.temperature:
-            error = thermal @ state.strain + state.expanding
-            findings.record("Levin", relative(error, np.abs(thermal).max()), f"{place}, {state.name}")
-
-
 def _check_bounds(findings: Findings, cell: DiscreteCell, bounds: Section, stiffness: Float) -> None:
     """Check Voigt's and Reuss' bounds, Hashin and Shtrikman's, and their order."""
     upper, lower = np.einsum("p,pij->ij", cell.fractions, cell.stiffnesses), cell.reuss
@@ -159,7 +149,20 @@ def constants_of(C: Float, heat: Float | None) -> dict[str, float]:
         table |= {"eta1": S[2, 0] / S[0, 0], "eta2": S[2, 1] / S[1, 1], "bulk": bulk, "shear": shear}
         table["anisotropy"] = _distance(C, nearest)
     else:
-        table |= _about_fibres(C)
+        # Constants of the mean over turns about x3, exact: the turned tensor has no more than four waves in a turn.
+        mean = np.mean([turned(C, angle) for angle in np.arange(5) * 72.0], axis=0)
+        M, angle = np.linalg.inv(mean), np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+        table |= {
+            "E_axial": 1 / M[2, 2], "E_transverse": 1 / M[0, 0], "nu_transverse": -M[0, 1] / M[0, 0],
+            "nu_axial": -M[0, 2] / M[2, 2], "G_axial": 1 / M[4, 4], "G_transverse": 1 / M[5, 5],
+            "K_transverse": (mean[0, 0] + mean[0, 1]) / 2, "deviation": _distance(C, mean),
+        }  # fmt: skip
+        # Ranges of E1 and G12 in turned axes.
+        c, s, none = np.cos(angle), np.sin(angle), np.zeros((3, DIRECTIONS))
+        tension, slide = np.vstack([c**2, s**2, none, c * s]), np.vstack([-2 * c * s, 2 * c * s, none, c**2 - s**2])
+        for name, stress in (("E", tension), ("G", slide)):
+            moduli = 1 / np.einsum("ia,ij,ja->a", stress, S, stress)
+            table |= {f"{name}_least": moduli.min(), f"{name}_largest": moduli.max()}
     if heat is not None:
         x1, x2, x3 = -np.linalg.solve(C, heat)[:3]
         table |= {"expansion_x1": x1, "expansion_x2": x2, "expansion_axial": x3, "expansion_transverse": (x1 + x2) / 2}
@@ -178,19 +181,3 @@ def _distance(C: Float, other: Float) -> float:
     voigt = VOIGT[len(C)]
     off, size = (np.linalg.norm(M[voigt[:, :, None, None], voigt[None, None]]) for M in (C - other, C))
     return float(off / size)
-
-
-def _about_fibres(C: Float) -> dict[str, float]:
-    """Constants of the mean tensor over turns about x3, its distance, and the ranges of E1 and G12 in turned axes."""
-    # Exact: the turned tensor has no more than four waves in a turn.
-    mean = np.mean([turned(C, angle) for angle in np.arange(5) * 72.0], axis=0)
-    S, angle = np.linalg.inv(mean), np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-    c, s, none = np.cos(angle), np.sin(angle), np.zeros((3, DIRECTIONS))
-    tension, shear = np.vstack([c**2, s**2, none, c * s]), np.vstack([-2 * c * s, 2 * c * s, none, c**2 - s**2])
-    E, G = (1 / np.einsum("ia,ij,ja->a", stress, np.linalg.inv(C), stress) for stress in (tension, shear))
-    return {
-        "E_axial": 1 / S[2, 2], "E_transverse": 1 / S[0, 0], "nu_transverse": -S[0, 1] / S[0, 0],
-        "nu_axial": -S[0, 2] / S[2, 2], "G_axial": 1 / S[4, 4], "G_transverse": 1 / S[5, 5],
-        "K_transverse": (mean[0, 0] + mean[0, 1]) / 2, "deviation": _distance(C, mean),
-        "E_least": E.min(), "E_largest": E.max(), "G_least": G.min(), "G_largest": G.max(),
-    }  # fmt: skip

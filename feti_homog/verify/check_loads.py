@@ -28,7 +28,6 @@ NAMES = {
 TEMPERATURE, COUNTS = "temperature", {"bonded": BONDED, "closed": CLOSED, "open": OPEN}
 SAME_SHARE = 1e-12  # rounding of shares of a leg
 OF_ARCS = "debonded_length", "damaged_length", "debonded_shares"  # of an angle, in all unit loads
-LAST_OF_PLANE = 2  # place of gamma12 in the unit loads, whose state has the counts of an angle
 SPATIAL_ORDER = [0, 1, 5, 2, 4, 3]  # of unit strains in generalized plane strain; the fifth unit load is a temperature
 FIELDS = ("displacement", "fluctuation", "stress", "mesh_error", "stress_33")  # of a state on its mesh
 
@@ -193,7 +192,7 @@ def _check_states(findings: Findings, cell: DiscreteCell, pairs: Sequence[Any], 
             "debonded_shares": (debonded @ of_section / of_section.sum(axis=0), 1.0),
         }
         numbers |= {name: (np.count_nonzero(state.status == status), 1.0) for name, status in COUNTS.items()}
-        for name in numbers.keys() & entries.keys():
+        for name in [name for name in numbers if name in entries]:
             law, (value, scale) = "energy" if name.startswith("stored") else "tables", numbers[name]
             findings.compare(law, entries[name], value, scale, f"{state.name}, {name}")
     for number, point in enumerate(cell.files.points):
@@ -254,10 +253,10 @@ def _columns(
     order = np.eye(6)[SPATIAL_ORDER] if cell.files.is_spatial else np.eye(3)
     unit, v = [Prescribed.strain(strain, 0.0) for strain in order], len(order)
     unit[4:4] = [] if cell.expansions is None else [Prescribed.strain(np.zeros(6), 1.0)]
-    for number, load in enumerate(unit):
+    for load in unit:
         matrix, is_thermal = np.array(table[f"{stiffness}{suffix}"]), load.values[v:].any()
         stress = np.array(table[f"thermal_stress{suffix}"]) if is_thermal else matrix @ load.values[:v]
-        names = (*OF_ARCS, *COUNTS) if number == LAST_OF_PLANE else OF_ARCS
+        names = (*OF_ARCS, *COUNTS) if load.values[v - 1] else OF_ARCS  # the state of gamma12 has the counts
         entries = {"stress": sign * stress} | {name: table[name] for name in names if name in table}
         yield replace(load, values=sign * load.values), entries
 

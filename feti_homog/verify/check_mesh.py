@@ -11,7 +11,7 @@ from scipy.special import roots_legendre
 from feti_homog.typing import Bool, Float
 from feti_homog.verify.check_loads import NAMES, States
 from feti_homog.verify.discrete_cell import BONDED, DiscreteCell
-from feti_homog.verify.elements import PLACES
+from feti_homog.verify.elements import PLACES, add_at_nodes, quadrature_points
 from feti_homog.verify.findings import ROUNDING, Findings, Section
 from feti_homog.verify.reading import State
 from feti_homog.verify.torus import from_centre
@@ -26,7 +26,8 @@ LENGTH_ERROR, NORMAL_ERROR = np.pi / 2 - 1, np.sqrt(2.0)
 WITHOUT_BUBBLE = 1.7
 # Share of the elements' errors to which arcs may cancel them.
 LEAST_SHARE = 0.05
-# Tips are nodes, to the rounding of directions; lengths for modes are at least this share of the radius.
+# Tips and first bonds are at nodes, to the rounding of directions, in radii or degrees; lengths for modes are at least
+# this share of the radius.
 AT_NODE, MODE_LENGTH = 1e-6, 1e-3
 LOADS = [sign + name for sign in ("", "-") for name in (*NAMES[3][0], "strain")]  # of release rates
 # Middles of sides, a quadrature rule for squares of linear functions.
@@ -46,7 +47,7 @@ def check_mesh(findings: Findings, cell: DiscreteCell) -> None:
 
 
 def check_interface(findings: Findings, cell: DiscreteCell) -> None:
-    """Check that each place where two bodies may part, and no other, has an interface node, of their section."""
+    """Check that interface nodes stand where two bodies may part, and their sections and shapes."""
     rows, faces, at = cell.files.interface, cell.faces, "interface node {}".format
     findings.record("interface", faces.distance / cell.files.size.max(), at)
     count = np.bincount(faces.place[faces.place >= 0], minlength=cell.nodes.places)
@@ -212,35 +213,37 @@ def check_mesh_error(findings: Findings, cell: DiscreteCell, state: State) -> No
 
 def _averaged(cell: DiscreteCell, state: State) -> float:
     """int d : S : d, with d the stresses interpolated from averages at nodes less the elements' stresses."""
-    mesh, v = cell.files.mesh, cell.stiffnesses.shape[1]
+    mesh, v, elements = cell.files.mesh, cell.stiffnesses.shape[1], cell.elements
     n, is_linear = mesh.triangles.shape[1], mesh.triangles.shape[1] == 3
+    r = MIDDLES if is_linear else quadrature_points()  # (q, 3) barycentric coordinates
+
+    def stresses() -> Iterator[tuple[slice, Float, Float]]:
+        """Yield elements in portions: weights (e, q), and stresses (e, q, v) at r."""
+        if is_linear:
+            w, stress = (np.repeat(of[:, None], 3, axis=1) for of in (elements.area / 3, state.stress))
+            yield slice(None), w, stress
+            return
+        free = cell.free_strains(state.temperature)
+        for part, _, w, _, _, stress in elements.responses(state.displacement, state.along, free):
+            yield part, w, stress
+
     weights, sums = np.zeros(len(mesh.points)), np.zeros((len(mesh.points), v))
-    for part, r, w, stress in _stresses(cell, state):
+    for part, w, stress in stresses():
         nodes, area = mesh.triangles[part], w.sum(axis=1)
         if not is_linear:  # values at nodes of the nearest linear functions
             corners = np.linalg.pinv(r) @ stress
             stress = np.concatenate([corners, (corners + np.roll(corners, -1, axis=1)) / 2], axis=1)
         weights += np.bincount(nodes.ravel(), np.repeat(area, n), len(weights))
-        for column, values in zip(sums.T, (stress * area[:, None, None]).T, strict=True):
-            column += np.bincount(nodes.ravel(), values.T.ravel(), len(weights))
+        add_at_nodes(sums, nodes, stress * area[:, None, None])
     averages = sums / np.where(weights > 0.0, weights, 1.0)[:, None]
     components, total = np.unique(PLACES[v]), 0.0  # on which displacements work; bubbles are in the plane
-    has_bubble = cell.elements.mixed[:, None] & np.isin(components, PLACES[v][:2])
+    has_bubble = elements.mixed[:, None] & np.isin(components, PLACES[v][:2])
     factor = np.where(has_bubble | is_linear, 1.0, np.sqrt(WITHOUT_BUBBLE))
     flexibility = np.linalg.inv(cell.stiffnesses[:, components[:, None], components])
-    for part, r, w, stress in _stresses(cell, state):
+    # (q, nodes) N_a, r_a or r_a (2 r_a - 1) and 4 r_a r_b.
+    functions = r if is_linear else np.hstack([r * (2 * r - 1), 4 * r * np.roll(r, -1, axis=1)])
+    for part, w, stress in stresses():
         phase = mesh.phase[part]
-        # (q, nodes) N_a, r_a or r_a (2 r_a - 1) and 4 r_a r_b.
-        functions = r if is_linear else np.hstack([r * (2 * r - 1), 4 * r * np.roll(r, -1, axis=1)])
         off = (functions @ averages[mesh.triangles[part]] - stress)[..., components] * factor[phase, None]
         total += float(np.einsum("eq,eqi,eij,eqj->", w, off, flexibility[phase], off, optimize=True))
     return total
-
-
-def _stresses(cell: DiscreteCell, state: State) -> Iterator[tuple[slice, Float, Float, Float]]:
-    """Elements in portions: barycentric coordinates (q, 3), weights (e, q) and stresses there (e, q, v)."""
-    if cell.files.mesh.triangles.shape[1] == 3:
-        w, stress = (np.repeat(of[:, None], 3, axis=1) for of in (cell.elements.area / 3, state.stress))
-        yield slice(None), MIDDLES, w, stress
-    else:
-        yield from cell.elements.point_stresses(state.displacement, state.along, cell.free_strains(state.temperature))

@@ -3,24 +3,21 @@
 Fields may be kept at some points only; the others in result.json obey the same laws of counts.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
-from feti_homog.typing import Bool, Float, Int
+from feti_homog.typing import Bool, Float
 from feti_homog.verify.bonds import law_at
 from feti_homog.verify.check_loads import NAMES, SAME_SHARE, TEMPERATURE, StateNumbers, States, damaged_at
-from feti_homog.verify.check_mesh import check_first_step
+from feti_homog.verify.check_mesh import AT_NODE, check_first_step
 from feti_homog.verify.discrete_cell import BONDED, DIRECTION_DIGITS, DiscreteCell
 from feti_homog.verify.findings import STRENGTH, Findings, Points, Section, relative, solver_limit
 from feti_homog.verify.path_energies import check_path_energies
 
 # Utilisations by tractions below 10 rtol of the stress are none to the program; twice as many are here.
 NOISE_PER_RTOL = 20.0
-SAME_DIRECTION = 1e-6  # degrees
 
 
 def check_path(findings: Findings, cell: DiscreteCell, states: States) -> None:
@@ -36,43 +33,45 @@ def check_path(findings: Findings, cell: DiscreteCell, states: States) -> None:
         findings.compare("breaks", point["bonded"] - after["bonded"], broke, 1.0, f"path[{number + 1}].bonded")
     if by_events and points[-1]["load_factor"] == 1.0:
         findings.record("breaks", points[-1]["broke"], f"path[{len(points) - 1}], bonds that broke at the end")
-    _check_breaks(findings, states, points, by_events)
     # Signs are sure where a force or a gap is 20 rtol beyond zero.  While contact changes at one load, all else moves
     # by 115 rtol then, the median of 276 changes, and by 2100 rtol at most.
     tolerance = max(STRENGTH, 10.0 * solver_limit(float(cell.files.document["solver"].hint("rtol"))))
-    for state in states if law.has_tips else ():
-        _check_tips(findings, cell, state, points[state.point]["tips"])
-    states = [replace(state, used=_used(cell, state, points[state.point].get("tips"))) for state in states]
+    if law.has_tips:
+        states = [_check_tips(findings, cell, state, points[state.point]["tips"]) for state in states]
     _check_strength(findings, states, points, by_events, tolerance)
-    if law.has_toughness:
-        _check_toughness(findings, cell, states, points, by_events)
+    _check_steps(findings, cell, states, points, by_events)
     check_path_energies(findings, cell, states, points)
 
 
-def _used(cell: DiscreteCell, state: StateNumbers, tips: Section | None) -> Float:
-    """(k,) utilisations of a state, sqrt(G / G_c) at tips by the rates in the file."""
-    used, node = state.used.copy(), tips_in_order(cell, state)
-    if tips is not None and len(tips["G_I"]) == len(tips["G_II"]) == len(node):
-        energy, law = np.array(tips["G_I"]) + np.array(tips["G_II"]), law_at(cell.files, node)
-        by_rate = np.sqrt(energy / law.lost(law.mode(state.traction[node])))
-        used[node] = np.where(np.isnan(used[node]), by_rate, used[node])
-    return used
+def _check_steps(findings: Findings, cell: DiscreteCell, states: States, points: Points, by_events: bool) -> None:
+    """Check the breaks between consecutive states, which never heal, and the growth of the fracture energy.
 
-
-def _check_breaks(findings: Findings, states: States, points: Points, by_events: bool) -> None:
-    """Check that bonds of consecutive states differ by the breaks between their points, and never heal."""
-    shift = 0 if by_events else 1
+    This energy grows with the broken length by G_c in the mode of the state before, if the files have that state, else
+    by the range over all modes.
+    """
+    has_toughness, scale = law_at(cell.files).has_toughness, float(np.finfo(float).tiny)
+    if has_toughness:
+        scale = max(points[-1]["fracture_energy"], scale)
+        findings.record("energy", points[0]["fracture_energy"] * by_events / scale, "path[0].fracture_energy")
     for state, after in pairwise(states):
-        bonded, still = state.status == BONDED, after.status == BONDED
-        between = points[state.point + shift : after.point + shift]
-        softened = np.count_nonzero(still & (after.damage > state.damage))
-        limit = sum(point.get("softened", 0) for point in between)
+        bonded, still, damaged = state.status == BONDED, after.status == BONDED, after.damage > state.damage
+        between = points[state.point : after.point] if by_events else points[state.point + 1 : after.point + 1]
+        softened, limit = np.count_nonzero(still & damaged), sum(point.get("softened", 0) for point in between)
         off = abs(softened - limit) if len(between) == 1 else max(softened - limit, 0)
         findings.record("breaks", off, f"{state.name}, bonds that softened")
         findings.record("breaks", np.count_nonzero(after.damage < state.damage), f"{after.name}, damage that healed")
         findings.record("breaks", np.count_nonzero(still & ~bonded), f"{after.name}, bonds that healed")
         broke, expected = np.count_nonzero(bonded & ~still), sum(point["broke"] for point in between)
         findings.compare("breaks", broke, expected, 1.0, f"{state.name}, bonds that broke")
+        if has_toughness:
+            law, damages = law_at(cell.files, damaged), (state.damage[damaged], after.damage[damaged])
+            bounds = law.absorbed_range(*damages)
+            if by_events and after.point == state.point + 1:
+                bounds = (law.absorbed(law.mode(state.traction[damaged]), *damages),) * 2
+            low, high = (float(energies @ cell.files.interface.length[damaged]) / cell.area for energies in bounds)
+            grown = points[after.point]["fracture_energy"] - points[state.point]["fracture_energy"]
+            off = max(low - grown, grown - high, 0.0) / scale
+            findings.record("energy", off, f"{after.name}, fracture_energy")
 
 
 def _check_strength(findings: Findings, states: States, points: Points, by_events: bool, tolerance: float) -> None:
@@ -112,80 +111,46 @@ def overloaded_by_jump(state: StateNumbers, points: Points, tolerance: float) ->
     return np.asarray(state.released & same)
 
 
-def tips_in_order(cell: DiscreteCell, state: StateNumbers) -> Int:
-    """(t,) interface nodes of tips by fibre, section and direction."""
+def _check_tips(findings: Findings, cell: DiscreteCell, state: StateNumbers, tips: Section) -> StateNumbers:
+    """Check that tips are the bonds next to broken ones, with the mode of their tractions and their spring energy.
+
+    Returns the state with utilisations sqrt(G / G_c), by the rates in the file, at tips that break by energy release.
+    """
+    # By fibre, section and direction.
     node, rows = np.flatnonzero(cell.tips(state.status)), cell.files.interface
     turned = np.round(cell.bond_directions[node], DIRECTION_DIGITS)
-    return np.asarray(node[np.lexsort((turned, rows.pair[node], rows.fibre[node]))])
-
-
-def _check_tips(findings: Findings, cell: DiscreteCell, state: StateNumbers, tips: Section) -> None:
-    """Check that tips are the bonds next to broken ones, with the mode of their tractions and their spring energy."""
-    node = tips_in_order(cell, state)
-    law, rows, where = law_at(cell.files, node), cell.files.interface, f"{state.name}, tip {{}}".format
+    node = node[np.lexsort((turned, rows.pair[node], rows.fibre[node]))]
+    law, where, used = law_at(cell.files, node), f"{state.name}, tip {{}}".format, state.used.copy()
+    psi, first, second = law.mode(state.traction[node]), np.array(tips["G_I"]), np.array(tips["G_II"])
+    if len(first) == len(second) == len(node):
+        used[node] = np.where(np.isnan(used[node]), np.sqrt((first + second) / law.lost(psi)), used[node])
     sections = (rows.pair[node] + 1).tolist() if len(cell.files.interfaces) > 1 else None
     is_complete = (list(tips["fibre"]), tips.get("interface")) == (rows.fibre[node].tolist(), sections)
-    findings.require("tables", is_complete and {*map(len, tips.values())} == {len(node)}, f"{state.name}, tips")
-    if not is_complete or {*map(len, tips.values())} != {len(node)}:
-        return
-    psi, first, second = law.mode(state.traction[node]), np.array(tips["G_I"]), np.array(tips["G_II"])
-    away = (np.array(tips["angle"]) - cell.bond_directions[node] + 180.0) % 360.0 - 180.0
-    findings.record("tables", np.abs(away) / 360.0, where)
-    findings.compare("tables", tips["psi"], np.degrees(psi), 90.0, where)
-    findings.compare("tables", first * np.sin(psi) ** 2, second * np.cos(psi) ** 2, first + second, where)
-    if law.grows_by_release:
-        for name in ("G_I", "G_II"):
-            tips.leaves_open(name)
-    else:
-        energies = law.energies(state.traction[node])
-        total = energies.sum(axis=1)[:, None]
-        findings.compare("tables", np.stack([first, second], axis=1), energies, total, where)
-
-
-def _check_toughness(findings: Findings, cell: DiscreteCell, states: States, points: Points, by_events: bool) -> None:
-    """Check that the fracture energy grows with the broken length.
-
-    It grows by G_c in the mode of the state before, if the files have that state, else by the range over all modes.
-    """
-    length = cell.files.interface.length / cell.area
-    scale = max(points[-1]["fracture_energy"], 1e-300)
-    findings.record("energy", points[0]["fracture_energy"] * by_events / scale, "path[0].fracture_energy")
-    for state, after in pairwise(states):
-        grown = points[after.point]["fracture_energy"] - points[state.point]["fracture_energy"]
-        broken = after.damage > state.damage
-        law, damages = law_at(cell.files, broken), (state.damage[broken], after.damage[broken])
-        if by_events and after.point == state.point + 1:
-            bounds = (law.absorbed(law.mode(state.traction[broken]), *damages),) * 2
+    is_complete &= {*map(len, tips.values())} == {len(node)}
+    findings.require("tables", is_complete, f"{state.name}, tips")
+    if is_complete:
+        away = (np.array(tips["angle"]) - cell.bond_directions[node] + 180.0) % 360.0 - 180.0
+        findings.record("tables", np.abs(away) / 360.0, where)
+        findings.compare("tables", tips["psi"], np.degrees(psi), 90.0, where)
+        findings.compare("tables", first * np.sin(psi) ** 2, second * np.cos(psi) ** 2, first + second, where)
+        if law.grows_by_release:
+            for name in ("G_I", "G_II"):
+                tips.leaves_open(name)
         else:
-            bounds = law.absorbed_range(*damages)
-        low, high = (float(energies @ length[broken]) for energies in bounds)
-        findings.record("energy", max(low - grown, grown - high, 0.0) / scale, f"{after.name}, fracture_energy")
-
-
-class _Bonds:
-    """Tractions and utilisations under any load, from the states of the unit loads."""
-
-    def __init__(self, cell: DiscreteCell, states: States) -> None:
-        self.law, status = law_at(cell.files), states[0].status
-        self._loads = np.array([[*state.strain, state.temperature] for state in states]).T
-        self._unit = np.stack([state.traction for state in states])
-        self.released = cell.tips(status) & self.law.grows_by_release
-        self._counts = (status == BONDED) & ~self.released
-
-    def traction(self, strain: Float, temperature: float) -> Float:
-        """(k, c) under a strain (v,) and a change of temperature."""
-        share, *_ = np.linalg.lstsq(self._loads, np.array([*strain, temperature]), rcond=None)
-        return np.tensordot(share, self._unit, axes=1)
-
-    def used(self, traction: Float) -> Float:
-        """(k,) utilisations, 0 at debonded nodes and at tips that break by energy release."""
-        return np.where(self._counts, self.law.onset(traction), 0.0)
+            energies = law.energies(state.traction[node])
+            total = energies.sum(axis=1)[:, None]
+            findings.compare("tables", np.stack([first, second], axis=1), energies, total, where)
+    return replace(state, used=used)
 
 
 def check_envelope(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check the points of `envelope` in result.json."""
-    document, keys = cell.files.document, cell.files.case["envelope"]
-    points, bonds, n = document["envelope"], _Bonds(cell, states), keys["directions"]
+    """Check the points of `envelope` in result.json, by the states of the unit loads."""
+    document, keys, law = cell.files.document, cell.files.case["envelope"], law_at(cell.files)
+    points, n, status = document["envelope"], keys["directions"], states[0].status
+    released = cell.tips(status) & law.grows_by_release
+    may_break = (status == BONDED) & ~released
+    unit_loads = np.array([[*state.strain, state.temperature] for state in states]).T
+    unit_tractions = np.stack([state.traction for state in states])
     findings.compare("load", len(points), n, 1.0, "envelope, which lacks directions or has too many")
     stiffness, temperature = np.array(document["effective_stiffness"]), float(keys.get("temperature", 0.0))
     thermal = temperature * np.array(document.get("thermal_stress", np.zeros(len(stiffness))))
@@ -196,35 +161,40 @@ def check_envelope(findings: Findings, cell: DiscreteCell, states: States) -> No
         at, angle, unit = f"envelope[{number}]", 360.0 * number / len(points), np.zeros(len(stiffness))
         findings.compare("load", point["angle"], angle, 360.0, f"{at}.angle")
         unit[places] = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-        if "factor" in point:  # others are zero, and stress follows from strain
-            strain, stress, factor = np.array(point["strain"]), np.array(point["stress"]), float(point["factor"])
+        has_factor = "factor" in point  # others are zero, and stress follows from strain
+        imposed = unit if of_strains else np.linalg.solve(stiffness, unit)
+        strain = np.array(point["strain"]) if has_factor else imposed
+        shares, *_ = np.linalg.lstsq(unit_loads, np.array([*strain, temperature * has_factor]), rcond=None)
+        traction = np.tensordot(shares, unit_tractions, axes=1)
+        used = np.where(may_break, law.onset(traction), 0.0)
+        if has_factor:
+            stress, factor = np.array(point["stress"]), float(point["factor"])
             value = strain if of_strains else stress
             scale = max(factor, float(np.abs(value).max()))
             findings.compare("load", value, factor * unit, scale, f"{at}, {' and '.join(keys['plane'])}")
             terms = np.abs(stiffness) @ np.abs(strain) + np.abs(thermal)
             findings.compare("load", stress, stiffness @ strain + thermal, terms.max(), f"{at}.stress")
-            _check_onset(findings, cell, bonds, point, temperature, at)
+            _check_onset(findings, cell, point, traction, used, released, at)
         else:
-            strain = unit if of_strains else np.linalg.solve(stiffness, unit)
             noise = NOISE_PER_RTOL * float(document["solver"].hint("rtol")) * np.abs(stiffness @ strain).max()
-            traction = bonds.traction(strain, 0.0)
-            over = bonds.used(traction) > bonds.law.onset(np.full_like(traction, noise))
+            over = used > law.onset(np.full_like(traction, noise))
             findings.require("onset", not over.any(), f"{at}, where some load breaks a bond")
 
 
 def _check_onset(
-    findings: Findings, cell: DiscreteCell, bonds: _Bonds, point: Mapping[str, Any], temperature: float, at: str
+    findings: Findings, cell: DiscreteCell, point: Section, traction: Float, used: Float, released: Bool, at: str
 ) -> None:
-    """Check that no bond exceeds its strength, and the bond in the file is at its strength and breaks as written."""
-    traction, rows = bonds.traction(np.array(point["strain"]), temperature), cell.files.interface
-    used = bonds.used(traction)
-    largest, away = float(used.max(initial=0.0)), cell.bond_directions - point["bond_angle"]
+    """Check that no bond exceeds its strength, and the bond in the file is at its strength and breaks as written.
+
+    Utilisations `used` (k,) are 0 at debonded nodes and at tips that break by energy release, `released` (k,).
+    """
+    rows, largest, away = cell.files.interface, float(used.max(initial=0.0)), cell.bond_directions - point["bond_angle"]
     on_curve = (rows.fibre == point["fibre"]) & (rows.pair == point.get("interface", 1) - 1)
-    nodes = np.flatnonzero(on_curve & (np.abs((away + 180.0) % 360.0 - 180.0) < SAME_DIRECTION))
+    nodes = np.flatnonzero(on_curve & (np.abs((away + 180.0) % 360.0 - 180.0) < AT_NODE))
     findings.require("tables", bool(len(nodes)), f"{at}, where no bond is")
     if not len(nodes):
         return
-    is_tip, node = bool(bonds.released[nodes].any()), int(nodes[np.argmax(used[nodes])])
+    is_tip, node = bool(released[nodes].any()), int(nodes[np.argmax(used[nodes])])
     if point["factor"] == 0.0:
         findings.record("onset", max(1.0 - largest, 0.0) if not is_tip else 0.0, f"{at}, of the temperature alone")
     else:

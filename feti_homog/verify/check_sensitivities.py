@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.typing import Float
+from feti_homog.verify.bonds import law_at
 from feti_homog.verify.check_constants import NOISE, constants_of
 from feti_homog.verify.check_loads import NAMES, SPATIAL_ORDER
 from feti_homog.verify.constitutive_law import laws, mixed_phases
@@ -16,9 +17,7 @@ from feti_homog.verify.elements import Elements
 from feti_homog.verify.findings import STEP, Findings, Section, relative
 from feti_homog.verify.reading import Mesh, State
 
-STIFFNESS_STEP = 1e-5  # relative
-SAME_RADIUS = 1e-8  # of a radius
-TINY = 1e-300
+TINY = np.finfo(float).tiny
 WEIGHTS = (1.0, -0.7, 0.5, 0.9, -0.8)
 SPRINGS = ("normal_stiffness", "tangential_stiffness", "axial_stiffness")
 Case = dict[str, Any]
@@ -55,22 +54,22 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
 
 
 def _parameters(cell: DiscreteCell) -> Iterator[str]:
-    """Yield the names of all constants of phases and springs that the answer depends on."""
+    """Yield the names of all constants of phases and springs that the answer depends on.
+
+    Names end in .k for one of several numbers, in .Cij for an entry of a stiffness.
+    """
     material, sections = cell.files.case["material"], cell.files.interfaces
     for phase in {*cell.files.phases} & material.keys():
         for key, value in material[phase].items():
             if "thermal_stress" in cell.files.document or not key.startswith("expansion"):
-                yield from (f"material.{phase}.{key}{place}" for place in _places(np.array(value, float)))
+                numbers = np.array(value, float)
+                places = [f".{k + 1}" for k in range(len(numbers))] if numbers.ndim else [""]
+                if numbers.ndim > 1:
+                    places = [f".C{i + 1}{j + 1}" for i, j in np.argwhere(np.triu(numbers))]
+                yield from (f"material.{phase}.{key}{place}" for place in places)
     for number, section in enumerate(sections, start=1):
         name = f"interface.{number}" if len(sections) > 1 else "interface"
         yield from (f"{name}.{key}" for key in SPRINGS if np.isfinite(float(section.get(key) or np.inf)))
-
-
-def _places(numbers: Float) -> list[str]:
-    """Return the endings of parameter names: none for one number, .k for several, .Cij for a stiffness."""
-    if numbers.ndim > 1:
-        return [f".C{i + 1}{j + 1}" for i, j in np.argwhere(np.triu(numbers))]
-    return [f".{k + 1}" for k in range(len(numbers))] if numbers.ndim else [""]
 
 
 def _check_secants(findings: Findings, cell: DiscreteCell, states: list[State], slope: Float, direction: Float) -> None:
@@ -130,7 +129,7 @@ def _check_linear(findings: Findings, document: Section, slope: Float, direction
     data, C, heat = document["sensitivities"], np.array(document["effective_stiffness"]), document.get("thermal_stress")
     heat = None if heat is None else np.array(heat)
     constants, n = constants_of(C, heat), len(C)
-    step = STIFFNESS_STEP * np.abs(C).max() / max(float(np.abs(slope).max()), TINY)
+    step = STEP * np.abs(C).max() / max(float(np.abs(slope).max()), TINY)
     ends = [
         constants_of(C + change[:, :n], None if heat is None else heat + change[:, n])
         for change in (step * slope, -step * slope)
@@ -178,19 +177,27 @@ def _energies(cell: DiscreteCell, states: list[State], case: Mapping[str, Any]) 
     stiffnesses, free = laws(case, phases)
     # Elements keep their kind where equal constants change apart.
     elements = Elements(mesh, stiffnesses, mixed_phases(files.case, phases))
-    strains, heated = _in_order(states)
+    none, lengths = np.zeros_like(states[0].jump), files.interface.length[:, None]
+    flexibility = law_at(replace(files, document=Section({"case": case}))).jumps(none + 1.0)
+    springs = np.divide(lengths, flexibility, out=none, where=flexibility > 0.0)
+    strains = [state for state in states if not state.temperature]
+    if len(strains) == 6:  # in the order of components
+        strains = [strains[SPATIAL_ORDER.index(k)] for k in range(6)]
     columns = []
-    for state in (*strains, *heated):
+    for state in (*strains, *(state for state in states if state.temperature)):
         free_strain = None if free is None else state.temperature * free
         fields = elements.fields(state.displacement, np.abs(state.displacement), state.along, free_strain)
         out = float(elements.area @ fields.stress[:, 2]) if files.is_spatial else 0.0
-        column = [float((other.displacement * fields.force).sum()) + other.along * out for other in strains]
-        columns.append(np.array(column) + [_springs(cell, case, other, state) for other in strains])
-    return np.asarray(np.stack(columns, axis=1) / cell.area)
+        columns.append([float((other.displacement * fields.force).sum()) + other.along * out for other in strains])
+        for row, other in enumerate(strains):
+            acts = np.repeat((other.status == BONDED)[:, None], other.jump.shape[1], axis=1)
+            acts[other.status == CLOSED, 0] = True  # closed faces press on the rest of their springs
+            columns[-1][row] += float((springs * other.jump * state.jump)[acts].sum())
+    return np.array(columns).T / cell.area
 
 
 def _grown(cell: DiscreteCell, growth: float, states: list[State]) -> tuple[Mesh, list[State]]:
-    """Return the mesh with all radii grown by this share, and the states at the same u - E x.
+    """Return the mesh with radii larger by the fraction `growth`, and the states with equal u - E x.
 
     Nodes around a fibre move with its circle, less and less to nothing halfway to the next fibre.
     """
@@ -202,31 +209,9 @@ def _grown(cell: DiscreteCell, growth: float, states: list[State]) -> tuple[Mesh
         half = np.partition(gaps.ravel(), 1)[1] / 2  # the least is to the fibre itself, -2 R
         d = (x - c + files.size / 2) % files.size - files.size / 2
         r = np.hypot(*d.T)
-        outside = R / np.maximum(r, R) * np.maximum(1 - (r - R) / half, 0.0)
-        V += d * np.where(r < R * (1 + SAME_RADIUS), 1.0, outside)[:, None]
+        V += d * (R / np.maximum(r, R) * np.clip(1 - (r - R) / half, 0.0, 1.0))[:, None]
     terms, grown = np.column_stack([x, np.ones(len(x))]), []
     for state in states:
         H = np.linalg.lstsq(terms, state.displacement - state.fluctuation, rcond=None)[0][:2]
         grown.append(replace(state, displacement=state.displacement + growth * V @ H))
     return replace(files.mesh, points=x + growth * V), grown
-
-
-def _in_order(states: list[State]) -> tuple[list[State], list[State]]:
-    """Return the states under unit strains, in the order of components, and the state under a temperature."""
-    strains = [state for state in states if not state.temperature]
-    ordered = [strains[SPATIAL_ORDER.index(k)] for k in range(6)] if len(strains) == 6 else strains
-    return ordered, [state for state in states if state.temperature]
-
-
-def _springs(cell: DiscreteCell, case: Mapping[str, Any], first: State, second: State) -> float:
-    """Sum [u] k l [u] over the bonds with springs."""
-    sections, rows, energy = case.get("interface") or [], cell.files.interface, 0.0
-    for number, section in enumerate(sections if isinstance(sections, list) else [sections]):
-        tangential = section.get("tangential_stiffness")
-        stiffnesses = section.get("normal_stiffness"), tangential, section.get("axial_stiffness") or tangential
-        for k, stiffness in zip(range(first.jump.shape[1]), stiffnesses, strict=False):
-            if stiffness is not None and np.isfinite(float(stiffness)):
-                # Closed faces press on the rest of their springs.
-                acts = (rows.pair == number) & ((first.status == BONDED) | ((first.status == CLOSED) & (k == 0)))
-                energy += float(stiffness) * float((rows.length * first.jump[:, k] * second.jump[:, k])[acts].sum())
-    return energy

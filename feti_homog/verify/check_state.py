@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from feti_homog.typing import Bool, Float, Int
+from feti_homog.typing import Float, Int
 from feti_homog.verify.bonds import friction_at, law_at, rubbing_force
 from feti_homog.verify.constitutive_law import out_of_plane
 from feti_homog.verify.discrete_cell import BONDED, CLOSED, OPEN, ROUNDED_TERMS, DiscreteCell
@@ -33,12 +33,11 @@ def check_state(findings: Findings, cell: DiscreteCell, state: State, fields: El
     size += ROUNDED_TERMS * float((weights[:, 0] * stiffest * fields.strain_size).sum() / area)
     findings.compare("mean stress", mean, state.mean_stress, max(size, scales.stress), state.name)
     jump = cell.in_axes(state.jump)
-    opening = np.einsum("ki,kj->ij", jump, cell.faces.sums(cell.node_integrals[cell.nodes.node], of_fibre=False))
-    opened = np.bincount(PLACES[v].ravel(), opening.ravel(), v) / area
+    integrals = (cell.elements.node_integrals + cell.void_integrals)[cell.nodes.node]
     # Voids have their share of E, and int sym(u* (x) n) ds along them; this closes where the boundary cuts one.
-    slope = np.einsum("ni,nd->id", state.fluctuation, cell.void_integrals)
-    of_voids = np.bincount(PLACES[v].ravel(), slope.ravel(), v) / area + cell.porosity * state.strain
-    strain = (weights * fields.strain).sum(axis=0) / area + of_voids - opened
+    slope = state.fluctuation.T @ cell.void_integrals - jump.T @ cell.faces.sums(integrals, of_fibre=False)
+    opened = np.bincount(PLACES[v].ravel(), slope.ravel(), v) / area + cell.porosity * state.strain
+    strain = (weights * fields.strain).sum(axis=0) / area + opened
     findings.compare("mean strain", strain, state.strain, scales.strain, state.name)
     work = area * float(state.mean_stress @ state.strain) - float((interface_forces(cell, state) * jump).sum())
     least = area * scales.stress * scales.strain
@@ -58,7 +57,7 @@ def interface_forces(cell: DiscreteCell, state: State) -> Float:
 
 
 def _glued(cell: DiscreteCell) -> Int:
-    """(b,) equal numbers of glued torn nodes: one a place, two at interface nodes, the odd one on the fibre."""
+    """(b,) numbers that glued nodes share: one at a place, two at an interface node, the odd number on the fibre."""
     return np.asarray(2 * cell.nodes.place + ((cell.faces.row >= 0) & cell.faces.is_fibre))
 
 
@@ -95,7 +94,10 @@ def _check_equilibrium(findings: Findings, cell: DiscreteCell, state: State, fie
 
 
 def _check_bonds(findings: Findings, cell: DiscreteCell, state: State) -> None:
-    """Check jumps by displacements, bonds by their springs, friction on damage by mu p."""
+    """Check jumps by displacements, bonds by their springs, friction by mu p, and contact.
+
+    On debonded faces gap >= 0, traction <= 0, gap traction = 0, and only friction acts along them.
+    """
     files, at = cell.files, f"{state.name}, interface node {{}}".format
     values, bonded = state.fluctuation[cell.nodes.node], state.status == BONDED
     parted = cell.faces.means(values, of_fibre=False) - cell.faces.means(values, of_fibre=True)
@@ -108,36 +110,29 @@ def _check_bonds(findings: Findings, cell: DiscreteCell, state: State) -> None:
     gap = slack[:, 0].copy()
     slack[rubs, 1] = slack[~bonded, 1:] = slack[state.status == OPEN] = 0.0
     findings.record("bond", relative(slack, largest), at)
-    if not bonded.all():
-        _check_contact(findings, cell, state, rubs, gap)
-    if rubs.any():
-        force, limit = (
-            rubbing_force(files, state),
-            friction_at(files, on_damage=True) * np.maximum(-state.traction[:, 0], 0),
-        )
-        sticks, pull = np.maximum(np.abs(force) - limit, 0.0), float(np.abs(state.traction).max())
-        off = np.where(state.sliding != 0, state.sliding * force - limit, sticks)
-        findings.record("sliding", relative(np.where(rubs, off, 0.0), max(pull, cell.scales_of(state).stress)), at)
-
-
-def _check_contact(findings: Findings, cell: DiscreteCell, state: State, rubs: Bool, gap: Float) -> None:
-    """Check gap >= 0, traction <= 0, gap traction = 0, and that only friction acts along debonded faces."""
-    at = f"{state.name}, interface node {{}}".format
-    debonded, closed = state.status != BONDED, state.status == CLOSED
+    if not len(bonded):
+        return
     normal, shear = state.traction[:, 0], np.abs(state.traction[:, 1:]).max(axis=1)
-    friction = friction_at(cell.files) * np.maximum(-normal, 0.0)
-    length, (_, least, imposed) = cell.files.interface.length, cell.scales_of(state)
-    pull, force = max(float(np.abs(state.traction).max()), least), np.abs(normal) * length
-    push = max(float(force.max()), least * float(length.max()))
-    excess = np.where(debonded, np.maximum(shear - friction, 0.0), 0.0)
-    laws = [("free faces", excess + np.where(state.status == OPEN, np.abs(normal), 0.0), pull)]
-    if friction.any():
-        slides = (state.sliding != 0) & closed
-        laws.append(("sliding", np.where(slides, state.sliding * state.traction[:, 1] - friction, 0.0), pull))
-        laws.append(("sliding", np.where(closed | rubs, 0.0, np.abs(state.sliding)), 1.0))
-    if cell.files.contact:
-        laws.append(("penetration", np.where(debonded, np.maximum(-gap, 0.0), 0.0), imposed))
-        laws.append(("tension", np.where(closed, np.maximum(normal, 0.0), 0.0), pull))
-        laws.append(("complementarity", np.where(debonded, force * gap, 0.0), push * imposed))
+    pressure, (_, least, imposed) = np.maximum(-normal, 0.0), cell.scales_of(state)
+    pull, force = max(float(np.abs(state.traction).max()), least), np.abs(normal) * files.interface.length
+    laws = []
+    if not bonded.all():
+        friction, closed = friction_at(files) * pressure, state.status == CLOSED
+        push = max(float(force.max()), least * float(files.interface.length.max()))
+        excess = np.where(bonded, 0.0, np.maximum(shear - friction, 0.0))
+        laws.append(("free faces", excess + np.where(state.status == OPEN, np.abs(normal), 0.0), pull))
+        if friction.any():
+            slides = (state.sliding != 0) & closed
+            laws.append(("sliding", np.where(slides, state.sliding * state.traction[:, 1] - friction, 0.0), pull))
+            laws.append(("sliding", np.where(closed | rubs, 0.0, np.abs(state.sliding)), 1.0))
+        if files.contact:
+            laws.append(("penetration", np.where(bonded, 0.0, np.maximum(-gap, 0.0)), imposed))
+            laws.append(("tension", np.where(closed, np.maximum(normal, 0.0), 0.0), pull))
+            laws.append(("complementarity", np.where(bonded, 0.0, force * gap), push * imposed))
+    if rubs.any():
+        rubbing, limit = rubbing_force(files, state), friction_at(files, on_damage=True) * pressure
+        sticks = np.maximum(np.abs(rubbing) - limit, 0.0)
+        off = np.where(state.sliding != 0, state.sliding * rubbing - limit, sticks)
+        laws.append(("sliding", np.where(rubs, off, 0.0), pull))
     for law, violation, scale in laws:
         findings.record(law, relative(violation, scale), at)

@@ -13,7 +13,7 @@ from feti_homog.typing import AnyInt, Bool, Float, Int
 from feti_homog.verify import torus
 from feti_homog.verify.bonds import friction_at, pairs_of
 from feti_homog.verify.constitutive_law import laws, mixed_phases
-from feti_homog.verify.elements import Elements
+from feti_homog.verify.elements import Elements, add_at_nodes
 from feti_homog.verify.findings import ROUNDING
 from feti_homog.verify.reading import ResultFiles, State, gradient
 from feti_homog.verify.torus import TornNodes, TornSides
@@ -97,12 +97,32 @@ class DiscreteCell:
         sides, nodes, radius = torus.torn(mesh, files.size)
         parts = torus.constituents(mesh, sides)
         inwards = torus.inwardness(mesh, files.phases, sides, parts)
+        # Places where exactly two bodies meet along one line, and the sections of their bonds.
+        node_depth = inwards[parts[nodes.subdomain]]
+        members = np.unique(np.column_stack([nodes.place, node_depth, nodes.phase]), axis=0)
         on_line = torus.along_one_line(sides, nodes, parts[mesh.subdomain])
-        faces = _faces(files, nodes, on_line, parts, inwards, radius)
+        two = np.flatnonzero((np.bincount(members[:, 0], minlength=nodes.places) == 2) & on_line)
+        outer, last = np.searchsorted(members[:, 0], two), np.searchsorted(members[:, 0], two, side="right") - 1
+        pairs, pair, innermost = pairs_of(files), np.full(nodes.places, -1), np.zeros(nodes.places, np.int64)
+        pair[two], innermost[two] = pairs[members[outer, 2], members[last, 2]], members[last, 1]
+        is_fibre = np.asarray((pair[nodes.place] >= 0) & (node_depth == innermost[nodes.place]))
+        # The place nearest to each interface node.
+        points, size = files.interface.points, files.size
+        place, distance = np.full(len(points), -1), np.full(len(points), np.inf)
+        if len(points) and len(nodes.node):
+            tree = cKDTree(torus.wrapped(mesh.points[nodes.node], size), boxsize=size)
+            away, nearest = tree.query(torus.wrapped(points, size), distance_upper_bound=radius)
+            on_mesh = np.flatnonzero(np.isfinite(away))
+            place[on_mesh], distance[on_mesh] = nodes.place[nearest[on_mesh]], away[on_mesh]
+        row_of = np.full(nodes.places, -1)
+        row_of[place[place >= 0]] = np.flatnonzero(place >= 0)
+        labels = nodes.place * (int(nodes.subdomain.max(initial=0)) + 1) + nodes.subdomain
+        _, which, count = np.unique(labels, return_inverse=True, return_counts=True)
+        faces = Faces(row_of[nodes.place], is_fibre, count[which.ravel()], distance, pair, place)
         depth, other = inwards[parts[mesh.subdomain]], sides.element[sides.partner]
-        may_part = (sides.partner >= 0) & (pairs_of(files)[mesh.phase[sides.element], mesh.phase[other]] >= 0)
+        may_part = (sides.partner >= 0) & (pairs[mesh.phase[sides.element], mesh.phase[other]] >= 0)
         inner = may_part & (depth[sides.element] > depth[other])
-        fractions = np.bincount(mesh.phase, elements.area, len(files.phases)) / files.size.prod()
+        fractions = np.bincount(mesh.phase, elements.area, len(files.phases)) / size.prod()
         strains = [np.abs(state.attrs["strain"]).max() for state in files.file.get("state", {}).values()]
         largest = float(np.max(strains, initial=0.0))
         return cls(files, stiffnesses, free, elements, sides, nodes, parts, inner, faces, fractions, largest)
@@ -159,11 +179,6 @@ class DiscreteCell:
         return np.stack([n1 * normal - n2 * tangential, n2 * normal + n1 * tangential, *axial], axis=1)
 
     @cached_property
-    def node_integrals(self) -> Float:
-        """(n, 2) int dN/dx over all elements of each node, and over voids, where it is int N n ds."""
-        return np.asarray(self.elements.node_integrals + self.void_integrals)
-
-    @cached_property
     def void_integrals(self) -> Float:
         """(n, 2) int N n ds along the voids, by Gauss' rule of two points."""
         sums, points = np.zeros_like(self.files.mesh.points), self.files.mesh.points
@@ -175,9 +190,7 @@ class DiscreteCell:
                 shapes = np.array([(1 - t) * (1 - 2 * t), t * (2 * t - 1), 4 * t * (1 - t)])
                 slopes = np.array([4 * t - 3, 4 * t - 1, 4 - 8 * t])
             dx, dy = np.einsum("a,sad->ds", slopes, points[nodes])
-            for column, part in enumerate((-dy, dx)):
-                terms = 0.5 * part[:, None] * shapes
-                sums[:, column] += np.bincount(nodes.ravel(), terms.ravel(), len(sums))
+            add_at_nodes(sums, nodes, 0.5 * np.stack([-dy, dx], axis=1)[:, None] * shapes[:, None])
         return sums
 
     def free_strains(self, temperature: float) -> Float | None:
@@ -190,7 +203,7 @@ class DiscreteCell:
         return strain if free is None else np.asarray(strain + np.abs(free).max(axis=0))
 
     def scales(self, strain: Float, temperature: float, slip: float = 0.0) -> Scales:
-        """Return the sizes under a load, or a faint one, and under a slip that friction holds in an unloaded cell."""
+        """Return the scales of a load and of a slip that friction holds; no scale vanishes with the load."""
         loads, longest, (width, height) = self.loads(strain, temperature), float(self.files.size.max()), self.files.size
         loads = np.asarray(loads + np.copysign(slip / longest, loads))
         corners = np.array([[width, 0.0], [0.0, height], [width, height]])
@@ -213,28 +226,3 @@ class DiscreteCell:
     def rounded_energy(self) -> float:
         """Energy per area to add to energy scales: where all has parted the stored energy is rounding."""
         return ROUNDED_TERMS * float(np.abs(self.reuss).max()) * self.largest_strain**2
-
-
-def _faces(files: ResultFiles, nodes: TornNodes, on_line: Bool, parts: Int, inwards: Int, radius: float) -> Faces:
-    """Find the interface nodes on the mesh by `inwardness` (parts,) and `along_one_line` (places,)."""
-    depth = inwards[parts[nodes.subdomain]]
-    members = np.unique(np.column_stack([nodes.place, depth, nodes.phase]), axis=0)
-    two = np.flatnonzero((np.bincount(members[:, 0], minlength=nodes.places) == 2) & on_line)
-    outer, inner = np.searchsorted(members[:, 0], two), np.searchsorted(members[:, 0], two, side="right") - 1
-    pair = np.full(nodes.places, -1)
-    pair[two] = pairs_of(files)[members[outer, 2], members[inner, 2]]
-    innermost = np.zeros(nodes.places, np.int64)
-    innermost[two] = members[inner, 1]
-    is_fibre = np.asarray((pair[nodes.place] >= 0) & (depth == innermost[nodes.place]))
-    points, size = files.interface.points, files.size
-    place, distance = np.full(len(points), -1), np.full(len(points), np.inf)
-    if len(points) and len(nodes.node):
-        tree = cKDTree(torus.wrapped(files.mesh.points[nodes.node], size), boxsize=size)
-        away, nearest = tree.query(torus.wrapped(points, size), distance_upper_bound=radius)
-        on_mesh = np.flatnonzero(np.isfinite(away))
-        place[on_mesh], distance[on_mesh] = nodes.place[nearest[on_mesh]], away[on_mesh]
-    row_of = np.full(nodes.places, -1)
-    row_of[place[place >= 0]] = np.flatnonzero(place >= 0)
-    labels = nodes.place * (int(nodes.subdomain.max(initial=0)) + 1) + nodes.subdomain
-    _, which, count = np.unique(labels, return_inverse=True, return_counts=True)
-    return Faces(row_of[nodes.place], is_fibre, count[which.ravel()], distance, pair, place)

@@ -79,7 +79,7 @@ class Elements:
         """(n, 2) int dN/dx over all elements of each node."""
         sums = np.zeros_like(self._mesh.points)
         for part, gradients, weights in self._parts():
-            _add(sums, self._mesh.triangles[part], np.einsum("eqad,eq->ead", gradients, weights))
+            add_at_nodes(sums, self._mesh.triangles[part], np.einsum("eqad,eq->ead", gradients, weights))
         return sums
 
     def fields(
@@ -92,7 +92,7 @@ class Elements:
         m, v = len(self._mesh.triangles), self._stiffnesses.shape[1]
         strain, stress, size = np.empty((m, v)), np.empty((m, v)), np.empty(m)
         force, terms, largest, energy = np.zeros_like(displacement), np.zeros_like(self._mesh.points), 0.0, 0.0
-        for part, gradients, weights, slope, local, answer in self._responses(displacement, along, free):
+        for part, gradients, weights, slope, local, answer in self.responses(displacement, along, free):
             nodes, phase = self._mesh.triangles[part], self._mesh.phase[part]
             share = weights / weights.sum(axis=1)[:, None]
             strain[part], stress[part] = (np.einsum("eqi,eq->ei", field, share) for field in (local, answer))
@@ -102,21 +102,14 @@ class Elements:
             size[part] += (np.abs(slope).max(axis=(2, 3)) * lengths).max(axis=1) + abs(along)
             size[part] += 0.0 if free is None else np.abs(free[phase]).max(axis=1)
             forces = np.einsum("eqad,eqid,eq->eai", gradients, answer[..., PLACES[v]], weights, optimize=True)
-            _add(force, nodes, forces)
+            add_at_nodes(force, nodes, forces)
             rounded = np.abs(self._stiffnesses).max(axis=(1, 2))[phase] * size[part]
-            _add(terms, nodes, np.einsum("eqad,eq,e->ead", np.abs(gradients), weights, rounded, optimize=True))
+            add_at_nodes(terms, nodes, np.einsum("eqad,eq,e->ead", np.abs(gradients), weights, rounded, optimize=True))
             largest = max(largest, float(np.abs(forces).max()))
             energy += float(np.einsum("eqi,eqi,eq->", answer, local, weights, optimize=True))
         return ElementFields(strain, stress, size, force, terms.max(axis=1), largest, energy)
 
-    def point_stresses(
-        self, displacement: Float, along: float, free: Float | None
-    ) -> Iterator[tuple[slice, Float, Float, Float]]:
-        """Yield quadratic elements in portions: places (q, 3), weights (e, q), stresses (e, q, v); else as `fields`."""
-        for part, _, weights, _, _, answer in self._responses(displacement, along, free):
-            yield part, _places(), weights, answer
-
-    def _responses(
+    def responses(
         self, displacement: Float, along: float, free: Float | None
     ) -> Iterator[tuple[slice, Float, Float, Float, Float, Float]]:
         """Yield elements in portions: gradients, weights, du/dx of nodes (e, q, c, 2), strains, stresses (e, q, v)."""
@@ -129,7 +122,7 @@ class Elements:
             if len(mixed):  # their pressure less lambda tr eps; bubbles add to the strains
                 lame = np.stack([self._stiffnesses[phase[mixed], 0, 1], self._stiffnesses[phase[mixed], -1, -1]], 1)
                 elastic = local[mixed] - own_free[mixed, None]
-                inner, pressure = inner_fields(_places(), gradients[mixed], weights[mixed], elastic, lame)
+                inner, pressure = inner_fields(quadrature_points(), gradients[mixed], weights[mixed], elastic, lame)
                 if v == 6:
                     inner = np.concatenate([inner, np.zeros((*inner.shape[:2], 1, 2))], axis=2)
                 bubble = _strains(inner, v, 0.0)
@@ -167,12 +160,12 @@ class Elements:
 def _rule(nodes: int) -> tuple[Float, Float]:
     """dN_a/dr_b (q, a, 3) and weights (q,), their sum 1, of a rule exact for constants or for degree 4.
 
-    The six points are Dunavant's (1985), `_places`.
+    The six points are Dunavant's (1985), `quadrature_points`.
     """
     if nodes == 3:
         return np.eye(3)[None], np.ones(1)
     root = np.sqrt(213125 - 53320 * np.sqrt(10.0))
-    weights, r = [(620 + sign * root) / 3720 for sign in (1, 1, 1, -1, -1, -1)], _places()
+    weights, r = [(620 + sign * root) / 3720 for sign in (1, 1, 1, -1, -1, -1)], quadrature_points()
     slopes = np.zeros((6, 6, 3))
     for a in range(3):
         slopes[:, a, a] = 4 * r[:, a] - 1
@@ -182,7 +175,7 @@ def _rule(nodes: int) -> tuple[Float, Float]:
 
 
 @cache
-def _places() -> Float:
+def quadrature_points() -> Float:
     """(6, 3) barycentric coordinates (b, b, 1 - 2 b), turned, with 18 b = 8 - sqrt(10) +- sqrt(38 - 44 sqrt(2/5))."""
     spread, places = np.sqrt(38 - 44 * np.sqrt(0.4)), []
     for sign in (1.0, -1.0):
@@ -201,7 +194,7 @@ def _strains(slope: Float, v: int, along: float) -> Float:
     return local
 
 
-def _add(sums: Float, nodes: Int, values: Float) -> None:
+def add_at_nodes(sums: Float, nodes: Int, values: Float) -> None:
     """Add values (e, a, c) to sums (n, c) at the nodes (e, a)."""
     for direction in range(values.shape[2]):
         sums[:, direction] += np.bincount(nodes.ravel(), values[..., direction].ravel(), len(sums))

@@ -30,7 +30,7 @@ STEP = 1e-6
 # Relative differences below this are rounding: of loads in proportion, of energies and strains next to their scale.
 ROUNDING = 1e-9
 # Coordinates of a user's mesh are rounded: sides match to 1e-7 of the cell, circles are round to 1e-6 of their radius.
-GENERATED_MESH, USERS_MESH = 1e-9, 1e-5
+USERS_MESH = 1e-5
 # Thin coatings bend by the rounding of the forces on their two faces: measured 4e-9 at a hundredth of the radius.
 BODIES, COATINGS = 1e-11, 1e-7
 # Nearly incompressible phases lose digits with lambda / mu beyond this, and stresses, which stiff phases around them
@@ -43,7 +43,7 @@ Place = str | Callable[[int], str]
 
 @dataclass(frozen=True)
 class Finding:
-    """A law with its largest admissible relative violation, its largest violation, and the place of this."""
+    """A law with the limit of its relative violations, the largest violation, and its place."""
 
     name: str
     description: str
@@ -79,7 +79,7 @@ class Findings:
         self._worst: dict[str, Finding] = {}
 
     def record(self, law: str, violations: ArrayLike, where: Place = "") -> None:
-        """Record relative violations, a number or one or several a row; `where` names the place of row i.
+        """Record the relative violations (), (k,) or (k, n) of a law; `where` names the place of row i.
 
         Laws without any record do not apply to the result.
         """
@@ -129,7 +129,7 @@ def checks(
     lost, of_balance = max(1.0, ratio), max(1.0, min(ratio, contrast / LARGE_CONTRAST))
     of_pressure = max(1.0, min(PRESSURE * ratio, contrast / LARGE_OF_PRESSURE))
     sums, balance, rounding = 1e-10 * lost, 1e-10 * of_balance, max(COATINGS * has_coatings, BODIES * lost)
-    shape, solver = USERS_MESH if users_mesh else GENERATED_MESH, solver_limit(rtol)
+    shape, solver = USERS_MESH if users_mesh else ROUNDING, solver_limit(rtol)
     contact = min(max(CONTACT_PER_RTOL * rtol, KKT), LARGEST_CHECK)
     rows = (
         ("files", "the files are unchanged since the run, by their checksums", 0.0),
@@ -203,22 +203,22 @@ class Section(dict[str, Any]):
     """A table of result.json that counts which entries laws have read.  ATOMS count as one number."""
 
     def __init__(self, content: Mapping[str, Any], unread: dict[str, bool] | None = None, place: str = "") -> None:
+        super().__init__(content)
         self.unread = {} if unread is None else unread
-        self._places = {key: f"{place}.{key}" if place else key for key in content}
-        super().__init__({key: self._inner(self._places[key], value) for key, value in content.items()})
+        self._prefix = f"{place}." if place else ""
+        for key, value in content.items():
+            inner = self._prefix + key
+            if isinstance(value, dict) and inner not in ATOMS:
+                self[key] = Section(value, self.unread, inner)
+            elif isinstance(value, list) and value and all(isinstance(entry, dict) for entry in value):
+                self[key] = [Section(entry, self.unread, f"{inner}[{k}]") for k, entry in enumerate(value)]
+            else:
+                self.unread[inner] = False
         self.places = tuple(self.unread)
 
-    def _inner(self, place: str, value: Any) -> Any:
-        if isinstance(value, dict) and place not in ATOMS:
-            return Section(value, self.unread, place)
-        if isinstance(value, list) and value and all(isinstance(entry, dict) for entry in value):
-            return [Section(entry, self.unread, f"{place}[{k}]") for k, entry in enumerate(value)]
-        self.unread[place] = False
-        return value
-
     def __getitem__(self, key: str) -> Any:
-        if self.unread.get(self._places[key]) is False:
-            del self.unread[self._places[key]]
+        if self.unread.get(self._prefix + key) is False:
+            del self.unread[self._prefix + key]
         return super().__getitem__(key)
 
     def get(self, key: str, default: Any = None) -> Any:
@@ -234,8 +234,8 @@ class Section(dict[str, Any]):
         return super().get(key, default)
 
     def leaves_open(self, key: str) -> None:
-        """Count an entry as unread for good, which laws use but do not determine."""
-        self.unread[self._places[key]] = True
+        """Count an entry as unread for good: laws use its value but do not determine it."""
+        self.unread[self._prefix + key] = True
 
 
 Points = Sequence[Section]

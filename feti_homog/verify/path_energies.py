@@ -19,7 +19,6 @@ Between event points without breaks the response is straight, so the work is (Si
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -62,17 +61,25 @@ class PointNumbers:
 
 def check_path_energies(findings: Findings, cell: DiscreteCell, states: States, points: Points) -> None:
     """Check work, stored and dissipated energy at all points."""
-    _check_stored(findings, cell, states, points)
+    # Without temperature and friction the stored energy is E.Sigma / 2.
+    with_fields = {state.point for state in states}
+    scale = max([state.stored for state in states], default=0.0) + cell.rounded_energy
+    for number, point in enumerate(points):
+        if number not in with_fields and not all(point["strain"]):
+            point.leaves_open("stress")  # the conjugate of no strain stores nothing
+        if not point.get(TEMPERATURE) and "friction_heat" not in point:
+            work = float(np.dot(point["strain"], point["stress"])) / 2
+            findings.compare("energy", point["stored"], work, scale, f"path[{number}].stored")
     by_events = cell.files.case["path"]["method"] == "events"
     # Under a load that only rises on the first leg of events, breaks at a load below the largest so far lose as much
     # more as energies grow up to it.
-    names = "dissipated", "dissipated_strain_controlled", "load_factor"
-    lost, rising, factor = np.array([[point[name] for name in names] for point in points]).T
+    names = "dissipated", "dissipated_strain_controlled", "load_factor", "stored"
+    lost, rising, factor, stored = np.array([[point[name] for name in names] for point in points]).T
     first_leg = 1.0 / len(targets(cell.files.case)) if by_events else 0.0
     falls = (factor > 0.0) & (factor < first_leg - SAME_SHARE)
     rise = np.where(falls, np.maximum.accumulate(factor) / np.where(falls, factor, 1.0), 1.0)
     expected = lost[0] + np.cumsum(np.r_[0.0, rise[:-1] ** 2 * np.diff(lost)])
-    scale = max(float(np.abs(expected).max()), *(abs(point["stored"]) for point in points))
+    scale = max(float(np.abs(expected).max()), float(np.abs(stored).max()))
     findings.compare("energy", rising, expected, scale, "path[{}].dissipated_strain_controlled".format)
     if "friction_heat" in points[0]:
         _check_heat(findings, states, points, by_events)
@@ -82,22 +89,7 @@ def check_path_energies(findings: Findings, cell: DiscreteCell, states: States, 
     for each, point in zip(numbers, points, strict=True):
         place = f"{each.name}, work less stored and dissipated"
         findings.compare("energy", point["work"], each.stored + point["dissipated"], scale, place)
-    if by_events:
-        _check_events(findings, numbers, points, scale)
-    else:
-        _check_increments(findings, cell, numbers, points, scale)
-
-
-def _check_stored(findings: Findings, cell: DiscreteCell, states: States, points: Points) -> None:
-    """Check the stored energy E.Sigma / 2 of points without temperature and friction."""
-    with_fields = {state.point for state in states}
-    scale = max([state.stored for state in states], default=0.0) + cell.rounded_energy
-    for number, point in enumerate(points):
-        if number not in with_fields and not all(point["strain"]):
-            point.leaves_open("stress")  # the conjugate of no strain stores nothing
-        if not point.get(TEMPERATURE) and "friction_heat" not in point:
-            work = float(np.dot(point["strain"], point["stress"])) / 2
-            findings.compare("energy", point["stored"], work, scale, f"path[{number}].stored")
+    _check_losses(findings, cell, numbers, points, scale)
 
 
 def _check_heat(findings: Findings, states: States, points: Points, by_events: bool) -> None:
@@ -165,22 +157,6 @@ def _numbers(cell: DiscreteCell, states: States, points: Points) -> list[PointNu
     return numbers
 
 
-def _check_events(findings: Findings, numbers: Sequence[PointNumbers], points: Points, scale: float) -> None:
-    """Check that the bonds breaking at a point lose the energy up to the next."""
-    findings.record("energy", abs(points[0]["dissipated"]) / scale, f"{numbers[0].name}, dissipated")
-    for (state, before), (after, now) in pairwise(zip(numbers, points, strict=True)):
-        low, high = 0.0, 0.0
-        if damaged_at(before):
-            least, largest = potentials(state.load, after)
-            low, high = max(state.potential - largest, 0.0), state.potential - least
-        lost = now["dissipated"] - before["dissipated"]
-        findings.record("energy", max(low - lost, lost - high, 0.0) / scale, f"{after.name}, dissipated")
-        if damaged_at(before) == 0:
-            straight = _work(after.strain - state.strain, state.stress + after.stress) / 2
-            off = np.nan_to_num(now["work"] - before["work"] - straight)
-            findings.record("energy", abs(off) / scale, f"{after.name}, work")
-
-
 def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:
     """Bound the potential of a load on the bonds in another state, by (P)."""
     if (load.by_stress != other.load.by_stress).any():
@@ -211,26 +187,35 @@ def _work(one: Float, other: Float) -> float:
     return float(one[one != 0.0] @ other[one != 0.0])
 
 
-def _check_increments(
+def _check_losses(
     findings: Findings, cell: DiscreteCell, numbers: Sequence[PointNumbers], points: Points, scale: float
 ) -> None:
-    """Check the loss at the load of each step: the old bonds' potential, by (P), less the new bonds'.
+    """Check the loss in breaks by (P): the old bonds' potential less the new bonds', at the load of the break.
 
-    Bonded phases at the strain of the new bonds store no less than the old bonds would.
+    At events, bonds that break at a point lose the energy up to the next. In an increment, bonds break at its end;
+    bonded phases at the strain of the new bonds store no less than the old bonds would.
     """
+    by_events = cell.files.case["path"]["method"] == "events"
     C: Float = np.einsum("p,pij->ij", cell.fractions, cell.stiffnesses)  # Voigt's, of strains and temperature
     if cell.files.is_spatial:
         alpha = np.zeros(cell.stiffnesses.shape[:2]) if cell.expansions is None else cell.expansions
         thermal = np.einsum("p,pij,pj->i", cell.fractions, cell.stiffnesses, alpha)
         square = np.einsum("p,pi,pij,pj->", cell.fractions, alpha, cell.stiffnesses, alpha)
         C = np.block([[C, -thermal[:, None]], [-thermal[None], square]])
-    total = 0.0
     for number, (point, now) in enumerate(zip(points, numbers, strict=True)):
-        lost, low, high = point["dissipated"] - total, 0.0, 0.0
-        if damaged_at(point):
+        state, before = (numbers[number - 1] if number else None), points[number - 1]
+        lost, low, high = point["dissipated"] - (before["dissipated"] if number else 0.0), 0.0, 0.0
+        if by_events and state:
+            if damaged_at(before):
+                least, largest = potentials(state.load, now)
+                low, high = max(state.potential - largest, 0.0), state.potential - least
+            else:  # the response is straight
+                straight = _work(now.strain - state.strain, state.stress + now.stress) / 2
+                off = np.nan_to_num(point["work"] - before["work"] - straight)
+                findings.record("energy", abs(off) / scale, f"{now.name}, work")
+        elif not by_events and damaged_at(point):
             n = len(now.strain)
             high = float(now.strain @ C[:n, :n] @ now.strain) / 2 - now.stored
-            least, largest = potentials(now.load, numbers[number - 1]) if number else (-np.inf, np.inf)
+            least, largest = potentials(now.load, state) if state else (-np.inf, np.inf)
             low, high = max(least - now.potential, 0.0), min(high, largest - now.potential)
         findings.record("energy", max(low - lost, lost - high, 0.0) / scale, f"{now.name}, dissipated")
-        total = point["dissipated"]

@@ -147,7 +147,8 @@ class ResultFiles:
     @property
     def interfaces(self) -> Sequence[Mapping[str, Any]]:
         """The sections [[interface]]; none if all bonds are perfect."""
-        return _interfaces(self.case)
+        sections: Any = self.case.get("interface", [])
+        return sections if isinstance(sections, list) else [sections]
 
     @property
     def points(self) -> Points:
@@ -160,32 +161,30 @@ class ResultFiles:
         """Yield the states in order, one in memory at a time."""
         for number in sorted(map(int, self.file.get("state", ()))):
             with _reading(Path(self.file.filename)):
-                yield self._state(number)
+                state = self._state(f"state/{number}", 6 if self.is_spatial else 3)
+            yield state
 
-    def _state(self, number: int) -> State:
-        group, n, m = self.file[f"state/{number}"], len(self.mesh.points), len(self.mesh.triangles)
-        k = len(self.interface.points)
-        table = partial(_table, self.file, f"state/{number}")
+    def _state(self, group: str, v: int) -> State:
+        """Read the state of a group, whose strain and stress have v components."""
+        attributes, table = self.file[group].attrs, partial(_table, self.file, group)
+        n, m, k = len(self.mesh.points), len(self.mesh.triangles), len(self.interface.points)
         status = table("status", (k,))
         # Older results have no damage, nothing that slides and no estimated errors.
         older = {"damage": (status != 0).astype(float), "sliding": np.zeros(k, int), "mesh_error": np.full(m, np.nan)}
         arrays = {name: table(name, value.shape, value) for name, value in older.items()}
         shapes = {"displacement": (n, 2), "stress": (m, 3), "stress_33": (m,), "traction": (k, 2), "jump": (k, 2)}
         arrays |= {name: table(name, shape) for name, shape in shapes.items()}
-        if self.is_spatial:
+        if v == 6:
             for name, rows in (("displacement", n), ("traction", k), ("jump", k)):
                 arrays[name] = np.column_stack([arrays[name], table(f"axial_{name}", (rows,))])
             plane, axial = arrays["stress"], table("axial_stress", (m, 2))
             arrays["stress"] = np.column_stack([plane[:, :2], arrays["stress_33"], axial, plane[:, 2]])
-        strain, mean = (np.array(group.attrs[name], float) for name in ("strain", "stress"))
-        v = 6 if self.is_spatial else 3
-        _expect(
-            strain.shape == mean.shape == (v,), f"/state/{number} has a strain or a stress of another size than {v}"
-        )
-        label, factor, point = str(group.attrs["label"]), float(group.attrs["load_factor"]), int(group.attrs["point"])
+        strain, mean = (np.array(attributes[name], float) for name in ("strain", "stress"))
+        _expect(strain.shape == mean.shape == (v,), f"/{group} has a strain or a stress of another size than {v}")
+        name = f"{group.replace('/', ' ')} ({attributes['label']})"
+        factor, point = float(attributes["load_factor"]), int(attributes["point"])
         arrays["fluctuation"] = arrays["displacement"] - self.mesh.points @ gradient(strain).T
-        temperature = float(group.attrs.get("temperature", 0.0))
-        name = f"state {number} ({label})"
+        temperature = float(attributes.get("temperature", 0.0))
         return State(name, strain, mean, factor, point, status=status, temperature=temperature, **arrays)
 
 
@@ -216,7 +215,7 @@ def opened(directory: Path) -> Iterator[ResultFiles]:
         file = h5py.File(path, "r")
     with file:
         with _reading(path):
-            files = _contents(_document(directory / JSON), file, changed)
+            files = _contents(Section(_document(directory / JSON)), file, changed)
         yield files
 
 
@@ -232,39 +231,35 @@ def _document(path: Path) -> Mapping[str, Any]:
     return document
 
 
-def _contents(document: Mapping[str, Any], file: h5py.File, altered: tuple[str, ...]) -> ResultFiles:
-    """Read both files except the states."""
+def _contents(document: Section, file: h5py.File, altered: tuple[str, ...]) -> ResultFiles:
+    """Read the mesh, the interface and the fibres, and check their indices."""
     n, m = len(file["mesh/points"]), len(file["mesh/triangles"])
     k, f = len(file["interface/points"]), len(file["fibre/radius"])
     columns = 6 if file["mesh/triangles"].shape[1:] == (6,) else 3
     _expect(n > 0 and m > 0, "/mesh has no nodes or no elements")
-    mesh_shapes = {"points": (n, 2), "triangles": (m, columns), "subdomain": (m,), "phase": (m,), "body": (m,)}
-    mesh = Mesh(**{name: _table(file, "mesh", name, shape) for name, shape in mesh_shapes.items()})
-    row_shapes = {"points": (k, 2), "normal": (k, 2), "length": (k,), "fibre_number": (k,), "fibre": (k,)}
-    rows = [_table(file, "interface", name, shape) for name, shape in row_shapes.items()]
+
+    def tables(group: str, **shapes: tuple[int, ...]) -> list[Any]:
+        return [_table(file, group, name, shape) for name, shape in shapes.items()]
+
+    mesh = Mesh(*tables("mesh", points=(n, 2), triangles=(m, columns), subdomain=(m,), phase=(m,), body=(m,)))
+    rows = tables("interface", points=(k, 2), normal=(k, 2), length=(k,), fibre_number=(k,), fibre=(k,))
     # Older results have one section [interface] and bonds of one strength.
     rows.append(_table(file, "interface", "pair", (k,), np.zeros(k, np.int32)))
     interface = InterfaceRows(*rows)
-    fibre_shapes = {"body": (f,), "centre": (f, 2), "radius": (f,)}
-    fibres = [_table(file, "fibre", name, shape) for name, shape in fibre_shapes.items()]
+    fibres = tables("fibre", body=(f,), centre=(f, 2), radius=(f,))
     fibres.append(_table(file, "fibre", "strength", (f,), np.ones(f)))
-    size = np.array([file.attrs["width"], file.attrs["height"]], float)
-    phases, sections = tuple(map(str, file.attrs["phases"])), _interfaces(document["case"])
+    size, phases = np.array([file.attrs["width"], file.attrs["height"]], float), tuple(map(str, file.attrs["phases"]))
+    files = ResultFiles(document, size, phases, mesh, interface, Fibres(*fibres), file, altered)
     for name, table, low, high in (
         ("/mesh/triangles names unknown nodes", mesh.triangles, 0, n),
         ("/mesh/phase names unknown phases", mesh.phase, 0, len(phases)),
-        ("/interface/pair names unknown interfaces", interface.pair, 0, max(len(sections), 1)),
+        ("/interface/pair names unknown interfaces", interface.pair, 0, max(len(files.interfaces), 1)),
         ("/interface/fibre_number names unknown fibres", interface.fibre, 1, f + 1),
     ):
         _expect(bool(((table >= low) & (table < high)).all()), name)
-    pairs = {name for section in sections for name in section.get("between", ())}
+    pairs = {name for section in files.interfaces for name in section.get("between", ())}
     _expect(pairs <= set(phases), "the case has interfaces between unknown phases")
-    return ResultFiles(Section(document), size, phases, mesh, interface, Fibres(*fibres), file, altered)
-
-
-def _interfaces(case: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
-    sections = case.get("interface", [])
-    return sections if isinstance(sections, list) else [sections]
+    return files
 
 
 def _table(file: h5py.File, group: str, name: str, shape: tuple[int, ...], default: Any = None) -> Any:

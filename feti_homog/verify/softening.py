@@ -11,17 +11,16 @@ from typing import ClassVar
 import numpy as np
 
 from feti_homog.typing import Float
-from feti_homog.verify.bonds import BondLaw, pulled
+from feti_homog.verify.bonds import QuadraticStrength, pulled
 
-HALVINGS = 80
 TAIL = 0.01  # traction / peak at which the last exponential tooth begins
 MODES = np.linspace(0.0, np.pi / 2, 33)
 # Relative excess of the energy that bonds with changing modes absorb over the range of single modes.
 BETWEEN_MODES = 0.25
 
 
-class Cohesive(BondLaw):
-    """delta = sqrt(<delta_n>^2 + delta_s^2) reaches the next tooth."""
+class Cohesive(QuadraticStrength):
+    """A bond softens where delta = sqrt(<delta_n>^2 + delta_s^2) reaches the next tooth."""
 
     has_toughness: ClassVar[bool] = True
 
@@ -54,16 +53,12 @@ class Cohesive(BondLaw):
         energies = np.stack([self.absorbed(np.full(len(after), psi), before, after) for psi in MODES])
         return energies.min(axis=0) * (1 - BETWEEN_MODES), energies.max(axis=0) * (1 + BETWEEN_MODES)
 
-    def breaks(self, traction: Float) -> dict[str, float]:
-        """Return the component shares at damage onset."""
-        return dict(zip(("normal", "tangential", "axial"), self._onset_shares(traction)[0].tolist(), strict=False))
-
     def onset(self, traction: Float) -> Float:
         """(k,) utilisation of the strengths by intact bonds."""
-        return np.asarray(np.sqrt(np.square(self._onset_shares(traction)).sum(axis=1)))
+        return super().utilisation(traction)
 
-    def _onset_shares(self, traction: Float) -> Float:
-        """(k, c) traction / strength, along the fibre by the energy of the slip."""
+    def shares(self, traction: Float) -> Float:
+        """(k, c) traction components / strengths, along the fibre by the energy of the slip."""
         shares = pulled(traction)
         shares[:, 0] /= self._number("normal_strength")
         stiffness = self._components("stiffness", traction)[..., 1:]
@@ -129,7 +124,7 @@ class Cohesive(BondLaw):
         high = low + 1.0
         while ((1.0 - d) * (first + stretch * high) < first * self.branch(high)).any() and high.max() < 1e6:
             high = high * 2.0
-        for _ in range(HALVINGS):
+        while (high - low > np.finfo(float).eps * (1.0 + high)).any():
             middle = (low + high) / 2
             above = (1.0 - d) * (first + stretch * middle) < first * self.branch(middle)
             low, high = np.where(above, middle, low), np.where(above, high, middle)
@@ -139,7 +134,7 @@ class Cohesive(BondLaw):
 
 
 class TableLaw(Cohesive):
-    """Straight pieces."""
+    """A branch of straight pieces between the points of a table."""
 
     @property
     def _points(self) -> tuple[Float, Float]:
@@ -166,13 +161,13 @@ class TableLaw(Cohesive):
 
 
 class BilinearLaw(TableLaw):
-    """One straight piece."""
+    """A branch of one straight piece."""
 
     _points = np.array([0.0, 1.0]), np.array([1.0, 0.0])
 
 
 class ExponentialLaw(Cohesive):
-    """exp(-u)."""
+    """The branch exp(-u)."""
 
     last = -float(np.log(TAIL))
 

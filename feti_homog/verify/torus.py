@@ -102,9 +102,9 @@ def same_places(points: Float, size: Float, radius: float) -> Int:
 
 
 def along_one_line(sides: TornSides, nodes: TornNodes, part: Int) -> Bool:
-    """(places,) whether two bodies, if two, meet there along one line; `part` (m,) is each element's body.
+    """(places,) True where two bodies meet along one line; `part` (m,) is the body of each element.
 
-    Then each body ends there at two sides, not all at voids.  A middle node is on one line.
+    Each body ends at two sides of such a place, not all at voids.  A middle node is on one line.
     """
     apart = ~sides.at_void & (part[sides.element] != part[sides.element[sides.partner]])
     place = np.full(int(nodes.node.max(initial=-1)) + 1, -1)
