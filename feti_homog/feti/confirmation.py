@@ -45,7 +45,7 @@ class InfluenceSolutions:
         if not self._granted:
             return None
         seen, torn = np.einsum("ki,nij,kj->nk", strains, self._squares, strains)
-        if not (seen > thresholds.LEAST_UNCONFIRMED_JUMP**2 * torn).all():
+        if not (seen > thresholds.LEAST_FOLLOWED**2 * torn).all():
             return None
         free = self._natural.unconstrained_modes.shape[1]
         answer = self._inverse.answer(d, strains.T, free)
@@ -106,7 +106,7 @@ class InfluenceSolutions:
         strains = np.stack([solution.strain for solution in solutions], axis=1)
         again = self._inverse.answer(d, strains, self._natural.unconstrained_modes.shape[1])
         is_same = again is not None and float(np.max(self._errors(*again))) <= thresholds.MOST_FOLLOWED_ERROR
-        self._rounding = min(error, thresholds.MOST_CONFIRMED_ROUNDING) if is_same else 0.0
+        self._rounding = min(error, thresholds.MOST_ROUNDING) if is_same else 0.0
 
     def _errors(self, lam: Float, opening: Float, residuals: Float | float = 0.0) -> tuple[float, float]:
         """Return how far the expected multipliers and jumps on inactive rows are off these, (owned rows, k) each.
@@ -118,7 +118,7 @@ class InfluenceSolutions:
         assert self._expected is not None
         expected, jumps, terms = self._expected
         is_open = (jumps != 0.0) * (self._natural.unconstrained_modes.shape[1] == 0)
-        sizes = np.maximum(np.abs(lam), thresholds.LEAST_UNCONFIRMED_JUMP * terms)
+        sizes = np.maximum(np.abs(lam), thresholds.LEAST_FOLLOWED * terms)
         errors = np.maximum(np.abs(expected - lam), residuals * np.abs(lam))
         parts = np.abs([errors, sizes, is_open * (jumps - opening), opening]).max(axis=1, initial=0.0)
         parts = np.max(self._comm.allgather(parts), axis=0)  # keeps NaN, which MPI.MAX may lose

@@ -10,7 +10,7 @@ from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.krylov import ActiveRows
 from feti_homog.feti.linalg.sparse_matrices import allreduce_sparse
 from feti_homog.feti.operators.interface_operators import DualOperator
-from feti_homog.feti.thresholds import CANCELLED, ROUNDING_MARGIN, SMALL_JUMP, ZERO_JUMP
+from feti_homog.feti.thresholds import CANCELLED, ROUNDING_MARGIN, ZERO_JUMP
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float
 
@@ -81,7 +81,7 @@ class ActiveJumps:
             torn: (k,) norms of the jumps on all rows.
         """
         rounding = ZERO_JUMP * torn
-        if ((seen > rounding) & (seen < SMALL_JUMP * torn)).any():
+        if ((seen > rounding) & (seen < np.sqrt(np.finfo(float).eps) * torn)).any():
             if self._rounding is None:
                 self._rounding = jump_rounding(self._operator, displacement)
             projected = self._natural.project(self._active.restrict(self._rounding @ loads))

@@ -114,8 +114,8 @@ class PrimalTest:
         self._jump_stall, self._force_stall = Stall(STALL_ITERATIONS), Stall(FORCE_STALL_ITERATIONS)
 
     def is_met(self, rtol: float, jump: float, forces: float) -> bool:
-        """Return whether norms of the jump and of the forces are both below rtol, or there is no jump."""
-        return jump <= rtol * self.jump_scale and (forces <= rtol * self.force_scale or jump == 0.0)
+        """Return whether norms of the jump and of the forces are both below rtol."""
+        return jump <= rtol * self.jump_scale and forces <= rtol * self.force_scale
 
     def __call__(self, ksp: PETSc.KSP, iteration: int, residual: float) -> PETSc.KSP.ConvergedReason:
         """Return whether to go on; `residual` is the norm of the preconditioned one, |P H r|.  Collective."""

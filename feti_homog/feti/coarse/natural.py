@@ -11,7 +11,7 @@ from scipy.sparse import block_diag, csc_matrix, csr_matrix, diags
 from feti_homog.feti.linalg.distributed_solver import DistributedSolver
 from feti_homog.feti.linalg.sparse_matrices import assemble_owned_rows
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.thresholds import UNCONSTRAINED
+from feti_homog.feti.thresholds import ZERO_TOLERANCE
 from feti_homog.mesh import periodic_topology
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int
@@ -124,7 +124,7 @@ class NaturalCoarseSpace:
             if len(other := np.flatnonzero((now != blocks).any(axis=(1, 2)))):
                 eigenvalues[other], vectors[other] = np.linalg.eigh(now[other])
                 blocks[other] = now[other]
-            tolerance = UNCONSTRAINED * self._diagonal[members].max(axis=1, keepdims=True)
+            tolerance = ZERO_TOLERANCE * self._diagonal[members].max(axis=1, keepdims=True)
             which, mode = np.nonzero(eigenvalues <= tolerance)
             if not len(which):
                 continue

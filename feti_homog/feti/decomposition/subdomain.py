@@ -9,7 +9,7 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.errors import MeshError
 from feti_homog.fem import PLANE, Problem, assembly, bubble
-from feti_homog.feti.thresholds import KERNEL_TOLERANCE, LEAST_ORDERED_DOFS, SCALED_LAME
+from feti_homog.feti.thresholds import LEAST_ORDERED_DOFS, SCALED_LAME, ZERO_TOLERANCE
 from feti_homog.mesh import FineMesh, ReferenceLattice, Submesh, mesh_fibres, refinement
 from feti_homog.typing import Float, Int
 
@@ -107,10 +107,8 @@ class Subdomain:
         K = _pinned(body.K, problem, submesh.pinned)
         # The rigid-body modes are in the kernel of K; NaN is above any tolerance.
         residual = abs(K @ R).max(initial=0.0) / abs(K.data).max()
-        if not residual <= KERNEL_TOLERANCE:
-            faults = (
-                f"|K R| / |K| = {residual:.1e}, expected at most {KERNEL_TOLERANCE:.0e}; its elements are degenerate"
-            )
+        if not residual <= ZERO_TOLERANCE:
+            faults = f"|K R| / |K| = {residual:.1e}, expected at most {ZERO_TOLERANCE:.0e}; its elements are degenerate"
             raise MeshError(f"{label(submesh)}: {faults}")
         Q, slopes = body.Q, body.slopes
         if submesh.pinned >= 0:

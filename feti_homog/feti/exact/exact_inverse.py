@@ -11,6 +11,7 @@ factored too, and its response is followed from there.
 """
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from feti_homog.errors import CaseError
@@ -33,13 +34,12 @@ class ExactInverse(Preconditioner):
         neighbours: which bonds lie beside each other.
         stiffness: (all rows,) bounds for the diagonal of H: the stiffness of both nodes and the spring between them,
             in a row, while all others are held.
-        norm: |H| with all bonds intact, which is the largest, as the power method finds it, with a margin.
+        norm: bound of |H|.
         factorizations: reference cells so far.
         batch: columns found at once at least.
         most_followed: columns from which on unused ones go, from the next time that none are followed.
     """
 
-    norm: float = np.inf
     is_exact = True
     reference: ReferenceCell
 
@@ -61,18 +61,19 @@ class ExactInverse(Preconditioner):
         self._first, end = jump_operator.owned
         self._rows = end - self._first
         self.stiffness = np.concatenate(comm.allgather(stiffness_of_rows(operators)))
+        # K <= n diag(K) for the n displacements of an element.
+        displacements = max((s.mesh.triangles.shape[1] * s.problem.components for s in operators.subdomains), default=0)
+        self.norm = comm.allreduce(displacements, MPI.MAX) * self.stiffness.max(initial=0.0)
         self._one_sided = one_sided_jumps(operators)
         self._ties = BodyTies(comm, jump_operator)
         self.neighbours = InterfaceNeighbours(comm, jump_operator, operators.subdomains)
-        self.batch = thresholds.INFLUENCE_BATCH * comm.size
-        self.most_followed = min(max(thresholds.FOLLOWED_COLUMNS, 2 * max_changes), jump_operator.global_rows)
+        self.batch = thresholds.COLUMNS_AT_ONCE * comm.size
+        self.most_followed = min(max(thresholds.NEVER_REFACTORED_ROWS, 2 * max_changes), jump_operator.global_rows)
         self.factorizations = 0
         # Of the present state active rows and what springs gained; the latter from the next `activate` on.
         self._active, self._more = np.ones(self._rows), np.zeros(self._rows)
         self._next = self._more
         self._restart()
-        # Rows that leave make H smaller.
-        self.norm = thresholds.NORM_MARGIN * self.reference.largest_eigenvalue()
 
     def soften(self, more: Float) -> None:
         """Let springs have `more` compliance (owned rows,) than at first, from the next `activate` on."""
@@ -80,7 +81,7 @@ class ExactInverse(Preconditioner):
 
     def activate(self, active: Float) -> None:
         """Restrict to the rows where `active` is 1.  Collective."""
-        if not self._follow(active, self._next, thresholds.LEAST_FOLLOWED_PIVOT):
+        if not self._follow(active, self._next, thresholds.LEAST_FOLLOWED):
             self._active, self._more = active, self._next
             self._restart()
 
@@ -162,7 +163,7 @@ class ExactInverse(Preconditioner):
             self._add(self._followed.lacking(rows), self._changes(), rows, np.inf)
 
     def _add(
-        self, rows: Int, changes: ReferenceChanges, needed: Int, max_error: float = thresholds.MOST_ASYMMETRY
+        self, rows: Int, changes: ReferenceChanges, needed: Int, max_error: float = thresholds.MOST_ROUNDING
     ) -> bool:
         """Follow columns of global rows (k,) too, unless followed ones are asymmetric with them.  Collective."""
         if not len(rows):

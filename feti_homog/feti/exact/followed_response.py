@@ -131,7 +131,7 @@ class FollowedResponse:
         self._rows = np.concatenate([self._rows, rows])
         self._buffer[:, old:new], self._used[old:new] = columns, self._now
 
-    def follow(self, rows: Int, turned: Float, gained: Float, pivot: float = thresholds.LEAST_FOLLOWED_PIVOT) -> bool:
+    def follow(self, rows: Int, turned: Float, gained: Float, pivot: float = thresholds.LEAST_FOLLOWED) -> bool:
         """Let the global rows (k,) leave (`turned` is 1), come (-1) or soften (0), their springs gain compliance (k,).
 
         All of them and the pins have columns.  False where pivots below `pivot` lose too many digits; then this is the
@@ -172,7 +172,7 @@ class FollowedResponse:
         columns, values = self._present(rows)
         # Pins that unit forces on rows that come press.
         forces = values[len(rows) :, : len(rows)][:, sign < 0.0]
-        if len(moved := self.pins[(np.abs(forces[self._slot[self.pins]]) > thresholds.RIGID_SHARE).any(axis=1)]):
+        if len(moved := self.pins[(np.abs(forces[self._slot[self.pins]]) > thresholds.LEAST_FOLLOWED).any(axis=1)]):
             rows, none = np.concatenate([rows, moved]), np.zeros(len(moved))
             sign, gained = np.concatenate([sign, none + 1.0]), np.concatenate([gained, none])
             columns, values = self._present(rows)
@@ -254,15 +254,15 @@ def _regular(block: Float, sign: Float, stiffness: Float, pivot: float) -> tuple
     root = np.sqrt(np.maximum(np.where(sign > 0.0, stiffness, 1.0 / stiffness), np.abs(block.diagonal())))
     outer = np.outer(root, root)
     scaled, which = block / outer, np.arange(len(block))
-    if not _has_digits(scaled, thresholds.LEAST_FOLLOWED_PIVOT):
+    if not _has_digits(scaled, thresholds.LEAST_FOLLOWED):
         come, leave = np.flatnonzero(sign < 0.0), np.flatnonzero(sign > 0.0)
         if not len(leave) or not _has_digits(scaled[come[:, None], come], pivot):
             return None
         across = scaled[come[:, None], leave]
         rest = scaled[leave[:, None], leave] - across.T @ np.linalg.solve(scaled[come[:, None], come], across)
-        factor, order, rank, _ = dpstrf(rest, tol=thresholds.SINGULAR_PIVOT, lower=1)
+        factor, order, rank, _ = dpstrf(rest, tol=thresholds.ZERO_TOLERANCE, lower=1)
         # The first pivot is taken whatever it is.
-        rank = min(rank, int((factor.diagonal() ** 2 > thresholds.SINGULAR_PIVOT).sum()))
+        rank = min(rank, int((factor.diagonal() ** 2 > thresholds.ZERO_TOLERANCE).sum()))
         which = np.concatenate([come, leave[order[:rank] - 1]])
         if not _has_digits(scaled[which[:, None], which], pivot):
             return None

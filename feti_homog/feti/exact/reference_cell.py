@@ -18,12 +18,9 @@ from feti_homog.feti.exact.assembled_schur import AssembledSchur, assembled_stif
 from feti_homog.feti.exact.spring_update import SpringUpdate
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.preconditioners import Preconditioner, never_softens
-from feti_homog.feti.thresholds import CHUNK_RANKS, INFLUENCE_BATCH, NORM_ITERATIONS, STIFF_FIBRES
+from feti_homog.feti.thresholds import COLUMNS_AT_ONCE, STIFF_FIBRES
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int
-
-# Bonds, each in all directions, that let no rigid-body motion pass between two bodies.
-HOLDING_BONDS = 2
 
 
 class BodyTies:
@@ -50,7 +47,7 @@ class BodyTies:
         holding = distributed_arrays.allreduce_sum(
             self._comm, np.bincount(self._pair, bonded, len(self._ties)).astype(float)
         )
-        ties = self._ties[holding < HOLDING_BONDS].ravel()
+        ties = self._ties[holding < self._ties.shape[1]].ravel()
         rows = self._rows[ties[(ties >= 0) & (ties < len(self._rows))]]
         tied = active.copy()
         tied[rows] = 1.0
@@ -88,9 +85,8 @@ class ReferenceCell:
     def columns(self, rows: Int) -> Float:
         """(owned rows, k) Gamma[:, rows] of global rows (k,), equal on all ranks.  Collective."""
         # A few columns too many are cheaper with others than by themselves.
-        chunk = INFLUENCE_BATCH * min(self._comm.size, CHUNK_RANKS)
         columns = [np.zeros((len(self.active), 0))]
-        for some in np.array_split(rows, max(round(len(rows) / chunk), 1)) if len(rows) else []:
+        for some in np.array_split(rows, max(round(len(rows) / COLUMNS_AT_ONCE), 1)) if len(rows) else []:
             unit, place = np.zeros((len(self.active), len(some))), some - self._first
             mine = np.flatnonzero((place >= 0) & (place < len(unit)))
             unit[place[mine], mine] = 1.0
@@ -110,18 +106,6 @@ class ReferenceCell:
         jump = distributed_arrays.scale_rows(self.active, self._jump_operator.sum(self._operators.B @ moved))
         force = distributed_arrays.scale_rows(self.active, self.respond(jump)) / stiffness
         return float(self._comm.allreduce(np.abs(force).max(initial=0.0), MPI.MAX))
-
-    def largest_eigenvalue(self) -> float:
-        """|Gamma| as some steps of the power method find it.  Collective."""
-        x = np.cos((self._first + np.arange(len(self.active))) ** 2.0)
-        norm = 0.0
-        for _ in range(NORM_ITERATIONS):
-            length = np.sqrt(distributed_arrays.allreduce_sum(self._comm, np.array([x @ x]))[0])
-            if length == 0.0:
-                break
-            x = self.respond(x / length)
-            norm = float(np.sqrt(distributed_arrays.allreduce_sum(self._comm, np.array([x @ x]))[0]))
-        return norm
 
     def _without_springs(self, x: Float) -> Float:
         """Gamma x without the springs at nodes of A where fibre and matrix are both cut.
@@ -188,7 +172,7 @@ class BondedInverse(Preconditioner):
     Unlike `ExactInverse` it follows no rows: another set of active rows is factored anew.
     """
 
-    norm, soften, is_exact = np.inf, never_softens, True
+    soften, is_exact = never_softens, True
 
     def __init__(self, operators: InterfaceOperators) -> None:
         """Factor the cell with all bonds; all boundary operators must be dense.  Collective."""

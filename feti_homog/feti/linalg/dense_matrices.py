@@ -12,7 +12,7 @@ from scipy.linalg.lapack import dlauum, dpotrf, dpotrs, dtrtri
 from scipy.sparse import bmat, csr_matrix
 
 from feti_homog.feti.linalg.sparse_direct import check_factor, mumps_error, power_of_two
-from feti_homog.feti.thresholds import COPIED_AT_ONCE, COPIED_COLUMNS, MIRRORED_BLOCK_ROWS, TRIANGLE_INVERSE_ROWS
+from feti_homog.feti.thresholds import BLOCK_ROWS, COLUMNS_AT_ONCE, COPIED_COLUMNS
 from feti_homog.system.petsc import c_functions, options_database
 from feti_homog.typing import Float, Int
 
@@ -239,7 +239,7 @@ def invert_upper(A: Float) -> None:
 def _invert_triangle(U: Float) -> None:
     """U <- U^-1 for the upper triangle of U, by halves: OpenBLAS inverts large ones column by column."""
     n = len(U)
-    if n <= TRIANGLE_INVERSE_ROWS:
+    if n <= BLOCK_ROWS:
         U[:], info = dtrtri(U, lower=0)
         check_lapack("dtrtri", info)
         return
@@ -249,7 +249,7 @@ def _invert_triangle(U: Float) -> None:
     corner[:] = dtrmm(1.0, last, dtrmm(-1.0, first, corner), side=1, overwrite_b=1)
 
 
-def full_from_lower(A: Float, block: int = MIRRORED_BLOCK_ROWS) -> Float:
+def full_from_lower(A: Float, block: int = BLOCK_ROWS) -> Float:
     """Return the symmetric matrix, in C order, with the lower triangle of A (n, n).
 
     By blocks that fit the cache.
@@ -272,6 +272,6 @@ def product_with_some(columns: Float, at: Int, x: Float) -> Float:
         padded[at] = x
         return np.asarray(columns @ padded)
     product = np.zeros((len(columns), *x.shape[1:]))
-    for some in np.array_split(np.arange(len(at)), len(at) // COPIED_AT_ONCE + 1):
+    for some in np.array_split(np.arange(len(at)), len(at) // COLUMNS_AT_ONCE + 1):
         product += columns[:, at[some]] @ x[some]
     return product

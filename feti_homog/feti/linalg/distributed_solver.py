@@ -7,7 +7,7 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.feti.linalg.sparse_direct import factored, is_direct, power_of_two, sequential, solve_columns
 from feti_homog.feti.linalg.sparse_matrices import assemble_distributed, gathered_sum
-from feti_homog.feti.thresholds import CHOLMOD_COLUMNS_ONE_BY_ONE, MUMPS_COLUMNS_ONE_BY_ONE, REPLICATED_UNKNOWNS
+from feti_homog.feti.thresholds import REPLICATED_UNKNOWNS
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int
 
@@ -26,7 +26,6 @@ class DistributedSolver:
         options = PETSc.Options(prefix)
         together = total > most_whole or any(options.hasName(name) for name in ("ksp_type", "pc_type"))
         self.is_distributed = comm.size > 1 and together
-        self.max_columns_one_by_one = MUMPS_COLUMNS_ONE_BY_ONE if self.is_distributed else CHOLMOD_COLUMNS_ONE_BY_ONE
 
     def factor(self, unknowns: Int, part: csr_matrix, near_kernel: Float | None = None) -> None:
         """Assemble and factor A, and free the factor before.  Collective.
@@ -73,7 +72,7 @@ class DistributedSolver:
         """
         assert self._ksp is not None, "nothing is factored"
         right = self._sum(B if B.ndim == 2 else B[:, None])[slice(*self._b.getOwnershipRange())]
-        X = solve_columns(self._ksp, self._x, self._b, right, self.max_columns_one_by_one)
+        X = solve_columns(self._ksp, self._x, self._b, right)
         X *= self._scale
         if self.is_distributed:
             X = distributed_arrays.allgather_rows(self.comm, X, np.diff(self._b.getOwnershipRanges()))

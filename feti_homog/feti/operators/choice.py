@@ -6,7 +6,7 @@ A pure function of sizes: it needs no mesh and no MPI.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from feti_homog.feti.thresholds import APPLY_SECONDS, DENSE_INVERSE_SECONDS, Thresholds
+from feti_homog.feti.thresholds import DENSE_INVERSE_COST, Thresholds
 
 KINDS = ("auto", "implicit", "explicit")
 
@@ -64,7 +64,7 @@ def choose(
     for size in sizes:
         n = size.boundary_dofs
         facewise = size.is_whole_body and n > thresholds.whole_boundary_dofs and not size.has_springs
-        pays = DENSE_INVERSE_SECONDS * n**3 <= APPLY_SECONDS * size.dofs * applications
+        pays = DENSE_INVERSE_COST * n**3 <= size.dofs * applications
         is_useful = pays or size.has_springs or (soft_modes and not facewise)
         possible = n <= thresholds.dense_boundary_dofs and can_condense
         explicit = kind == "explicit" or (kind == "auto" and is_useful and possible)

@@ -20,13 +20,11 @@ class Preconditioner(Protocol):
 
     Attributes:
         is_exact: whether it is the inverse of the projected dual operator, so that nothing is left to iterate.
+        norm: bound of |M^-1|; inf if none is known.
     """
 
     is_exact: bool = False
-
-    @property
-    def norm(self) -> float:
-        """Bound of |M^-1|, inf if none is known."""
+    norm: float = np.inf
 
     def activate(self, active: Float) -> None:
         """Restrict to the rows where `active` is 1."""
@@ -54,7 +52,7 @@ def never_softens(preconditioner: Preconditioner, more: Float) -> None:
 class Identity(Preconditioner):
     """z = r."""
 
-    norm, soften = 1.0, never_softens
+    soften = never_softens
 
     def activate(self, active: Float) -> None:
         """Nothing depends on the rows."""
@@ -72,7 +70,7 @@ class StiffnessScaled(Preconditioner):
         W_inverse: (owned rows, owned rows) W^-1 of the active rows, 0 on the others.
     """
 
-    norm, soften = np.inf, never_softens
+    soften = never_softens
 
     def __init__(self, operators: InterfaceOperators, stiffness: Callable[[Float], Float]) -> None:
         """`stiffness` is x -> S x for x (boundary dofs,) or (boundary dofs, k).  Collective."""
