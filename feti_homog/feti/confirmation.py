@@ -84,7 +84,7 @@ class InfluenceSolutions:
         self._granted = min(2 * self._granted + 1, thresholds.MOST_UNCONFIRMED) if confirmed else 0
         self._left, self._residual = self._granted, max((solution.residual for solution in solutions), default=0.0)
         if confirmed:
-            seen = self._jumps.projected(d, self._jumps.norms(d))
+            seen = self._jumps.projected(d)
             self._squares = distributed_arrays.allreduce_sum(self._comm, np.stack([seen.T @ seen, d.T @ d]))
 
     def _check(self, d: Float, solutions: list[DualSolution]) -> None:

@@ -10,7 +10,7 @@ from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.krylov import ActiveRows
 from feti_homog.feti.linalg.sparse_matrices import allreduce_sparse
 from feti_homog.feti.operators.interface_operators import DualOperator
-from feti_homog.feti.thresholds import CANCELLED, ROUNDING_MARGIN, ZERO_JUMP
+from feti_homog.feti.thresholds import ROUNDING_MARGIN, ZERO_JUMP
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float
 
@@ -59,16 +59,12 @@ class ActiveJumps:
         norms: Float = np.sqrt(distributed_arrays.allreduce_sum(self._comm, np.einsum("ik,ik->k", x, x)))
         return norms
 
-    def projected(self, x: Float, size: Float) -> Float:
-        """P x for jumps x (owned rows, k) of the norms `size` (k,).
+    def projected(self, x: Float) -> Float:
+        """P x for jumps x (owned rows, k), projected twice.
 
-        It is projected again where it is far smaller than x. Rounding of the motions that P takes away is out of the
-        range of P, so no multipliers remove it, and a Krylov method that meets it stalls.
+        One projection leaves rounding of rigid-body motions.  No multipliers remove it, so that a Krylov method stalls.
         """
-        projected = self._natural.project(self._active.restrict(x))
-        if (self.norms(projected) < CANCELLED * size).any():
-            projected = self._natural.project(projected)
-        return projected
+        return self._natural.project(self._natural.project(self._active.restrict(x)))
 
     def rounding(self, displacement: Float, loads: Float, seen: Float, torn: Float) -> Float:
         """(k,) up to which jumps of the torn cell under k loads (v, k) are rounding, on the active rows.
@@ -120,7 +116,7 @@ class ActiveJumps:
         """
         torn = (d @ solution.strain)[:, None]
         jump = torn - self._operator.apply(solution.lam[:, None])
-        scale = self.norms(self.projected(torn, self.norms(torn)))
+        scale = self.norms(self.projected(torn))
         parts = solution.iterations, solution.reason, scale
         return self.solutions(solution.strain[None], solution.lam[:, None], jump, *parts)[0]
 

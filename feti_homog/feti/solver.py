@@ -186,7 +186,7 @@ class FetiSolver:
         krylov = self._krylov_for(k)
         torn_jump = self.d @ strains.T
         torn = self._jumps.norms(torn_jump)
-        right = self._jumps.projected(torn_jump, torn)
+        right = self._jumps.projected(torn_jump)
         jump = self._jumps.norms(right)
         # A load that the active rows do not see has no multipliers.
         rounding = self._jumps.rounding(self._torn_displacement, strains.T, jump, torn)
@@ -258,7 +258,7 @@ class FetiSolver:
             applied, residual = np.zeros_like(lam), right
             if self._jumps.norms(lam).any():
                 applied = self.operator.apply(lam)
-                residual = self._jumps.projected(right - applied, self._jumps.norms(right))
+                residual = self._jumps.projected(right - applied)
             is_better = self._jumps.norms(residual) <= self._jumps.norms(right)
             lam, applied = np.where(is_better, lam, 0.0), np.where(is_better, applied, 0.0)
             first = Iterate(lam, applied, np.where(is_better, residual, right))

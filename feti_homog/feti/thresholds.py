@@ -129,9 +129,6 @@ STALL_ITERATIONS = 4
 FORCE_STALL_ITERATIONS = 50
 # Restarts of a stalled iteration, after which it goes on.
 MAX_RESTARTS = 2
-# A projected vector, relative to the one before, below which it is projected again: what rounding leaves of rigid-body
-# motions is then that of a vector of its own size.
-CANCELLED = 1e-2
 # A jump on the active rows is rounding if it is below the first number times the jump of the torn cell.  A larger one
 # is rounding up to this multiple of the estimate by `dual_solution.jump_rounding`: with phases 1000 times apart
 # rounding was up to 20 times the estimate.
