@@ -11,7 +11,6 @@ factored too, and its response is followed from there.
 """
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from feti_homog.errors import CaseError
@@ -63,7 +62,7 @@ class ExactInverse(Preconditioner):
         self.stiffness = np.concatenate(comm.allgather(stiffness_of_rows(operators)))
         # K <= n diag(K) for the n displacements of an element.
         displacements = max((s.mesh.triangles.shape[1] * s.problem.components for s in operators.subdomains), default=0)
-        self.norm = comm.allreduce(displacements, MPI.MAX) * self.stiffness.max(initial=0.0)
+        self.norm = max(comm.allgather(displacements)) * self.stiffness.max(initial=0.0)
         self._one_sided = one_sided_jumps(operators)
         self._ties = BodyTies(comm, jump_operator)
         self.neighbours = InterfaceNeighbours(comm, jump_operator, operators.subdomains)

@@ -20,7 +20,7 @@ class DistributedSolver:
     """
 
     def __init__(self, comm: MPI.Intracomm, total: int, prefix: str, most_whole: int = REPLICATED_UNKNOWNS) -> None:
-        """`total` is n, `most_whole` the largest n that every rank factors whole.  Nothing is factored yet."""
+        """Choose the solver for n = `total`; up to `most_whole` every rank factors the whole matrix."""
         self.comm, self.total, self._prefix = comm, total, prefix
         self._ksp: PETSc.KSP | None = None
         options = PETSc.Options(prefix)
@@ -28,7 +28,7 @@ class DistributedSolver:
         self.is_distributed = comm.size > 1 and together
 
     def factor(self, unknowns: Int, part: csr_matrix, near_kernel: Float | None = None) -> None:
-        """Assemble and factor A, and free the factor before.  Collective.
+        """Assemble and factor A; the last factor is freed.  Collective.
 
         Args:
             unknowns: (u,) numbers of local unknowns, ascending; several ranks may have one.
@@ -66,9 +66,9 @@ class DistributedSolver:
             raise np.linalg.LinAlgError(f"a coarse matrix is singular: {error or 'on another rank'}") from error
 
     def solve(self, B: Float) -> Float:
-        """A^-1 times right-hand sides summed over ranks, on the local unknowns.  Collective.
+        """Compute A^-1 times right-hand sides summed over ranks, on the local unknowns.  Collective.
 
-        Each rank has a part B (u,) or (u, k) of them.
+        Each rank passes its part B (u,) or (u, k).
         """
         assert self._ksp is not None, "nothing is factored"
         right = self._sum(B if B.ndim == 2 else B[:, None])[slice(*self._b.getOwnershipRange())]
@@ -79,7 +79,7 @@ class DistributedSolver:
         return np.asarray(X[self._unknowns]).reshape(B.shape)
 
     def _sum(self, B: Float) -> Float:
-        """(n, k) the sum over ranks of B (u, k)."""
+        """Sum B (u, k) over ranks: (n, k)."""
         part = np.zeros((self.total, B.shape[1]))
         part[self._unknowns] = B
         return distributed_arrays.allreduce_sum(self.comm, part)
