@@ -1,4 +1,4 @@
-"""Measures on one rank where the dense and sparse kernels of the solver change their ways.
+"""Measures on one rank where the dense kernels of the solver change their ways.
 
     .venv/bin/python scripts/measure_kernels.py [--dofs N]
 
@@ -10,16 +10,11 @@ from collections.abc import Callable
 from time import perf_counter
 
 import numpy as np
-from mpi4py import MPI
-from petsc4py import PETSc
 from scipy.linalg.blas import dsymm, dsymv, dtrmm
 from scipy.linalg.lapack import dtrtri
-from scipy.sparse import csr_matrix, diags, kronsum
 
 from feti_homog.feti import thresholds
 from feti_homog.feti.linalg.dense_matrices import full_from_lower
-from feti_homog.feti.linalg.distributed_solver import DistributedSolver
-from feti_homog.feti.linalg.sparse_direct import DirectSolver
 
 COLUMNS = (1, 2, 3, 4, 6, 8, 12)
 
@@ -39,19 +34,6 @@ def compare(title: str, pairs: list[tuple[int, float, float]], small: str, large
     print(f"\n{title}\n{'size':>6}{small:>16}{large:>16}   us")
     for size, first, second in pairs:
         print(f"{size:6}{first:16.1f}{second:16.1f}")
-
-
-def sparse_columns(solver: DirectSolver | DistributedSolver, matrix: csr_matrix) -> list[tuple[int, float, float]]:
-    """Solves for columns one after the other, and all at once."""
-    found = []
-    for k in COLUMNS:
-        B = np.asfortranarray(np.random.default_rng(0).random((matrix.shape[0], k)))
-        times = []
-        for limit in (k, 0):
-            solver.max_columns_one_by_one = limit
-            times.append(best(lambda B=B: solver.solve(B)))
-        found.append((k, times[0], times[1]))
-    return found
 
 
 def dense_columns(n: int) -> list[tuple[int, float, float]]:
@@ -83,24 +65,13 @@ def triangles() -> list[tuple[int, float, float]]:
 def main() -> None:
     """Measure all."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--dofs", type=int, default=3000, help="of the sparse matrix and, a tenth, of the dense one")
+    parser.add_argument("--dofs", type=int, default=3000, help="ten times the rows of the matrix")
     dofs = parser.parse_args().dofs
-    m = round(dofs**0.5)
-    line = diags([-1, 2.1, -1], [-1, 0, 1], (m, m))
-    matrix = kronsum(line, line).tocsr()
-    n = matrix.shape[0]
-    cholmod = DirectSolver(matrix, "measure_")
-    PETSc.Options("measure_")["pc_factor_mat_solver_type"] = "mumps"
-    mumps = DistributedSolver(MPI.COMM_SELF, n, "measure_")
-    mumps.factor(np.arange(n), matrix)
-    for solver, name in ((cholmod, "CHOLMOD"), (mumps, "MUMPS")):
-        title = f"{name}_COLUMNS_ONE_BY_ONE = {getattr(thresholds, f'{name}_COLUMNS_ONE_BY_ONE')}"
-        compare(title, sparse_columns(solver, matrix), "one by one", "at once")
     title = f"DENSE_COLUMNS_ONE_BY_ONE = {thresholds.DENSE_COLUMNS_ONE_BY_ONE}"
     compare(title, dense_columns(max(dofs // 10, 1)), "one by one", "at once")
-    compare(f"TRIANGLE_INVERSE_ROWS = {thresholds.TRIANGLE_INVERSE_ROWS}", triangles(), "dtrtri", "halves")
+    compare(f"BLOCK_ROWS = {thresholds.BLOCK_ROWS}", triangles(), "dtrtri", "halves")
     A = np.asfortranarray(np.random.default_rng(0).random((dofs // 2, dofs // 2)))
-    print(f"\nMIRRORED_BLOCK_ROWS = {thresholds.MIRRORED_BLOCK_ROWS}\n{'size':>6}{'us':>16}")
+    print(f"\nBLOCK_ROWS = {thresholds.BLOCK_ROWS}\n{'size':>6}{'us':>16}")
     for block in (16, 32, 64, 128, 256):
         print(f"{block:6}{best(lambda block=block: full_from_lower(A, block)):16.1f}")
 

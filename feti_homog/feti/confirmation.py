@@ -1,4 +1,4 @@
-"""Solutions by influence columns; as long as F lambda confirms them, it is applied only now and then."""
+"""Solutions by influence columns, which F lambda confirms from time to time."""
 
 import numpy as np
 from mpi4py import MPI
@@ -30,22 +30,23 @@ class InfluenceSolutions:
     ) -> None:
         self._comm, self._inverse, self._operator, self._natural, self._jumps = comm, inverse, operator, natural, jumps
         self._granted = self._left = 0
-        # Multipliers and jumps on inactive rows, (owned rows, k) each, that F lambda comes to confirm, and how large
-        # the multipliers of single strains are that make them up.
+        # Multipliers and jumps on inactive rows, (owned rows, k) each, that F lambda will confirm, and the sums of the
+        # absolute multipliers under single strains.
         self._expected: tuple[Float, Float, Float] | None = None
         self._residual, self._rounding, self._squares = 0.0, 0.0, np.zeros((2, 0, 0))
 
     def solutions(self, strains: Float, d: Float) -> list[DualSolution] | None:
-        """Return the solutions of loads (k, v), with jumps d (owned rows, v) of the torn cell; None if F lambda is due.
+        """Solve by influence columns for loads (k, v), unless F lambda is due.
 
-        It is always due for loads whose jump on the active rows may be rounding, and where the columns find another
-        number of free motions than the coarse space has.  Collective.
+        Return None if it is: always for loads whose jump on the active rows may be rounding, and where the columns find
+        another number of free motions than the coarse space.  d (owned rows, v) are the jumps of the torn cell under
+        the unit loads.  Collective.
         """
         self._expected = None
         if not self._granted:
             return None
         seen, torn = np.einsum("ki,nij,kj->nk", strains, self._squares, strains)
-        if not (seen > thresholds.LEAST_UNCONFIRMED_JUMP**2 * torn).all():
+        if not (seen > thresholds.LEAST_FOLLOWED**2 * torn).all():
             return None
         free = self._natural.unconstrained_modes.shape[1]
         answer = self._inverse.answer(d, strains.T, free)
@@ -63,20 +64,20 @@ class InfluenceSolutions:
         return [DualSolution(E, x, jump, None, 0, reason, self._residual, C) for E, x, jump in rows]
 
     def closing(self, d: Float, E: Float, weights: Float) -> Float:
-        """H d E, but for rounding, for loads E (v, k) in a solve with `weights` (k,), for F lambda to confirm.
+        """Compute the multipliers H d E for loads E (v, k), which F lambda will confirm.
 
-        Multipliers that `solutions` has left to be confirmed are taken: they cost no columns.  Collective.
+        Multipliers that `solutions` left to be confirmed, times `weights` (k,), need no new columns.  Collective.
         """
         return self._inverse.multipliers(d, E) if self._expected is None else self._expected[0] * weights
 
     def record(self, solutions: list[DualSolution], d: Float) -> None:
-        """Record solutions that F lambda confirmed, or that iterations had to improve; none if a load is unseen.
+        """Record solutions by F lambda, and grant more solves without it if no iterations were needed.
 
-        Collective.
+        `solutions` is empty if the active rows do not see a load.  Expected multipliers with more error than rounding
+        are renewed.  Collective.
 
         Raises:
-            ConvergenceError: the multipliers that the columns give, as in the solves before, have a larger error than
-                the checks of a run allow.
+            ConvergenceError: the multipliers by columns have a larger error than the checks of a run allow.
         """
         if solutions and self._expected is not None:
             self._check(d, solutions)
@@ -84,11 +85,11 @@ class InfluenceSolutions:
         self._granted = min(2 * self._granted + 1, thresholds.MOST_UNCONFIRMED) if confirmed else 0
         self._left, self._residual = self._granted, max((solution.residual for solution in solutions), default=0.0)
         if confirmed:
-            seen = self._jumps.projected(d, self._jumps.norms(d))
+            seen = self._jumps.projected(d)
             self._squares = distributed_arrays.allreduce_sum(self._comm, np.stack([seen.T @ seen, d.T @ d]))
 
     def _check(self, d: Float, solutions: list[DualSolution]) -> None:
-        """Compare expected multipliers with solutions that F lambda confirms; renew them if more than rounding differs.
+        """Compare the expected multipliers with solutions by F lambda; renew them if more than rounding differs.
 
         Collective; raises as `record`.
         """
@@ -106,19 +107,19 @@ class InfluenceSolutions:
         strains = np.stack([solution.strain for solution in solutions], axis=1)
         again = self._inverse.answer(d, strains, self._natural.unconstrained_modes.shape[1])
         is_same = again is not None and float(np.max(self._errors(*again))) <= thresholds.MOST_FOLLOWED_ERROR
-        self._rounding = min(error, thresholds.MOST_CONFIRMED_ROUNDING) if is_same else 0.0
+        self._rounding = min(error, thresholds.MOST_ROUNDING) if is_same else 0.0
 
     def _errors(self, lam: Float, opening: Float, residuals: Float | float = 0.0) -> tuple[float, float]:
-        """Return how far the expected multipliers and jumps on inactive rows are off these, (owned rows, k) each.
+        """Compare the expected multipliers and jumps on inactive rows with `lam` and `opening`, (owned rows, k) each.
 
-        They are relative to the largest of each load; jumps count where no body is free, which may be anywhere.
-        Multipliers of a load may cancel, as where bonds come to be pressed: then a share of the multipliers of single
-        strains measures them.  `residuals` (k,) are errors of lam, relative to its own size.  Collective.
+        Both errors are relative to the largest entry of a load.  Jumps count only if no body is free to move.
+        Multipliers of a load may cancel, for example where bonds are pressed: then a fraction of the multipliers under
+        single strains is the scale.  `residuals` (k,) are relative errors of lam.  Collective.
         """
         assert self._expected is not None
         expected, jumps, terms = self._expected
         is_open = (jumps != 0.0) * (self._natural.unconstrained_modes.shape[1] == 0)
-        sizes = np.maximum(np.abs(lam), thresholds.LEAST_UNCONFIRMED_JUMP * terms)
+        sizes = np.maximum(np.abs(lam), thresholds.LEAST_FOLLOWED * terms)
         errors = np.maximum(np.abs(expected - lam), residuals * np.abs(lam))
         parts = np.abs([errors, sizes, is_open * (jumps - opening), opening]).max(axis=1, initial=0.0)
         parts = np.max(self._comm.allgather(parts), axis=0)  # keeps NaN, which MPI.MAX may lose

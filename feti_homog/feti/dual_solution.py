@@ -1,4 +1,4 @@
-"""Solutions of the dual problem, and the jumps that they leave on the active rows, without rigid-body motions."""
+"""Solutions of the dual problem, and the jumps on the active rows that rigid-body motions cannot close."""
 
 from dataclasses import dataclass
 
@@ -10,20 +10,20 @@ from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.krylov import ActiveRows
 from feti_homog.feti.linalg.sparse_matrices import allreduce_sparse
 from feti_homog.feti.operators.interface_operators import DualOperator
-from feti_homog.feti.thresholds import CANCELLED, ROUNDING_MARGIN, SMALL_JUMP, ZERO_JUMP
+from feti_homog.feti.thresholds import ROUNDING_MARGIN, ZERO_JUMP
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float
 
 
 @dataclass(frozen=True)
 class DualSolution:
-    """The multipliers under one macroscopic strain, and the jumps that follow from them.
+    """Multipliers under one load, and the jumps that follow from them.
 
     Attributes:
-        strain: (v,) E, of plane strain (3,); with the other loads of the problem.
+        strain: (v,) E, the macroscopic strain first, then the other loads of the problem.
         lam: (owned rows,) multipliers, nodal forces between the faces; 0 on inactive rows.
         jump: (owned rows,) B u* - C lam, 0 up to tolerance on active rows, gap and slip on the others.
-        alpha: (kernel dimension,) rigid-body amplitudes; None of multipliers that F lambda did not confirm.
+        alpha: (kernel dimension,) rigid-body amplitudes; None if F lambda did not confirm the multipliers.
         iterations, reason: of the Krylov method (PETSc's KSPConvergedReason).
         residual: |B u* - C lam| on the active rows, relative to the jump of the torn cell; of the last solution
             that F lambda confirmed, if not of this one.
@@ -55,25 +55,21 @@ class ActiveJumps:
         self._rounding: Float | None = None
 
     def norms(self, x: Float) -> Float:
-        """(k,) of the columns of x (owned rows, k)."""
+        """Compute the Euclidean norms (k,) of the columns of x (owned rows, k)."""
         norms: Float = np.sqrt(distributed_arrays.allreduce_sum(self._comm, np.einsum("ik,ik->k", x, x)))
         return norms
 
-    def projected(self, x: Float, size: Float) -> Float:
-        """P x for jumps x (owned rows, k) of the norms `size` (k,).
+    def projected(self, x: Float) -> Float:
+        """Project jumps x (owned rows, k) on the active rows, twice.
 
-        It is projected again where it is far smaller than x. Rounding of the motions that P takes away is out of the
-        range of P, so no multipliers remove it, and a Krylov method that meets it stalls.
+        One projection leaves rounding of rigid-body motions.  No multipliers remove it, so that a Krylov method stalls.
         """
-        projected = self._natural.project(self._active.restrict(x))
-        if (self.norms(projected) < CANCELLED * size).any():
-            projected = self._natural.project(projected)
-        return projected
+        return self._natural.project(self._natural.project(self._active.restrict(x)))
 
     def rounding(self, displacement: Float, loads: Float, seen: Float, torn: Float) -> Float:
-        """(k,) up to which jumps of the torn cell under k loads (v, k) are rounding, on the active rows.
+        """Bound the rounding (k,) in jumps of the torn cell under k loads (v, k), on the active rows.
 
-        It is measured only if there are jumps which might be.
+        The bound is estimated only if a jump may be rounding.
 
         Args:
             displacement: (boundary dofs, v) of the torn cell under the unit loads, equal at every call.
@@ -81,7 +77,7 @@ class ActiveJumps:
             torn: (k,) norms of the jumps on all rows.
         """
         rounding = ZERO_JUMP * torn
-        if ((seen > rounding) & (seen < SMALL_JUMP * torn)).any():
+        if ((seen > rounding) & (seen < np.sqrt(np.finfo(float).eps) * torn)).any():
             if self._rounding is None:
                 self._rounding = jump_rounding(self._operator, displacement)
             projected = self._natural.project(self._active.restrict(self._rounding @ loads))
@@ -91,9 +87,9 @@ class ActiveJumps:
     def solutions(
         self, strains: Float, lam: Float, jump: Float, iterations: int, reason: int, scale: Float
     ) -> list[DualSolution]:
-        """Return the solutions that multipliers `lam` (owned rows, k) make, with amplitudes, jumps and residuals.
+        """Make solutions from multipliers `lam` (owned rows, k): amplitudes, jumps and residuals.
 
-        `jump` (owned rows, k) is d E - F lam, to which rigid-body motions are added; `scale` (k,) is the residual unit.
+        `jump` (owned rows, k) is d E - F lam, without rigid-body motions; residuals are relative to `scale` (k,).
         """
         alpha = np.zeros((self._natural.kernel_dimension, len(strains)))
         if self._natural.kernel_dimension:
@@ -114,22 +110,22 @@ class ActiveJumps:
         return [DualSolution(E, x, g, a, iterations, reason, float(size), C) for E, x, g, a, size in rows]
 
     def completed(self, solution: DualSolution, d: Float) -> DualSolution:
-        """Return a solution of the present state with amplitudes, jumps and residual by F lambda.
+        """Complete a solution of the present state: amplitudes, jumps and residual by F lambda.
 
         d (owned rows, v) are the jumps of the torn cell.
         """
         torn = (d @ solution.strain)[:, None]
         jump = torn - self._operator.apply(solution.lam[:, None])
-        scale = self.norms(self.projected(torn, self.norms(torn)))
+        scale = self.norms(self.projected(torn))
         parts = solution.iterations, solution.reason, scale
         return self.solutions(solution.strain[None], solution.lam[:, None], jump, *parts)[0]
 
 
 def jump_rounding(operator: DualOperator, displacement: Float) -> Float:
-    """(owned rows, v) about how far rounding takes jumps B u of displacements u = K+ f (boundary dofs, v).  Collective.
+    """Estimate the rounding (owned rows, v) in jumps B u of displacements u = K+ f (boundary dofs, v).  Collective.
 
-    They are the jumps that forces of random signs as large as the rounding of K u make, B K+ (eps diag(K) |u|): each
-    subdomain has its own scale, and a soft one beside stiff ones moves far.
+    The estimate is B K+ (eps diag(K) |u|) with random signs, the jumps by forces as large as the rounding of K u: each
+    subdomain has its own scale, and a soft subdomain beside stiff ones moves far.
     """
     signs = np.random.default_rng(0).choice([-1.0, 1.0], displacement.shape)
     forces = operator.boundary.body_diagonal[:, None] * np.abs(displacement) * signs

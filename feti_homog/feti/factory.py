@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
 
 def construct(name: str, operators: InterfaceOperators) -> Preconditioner:
-    """Construct a preconditioner that `choose` may choose.  Collective.
+    """Construct a preconditioner by its name.  Collective.
 
-    Modules of exact inverses are loaded where they are needed.
+    Modules of exact inverses are imported only if they are needed.
     """
     if name == "influence":
         from feti_homog.feti.exact.exact_inverse import ExactInverse
@@ -43,7 +43,7 @@ def construct(name: str, operators: InterfaceOperators) -> Preconditioner:
 
 @dataclass(frozen=True)
 class SolverParts:
-    """Parts that the Krylov method works with.
+    """The parts of the solver.
 
     Attributes:
         adaptive: the coarse space of the preconditioner, if it has one.
@@ -62,7 +62,7 @@ class SolverParts:
         return self.natural.kernel_dimension if self.adaptive is None else self.adaptive.coarse_dimension
 
     def describe(self, comm: MPI.Intracomm) -> str:
-        """Subdomains, operators, preconditioner and coarse space, as -feti_view prints them.  Collective."""
+        """Describe subdomains, operators, preconditioner and coarse space for -feti_view.  Collective."""
         operators, adaptive = self.operators, self.adaptive
         sizes = np.array([n for part in comm.allgather([len(d) for d in operators.dofs]) for n in part])
         dense = comm.allreduce(sum(o.is_dense for o in operators.operators))
@@ -110,9 +110,9 @@ def build(
 ) -> SolverParts:
     """Factor the subdomains and set up the parts that options and sizes ask for.  Collective.
 
-    `compliance` (owned rows,) is C, which may grow if the springs `soften`. Where the run `recovers`
-    displacements inside, a rank with one subdomain keeps its factor, which takes about the memory that a factor of the
-    interior would take later.
+    `compliance` (owned rows,) is C, which may grow if the springs `soften`.  If the run `recovers`
+    displacements inside, a rank with one subdomain keeps its factor: a later factor of the interior would take as much
+    memory.
 
     Options: `feti_dual_operator`, `feti_pc_type`, `feti_coarse_space`, `feti_coarse_threshold`.
 
@@ -149,7 +149,7 @@ def build(
 
 
 def _sizes(operators: InterfaceOperators, applications: int, one_each: bool) -> ProblemSizes:
-    """Return the sizes of a torn cell.  Collective."""
+    """Collect the sizes that the choice depends on.  Collective."""
     comm, dense = operators.comm, [o.is_dense for o in operators.operators]
     return ProblemSizes(
         applications=applications,
@@ -163,13 +163,12 @@ def _sizes(operators: InterfaceOperators, applications: int, one_each: bool) -> 
 
 
 def _has_one_each(comm: MPI.Intracomm, subdomains: Sequence[Subdomain]) -> bool:
-    """Return whether each of several ranks has one subdomain, and these reach across materials.  Collective."""
-    flags = len(subdomains) == 1, any(s.material is not None for s in subdomains)
-    has_one, across = (comm.allreduce(*pair) for pair in zip(flags, (MPI.LAND, MPI.LOR), strict=True))
-    return comm.size > 1 and has_one and across
+    """Return whether each of several ranks has one subdomain, and some have several materials.  Collective."""
+    across = comm.allreduce(any(s.material is not None for s in subdomains), MPI.LOR)
+    return comm.size > 1 and comm.allreduce(len(subdomains) == 1, MPI.LAND) and across
 
 
 def _are_cut(comm: MPI.Intracomm, subdomains: Sequence[Subdomain]) -> bool:
-    """Return whether there are more subdomains than bodies; collective."""
+    """Return whether there are more subdomains than bodies.  Collective."""
     bodies = comm.allreduce(max((s.submesh.body for s in subdomains), default=-1), MPI.MAX) + 1
     return bool(comm.allreduce(len(subdomains)) > bodies)

@@ -28,18 +28,18 @@ ESTIMATES_SINGULAR_VALUES = (PETSc.KSP.Type.CG, PETSc.KSP.Type.GMRES, PETSc.KSP.
 
 
 class ActiveRows:
-    """Owned rows that carry multipliers: `mask` (owned rows,) is 1 where they do, else 0."""
+    """The owned rows that carry multipliers: `mask` (owned rows,) is 1 there, else 0."""
 
     def __init__(self, rows: int) -> None:
         self.mask = np.ones(rows)
 
     def restrict(self, x: Float) -> Float:
-        """x (rows,) or (rows, k) with 0 on the inactive rows."""
+        """Set x (rows,) or (rows, k) to 0 on the inactive rows."""
         return distributed_arrays.scale_rows(self.mask, x)
 
 
 class ProjectedProblem:
-    """y = P F x and z = P H r on the active rows; keeps r, the interface jump B u of the iterate."""
+    """The products y = P F x and z = P H r on the active rows; r, the jump of the iterate, is kept."""
 
     def __init__(
         self,
@@ -50,30 +50,30 @@ class ProjectedProblem:
         active: ActiveRows,
         columns: int,
     ) -> None:
-        """For vectors of so many columns."""
+        """Set up for vectors with this number of `columns`."""
         self._errors, self._operator, self._preconditioner = errors, operator, preconditioner
         self._natural, self._active, self._residual = natural, active, np.zeros((0, columns))
         self._events = PETSc.Log.Event("FETIDual"), PETSc.Log.Event("FETIPrecond")
 
     def mult(self, mat: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """y = P F x.  Collective."""
+        """Set y = P F x.  Collective."""
         with self._events[0]:
             values = x.getArray(readonly=True).reshape(-1, self._residual.shape[1])
             y.setArray(self._projected(lambda: self._active.restrict(self._operator.apply(values))))
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, z: PETSc.Vec) -> None:
-        """z = P H r.  Collective."""
+        """Set z = P H r.  Collective."""
         with self._events[1]:
             self._residual = r.getArray(readonly=True).reshape(-1, self._residual.shape[1])
             z.setArray(self._projected(lambda: self._preconditioner.apply(self._residual)))
 
     def _projected(self, vectors: Callable[[], Float]) -> Float:
-        """P of `vectors`, flat; NaN where they raise."""
+        """Project `vectors()` and flatten the result; NaN if `vectors` raises."""
         nothing = np.full((len(self._active.mask), self._residual.shape[1]), np.nan)
         return self._errors.call(lambda: self._natural.project(vectors()), nothing).ravel()
 
     def jump_norm(self) -> float:
-        """|P r| of the last r: the jump that the best rigid-body motions leave.  Collective."""
+        """Compute |P r| of the last r, the jump that no rigid-body motion closes.  Collective."""
         r = self._natural.project(self._residual)
         return float(
             np.sqrt(distributed_arrays.allreduce_sum(self._operator.boundary.comm, np.array([(r * r).sum()]))[0])
@@ -81,7 +81,7 @@ class ProjectedProblem:
 
 
 class Stall:
-    """Watches a norm: it stalls if it has not halved for `patience` iterations."""
+    """Test for a norm that has not halved for `patience` iterations."""
 
     def __init__(self, patience: int) -> None:
         self._patience = patience
@@ -91,7 +91,7 @@ class Stall:
         self._smallest, self._found_at = np.inf, 0
 
     def is_reached(self, iteration: int, norm: float) -> bool:
-        """Return whether the norm stalls, with its value at this iteration."""
+        """Record the norm at this iteration, and return whether it stalls."""
         if norm < self._smallest / 2:
             self._smallest, self._found_at = norm, iteration
         return iteration - self._found_at >= self._patience
@@ -104,7 +104,7 @@ class PrimalTest:
     the forces of the torn cell, |P M^-1 P d|.  A small dual residual alone can hide a large one of these.
 
     Attributes:
-        ends_on_stall: whether norms that do not fall any more are a breakdown.
+        ends_on_stall: whether a stall is a breakdown.
         jump_scale, force_scale: norms of the torn cell's jump and of the forces that close it, for the next solve.
     """
 
@@ -114,11 +114,11 @@ class PrimalTest:
         self._jump_stall, self._force_stall = Stall(STALL_ITERATIONS), Stall(FORCE_STALL_ITERATIONS)
 
     def is_met(self, rtol: float, jump: float, forces: float) -> bool:
-        """Return whether norms of the jump and of the forces are both below rtol, or there is no jump."""
-        return jump <= rtol * self.jump_scale and (forces <= rtol * self.force_scale or jump == 0.0)
+        """Return whether norms of the jump and of the forces are both below rtol."""
+        return jump <= rtol * self.jump_scale and forces <= rtol * self.force_scale
 
     def __call__(self, ksp: PETSc.KSP, iteration: int, residual: float) -> PETSc.KSP.ConvergedReason:
-        """Return whether to go on; `residual` is the norm of the preconditioned one, |P H r|.  Collective."""
+        """Test for convergence; `residual` is the norm |P H r|.  Collective."""
         failed = PETSc.KSP.ConvergedReason.DIVERGED_NANORINF
         return self._errors.call(lambda: self._judge(ksp, iteration, residual), failed)
 
@@ -143,7 +143,7 @@ class PrimalTest:
         return self._go_on(self._jump_stall.is_reached(iteration, jump))
 
     def _go_on(self, stalled: bool) -> PETSc.KSP.ConvergedReason:
-        """Return iterating, or a breakdown."""
+        """Return DIVERGED_BREAKDOWN for a stall that ends the solve, else ITERATING."""
         if stalled and self.ends_on_stall:
             return PETSc.KSP.ConvergedReason.DIVERGED_BREAKDOWN
         return PETSc.KSP.ConvergedReason.ITERATING
@@ -153,7 +153,7 @@ class Krylov:
     """PETSc's Krylov method for k load cases at once.
 
     Options have the prefix `feti_`.  The preconditioner's own prefix is `feti_projected_`, because `feti_pc_type` names
-    one of ours, not one of PETSc's; options under it are refused.
+    a preconditioner of this program, not of PETSc; options under that prefix are refused.
     """
 
     def __init__(
@@ -166,7 +166,7 @@ class Krylov:
         active: ActiveRows,
         columns: int,
     ) -> None:
-        """Set up; `vector` is one of the multiplier vectors.  Collective."""
+        """Set up; `vector` is a multiplier vector with the layout of one load case.  Collective."""
         self._columns = columns
         owned_rows, all_rows = vector.getSizes()
         sizes = (owned_rows * columns, all_rows * columns)
@@ -191,9 +191,10 @@ class Krylov:
         self.ksp.setFromOptions()
 
     def solve(self, residual: Float) -> Float:
-        """Return the multipliers (rows, k) that remove the residual (rows, k), as far as `ksp` converged.  Collective.
+        """Solve for the multipliers (rows, k) that remove the residual (rows, k).  Collective.
 
-        Errors of operator, preconditioner or test pass if all ranks raise them; a rank that raises alone ends the job.
+        Errors in the operator, the preconditioner or the test are raised again if all ranks raise them; otherwise the
+        job ends.
         """
         self._right.setArray(residual.ravel())
         self._solution.zeroEntries()
@@ -203,7 +204,7 @@ class Krylov:
         return multipliers
 
     def describe(self, iterations: int) -> str:
-        """Return iterations and estimated condition number of the last solve, as -feti_view prints them."""
+        """Describe the last solve for -feti_view: iterations and estimated condition number."""
         ksp, load_cases = self.ksp, self._columns
         line = f"FETI: {load_cases} load case{'s' * (load_cases > 1)}, {iterations} iterations"
         if not iterations or ksp.getType() not in ESTIMATES_SINGULAR_VALUES:

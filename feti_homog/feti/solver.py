@@ -44,9 +44,9 @@ class Iterate(NamedTuple):
 
 
 class FetiSolver:
-    """Set-up of the dual problem: it factors every subdomain, once; `displacement` may factor interiors.
+    """The dual problem of a torn cell: set up once, solved for many loads and states.
 
-    Options have the prefix `feti_`.
+    The set-up factors every subdomain; `displacement` may factor interiors.  Options have the prefix `feti_`.
 
     Attributes:
         problem: the displacements and the unit loads.
@@ -59,8 +59,8 @@ class FetiSolver:
         natural: the rigid-body motions, G and P.
         adaptive: the coarse space of the preconditioner, if it has one.
         coarse_dimension: number of coarse displacements, or of rigid-body motions without `adaptive`.
-        active: which rows carry multipliers.
-        solves: dual problems so far, one for each load.
+        active: the rows that carry multipliers.
+        solves: number of dual problems so far, one for each load.
     """
 
     def __init__(
@@ -75,9 +75,11 @@ class FetiSolver:
         problem: Problem = PLANE,
         recovers: bool = False,
     ) -> None:
-        """Set up; `applications` is how often the dual operator is expected to be applied, `recovers` as of `build`.
+        """Set up; `applications` is the expected number of applications of F, `recovers` as in `factory.build`.
 
-        Collective. Raises:
+        Collective.
+
+        Raises:
             CaseError: an option has no such value, or two exclude each other.
         """
         self.comm, self.subdomains, self.problem = comm, subdomains, problem
@@ -125,36 +127,37 @@ class FetiSolver:
 
     @property
     def condensed(self) -> CondensedLoads:
-        """The unit loads on the boundaries, with the answer of the interiors to loads inside."""
+        """The unit loads condensed to the boundaries."""
         return self.interface_operators.condensed
 
     @cached_property
     def _torn_displacement(self) -> Float:
-        """(boundary dofs, v) K+ (-Q), of the torn cell under the unit loads."""
+        """Displacements -K+ Q (boundary dofs, v) of the torn cell under the unit loads."""
         operators, u = self.interface_operators, self.interface_operators.apply_flexibility(-self.condensed.boundary)
         parts = zip(self.subdomains, operators.dofs, operators.slices, strict=True)
         return np.concatenate([u[:0], *(s.without_rounding(u[span], dofs) for s, dofs, span in parts)])
 
     @cached_property
     def d(self) -> Float:
-        """(owned rows, v) jumps -B K+ Q of the torn cell under the unit loads."""
+        """Jumps d = -B K+ Q (owned rows, v) of the torn cell under the unit loads."""
         return self.operator.jump(self._torn_displacement)
 
     @cached_property
     def torn_stiffness(self) -> Float:
-        """(v, v) sum |Omega_s| L_s - Q^T K+ Q: the stress integral of the torn cell under the unit loads."""
+        """Stress integral (v, v) of the torn cell under the unit loads: sum |Omega_s| L_s - Q^T K+ Q."""
         local = self.condensed.stiffness + self.condensed.boundary.T @ self._torn_displacement
         return np.asarray(self.comm.allreduce(local))
 
     def stress_integral(self, solution: DualSolution) -> Float:
-        """(v,) |UC| Sigma = int sigma, from the multipliers alone: the torn cell's plus d^T lam.  Collective."""
+        """Compute |UC| Sigma = int sigma (v,): the stress integral of the torn cell plus d^T lam.  Collective."""
         forces = self.comm.allreduce(self.d.T @ solution.lam)
         return np.asarray(self.torn_stiffness @ solution.strain + forces)
 
     def set_state(self, active: Float, compliance: Float) -> None:
-        """Let only rows where `active` is 1 carry multipliers, and springs have this C (owned rows,).  Collective.
+        """Set the rows that carry multipliers, where `active` is 1, and the compliance C (owned rows,).  Collective.
 
-        C is no less than at first. Only the coarse problem is refactored. Raises as `Preconditioner.soften`.
+        C must not fall below its first value.  Only the coarse problem is factored anew.  Raises as
+        `Preconditioner.soften`.
         """
         changed = bool((active != self.active.mask).any()) + 2 * bool((compliance != self.operator.compliance).any())
         change = self.comm.allreduce(changed, MPI.BOR)
@@ -168,13 +171,13 @@ class FetiSolver:
             self.preconditioner.activate(active)
 
     def solve(self, strain: Float, start: Float) -> DualSolution:
-        """Solve for the loads (v,) from the multipliers `start` (owned rows,); see its `reason`.  Collective."""
+        """Solve for one load (v,), beginning with the multipliers `start` (owned rows,).  Collective."""
         return self.solve_many(strain[None], start[:, None])[0]
 
     def solve_many(self, strains: Float, starts: Float) -> list[DualSolution]:
-        """Solve for k loads (k, v) at once, beginning with the multipliers `starts` (owned rows, k).  Collective.
+        """Solve for k loads (k, v) together, beginning with the multipliers `starts` (owned rows, k).  Collective.
 
-        One Krylov method works on all of them side by side, each scaled by the jump of its torn cell.
+        One Krylov method solves for all loads, each scaled by the jump that it makes in the torn cell.
         """
         k = len(strains)
         self.solves += k
@@ -186,7 +189,7 @@ class FetiSolver:
         krylov = self._krylov_for(k)
         torn_jump = self.d @ strains.T
         torn = self._jumps.norms(torn_jump)
-        right = self._jumps.projected(torn_jump, torn)
+        right = self._jumps.projected(torn_jump)
         jump = self._jumps.norms(right)
         # A load that the active rows do not see has no multipliers.
         rounding = self._jumps.rounding(self._torn_displacement, strains.T, jump, torn)
@@ -214,23 +217,23 @@ class FetiSolver:
         return solutions
 
     def completed(self, solution: DualSolution) -> DualSolution:
-        """Return a solution of the present state, completed by F lambda unless that confirmed it.  Collective."""
+        """Complete a solution of the present state by F lambda, if F lambda did not confirm it.  Collective."""
         return solution if solution.alpha is not None else self._jumps.completed(solution, self.d)
 
     def boundary_displacement(self, solution: DualSolution) -> Float:
-        """Return u* (boundary dofs,), Eq. (34), of a complete solution or one in the present state.  Collective."""
+        """Compute u* (boundary dofs,), Eq. (34), of a complete or a present solution.  Collective."""
         solution = self.completed(solution)
         assert solution.alpha is not None
         u = self._torn_displacement @ solution.strain - self.operator.displacement(solution.lam)
         return np.asarray(u + self.natural.rigid_body_motion(solution.alpha))
 
     def displacement(self, solution: DualSolution) -> Float:
-        """(local dofs,) u* of a solution; the first call factors interiors without a kept factor.  Collective."""
+        """Compute u* (local dofs,) of a solution; the first call may factor interiors.  Collective."""
         u, places = self.boundary_displacement(solution), range(len(self.subdomains))
         return np.concatenate([np.zeros(0), *(self.extended(place, u, solution.strain) for place in places)])
 
     def extended(self, place: int, u: Float, loads: Float, keep: bool = True) -> Float:
-        """(dofs, k) u* of one subdomain, of u (boundary dofs, k) on all boundaries; see `InterfaceOperators.extend`."""
+        """Extend u (boundary dofs, k) to one subdomain: (dofs, k); see `InterfaceOperators.extend`."""
         operators = self.interface_operators
         return operators.extend(place, u[operators.slices[place]], loads, keep)
 
@@ -245,7 +248,7 @@ class FetiSolver:
             self.adaptive.destroy()
 
     def _solve_with_restarts(self, krylov: Krylov, lam: Float, right: Float) -> tuple[Iterate, int, int]:
-        """Return multipliers, iterations, and why these ended.
+        """Solve with restarts; return the last iterate, the number of iterations and the reason for their end.
 
         With an adaptive coarse space the condition number is small: proven with all rows active, measured with others.
         So only rounding stalls the iteration. Then it restarts from its last multipliers, with their residual computed
@@ -258,7 +261,7 @@ class FetiSolver:
             applied, residual = np.zeros_like(lam), right
             if self._jumps.norms(lam).any():
                 applied = self.operator.apply(lam)
-                residual = self._jumps.projected(right - applied, self._jumps.norms(right))
+                residual = self._jumps.projected(right - applied)
             is_better = self._jumps.norms(residual) <= self._jumps.norms(right)
             lam, applied = np.where(is_better, lam, 0.0), np.where(is_better, applied, 0.0)
             first = Iterate(lam, applied, np.where(is_better, residual, right))
@@ -273,7 +276,7 @@ class FetiSolver:
         return Iterate(lam, self.operator.apply(lam), first.residual), iterations, reason
 
     def _krylov_for(self, columns: int) -> Krylov:
-        """Return the Krylov method for so many load cases, set up when first asked for."""
+        """Return the Krylov method for this number of load cases, set up at the first call."""
         if columns not in self._krylov:
             vector, parts = self.jump_operator.vector, (self.operator, self.preconditioner, self.natural, self.active)
             self._krylov[columns] = Krylov(self.comm, vector, *parts, columns)

@@ -1,4 +1,4 @@
-"""Preconditioner and coarse space of a problem, chosen from its sizes and the options before any is made."""
+"""Choice of the preconditioner and the coarse space, from the options and the sizes of the problem."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 
 PRECONDITIONERS = ("auto", "none", "lumped", "dirichlet", "influence")
 BONDED = "bonded"
-"""The preconditioner of cells of few large subdomains in which nothing parts: no option asks for it."""
+"""The preconditioner of bonded cells with few large subdomains; no option names it."""
 COARSE_SPACES = ("auto", "natural", "adaptive")
 WITHOUT_INVERSE = (
     f"[interface] friction: needs influence columns, which are taken up to {DEFAULTS.assembled_schur_dofs} degrees of "
     "freedom on shared nodes unless -feti_pc_type asks for others; -feti_pc_type influence has them in any cell"
 )
-"""The message to a cell with friction whose preconditioner is not made of influence columns."""
+"""The message for friction without influence columns."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class SolverOptions:
     def read(
         cls, text: Callable[[str, str], str], number: Callable[[str, float], float], thresholds: Thresholds = DEFAULTS
     ) -> SolverOptions:
-        """Return the options that text(name, default) and number(name, default) find, names without `feti_`.
+        """Read the options by text(name, default) and number(name, default), names without `feti_`.
 
         Raises:
             CaseError: an option has no such value.
@@ -61,23 +61,23 @@ class SolverOptions:
         )
 
     def want_soft_modes(self, bodies_are_cut: bool) -> bool:
-        """Return whether soft modes are looked for: if asked for, or if bodies are cut, as webs by METIS have some."""
+        """Return whether to search for soft modes: by option, or where bodies are cut (webs by METIS have some)."""
         return self.coarse_space == "adaptive" or (self.coarse_space == "auto" and bodies_are_cut)
 
 
 @dataclass(frozen=True)
 class ProblemSizes:
-    """Quantities that the choice depends on, summed up over all ranks.
+    """Sizes that the choice depends on, over all ranks.
 
     Attributes:
         applications: how many times the dual operator is expected to be applied.
         bodies_are_cut: whether there are more subdomains than bodies.
         all_dense: whether all boundary operators are dense.
-        all_searchable: whether all can be searched for soft modes: they are dense, or are searched face by face.
-        shared_dofs: dofs on the shared nodes, of the cell with all bonds intact.
+        all_searchable: whether all subdomains can be searched for soft modes, as a whole or face by face.
+        shared_dofs: dofs on the shared nodes of the cell with all bonds intact.
         has_thin: whether some bodies are thin.  A thin ring bends easily but resists a change of its thickness, which
             no scaling reflects: the Dirichlet preconditioner takes hundreds of iterations then, or does not converge.
-        one_each: whether each of several ranks has a single subdomain, and these reach across materials.
+        one_each: whether each of several ranks has one subdomain, and some subdomain has several materials.
     """
 
     applications: int
@@ -103,7 +103,7 @@ class SolverPlan:
 
     @property
     def in_words(self) -> str:
-        """For the lines of `check`."""
+        """The text that `check` prints."""
         if self.preconditioner == "influence":
             return "influence columns, an inverse of the bonded cell"
         if self.preconditioner == BONDED:
@@ -112,7 +112,7 @@ class SolverPlan:
 
 
 def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds = DEFAULTS) -> SolverPlan:
-    """Return the parts for a problem of these sizes.
+    """Choose the preconditioner and the coarse space for a problem of these sizes.
 
     Raises:
         CaseError: two options exclude each other.
@@ -131,7 +131,7 @@ def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds =
 
 
 def _fastest(sizes: ProblemSizes, coarse_space: str, thresholds: Thresholds) -> str:
-    """Return the preconditioner where no option names one."""
+    """Choose the preconditioner where no option names one."""
     pays = sizes.applications >= thresholds.influence_applications
     is_wanted = sizes.has_thin or (pays and sizes.shared_dofs <= thresholds.assembled_schur_dofs)
     if coarse_space != "adaptive" and sizes.all_dense and is_wanted:

@@ -22,7 +22,7 @@ from feti_homog.fem import Problem
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.linalg.dense_matrices import schur_complement
 from feti_homog.feti.operators.one_subdomain import ExplicitInterfaceOperator
-from feti_homog.feti.thresholds import DEFAULTS, MIN_FACE_NODES, Thresholds
+from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.mesh import ReferenceLattice, Submesh, periodic_topology, submeshes
 from feti_homog.typing import Bool, Float, Int
 
@@ -126,7 +126,7 @@ def _neighbourhood(
     of_body = np.empty(subdomain.mesh.n_classes, np.int64)
     of_body[subdomain.mesh.node_class[subdomain.mesh.nodes]] = body.mesh.node_class[body.mesh.nodes[triangles]]
     nodes = np.flatnonzero(on_face[of_body])
-    if len(nodes) < MIN_FACE_NODES:
+    if len(nodes) < 2:  # a single node has no soft mode: it can only translate
         return None
     all_of = body.problem.dofs
     face, at = all_of(nodes), np.searchsorted(dofs, all_of(of_body[nodes]))

@@ -22,8 +22,11 @@ from feti_homog.feti.coarse.face_neighbourhoods import face_neighbourhoods, trac
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.linalg.dense_matrices import cholesky
 from feti_homog.feti.operators.with_springs import BoundaryOperator, DenseOperator, is_dense
-from feti_homog.feti.thresholds import DEFAULTS, SINGLE_PRECISION_NULL, Thresholds
+from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.typing import Float, Float32, Int
+
+# Eigenvalues of a matrix in single precision, relative to its largest, that are rounding.
+SINGLE_PRECISION_NULL = 10 * np.finfo(np.float32).eps
 
 
 @dataclass(frozen=True)

@@ -11,14 +11,14 @@ from scipy.sparse import block_diag, csc_matrix, csr_matrix, diags
 from feti_homog.feti.linalg.distributed_solver import DistributedSolver
 from feti_homog.feti.linalg.sparse_matrices import assemble_owned_rows
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.thresholds import UNCONSTRAINED
+from feti_homog.feti.thresholds import ZERO_TOLERANCE
 from feti_homog.mesh import periodic_topology
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int
 
 
 class NaturalCoarseSpace:
-    """Solvability of all subdomains on the active multipliers: G^T lam = 0.
+    """The condition G^T lam = 0 on the active multipliers, for which all subdomains are in equilibrium.
 
     The load of a macroscopic strain does no work on rigid-body motions, so e = R^T f vanishes.  G has a row for each
     multiplier and a column for each kernel mode; every rank holds its own rows, and its share in a factor of G^T G.
@@ -28,10 +28,10 @@ class NaturalCoarseSpace:
         owned_modes: the modes of this rank's subdomains among the m.
         R: (boundary dofs, own modes) kernels on the boundaries.
         G: (owned rows, m).
-        body: (m,) body that each mode moves.
+        body: (m,) the body of each mode.
         pinned_body: the body with the pinned class, -1 if there is none.
         unconstrained_modes: (m, z) orthonormal amplitudes of the motions that no active row resists, sparse.
-        unknowns: (u,) the modes that this rank's rows, or motions that nothing resists, concern, and its own.
+        unknowns: (u,) modes in this rank's rows of G or in its unconstrained modes, and this rank's own modes.
         factorizations: of G^T G so far.
         solver: of G^T G.
     """
@@ -64,17 +64,17 @@ class NaturalCoarseSpace:
         self.factor()
 
     def activate(self, active: Float) -> None:
-        """Let the owned rows be active of which `active` is 1; the others, 0, carry no multiplier.  Collective.
+        """Set the active rows, where `active` (owned rows,) is 1; the other rows carry no multiplier.  Collective.
 
-        G^T G is factored when next wanted.  Motions that no active row resists, of a fibre that nothing holds, get a
-        stiffness: G^T G + s Z Z^T.
+        The next projection factors G^T G.  Motions Z that no active row resists, as of a free fibre, get a stiffness s:
+        G^T G + s Z Z^T.
         """
         self._active, self._is_factored = active, False
         self.unconstrained_modes = self._null_space(self._gram.entries(active))
 
     @property
     def G_active(self) -> csr_matrix:
-        """G, 0 in inactive rows."""
+        """G with 0 in inactive rows."""
         return (diags(self._active) @ self.G).tocsr()
 
     def factor(self) -> None:
@@ -95,27 +95,27 @@ class NaturalCoarseSpace:
 
     @cached_property
     def _gram(self) -> GramMatrix:
-        """Made when rows first leave: it takes 36 numbers a row.  Collective."""
+        """Products of G, set up when rows first leave: 36 numbers a row.  Collective."""
         return GramMatrix(self.comm, self.G)
 
     @cached_property
     def _groups(self) -> list[tuple[Int, Int]]:
-        """Modes that may be coupled, (groups, size), and where their blocks are in the entries of G^T G.
+        """Groups of coupled modes (groups, size), and the positions of their blocks in the entries of G^T G.
 
-        The pieces of the pinned body are glued to the pinned class and cannot move.  Other modes that are
-        coupled have an eigenproblem together, so each is about as large as a fibre's kernel.
+        The pieces of the pinned body are glued to the pinned class and cannot move.  The other modes that are coupled
+        share an eigenproblem, which is about as large as the kernel of a fibre.
         """
         movable = np.flatnonzero(self.body != self.pinned_body)
         return [(members, self._gram.places(members)) for members in self._gram.groups(movable)]
 
     @cached_property
     def _eigenpairs(self) -> list[tuple[Float, Float, Float]]:
-        """Blocks of the groups, their eigenvalues and eigenvectors, as they were last."""
+        """Blocks of the groups at the last call, their eigenvalues and their eigenvectors."""
         shapes = [places.shape for _, places in self._groups]
         return [(np.full(shape, np.nan), np.empty(shape[:2]), np.empty(shape)) for shape in shapes]
 
     def _null_space(self, entries: Float) -> csc_matrix:
-        """(m, z) orthonormal null space of G^T G with these entries: eigenvectors whose eigenvalues are rounding."""
+        """Compute the orthonormal null space (m, z) of G^T G with these entries."""
         padded, columns, none = np.append(entries, 0.0), 0, np.zeros(0, np.int64)
         rows, numbers, values = [none], [none], [np.zeros(0)]
         for (members, places), (blocks, eigenvalues, vectors) in zip(self._groups, self._eigenpairs, strict=True):
@@ -124,7 +124,7 @@ class NaturalCoarseSpace:
             if len(other := np.flatnonzero((now != blocks).any(axis=(1, 2)))):
                 eigenvalues[other], vectors[other] = np.linalg.eigh(now[other])
                 blocks[other] = now[other]
-            tolerance = UNCONSTRAINED * self._diagonal[members].max(axis=1, keepdims=True)
+            tolerance = ZERO_TOLERANCE * self._diagonal[members].max(axis=1, keepdims=True)
             which, mode = np.nonzero(eigenvalues <= tolerance)
             if not len(which):
                 continue
@@ -141,33 +141,29 @@ class NaturalCoarseSpace:
         return Z
 
     def amplitudes(self, x: Float) -> Float:
-        """(G^T G)^-1 G^T x on every rank, for the owned rows x (rows,) or (rows, k).  Collective."""
+        """Compute (G^T G)^-1 G^T x on every rank, for the owned rows x (rows,) or (rows, k).  Collective."""
         if not self._is_factored:
             self.factor()
         place = np.searchsorted(self.unknowns, np.arange(self.kernel_dimension)[self.owned_modes])
         amplitudes = np.zeros((self.kernel_dimension, *x.shape[1:]))
-        amplitudes[self.owned_modes] = self.solve(self._GT @ x)[place]
+        amplitudes[self.owned_modes] = self.solver.solve(self._GT @ x)[place]
         return distributed_arrays.allreduce_sum(self.comm, amplitudes)
 
-    def solve(self, work: Float) -> Float:
-        """(G^T G)^-1 times the sum over ranks of work, for the `unknowns`: (u,) or (u, k) both.  Collective."""
-        return self.solver.solve(work)
-
     def project(self, x: Float) -> Float:
-        """P x for the owned rows x, whose inactive ones are 0: no rigid-body motion works on it.  Collective."""
+        """Project the owned rows x, which are 0 on inactive rows: P x works on no rigid-body motion.  Collective."""
         if not self.kernel_dimension:
             return x.copy()
         if not self._is_factored:
             self.factor()
-        projected: Float = x - self._G @ self.solve(self._GT @ x)
+        projected: Float = x - self._G @ self.solver.solve(self._GT @ x)
         return projected
 
     def free_motions(self, active: Float) -> csc_matrix:
-        """(m, z) as `unconstrained_modes`, if the owned rows with `active` = 1 were active.  Collective."""
+        """Compute the `unconstrained_modes` (m, z) for other active rows.  Collective."""
         return self._null_space(self._gram.entries(active))
 
     def rigid_body_motion(self, amplitudes: Float) -> Float:
-        """R alpha on the boundary dofs, for alpha (m,) or (m, k)."""
+        """Compute the motion R alpha of the boundary dofs for alpha (m,) or (m, k)."""
         motion: Float = self.R @ amplitudes[self.owned_modes]
         return motion
 
@@ -177,10 +173,7 @@ class NaturalCoarseSpace:
 
 
 class GramMatrix:
-    """Entries of G^T A G in the pattern of G^T G, for active rows A = diag(a): sums of stored products.
-
-    And which of its diagonal blocks are not coupled with each other.
-    """
+    """Entries of G^T A G in the pattern of G^T G, for active rows A = diag(a), as sums of stored products."""
 
     def __init__(self, comm: MPI.Intracomm, G: csr_matrix) -> None:
         """`G` (owned rows, m).  Collective."""
@@ -201,9 +194,9 @@ class GramMatrix:
         self._rows, self._columns = np.divmod(self._keys, self._m)
 
     def entries(self, active: Float) -> Float:
-        """(entries,) of G^T A G, row by row, for owned rows where `active` is 1.  Collective.
+        """Compute the entries of G^T A G, row by row, for owned rows where `active` is 1.  Collective.
 
-        Products of rows that changed since the call before are added or taken off.
+        Products of rows that changed since the last call are added or subtracted.
         """
         changed = np.flatnonzero(active != self._active)
         count = self._count[changed]
@@ -214,7 +207,7 @@ class GramMatrix:
         return distributed_arrays.allreduce_sum(self._comm, self._own)
 
     def groups(self, some: Int) -> list[Int]:
-        """Return the numbers `some` in groups that G^T G couples: of each size, (groups, size)."""
+        """Group the mode numbers `some` that G^T G couples: an array (groups, size) for each group size."""
         place = np.full(self._m, -1)
         place[some] = np.arange(len(some))
         i, j = place[self._rows], place[self._columns]
@@ -225,7 +218,10 @@ class GramMatrix:
         return [some[order[starts[sizes == size][:, None] + np.arange(size)]] for size in np.unique(sizes)]
 
     def places(self, members: Int) -> Int:
-        """(g, s, s) entry numbers that couple the members (g, s) in each group; one too many for none."""
+        """Return the entry numbers (g, s, s) that couple the members (g, s) of each group.
+
+        A pair without an entry gets the number of entries.
+        """
         key = members[:, :, None] * self._m + members[:, None, :]
         at = np.minimum(np.searchsorted(self._keys, key), len(self._keys) - 1)
         return np.asarray(np.where(self._keys[at] == key, at, len(self._keys)))

@@ -1,4 +1,4 @@
-"""Gluing constraints B on one rank, their place among the multipliers, springs in place of glue, and node blocks.
+"""The jump operator B on one rank, the layout of the multipliers, interface springs, and node blocks.
 
 Of the k copies of a fine node, copies within one body are glued in x and y by orthonormal contrasts and can never
 part.  A body, such as a fibre, and the one around it are glued by one pair of rows (n, t) between the means of their
@@ -27,7 +27,7 @@ from feti_homog.typing import Float, Int
 
 @dataclass(frozen=True)
 class InterfaceSprings:
-    """Traction = stiffness x jump at every node that holds, in tension and compression.
+    """Springs at all bonded nodes: traction = stiffness x jump, in tension and compression.
 
     Attributes:
         stiffness: for each interface of the case stress per opening and per slip, or per slip along the fibre;
@@ -39,7 +39,7 @@ class InterfaceSprings:
     soften: bool = False
 
     def compliance(self, jump_operator: JumpOperator) -> Float:
-        """(owned rows,) C = 1 / (k l) on interface rows with tributary lengths l, else 0."""
+        """Compute C = 1 / (k l) (owned rows,) on interface rows with tributary lengths l, else 0."""
         nodes, C = jump_operator.nodes, np.zeros(jump_operator.owned[1] - jump_operator.owned[0])
         for component, stiffness in enumerate(zip(*self.stiffness, strict=True)):
             C[nodes.row + component] = 1.0 / (np.array(stiffness)[nodes.pair] * nodes.length)
@@ -97,7 +97,7 @@ class JumpOperator:
         self._exchanges: dict[int, _Exchange] = {}
 
     def rows_of(self, entities: Int) -> Int:
-        """Local rows of nodes on shared entities, one entity after the other."""
+        """Return the local rows of shared entities, one entity after the other."""
         entity, p = expand(entities, self._count[entities])
         return np.asarray(self._first[entity] + p)
 
@@ -110,9 +110,9 @@ class JumpOperator:
         return self._exchange(local).sum(local)
 
     def from_outer(self, numbers: Int) -> Int:
-        """(k,) numbers that outer bodies' ranks give their fine nodes, at the interface nodes of this rank.
+        """Send numbers of outer fine nodes to the ranks that own the interface nodes (k,).  Collective.
 
-        The rank owns the interface nodes; each rank has one number for each of its own fine nodes. Collective.
+        Each rank passes one number for each of its fine nodes.
         """
         rows, copies = self.outer_copies
         local = np.zeros(len(self.rows))
@@ -120,7 +120,7 @@ class JumpOperator:
         return self.sum(local)[self.nodes.row].astype(np.int64)
 
     def _exchange(self, x: Float) -> _Exchange:
-        """Return the exchange for vectors of as many columns as x; the KEPT_EXCHANGES that were used last are kept."""
+        """Return the exchange for vectors with as many columns as x; the last KEPT_EXCHANGES are kept."""
         columns = x.size // len(x) if len(x) else int(np.prod(x.shape[1:]))
         exchange = self._exchanges.pop(columns, None) or _Exchange(self.vector, self.rows, columns)
         self._exchanges[columns] = exchange
@@ -170,7 +170,7 @@ class _Exchange:
 
 
 class NodeBlocks:
-    """A matrix on the multipliers whose entries couple only rows of one fine node, as small dense blocks.
+    """A matrix that couples only multipliers at the same fine node, as small dense blocks.
 
     Attributes:
         rows: number of rows that this rank owns.
@@ -199,7 +199,7 @@ class NodeBlocks:
             self.blocks.append((starts[some][:, None] + np.arange(size), dense))
 
     def inverse(self, active: Float) -> csr_matrix:
-        """(owned rows, owned rows) inverse of the part where `active` (owned rows,) is 1; 0 elsewhere."""
+        """Invert the part where `active` (owned rows,) is 1; the rest of (owned rows, owned rows) is 0."""
         rows, columns, values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
         for at, dense in self.blocks:
             mask = active[at]

@@ -13,6 +13,7 @@ from scipy.special import roots_legendre
 
 from feti_homog.errors import MeshError
 from feti_homog.feti.decomposition.sharers import Sharers, entity_code, find_sharers
+from feti_homog.feti.thresholds import ZERO_TOLERANCE
 from feti_homog.mesh import ReferenceLattice, Submesh, SubmeshesOfRank, submeshes
 from feti_homog.system.parallel import distributed_arrays, mpi_errors
 from feti_homog.typing import Array, Bool, Float, Int
@@ -21,8 +22,6 @@ from feti_homog.typing import Array, Bool, Float, Int
 POINTS, WEIGHTS = roots_legendre(6)
 # (p + 1, points) weights of the nodes of a side of order p: 1/2 if linear, N_a if quadratic.
 SHARES = {1: np.full((2, 6), 0.5), 2: np.stack([POINTS**2 - POINTS, 2 - 2 * POINTS**2, POINTS**2 + POINTS]) / 2}
-# Two sides at a node are folded onto each other if their normals add up to no more than this share of their lengths.
-FOLDED = 1e-9
 
 
 def along(ends: Float, turn: Float, place: Float) -> Float:
@@ -107,7 +106,7 @@ def _check(meshes: SubmeshesOfRank, sharers: Sharers, normals: Float, sums: Floa
     The directions of folded sides cancel; `normals` (n, 2, 2) and `sums` (n, 4) as in `interface_geometry`.
     """
     length = np.linalg.norm(normals, axis=2)
-    folded = ~sharers.is_edge & ~(np.hypot(*sums[:, :2].T) > FOLDED * sums[:, 2])
+    folded = ~sharers.is_edge & ~(np.hypot(*sums[:, :2].T) > ZERO_TOLERANCE * sums[:, 2])
     bad = np.flatnonzero(~(np.isfinite(length) & (length > 0)).all(axis=1) | folded)
     if len(bad):
         mesh, first = meshes.whole, bad[0]

@@ -9,17 +9,17 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.errors import MeshError
 from feti_homog.fem import PLANE, Problem, assembly, bubble
-from feti_homog.feti.thresholds import KERNEL_TOLERANCE, LEAST_ORDERED_DOFS, SCALED_LAME
+from feti_homog.feti.thresholds import LEAST_ORDERED_DOFS, SCALED_LAME, ZERO_TOLERANCE
 from feti_homog.mesh import FineMesh, ReferenceLattice, Submesh, mesh_fibres, refinement
 from feti_homog.typing import Float, Int
 
 
 @dataclass(eq=False)
 class Subdomain:
-    """A piece of a body, or of several bonded ones, with n classes of c displacements each, and kernel dimension k.
+    """A piece of one body, or of several bonded bodies: n node classes, c displacements each, kernel dimension k.
 
-    All but K stays as it is made.  K is by far the largest: the one that `build` makes stays until the first call of
-    `take_stiffness`, whose caller then owns it.  Later calls assemble it anew.
+    K is by far the largest part.  The matrix that `build` assembles stays until the first call of `take_stiffness`,
+    whose caller then owns it; later calls assemble K anew.
 
     Attributes:
         submesh: the coarse share.
@@ -107,10 +107,8 @@ class Subdomain:
         K = _pinned(body.K, problem, submesh.pinned)
         # The rigid-body modes are in the kernel of K; NaN is above any tolerance.
         residual = abs(K @ R).max(initial=0.0) / abs(K.data).max()
-        if not residual <= KERNEL_TOLERANCE:
-            faults = (
-                f"|K R| / |K| = {residual:.1e}, expected at most {KERNEL_TOLERANCE:.0e}; its elements are degenerate"
-            )
+        if not residual <= ZERO_TOLERANCE:
+            faults = f"|K R| / |K| = {residual:.1e}, expected at most {ZERO_TOLERANCE:.0e}; its elements are degenerate"
             raise MeshError(f"{label(submesh)}: {faults}")
         Q, slopes = body.Q, body.slopes
         if submesh.pinned >= 0:
@@ -122,7 +120,7 @@ class Subdomain:
         )
 
     def mean_strain(self, dofs: Int) -> Float:
-        """(k, m) whose transpose times the displacements u of `dofs` (k,) is their share in int eps*.
+        """Compute weights (k, m): their transpose times the displacements of `dofs` (k,) is a part of int eps*.
 
         The integral is over the subdomain and its share of the voids beside it, int_Omega eps* + int u (x) n ds, n
         outward from the voids; 0 at voids.
@@ -139,14 +137,14 @@ class Subdomain:
 
     @property
     def loads_inside(self) -> bool:
-        """True if the unit loads act on nodes that are not shared: at voids, and where materials meet."""
+        """Whether unit loads act on nodes that are not shared: at voids, and where materials meet."""
         return self.material is not None or bool(self.submesh.at_void.any())
 
     def without_rounding(self, answers: Float, dofs: Int) -> Float:
-        """(k, v) the answers -K+ Q of `dofs` (k,), with -E x in place of a body's own.
+        """Remove rounding from the displacements -K+ Q (k, v) of `dofs` (k,).
 
-        A body that can turn, beside no voids, answers to a strain E by -E x and a rigid-body motion.  K+ leaves
-        rounding of the body's own stiffness, which may be far above all forces on it.
+        The displacement of a body that can turn, without voids, under a strain E is -E x and a rigid-body motion.  K+
+        adds rounding in proportion to the stiffness of the body, which may be far above all forces on it.
         """
         if self.R.shape[1] < 3 or self.submesh.at_void.any():
             return answers
@@ -158,19 +156,19 @@ class Subdomain:
 
     @property
     def is_mixed(self) -> bool:
-        """True if any material has mixed elements."""
+        """Whether any material has mixed elements."""
         return bool(np.any(self.mixed))
 
     @property
     def n_dofs(self) -> int:
-        """cn."""
+        """Number of degrees of freedom, cn."""
         return len(self.Q)
 
     @property
     def compressible_share(self) -> float:
-        """Share of the diagonal of K in the scaling D: the diagonal of a phase with equal mu and lambda <= 2 mu.
+        """Fraction of the diagonal of K that scales jumps: of a phase with the same mu and lambda <= 2 mu.
 
-        1 of several materials, none of which is nearly incompressible.
+        1 for several materials, none of which is nearly incompressible.
         A boundary that keeps the volume is as stiff as mu, but single nodes of mixed elements are as lambda.
         """
         if not self.is_mixed or self.material is not None:
@@ -179,25 +177,25 @@ class Subdomain:
         return (min(first, SCALED_LAME * shear) + 3 * shear) / (first + 3 * shear)
 
     def elimination_order(self) -> Int | None:
-        """(cn,) all dofs in an order of elimination; None where the library finds one at less cost.
+        """Return an elimination order (cn,) of all dofs; None where the library orders at less cost.
 
-        It does where all nodes are coarse nodes, for then all triangles are to be halved.
+        The library does if all nodes are coarse nodes, for then all triangles would have to be halved.
         """
         pays = self.n_dofs >= LEAST_ORDERED_DOFS and self.mesh.lattice.intervals > 1
         return self.problem.dofs(refinement.elimination_order(self.mesh)) if pays else None
 
     def take_stiffness(self) -> csr_matrix:
-        """(cn, cn) K, which belongs to the caller: the one of `build` at first, then one assembled anew."""
+        """Hand K (cn, cn) over to the caller: at first the matrix of `build`, later a new one."""
         K, self._built_stiffness = self._built_stiffness, None
         return self.assemble_stiffness() if K is None else K
 
     def assemble_stiffness(self) -> csr_matrix:
-        """(cn, cn) K, Eq. (28), the pinned class (15) eliminated by a unit row scaled like the others."""
+        """Assemble K (cn, cn), Eq. (28); a scaled unit row eliminates the pinned class (15)."""
         body = assembly.assemble(self.mesh, self.laws, self.problem, self.mixed, self.material)
         return _pinned(body.K, self.problem, self.submesh.pinned)
 
     def fixing(self, K: csr_matrix, candidates: Int) -> tuple[Int, Float]:
-        """Degrees of freedom and dense block rho Rf Rf^T that make K + block an SPD matrix.
+        """Return dofs and a dense block rho Rf Rf^T on them that makes K + block SPD.
 
         Its inverse is a generalized inverse K+ of K.  Rf is the kernel restricted to at most three of the
         `candidates` (nodes), far apart, and orthonormalised (Brzobohaty, Dostal, Kozubek, Kovar, Markopoulos,
@@ -220,14 +218,14 @@ class Subdomain:
         return dofs, K.diagonal()[dofs].mean() * Rf @ Rf.T
 
     def regularised(self, K: csr_matrix, candidates: Int) -> csr_matrix:
-        """K with the block of `fixing`."""
+        """Add the block of `fixing` to K."""
         dofs, block = self.fixing(K, candidates)
         rows, columns = np.meshgrid(dofs, dofs, indexing="ij")
         return (K + csr_matrix((block.ravel(), (rows.ravel(), columns.ravel())), shape=K.shape)).tocsr()
 
 
 def kernel(problem: Problem, positions: Float, rotates: bool, pinned: int) -> Float:
-    """Orthonormal rigid-body modes (cn, k) of nodes at `positions` (n, 2); `pinned` is a node or -1."""
+    """Compute orthonormal rigid-body modes (cn, k) of nodes at `positions` (n, 2); `pinned` is a node or -1."""
     n, c = len(positions), problem.components
     free = np.zeros((n, c, 0)) if pinned >= 0 else np.tile(np.eye(c), (n, 1, 1))
     if rotates and problem.turns:
@@ -239,14 +237,14 @@ def kernel(problem: Problem, positions: Float, rotates: bool, pinned: int) -> Fl
 
 
 def label(submesh: Submesh) -> str:
-    """Return the subdomain in messages."""
+    """Describe a subdomain in messages."""
     x, y = submesh.points[0]
     kind = f" ({submesh.phase})" if submesh.phase else ""
     return f"subdomain {submesh.index}{kind} near ({x:.6g}, {y:.6g})"
 
 
 def _pinned(K: csr_matrix, problem: Problem, pinned: int) -> csr_matrix:
-    """K, with rows and columns of the node `pinned` as in a multiple of I; unchanged for -1."""
+    """Replace rows and columns of the node `pinned` in K by those of a multiple of I; none for -1."""
     if pinned < 0:
         return K
     dofs, largest = problem.dofs(np.array([pinned])), K.diagonal().max()

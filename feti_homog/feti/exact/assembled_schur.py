@@ -9,13 +9,10 @@ from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, allreduce_sparse
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.with_springs import is_dense
-from feti_homog.feti.thresholds import DEFAULTS, DENSE_SHARE
+from feti_homog.feti.thresholds import DEFAULTS
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.system.petsc import options_database
 from feti_homog.typing import Float
-
-# Entries of Z, which are cosines of angles or their products, that rounding leaves of zero.
-DIRECTION_ROUNDING = 1e-14
 
 
 class AssembledSchur:
@@ -57,8 +54,8 @@ class AssembledSchur:
 def assembled_stiffness(operators: InterfaceOperators, active: Float) -> tuple[csr_matrix, csr_matrix | Float]:
     """Return Z (n, columns) and Z^T S Z of all ranks for the owned rows where `active` is 1.  Collective.
 
-    The rows must leave no rigid-body motion free.  The sum is dense, in Fortran order, where all ranks' blocks fill
-    most of it and there are no options `feti_bonded_`; sparse otherwise.
+    The rows must leave no rigid-body motion free.  The sum is dense, in Fortran order, where all ranks' blocks have
+    as many entries as the whole matrix and there are no options `feti_bonded_`; sparse otherwise.
 
     Raises:
         TypeError: a boundary operator is not dense.
@@ -67,9 +64,7 @@ def assembled_stiffness(operators: InterfaceOperators, active: Float) -> tuple[c
     size, columns = Z.shape[1], [np.unique(Z[span].indices) for span in operators.slices]
     entries = comm.allreduce(sum(len(of) ** 2 for of in columns))
     is_full = (
-        entries >= DENSE_SHARE * size**2
-        and size <= DEFAULTS.dense_boundary_dofs
-        and not options_database.choices("feti_bonded_")
+        entries >= size**2 and size <= DEFAULTS.dense_boundary_dofs and not options_database.choices("feti_bonded_")
     )
     dense, blocks = np.zeros((size, size) if is_full else (0, 0)), DenseBlockSum((size, size))
     for operator, span, of in zip(operators.with_springs, operators.slices, columns, strict=True):
@@ -116,7 +111,6 @@ def _released(operators: InterfaceOperators, active: Float) -> csr_matrix:
     rows, e, square = rows[square > 0], e.tocsr()[square > 0], square[square > 0]
     directions = csr_matrix((np.ones(len(rows)), (np.arange(len(rows)), number[rows])), shape=(len(rows), sum(counts)))
     common = (together - e.T @ (diags(1.0 / square) @ (e @ together))).tocsr()
-    common.data[np.abs(common.data) < DIRECTION_ROUNDING] = 0.0
     common.eliminate_zeros()
     apart = (e.T @ directions).tocsr()
     apart.eliminate_zeros()

@@ -27,19 +27,18 @@ from feti_homog.typing import Bool, Float, Int
 
 
 class ExactInverse(Preconditioner):
-    """z = H r on the active rows, H the inverse of the dual operator there: nothing is left to iterate.
+    """The preconditioner z = H r, H the inverse of the dual operator on the active rows.
 
     Attributes:
         neighbours: which bonds lie beside each other.
         stiffness: (all rows,) bounds for the diagonal of H: the stiffness of both nodes and the spring between them,
             in a row, while all others are held.
-        norm: |H| with all bonds intact, which is the largest, as the power method finds it, with a margin.
+        norm: bound of |H|.
         factorizations: reference cells so far.
-        batch: columns found at once at least.
-        most_followed: columns from which on unused ones go, from the next time that none are followed.
+        batch: least number of columns that are computed together.
+        most_followed: number of columns from which unused columns are dropped; a change holds from the next restart.
     """
 
-    norm: float = np.inf
     is_exact = True
     reference: ReferenceCell
 
@@ -61,18 +60,19 @@ class ExactInverse(Preconditioner):
         self._first, end = jump_operator.owned
         self._rows = end - self._first
         self.stiffness = np.concatenate(comm.allgather(stiffness_of_rows(operators)))
+        # K <= n diag(K) for the n displacements of an element.
+        displacements = max((s.mesh.triangles.shape[1] * s.problem.components for s in operators.subdomains), default=0)
+        self.norm = max(comm.allgather(displacements)) * self.stiffness.max(initial=0.0)
         self._one_sided = one_sided_jumps(operators)
         self._ties = BodyTies(comm, jump_operator)
         self.neighbours = InterfaceNeighbours(comm, jump_operator, operators.subdomains)
-        self.batch = thresholds.INFLUENCE_BATCH * comm.size
-        self.most_followed = min(max(thresholds.FOLLOWED_COLUMNS, 2 * max_changes), jump_operator.global_rows)
+        self.batch = thresholds.COLUMNS_AT_ONCE * comm.size
+        self.most_followed = min(max(thresholds.NEVER_REFACTORED_ROWS, 2 * max_changes), jump_operator.global_rows)
         self.factorizations = 0
         # Of the present state active rows and what springs gained; the latter from the next `activate` on.
         self._active, self._more = np.ones(self._rows), np.zeros(self._rows)
         self._next = self._more
         self._restart()
-        # Rows that leave make H smaller.
-        self.norm = thresholds.NORM_MARGIN * self.reference.largest_eigenvalue()
 
     def soften(self, more: Float) -> None:
         """Let springs have `more` compliance (owned rows,) than at first, from the next `activate` on."""
@@ -80,12 +80,12 @@ class ExactInverse(Preconditioner):
 
     def activate(self, active: Float) -> None:
         """Restrict to the rows where `active` is 1.  Collective."""
-        if not self._follow(active, self._next, thresholds.LEAST_FOLLOWED_PIVOT):
+        if not self._follow(active, self._next, thresholds.LEAST_FOLLOWED):
             self._active, self._more = active, self._next
             self._restart()
 
     def _follow(self, active: Float, more: Float, pivot: float) -> bool:
-        """Follow rows that leave, come or soften to another state, if pivots are above `pivot`.  Collective."""
+        """Follow rows that leave, come or soften; return False if a pivot is below `pivot`.  Collective."""
         gained, turned = more * active - self._more * self._active, self._active - active
         places = np.flatnonzero((turned != 0.0) | (gained != 0.0))
         parts = zip(*self.comm.allgather((self._first + places, turned[places], gained[places])), strict=True)
@@ -100,7 +100,7 @@ class ExactInverse(Preconditioner):
         return True
 
     def _restart(self) -> None:
-        """Factor the cell as it stands, and follow its response from there.  Collective."""
+        """Factor the cell in its present state, and follow its response from there.  Collective."""
         active, more = self._active, self._more
         self._active, self._more = self._ties.tied(active), np.zeros(self._rows)
         nothing = np.zeros((self._rows, 0))
@@ -110,7 +110,7 @@ class ExactInverse(Preconditioner):
         self._is_fresh = True
 
     def _factor(self, active: Float) -> None:
-        """Let the reference cell be the one with these bonds, which must hold all bodies.  Collective."""
+        """Factor the reference cell with the bonds `active`, which must hold all bodies.  Collective."""
         if self.factorizations:
             self.reference.destroy()  # before the new cell takes memory
             process_memory.trim()
@@ -139,7 +139,7 @@ class ExactInverse(Preconditioner):
         return ReferenceChanges(self.comm, self._first, self.reference, self._followed, *map(np.concatenate, parts))
 
     def _up_to_date(self) -> ReferenceChanges:
-        """Return the changes since the reference cell, which is factored anew if they are too many.  Collective."""
+        """Return the changes since the reference cell; factor this cell anew if they are too many.  Collective."""
         changes = self._changes()
         if len(changes.rows) - self._tied <= self._max_changes:
             return changes
@@ -151,7 +151,7 @@ class ExactInverse(Preconditioner):
         return self._changes()
 
     def _add_columns(self, rows: Int) -> None:
-        """Let all global rows (k,) and the pins have columns of the present response.  Collective."""
+        """Compute the missing columns of the present response for global rows (k,) and pins.  Collective."""
         rows = np.union1d(rows, self._followed.pins)
         if not len(self._followed.lacking(rows)):
             return
@@ -162,9 +162,9 @@ class ExactInverse(Preconditioner):
             self._add(self._followed.lacking(rows), self._changes(), rows, np.inf)
 
     def _add(
-        self, rows: Int, changes: ReferenceChanges, needed: Int, max_error: float = thresholds.MOST_ASYMMETRY
+        self, rows: Int, changes: ReferenceChanges, needed: Int, max_error: float = thresholds.MOST_ROUNDING
     ) -> bool:
-        """Follow columns of global rows (k,) too, unless followed ones are asymmetric with them.  Collective."""
+        """Follow new columns of global rows (k,), unless they are asymmetric with followed columns.  Collective."""
         if not len(rows):
             return True
         columns = changes.present(self.reference.columns(rows))
@@ -175,9 +175,10 @@ class ExactInverse(Preconditioner):
         return True
 
     def _with_near(self, rows: Int, followed: FollowedResponse) -> Int:
-        """Return rows that lack columns and active ones near them, which break next: columns are cheaper together.
+        """Return the rows without columns, and active rows near them.
 
-        Where only rows lack that have left, none: faces touch here and there.  Collective.
+        Near bonds break next, and columns are cheaper together.  If all of the rows are inactive, near rows are left
+        out.  Collective.
         """
         rows, active = followed.lacking(rows), self._are_active
         enough = self.batch if active[rows].any() else 0
@@ -185,14 +186,15 @@ class ExactInverse(Preconditioner):
 
     @property
     def _are_active(self) -> Bool:
-        """(all rows,) which are active.  Collective."""
+        """Whether each row is active (all rows,).  Collective."""
         return np.asarray(np.concatenate(self.comm.allgather(self._active)) > 0.0)
 
     @property
     def rounding(self) -> float:
-        """Return the largest force, relative to `stiffness`, that jumps of unit rigid-body motions make.
+        """Relative error of H: the largest force by jumps of unit rigid-body motions, over `stiffness`.
 
-        Bodies follow them without force: it is rounding alone, a relative error of H.  Collective."""
+        Bodies follow rigid-body motions without force, so that all of this force is rounding.  Collective.
+        """
         if self._rounding is None:
             stiffness = self.stiffness[self._first : self._first + self._rows]
             self._rounding = self.reference.force_of_rigid_motions(stiffness)
@@ -204,19 +206,19 @@ class ExactInverse(Preconditioner):
         return distributed_arrays.scale_rows(self._active, z.reshape(r.shape))
 
     def _of_reference(self, g: Float) -> Float:
-        """(owned rows, k) Gamma g_A + g_R: jumps of rows that are not active stay.  Collective."""
+        """Compute Gamma g_A + g_R (owned rows, k): jumps g_R on inactive rows stay.  Collective."""
         at_rest = distributed_arrays.scale_rows(1.0 - self.reference.active, g)
         return self.reference.respond(distributed_arrays.scale_rows(self.reference.active, g)) + at_rest
 
     def multipliers(self, d: Float, E: Float) -> Float:
-        """H d E, but for rounding, for d (owned rows, v), equal at every call, and E (v, k).  Collective."""
+        """Compute H d E for d (owned rows, v), the same at every call, and E (v, k).  Collective."""
         return distributed_arrays.scale_rows(self._active, self.renew_answer(d) @ E)
 
     def answer(self, d: Float, E: Float, free: int = 0) -> tuple[Float, Float] | None:
-        """Multipliers H d E and jumps on inactive rows, (owned rows, k), with arguments as of `multipliers`.
+        """Return H d E and the jumps on inactive rows, (owned rows, k) each, updated from state to state.
 
-        They are updated from state to state.  Jumps hold for one place of the bodies that nothing holds; None where
-        these have another number of motions than `free`.  Collective.
+        Arguments as in `multipliers`.  Jumps hold for one position of free bodies.  Return None if these have another
+        number of motions than `free`.  Collective.
         """
         if len(self._followed.pins) != free:
             if not self._is_fresh:
@@ -228,9 +230,10 @@ class ExactInverse(Preconditioner):
         return lam, U - lam
 
     def renew_answer(self, d: Float) -> Float:
-        """Return U (owned rows, v) of d (owned rows, v) without rounding of the updates, which go on from there.
+        """Compute U (owned rows, v) for d (owned rows, v) without rounding of the updates, and update this one.
 
-        Collective."""
+        Collective.
+        """
         changes = self._up_to_date()
         if self._answer is None:
             self._answer = self._of_reference(d)
@@ -241,17 +244,17 @@ class ExactInverse(Preconditioner):
         return self._followed.answer
 
     def inverse_blocks(self, pairs: Int) -> Float:
-        """(m, 2, 2) diagonal blocks of H, for pairs (m, 2) of active global rows, equal on all ranks.  Collective.
+        """Return the diagonal blocks (m, 2, 2) of H for pairs (m, 2) of active global rows.  Collective.
 
-        Rows that leave together change the multipliers of their own by all of them, and open by H_ii^-1 lam_i.
+        All ranks pass the same pairs.  Rows i that leave together open by H_ii^-1 lam_i.
         """
         self._add_columns(np.unique(pairs))
         return self._followed.blocks(pairs)
 
     def columns(self, rows: Int) -> tuple[Float, Float]:
-        """(owned rows, k) columns of H of the reference cell, and their (k, k) block, for global rows (k,).
+        """Return columns (owned rows, k) of H in the reference cell, and their (k, k) block, for global rows (k,).
 
-        Until rows are first restricted, the reference cell is the bonded one.  Collective.
+        Before the first `activate` the reference cell is the bonded cell.  Collective.
         """
         if len(self._unchanged.lacking(rows)):
             new = self._with_near(rows, self._unchanged)

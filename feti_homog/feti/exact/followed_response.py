@@ -31,7 +31,7 @@ from feti_homog.typing import Bool, Float, Int
 
 
 class FollowedResponse:
-    """U and columns of Gamma in the present state.
+    """The answer U to the unit loads, and columns of the response Gamma, in the present state.
 
     Attributes:
         answer: (owned rows, v) U.
@@ -42,7 +42,7 @@ class FollowedResponse:
     def __init__(self, comm: MPI.Intracomm, first: int, stiffness: Float, answer: Float, capacity: int) -> None:
         """Begin with the `answer` U and no columns; this rank's rows begin at `first`.
 
-        `stiffness` (all rows,) bounds the diagonal of Gamma on active rows; from `capacity` columns on, unused ones go.
+        `stiffness` (all rows,) bounds the diagonal of Gamma on active rows; beyond `capacity`, unused columns go.
         """
         self._comm, self._first, self._stiffness = comm, first, stiffness
         self.answer, self.pins, self.had_pins = answer, np.zeros(0, np.int64), False
@@ -58,11 +58,11 @@ class FollowedResponse:
         self._count = 0
 
     def lacking(self, rows: Int) -> Int:
-        """Return which of the global rows have no column."""
+        """Return the global rows without a column."""
         return rows[self._slot[rows] < 0]
 
     def make_room(self, more: int, needed: Int, useful: Bool) -> None:
-        """Have room for so many more columns: the longest unused go.
+        """Make room for `more` columns: the columns that were unused longest go.
 
         Columns of the rows `needed` stay; columns of `useful` rows (all rows,) go last.
         """
@@ -89,18 +89,18 @@ class FollowedResponse:
             self._used, self._factors = np.pad(self._used, (0, new)), np.pad(self._factors, [(0, new), (0, 0)])
 
     def columns(self, rows: Int) -> Float:
-        """(owned rows, k) columns of the global rows (k,), which have them."""
+        """Return the columns (owned rows, k) of global rows (k,), which must have columns."""
         at, n = self._slot[rows], self._count
         return np.asarray(self._buffer[:, at] - self._waiting[:, :n] @ self._factors[at, :n].T)
 
     def product(self, rows: Int, x: Float) -> Float:
-        """(owned rows, k) columns of the global rows (c,), which have them, times x (c, k)."""
+        """Multiply the columns of global rows (c,), which must have columns, with x (c, k)."""
         at, n, columns = self._slot[rows], self._count, len(self._rows)
         waiting = self._waiting[:, :n] @ (self._factors[at, :n].T @ x)
         return product_with_some(self._buffer[:, :columns], at, x) - waiting
 
     def entries(self, rows: Int, of: Int) -> Float:
-        """(k, c) entries at global rows (k,) in the columns of global rows `of` (c,).  Collective."""
+        """Return the entries (k, c) at global rows (k,) in the columns of global rows `of` (c,).  Collective."""
         at, n, places = self._slot[of], self._count, rows - self._first
         mine = np.flatnonzero((places >= 0) & (places < len(self._buffer)))
         places, entries = places[mine], np.zeros((len(rows), len(of)))
@@ -108,9 +108,9 @@ class FollowedResponse:
         return distributed_arrays.allreduce_sum(self._comm, entries)
 
     def blocks(self, pairs: Int) -> Float:
-        """(m, 2, 2) diagonal blocks of Gamma at global row pairs (m, 2), which have columns.  Collective.
+        """Return the diagonal blocks (m, 2, 2) of Gamma at global row pairs (m, 2).  Collective.
 
-        A pair is on one rank.
+        The rows of a pair must have columns and belong to one rank.
         """
         if len(self.lacking(pairs)):
             raise ValueError("rows without columns have no blocks")
@@ -124,18 +124,18 @@ class FollowedResponse:
         return distributed_arrays.allreduce_sum(self._comm, blocks)
 
     def add(self, rows: Int, columns: Float) -> None:
-        """Take the columns (owned rows, k) of these global rows (k,) in, for which there is room."""
+        """Add the columns (owned rows, k) of global rows (k,), for which there must be room."""
         self._apply_waiting()
         old, new = len(self._rows), len(self._rows) + len(rows)
         self._slot[rows] = np.arange(old, new)
         self._rows = np.concatenate([self._rows, rows])
         self._buffer[:, old:new], self._used[old:new] = columns, self._now
 
-    def follow(self, rows: Int, turned: Float, gained: Float, pivot: float = thresholds.LEAST_FOLLOWED_PIVOT) -> bool:
-        """Let the global rows (k,) leave (`turned` is 1), come (-1) or soften (0), their springs gain compliance (k,).
+    def follow(self, rows: Int, turned: Float, gained: Float, pivot: float = thresholds.LEAST_FOLLOWED) -> bool:
+        """Let global rows (k,) leave (`turned` is 1), come (-1) or soften (0); springs gain compliance (k,).
 
-        All of them and the pins have columns.  False where pivots below `pivot` lose too many digits; then this is the
-        response of no state.  Collective.
+        These rows and the pins must have columns.  Return False if pivots below `pivot` lose too many digits; then the
+        response belongs to no state.  Collective.
         """
         is_pin = (rows[:, None] == self.pins).any(axis=1)
         if is_pin.any():
@@ -152,7 +152,7 @@ class FollowedResponse:
         return all(self._exchange(rows[some], turned[some], gained[some], pivot) for some in parts if len(some))
 
     def soften(self, rows: Int, more: Float, pivot: float = 0.0) -> bool:
-        """Let springs of global rows (k,) gain compliance (k,), some less than 0; False as `follow`.  Collective."""
+        """Let springs of global rows (k,) gain compliance (k,), of any sign; False as in `follow`.  Collective."""
         self._make_room(len(rows))
         columns, values = self._present(rows)
         k, root = len(rows), np.sqrt(np.abs(more))
@@ -165,14 +165,14 @@ class FollowedResponse:
         return B is not None
 
     def _exchange(self, rows: Int, sign: Float, gained: Float, pivot: float) -> bool:
-        """Let rows leave (sign 1) or come (-1), and pins leave with rows that come; False where digits are lost.
+        """Let rows leave (sign 1) or come (-1), and pins leave with rows that come; False as in `follow`.
 
         Collective.
         """
         columns, values = self._present(rows)
         # Pins that unit forces on rows that come press.
         forces = values[len(rows) :, : len(rows)][:, sign < 0.0]
-        if len(moved := self.pins[(np.abs(forces[self._slot[self.pins]]) > thresholds.RIGID_SHARE).any(axis=1)]):
+        if len(moved := self.pins[(np.abs(forces[self._slot[self.pins]]) > thresholds.LEAST_FOLLOWED).any(axis=1)]):
             rows, none = np.concatenate([rows, moved]), np.zeros(len(moved))
             sign, gained = np.concatenate([sign, none + 1.0]), np.concatenate([gained, none])
             columns, values = self._present(rows)
@@ -216,7 +216,7 @@ class FollowedResponse:
         self._buffer[:, at], self._factors[at] = turned, 0.0
 
     def _present(self, rows: Int) -> tuple[Float, Float]:
-        """(owned rows, k) columns, and (k + all columns, k + v) rows of them and of U on every rank.  Collective."""
+        """Return columns (owned rows, k), and rows (k + all columns, k + v) of them and U on all ranks.  Collective."""
         self._now += 1
         self._used[self._slot[rows]] = self._now
         columns = self.columns(rows)
@@ -226,7 +226,7 @@ class FollowedResponse:
         )
 
     def _change(self, difference: Float, B: Float, values: Float) -> None:
-        """Take `difference` B times the rows I off the answer, and later off all columns."""
+        """Subtract `difference` B times the rows I from the answer, and later from all columns."""
         n, k = self._count, len(B)
         self.answer = self.answer - difference @ (B @ values[:k, k:])
         self._waiting[:, n : n + k], self._factors[: len(self._rows), n : n + k] = difference, values[k:, :k] @ B
@@ -246,23 +246,23 @@ class FollowedResponse:
 
 
 def _regular(block: Float, sign: Float, stiffness: Float, pivot: float) -> tuple[Int, Float] | None:
-    """Return the rows that can turn, and the inverse of their part of `block` (k, k); None if one is below `pivot`.
+    """Return the rows that can turn, and the inverse of their part of `block` (k, k); None below `pivot`.
 
-    All rows that come (sign -1) can turn, and as many of the rows that leave (1) as leave no body free.
+    All rows that come (sign -1) can turn, and rows that leave (1) as long as no body becomes free.
     """
     # Rows that leave and rows that come differ by the square of a stiffness.
     root = np.sqrt(np.maximum(np.where(sign > 0.0, stiffness, 1.0 / stiffness), np.abs(block.diagonal())))
     outer = np.outer(root, root)
     scaled, which = block / outer, np.arange(len(block))
-    if not _has_digits(scaled, thresholds.LEAST_FOLLOWED_PIVOT):
+    if not _has_digits(scaled, thresholds.LEAST_FOLLOWED):
         come, leave = np.flatnonzero(sign < 0.0), np.flatnonzero(sign > 0.0)
         if not len(leave) or not _has_digits(scaled[come[:, None], come], pivot):
             return None
         across = scaled[come[:, None], leave]
         rest = scaled[leave[:, None], leave] - across.T @ np.linalg.solve(scaled[come[:, None], come], across)
-        factor, order, rank, _ = dpstrf(rest, tol=thresholds.SINGULAR_PIVOT, lower=1)
+        factor, order, rank, _ = dpstrf(rest, tol=thresholds.ZERO_TOLERANCE, lower=1)
         # The first pivot is taken whatever it is.
-        rank = min(rank, int((factor.diagonal() ** 2 > thresholds.SINGULAR_PIVOT).sum()))
+        rank = min(rank, int((factor.diagonal() ** 2 > thresholds.ZERO_TOLERANCE).sum()))
         which = np.concatenate([come, leave[order[:rank] - 1]])
         if not _has_digits(scaled[which[:, None], which], pivot):
             return None

@@ -18,16 +18,13 @@ from feti_homog.feti.exact.assembled_schur import AssembledSchur, assembled_stif
 from feti_homog.feti.exact.spring_update import SpringUpdate
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.preconditioners import Preconditioner, never_softens
-from feti_homog.feti.thresholds import CHUNK_RANKS, INFLUENCE_BATCH, NORM_ITERATIONS, STIFF_FIBRES
+from feti_homog.feti.thresholds import COLUMNS_AT_ONCE, STIFF_FIBRES
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int
 
-# Bonds, each in all directions, that let no rigid-body motion pass between two bodies.
-HOLDING_BONDS = 2
-
 
 class BodyTies:
-    """Two bonds of every fibre and the body around it, the second as far as can be from the first."""
+    """Two bonds that tie each fibre to the body around it, the second farthest from the first."""
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator) -> None:
         """Choose the bonds.  Collective."""
@@ -45,12 +42,12 @@ class BodyTies:
         self._pair = pair[begin : begin + len(nodes.row)]
 
     def tied(self, active: Float) -> Float:
-        """`active` (owned rows,) with all rows of the ties where fewer than two bonds hold two bodies.  Collective."""
+        """Add the ties of bodies that fewer than two bonds hold to `active` (owned rows,).  Collective."""
         bonded = active[self._rows].prod(axis=1)
         holding = distributed_arrays.allreduce_sum(
             self._comm, np.bincount(self._pair, bonded, len(self._ties)).astype(float)
         )
-        ties = self._ties[holding < HOLDING_BONDS].ravel()
+        ties = self._ties[holding < self._ties.shape[1]].ravel()
         rows = self._rows[ties[(ties >= 0) & (ties < len(self._rows))]]
         tied = active.copy()
         tied[rows] = 1.0
@@ -58,7 +55,7 @@ class BodyTies:
 
 
 class ReferenceCell:
-    """Response operator Gamma of the cell with the reference set A.
+    """The response operator Gamma of the cell with the reference set A.
 
     Attributes:
         active: (owned rows,) 1 on A.
@@ -82,15 +79,17 @@ class ReferenceCell:
         self.assembled.destroy()
 
     def respond(self, x: Float) -> Float:
-        """Gamma x for x (owned rows,) or (owned rows, k).  Collective."""
+        """Compute Gamma x for x (owned rows,) or (owned rows, k).  Collective."""
         return self._springs.apply(self._without_springs(x))
 
     def columns(self, rows: Int) -> Float:
-        """(owned rows, k) Gamma[:, rows] of global rows (k,), equal on all ranks.  Collective."""
+        """Compute the columns Gamma[:, rows] (owned rows, k) for global rows (k,).  Collective.
+
+        All ranks pass the same rows.
+        """
         # A few columns too many are cheaper with others than by themselves.
-        chunk = INFLUENCE_BATCH * min(self._comm.size, CHUNK_RANKS)
         columns = [np.zeros((len(self.active), 0))]
-        for some in np.array_split(rows, max(round(len(rows) / chunk), 1)) if len(rows) else []:
+        for some in np.array_split(rows, max(round(len(rows) / COLUMNS_AT_ONCE), 1)) if len(rows) else []:
             unit, place = np.zeros((len(self.active), len(some))), some - self._first
             mine = np.flatnonzero((place >= 0) & (place < len(unit)))
             unit[place[mine], mine] = 1.0
@@ -98,7 +97,7 @@ class ReferenceCell:
         return np.hstack(columns)
 
     def force_of_rigid_motions(self, stiffness: Float) -> float:
-        """Return the largest force, relative to `stiffness` (owned rows,), by jumps of unit rigid-body motions.
+        """Compute the largest force by jumps of unit rigid-body motions, relative to `stiffness` (owned rows,).
 
         Collective.
         """
@@ -111,20 +110,8 @@ class ReferenceCell:
         force = distributed_arrays.scale_rows(self.active, self.respond(jump)) / stiffness
         return float(self._comm.allreduce(np.abs(force).max(initial=0.0), MPI.MAX))
 
-    def largest_eigenvalue(self) -> float:
-        """|Gamma| as some steps of the power method find it.  Collective."""
-        x = np.cos((self._first + np.arange(len(self.active))) ** 2.0)
-        norm = 0.0
-        for _ in range(NORM_ITERATIONS):
-            length = np.sqrt(distributed_arrays.allreduce_sum(self._comm, np.array([x @ x]))[0])
-            if length == 0.0:
-                break
-            x = self.respond(x / length)
-            norm = float(np.sqrt(distributed_arrays.allreduce_sum(self._comm, np.array([x @ x]))[0]))
-        return norm
-
     def _without_springs(self, x: Float) -> Float:
-        """Gamma x without the springs at nodes of A where fibre and matrix are both cut.
+        """Compute Gamma x without the springs at nodes of A where fibre and matrix are both cut.
 
         Displacements u = B_D^T g + Z y whose forces S u - B_I^T f vanish on Z; then B_A^T lam = S u - B_I^T f.
         """
@@ -149,9 +136,9 @@ class ReferenceCell:
 
 
 def one_sided_jumps(operators: InterfaceOperators) -> csr_matrix:
-    """(local rows, boundary dofs) B_D with B B_D^T = I that leaves one side of each interface at rest.  Collective.
+    """Build B_D (local rows, boundary dofs), B B_D^T = I, which moves one side of each interface.  Collective.
 
-    So only the other side needs forces: the inner body, if it is not so stiff that rounding would show.
+    Only this side needs forces: the inner body, unless it is so stiff that its forces lose digits.
     """
     comm, jump_operator = operators.comm, operators.jump_operator
     inside, B = jump_operator.inside, operators.B.tocoo()
@@ -174,7 +161,7 @@ def one_sided_jumps(operators: InterfaceOperators) -> csr_matrix:
 
 
 def stiffness_of_rows(operators: InterfaceOperators) -> Float:
-    """(owned rows,) 1 / (B D^-1 B^T + C) of each row.  Collective.
+    """Compute the stiffness 1 / (B D^-1 B^T + C) of each owned row.  Collective.
 
     D is the diagonal of the bodies' stiffness, C the compliance of the springs.
     """
@@ -183,12 +170,12 @@ def stiffness_of_rows(operators: InterfaceOperators) -> Float:
 
 
 class BondedInverse(Preconditioner):
-    """z = H r by the factor of the assembled Schur complement: nothing is left to iterate.
+    """The preconditioner z = H r by the factor of the assembled Schur complement.
 
     Unlike `ExactInverse` it follows no rows: another set of active rows is factored anew.
     """
 
-    norm, soften, is_exact = np.inf, never_softens, True
+    soften, is_exact = never_softens, True
 
     def __init__(self, operators: InterfaceOperators) -> None:
         """Factor the cell with all bonds; all boundary operators must be dense.  Collective."""
@@ -196,11 +183,11 @@ class BondedInverse(Preconditioner):
         self._cell = ReferenceCell(operators, self._one_sided, np.ones(len(operators.springs)))
 
     def activate(self, active: Float) -> None:
-        """Factor the cell with these bonds, which must hold all bodies, unless it is."""
+        """Factor the cell with the bonds `active`, which must hold all bodies, if they have changed."""
         if self._operators.comm.allreduce(bool((active != self._cell.active).any()), MPI.LOR):
             self._cell.destroy()
             self._cell = ReferenceCell(self._operators, self._one_sided, active)
 
     def apply(self, r: Float) -> Float:
-        """Return the multipliers that close the jump r on the active rows."""
+        """Compute the multipliers that close the jump r on the active rows."""
         return self._cell.respond(distributed_arrays.scale_rows(self._cell.active, r))

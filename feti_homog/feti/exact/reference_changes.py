@@ -12,7 +12,6 @@ from mpi4py import MPI
 
 from feti_homog.feti.exact.followed_response import FollowedResponse
 from feti_homog.feti.exact.reference_cell import ReferenceCell
-from feti_homog.feti.thresholds import CHECKED_COLUMNS
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int
 
@@ -66,7 +65,6 @@ class ReferenceChanges:
         Gamma' is symmetric.  Relative to the largest entry, each by its units: `stiffness` (all rows,) on active rows.
         Collective.
         """
-        rows, columns = rows[:CHECKED_COLUMNS], columns[:, :CHECKED_COLUMNS]
         entries, followed = self._gathered(columns), self._followed.entries(rows, self.rows).T
         holds = (
             self._turned[:, 0] <= 0.0,

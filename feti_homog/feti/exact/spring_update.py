@@ -78,11 +78,6 @@ class SpringUpdated(Preconditioner):
         self.is_exact = inner.is_exact
         self._update = SpringUpdate(comm, first, compliance, inner.apply)
 
-    @property
-    def norm(self) -> float:
-        """Bound of |H|, which softer springs make smaller."""
-        return self._inner.norm
-
     def soften(self, more: Float) -> None:
         """Let springs have `more` compliance (owned rows,) than at first, from the next `activate` on."""
         self._compliance = self._left_out + more

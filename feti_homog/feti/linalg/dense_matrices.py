@@ -12,7 +12,7 @@ from scipy.linalg.lapack import dlauum, dpotrf, dpotrs, dtrtri
 from scipy.sparse import bmat, csr_matrix
 
 from feti_homog.feti.linalg.sparse_direct import check_factor, mumps_error, power_of_two
-from feti_homog.feti.thresholds import COPIED_AT_ONCE, COPIED_COLUMNS, MIRRORED_BLOCK_ROWS, TRIANGLE_INVERSE_ROWS
+from feti_homog.feti.thresholds import BLOCK_ROWS, COLUMNS_AT_ONCE, COPIED_COLUMNS
 from feti_homog.system.petsc import c_functions, options_database
 from feti_homog.typing import Float, Int
 
@@ -24,10 +24,10 @@ TOO_SMALL, MORE_WORKSPACE = (-8, -9), (None, 100, 1000)
 
 
 def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) -> Float:
-    """(n, n) Schur complement of a matrix on `rows`, in Fortran order; the rest of the matrix has to be SPD.
+    """Compute the Schur complement (n, n) on `rows`, in Fortran order; the rest of the matrix must be SPD.
 
-    CHOLMOD eliminates the rest in the `order` (dofs,) if that is given; the diagonal on `rows` has to be positive then.
-    Without an order, and if there are options under `feti_schur_`, MUMPS does.
+    CHOLMOD eliminates the rest in the `order` (dofs,) if there is one; the diagonal on `rows` must be positive then.
+    Without an order, or with options under `feti_schur_`, MUMPS eliminates it.
 
     Raises:
         LinAlgError: the rest of the matrix is not positive definite, or has entries that are not finite.
@@ -64,7 +64,7 @@ class ShiftedFactor:
     D: Float
 
     def solution(self, f: Float, x: Float) -> Float:
-        """(dofs, k) u with K u = f (dofs, k) and known values x (n, k) on `rows`, from (K + D) u = f + D x."""
+        """Solve K u = f (dofs, k) with known values x (n, k) on `rows`, from (K + D) u = f + D x."""
         right = f.copy(order="F")
         right[self.rows] += (self.D * x.T).T
         u = self.factor.solve(right)
@@ -189,7 +189,7 @@ def cholesky(A: Float, lower: bool = True, clean: bool = True) -> Float:
 
 
 class DenseSolver:
-    """X = A^-1 B for one SPD matrix A (n, n), in whose memory the factor is if A is in Fortran order."""
+    """Solver X = A^-1 B for one SPD matrix A (n, n); a matrix in Fortran order is overwritten by its factor."""
 
     def __init__(self, A: Float) -> None:
         """Factorize.
@@ -200,7 +200,7 @@ class DenseSolver:
         self._L = cholesky(A, clean=False)
 
     def solve(self, B: Float) -> Float:
-        """A^-1 B for B (n,) or (n, k)."""
+        """Compute A^-1 B for B (n,) or (n, k)."""
         X, info = dpotrs(self._L, B, lower=1)
         check_lapack("dpotrs", info)
         return np.asarray(X)
@@ -239,7 +239,7 @@ def invert_upper(A: Float) -> None:
 def _invert_triangle(U: Float) -> None:
     """U <- U^-1 for the upper triangle of U, by halves: OpenBLAS inverts large ones column by column."""
     n = len(U)
-    if n <= TRIANGLE_INVERSE_ROWS:
+    if n <= BLOCK_ROWS:
         U[:], info = dtrtri(U, lower=0)
         check_lapack("dtrtri", info)
         return
@@ -249,7 +249,7 @@ def _invert_triangle(U: Float) -> None:
     corner[:] = dtrmm(1.0, last, dtrmm(-1.0, first, corner), side=1, overwrite_b=1)
 
 
-def full_from_lower(A: Float, block: int = MIRRORED_BLOCK_ROWS) -> Float:
+def full_from_lower(A: Float, block: int = BLOCK_ROWS) -> Float:
     """Return the symmetric matrix, in C order, with the lower triangle of A (n, n).
 
     By blocks that fit the cache.
@@ -264,7 +264,7 @@ def full_from_lower(A: Float, block: int = MIRRORED_BLOCK_ROWS) -> Float:
 
 
 def product_with_some(columns: Float, at: Int, x: Float) -> Float:
-    """columns[:, at] x of (n, m) columns, for x (c,) or (c, k), which copies a few columns at a time."""
+    """Compute columns[:, at] x for columns (n, m) and x (c,) or (c, k), with copies of a few columns."""
     k = x.size // max(len(x), 1)
     if len(at) * (k + COPIED_COLUMNS) > columns.shape[1] * k:
         # A product with all columns is cheaper than a copy of some.
@@ -272,6 +272,6 @@ def product_with_some(columns: Float, at: Int, x: Float) -> Float:
         padded[at] = x
         return np.asarray(columns @ padded)
     product = np.zeros((len(columns), *x.shape[1:]))
-    for some in np.array_split(np.arange(len(at)), len(at) // COPIED_AT_ONCE + 1):
+    for some in np.array_split(np.arange(len(at)), len(at) // COLUMNS_AT_ONCE + 1):
         product += columns[:, at[some]] @ x[some]
     return product

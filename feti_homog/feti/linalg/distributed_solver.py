@@ -7,7 +7,7 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.feti.linalg.sparse_direct import factored, is_direct, power_of_two, sequential, solve_columns
 from feti_homog.feti.linalg.sparse_matrices import assemble_distributed, gathered_sum
-from feti_homog.feti.thresholds import CHOLMOD_COLUMNS_ONE_BY_ONE, MUMPS_COLUMNS_ONE_BY_ONE, REPLICATED_UNKNOWNS
+from feti_homog.feti.thresholds import REPLICATED_UNKNOWNS
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int
 
@@ -20,16 +20,15 @@ class DistributedSolver:
     """
 
     def __init__(self, comm: MPI.Intracomm, total: int, prefix: str, most_whole: int = REPLICATED_UNKNOWNS) -> None:
-        """`total` is n, `most_whole` the largest n that every rank factors whole.  Nothing is factored yet."""
+        """Choose the solver for n = `total`; up to `most_whole` every rank factors the whole matrix."""
         self.comm, self.total, self._prefix = comm, total, prefix
         self._ksp: PETSc.KSP | None = None
         options = PETSc.Options(prefix)
         together = total > most_whole or any(options.hasName(name) for name in ("ksp_type", "pc_type"))
         self.is_distributed = comm.size > 1 and together
-        self.max_columns_one_by_one = MUMPS_COLUMNS_ONE_BY_ONE if self.is_distributed else CHOLMOD_COLUMNS_ONE_BY_ONE
 
     def factor(self, unknowns: Int, part: csr_matrix, near_kernel: Float | None = None) -> None:
-        """Assemble and factor A, and free the factor before.  Collective.
+        """Assemble and factor A; the last factor is freed.  Collective.
 
         Args:
             unknowns: (u,) numbers of local unknowns, ascending; several ranks may have one.
@@ -67,20 +66,20 @@ class DistributedSolver:
             raise np.linalg.LinAlgError(f"a coarse matrix is singular: {error or 'on another rank'}") from error
 
     def solve(self, B: Float) -> Float:
-        """A^-1 times right-hand sides summed over ranks, on the local unknowns.  Collective.
+        """Compute A^-1 times right-hand sides summed over ranks, on the local unknowns.  Collective.
 
-        Each rank has a part B (u,) or (u, k) of them.
+        Each rank passes its part B (u,) or (u, k).
         """
         assert self._ksp is not None, "nothing is factored"
         right = self._sum(B if B.ndim == 2 else B[:, None])[slice(*self._b.getOwnershipRange())]
-        X = solve_columns(self._ksp, self._x, self._b, right, self.max_columns_one_by_one)
+        X = solve_columns(self._ksp, self._x, self._b, right)
         X *= self._scale
         if self.is_distributed:
             X = distributed_arrays.allgather_rows(self.comm, X, np.diff(self._b.getOwnershipRanges()))
         return np.asarray(X[self._unknowns]).reshape(B.shape)
 
     def _sum(self, B: Float) -> Float:
-        """(n, k) the sum over ranks of B (u, k)."""
+        """Sum B (u, k) over ranks: (n, k)."""
         part = np.zeros((self.total, B.shape[1]))
         part[self._unknowns] = B
         return distributed_arrays.allreduce_sum(self.comm, part)

@@ -16,7 +16,7 @@ from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
 from feti_homog.errors import CaseError
-from feti_homog.feti.thresholds import CHOLMOD_COLUMNS_ONE_BY_ONE, ITERATIVE_RTOL, MUMPS_EXTRA_WORKSPACE_PERCENT
+from feti_homog.feti.thresholds import ITERATIVE_RTOL, MUMPS_EXTRA_WORKSPACE_PERCENT
 from feti_homog.system.petsc import c_functions
 from feti_homog.typing import Float
 
@@ -87,8 +87,6 @@ def mumps_error(factor: PETSc.Mat) -> tuple[int, int]:
 class DirectSolver:
     """X = A^-1 B for one symmetric definite matrix A (n, n) of one rank and any number of right-hand sides."""
 
-    max_columns_one_by_one = CHOLMOD_COLUMNS_ONE_BY_ONE
-
     def __init__(self, matrix: csr_matrix, prefix: str, is_ordered: bool = False) -> None:
         """Factorize.  Options under `prefix` (default: cholesky by CHOLMOD).  Arguments as of `factored`.
 
@@ -112,7 +110,7 @@ class DirectSolver:
 
     def solve(self, B: Float) -> Float:
         """A^-1 B for B (n,) or (n, k)."""
-        X = solve_columns(self._ksp, self._x, self._b, B if B.ndim == 2 else B[:, None], self.max_columns_one_by_one)
+        X = solve_columns(self._ksp, self._x, self._b, B if B.ndim == 2 else B[:, None])
         X *= self._scale
         return X.reshape(B.shape)
 
@@ -126,14 +124,14 @@ def is_direct(ksp: PETSc.KSP) -> bool:
     return bool(ksp.getType() == PETSc.KSP.Type.PREONLY)
 
 
-def solve_columns(ksp: PETSc.KSP, x: PETSc.Vec, b: PETSc.Vec, B: Float, one_by_one: int) -> Float:
+def solve_columns(ksp: PETSc.KSP, x: PETSc.Vec, b: PETSc.Vec, B: Float) -> Float:
     """Return the rows (own rows, k) of A^-1 B on this rank, Fortran order, for its rows B (own rows, k).
 
-    `x` and `b` are work vectors. Up to `one_by_one` columns, and all of iterative methods, are solved one by one.
-    Collective where the matrix is.
+    `x` and `b` are work vectors.  Iterative methods solve the columns one after the other.  Collective where the matrix
+    is.
     """
     X = np.empty(B.shape, order="F")
-    if B.shape[1] > one_by_one and is_direct(ksp):
+    if B.shape[1] > 1 and is_direct(ksp):
         sizes = (b.getSizes(), B.shape[1])
         matrices = [PETSc.Mat().createDense(sizes, array=a, comm=b.comm) for a in (np.asfortranarray(B), X)]
         ksp.getPC().matApply(*matrices)

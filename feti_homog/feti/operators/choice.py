@@ -1,4 +1,4 @@
-"""Choice of the subdomains with dense boundary operators, or examined for soft modes face by face.
+"""Choice of dense or sparse boundary operators, and of soft modes by faces or by whole boundaries.
 
 A pure function of sizes: it needs no mesh and no MPI.
 """
@@ -6,7 +6,7 @@ A pure function of sizes: it needs no mesh and no MPI.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from feti_homog.feti.thresholds import APPLY_SECONDS, DENSE_INVERSE_SECONDS, Thresholds
+from feti_homog.feti.thresholds import DENSE_INVERSE_COST, Thresholds
 
 KINDS = ("auto", "implicit", "explicit")
 
@@ -18,8 +18,8 @@ class SubdomainSize:
     Attributes:
         dofs: degrees of freedom of the subdomain.
         boundary_dofs: degrees of freedom that constraints act on.
-        is_whole_body: whether all that the subdomain shares, it shares with one other body.
-        has_springs: whether springs hold it, with which its stiffness is a dense matrix.
+        is_whole_body: whether each shared node of the subdomain belongs to one other body only.
+        has_springs: whether springs hold the subdomain; its stiffness with springs is a dense matrix.
     """
 
     dofs: int
@@ -33,8 +33,8 @@ class OperatorChoice:
     """Choice for one subdomain.
 
     Attributes:
-        explicit: whether its boundary operators are dense matrices; else they are sparse factorizations.
-        facewise: whether its soft modes are to be looked for face by face.
+        explicit: whether the boundary operators are dense matrices, not sparse factorizations.
+        facewise: whether soft modes are computed face by face.
     """
 
     explicit: bool
@@ -49,22 +49,22 @@ def choose(
     can_condense: bool,
     thresholds: Thresholds,
 ) -> list[OperatorChoice]:
-    """Return the choice for each subdomain.
+    """Choose the boundary operators of each subdomain.
 
-    Dense matrices pay if their inverse takes no longer than all applications of sparse factors would.  Soft modes need
-    them, but for large whole bodies, which are examined face by face.
+    Dense matrices pay if their inverse takes no longer than all applications of sparse factors.  Soft modes need dense
+    matrices, except on large whole bodies, whose soft modes are computed face by face.
 
     Args:
         kind: of KINDS, the user's choice; `auto` leaves it to this function.
         applications: how many times the operators are expected to be applied.
-        soft_modes: whether soft modes will be looked for.
+        soft_modes: whether soft modes will be computed.
         can_condense: whether PETSc has MUMPS, which condenses subdomains to their boundaries.
     """
     choices = []
     for size in sizes:
         n = size.boundary_dofs
         facewise = size.is_whole_body and n > thresholds.whole_boundary_dofs and not size.has_springs
-        pays = DENSE_INVERSE_SECONDS * n**3 <= APPLY_SECONDS * size.dofs * applications
+        pays = DENSE_INVERSE_COST * n**3 <= size.dofs * applications
         is_useful = pays or size.has_springs or (soft_modes and not facewise)
         possible = n <= thresholds.dense_boundary_dofs and can_condense
         explicit = kind == "explicit" or (kind == "auto" and is_useful and possible)

@@ -1,4 +1,4 @@
-"""All subdomains of this rank as the dual problem sees them, by their boundary dofs; the dual operator, Eq. (36)."""
+"""Boundary operators of all subdomains of this rank, and the dual operator, Eq. (36)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ InterfaceOperator = one_subdomain.ExplicitInterfaceOperator | one_subdomain.Impl
 
 
 class DualOperator:
-    """y = (F + C) x.  Symmetric positive definite, since B has full row rank and K+ is definite.
+    """The dual operator F + C: symmetric positive definite, since B has full row rank and K+ is definite.
 
     Attributes:
         compliance: (owned rows,) the diagonal C.
@@ -35,35 +35,35 @@ class DualOperator:
         self.jump_operator, self.boundary, self.compliance = boundary.jump_operator, boundary, compliance
 
     def apply(self, x: Float) -> Float:
-        """Return sum_s B K+ B^T x + C x for x (owned rows,) or (owned rows, k)."""
+        """Compute sum_s B K+ B^T x + C x for x (owned rows,) or (owned rows, k)."""
         return self.jump(self.displacement(x)) + distributed_arrays.scale_rows(self.compliance, x)
 
     def displacement(self, lam: Float) -> Float:
-        """K+ B^T lam on the boundary dofs: minus the torn cell's answer to multipliers in Eq. (34)."""
+        """Compute K+ B^T lam on the boundary dofs: minus the displacement by multipliers in Eq. (34)."""
         return self.boundary.apply_flexibility(self.boundary.BT @ self.jump_operator.gather(lam))
 
     def jump(self, u: Float) -> Float:
-        """B u, Eq. (33), for displacements u (boundary dofs,) or (boundary dofs, k)."""
+        """Compute the jumps B u, Eq. (33), for displacements u (boundary dofs,) or (boundary dofs, k)."""
         return self.jump_operator.sum(self.boundary.B @ u)
 
 
 class InterfaceOperators:
-    """The boundary dofs of this rank's subdomains, one subdomain after the other, n in all.
+    """Boundary operators on the n boundary dofs of this rank, one subdomain after the other.
 
     Attributes:
         dofs: for each subdomain, (n_s,) local numbers of its boundary dofs, sorted.
         offsets: (subdomains + 1,) where each subdomain begins among the n.
         local_dofs: (n,) their numbers among all dofs of this rank.
         operators: of each subdomain, dense matrices or sparse factors.
-        with_springs: operators with the springs on which a body is, for preconditioner and coarse space.
-        facewise: whether the soft modes of each are to be looked for face by face.
+        with_springs: operators of bodies together with their springs, for preconditioner and coarse space.
+        facewise: of each subdomain, whether soft modes are computed face by face.
         B: (local rows, n) the constraints on them, and `BT` its transpose.
         of_inner: (n,) whether each boundary dof belongs to the inner of two bodies.
         body_diagonal: (n,) the diagonal of K.
         diagonal: (n,) its compressible share, in series with the springs of the body: it scales jumps.
-        interiors: kept interior factors, by place of the subdomain.
+        interiors: kept interior factors, by the position of the subdomain.
         springs: (owned rows,) compliance of the springs.
-        compliance: (owned rows,) of springs that belong to no subdomain, as both bodies are cut; else 0.
+        compliance: (owned rows,) compliance of springs between two cut bodies, which belong to no subdomain; else 0.
     """
 
     def __init__(
@@ -77,10 +77,10 @@ class InterfaceOperators:
         compliance: Float | None = None,
         keep_factors: bool = False,
     ) -> None:
-        """Factor every subdomain, once, as `choose` chooses; takes the stiffness of each.  Arguments as of `choose`.
+        """Factor every subdomain as `choose` decides; arguments as in `choose`.
 
-        `compliance` (local rows,) belongs to the interface springs, None where no rank has any.  `keep_factors` of
-        dense operators for `extend`.  Nothing is communicated: a rank may fail alone.
+        `compliance` (local rows,) is that of the interface springs, None if no rank has springs.  `keep_factors` keeps
+        the factors of dense operators for `extend`.  Without communication: a rank may fail alone.
         """
         self.comm, self.jump_operator, self.subdomains = jump_operator.comm, jump_operator, subdomains
         self._loads = len(jump_operator.problem.loads)
@@ -119,7 +119,7 @@ class InterfaceOperators:
         self.body_diagonal, self.diagonal = np.concatenate(bodies), np.concatenate(diagonals)
 
     def _compliance_roots(self, copies: Int, compliance: Float | None) -> list[csr_matrix | None]:
-        """Compute the compliance root of each subdomain's springs, None without any."""
+        """Compute the root of the spring compliance for each subdomain; None without springs."""
         if compliance is None:
             return [None for _ in self.subdomains]
         roots = [compliance_root(self.B[:, span], compliance, copies, self.of_inner[span]) for span in self.slices]
@@ -127,11 +127,11 @@ class InterfaceOperators:
 
     @cached_property
     def slices(self) -> list[slice]:
-        """The dofs of each subdomain among the n."""
+        """Slice of each subdomain in the n boundary dofs."""
         return [slice(a, b) for a, b in pairwise(self.offsets.tolist())]
 
     def _inner_dofs(self, jump_operator: JumpOperator) -> Bool:
-        """`of_inner`; where more than two bodies meet, of all but the outermost."""
+        """Compute `of_inner`; where more than two bodies meet, all but the outermost are inner bodies."""
         sizes = np.diff(self.offsets)
         of_inner = np.repeat(np.array([not s.is_outer for s in self.subdomains], bool), sizes)
         body = np.repeat(np.array([s.submesh.body for s in self.subdomains], np.int64), sizes)
@@ -141,15 +141,15 @@ class InterfaceOperators:
         return of_inner
 
     def apply_schur(self, x: Float) -> Float:
-        """S x for x (n,) or (n, k)."""
+        """Compute S x for x (n,) or (n, k)."""
         return self._each([o.apply_schur for o in self.operators], x)
 
     def apply_with_springs(self, x: Float) -> Float:
-        """S~ x for x (n,) or (n, k): S x, with the springs where there are some."""
+        """Compute S~ x, the stiffness with springs, for x (n,) or (n, k)."""
         return self._each([o.apply_schur for o in self.with_springs], x)
 
     def apply_some_with_springs(self, which: Sequence[bool], x: Float) -> Float:
-        """S~ x for x (n,) or (n, k) on some of the subdomains, 0 on the others."""
+        """Compute S~ x for x (n,) or (n, k) on the subdomains in `which`, 0 on the others."""
         x = np.asfortranarray(x)
         y = np.zeros(x.shape, order="F")
         for operator, span, is_wanted in zip(self.with_springs, self.slices, which, strict=True):
@@ -158,11 +158,11 @@ class InterfaceOperators:
         return y
 
     def apply_flexibility(self, x: Float) -> Float:
-        """Return the boundary part of K+ x for x (n,) or (n, k)."""
+        """Compute the boundary part of K+ x for x (n,) or (n, k)."""
         return self._each([o.apply_flexibility for o in self.operators], x)
 
     def _each(self, applied: Sequence[Callable[[Float, Float], Float]], x: Float) -> Float:
-        """Return the operators of the subdomains, each applied to its part of x (n,) or (n, k)."""
+        """Apply the operator of each subdomain to its part of x (n,) or (n, k)."""
         x = np.asfortranarray(x)
         y = np.empty(x.shape, order="F")
         for apply, span in zip(applied, self.slices, strict=True):
@@ -171,7 +171,7 @@ class InterfaceOperators:
 
     @cached_property
     def condensed(self) -> one_subdomain.CondensedLoads:
-        """The unit loads on all boundaries, and the sum of the stiffnesses."""
+        """Unit loads condensed to all boundaries, with the sum of the stiffnesses."""
         v = self._loads
         parts = [operator.condensed for operator in self.operators]
         boundary = np.concatenate([np.zeros((0, v)), *(part.boundary for part in parts)])
@@ -181,10 +181,10 @@ class InterfaceOperators:
         )
 
     def extend(self, place: int, x: Float, loads: Float | None = None, keep: bool = True) -> Float:
-        """(dofs, k) displacements of the subdomain at a place, of x (n_s, k) on its boundary and loads (v, k), if any.
+        """Extend boundary displacements x (n_s, k) into the subdomain at position `place`: (dofs, k).
 
-        They come from the factor of the subdomain if that was kept.  Otherwise its interior is factored: by the first
-        call if that may `keep` it, else by every call.
+        `loads` (v, k) act inside.  Without a kept factor of the subdomain its interior is factored: by the first call
+        if that may `keep` it, else by every call.
         """
         operator, s = self.operators[place], self.subdomains[place]
         if isinstance(operator, one_subdomain.ExplicitInterfaceOperator) and operator.factor is not None:
@@ -209,9 +209,9 @@ class InterfaceOperators:
 
 
 def _factor(subdomain: Subdomain, dofs: Int, explicit: bool, keep_factor: bool) -> tuple[InterfaceOperator, Float]:
-    """Return the boundary operator of a subdomain and the diagonal of K on its boundary `dofs`; K is freed.
+    """Factor one subdomain; return its boundary operator and the diagonal of K on its boundary `dofs`.
 
-    `keep_factor` as of `ExplicitInterfaceOperator`.
+    K is freed.  `keep_factor` as in `ExplicitInterfaceOperator`.
 
     Raises:
         MeshError: rounding leaves K no factor.
@@ -230,7 +230,7 @@ def _factor(subdomain: Subdomain, dofs: Int, explicit: bool, keep_factor: bool) 
 
 
 def _constrained_dofs(B: csr_matrix, subdomains: Sequence[Subdomain]) -> list[Int]:
-    """Local numbers of the dofs in each subdomain that constraints act on, node by node."""
+    """Find the constrained dofs of each subdomain, as sorted local numbers of whole nodes."""
     constrained = np.split(B.getnnz(axis=0) > 0, np.cumsum([s.n_dofs for s in subdomains]))[:-1]
     pairs = zip(subdomains, constrained, strict=True)
     return [s.problem.dofs(np.unique(s.problem.nodes(np.flatnonzero(is_constrained)))) for s, is_constrained in pairs]
@@ -239,7 +239,7 @@ def _constrained_dofs(B: csr_matrix, subdomains: Sequence[Subdomain]) -> list[In
 def _sizes(
     shared: SharedEntities, subdomains: Sequence[Subdomain], dofs: Sequence[Int], springs: Sequence[bool]
 ) -> list[SubdomainSize]:
-    """Return the subdomain sizes on which the choice of operators depends."""
+    """Collect the subdomain sizes on which the choice of operators depends."""
     entity = np.repeat(np.arange(len(shared.key)), shared.copies)
     first, last = shared.pointer[:-1], shared.pointer[1:] - 1
     between_two_bodies = (shared.copies == 2) & (shared.body[first] != shared.body[last])

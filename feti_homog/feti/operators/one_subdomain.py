@@ -256,15 +256,15 @@ class Interior:
 
 
 def _by_columns(apply: Callable[[Float], Float], x: Float, out: Float | None) -> Float:
-    """`apply` to at most SPARSE_COLUMNS_AT_ONCE columns of x (n, k) at a time, or to x (n,)."""
+    """`apply` to at most COLUMNS_AT_ONCE columns of x (n, k) at a time, or to x (n,)."""
     if out is None:
         out = np.empty_like(x)
     if not len(x):
         return out
-    if x.size <= thresholds.SPARSE_COLUMNS_AT_ONCE * len(x):
+    if x.size <= thresholds.COLUMNS_AT_ONCE * len(x):
         out[:] = apply(x)
         return out
-    for first in range(0, x.shape[1], thresholds.SPARSE_COLUMNS_AT_ONCE):
-        some = slice(first, first + thresholds.SPARSE_COLUMNS_AT_ONCE)
+    for first in range(0, x.shape[1], thresholds.COLUMNS_AT_ONCE):
+        some = slice(first, first + thresholds.COLUMNS_AT_ONCE)
         out[:, some] = apply(x[:, some])
     return out

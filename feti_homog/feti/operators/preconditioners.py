@@ -20,47 +20,45 @@ class Preconditioner(Protocol):
 
     Attributes:
         is_exact: whether it is the inverse of the projected dual operator, so that nothing is left to iterate.
+        norm: bound of |M^-1|; inf if none is known.
     """
 
     is_exact: bool = False
-
-    @property
-    def norm(self) -> float:
-        """Bound of |M^-1|, inf if none is known."""
+    norm: float = np.inf
 
     def activate(self, active: Float) -> None:
-        """Restrict to the rows where `active` is 1."""
+        """Restrict the preconditioner to the rows where `active` is 1."""
 
     def soften(self, more: Float) -> None:
-        """Let springs have `more` compliance (owned rows,) than at first, from the next `activate` on.
+        """Give springs `more` compliance (owned rows,) than at first, from the next `activate` on.
 
         Raises:
             ValueError: the preconditioner was set up for springs that never soften.
         """
 
     def apply(self, r: Float) -> Float:
-        """M^-1 r; r and the result are 0 on inactive rows."""
+        """Compute M^-1 r; r and the result are 0 on inactive rows."""
 
     def closing_forces(self, jump: Float) -> Float:
-        """Return the forces that close a jump while coarse displacements are held: M^-1 of it where there are none."""
+        """Compute the forces that close a jump while coarse displacements are fixed; else M^-1 times the jump."""
         return self.apply(jump)
 
 
 def never_softens(preconditioner: Preconditioner, more: Float) -> None:
-    """Raise ValueError: `soften` without `SpringUpdated`."""
+    """Refuse to soften springs: `soften` of preconditioners without `SpringUpdated`."""
     raise ValueError("springs soften, and the preconditioner was set up for springs that never do")
 
 
 class Identity(Preconditioner):
-    """z = r."""
+    """The identity, z = r."""
 
-    norm, soften = 1.0, never_softens
+    soften = never_softens
 
     def activate(self, active: Float) -> None:
-        """Nothing depends on the rows."""
+        """Do nothing: the identity is the same on all rows."""
 
     def apply(self, r: Float) -> Float:
-        """r."""
+        """Copy r."""
         return r.copy()
 
 
@@ -72,7 +70,7 @@ class StiffnessScaled(Preconditioner):
         W_inverse: (owned rows, owned rows) W^-1 of the active rows, 0 on the others.
     """
 
-    norm, soften = np.inf, never_softens
+    soften = never_softens
 
     def __init__(self, operators: InterfaceOperators, stiffness: Callable[[Float], Float]) -> None:
         """`stiffness` is x -> S x for x (boundary dofs,) or (boundary dofs, k).  Collective."""
@@ -90,27 +88,27 @@ class StiffnessScaled(Preconditioner):
         self.W_inverse = self.W.inverse(active)
 
     def displacement_with_jump(self, g: Float) -> Float:
-        """(boundary dofs,) or (boundary dofs, k) B_D^T g = D^-1 B^T W^-1 g, which jumps by g on the active rows."""
+        """Compute displacements B_D^T g = D^-1 B^T W^-1 g with the jumps g on the active rows."""
         return np.asarray(self.DBT @ self.jump_operator.gather(self.W_inverse @ g))
 
     def multipliers(self, forces: Float) -> Float:
-        """B_D f = W^-1 B D^-1 f: lam on the active rows with B^T lam = f, if there is any."""
+        """Compute B_D f = W^-1 B D^-1 f: the lam on the active rows with B^T lam = f, if it exists."""
         return np.asarray(self.W_inverse @ self.jump_operator.sum(self.BD @ forces))
 
     def apply(self, r: Float) -> Float:
-        """W^-1 B D^-1 S D^-1 B^T W^-1 r."""
+        """Compute W^-1 B D^-1 S D^-1 B^T W^-1 r."""
         return self.multipliers(self.stiffness(self.displacement_with_jump(r)))
 
 
 class Dirichlet(StiffnessScaled):
-    """Around the Schur complements."""
+    """M^-1 with the Schur complements of the subdomains."""
 
     def __init__(self, operators: InterfaceOperators) -> None:
         super().__init__(operators, operators.apply_with_springs)
 
 
 class Lumped(StiffnessScaled):
-    """Around the boundary blocks of K."""
+    """M^-1 with the boundary blocks of K."""
 
     def __init__(self, operators: InterfaceOperators) -> None:
         parts = zip(operators.subdomains, operators.dofs, strict=True)

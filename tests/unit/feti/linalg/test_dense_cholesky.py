@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from feti_homog.feti.linalg.dense_matrices import full_from_lower, invert_upper
-from feti_homog.feti.thresholds import MIRRORED_BLOCK_ROWS, TRIANGLE_INVERSE_ROWS
+from feti_homog.feti.thresholds import BLOCK_ROWS
 
-SIZES = [1, 2, TRIANGLE_INVERSE_ROWS, TRIANGLE_INVERSE_ROWS + 1, MIRRORED_BLOCK_ROWS, MIRRORED_BLOCK_ROWS + 1, 203]
+SIZES = [1, 2, BLOCK_ROWS, BLOCK_ROWS + 1, 2 * BLOCK_ROWS, 2 * BLOCK_ROWS + 1, 203]
 
 
 def definite(n):
