@@ -15,6 +15,7 @@ import numpy as np
 
 from feti_homog.case import sections, toml_files
 from feti_homog.materials import engineering_constants, voigt
+from feti_homog.report.text import study_tables
 from feti_homog.results import atomic
 from feti_homog.studies import estimation, fit_result
 from feti_homog.studies.axes import Assignment
@@ -106,7 +107,7 @@ class Fit(Study):
         return mpi_errors.on_root(evaluator.comm, write, Evaluations(self, evaluator).estimate())
 
     def text(self, document: Mapping[str, Any]) -> str:
-        return fit_result.text(document)
+        return study_tables.fit_text(document)
 
 
 def _set_output(document: dict[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""A fit's result: the content of fit.json, the table of measured values, and the text."""
+"""A fit's result: the content of fit.json, and the table of measured values."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -6,12 +6,10 @@ from typing import Any
 import numpy as np
 
 from feti_homog.case import sections
-from feti_homog.report.text import tables
 from feti_homog.studies.case_folders import csv_text
 from feti_homog.studies.estimation import CONFIDENCE, ParameterEstimates, names_of
 from feti_homog.studies.predictions import Datum
 
-FIRST, LEAST_SHARE, MOST_DEVIATIONS = tables.Column("", -38), 0.01, 3.0
 HEAD = ("test", "name", "strain", "value", "std", "computed", "residual")
 
 
@@ -69,48 +67,3 @@ def _finite(value: float) -> float | None:
 def measured_csv(document: Mapping[str, Any]) -> str:
     """Return the table of measured values."""
     return csv_text([HEAD, *([datum[name] for name in HEAD] for datum in document["measured"])])
-
-
-def text(document: Mapping[str, Any]) -> str:
-    """Return the tables of a fit for a terminal."""
-    measured, is_single = document["measured"], len({datum["test"] for datum in document["measured"]}) == 1
-    tests = ["" if is_single else f"test {datum['test']} " for datum in measured]
-    strains = ["" if d["strain"] is None else f"({d['strain_name']} = {d['strain']:g})" for d in measured]
-    data = [f"{test}{d['name']}{strain}" for test, d, strain in zip(tests, measured, strains, strict=True)]
-    heads = [FIRST, tables.Column("estimate"), tables.Column("std")]
-    heads += [tables.Column(f"{document['confidence']:.0%} interval", 14), tables.Column("", 12)]
-    heads += [tables.Column("  determined by", -40)]
-    rows = list[list[Any]]()
-    for name, unknown in document["unknowns"].items():
-        order = np.argsort(-np.array(unknown["shares"]), kind="stable")[:3]  # the data that determine it best
-        best = [f"{data[k]} {unknown['shares'][k]:.0%}" for k in order if unknown["shares"][k] >= LEAST_SHARE]
-        bound = "" if unknown["at_bound"] is None else f"at its {unknown['at_bound']} bound; "
-        numbers = [unknown["estimate"], *map(_dash, [unknown["std"], *unknown["interval"]])]
-        rows.append([name, *numbers, f"  {bound}{', '.join(best)}"])
-    printed = [tables.Table("Unknowns", heads, rows, title_in_head=True)]
-    rows = [[name, *map(_dash, row)] for name, row in zip(document["unknowns"], document["correlation"], strict=True)]
-    columns = [FIRST, *(tables.Column(str(k + 1), 8, ".3f") for k in range(len(rows)))]
-    printed += [tables.Table("Correlation", columns, rows, title_in_head=True)] if len(rows) > 1 else []
-    columns = [FIRST, *(tables.Column(name) for name in HEAD[3:6]), tables.Column("in std", 10, ".2f")]
-    rows = [[label, *(datum[n] for n in HEAD[3:])] for label, datum in zip(data, measured, strict=True)]
-    printed.append(tables.Table("Measured", columns, rows, title_in_head=True))
-    chance = "" if document["chance"] is None else f", as large or larger with a chance of {document['chance']:.2g}"
-    squares = document["sum_of_squares"]
-    total = "beyond all numbers" if squares is None else f"{squares:.4g}"
-    last = f"Sum of squares {total}{chance}; {document['evaluations']} evaluations"
-    return "\n\n".join(["", *("\n".join(table.lines) for table in printed), last, *_remarks(document, data)])
-
-
-def _dash(value: float | None) -> float | str:
-    return "-" if value is None else value
-
-
-def _remarks(document: Mapping[str, Any], data: Sequence[str]) -> list[str]:
-    """Return a remark where unknowns end at their bounds and a measured value is off by MOST_DEVIATIONS or more."""
-    bound = [f"{name} at its {row['at_bound']}" for name, row in document["unknowns"].items() if row["at_bound"]]
-    residuals = [datum["residual"] for datum in document["measured"]]
-    worst = int(np.argmax(np.abs(residuals)))
-    if not bound or abs(residuals[worst]) <= MOST_DEVIATIONS:
-        return []
-    deviation = f"{data[worst]} is {abs(residuals[worst]):.3g} standard deviations off"
-    return [f"Remark: the fit ends with {', '.join(bound)} bound, and {deviation}"]

@@ -20,7 +20,7 @@ import numpy as np
 
 from feti_homog.case import sections, toml_files
 from feti_homog.errors import CaseError
-from feti_homog.report.text import constant_tables, tables
+from feti_homog.report.text import constant_tables, study_tables
 from feti_homog.schema import wording
 from feti_homog.studies.axes import Assignment, read_points
 from feti_homog.studies.predictions import Datum, exact_derivatives, responses
@@ -32,8 +32,6 @@ from feti_homog.typing import Float
 
 if TYPE_CHECKING:
     Documents = Sequence[Mapping[str, Any]]
-
-NOISY = 0.5  # of a slope: a larger standard error over random cells is worth a line
 
 
 @dataclass(frozen=True)
@@ -85,7 +83,7 @@ class ScatterStudy(Study):
         return mpi_errors.on_root(comm, self._content, means, inexact, ends)
 
     def text(self, document: Mapping[str, Any]) -> str:
-        return text(document)
+        return study_tables.scatter_text(document)
 
     def _content(self, means: Documents, inexact: Sequence[str], ends: Documents) -> dict[str, Any]:
         """Return the content of uncertainty.json behind its digest."""
@@ -200,49 +198,3 @@ def _values(documents: Documents, data: Sequence[Datum]) -> Float:
     """(r, n) values of n data in r results."""
     named = [responses(document) for document in documents]
     return np.array([[values[datum.name] for datum in data] for values in named], float)
-
-
-def text(document: Mapping[str, Any]) -> str:
-    """Return the table with results, their scatter and each input's share, and remarks on noisy slopes."""
-    inputs, of_cells = document["parameters"], {"+- cells": "std_cells", "+- both": "std"}
-    heads = {"value": "value", "+- inputs": "std_inputs", **(of_cells if document["cells"] > 1 else {})}
-    heads["+- mesh"] = "mesh_error"
-    results, labels = _scattered(document), [number["name"].removeprefix("material.") for number in inputs]
-    rows = list[list[Any]]()
-    for result in results:
-        numbers = ["-" if result[key] is None else result[key] for key in heads.values()]
-        name = tables.with_unit(result["name"], document.get("stress_unit", ""))
-        rows.append([name, *numbers, *(100 * fraction for fraction in result["shares"])])
-    columns = [tables.Column("", -max([18, *(len(row[0]) for row in rows)]) - 2), *map(tables.Column, heads)]
-    columns += [tables.Column(label, max(12, len(label) + 2), ".1f") for label in labels]
-    title = "Scatter by uncertain numbers (std), and their shares of its variance (%)"
-    lines = tables.Table(title, columns, rows).lines if rows else ["No result depends on the uncertain numbers."]
-    differing = ", ".join(number["name"] for number in inputs if number["by"] == "differences")
-    lines = ["", *lines, f"By differences of runs: {differing or 'none'}"]
-    for k, number in enumerate(inputs):
-        noisy = [
-            result["name"]
-            for result in results
-            if (errors := result["derivative_errors"]) and errors[k] > NOISY * abs(result["derivatives"][k])
-        ]
-        if noisy:
-            lines.append(
-                f"Standard error over the cells above half of the slope by {number['name']}: {', '.join(noisy)}"
-            )
-    return "\n".join(lines)
-
-
-def _scattered(document: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Return results with more scatter than solver noise beside the largest of their kind."""
-    results = document["results"]
-    names = [result["name"] for result in results]
-    listed, sizes = {*(constant_tables.shown(names) if "C11" in names else names)}, dict[str, float]()
-    for result in results:
-        kind = result["name"].rstrip("0123456789")
-        sizes[kind] = max(sizes.get(kind, 0.0), abs(result["value"]), result["std"])
-    return [
-        result
-        for result in results
-        if result["name"] in listed
-        and tables.without_noise(result["std"], sizes[result["name"].rstrip("0123456789")]) > 0
-    ]

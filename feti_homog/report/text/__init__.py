@@ -3,4 +3,4 @@
 Imports `case`, `materials`, `microstructure` and `results`.  Main entries: `summary.summary`, `tables.Table`.
 """
 
-__all__ = ["constant_tables", "point_tables", "summary", "tables"]
+__all__ = ["constant_tables", "point_tables", "study_tables", "summary", "tables"]

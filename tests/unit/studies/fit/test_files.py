@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from support.base_case import BASE
 
+from feti_homog.report.text import study_tables
 from feti_homog.studies import fit_result
 from feti_homog.studies.estimation import summarize
 from feti_homog.studies.fit_file import parse
@@ -27,7 +28,7 @@ def test_an_unknown_with_a_scatter_beyond_its_bounds_is_named(slope, status):
         fit.unknowns, fit.data, summarize(np.array([200.0]), measured[0], measured, np.array([[slope]]), bounds)
     )
     assert found["status"] == status
-    assert "Remark" not in fit_result.text(found)
+    assert "Remark" not in study_tables.fit_text(found)
     assert [line.partition(": its")[0] for line in found["faults"]] == (
         [] if status == "done" else ["[unknown] material.fibre.young: the measured values hardly determine it"]
     )
@@ -38,7 +39,7 @@ def test_a_fit_that_its_bounds_keep_from_the_data_has_a_remark(computed, words):
     fit = parse(tomllib.loads(BASE + TEXT), Path())
     bounds, measured = (np.array([50.0]), np.array([500.0])), (np.array([150.0]), np.array([1.5]))
     found = summarize(bounds[1], np.array([computed]), measured, np.array([[1.0]]), bounds)
-    last = fit_result.text(fit_result.content(fit.unknowns, fit.data, found)).splitlines()[-1]
+    last = study_tables.fit_text(fit_result.content(fit.unknowns, fit.data, found)).splitlines()[-1]
     assert last.endswith(words) and ("material.fibre.young at its upper bound" in last) == bool(words)
 
 
@@ -50,7 +51,8 @@ def test_every_printed_number_is_that_of_the_normal_equations():
     x, y, std = np.array([200.0, 88.0]), np.array([150.0, 160.0, 40.0]), np.array([1.5, 3.0, 0.5])
     J, computed = np.array([[0.2, 1.0], [0.4, 0.5], [0.05, 0.3]]), y + np.array([3.0, -1.5, 0.25])
     bounds = np.array([50.0, 50.0]), np.array([500.0, 120.0])
-    text = fit_result.text(fit_result.content(asked.unknowns, asked.data, summarize(x, computed, (y, std), J, bounds)))
+    estimates = summarize(x, computed, (y, std), J, bounds)
+    text = study_tables.fit_text(fit_result.content(asked.unknowns, asked.data, estimates))
     covariance = np.linalg.inv(J.T @ (J / std[:, None] ** 2))
     deviation, shares = np.sqrt(covariance.diagonal()), (covariance @ J.T / std) ** 2
     blocks = [[line.split() for line in part.splitlines()] for part in text.split("\n\n")]

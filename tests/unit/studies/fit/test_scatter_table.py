@@ -2,7 +2,7 @@
 
 import re
 
-from feti_homog.studies.uncertainty import text
+from feti_homog.report.text.study_tables import scatter_text
 
 
 def test_stresses_have_their_unit_and_strains_none():
@@ -18,10 +18,10 @@ def test_stresses_have_their_unit_and_strains_none():
         "stress_unit": "MPa", "cells": 1, "parameters": [{"name": "material.matrix.young", "by": "differences"}],
         "results": [scatter | {"name": name} for name in ("onset_S11", "peak_E11", "E_axial")],
     }  # fmt: skip
-    rows = [line.split("  ")[1] for line in text(document).splitlines() if " 30 " in line]
+    rows = [line.split("  ")[1] for line in scatter_text(document).splitlines() if " 30 " in line]
     assert rows == ["onset_S11 (MPa)", "peak_E11", "E_axial (MPa)"]
     del document["stress_unit"]  # as files of earlier versions
-    assert "onset_S11  " in text(document)
+    assert "onset_S11  " in scatter_text(document)
 
 
 def test_every_number_stands_under_its_head():
@@ -40,7 +40,7 @@ def test_every_number_stands_under_its_head():
             for row, own, errors in zip(rows, shares, ([0.4, 1.1], [0.6, 0.9]), strict=True)
         ],
     }  # fmt: skip
-    lines = text(document).splitlines()
+    lines = scatter_text(document).splitlines()
     head = re.split(r"\s{2,}", lines[2].strip())
     assert head == ["value", "+- inputs", "+- cells", "+- both", "+- mesh", "matrix.young", names[1]]
     cells = [re.split(r"\s{2,}", line.strip())[1:] for line in lines[3:5]]

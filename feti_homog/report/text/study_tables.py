@@ -1,0 +1,104 @@
+"""Text of studies: the tables of a fit from fit.json, and of scatter from uncertainty.json."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from feti_homog.report.text import constant_tables, tables
+from feti_homog.typing import Document
+
+FIRST, NUMBERS = tables.Column("", -38), ("value", "std", "computed", "residual")
+LEAST_SHARE, MOST_DEVIATIONS = 0.01, 3.0
+NOISY = 0.5  # of a slope: a larger standard error over random cells is worth a line
+
+
+def fit_text(document: Document) -> str:
+    """Return the tables of a fit: unknowns, their correlation, and measured beside computed values."""
+    measured, is_single = document["measured"], len({datum["test"] for datum in document["measured"]}) == 1
+    tests = ["" if is_single else f"test {datum['test']} " for datum in measured]
+    strains = ["" if d["strain"] is None else f"({d['strain_name']} = {d['strain']:g})" for d in measured]
+    data = [f"{test}{d['name']}{strain}" for test, d, strain in zip(tests, measured, strains, strict=True)]
+    heads = [FIRST, tables.Column("estimate"), tables.Column("std")]
+    heads += [tables.Column(f"{document['confidence']:.0%} interval", 14), tables.Column("", 12)]
+    heads += [tables.Column("  determined by", -40)]
+    rows = list[list[Any]]()
+    for name, unknown in document["unknowns"].items():
+        order = np.argsort(-np.array(unknown["shares"]), kind="stable")[:3]  # the data that determine it best
+        best = [f"{data[k]} {unknown['shares'][k]:.0%}" for k in order if unknown["shares"][k] >= LEAST_SHARE]
+        bound = "" if unknown["at_bound"] is None else f"at its {unknown['at_bound']} bound; "
+        numbers = [unknown["estimate"], *map(_dash, [unknown["std"], *unknown["interval"]])]
+        rows.append([name, *numbers, f"  {bound}{', '.join(best)}"])
+    printed = [tables.Table("Unknowns", heads, rows, title_in_head=True)]
+    rows = [[name, *map(_dash, row)] for name, row in zip(document["unknowns"], document["correlation"], strict=True)]
+    columns = [FIRST, *(tables.Column(str(k + 1), 8, ".3f") for k in range(len(rows)))]
+    printed += [tables.Table("Correlation", columns, rows, title_in_head=True)] if len(rows) > 1 else []
+    columns = [FIRST, *(tables.Column(name) for name in NUMBERS[:3]), tables.Column("in std", 10, ".2f")]
+    rows = [[label, *(datum[n] for n in NUMBERS)] for label, datum in zip(data, measured, strict=True)]
+    printed.append(tables.Table("Measured", columns, rows, title_in_head=True))
+    chance = "" if document["chance"] is None else f", as large or larger with a chance of {document['chance']:.2g}"
+    squares = document["sum_of_squares"]
+    total = "beyond all numbers" if squares is None else f"{squares:.4g}"
+    last = f"Sum of squares {total}{chance}; {document['evaluations']} evaluations"
+    return "\n\n".join(["", *("\n".join(table.lines) for table in printed), last, *_remarks(document, data)])
+
+
+def _dash(value: float | None) -> float | str:
+    return "-" if value is None else value
+
+
+def _remarks(document: Document, data: Sequence[str]) -> list[str]:
+    """Return a remark where unknowns end at their bounds and a measured value is off by MOST_DEVIATIONS or more."""
+    bound = [f"{name} at its {row['at_bound']}" for name, row in document["unknowns"].items() if row["at_bound"]]
+    residuals = [datum["residual"] for datum in document["measured"]]
+    worst = int(np.argmax(np.abs(residuals)))
+    if not bound or abs(residuals[worst]) <= MOST_DEVIATIONS:
+        return []
+    deviation = f"{data[worst]} is {abs(residuals[worst]):.3g} standard deviations off"
+    return [f"Remark: the fit ends with {', '.join(bound)} bound, and {deviation}"]
+
+
+def scatter_text(document: Document) -> str:
+    """Return the table with results, their scatter and each input's share, and remarks on noisy slopes."""
+    inputs, of_cells = document["parameters"], {"+- cells": "std_cells", "+- both": "std"}
+    heads = {"value": "value", "+- inputs": "std_inputs", **(of_cells if document["cells"] > 1 else {})}
+    heads["+- mesh"] = "mesh_error"
+    results, labels = _scattered(document), [number["name"].removeprefix("material.") for number in inputs]
+    rows = list[list[Any]]()
+    for result in results:
+        numbers = ["-" if result[key] is None else result[key] for key in heads.values()]
+        name = tables.with_unit(result["name"], document.get("stress_unit", ""))
+        rows.append([name, *numbers, *(100 * fraction for fraction in result["shares"])])
+    columns = [tables.Column("", -max([18, *(len(row[0]) for row in rows)]) - 2), *map(tables.Column, heads)]
+    columns += [tables.Column(label, max(12, len(label) + 2), ".1f") for label in labels]
+    title = "Scatter by uncertain numbers (std), and their shares of its variance (%)"
+    lines = tables.Table(title, columns, rows).lines if rows else ["No result depends on the uncertain numbers."]
+    differing = ", ".join(number["name"] for number in inputs if number["by"] == "differences")
+    lines = ["", *lines, f"By differences of runs: {differing or 'none'}"]
+    for k, number in enumerate(inputs):
+        noisy = [
+            result["name"]
+            for result in results
+            if (errors := result["derivative_errors"]) and errors[k] > NOISY * abs(result["derivatives"][k])
+        ]
+        if noisy:
+            lines.append(
+                f"Standard error over the cells above half of the slope by {number['name']}: {', '.join(noisy)}"
+            )
+    return "\n".join(lines)
+
+
+def _scattered(document: Document) -> list[Document]:
+    """Return results with more scatter than solver noise beside the largest of their kind."""
+    results = document["results"]
+    names = [result["name"] for result in results]
+    listed, sizes = {*(constant_tables.shown(names) if "C11" in names else names)}, dict[str, float]()
+    for result in results:
+        kind = result["name"].rstrip("0123456789")
+        sizes[kind] = max(sizes.get(kind, 0.0), abs(result["value"]), result["std"])
+    return [
+        result
+        for result in results
+        if result["name"] in listed
+        and tables.without_noise(result["std"], sizes[result["name"].rstrip("0123456789")]) > 0
+    ]
