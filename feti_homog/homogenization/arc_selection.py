@@ -1,7 +1,4 @@
-"""Debonded arcs in a cell.
-
-Whether they select any node, where their tips are, how fine the mesh is there.
-"""
+"""Debonded arcs in a cell: their faults, their tips, and the mesh size there."""
 
 from __future__ import annotations
 
@@ -109,14 +106,12 @@ class EstimatedNodes:
 
 
 def fibre_faults(case: Case, centres: Float) -> list[str]:
-    """List faulty fibres with arcs; centres (fibres, 2), NaN without one."""
-    return [
-        fault
-        for pair, interface in enumerate(case.interfaces)
-        for fault in debonded_arcs.faults(
-            interface.debonded, centres, interface_section.interface_label(pair, len(case.interfaces))
-        )
-    ]
+    """List faults in the fibres of arcs; centres (fibres, 2) are NaN for fibres without a centre."""
+    lines = []
+    for pair, interface in enumerate(case.interfaces):
+        label = interface_section.interface_label(pair, len(case.interfaces))
+        lines += debonded_arcs.faults(interface.debonded, centres, label)
+    return lines
 
 
 def faults(case: Case, nodes: EstimatedNodes, moved: Sequence[debonded_arcs.MovedTips]) -> list[str]:

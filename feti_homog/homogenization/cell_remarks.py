@@ -105,12 +105,11 @@ def table_remarks(case: Case) -> tuple[str, ...]:
     if cell.match is None or cell.matched is None or cell.fibre_fraction is None:
         return ()
     fraction = cell.matched.fibre_fraction
-    if abs(cell.fibre_fraction / fraction - 1.0) <= SAME_FRACTION:
-        return ()
-    return (
+    remark = (
         f"[cell] fibre_fraction = {cell.fibre_fraction:g}: {cell.match.name} has {fraction:.4g}; neighbours are as far "
-        "away as there, in diameters",
+        "away as there, in diameters"
     )
+    return (remark,) if abs(cell.fibre_fraction / fraction - 1.0) > SAME_FRACTION else ()
 
 
 def longest(ends: Float) -> float:
@@ -160,7 +159,17 @@ def warnings(case: Case, width: float, edge: float) -> list[str]:
         strength = f"{math.sqrt(2.0 * stiffness * toughness):.3g}"
         zone, share = f"E' G_Ic / sigma_c^2 = {length:.3g} long for sigma_c = sqrt(2 k_n G_Ic) = {strength}", "half"
     law, limit = f'[interface] law = "{case.interfaces[0].criterion}"', f"elements should be at most {share} of that"
-    remedies = _remedies(case, width, edge, resolved * length)
+    refine = math.ceil(math.log2(edge / (resolved * length)))
+    # Rounded down to two digits.
+    needed = resolved * length * 2**case.cell.refine / width
+    digit = 10.0 ** (math.floor(math.log10(needed)) - 1)
+    needed = math.floor(needed / digit + 1e-9) * digit
+    finer = [f"refine = {refine}"] if refine <= cell_sizes.MOST_REFINED else []
+    if case.cell.has_own_mesh:
+        remedies = " or ".join([*finer, "a finer mesh"])
+    else:
+        sizes = [f"interface_size = {needed:.2g} (or mesh_size, of all elements)"] if needed >= LEAST_SIZE else []
+        remedies = ", or ".join([*sizes, *finer]) or "interface_size and refine"
     return [f"{law}: {size}; the process zone is {zone}, {limit}: set {remedies}", *lines]
 
 
@@ -189,18 +198,3 @@ def _law_warnings(case: Case) -> list[str]:
             f"softening_tolerance is {tolerance:.1%}; without teeth the program chooses their number"
         )
     return lines
-
-
-def _remedies(case: Case, width: float, edge: float, length: float) -> str:
-    """Return keys that make elements as short as `length`."""
-    refine = math.ceil(math.log2(edge / length))
-    # Rounded down to two digits.
-    size = length * 2**case.cell.refine / width
-    digit = 10.0 ** (math.floor(math.log10(size)) - 1)
-    size = math.floor(size / digit + 1e-9) * digit
-    finer = [f"refine = {refine}"] if refine <= cell_sizes.MOST_REFINED else []
-    if case.cell.has_own_mesh:
-        return " or ".join([*finer, "a finer mesh"])
-    if size >= LEAST_SIZE:
-        finer.insert(0, f"interface_size = {size:.2g} (or mesh_size, of all elements)")
-    return ", or ".join(finer) or "interface_size and refine"

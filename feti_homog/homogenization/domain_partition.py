@@ -17,7 +17,7 @@ from feti_homog.mesh.tiles import tile_filling
 from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.typing import Bool, Float, Int
 
-ROUNDING = 1e-9  # of coordinates, relative to the cell
+ROUNDING = 1e-9  # of coordinates, relative to the cell or to the radius of a fibre
 
 
 @dataclass(frozen=True)
@@ -222,20 +222,13 @@ def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triang
 def _cut_across(
     case: Case, torus: Torus, lattice: ReferenceLattice, n_ranks: int, policy: partition_policy.PartitionPolicy
 ) -> partition.Partition | None:
-    """Return the cell cut across materials.
-
-    None if it is not asked for, or leaves a rank without a piece.
-    """
+    """Cut the cell across materials; None unless the policy wants it and each rank gets a piece."""
     triangles = len(torus.mesh.triangles)
-    pieces = (
-        policy.across_pieces(triangles * lattice.intervals**2, n_ranks)
-        if partition_policy.can_be_cut_across(case)
-        else 0
-    )
+    dofs = triangles * lattice.intervals**2
+    pieces = policy.across_pieces(dofs, n_ranks) if partition_policy.can_be_cut_across(case) else 0
     if not 0 < pieces <= triangles:
         return None
-    is_large = triangles * lattice.intervals**2 >= policy.strip_dofs
-    if pieces == n_ranks == 2 and is_large and (strips := partition.halves(torus)):
+    if pieces == n_ranks == 2 and dofs >= policy.strip_dofs and (strips := partition.halves(torus)):
         return strips
     cut = partition.decompose(torus, np.zeros(triangles, np.int64), np.array([pieces]), n_ranks)
     return cut if len(cut.rank) >= n_ranks else None  # METIS leaves some pieces empty

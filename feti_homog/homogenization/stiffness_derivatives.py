@@ -22,14 +22,13 @@ from feti_homog.case import Case, cell_section, material_sections
 from feti_homog.fem import Problem, assembly, bubble, shape_functions
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
-from feti_homog.homogenization.domain_partition import CellSummary
+from feti_homog.homogenization.domain_partition import ROUNDING, CellSummary
 from feti_homog.homogenization.uniform_parts import UniformPart
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.materials import material_derivatives
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int32
 
-ON_CIRCLE = 1e-9  # of the radius
 IMAGES = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2)
 
 
@@ -182,7 +181,7 @@ def _gram(fields: Float, weights: Float) -> Float:
 
 
 def _stretched_springs(cell: TornCell, responses: Sequence[Response]) -> Float:
-    """(sections, components, k, k) sums lam_i C lam_j over bonds.  Collective."""
+    """Sum lam_i C lam_j over the bonds: (sections, components, k, k).  Collective."""
     nodes, c, k = cell.solver.jump_operator.nodes, cell.solver.problem.components, len(responses)
     work = np.zeros((len(cell.case.interfaces), c, k, k))
     lam = np.stack([response.scale * response.state.solution.lam for response in responses], axis=1)
@@ -194,7 +193,7 @@ def _stretched_springs(cell: TornCell, responses: Sequence[Response]) -> Float:
 
 
 def _spring_constants(case: Case) -> Iterator[tuple[str, float, tuple[list[tuple[int, int]], list[tuple[int, int]]]]]:
-    """Yield finite interface stiffnesses with sections and components by problem."""
+    """Yield names and values of finite spring stiffnesses, with their sections and components by problem."""
     several = len(case.interfaces) > 1
     for number, bond in enumerate(case.interfaces):
         section = f"interface.{number + 1}" if several else "interface"
@@ -234,5 +233,5 @@ def _velocity(points: Float, cell: CellSummary) -> Float:
         away -= period * np.round(away / period)
         distance = np.linalg.norm(away, axis=1, keepdims=True)
         share = np.clip((radius + reach - distance) / reach, 0.0, 1.0) * radius / np.maximum(distance, radius)
-        V += away * np.where(distance <= radius * (1 + ON_CIRCLE), 1.0, share)
+        V += away * np.where(distance <= radius * (1 + ROUNDING), 1.0, share)
     return V

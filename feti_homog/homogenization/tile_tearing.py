@@ -129,10 +129,10 @@ def fill_own(tiles: list[tuple[int, tile_filling.Tile]]) -> list[tuple[int, tile
 def can_be_torn_by_tiles(
     case: Case, noded: gmsh_mesher.NodedCell | CoarseMesh | None, lattice: ReferenceLattice, policy: PartitionPolicy
 ) -> bool:
-    """Return whether nothing needs the mesh on one rank.
+    """Return whether the mesh need not be on one rank.
 
-    One rank is needed for arc tips, bodies cut by the sides, the matrix in fewer pieces than tiles, and cells that
-    are expected to be small enough for cuts across materials.  A user's mesh is on one rank already.
+    Arc tips, bodies cut by the sides, a matrix in fewer pieces than tiles, and cells that are probably small enough for
+    cuts across materials need one rank.  A user's mesh is on one rank already.
     """
     on_one_rank = case.arcs or case.cell.bodies == "plane" or case.decomposition.subdomains is not None
     if not isinstance(noded, gmsh_mesher.NodedCell) or len(noded.parts) < 2 or on_one_rank:
@@ -162,7 +162,7 @@ def tear_by_tiles(
     pieces = wanted_pieces(case, load, edges, lattice, comm.size, policy)
     longest = comm.allreduce(float(torus.edge_lengths.max(initial=0.0)), MPI.MAX)
     local = mpi_errors.agree(comm, _cut, torus, tile, pieces / load, longest)
-    # Subdomains of all ranks are numbered by body and tile.
+    # Subdomains of all ranks are numbered by body, then by tile.
     first = np.unique(local, return_index=True)[1]
     parts = comm.allgather((torus.constituent[first], tile[first], np.bincount(local)))
     body, tiles, loads = (np.concatenate(rows) for rows in zip(*parts, strict=True))

@@ -33,8 +33,8 @@ ELEMENTS_AT_ONCE = 1 << 13
 REFINED_OFTEN = 3
 # Largest lambda / mu on that mesh, of a Poisson's ratio of 0.4: beyond, errors of coarse elements are no guide.
 LOCKING = 4.0
-# Places of displacements inside bodies, and of pinned ones.
-INSIDE, PINNED = -2, -1
+# Position of a displacement that is not on a boundary: the last one, which is zero.
+NONE = -1
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +146,7 @@ class NestedInterior:
         members: the subdomains.
         mesh: their meshes, joined.
         fixed: (c n,) prescribed displacements: on the boundary, and 0 where a class is pinned.
-        place: (fixed,) places among the displacements on all boundaries; PINNED where a class is pinned.
+        place: (fixed,) positions among the displacements on all boundaries; NONE where a class is pinned.
         interior: the free displacements.
         loads: (free, v) unit load forces Q on free displacements; None without voids.
     """
@@ -170,15 +170,16 @@ class NestedInterior:
         members = [boundary.subdomains[place] for place in places]
         first, meshes, numbers = members[0], [refinement.refine(s.submesh, lattice) for s in members], list[Int]()
         for k, s, mesh in zip(places, members, meshes, strict=True):
-            of_fine = np.full(s.n_dofs, INSIDE)
+            inside = NONE - 1
+            of_fine = np.full(s.n_dofs, inside)
             of_fine[boundary.dofs[k]] = boundary.offsets[k] + np.arange(len(boundary.dofs[k]))
             if s.submesh.pinned >= 0:
-                of_fine[s.problem.dofs(np.array([s.submesh.pinned]))] = PINNED
+                of_fine[s.problem.dofs(np.array([s.submesh.pinned]))] = NONE
             fine = np.empty(mesh.n_classes, np.int64)
             fine[mesh.node_class[mesh.nodes]] = s.mesh.node_class[s.mesh.nodes[:, nested]]
             numbers.append(of_fine[s.problem.dofs(fine)])
         place = np.concatenate(numbers)
-        fixed = np.flatnonzero(place != INSIDE)
+        fixed = np.flatnonzero(place != inside)
         mesh = refinement.joined(meshes)
         body = assembly.assemble(mesh, first.L, first.problem, first.is_mixed)
         interior = one_subdomain.Interior(body.K, fixed)
@@ -188,7 +189,7 @@ class NestedInterior:
     def displacement(self, u: Float, loads: Float) -> Float:
         """(classes, c, k) u* from u (boundary dofs, k) on all boundaries under the loads (v, k)."""
         problem = self.members[0].problem
-        on_boundary = np.vstack([u, np.zeros((1, u.shape[1]))])[self.place]  # PINNED is the last row
+        on_boundary = np.vstack([u, np.zeros((1, u.shape[1]))])[self.place]  # the last row for NONE
         all_dofs = np.empty((len(self.fixed) + len(self.interior.dofs), u.shape[1]))
         all_dofs[self.fixed], all_dofs[self.interior.dofs] = on_boundary, self.interior.extend(on_boundary)
         if self.loads is not None:

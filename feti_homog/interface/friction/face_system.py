@@ -22,8 +22,6 @@ FACTORIZATIONS = 12
 
 # Force on a free motion, relative to the forces of the loads, that counts as none.
 UNBALANCED = 1e-7
-# Rounding of forces and jumps, scaled by the stiffness of the node, relative to the terms of its rows of S x.
-NOISE = 1e-11
 
 
 @dataclass(frozen=True)
@@ -65,7 +63,7 @@ class FaceSystem:
 
     @property
     def nodes(self) -> int:
-        """n."""
+        """Number n of nodes."""
         return len(self.friction)
 
     @property
@@ -175,6 +173,6 @@ class FaceSystem:
         return x, rows
 
     def noise(self, x: Float) -> Float:
-        """(n,) rounding in each node's scaled force, and jump."""
+        """Return the rounding (n,) in the scaled force and jump of each node."""
         terms = self.terms(x)[: 2 * self.nodes].reshape(-1, 2)
-        return np.asarray(NOISE * terms.max(axis=1, initial=0.0))
+        return np.asarray(status_system.NOISE * terms.max(axis=1, initial=0.0))

@@ -22,13 +22,10 @@ from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status, coulomb_errors
 from feti_homog.interface.friction.coulomb_faces import CoulombFaces
-from feti_homog.interface.friction.status_system import HELD, OPEN_FACE, REFINEMENTS, STICK
+from feti_homog.interface.friction.status_system import HELD, OPEN_FACE, REFINEMENTS, STICK, UNRESISTED
 from feti_homog.interface.loads import Load, Macroscopic
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int
-
-# Stiffness, relative to the bonded one, that is rounding.
-NO_STIFFNESS = 1e-10
 
 
 class CondensedProblem:
@@ -124,8 +121,8 @@ class AxialFaces:
         diagonal, stiffness = L.diagonal(), L - b.T @ self.jumps
         roots = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
         values, vectors = np.linalg.eigh((stiffness + stiffness.T) / (2.0 * np.outer(roots, roots)))
-        positive = (vectors * np.where(values > NO_STIFFNESS, values, 0.0)) @ vectors.T
-        resists = positive.diagonal() > NO_STIFFNESS
+        positive = (vectors * np.where(values > UNRESISTED, values, 0.0)) @ vectors.T
+        resists = positive.diagonal() > UNRESISTED
         self.stiffness = np.asarray(positive * np.outer(resists * roots, resists * roots))
 
 
@@ -259,7 +256,7 @@ class SlidingCell:
         scales, asked = [problem.scales for problem in self.cell.problems], list[Float]()
         for scale, of in zip(scales, of_problems, strict=True):
             asked.append(np.max([scale.asked(load) for load in of], axis=0))
-        # An unloaded problem has the rounding of the loaded one.
+        # An unloaded problem has the rounding of the loaded problem.
         largest = max(scale.imposed_strain(strain).max() for scale, strain in zip(scales, asked, strict=True))
         for of, strains, (problem, (jump, strain)) in zip(of_problems, asked, self._parts(x), strict=True):
             solution = problem.solution(bonds, jump, strain)

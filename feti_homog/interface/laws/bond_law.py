@@ -18,8 +18,8 @@ from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BondState
 from feti_homog.typing import Bool, Float, Int
 
-# Halvings of an interval of length one that exhaust double precision.
-BISECTIONS = 60
+# Halvings of an interval of length one, or steps of Newton's method, that exhaust double precision.
+MOST_STEPS = 60
 
 
 class KeyValues(Protocol):
@@ -130,12 +130,12 @@ class BondLaw(ABC):
     def crossing(self, before: Float, direction: Float, low: Float, high: Float) -> Float:
         """Bisect [`low`, `high`] for f (p,) at which `before` + f `direction` (p, c) breaks; double a low `high`."""
         high = high.copy()
-        for _ in range(BISECTIONS):
+        for _ in range(MOST_STEPS):
             below = self.share(before + high[:, None] * direction) < 1.0
             if not below.any():
                 break
             high[below] *= 2.0
-        for _ in range(BISECTIONS):
+        for _ in range(MOST_STEPS):
             middle = (low + high) / 2
             broken = self.share(before + middle[:, None] * direction) > 1.0
             low, high = np.where(broken, low, middle), np.where(broken, middle, high)
