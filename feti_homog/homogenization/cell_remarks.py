@@ -1,4 +1,4 @@
-"""Interfaces between a cell's phases, unexpected cell properties, and unresolved bonds."""
+"""Faults of interfaces between phases, remarks on unexpected properties of a cell, warnings of coarse interfaces."""
 
 import math
 
@@ -23,9 +23,9 @@ SAME_RATIO = 1e-3
 
 
 def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
-    """(phases, phases) the case's interface number between two phases; -1 where they never part.
+    """Return the number (phases, phases) of the interface between two phases; -1 where they never part.
 
-    An interface without `between` lies between the matrix, the first phase, and all other phases; perfect bonding too.
+    An interface without `between`, or perfect bonding, lies between the matrix, the first phase, and all other phases.
     """
     pairs = np.full((len(phases), len(phases)), -1)
     for number, between in enumerate([interface.between for interface in case.interfaces] or [None]):
@@ -38,7 +38,7 @@ def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
 
 
 def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -> list[str]:
-    """List interfaces between phases that the cell lacks, or that never touch.
+    """List interfaces between phases that the cell does not have, or that never touch.
 
     Phases `first` (n,) touch phases `second` (n,).
     """
@@ -59,7 +59,7 @@ def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -
 
 
 def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
-    """List mesh remarks, an [interface] without effect, and nodes that never part.
+    """List remarks of the mesh, an [interface] without effect, and nodes that never part.
 
     `pairs` as in `share_entities`.
     """
@@ -87,7 +87,7 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
 
 
 def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles: int) -> tuple[str, ...]:
-    """Remark more or fewer subdomains than asked for, with the reason."""
+    """Explain a number of subdomains that differs from the requested number."""
     asked = case.decomposition.subdomains
     if asked is None or asked == subdomains:
         return ()
@@ -100,7 +100,7 @@ def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles
 
 
 def table_remarks(case: Case) -> tuple[str, ...]:
-    """Remark a fibre fraction that differs from the matched table."""
+    """Note a fibre fraction that differs from the fraction of the matched table."""
     cell = case.cell
     if cell.match is None or cell.matched is None or cell.fibre_fraction is None:
         return ()
@@ -174,7 +174,7 @@ def warnings(case: Case, width: float, edge: float) -> list[str]:
 
 
 def _law_warnings(case: Case) -> list[str]:
-    """Warn if cohesive energy depends on mode order, and if teeth overshoot."""
+    """Warn if the cohesive energy depends on the order of modes, and if teeth exceed the peak traction."""
     if not phase_laws.has_softening(case):
         return []
     lines, law = [], phase_laws.bond_law(case.interfaces, np.zeros(0, np.int64))

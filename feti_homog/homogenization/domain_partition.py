@@ -27,7 +27,7 @@ class CellSummary:
     Attributes:
         width, height: periods.
         phases: material phase names, the matrix first.
-        bodies, subdomains, coarse_triangles: how many there are.
+        bodies, subdomains, coarse_triangles: their numbers.
         interface_edge: longest coarse edge between phases.
         numbers: (constituents,) numbers from 1, as in case files, for fibres and the fibres that coatings coat; 0 for
             the matrix.
@@ -183,7 +183,7 @@ def distribute(
 
 
 def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triangles: int) -> CellSummary:
-    """Summarize the cell with so many subdomains and coarse triangles."""
+    """Summarize a tiled cell with its numbers of subdomains and coarse triangles."""
     regions, lines, arrangement = noded.regions, noded.lines, noded.arrangement
     inside = regions.constituent[:-1]
     solid = np.flatnonzero(inside >= 0)
@@ -251,7 +251,7 @@ def in_cell(points: Float, period: Float) -> Float:
 
 
 def _interface_nodes(torus: Torus, pairs: Int, lattice: ReferenceLattice) -> int:
-    """Count nodes where two bodies could part if they had an interface."""
+    """Count the nodes at which two bodies could part if they had an interface."""
     first, second, edge = torus.sides
     between = edge[pairs[torus.mesh.phase[first], torus.mesh.phase[second]] >= 0]
     plane = np.unique(torus.torus_edge, return_index=True)[1][between]

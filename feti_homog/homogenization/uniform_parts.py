@@ -27,7 +27,7 @@ from feti_homog.mesh import (
 )
 from feti_homog.typing import Float, Int
 
-# Subdomains of so many elements at once: few enough for the processor's cache, many enough for NumPy.
+# Elements of a group of subdomains: few enough for the processor's cache, many enough for NumPy.
 ELEMENTS_AT_ONCE = 1 << 13
 # Halvings from which on the mesh that is refined twice less serves, but across materials and where a phase locks.
 REFINED_OFTEN = 3
@@ -59,7 +59,7 @@ class UniformPart:
 
 
 def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterator[UniformPart]:
-    """Yield all subdomains' parts, in each by phase and body; `phase_of` (constituents,) names phases."""
+    """Yield the parts of all subdomains, ordered by phase and body; `phase_of` (constituents,) names phases."""
     for place, s in enumerate(subdomains):
         if s.material is None:
             yield UniformPart(place, s.submesh, s.mesh, np.arange(s.n_dofs), s.L, s.problem, s.is_mixed)
@@ -75,7 +75,7 @@ def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterat
 
 
 def nodes_of_parts(s: Subdomain) -> int:
-    """Count plane nodes in all parts; shared nodes count for each."""
+    """Count the plane nodes of all parts of a subdomain; each part counts its shared nodes."""
     body, nodes = np.repeat(s.submesh.constituent, s.mesh.nodes.shape[1]), s.mesh.nodes.ravel()
     last = np.empty(len(s.mesh.points), np.int64)
     last[nodes] = body
@@ -84,10 +84,7 @@ def nodes_of_parts(s: Subdomain) -> int:
 
 
 def _restricted(mesh: FineMesh, members: Int) -> tuple[FineMesh, Int]:
-    """Restrict the mesh to the coarse triangles `members` (t,).
-
-    Returns it and (c,) its classes in the whole mesh.
-    """
+    """Restrict a mesh to coarse triangles (t,); return it and its classes (c,) in the whole mesh."""
     nodes, local = periodic_topology.present(mesh.nodes[members], len(mesh.points))
     classes, node_class = periodic_topology.present(mesh.node_class[nodes], mesh.n_classes)
     numbers, curved = (local.astype(np.int32), node_class.astype(np.int32)), mesh.curved[members]
@@ -101,7 +98,7 @@ def share_parts(
     pairs: Int,
     lattice: ReferenceLattice,
 ) -> SharedEntities:
-    """Share part nodes as `share_entities` shares subdomain nodes, listed in `table`.  Collective."""
+    """Share the nodes of parts, as `share_entities` shares the nodes of subdomains.  Collective."""
     body = np.array([p.submesh.body for p in parts])
     member = np.repeat(np.arange(len(parts)), [len(p.mesh.nodes) for p in parts])
     index, phase = np.array([p.submesh.index for p in parts]), tuple(p.submesh.phase for p in parts)
@@ -132,7 +129,7 @@ class ForcesBetweenParts:
         self._inverse = blocks.inverse(np.ones(jumps.owned[1] - jumps.owned[0]))
 
     def multipliers(self, u: Float, loads: Float) -> Float:
-        """(owned rows,) lam = (B B^T)^-1 B (-K u - Q E); u (dofs,).  Collective."""
+        """Return lam = (B B^T)^-1 B (-K u - Q E) (owned rows,) from u (dofs,).  Collective."""
         forces = np.zeros(len(u))
         forces[self._dofs] = -self._K @ u[self._dofs] - self._Q @ loads
         return np.asarray(self._inverse @ self._jumps.sum(self._jumps.B @ forces))
@@ -198,7 +195,7 @@ class NestedInterior:
 
 
 def locks(subdomains: Sequence[Subdomain | UniformPart], comm: MPI.Intracomm) -> bool:
-    """Return whether elements in any phase hardly change volume.  Collective."""
+    """Return whether any phase is nearly incompressible, so that coarse elements lock.  Collective."""
     locking = any(s.problem.components == 2 and s.L[0, 1] > LOCKING * s.L[2, 2] for s in subdomains)
     return bool(comm.allreduce(locking, MPI.LOR))
 

@@ -46,7 +46,7 @@ class StuckError(NotCarriedError):
 
 @dataclass(frozen=True)
 class StatusSearch:
-    """Search for admissible statuses (n,) and scaled x (m,); methods return None if they find none.
+    """Search for admissible statuses (n,) and scaled x (m,); methods return None without a result.
 
     Attributes:
         allowed: (n, 4) statuses that a node may have, in the columns [STICK, FORWARD, OPEN_FACE, BACKWARD]; conditions
