@@ -38,10 +38,7 @@ def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
 
 
 def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -> list[str]:
-    """List interfaces between phases that the cell does not have, or that never touch.
-
-    Phases `first` (n,) touch phases `second` (n,).
-    """
+    """List interfaces between absent or separate phases; phases `first` (n,) touch phases `second` (n,)."""
     lines = []
     touching = np.zeros((len(phases), len(phases)), bool)
     touching[first, second] = touching[second, first] = True

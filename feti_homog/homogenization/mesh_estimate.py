@@ -146,10 +146,7 @@ def _has_corners(cell: TornCell) -> bool:
 def _recovered(
     cell: TornCell, responses: Sequence[Response], keep: bool, lattice: ReferenceLattice
 ) -> Iterator[tuple[stress_recovery.RecoveredStress, arc_error.ArcSides]]:
-    """Yield recovered stresses and arcs of this rank's subdomain groups, refined by the lattice.
-
-    Collective before the first.
-    """
+    """Yield recovered stresses and arcs by subdomain group, refined by the lattice.  Collective before the first."""
     u = np.stack([response.u for response in responses], axis=1)
     loads = np.stack([response.strain for response in responses], axis=1)
     groups_of_rank, meshes = list[Group](), list[tuple[list[Submesh], FineMesh]]()

@@ -156,10 +156,7 @@ def wanted_pieces(
 
 
 def applications(case: Case, problem: Problem, across: bool = False) -> int:
-    """Estimate how often the analysis applies a problem's dual operator.
-
-    Coatings cost no iterations where pieces reach `across` materials.
-    """
+    """Estimate applications of a problem's dual operator; coatings cost no iterations in pieces `across` phases."""
     has_arcs = bool(case.arcs) or case.cell.has_own_mesh  # with a curve "debonded", perhaps
     touches = case.interface is not None and case.interface.contact and (has_arcs or case.section.is_followed)
     contact = touches and problem != AXIAL  # along the fibres nothing touches

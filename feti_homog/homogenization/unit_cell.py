@@ -88,10 +88,7 @@ class TornCell:
         return np.concatenate([np.zeros(0), *(part for _, part in self.displacements(u, solution.strain))])
 
     def displacements(self, u: Float, loads: Float, keep: bool = True) -> Iterator[tuple[UniformPart, Float]]:
-        """Yield each part with its u* (dofs, k), extended from u (boundary dofs, k) under the loads (v, k).
-
-        `keep` stores the interior factors.
-        """
+        """Extend u (boundary dofs, k) under loads (v, k) to each part's u* (dofs, k); `keep` stores factors."""
         place, extended = -1, np.zeros(0)
         for part in self.parts:
             if part.place != place:

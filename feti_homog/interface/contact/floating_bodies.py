@@ -45,8 +45,7 @@ class _Fibres:
         is_open: (k,) open nodes.
         opening: (k, motions) gaps that the free motions open.
         reach: (motions,) largest gap or slip of each motion at any node: open nodes may lie within one rigid group.
-        fibre: (k,) number of the fibre; a fibre and its coating, which may part too, count as one, as do neighbouring
-            layers.
+        fibre: (k,) number of the fibre; a fibre and its coating, or neighbouring layers, count as one.
     """
 
     is_open: Bool

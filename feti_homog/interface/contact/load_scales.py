@@ -1,7 +1,4 @@
-"""Sizes of strains, stresses and displacements that a load causes in the bonded cell: scales for tolerances and errors.
-
-Debonding does not change these scales, so that they vanish without a load only.
-"""
+"""Sizes of load effects in the bonded cell, which debonding does not change: scales for tolerances and errors."""
 
 from functools import cached_property
 

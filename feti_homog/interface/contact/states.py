@@ -150,7 +150,7 @@ def kkt_errors(
 def coulomb_errors(force: Float, friction: Float, sliding: Status) -> Float:
     """Measure the violation (k,) of Coulomb's law: |t| <= mu p where faces stick, t = s mu p where they slide.
 
-    Shear along the fibres, where debonded faces have no friction, counts as a violation too.
+    Shear along the fibres, where faces have no friction, is a violation too.
 
     Args:
         force: (k, c) normal, tangential and axial traction of faces, without the springs of damaged bonds.

@@ -256,10 +256,7 @@ class CoulombFaces(FaceSystem):
         return float((tangential * (after - before)[1 : 2 * self.nodes : 2])[sliding].sum())
 
     def losses(self, status: Status, before: Float, after: Float) -> tuple[float, float]:
-        """Return the energy that faces lose in a step at constant load, and the heat in this energy.
-
-        Along the way forces change in proportion to jumps.
-        """
+        """Return the energy that faces lose on a straight way at constant load, and the heat in this energy."""
         forces = -(self.product(before) + self.product(after)) / 2
         forces[self.loads] = 0.0
         return float(forces @ (after - before)), self.heat_behind(status, before, after)

@@ -68,7 +68,7 @@ class FaceSystem:
 
     @property
     def loads(self) -> slice:
-        """Places of the loads in x."""
+        """Indices of the loads in x."""
         return slice(2 * self.nodes, len(self.S))
 
     def forces(self, x: Float) -> tuple[Float, Float]:
@@ -143,10 +143,7 @@ class FaceSystem:
         return self._last[1]
 
     def settled(self, status: Status, load: Prescribed, x: Float) -> tuple[Status, Float]:
-        """Return the statuses, and x (m,) without the rounding of the way to it.
-
-        With a free motion, which rounding would drive, x stays.
-        """
+        """Solve for x (m,) again without accumulated rounding; keep x if a free motion exists."""
         return status, self.linear(status, load, x)[0] if self.sign(status, load.by_stress) else x
 
     def is_balanced(self, status: Status, load: Prescribed, x: Float) -> bool:

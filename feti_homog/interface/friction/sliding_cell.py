@@ -180,10 +180,7 @@ class SlidingCell:
             self.faces.follow(faces, np.concatenate([pairs, loads]), other)
 
     def begin(self, bonds: BondState, strain: Float) -> tuple[Status, Float]:
-        """Return statuses (n,) and scaled x (m,) from bonds and a strain (v,).  Collective.
-
-        Faces without a history just touch.
-        """
+        """Return statuses (n,) and scaled x (m,) of bonds, closed without a history, at a strain (v,).  Collective."""
         self.take(bonds)
         jump = np.zeros((len(bonds.status), 2)) if bonds.gap_and_slip is None else bonds.gap_and_slip
         apart = np.where(self._damaged, ~bonds.pressed, bonds.status == OPEN)
@@ -218,10 +215,7 @@ class SlidingCell:
         return np.asarray((x / self.faces.size)[: self.faces.loads.start])
 
     def traction(self, x: Float) -> Float:
-        """(k, 2) or, with the axial one, (k, 3) traction at this rank's bonds; 0 where they broke.
-
-        A damaged bond has its intact share's traction.
-        """
+        """Return the traction (k, 2), or (k, 3) with the axial one, in the intact fractions of this rank's bonds."""
         force = np.zeros((len(self.friction), sum(rows.shape[1] for rows in self._held_rows)))
         parts = zip(self._held_rows, self._parts(x), strict=True)
         force[self._held] = np.hstack([problem.some_multipliers(rows, *answer) for rows, (problem, answer) in parts])

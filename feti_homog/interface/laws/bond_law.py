@@ -85,17 +85,11 @@ class BondLaw(ABC):
         return np.full(p, self.is_convex)
 
     def after(self, bonds: BondState, which: Bool, traction: Float) -> tuple[Float, Bool]:
-        """(k, h) internal variables after the break of some bonds, and (k,) bonds that part.
-
-        The bonds `which` (k,) break, under tractions (k, c).
-        """
+        """Break the bonds `which` (k,) under tractions (k, c): internal variables (k, h), and (k,) bonds that part."""
         return bonds.history, which
 
     def softening(self, bonds: BondState, pulled: Bool) -> Float | None:
-        """(k, 3) C / C_0 of normal, tangential and axial springs, of bonds `pulled` (k,) or pressed.
-
-        None if C never changes.
-        """
+        """Return C / C_0 (k, 3) of all springs in bonds `pulled` (k,) or pressed; None if C never changes."""
         return None
 
     def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:

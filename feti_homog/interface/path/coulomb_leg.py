@@ -24,7 +24,7 @@ from feti_homog.interface.path.path_points import Energies, PathState, Point
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.typing import Float
 
-# Share of a leg between points, after which a change of statuses is a point.
+# Fraction of a leg after the last point, beyond which a change of statuses is a point.
 LEAST_SHARE = 0.01
 # Changes at one load that count as a cycle.
 MOST_CHANGES_AT_A_LOAD = 200
@@ -68,7 +68,7 @@ class CoulombLeg(Leg):
         return replace(super()._path_state(), stretched=self.sliding.stretched(self._x))
 
     def _on_root(self, find: Callable[..., tuple[Status, Float]], *arguments: Any) -> tuple[Status, Float]:
-        """Return statuses and x that rank 0 finds; every rank stores their product.  Collective."""
+        """Call `find` on rank 0; return its statuses and x, whose product all ranks store.  Collective."""
         faces = self.sliding.faces
 
         def found() -> tuple[Status, Float, Float]:
@@ -80,12 +80,12 @@ class CoulombLeg(Leg):
         return status, x
 
     def _given(self, share: float, x: Float) -> Prescribed:
-        """Return the load at a share of the leg, with the slips of scaled x."""
+        """Prescribe the load at a fraction of the leg, and the slips of scaled x."""
         load = self._load_at(share)
         return Prescribed(load.by_stress, self.sliding.given(load), x[1 : 2 * len(self.sliding.rows) : 2])
 
     def _stand(self, status: Status, x: Float, mean: Macroscopic, way: Energies) -> None:
-        """Take statuses and scaled x, after a way with these energies."""
+        """Set the state to statuses and scaled x, after a way with these energies."""
         self._energies = self._energies.plus(way)
         self._bonds = self.sliding.bonds(self._bonds, status, x)
         self._status, self._x, self._mean, self._state = status, x, mean, None
@@ -156,7 +156,7 @@ class CoulombLeg(Leg):
             raise StuckError(CYCLE)
 
     def _go_to(self, share: float) -> None:
-        """Advance to a share of the leg in one step, or to the largest share that the cell carries.  Collective.
+        """Advance to a fraction of the leg in one step, or to the largest that the cell carries.  Collective.
 
         Raises:
             NotCarriedError: the cell carries nothing beyond the last step.
@@ -169,7 +169,7 @@ class CoulombLeg(Leg):
         self._stand(status, after, sliding.macroscopic(after), way)
 
     def _carried(self, share: float) -> tuple[float, NotCarriedError | None]:
-        """Return this share of the leg, or the largest one that the cell carries with the error beyond it."""
+        """Return the largest fraction up to `share` that the cell carries, and the error that limits it or None."""
         low, high, faces = self._share, share, self.sliding.faces
         try:
             faces.step(self._status, self._given(share, self._x), self._x)

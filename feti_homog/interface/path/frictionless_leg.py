@@ -74,7 +74,7 @@ class FrictionlessLeg(Leg):
         return self.cell.equilibrium(self._load_at(share), bonds, lam)
 
     def _stand(self, share: float, state: Equilibrium) -> None:
-        """Take the equilibrium at a share of the leg, and add the energies of the way."""
+        """Set the state to the equilibrium at a fraction of the leg, and add the energies of the way."""
         if share >= self._bends_before:
             self._bends_before = np.inf
         self._share, self._state, self._bonds = share, state, state.bonds
@@ -131,14 +131,11 @@ class FrictionlessLeg(Leg):
         return self._share + rest * breaks, self._share + rest * begins, self._share + rest * certain
 
     def _is_due(self) -> bool:
-        """Return whether the worst bonds are at their strength."""
+        """Return whether the most utilised bonds are at their strength."""
         return self._used()[1] > 1.0 - UTILISATION_TIE
 
     def _approach(self, target: float, end: Sequence[DualSolution]) -> bool:
-        """Advance to the target, or to the first half, quarter, ... of the way with a straight response.
-
-        Return whether it is the target.
-        """
+        """Advance to the target if the response is straight, else halve the way; return whether it is reached."""
         start, begin, reached = self._share, self._state, True
         nearest = min(start + SAME_SHARE, 1.0)
         target = max(target, nearest)
