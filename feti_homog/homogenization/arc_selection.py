@@ -1,7 +1,4 @@
-"""Debonded arcs in a cell.
-
-Whether they select any node, where their tips are, how fine the mesh is there.
-"""
+"""Debonded arcs in a cell: their faults, their tips, and the mesh size there."""
 
 from __future__ import annotations
 
@@ -28,7 +25,7 @@ LEAST_SIZE = 1e-5  # at tips / width of the cell, by default
 
 
 def marks(case: Case, fibres: int) -> dict[int, list[float]]:
-    """Return all tip directions by their curve's number (`BareOutline.of`)."""
+    """Return the directions of all tips by curve number (`BareOutline.of`)."""
     by_curve: dict[int, set[float]] = {}
     for interface in case.interfaces:
         is_within = interface.between is not None and {phase_names.COATING, phase_names.MATRIX} & set(
@@ -40,7 +37,7 @@ def marks(case: Case, fibres: int) -> dict[int, list[float]]:
 
 
 def size(case: Case, estimate: element_estimate.ElementEstimate) -> float | None:
-    """Return element size at tips / cell width, None for the interface size.
+    """Return the element size at tips over the cell width; None for the size on interfaces.
 
     Without `tip_size` in the case it is, with the mean radius / width R,
 
@@ -94,10 +91,7 @@ class EstimatedNodes:
         return cls(numbers[inner[side]], pair[pair >= 0][side], directions, is_vertex)
 
     def moved_tips(self, case: Case, fibres: int) -> tuple[debonded_arcs.MovedTips, ...]:
-        """Find each interface's tips that the mesher moved into a near vertex.
-
-        A user's mesh has none.
-        """
+        """Return, by interface, the tips that the mesher moved into a near vertex; none in a user's mesh."""
         if case.cell.has_own_mesh:
             return (debonded_arcs.NOT_MOVED,) * len(case.interfaces)
         distance, moved = float(np.degrees(outline.MERGED)), []
@@ -109,18 +103,16 @@ class EstimatedNodes:
 
 
 def fibre_faults(case: Case, centres: Float) -> list[str]:
-    """List faulty fibres with arcs; centres (fibres, 2), NaN without one."""
-    return [
-        fault
-        for pair, interface in enumerate(case.interfaces)
-        for fault in debonded_arcs.faults(
-            interface.debonded, centres, interface_section.interface_label(pair, len(case.interfaces))
-        )
-    ]
+    """List faults in the fibres of arcs; centres (fibres, 2) are NaN for fibres without a centre."""
+    lines = []
+    for pair, interface in enumerate(case.interfaces):
+        label = interface_section.interface_label(pair, len(case.interfaces))
+        lines += debonded_arcs.faults(interface.debonded, centres, label)
+    return lines
 
 
 def faults(case: Case, nodes: EstimatedNodes, moved: Sequence[debonded_arcs.MovedTips]) -> list[str]:
-    """List faulty arcs, and nonzero [angle] openings that select no node."""
+    """List the arcs, and the nonzero [angle] openings, that select no node."""
     openings: Sequence[float | None] = case.section.openings or [None]
     lines = []
     for pair, interface in enumerate(case.interfaces):

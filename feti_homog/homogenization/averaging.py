@@ -1,4 +1,4 @@
-"""Macroscopic cell response, laws that it obeys, and debonded fibre lengths.
+"""Macroscopic response of a cell, errors in the laws that it obeys, and debonded lengths of fibres.
 
 Strains E are [E11, E22, gamma12] in the plane, then the problem's other loads; stresses are alike.
 """
@@ -51,7 +51,7 @@ class Response:
             where forces do; absent for a cell that is one subdomain.
             `stress`: the largest error in a prescribed stress relative to the largest stress or, if less, to the least
             stress from the strains in a bonded cell.  And the KKT certificate of contact.
-        counts: how many interface nodes are `bonded`, `open` and `closed`.
+        counts: numbers of `bonded`, `open` and `closed` interface nodes.
         damage: (k,) bond damage, 0 intact to 1 broken.
         shares: (m,) this rank's element shares in the estimated error of E . Sigma; None without estimate.
     """
@@ -185,7 +185,7 @@ class Homogenization:
         return (bonds.status != BONDED).astype(float) if damage is None else damage
 
     def _rubbing(self, state: Equilibrium) -> float:
-        """Sum force times slip on faces with friction, per area, which is not stored.  Collective."""
+        """Return the work on faces with friction per area, which is not stored.  Collective."""
         if state.bonds.gap_and_slip is None:
             return 0.0
         work = float(state.solution.lam @ state.solution.jump) - coupled_interfaces.energy_beside_springs(
@@ -242,15 +242,12 @@ class Homogenization:
         return float(self.cell.comm.allreduce(inner, MPI.MAX) / self.cell.comm.allreduce(size, MPI.MAX))
 
     def _largest(self, values: Float) -> float:
-        """max |values| over all ranks."""
+        """Return max |values| over all ranks.  Collective."""
         return float(self.cell.comm.allreduce(np.abs(values).max(initial=0.0), MPI.MAX))
 
 
 class FibreInterfaces:
-    """Interfaces of a cell's f fibres, by number; a coated fibre may have two.
-
-    A node has its tributary length, debonded or not.
-    """
+    """Interfaces of a cell's f fibres, by number; a coated fibre may have two."""
 
     def __init__(self, cell: TornCell) -> None:
         """Sum all interface lengths.  Collective."""
@@ -274,7 +271,7 @@ class FibreInterfaces:
         return [int(number) for number in np.flatnonzero(is_loose) + 1]
 
     def angle(self, length: Float) -> Float:
-        """(f,) arc degrees for lengths (f,): 360 times their share if not round, or coated with an interface."""
+        """Convert lengths (f,) to degrees (f,): 360 times the fraction if not round, or coated with an interface."""
         return np.asarray(length * self._degrees)
 
     def share(self, length: Float) -> float:
@@ -282,7 +279,7 @@ class FibreInterfaces:
         return float(length.sum() / (self._length.sum() or 1.0))
 
     def shares(self, status: Status) -> Float:
-        """(i,) debonded share in each [[interface]] section's length.  Collective."""
+        """Return the debonded fraction (i,) of the length of each [[interface]] section.  Collective."""
         length, debonded = (
             np.bincount(self._nodes.pair, values, self._pairs).astype(float)
             for values in (self._nodes.length, self._nodes.length * (status != BONDED))

@@ -1,4 +1,4 @@
-"""Interfaces between a cell's phases, unexpected cell properties, and unresolved bonds."""
+"""Faults of interfaces between phases, remarks on unexpected properties of a cell, warnings of coarse interfaces."""
 
 import math
 
@@ -23,9 +23,9 @@ SAME_RATIO = 1e-3
 
 
 def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
-    """(phases, phases) the case's interface number between two phases; -1 where they never part.
+    """Return the number (phases, phases) of the interface between two phases; -1 where they never part.
 
-    An interface without `between` lies between the matrix, the first phase, and all other phases; perfect bonding too.
+    An interface without `between`, or perfect bonding, lies between the matrix, the first phase, and all other phases.
     """
     pairs = np.full((len(phases), len(phases)), -1)
     for number, between in enumerate([interface.between for interface in case.interfaces] or [None]):
@@ -38,10 +38,7 @@ def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
 
 
 def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -> list[str]:
-    """List interfaces between phases that the cell lacks, or that never touch.
-
-    Phases `first` (n,) touch phases `second` (n,).
-    """
+    """List interfaces between absent or separate phases; phases `first` (n,) touch phases `second` (n,)."""
     lines = []
     touching = np.zeros((len(phases), len(phases)), bool)
     touching[first, second] = touching[second, first] = True
@@ -59,7 +56,7 @@ def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -
 
 
 def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
-    """List mesh remarks, an [interface] without effect, and nodes that never part.
+    """List remarks of the mesh, an [interface] without effect, and nodes that never part.
 
     `pairs` as in `share_entities`.
     """
@@ -87,7 +84,7 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
 
 
 def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles: int) -> tuple[str, ...]:
-    """Remark more or fewer subdomains than asked for, with the reason."""
+    """Explain a number of subdomains that differs from the requested number."""
     asked = case.decomposition.subdomains
     if asked is None or asked == subdomains:
         return ()
@@ -100,17 +97,16 @@ def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles
 
 
 def table_remarks(case: Case) -> tuple[str, ...]:
-    """Remark a fibre fraction that differs from the matched table."""
+    """Note a fibre fraction that differs from the fraction of the matched table."""
     cell = case.cell
     if cell.match is None or cell.matched is None or cell.fibre_fraction is None:
         return ()
     fraction = cell.matched.fibre_fraction
-    if abs(cell.fibre_fraction / fraction - 1.0) <= SAME_FRACTION:
-        return ()
-    return (
+    remark = (
         f"[cell] fibre_fraction = {cell.fibre_fraction:g}: {cell.match.name} has {fraction:.4g}; neighbours are as far "
-        "away as there, in diameters",
+        "away as there, in diameters"
     )
+    return (remark,) if abs(cell.fibre_fraction / fraction - 1.0) > SAME_FRACTION else ()
 
 
 def longest(ends: Float) -> float:
@@ -160,12 +156,22 @@ def warnings(case: Case, width: float, edge: float) -> list[str]:
         strength = f"{math.sqrt(2.0 * stiffness * toughness):.3g}"
         zone, share = f"E' G_Ic / sigma_c^2 = {length:.3g} long for sigma_c = sqrt(2 k_n G_Ic) = {strength}", "half"
     law, limit = f'[interface] law = "{case.interfaces[0].criterion}"', f"elements should be at most {share} of that"
-    remedies = _remedies(case, width, edge, resolved * length)
+    refine = math.ceil(math.log2(edge / (resolved * length)))
+    # Rounded down to two digits.
+    needed = resolved * length * 2**case.cell.refine / width
+    digit = 10.0 ** (math.floor(math.log10(needed)) - 1)
+    needed = math.floor(needed / digit + 1e-9) * digit
+    finer = [f"refine = {refine}"] if refine <= cell_sizes.MOST_REFINED else []
+    if case.cell.has_own_mesh:
+        remedies = " or ".join([*finer, "a finer mesh"])
+    else:
+        sizes = [f"interface_size = {needed:.2g} (or mesh_size, of all elements)"] if needed >= LEAST_SIZE else []
+        remedies = ", or ".join([*sizes, *finer]) or "interface_size and refine"
     return [f"{law}: {size}; the process zone is {zone}, {limit}: set {remedies}", *lines]
 
 
 def _law_warnings(case: Case) -> list[str]:
-    """Warn if cohesive energy depends on mode order, and if teeth overshoot."""
+    """Warn if the cohesive energy depends on the order of modes, and if teeth exceed the peak traction."""
     if not phase_laws.has_softening(case):
         return []
     lines, law = [], phase_laws.bond_law(case.interfaces, np.zeros(0, np.int64))
@@ -189,18 +195,3 @@ def _law_warnings(case: Case) -> list[str]:
             f"softening_tolerance is {tolerance:.1%}; without teeth the program chooses their number"
         )
     return lines
-
-
-def _remedies(case: Case, width: float, edge: float, length: float) -> str:
-    """Return keys that make elements as short as `length`."""
-    refine = math.ceil(math.log2(edge / length))
-    # Rounded down to two digits.
-    size = length * 2**case.cell.refine / width
-    digit = 10.0 ** (math.floor(math.log10(size)) - 1)
-    size = math.floor(size / digit + 1e-9) * digit
-    finer = [f"refine = {refine}"] if refine <= cell_sizes.MOST_REFINED else []
-    if case.cell.has_own_mesh:
-        return " or ".join([*finer, "a finer mesh"])
-    if size >= LEAST_SIZE:
-        finer.insert(0, f"interface_size = {size:.2g} (or mesh_size, of all elements)")
-    return ", or ".join(finer) or "interface_size and refine"

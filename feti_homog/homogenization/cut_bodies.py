@@ -38,7 +38,7 @@ class SharedVertices:
     def __init__(self, comm: MPI.Intracomm, meshes: Sequence[tuple[Sequence[Submesh], FineMesh]]) -> None:
         """Find the vertices and edges that several pieces have.  Collective."""
         self._comm = comm
-        borders = [_border(submeshes, mesh) for submeshes, mesh in meshes]
+        borders = [_border(pieces, mesh) for pieces, mesh in meshes]
         vertex_copies, edge_copies = (self._copies([border[k] for border in borders]) for k in (0, 2))
         self._rows = NO_ROWS
         self.meshes, self.classes, self.sides, self.is_first = list[int](), list[Int](), list[Int](), list[Bool]()
@@ -88,18 +88,18 @@ class SharedVertices:
 
 
 def _split(values: Array, parts: Sequence[Array]) -> list[Array]:
-    """Split value rows into as many as each part has."""
+    """Split rows of values into arrays as long as the parts."""
     return [values[a:b] for a, b in pairwise(np.cumsum([0, *map(len, parts)]).tolist())]
 
 
-def _border(submeshes: Sequence[Submesh], mesh: FineMesh) -> tuple[Int, Int, Int, Int]:
-    """Return vertices and coarse edges on piece borders in a joined mesh.
+def _border(pieces: Sequence[Submesh], mesh: FineMesh) -> tuple[Int, Int, Int, Int]:
+    """Return vertices and coarse edges on the piece borders of a joined mesh.
 
-    Vertices (n, 3): body, entity, place; their classes (n,).  Then the coarse edges there (e, 3), alike, and the vertex
-    classes along them (e, m).
+    These are vertices (n, 3) by body, entity and position, their classes (n,), coarse edges (e, 3) alike, and the
+    vertex classes along the edges (e, m).
     """
     first, borders = 0, []
-    for s in submeshes:
+    for s in pieces:
         triangle, k, line = border_lines(s, mesh, mesh.node_class[mesh.nodes[first : first + len(s.triangles)]])
         first, line = first + len(s.triangles), line[:, :: mesh.lattice.order]
         ends = s.vertex_class[s.triangles[triangle[:, None], np.stack([k, (k + 1) % 3], axis=1)]]
@@ -120,9 +120,9 @@ def _border(submeshes: Sequence[Submesh], mesh: FineMesh) -> tuple[Int, Int, Int
 
 
 def border_lines(s: Submesh, mesh: FineMesh, classes: Int32) -> tuple[Int, Int, Int]:
-    """Return triangles (e,) at a piece's border, their edges (e,) there, and classes (e, M + 1) along the edges.
+    """Return triangles (e,) at a piece border, their edges (e,), and classes (e, M + 1) along the edges.
 
-    Classes (e, M + 1) run along the edges.  `classes` (t, q) are lattice node classes.
+    `classes` (t, q) are the lattice node classes of all triangles.
     """
     edge, inner = s.edge_class[s.triangle_edges], np.arange(mesh.lattice.intervals - 1)
     triangle, k = np.nonzero(np.bincount(edge.ravel(), minlength=len(s.edge_keys))[edge] == 1)

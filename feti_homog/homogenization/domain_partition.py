@@ -17,7 +17,7 @@ from feti_homog.mesh.tiles import tile_filling
 from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.typing import Bool, Float, Int
 
-ROUNDING = 1e-9  # of coordinates, relative to the cell
+ROUNDING = 1e-9  # of coordinates, relative to the cell or to the radius of a fibre
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class CellSummary:
     Attributes:
         width, height: periods.
         phases: material phase names, the matrix first.
-        bodies, subdomains, coarse_triangles: how many there are.
+        bodies, subdomains, coarse_triangles: their numbers.
         interface_edge: longest coarse edge between phases.
         numbers: (constituents,) numbers from 1, as in case files, for fibres and the fibres that coatings coat; 0 for
             the matrix.
@@ -183,7 +183,7 @@ def distribute(
 
 
 def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triangles: int) -> CellSummary:
-    """Summarize the cell with so many subdomains and coarse triangles."""
+    """Summarize a tiled cell with its numbers of subdomains and coarse triangles."""
     regions, lines, arrangement = noded.regions, noded.lines, noded.arrangement
     inside = regions.constituent[:-1]
     solid = np.flatnonzero(inside >= 0)
@@ -222,20 +222,13 @@ def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triang
 def _cut_across(
     case: Case, torus: Torus, lattice: ReferenceLattice, n_ranks: int, policy: partition_policy.PartitionPolicy
 ) -> partition.Partition | None:
-    """Return the cell cut across materials.
-
-    None if it is not asked for, or leaves a rank without a piece.
-    """
+    """Cut the cell across materials; None unless the policy wants it and each rank gets a piece."""
     triangles = len(torus.mesh.triangles)
-    pieces = (
-        policy.across_pieces(triangles * lattice.intervals**2, n_ranks)
-        if partition_policy.can_be_cut_across(case)
-        else 0
-    )
+    dofs = triangles * lattice.intervals**2
+    pieces = policy.across_pieces(dofs, n_ranks) if partition_policy.can_be_cut_across(case) else 0
     if not 0 < pieces <= triangles:
         return None
-    is_large = triangles * lattice.intervals**2 >= policy.strip_dofs
-    if pieces == n_ranks == 2 and is_large and (strips := partition.halves(torus)):
+    if pieces == n_ranks == 2 and dofs >= policy.strip_dofs and (strips := partition.halves(torus)):
         return strips
     cut = partition.decompose(torus, np.zeros(triangles, np.int64), np.array([pieces]), n_ranks)
     return cut if len(cut.rank) >= n_ranks else None  # METIS leaves some pieces empty
@@ -258,7 +251,7 @@ def in_cell(points: Float, period: Float) -> Float:
 
 
 def _interface_nodes(torus: Torus, pairs: Int, lattice: ReferenceLattice) -> int:
-    """Count nodes where two bodies could part if they had an interface."""
+    """Count the nodes at which two bodies could part if they had an interface."""
     first, second, edge = torus.sides
     between = edge[pairs[torus.mesh.phase[first], torus.mesh.phase[second]] >= 0]
     plane = np.unique(torus.torus_edge, return_index=True)[1][between]

@@ -57,7 +57,7 @@ class CrackExtension:
         """Return the energy change when a tip's crack turns by a unit angle.
 
         Args:
-            tip, spoke: (2,) place, and place relative to the circle centre.
+            tip, spoke: (2,) position, and position relative to the circle centre.
             reach: distance beyond which nothing turns.
             u: (dofs,) u*.
             E: (2, 2) macroscopic strain.

@@ -15,7 +15,7 @@ from mpi4py import MPI
 from feti_homog.fem import arc_error, local_fits, stress_recovery
 from feti_homog.feti.decomposition import Subdomain
 from feti_homog.homogenization.averaging import Response
-from feti_homog.homogenization.uniform_parts import UniformPart, groups, locks, nested_interiors
+from feti_homog.homogenization.uniform_parts import NONE, UniformPart, groups, locks, nested_interiors
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact import BONDED
 from feti_homog.mesh import FineMesh, ReferenceLattice, Submesh, refinement
@@ -32,12 +32,10 @@ Members = list[Subdomain] | list[UniformPart]
 NESTED = {1: ((0.26, 0.27), (0.07, 0.066)), 2: ((1 / 15, 1 / 14), (1 / 185, 1 / 255))}
 LOCKED = {1: (0.31, 0.34), 2: (0.1, 0.065)}
 SAMPLED = {False: (0.066, 0.065), True: (0.052, 0.065)}
-# The two parts may cancel; the smallest shares that remain (`scripts/measure_mesh_error.py`): on the diagonal; of two
-# states by the order of elements; of quadratic ones with interfaces that may part, or with few corners that have most
-# of the error; and where faces touch at different places, for which the energy is not bilinear.
+# Elements and arcs may cancel; the smallest fractions that remain (`scripts/measure_mesh_error.py`): on the diagonal,
+# and of two states if quadratic elements have interfaces that may part, or few corners have most of the error; of other
+# pairs of states by the order of elements.
 LEAST_SHARE, LEAST_OF_TWO = 0.05, {1: 0.01, 2: 0.005}
-LEAST_OF_TWO_UNEVEN, LEAST_OF_TWO_TOUCHING = 0.05, 1.0
-INSIDE = -1  # place of a class that is not on a boundary
 
 
 @dataclass(frozen=True)
@@ -107,8 +105,9 @@ def energy_errors(
         springs = cell.spring_sides.errors(state.status, state.solution.compliance, lam)
         elements, arcs = np.stack([elements, arcs]) + np.stack(springs) / area
     is_uneven = _has_corners(cell) or (lattice.order == 2 and bool(cell.case.interfaces))
-    smallest = LEAST_OF_TWO_UNEVEN if is_uneven else LEAST_OF_TWO[lattice.order]
-    return EnergyErrors(elements, arcs, np.concatenate(shares) / area, LEAST_OF_TWO_TOUCHING if contact else smallest)
+    smallest = LEAST_SHARE if is_uneven else LEAST_OF_TWO[lattice.order]
+    # Where faces touch at different positions the energy is not bilinear: nothing cancels.
+    return EnergyErrors(elements, arcs, np.concatenate(shares) / area, 1.0 if contact else smallest)
 
 
 def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
@@ -129,8 +128,8 @@ def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
     not graded: `tip_size` is given, or bonds break. Collective.
     """
     lattice = cell.lattice
-    submeshes = (s.submesh for s in cell.subdomains)
-    straight = any(bool((mesh.at_void[mesh.edge_class] & (mesh.turns == 0)).any()) for mesh in submeshes)
+    pieces = (s.submesh for s in cell.subdomains)
+    straight = any(bool((piece.at_void[piece.edge_class] & (piece.turns == 0)).any()) for piece in pieces)
     if not lattice.halvings or _has_corners(cell) or cell.comm.allreduce(straight, MPI.LOR):
         return False
     if not cell.case.interfaces:
@@ -147,23 +146,18 @@ def _has_corners(cell: TornCell) -> bool:
 def _recovered(
     cell: TornCell, responses: Sequence[Response], keep: bool, lattice: ReferenceLattice
 ) -> Iterator[tuple[stress_recovery.RecoveredStress, arc_error.ArcSides]]:
-    """Yield recovered stresses and arcs in this rank's subdomains, group by group.
-
-    They are refined by the lattice.  Collective before the first.
-    """
+    """Yield recovered stresses and arcs by subdomain group, refined by the lattice.  Collective before the first."""
     u = np.stack([response.u for response in responses], axis=1)
     loads = np.stack([response.strain for response in responses], axis=1)
     groups_of_rank, meshes = list[Group](), list[tuple[list[Submesh], FineMesh]]()
-    in_equilibrium = lattice is not cell.lattice and not cell.summary.across
-    displacements = _nested_displacements if in_equilibrium else _displacements
-    for members, mesh, displacement, place in displacements(cell, u, loads, keep, lattice):
-        first, submeshes = members[0], [s.submesh for s in members]
+    for members, mesh, displacement, place in _displacements(cell, u, loads, keep, lattice):
+        first, pieces = members[0], [s.submesh for s in members]
         stress = stress_recovery.RecoveredStress.on(mesh, first.L, first.problem, displacement, loads, first.is_mixed)
-        sides = arc_error.ArcSides.of(stress, submeshes, lattice)
+        sides = arc_error.ArcSides.of(stress, pieces, lattice)
         groups_of_rank.append(Group(stress, sides, place[:: first.problem.components]))
-        meshes.append((submeshes, mesh))
-    pieces, shared, fits = cell.table.body, None, dict[int, tuple[Int, Float]]()
-    if (len(pieces) > 1) if cell.summary.across else (np.bincount(pieces) > 1).any():
+        meshes.append((pieces, mesh))
+    body, shared, fits = cell.table.body, None, dict[int, tuple[Int, Float]]()
+    if (len(body) > 1) if cell.summary.across else (np.bincount(body) > 1).any():
         from feti_homog.homogenization.cut_bodies import SharedVertices, fits_across_cuts  # most bodies are not cut
 
         shared = SharedVertices(cell.comm, meshes)
@@ -176,37 +170,30 @@ def _recovered(
         yield replace(stress, known=tractions.get(number), shared=fits.get(number)), sides
 
 
-def _nested_displacements(
-    cell: TornCell, u: Float, loads: Float, keep: bool, lattice: ReferenceLattice
-) -> Iterator[tuple[Members, FineMesh, Float, Int]]:
-    """Yield the `_displacements` groups, in equilibrium on a coarser lattice's mesh."""
-    fresh = nested_interiors(cell.solver.interface_operators, cell.lattice, lattice)
-    for interior in cell.nested_interiors if keep else fresh:
-        displacement = interior.displacement(u, loads)
-        place = np.full(displacement.shape[0] * displacement.shape[1], INSIDE)
-        place[interior.fixed] = interior.place
-        yield interior.members, interior.mesh, displacement, place
-
-
 def _displacements(
     cell: TornCell, u: Float, loads: Float, keep: bool, lattice: ReferenceLattice
 ) -> Iterator[tuple[Members, FineMesh, Float, Int]]:
-    """Yield subdomain groups with one phase: mesh, displacements (classes, c, k), places.
+    """Yield subdomain groups with one phase: members, mesh, displacements (classes, c, k), positions.
 
-    Places (c classes,) count displacements on all boundaries or, across materials, in all parts; INSIDE elsewhere.
-    Across materials a coarser lattice takes the mesh displacements at its nodes: their error is hardly less than
-    in equilibrium on its own mesh.
+    Positions (c classes,) number the displacements on all boundaries or, across materials, in all parts; NONE
+    elsewhere.  A coarser lattice has its own equilibrium, but across materials the mesh displacements at its nodes,
+    whose error is hardly less.
     """
     boundary, is_nested, across = cell.solver.interface_operators, lattice is not cell.lattice, cell.summary.across
+    if is_nested and not across:
+        for interior in cell.nested_interiors if keep else nested_interiors(boundary, cell.lattice, lattice):
+            displacement = interior.displacement(u, loads)
+            place = np.full(displacement.shape[0] * displacement.shape[1], NONE)
+            place[interior.fixed] = interior.place
+            yield interior.members, interior.mesh, displacement, place
+        return
     displacements = cell.displacements(u, loads, keep)
     firsts = cell.offsets if across else boundary.offsets
     dofs = [np.arange(len(part.dofs)) for part in cell.parts] if across else boundary.dofs
     for group in groups(cell.parts, lattice):
         members = [cell.parts[k] for k in group]
-        mesh, places = (
-            refinement.joined([part.mesh for part in members]),
-            [np.full(len(part.dofs), INSIDE) for part in members],
-        )
+        mesh = refinement.joined([part.mesh for part in members])
+        places = [np.full(len(part.dofs), NONE) for part in members]
         if is_nested:
             mesh = replace(mesh, nodes=mesh.nodes[:, lattice.within(cell.lattice)], lattice=lattice)
         for k, place in zip(group, places, strict=True):
@@ -233,7 +220,7 @@ def boundary_tractions(
     over side lengths, so that uniform stresses give exact tractions.
     """
     forces, lengths = _forces(cell, responses, groups)
-    sums, of_node = list[Float](), np.append(lengths, 0.0)  # at INSIDE
+    sums, of_node = list[Float](), np.append(lengths, 0.0)  # at NONE, the last
     for stress, sides, place in groups:
         ends = stress.node_class[stress.triangles[sides.element[:, None], sides.ends]].ravel()
         half = np.repeat(sides.points[:, -1] - sides.points[:, 0], 2, axis=0) / 2

@@ -88,10 +88,7 @@ class PartitionPolicy:
     strip_dofs: int = 30_000
 
     def across_pieces(self, dofs: int, n_ranks: int) -> int:
-        """Return how many pieces a cut across materials has.
-
-        Equally many on each rank; 0 for a cut body by body.
-        """
+        """Return the number of pieces across materials, equal on all ranks; 0 for a cut body by body."""
         if dofs > self.across_dofs:
             return 0
         if n_ranks <= self.whole_ranks and dofs <= self.whole_dofs:
@@ -159,26 +156,19 @@ def wanted_pieces(
 
 
 def applications(case: Case, problem: Problem, across: bool = False) -> int:
-    """Estimate how often the analysis applies a problem's dual operator.
-
-    Coatings cost no iterations where pieces reach `across` materials.
-    """
+    """Estimate applications of a problem's dual operator; coatings cost no iterations in pieces `across` phases."""
     has_arcs = bool(case.arcs) or case.cell.has_own_mesh  # with a curve "debonded", perhaps
     touches = case.interface is not None and case.interface.contact and (has_arcs or case.section.is_followed)
     contact = touches and problem != AXIAL  # along the fibres nothing touches
-    many = case.section.is_followed or (has_arcs and _asks_for_tips(case))
+    bond = case.interface
+    by_energy = bond is not None and bond.criterion in bond_laws.laws_with("growth") and bond.growth == "released"
+    # Envelopes with arcs need the inverse, for many solves.
+    many = case.section.is_followed or (has_arcs and case.section.breaks and by_energy)
     solves = SOLVES_OF_A_PATH if many else case.section.solves(len(problem.loads), contact)
     iterations = (
         ITERATIONS_WITH_COATINGS if phase_names.COATING in case.materials and not across else ITERATIONS_OF_A_SOLVE
     )
     return iterations * solves * (SOLVES_OF_A_CONTACT if contact else 1)
-
-
-def _asks_for_tips(case: Case) -> bool:
-    """Return whether envelopes with arcs need the inverse, for many solves."""
-    bond = case.interface
-    by_energy = bond is not None and bond.criterion in bond_laws.laws_with("growth") and bond.growth == "released"
-    return case.section.breaks and by_energy
 
 
 def memory(nodes: Sequence[int], subdomains: Sequence[int], components: Sequence[int], columns: int) -> float:
@@ -194,10 +184,7 @@ def memory(nodes: Sequence[int], subdomains: Sequence[int], components: Sequence
 
 
 def memory_to_the_end(case: Case, few: float, multipliers: int, columns: int, ranks: int) -> float:
-    """Estimate the largest rank's bytes when all bonds have broken.
-
-    `few` are its bytes before the path breaks bonds.
-    """
+    """Estimate the bytes of the largest rank when all bonds have broken; `few` before the first break."""
     stored = columns if columns <= thresholds.NEVER_REFACTORED_ROWS else thresholds.INFLUENCE_COLUMNS
     faces = FACE_PAIR_BYTES * multipliers**2 if case.has_friction else 0
     return few + columns / ranks * (PATH_BYTES + stored * PAIR_BYTES) + faces

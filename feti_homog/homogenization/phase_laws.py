@@ -27,10 +27,7 @@ POWERS = {"strength": 1, "toughness": 2}
 
 
 def problems(case: Case) -> tuple[Problem, ...]:
-    """Return the plane problem and, if strains along the fibres are loads, the axial one.
-
-    A temperature is a load if the phases have thermal expansions.
-    """
+    """Return the plane and, in generalized plane strain, the axial problem; expansion makes temperature a load."""
     if not voigt.PLANE_STATES[case.analysis.plane].is_spatial:
         return (PLANE,)
     if any(laws.expansion(material) is None for material in case.materials.values()):
@@ -104,10 +101,7 @@ def spatial_vector(plane: Float | None, axial: Float | None) -> Float:
 
 
 def springs(case: Case, problem: Problem = PLANE) -> jump_operator.InterfaceSprings:
-    """Return normal and tangential springs, or axial ones along the fibres.
-
-    Axial springs without their own stiffness are as around the fibre.
-    """
+    """Return the springs of a problem: normal and tangential, or axial, by default as stiff as tangential springs."""
     along = [(bond.axial_stiffness or bond.tangential_stiffness or math.inf,) for bond in case.interfaces]
     around = [(bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf) for bond in case.interfaces]
     return jump_operator.InterfaceSprings(tuple(along if problem == AXIAL else around), has_softening(case))

@@ -109,10 +109,10 @@ class SpringSides:
 
 
 def _sides(part: UniformPart, number: Int, fibre: Int, lattice: ReferenceLattice) -> tuple[Int, Float, Float]:
-    """Return a fibre part's sides: nodes (f, order + 1), normals, turns (f,).
+    """Return the sides of a fibre: nodes (f, order + 1), normals (f, q, 2) at Gauss points, and turns (f,).
 
-    Normals (f, q, 2) at Gauss points are as long as the arc per unit place.  `number` (classes,) are interface nodes on
-    all ranks, -1 elsewhere, `fibre` (n,) each one's inner body.
+    Normals are as long as the arc per unit of its parameter.  `number` (classes,) has the interface nodes of all ranks,
+    -1 elsewhere, and `fibre` (n,) the inner body of each interface node.
     """
     triangle, k, line = border_lines(part.submesh, part.mesh, part.mesh.node_class[part.mesh.nodes])
     nodes = number[line]

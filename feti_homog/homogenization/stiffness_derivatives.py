@@ -22,20 +22,19 @@ from feti_homog.case import Case, cell_section, material_sections
 from feti_homog.fem import Problem, assembly, bubble, shape_functions
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
-from feti_homog.homogenization.domain_partition import CellSummary
+from feti_homog.homogenization.domain_partition import ROUNDING, CellSummary
 from feti_homog.homogenization.uniform_parts import UniformPart
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.materials import material_derivatives
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int32
 
-ON_CIRCLE = 1e-9  # of the radius
 IMAGES = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2)
 
 
 @dataclass(frozen=True)
 class Derivative:
-    """Stress derivatives by one constant, under unit loads.
+    """Derivatives of the stresses under unit loads by one constant.
 
     Attributes:
         name: the key with its section, such as `material.fibre.young`.
@@ -59,7 +58,16 @@ def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response
                 pairs = zip(phase_laws.law_derivatives(case, phase, change), integrals, strict=True)
                 energies = tuple(np.einsum("ab,aibj->ij", dA, grams[phase]) / area for dA, (grams, _) in pairs)
                 changes.append(Derivative(f"material.{phase}.{change.name}", change.value, energies))
-    springs = [*map(_stretched_springs, cells, responses)]
+    springs = list[Float]()
+    for cell, group in zip(cells, responses, strict=True):
+        # Sums lam_i C lam_j over bonds: (sections, components, k, k).
+        nodes, k = cell.solver.jump_operator.nodes, len(group)
+        work = np.zeros((len(case.interfaces), cell.solver.problem.components, k, k))
+        lam = np.stack([response.scale * response.state.solution.lam for response in group], axis=1)
+        for section, component in np.ndindex(work.shape[:2]):
+            rows = nodes.row[nodes.pair == section] + component
+            work[section, component] = lam[rows].T @ (group[0].state.solution.compliance[rows, None] * lam[rows])
+        springs.append(distributed_arrays.allreduce_sum(cell.comm, work))
     for name, value, places in _spring_constants(case):
         energies = tuple(
             sum((work[place] for place in of_problem), np.zeros(work.shape[2:])) / (value * area)
@@ -181,20 +189,8 @@ def _gram(fields: Float, weights: Float) -> Float:
     return np.asarray(flat.T @ (weights.reshape(-1, 1) * flat))
 
 
-def _stretched_springs(cell: TornCell, responses: Sequence[Response]) -> Float:
-    """(sections, components, k, k) sums lam_i C lam_j over bonds.  Collective."""
-    nodes, c, k = cell.solver.jump_operator.nodes, cell.solver.problem.components, len(responses)
-    work = np.zeros((len(cell.case.interfaces), c, k, k))
-    lam = np.stack([response.scale * response.state.solution.lam for response in responses], axis=1)
-    for section, component in np.ndindex(work.shape[:2]):
-        rows = nodes.row[nodes.pair == section] + component
-        C = responses[0].state.solution.compliance[rows]
-        work[section, component] = lam[rows].T @ (C[:, None] * lam[rows])
-    return np.asarray(distributed_arrays.allreduce_sum(cell.comm, work))
-
-
 def _spring_constants(case: Case) -> Iterator[tuple[str, float, tuple[list[tuple[int, int]], list[tuple[int, int]]]]]:
-    """Yield finite interface stiffnesses with sections and components by problem."""
+    """Yield names and values of finite spring stiffnesses, with their sections and components by problem."""
     several = len(case.interfaces) > 1
     for number, bond in enumerate(case.interfaces):
         section = f"interface.{number + 1}" if several else "interface"
@@ -212,7 +208,7 @@ def _spring_constants(case: Case) -> Iterator[tuple[str, float, tuple[list[tuple
 
 
 def _fractions(case: Case) -> Iterator[float]:
-    """Yield the fibre fraction in patterns of equal, uncoated, bonded fibres."""
+    """Yield the fibre fraction if the cell is a lattice of equal, uncoated, bonded fibres."""
     cell = case.cell
     is_bare = cell.geometry in cell_section.LATTICES and cell.coating is None and not case.interfaces
     if is_bare and cell.fibre_fraction is not None:
@@ -220,9 +216,9 @@ def _fractions(case: Case) -> Iterator[float]:
 
 
 def _velocity(points: Float, cell: CellSummary) -> Float:
-    """(n, 2) V = dx / d ln R at points (n, 2) where all fibres in a pattern grow.
+    """Return V = dx / d ln R (n, 2) at points (n, 2) while all fibres grow.
 
-    x - c in a fibre with centre c and radius R, falling to 0 halfway to the next fibre.
+    V is x - c in a fibre with centre c and radius R, and falls to 0 halfway to the next fibre.
     """
     centres, radii, period = cell.centres[cell.is_fibre], cell.radii[cell.is_fibre], cell.period
     V = np.zeros_like(points)
@@ -234,5 +230,5 @@ def _velocity(points: Float, cell: CellSummary) -> Float:
         away -= period * np.round(away / period)
         distance = np.linalg.norm(away, axis=1, keepdims=True)
         share = np.clip((radius + reach - distance) / reach, 0.0, 1.0) * radius / np.maximum(distance, radius)
-        V += away * np.where(distance <= radius * (1 + ON_CIRCLE), 1.0, share)
+        V += away * np.where(distance <= radius * (1 + ROUNDING), 1.0, share)
     return V

@@ -1,8 +1,8 @@
-"""Cells meshed by all ranks, cut on rank 0 or by tiles.
+"""Mesh a cell on all ranks, and cut it on rank 0 or by tiles.
 
-Rank 0 begins the coarse mesh; all ranks make nodes on lines, and the tiles of large cells.  There each rank cuts its
-tiles, and no rank has all tiles.  Matrix pieces lie within tiles, and a fibre lies in one tile, so subdomains depend on
-the case and the number of ranks, not on the rank that filled a tile.
+Rank 0 begins the coarse mesh; all ranks place nodes on lines, and fill the tiles of large cells.  Each rank cuts its
+tiles, and no rank has all tiles.  A piece of the matrix, or a fibre, lies in one tile: subdomains depend on the case
+and the number of ranks, not on the rank that filled a tile.
 """
 
 from dataclasses import replace
@@ -45,9 +45,7 @@ def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: Part
 def place_nodes(
     case: Case, comm: MPI.Intracomm, policy: tiling.TilePolicy
 ) -> gmsh_mesher.NodedCell | CoarseMesh | None:
-    """Return a user's mesh, or the cell with nodes that all ranks place on its lines.  Collective.
-
-    All ranks place nodes; None but on rank 0.
+    """Return a user's mesh or the cell with nodes on its lines, on rank 0, else None.  Collective.
 
     Raises:
         CaseError, MeshError: on every rank, as `begin_mesh`.
@@ -107,10 +105,7 @@ def fill_tiles(cell: gmsh_mesher.NodedCell | CoarseMesh | None, comm: MPI.Intrac
 
 
 def deal_tiles(tiles: list[T], loads: list[int], comm: MPI.Intracomm) -> list[tuple[int, T]]:
-    """Deal tiles from rank 0 to all ranks.  Collective.
-
-    The tiles have sizes `loads`; returns the numbers and tiles that this rank fills.
-    """
+    """Deal numbered tiles with sizes `loads` from rank 0 to all ranks, which fill them.  Collective."""
     parts: list[list[tuple[int, T]]] = [[] for _ in range(comm.size)]
     for k, rank in enumerate(dividing.balanced(np.array(loads, np.int64), comm.size).tolist()):
         parts[rank].append((k, tiles[k]))
@@ -129,10 +124,10 @@ def fill_own(tiles: list[tuple[int, tile_filling.Tile]]) -> list[tuple[int, tile
 def can_be_torn_by_tiles(
     case: Case, noded: gmsh_mesher.NodedCell | CoarseMesh | None, lattice: ReferenceLattice, policy: PartitionPolicy
 ) -> bool:
-    """Return whether nothing needs the mesh on one rank.
+    """Return whether the mesh need not be on one rank.
 
-    One rank is needed for arc tips, bodies cut by the sides, the matrix in fewer pieces than tiles, and cells that
-    are expected to be small enough for cuts across materials.  A user's mesh is on one rank already.
+    Arc tips, bodies cut by the sides, a matrix in fewer pieces than tiles, and cells that are probably small enough for
+    cuts across materials need one rank.  A user's mesh is on one rank already.
     """
     on_one_rank = case.arcs or case.cell.bodies == "plane" or case.decomposition.subdomains is not None
     if not isinstance(noded, gmsh_mesher.NodedCell) or len(noded.parts) < 2 or on_one_rank:
@@ -162,7 +157,7 @@ def tear_by_tiles(
     pieces = wanted_pieces(case, load, edges, lattice, comm.size, policy)
     longest = comm.allreduce(float(torus.edge_lengths.max(initial=0.0)), MPI.MAX)
     local = mpi_errors.agree(comm, _cut, torus, tile, pieces / load, longest)
-    # Subdomains of all ranks are numbered by body and tile.
+    # Subdomains of all ranks are numbered by body, then by tile.
     first = np.unique(local, return_index=True)[1]
     parts = comm.allgather((torus.constituent[first], tile[first], np.bincount(local)))
     body, tiles, loads = (np.concatenate(rows) for rows in zip(*parts, strict=True))
@@ -196,10 +191,7 @@ def _filled(noded: gmsh_mesher.NodedCell | None, regions: tiling.Regions, comm: 
 
 
 def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) -> Int:
-    """(m,) the subdomain of each triangle on this rank.
-
-    Subdomains are numbered from 0 tile by tile within a constituent.
-    """
+    """Return the subdomain (m,) of each triangle on this rank, numbered by constituent, then by tile."""
     a, b, _ = torus.sides
     within = (tile[a] == tile[b]) & (torus.constituent[a] == torus.constituent[b])
     label = periodic_topology.components(len(tile), a[within], b[within])
@@ -212,9 +204,9 @@ def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) ->
 
 
 def _neighbours(torus: Torus, subdomain: Int) -> tuple[Int, Int, Int, Int]:
-    """Return subdomain pairs (n,) and (n,) that meet at this rank's edges.
+    """Return subdomain pairs (n,) and (n,) that meet at this rank's edges, and its edges on other ranks' triangles.
 
-    Then edges (k,) with one triangle on this rank and the other one elsewhere, and its subdomain here (k,).
+    These are edges (k,) with one triangle on this rank, and the subdomain (k,) of this triangle.
     """
     a, b, _ = torus.sides
     apart = subdomain[a] != subdomain[b]
@@ -225,7 +217,7 @@ def _neighbours(torus: Torus, subdomain: Int) -> tuple[Int, Int, Int, Int]:
 
 
 def _assigned(load: Int, neighbours: list[tuple[Int, Int, Int, Int]], n_ranks: int) -> Int:
-    """(s,) each subdomain's rank, by all ranks' `neighbours`."""
+    """Assign a rank to each subdomain (s,), from all ranks' `neighbours`."""
     a, b, edge, side = (np.concatenate(rows) for rows in zip(*neighbours, strict=True))
     side = side[np.argsort(edge, kind="stable")]
     return partition.assign_ranks(load, np.append(a, side[::2]), np.append(b, side[1::2]), n_ranks)
@@ -257,7 +249,7 @@ def tiled_cell(case: Case, noded: gmsh_mesher.NodedCell) -> tuple[Int, Int, Int]
 
 
 def tiles_to_fill(noded: gmsh_mesher.NodedCell) -> list[tiling.NumberedTile]:
-    """Return a noded cell's numbered tiles."""
+    """List the tiles of a cell with numbered nodes."""
     lines, arrangement = noded.lines, noded.arrangement
     stands_for = coarse_mesh.representatives(lines.points, arrangement.width, arrangement.height).astype(np.int64)
     return [tiling.NumberedTile(nodes, stands_for[nodes], tile) for nodes, tile in noded.parts]

@@ -27,14 +27,14 @@ from feti_homog.mesh import (
 )
 from feti_homog.typing import Float, Int
 
-# Subdomains of so many elements at once: few enough for the processor's cache, many enough for NumPy.
+# Elements of a group of subdomains: few enough for the processor's cache, many enough for NumPy.
 ELEMENTS_AT_ONCE = 1 << 13
 # Halvings from which on the mesh that is refined twice less serves, but across materials and where a phase locks.
 REFINED_OFTEN = 3
 # Largest lambda / mu on that mesh, of a Poisson's ratio of 0.4: beyond, errors of coarse elements are no guide.
 LOCKING = 4.0
-# Places of displacements inside bodies, and of pinned ones.
-INSIDE, PINNED = -2, -1
+# Position of a displacement that is not on a boundary: the last one, which is zero.
+NONE = -1
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +59,7 @@ class UniformPart:
 
 
 def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterator[UniformPart]:
-    """Yield all subdomains' parts, in each by phase and body; `phase_of` (constituents,) names phases."""
+    """Yield the parts of all subdomains, ordered by phase and body; `phase_of` (constituents,) names phases."""
     for place, s in enumerate(subdomains):
         if s.material is None:
             yield UniformPart(place, s.submesh, s.mesh, np.arange(s.n_dofs), s.L, s.problem, s.is_mixed)
@@ -75,7 +75,7 @@ def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterat
 
 
 def nodes_of_parts(s: Subdomain) -> int:
-    """Count plane nodes in all parts; shared nodes count for each."""
+    """Count the plane nodes of all parts of a subdomain; each part counts its shared nodes."""
     body, nodes = np.repeat(s.submesh.constituent, s.mesh.nodes.shape[1]), s.mesh.nodes.ravel()
     last = np.empty(len(s.mesh.points), np.int64)
     last[nodes] = body
@@ -84,10 +84,7 @@ def nodes_of_parts(s: Subdomain) -> int:
 
 
 def _restricted(mesh: FineMesh, members: Int) -> tuple[FineMesh, Int]:
-    """Restrict the mesh to the coarse triangles `members` (t,).
-
-    Returns it and (c,) its classes in the whole mesh.
-    """
+    """Restrict a mesh to coarse triangles (t,); return it and its classes (c,) in the whole mesh."""
     nodes, local = periodic_topology.present(mesh.nodes[members], len(mesh.points))
     classes, node_class = periodic_topology.present(mesh.node_class[nodes], mesh.n_classes)
     numbers, curved = (local.astype(np.int32), node_class.astype(np.int32)), mesh.curved[members]
@@ -101,7 +98,7 @@ def share_parts(
     pairs: Int,
     lattice: ReferenceLattice,
 ) -> SharedEntities:
-    """Share part nodes as `share_entities` shares subdomain nodes, listed in `table`.  Collective."""
+    """Share the nodes of parts, as `share_entities` shares the nodes of subdomains.  Collective."""
     body = np.array([p.submesh.body for p in parts])
     member = np.repeat(np.arange(len(parts)), [len(p.mesh.nodes) for p in parts])
     index, phase = np.array([p.submesh.index for p in parts]), tuple(p.submesh.phase for p in parts)
@@ -132,7 +129,7 @@ class ForcesBetweenParts:
         self._inverse = blocks.inverse(np.ones(jumps.owned[1] - jumps.owned[0]))
 
     def multipliers(self, u: Float, loads: Float) -> Float:
-        """(owned rows,) lam = (B B^T)^-1 B (-K u - Q E); u (dofs,).  Collective."""
+        """Return lam = (B B^T)^-1 B (-K u - Q E) (owned rows,) from u (dofs,).  Collective."""
         forces = np.zeros(len(u))
         forces[self._dofs] = -self._K @ u[self._dofs] - self._Q @ loads
         return np.asarray(self._inverse @ self._jumps.sum(self._jumps.B @ forces))
@@ -146,7 +143,7 @@ class NestedInterior:
         members: the subdomains.
         mesh: their meshes, joined.
         fixed: (c n,) prescribed displacements: on the boundary, and 0 where a class is pinned.
-        place: (fixed,) places among the displacements on all boundaries; PINNED where a class is pinned.
+        place: (fixed,) positions among the displacements on all boundaries; NONE where a class is pinned.
         interior: the free displacements.
         loads: (free, v) unit load forces Q on free displacements; None without voids.
     """
@@ -170,15 +167,16 @@ class NestedInterior:
         members = [boundary.subdomains[place] for place in places]
         first, meshes, numbers = members[0], [refinement.refine(s.submesh, lattice) for s in members], list[Int]()
         for k, s, mesh in zip(places, members, meshes, strict=True):
-            of_fine = np.full(s.n_dofs, INSIDE)
+            inside = NONE - 1
+            of_fine = np.full(s.n_dofs, inside)
             of_fine[boundary.dofs[k]] = boundary.offsets[k] + np.arange(len(boundary.dofs[k]))
             if s.submesh.pinned >= 0:
-                of_fine[s.problem.dofs(np.array([s.submesh.pinned]))] = PINNED
+                of_fine[s.problem.dofs(np.array([s.submesh.pinned]))] = NONE
             fine = np.empty(mesh.n_classes, np.int64)
             fine[mesh.node_class[mesh.nodes]] = s.mesh.node_class[s.mesh.nodes[:, nested]]
             numbers.append(of_fine[s.problem.dofs(fine)])
         place = np.concatenate(numbers)
-        fixed = np.flatnonzero(place != INSIDE)
+        fixed = np.flatnonzero(place != inside)
         mesh = refinement.joined(meshes)
         body = assembly.assemble(mesh, first.L, first.problem, first.is_mixed)
         interior = one_subdomain.Interior(body.K, fixed)
@@ -188,7 +186,7 @@ class NestedInterior:
     def displacement(self, u: Float, loads: Float) -> Float:
         """(classes, c, k) u* from u (boundary dofs, k) on all boundaries under the loads (v, k)."""
         problem = self.members[0].problem
-        on_boundary = np.vstack([u, np.zeros((1, u.shape[1]))])[self.place]  # PINNED is the last row
+        on_boundary = np.vstack([u, np.zeros((1, u.shape[1]))])[self.place]  # the last row for NONE
         all_dofs = np.empty((len(self.fixed) + len(self.interior.dofs), u.shape[1]))
         all_dofs[self.fixed], all_dofs[self.interior.dofs] = on_boundary, self.interior.extend(on_boundary)
         if self.loads is not None:
@@ -197,7 +195,7 @@ class NestedInterior:
 
 
 def locks(subdomains: Sequence[Subdomain | UniformPart], comm: MPI.Intracomm) -> bool:
-    """Return whether elements in any phase hardly change volume.  Collective."""
+    """Return whether any phase is nearly incompressible, so that coarse elements lock.  Collective."""
     locking = any(s.problem.components == 2 and s.L[0, 1] > LOCKING * s.L[2, 2] for s in subdomains)
     return bool(comm.allreduce(locking, MPI.LOR))
 

@@ -21,7 +21,7 @@ from feti_homog.homogenization.tile_tearing import cut
 from feti_homog.homogenization.uniform_parts import UniformPart, locks
 from feti_homog.interface import debonded_arcs
 from feti_homog.interface.laws import BondLaw
-from feti_homog.mesh import ReferenceLattice, Submesh, SubmeshesOfRank, submeshes
+from feti_homog.mesh import ReferenceLattice, Submesh, submeshes
 from feti_homog.microstructure import phase_names
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.runtime import progress_bar
@@ -88,10 +88,7 @@ class TornCell:
         return np.concatenate([np.zeros(0), *(part for _, part in self.displacements(u, solution.strain))])
 
     def displacements(self, u: Float, loads: Float, keep: bool = True) -> Iterator[tuple[UniformPart, Float]]:
-        """Yield each part with its u* (dofs, k) for u (boundary dofs, k) on all boundaries and the loads (v, k).
-
-        u (boundary dofs, k) on all boundaries, under the loads (v, k); `keep` stores the interior factors.
-        """
+        """Extend u (boundary dofs, k) under loads (v, k) to each part's u* (dofs, k); `keep` stores factors."""
         place, extended = -1, np.zeros(0)
         for part in self.parts:
             if part.place != place:
@@ -121,7 +118,7 @@ class TornCell:
 
     @cached_property
     def class_nodes(self) -> Int:
-        """(c,) a plane node for each class in this rank's parts, one part after the other."""
+        """A plane node (c,) of each class in this rank's parts, part by part."""
         nodes, first = [np.zeros(0, np.int64)], 0
         for mesh in (part.mesh for part in self.parts):
             nodes.append(np.empty(mesh.n_classes, np.int64))
@@ -160,10 +157,7 @@ class TornCell:
         return list(uniform_parts.nested_interiors(self.solver.interface_operators, self.lattice, self.nested_lattice))
 
     def debonded(self, opening: float | None) -> Bool:
-        """(k,) mark this rank's interface nodes that are debonded from the start.
-
-        Arcs without an angle have the `opening`, which is None without such arcs.
-        """
+        """Mark this rank's initially debonded nodes (k,); arcs without an angle have the `opening`."""
         nodes = self.solver.jump_operator.nodes
         number = self.summary.fibre_number(nodes.fibre)
         is_debonded = nodes.precracked & bool(self.case.interfaces)
@@ -200,7 +194,7 @@ def tear(
     case: Case,
     comm: MPI.Intracomm,
     progress: progress_bar.Progress,
-    thresholds: thresholds.Thresholds = thresholds.DEFAULTS,
+    limits: thresholds.Thresholds = thresholds.DEFAULTS,
     policy: PartitionPolicy = DEFAULT_POLICY,
 ) -> TornCell:
     """Tear a case's cell and factor its subdomains.  Collective.
@@ -214,7 +208,7 @@ def tear(
     def solver_of(problem: Problem, subdomains: list[Subdomain]) -> FetiSolver:
         applications = partition_policy.applications(case, problem, summary.across)
         springs = phase_laws.springs(case, problem)
-        return FetiSolver(comm, shared, subdomains, lattice, applications, thresholds, springs, problem, recovers)
+        return FetiSolver(comm, shared, subdomains, lattice, applications, limits, springs, problem, recovers)
 
     with progress.stage("factor") as line:
         solver = solver_of(phase_laws.problems(case)[0], subdomains)
@@ -256,7 +250,7 @@ def assemble_subdomains(
     for remark in summary.remarks:
         progress.say(f"remark: {remark}")
     with progress.stage("assemble") as line:
-        subdomains = mpi_errors.agree(comm, _assemble, case, summary, share.submeshes, lattice)
+        subdomains = mpi_errors.agree(comm, _assemble, case, share, lattice)
         dofs = comm.allreduce(sum(s.n_dofs for s in subdomains))
         meshed = comm.allreduce(sum(s.area for s in subdomains))
         if summary.voids:
@@ -265,12 +259,10 @@ def assemble_subdomains(
     return share, shared, lattice, subdomains
 
 
-def _assemble(
-    case: Case, summary: CellSummary, submeshes: SubmeshesOfRank, lattice: ReferenceLattice
-) -> list[Subdomain]:
+def _assemble(case: Case, share: RankShare, lattice: ReferenceLattice) -> list[Subdomain]:
     """Refine and assemble this rank's subdomains."""
-    problem, subdomains = phase_laws.problems(case)[0], list[Subdomain]()
-    for s in submeshes.cut():
+    summary, problem, subdomains = share.summary, phase_laws.problems(case)[0], list[Subdomain]()
+    for s in share.submeshes.cut():
         phase_of = summary.constituent_phase[s.constituent]
         material = None if s.phase else np.unique(phase_of, return_inverse=True)[1]
         mixed = tuple(phase_laws.is_mixed(case, name) for name in _phases(summary, s))

@@ -139,7 +139,13 @@ def debonded(
         width = opening if arc.angle is None else arc.angle
         if width is None:
             raise ValueError("an arc without an angle needs an opening")
-        start, stop = (_ends(arc, side * width / 2, fibre, moved) for side in (-1, 1))
+        ends = np.empty((2, len(fibre)))  # of each fibre's arc, not reduced to [0, 360)
+        for end, half in zip(ends, (-width / 2, width / 2), strict=True):
+            end[:], tip = arc.centre + half, _end(arc, half)
+            for (number, direction), actual in moved.items():
+                if direction == tip:
+                    end[fibre == number] += actual - direction
+        start, stop = ends
         away = (angle - start) % 360.0
         within = (away > TIP_TOLERANCE_DEGREES) & (away < stop - start - TIP_TOLERANCE_DEGREES)
         within = (within & (0 < width < 360)) | (width >= 360.0)
@@ -152,26 +158,17 @@ def _end(arc: interface_section.Arc, half: float) -> float:
     return round(arc.centre + half, 9) % 360.0
 
 
-def _ends(arc: interface_section.Arc, half: float, fibre: Int, moved: MovedTips) -> Float:
-    """(k,) directions of this tip on the fibres (k,), not reduced to [0, 360)."""
-    ends, key = np.full(len(fibre), arc.centre + half), _end(arc, half)
-    for (number, end), actual in moved.items():
-        if end == key:
-            ends[fibre == number] += actual - end
-    return ends
-
-
 def faults(arcs: Sequence[interface_section.Arc], centres: Float, label: str = "interface") -> list[str]:
     """List faults in the arcs of interface `label`, on fibres with centres (fibres, 2), NaN without one."""
     messages = []
-    for place, arc in enumerate(arcs):
+    for number, arc in enumerate(arcs):
         chosen = range(1, len(centres) + 1) if isinstance(arc.fibre, str) else arc.fibre
         written = arc.fibre if isinstance(arc.fibre, str) or len(arc.fibre) > 1 else arc.fibre[0]
-        line = f"[{label}] debonded[{place}].fibre = {wording.toml_value(written)}: "
+        line = f"[{label}] debonded[{number}].fibre = {wording.toml_value(written)}: "
         if max(chosen, default=0) > len(centres):
             most = f"expected at most {len(centres)}; the cell has {len(centres)} fibres, counted from 1"
             messages.append(line + most)
-        winding = [number for number in chosen if number <= len(centres) and np.isnan(centres[number - 1, 0])]
+        winding = [fibre for fibre in chosen if fibre <= len(centres) and np.isnan(centres[fibre - 1, 0])]
         if winding and arc.angle not in (0.0, 360.0):
             messages.append(
                 f"{line}fibre {winding[0]} has no centre, for it winds around the cell; expected angle = 360, or "

@@ -1,4 +1,4 @@
-"""Loads on a cell, strains or the stresses that work on them, and macroscopic states."""
+"""Loads of a cell: prescribed strains, or the stresses that work on them; and macroscopic states."""
 
 from __future__ import annotations
 
@@ -9,17 +9,16 @@ import numpy as np
 
 from feti_homog.typing import Bool, Float
 
-# Values below this, relative to the ends of their leg, are zero with rounding.
-LOAD_ROUNDING = 1e-13
-
+# Rounding of loads relative to the ends of their leg, of fractions of a leg, and of vanishing jumps and strains.
+ROUNDING = 1e-12
 
 Multipliers = tuple[Float, ...]
-"""(owned rows,) multipliers of each problem, the plane first."""
+"""Multipliers (owned rows,) of each problem, the plane first."""
 
 
 @dataclass(frozen=True)
 class Macroscopic:
-    """Strains E, temperature changes among them, and their work conjugates Sigma, energy per area of the cell.
+    """Strains E, including temperature changes, and their work conjugates Sigma, energy per cell area.
 
     With fixed bonds the cell stores E.Sigma / 2, and E'.Sigma = E.Sigma' for two states (Betti).
 
@@ -32,7 +31,7 @@ class Macroscopic:
 
     @property
     def stored(self) -> float:
-        """E.Sigma / 2."""
+        """Stored energy E.Sigma / 2."""
         return 0.5 * float(self.strain @ self.stress)
 
     def scaled(self, factor: float) -> Macroscopic:
@@ -40,20 +39,20 @@ class Macroscopic:
         return Macroscopic(factor * self.strain, factor * self.stress)
 
     def load(self, by_stress: Bool) -> Load:
-        """Return the state's load, with (n,) components `by_stress`."""
+        """Return the load that prescribes stresses in the components `by_stress` (n,), else strains."""
         return Load(np.where(by_stress, self.stress, self.strain), by_stress)
 
     def released_to(self, after: Macroscopic) -> float:
-        """Return the energy released by a break at constant load: 1/2 (E'.Sigma - E.Sigma'), with ' after the break.
+        """Return the energy that a break releases at constant load: work minus change of stored energy.
 
-        It is the work minus the change of stored energy; at constant strain 1/2 E.(Sigma - Sigma').
+        1/2 (E'.Sigma - E.Sigma'), with ' after the break; at constant strain 1/2 E.(Sigma - Sigma').
         """
         return 0.5 * float(after.strain @ self.stress - self.strain @ after.stress)
 
 
 @dataclass(frozen=True)
 class Load:
-    """Values of n macroscopic strains, a temperature change among them, or stresses.
+    """Prescribed values of n macroscopic strains, including a temperature change, or of their stresses.
 
     Attributes:
         values: (n,) strains and stresses.
@@ -65,7 +64,7 @@ class Load:
 
     @classmethod
     def strain(cls, values: Float) -> Load:
-        """Return a load by strains (n,)."""
+        """Prescribe strains (n,)."""
         return cls(values, np.zeros(len(values), bool))
 
     def parts(self, sizes: Sequence[int]) -> list[Load]:
@@ -74,7 +73,7 @@ class Load:
         return [Load(*part) for part in zip(np.split(self.values, ends), np.split(self.by_stress, ends), strict=True)]
 
     def after(self, share: float, end: Load) -> Load:
-        """Return (1 - share) load + share end; components that cancel to rounding are zero."""
+        """Interpolate to another load: (1 - share) load + share end; components that cancel are zero."""
         values = (1.0 - share) * self.values + share * end.values
         largest = np.abs([self.values, end.values]).max(axis=0)
-        return Load(np.where(np.abs(values) <= LOAD_ROUNDING * largest, 0.0, values), self.by_stress)
+        return Load(np.where(np.abs(values) <= ROUNDING * largest, 0.0, values), self.by_stress)

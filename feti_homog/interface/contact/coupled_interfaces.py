@@ -3,10 +3,10 @@
 Phases are symmetric about x3 = 0, so the problems share only the bonds: the plane problem decides contact, and a
 debonded node carries no traction along the fibre.
 
-The damaged share of a bond rubs, after Alfano & Sacco (2006).  At damage d, slip s and stiffness K, the share 1 - d
-bears (1 - d) K s, and the share d bears f = K (s - s_i), bounded by Coulomb's law with the full pressure.  With
-g = d s_i this is a face with the jump g on the spring 1 / (C - C_0) and the extra force f: lam = g / (C - C_0) + f,
-s = C_0 lam + g.  The solution has r = s - C lam.
+The damaged fraction of a bond rubs, after Alfano & Sacco (2006).  At damage d, slip s and stiffness K, the fraction
+1 - d bears (1 - d) K s, and the fraction d bears f = K (s - s_i), bounded by Coulomb's law with the full pressure.
+With g = d s_i this is a face with the jump g on the spring 1 / (C - C_0) and the extra force f:
+lam = g / (C - C_0) + f, s = C_0 lam + g.  The solution has r = s - C lam.
 """
 
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ from feti_homog.typing import Float
 class CoupledInterfaces:
     """Interfaces of a cell, which its plane and axial problems share.
 
-    Strains and stresses (n,) have the plane components first, then the axial ones.
+    Strains and stresses (n,) have the plane components first, then the axial components.
 
     Attributes:
         plane: plane problem, with contact.
@@ -48,7 +48,7 @@ class CoupledInterfaces:
 
     @property
     def area(self) -> float:
-        """Area of the cell."""
+        """Cell area."""
         return float(self.plane.size.prod())
 
     @property
@@ -61,12 +61,12 @@ class CoupledInterfaces:
         return tuple(np.zeros(problem.solver.rows) for problem in self.problems)
 
     def linear(self, load: Load, bonds: BondState, start: Multipliers) -> tuple[DualSolution, ...]:
-        """Solve the dual problems with fixed states.  Collective."""
+        """Solve the dual problems at fixed statuses.  Collective."""
         triples = zip(self.problems, self.parts(load), start, strict=True)
         return tuple(problem.linear(part, bonds, lam) for problem, part, lam in triples)
 
     def equilibrium(self, load: Load, bonds: BondState, start: Multipliers) -> Equilibrium:
-        """Return the equilibrium under a load, with `bonds` as a first guess of contact states.  Collective."""
+        """Find the equilibrium under a load, with `bonds` as a first guess of contact states.  Collective."""
         loads = self.parts(load)
         state = self.plane.equilibrium(loads[0], bonds, start[0])
         for axial, along, lam in zip(self.problems[1:], loads[1:], start[1:], strict=True):
@@ -74,21 +74,19 @@ class CoupledInterfaces:
         return state
 
     def completed(self, state: Equilibrium) -> Equilibrium:
-        """Return a state with amplitudes and jumps by F lambda, where they lack.  Collective."""
-        plane, *rest = state.problems
-        pairs = zip(self.problems[1:], rest, strict=False)
-        axial = next((problem.completed(equilibrium) for problem, equilibrium in pairs), None)
-        return replace(self.plane.completed(plane), axial=axial)
+        """Add amplitudes and jumps by F lambda to a state without them.  Collective."""
+        axial = None if state.axial is None else self.problems[1].completed(state.axial)
+        return replace(self.plane.completed(state), axial=axial)
 
     def parts(self, load: Load) -> list[Load]:
-        """Return the load of each problem."""
+        """Split a load into the loads of the problems."""
         return load.parts([len(problem.solver.problem.loads) for problem in self.problems])
 
     def leg_start(self, origin: Macroscopic, before: Load | None, end: Load) -> Load:
         """Return the load at the beginning of a leg to `end`.  Collective.
 
-        It is the waypoint `before`; components that change between strain and stress are those of the last point,
-        `origin`, stresses without the solver's error.
+        Its values are the values of the waypoint `before`; components that change between strain and stress have the
+        values of the last point, `origin`, where a stress within the solver's error is 0.
         """
         parts = np.split(origin.strain, [len(self.plane.solver.problem.loads)])
         pairs = zip(parts, self.problems, strict=False)
@@ -101,24 +99,24 @@ class CoupledInterfaces:
         return Load(values, end.by_stress)
 
     def traction(self, solutions: Sequence[DualSolution]) -> Float:
-        """(k, 2) normal and tangential traction, tension positive, or (k, 3) with the axial one."""
+        """Return the normal and tangential traction (k, 2), tension positive, or (k, 3) with the axial traction."""
         pairs = zip(self.problems, solutions, strict=True)
         return np.hstack([problem.traction(solution) for problem, solution in pairs])
 
     def macroscopic(self, solutions: Sequence[DualSolution]) -> Macroscopic:
-        """Return strains and stresses.  Collective."""
+        """Return the macroscopic strains and stresses of the solutions.  Collective."""
         stresses = [problem.stress(solution) for problem, solution in zip(self.problems, solutions, strict=True)]
         return Macroscopic(np.concatenate([solution.strain for solution in solutions]), np.concatenate(stresses))
 
     def least_bonded_stress(self, strains: Float) -> Float:
-        """(m, n) stresses of strains (m, n), by the smallest bonded stiffness.  Collective."""
+        """Return the stresses (m, n) of strains (m, n) by the smallest bonded stiffness.  Collective."""
         parts = np.split(strains, [len(self.plane.solver.problem.loads)], axis=1)
         pairs = zip(parts, self.problems, strict=False)
         return np.hstack([strain @ problem.scales.least_bonded_stiffness for strain, problem in pairs])
 
 
 def slipped(interface: ContactProblem, state: Equilibrium) -> Float:
-    """(owned rows,) r in the tangential rows of damaged bonds; 0 in other rows, or without friction."""
+    """Return r (owned rows,) in the tangential rows of damaged bonds; 0 in other rows, or without friction."""
     r = np.zeros(interface.solver.rows)
     if state.bonds.gap_and_slip is not None and interface.solver.jump_operator.components > 1:
         rows = interface.nodes.row[state.status == BONDED] + 1
@@ -135,7 +133,7 @@ def energy_beside_springs(interface: ContactProblem, state: Equilibrium) -> floa
 
 
 def held_traction(cell: CoupledInterfaces, state: Equilibrium) -> Float:
-    """(k, c) traction at this rank's nodes; s / C, of the intact share, at damaged bonds."""
+    """Return the traction (k, c) at this rank's nodes; in damaged bonds s / C, of the intact fraction."""
     traction, r = cell.traction(state.solutions), slipped(cell.plane, state)[cell.nodes.row + 1]
     nodes = np.flatnonzero(r)
     C = state.solution.compliance[cell.nodes.row[nodes] + 1]

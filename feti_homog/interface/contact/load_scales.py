@@ -1,4 +1,4 @@
-"""Sizes of load effects, independent of debonding: scales for tolerances and errors."""
+"""Sizes of load effects in the bonded cell, which debonding does not change: scales for tolerances and errors."""
 
 from functools import cached_property
 
@@ -10,26 +10,25 @@ from feti_homog.interface.loads import Load
 from feti_homog.materials import phase_bounds
 from feti_homog.typing import Float
 
-# A strain so many times the bonded one is no scale for errors.
+# Strains beyond this multiple of the bonded cell's strains are no scale for errors.
 ABSURD = 1e3
-# A force or a gap has a sign above this many relative tolerances of the Krylov method, times the largest force or
-# imposed displacement; below, it may be the solver's error.
+# Sizes up to this many relative tolerances of the Krylov method, times the largest force or the imposed displacement,
+# may be the solver's error, which in solves from good multipliers was a few hundredths of a tolerance.
 SIGN_NOISE_PER_RTOL = 10.0
+# Smaller fractions of the largest force, stress or squared amplitude are rounding.
+NEGLIGIBLE = 1e-6
 
 
 class LoadScales:
-    """Loads (v,) of a problem: its m strains, then other actions."""
+    """Scales of the loads (v,) of one problem: its m strains, then other actions such as a temperature."""
 
     def __init__(self, solver: FetiSolver, size: Float) -> None:
-        """Take the solver, and the cell's size (2,)."""
+        """Take the dual solver and the cell size (2,)."""
         self.solver, self.size = solver, size
 
     @cached_property
     def least_bonded_stiffness(self) -> Float:
-        """(v, v) Reuss' bound <L^-1>^-1 for strains, <L> for other loads.  Collective.
-
-        A scale of stress and energy that debonding does not make zero.
-        """
+        """Reuss' bound <L^-1>^-1 for strains, <L> for other loads (v, v).  Collective."""
         shares, stiffnesses = self._phases
         m, bound = self.solver.problem.strains, self.mean_stiffness.copy()
         bound[:m, m:] = bound[m:, :m] = 0.0
@@ -38,12 +37,12 @@ class LoadScales:
 
     @cached_property
     def mean_stiffness(self) -> Float:
-        """(v, v) <L>, Voigt's bound for strains.  Collective."""
+        """Mean stiffness <L> (v, v), Voigt's bound for strains.  Collective."""
         return phase_bounds.voigt(*self._phases)
 
     @cached_property
     def _phases(self) -> tuple[Float, Float]:
-        """Area shares (n,) and stiffnesses (n, v, v), one a subdomain.  Collective."""
+        """Area fractions (n,) and stiffnesses (n, v, v) of the phases in all subdomains.  Collective."""
         parts = self.solver.comm.allgather([(s.areas, s.laws) for s in self.solver.subdomains])
         columns = zip(*(pair for pairs in parts for pair in pairs), strict=True)
         areas, stiffnesses = map(np.concatenate, columns)
@@ -51,9 +50,9 @@ class LoadScales:
 
     @cached_property
     def roots(self) -> Float:
-        """(v,) roots of the diagonal in `least_bonded_stiffness`.  Collective.
+        """Square roots (v,) of the diagonal of `least_bonded_stiffness`.  Collective.
 
-        Comparisons multiply strains and divide stresses by them; inf for loads without a stress.
+        Strains times these roots, and stresses over them, are comparable; inf for loads without a stress.
         """
         diagonal = np.full(len(self.least_bonded_stiffness), np.inf)
         stresses = slice(self.solver.problem.stresses)
@@ -68,10 +67,7 @@ class LoadScales:
 
     @cached_property
     def _bond_stiffness(self) -> Float:
-        """(k,) stress at this rank's bonds per cell strain: by the softer body and springs in a row.
-
-        Collective.
-        """
+        """Stress (k,) at bonds per cell strain, by the softer body in series with the springs.  Collective."""
         solver, nodes = self.solver, self.solver.jump_operator.nodes
         m, stiffness = solver.problem.strains, np.zeros(self._bodies)
         for s in solver.subdomains:
@@ -88,7 +84,7 @@ class LoadScales:
         return int(self.solver.comm.allreduce(last, MPI.MAX)) + 1
 
     def over_interface(self, values: Float) -> Float:
-        """(k,) largest of values (k,) and 0 on each bond's inner body.  Collective."""
+        """Return the largest of the values (k,) around each bond's inner body, at least 0.  Collective."""
         inner, largest = self.solver.jump_operator.nodes.bodies[:, 1], np.zeros(self._bodies)
         np.maximum.at(largest, inner, values)
         self.solver.comm.Allreduce(MPI.IN_PLACE, largest, MPI.MAX)
@@ -96,49 +92,51 @@ class LoadScales:
 
     @cached_property
     def longest(self) -> Float:
-        """Return the largest tributary length (k,) around the inner body of each bond.  Collective."""
+        """Largest tributary length (k,) around each bond's inner body.  Collective."""
         return self.over_interface(self.solver.jump_operator.nodes.length)
 
     def bond_stress(self, loads: Float) -> Float:
-        """(k,) or (k, n) stress at this rank's bonds, if each bore the loads (v,) or (v, n) alone.  Collective."""
+        """Bound the stress at this rank's bonds, (k,) or (k, n), under loads (v,) or (v, n).  Collective."""
         largest: Float = np.multiply.outer(self._bond_stiffness, self.imposed_strain(loads).max(axis=0))
         return largest
 
     @cached_property
     def _free_strains(self) -> Float:
-        """(m, v) sizes of the strains that loads make; other actions make the largest strains of free bodies.
+        """Strains (m, v) that unit loads cause; actions other than strains cause the largest strains of free bodies.
 
-        A soft body that expands hardly moves a stiff one, but the dual problem has to close its free motion.
-        Collective."""
+        A soft body that expands hardly moves a stiff body, but the dual problem has to close its free expansion.
+        Collective.
+        """
         m, stiffnesses = self.solver.problem.strains, self._phases[1]
         free = np.linalg.solve(stiffnesses[:, :m, :m], stiffnesses[:, :m, m:])
         return np.hstack([np.eye(m), np.abs(free).max(axis=0)])
 
     def imposed(self, loads: Float) -> float:
-        """Largest displacement E y that the loads (v,) impose on the cell.  Collective."""
+        """Return the largest displacement E y that loads (v,) impose on the cell.  Collective."""
         corners = self.size * np.array([[1, 0], [0, 1], [1, 1]])
         return float(np.abs(corners @ self.solver.problem.gradient(self.imposed_strain(loads)).T).max())
 
     def stress_scale(self, loads: Float) -> float:
-        """Return a lower stress bound in the bonded cell under loads (v,), whatever their signs.  Collective."""
+        """Return a lower bound of the stress in the bonded cell under loads (v,) of any sign.  Collective."""
         m = self.solver.problem.strains
         return float(np.abs(self.least_bonded_stiffness[:m, :m] @ self.imposed_strain(loads)).max())
 
     @property
     def sign_noise(self) -> float:
-        """Relative size up to which a sign is the solver's error."""
+        """Relative size up to which a force, a gap or a stiffness may be the solver's error."""
         return SIGN_NOISE_PER_RTOL * self.solver.rtol
 
     def gap_noise(self, strain: Float) -> float:
-        """Return the gap below which a sign may be the solver's error.  Collective."""
+        """Return the size up to which a gap may be the solver's error.  Collective."""
         return self.sign_noise * self.imposed(strain)
 
     def force_noise(self, solution: DualSolution) -> Float:
-        """(k,) nodal force at this rank's nodes that may be the solver's error.  Collective.
+        """Return the sizes (k,) up to which the nodal forces may be the solver's error.  Collective.
 
-        It is relative to the largest force on the interface, or to the force by the imposed strain: an error of the
-        jumps changes forces by the stiffness of the softer side.  Forces on other interfaces, or between the pieces of
-        a cut body, do not count."""
+        The error is relative to the largest force on the interface or, if larger, to the force by the imposed strain:
+        errors of jumps change forces by the stiffness of the softer side.  Forces on other interfaces and between the
+        pieces of a cut body do not count.
+        """
         B = self.solver.jump_operator
         pairs = B.nodes.row[:, None] + np.arange(B.components)
         forces = np.abs(solution.lam[pairs]).max(axis=1, initial=0.0)
@@ -146,7 +144,7 @@ class LoadScales:
         return np.asarray(self.sign_noise * np.maximum(self.over_interface(forces), caused))
 
     def asked(self, load: Load) -> Float:
-        """(v,) sizes of a load's strains: prescribed ones, and the bonded cell's under its stresses.  Collective."""
+        """Return the sizes (v,) of prescribed strains, plus strains of the bonded cell by stresses.  Collective."""
         k = self.solver.problem.stresses
         strain = np.abs(np.where(load.by_stress, 0.0, load.values))
         stress = np.abs(np.where(load.by_stress, load.values, 0.0))[:k]
@@ -154,15 +152,15 @@ class LoadScales:
         return np.asarray(strain)
 
     def acting(self, strain: Float, asked: Float) -> Float:
-        """(v,) strain sizes as scales for errors: the state's, at most an absurd multiple of `asked`.  Collective."""
+        """Return the strain sizes (v,) of a state, at most ABSURD times `asked`, as error scales.  Collective."""
         limit = ABSURD * self.imposed_strain(asked).max()
         is_strain = np.arange(len(strain)) < self.solver.problem.strains
         return np.where(is_strain, np.minimum(np.abs(strain), limit), np.abs(strain))
 
     def excess(self, strain: Float, asked: Float) -> float:
-        """Return the ratio of a state's strains (v,) to `asked`.  Collective."""
+        """Return the ratio of the largest strain of a state (v,) to the largest one of `asked` (v,).  Collective."""
         return float(self.imposed_strain(strain).max() / (self.imposed_strain(asked).max() or np.inf))
 
     def imposed_strain(self, loads: Float) -> Float:
-        """(m,) or (m, n) sizes of strains under loads (v,) or (v, n).  Collective."""
+        """Return the strain sizes, (m,) or (m, n), under loads (v,) or (v, n) in the bonded cell.  Collective."""
         return np.asarray(self._free_strains @ np.abs(loads))

@@ -1,7 +1,7 @@
 """The dual problem under mixed loads: some strains follow from prescribed stresses.
 
-With fixed active rows the response is linear: the answers to the prescribed strains and to unit strains superpose, with
-factors that meet the stresses.
+With fixed active rows the response is linear: the solutions under the prescribed strains and under unit strains
+superpose, with factors that meet the stresses.
 """
 
 from collections.abc import Sequence
@@ -11,24 +11,19 @@ import numpy as np
 
 from feti_homog.errors import NotCarriedError
 from feti_homog.feti import DualSolution, FetiSolver
-from feti_homog.interface.contact.load_scales import LoadScales
+from feti_homog.interface.contact.load_scales import NEGLIGIBLE, LoadScales
 from feti_homog.interface.loads import Load
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Bool, Float
 
-# Share of the stresses that may act on directions without stiffness: rounding of these.
-UNCARRIED_SHARE = 1e-6
-# Rounding of squared jumps, relative to the torn cell, and of stresses, relative to clamped bodies.
-UNRESISTED = 1e-12
-
 
 def solve(scales: LoadScales, load: Load, start: Float) -> DualSolution:
-    """Return the solution under a load, from the multipliers `start` (owned rows,) on.  Collective.
+    """Solve the dual problem under a load, from multipliers `start` (owned rows,).  Collective.
 
-    Strains that meet no more than noise stay zero.
+    Strains whose stresses are noise stay zero.
 
     Raises:
-        NotCarriedError: the stresses meet no stiffness.
+        NotCarriedError: no stiffness resists the stresses.
     """
     solver = scales.solver
     if not (load.by_stress.any() and load.values.any()):
@@ -44,15 +39,15 @@ def solve(scales: LoadScales, load: Load, start: Float) -> DualSolution:
         missing = missing - stresses[0]
     imposed = scales.imposed_strain(strains[0])
     noise = scales.sign_noise * float((scales.roots[: len(imposed)] * imposed).max())
-    # Roots of their own stiffnesses scale the strains, so that none is small beside another.  Scaled stiffnesses below
-    # the solver's error, and scaled stresses below `noise`, are zero.
+    # Roots of stiffnesses scale the strains, so that no strain is small beside another.  Scaled stiffnesses below the
+    # solver's error, and scaled stresses below `noise`, are zero.
     stiffness, roots = stresses[-len(unknown) :], scales.roots[unknown]
     eigenvalues, vectors = np.linalg.eigh((stiffness + stiffness.T) / (2 * np.outer(roots, roots)))
     along, resists = vectors.T @ (missing / roots), eigenvalues > scales.sign_noise
-    largest = max(UNCARRIED_SHARE * np.abs(missing / roots).max(), noise)
+    largest = max(NEGLIGIBLE * np.abs(missing / roots).max(), noise)
     is_carried = not np.abs(along[~resists]).max(initial=0.0) > largest
     answer = vectors[:, resists] @ (along[resists] / eigenvalues[resists]) / roots if is_carried else None
-    # Rank 0 decides: rounding on other processors may part the ranks where a stiffness is nearly none.
+    # Rank 0 decides: where a stiffness nearly vanishes, rounding may differ from processor to processor.
     factors = solver.comm.bcast(answer)
     if factors is None:
         raise NotCarriedError("nothing in the cell carries the stresses of the load")
@@ -60,10 +55,10 @@ def solve(scales: LoadScales, load: Load, start: Float) -> DualSolution:
 
 
 def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:
-    """(v,) strains, of prescribed stresses (v,), with a share in a strain that strains no body.  Collective.
+    """Mark the strains (v,) of prescribed stresses that contribute to a strain without stiffness.  Collective.
 
-    Such a strain opens faces without multipliers alone: rigid motions close the jumps of the torn cell, and the torn
-    bodies bear no stress.  `voigt` (v, v) is the stress integral of clamped bodies.
+    Such a strain opens debonded faces alone: rigid motions close the jumps of the torn cell, and the torn bodies bear
+    no stress.  `voigt` (v, v) is the stress integral of clamped bodies.
     """
     unknown, undetermined = np.flatnonzero(by_stress), np.zeros(len(by_stress), bool)
     torn = solver.d[:, unknown]
@@ -73,13 +68,13 @@ def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:
     scales = np.sqrt(np.where(largest > 0.0, largest, 1.0))
     pairs = zip((open_jumps, solver.torn_stiffness[np.ix_(unknown, unknown)]), scales, strict=True)
     values, vectors = np.linalg.eigh(sum(matrix / np.outer(scale, scale) for matrix, scale in pairs))
-    shares = np.abs(vectors[:, values < UNRESISTED]) > UNCARRIED_SHARE
-    undetermined[unknown] = shares.any(axis=1)
+    # The values are squares.
+    undetermined[unknown] = (np.abs(vectors[:, values < NEGLIGIBLE**2]) > NEGLIGIBLE).any(axis=1)
     return np.asarray(solver.comm.bcast(undetermined))
 
 
 def superposed(solver: FetiSolver, solutions: Sequence[DualSolution], factors: Float) -> DualSolution:
-    """Return the sum of solutions with equal active rows, times factors.  Collective."""
+    """Superpose solutions with equal active rows, times factors.  Collective."""
     triples = zip(*((solution.strain, solution.lam, solution.jump) for solution in solutions), strict=True)
     strain, lam, jump = (np.stack(arrays, axis=1) @ factors for arrays in triples)
     total = replace(solutions[0], strain=strain, lam=lam, jump=jump, alpha=None)

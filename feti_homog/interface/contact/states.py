@@ -1,6 +1,7 @@
 """Interface states: bonds with their memory, the equilibrium under one load, and its certificate.
 
-The certificate measures errors of the KKT conditions, independent of the search.
+The certificate (`kkt_errors`, `coulomb_errors`) measures how well a state satisfies the conditions of contact and of
+friction, independent of the search that found the state.
 """
 
 from __future__ import annotations
@@ -23,13 +24,13 @@ BONDED, CLOSED, OPEN = 0, 1, 2
 
 @dataclass(frozen=True)
 class BondState:
-    """State at this rank's k interface nodes.
+    """State of this rank's k interface nodes.
 
     Attributes:
-        status: (k,) BONDED, CLOSED or OPEN.
+        status: (k,) BONDED, CLOSED (debonded faces touch) or OPEN (they do not).
         history: (k, h) internal variables of the bond law, from its `begin`; h = 0 without memory.
-        pressed: (k,) bonds with the normal stiffness of compression, which damage does not change.
-        gap_and_slip: (k, 2) jumps of debonded faces with friction, and the jumps that damage adds to bonds; 0 at intact
+        pressed: (k,) bonds under compression, whose normal stiffness is that without damage.
+        gap_and_slip: (k, 2) with friction, jumps of debonded faces and the jumps that damage adds to bonds, 0 at intact
             bonds; None without friction.
         sliding: (k,) sign with which the slip of a closed node grows, 0 if it sticks; None without friction.
     """
@@ -42,37 +43,38 @@ class BondState:
 
     @property
     def sliding_signs(self) -> Status:
-        """(k,) `sliding`, 0 without friction."""
+        """Return `sliding` (k,), 0 without friction."""
         return np.zeros(len(self.status), np.int8) if self.sliding is None else self.sliding
 
     def with_status(self, status: Status) -> BondState:
-        """Return the state with another status."""
+        """Return these bonds with the status (k,)."""
         return replace(self, status=status)
 
     def flipped(self, which: Bool) -> BondState:
-        """Flip the nodes `which` (k,) between open and closed, or between pulled and pressed."""
-        holds = self.status == BONDED
-        turned = np.where(which & ~holds, CLOSED + OPEN - self.status, self.status).astype(np.int8)
-        return replace(self, status=turned, pressed=self.pressed ^ (which & holds))
+        """Flip debonded nodes `which` (k,) between open and closed, and bonds between pulled and pressed."""
+        bonded = self.status == BONDED
+        status = np.where(which & ~bonded, CLOSED + OPEN - self.status, self.status).astype(np.int8)
+        return replace(self, status=status, pressed=self.pressed ^ (which & bonded))
 
     def differs(self, other: BondState) -> Bool:
-        """(k,) nodes with another contact state."""
+        """Mark the nodes (k,) whose contact state differs from the `other` one."""
         return np.asarray((self.status != other.status) | (self.pressed != other.pressed))
 
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """The cell under one load, with its contact states.
+    """Equilibrium of the cell under one load.
 
     Attributes:
         load: prescribed load.
-        bonds: states at this rank's interface nodes.
+        bonds: states of this rank's interface nodes.
         solution: last dual solution.
         iterations, solves: numbers of Krylov iterations and dual problems.
-        free_motions: number of rigid motions that no interface force resists; touching without a force resists none.
+        free_motions: number of rigid motions that no interface force resists.
         certificate: errors by `kkt_errors`.
-        asked: (v,) sizes of the strains that the load makes in the bonded cell; with friction all loads up to it.
-        axial: equilibrium along the fibres with these bonds, if that is a problem.
+        asked: (v,) sizes of the strains that the load causes in the bonded cell; with friction, the largest sizes of
+            all loads up to this load.
+        axial: equilibrium along the fibres with these bonds, in generalized plane strain.
     """
 
     load: Load
@@ -87,44 +89,44 @@ class Equilibrium:
 
     @property
     def status(self) -> Status:
-        """(k,) BONDED, CLOSED or OPEN."""
+        """Status (k,) of the bonds."""
         return self.bonds.status
 
     @property
     def problems(self) -> tuple[Equilibrium, ...]:
-        """Equilibria, one a problem, the plane one first."""
+        """Equilibrium of each problem, the plane first."""
         return (self,) if self.axial is None else (self, self.axial)
 
     @property
     def solutions(self) -> tuple[DualSolution, ...]:
-        """Solutions, one a problem."""
+        """Dual solution of each problem."""
         return tuple(state.solution for state in self.problems)
 
     @property
     def multipliers(self) -> Multipliers:
-        """Multipliers, one array a problem."""
+        """Multipliers of each problem."""
         return tuple(solution.lam for solution in self.solutions)
 
     @property
     def converged(self) -> bool:
-        """Return whether the Krylov method solved all problems."""
+        """True if the Krylov method converged in all problems."""
         return all(solution.reason > 0 for solution in self.solutions)
 
 
 def kkt_errors(
     scales: LoadScales, traction: Float, gap: Float, debonded: Bool, closed: Bool, acting: Float
 ) -> dict[str, float]:
-    """Return the largest relative errors of gap >= 0, force <= 0, force gap = 0 on debonded faces.  Collective.
+    """Measure the largest relative violations of the KKT conditions on debonded faces.  Collective.
 
-    `kkt_penetration` is -gap relative to the imposed displacement, `kkt_tension` the normal traction of a closed node
-    relative to the largest traction on its interface, `kkt_complementarity` |force gap| relative to the largest force
-    on the interface times the displacement.  Scales of traction are at least the imposed stress: without forces on
-    faces the tractions are rounding.
+    `kkt_penetration` measures gap >= 0: -gap relative to the imposed displacement.  `kkt_tension` measures force <= 0:
+    normal traction of a closed node relative to the largest traction on its interface.  `kkt_complementarity` measures
+    force gap = 0: |force gap| relative to the largest force on the interface times the displacement.  Scales of
+    traction are at least the imposed stress, because without forces on the faces all tractions are rounding.
 
     Args:
-        traction, gap: (k, 2) normal and tangential traction at this rank's nodes, tension positive, and (k,) opening.
-        debonded, closed: (k,) nodes with these conditions, and nodes that touch.
-        acting: (v,) sizes of loads, whose displacement and stress are imposed.
+        traction, gap: (k, 2) normal and tangential traction at this rank's nodes, tension positive, and (k,) gap.
+        debonded, closed: (k,) nodes that have to satisfy the conditions, and nodes that touch.
+        acting: (v,) sizes of the loads that impose displacement and stress.
     """
     comm, length = scales.solver.comm, scales.solver.jump_operator.nodes.length
     displacement, stress, over_interface = scales.imposed(acting), scales.bond_stress(acting), scales.over_interface
@@ -146,7 +148,9 @@ def kkt_errors(
 
 
 def coulomb_errors(force: Float, friction: Float, sliding: Status) -> Float:
-    """(k,) excess of shear over mu p, or its distance to s mu p, and any shear along the fibres.
+    """Measure the violation (k,) of Coulomb's law: |t| <= mu p where faces stick, t = s mu p where they slide.
+
+    Shear along the fibres, where faces have no friction, is a violation too.
 
     Args:
         force: (k, c) normal, tangential and axial traction of faces, without the springs of damaged bonds.

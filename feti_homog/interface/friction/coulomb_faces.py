@@ -28,10 +28,10 @@ from feti_homog.interface.friction.face_system import FaceSystem, Prescribed
 from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK
 from feti_homog.typing import Bool, Float
 
-# Pivots, and pivots a node, after which other searches take over; a continuation step has as many as the former.
+# Pivots, and pivots a node, after which other searches take over; a continuation step takes at most SOLVES pivots.
 SOLVES, SOLVES_PER_NODE = 50, 4
-# Largest number of sets to try, smallest step of mu.
-MOST_TRIED, LEAST_STEP = 256.0, 1.0 / 256.0
+# Largest number of status sets to try, and of equal continuation steps of mu.
+MOST_TRIED = 256.0
 STATUSES = np.array([STICK, FORWARD, OPEN_FACE, BACKWARD], np.int8)
 Found = tuple[Status, Float] | None
 
@@ -46,7 +46,7 @@ class StuckError(NotCarriedError):
 
 @dataclass(frozen=True)
 class StatusSearch:
-    """Search for admissible statuses (n,) and scaled x (m,); methods return None if they find none.
+    """Search for admissible statuses (n,) and scaled x (m,); methods return None without a result.
 
     Attributes:
         allowed: (n, 4) statuses that a node may have, in the columns [STICK, FORWARD, OPEN_FACE, BACKWARD]; conditions
@@ -61,31 +61,26 @@ class StatusSearch:
 
     def run(self, status: Status) -> Found:
         """Search from a first guess by pivots, then trial, then continuation."""
-        result = self.by_pivots(status, self._solves)
+        result = self.by_pivots(status)
         return result or self.by_trial(status) or self.by_continuation(status)
 
-    @property
-    def _solves(self) -> int:
-        """Largest number of pivots."""
-        return SOLVES + SOLVES_PER_NODE * self.faces.nodes
-
-    def by_pivots(self, status: Status, solves: int) -> Found:
+    def by_pivots(self, status: Status, solves: int | None = None) -> Found:
         """Return the statuses to which pivots lead, if their forces balance."""
         result, balanced = self._pivoted(status, solves)
         return result if balanced else None
 
     def slides_freely(self, status: Status) -> bool:
         """Return whether pivots lead to statuses whose forces drive a free motion."""
-        result, balanced = self._pivoted(status, self._solves)
+        result, balanced = self._pivoted(status)
         return result is not None and not balanced
 
-    def _pivoted(self, status: Status, solves: int) -> tuple[Found, bool]:
-        """Return the result of pivots, and whether its forces balance.
+    def _pivoted(self, status: Status, solves: int | None = None) -> tuple[Found, bool]:
+        """Pivot at most `solves` times; return the statuses and x, and whether their forces balance.
 
         After some block pivots without progress single nodes change at random: a fixed order may end in a cycle.
         """
         fewest, pivots, random = self.faces.nodes + 1, 0, np.random.default_rng(0)
-        for _ in range(solves):
+        for _ in range(solves or SOLVES + SOLVES_PER_NODE * self.faces.nodes):
             x, balanced = self.faces.linear(status, self.load, self.start)
             better = self._improved(status, x)
             wrong = np.flatnonzero(better != status)
@@ -127,10 +122,10 @@ class StatusSearch:
                 yield tried, x
 
     def by_continuation(self, status: Status) -> Found:
-        """Raise the share of mu to 1, and pivot from the last statuses at each step."""
+        """Raise the fraction of mu to 1, and pivot from the last statuses at each step."""
         share, step, faces = 0.0, 0.5, copy(self.faces)
         search = replace(self, faces=faces)
-        while step >= LEAST_STEP:
+        while step >= 1.0 / MOST_TRIED:
             faces.friction = min(share + step, 1.0) * self.faces.friction
             result = search.by_pivots(status, SOLVES)
             if result is None:
@@ -142,7 +137,7 @@ class StatusSearch:
         return None
 
     def _improved(self, status: Status, x: Float) -> Status:
-        """(n,) statuses that the signs of forces and jumps call for."""
+        """Return the statuses (n,) that the signs of forces and jumps require."""
         faces, allowed, slip, last = self.faces, self.allowed, self.load.slip, 2 * self.faces.nodes
         normal, tangential = faces.forces(x)
         noise, gap, moved = faces.noise(x), x[:last:2], x[1:last:2] - slip
@@ -178,16 +173,14 @@ class CoulombFaces(FaceSystem):
         return result
 
     def all_allowed(self) -> Bool:
-        """(n, 4) True; of touching, faces without friction have one status, FORWARD."""
-        return self._without_friction_free(np.ones((self.nodes, 4), bool))
-
-    def _known(self, status: Status) -> Status:
-        """(n,) statuses, FORWARD for touching faces without friction."""
-        return np.where((self.friction == 0.0) & (status != OPEN_FACE), FORWARD, status).astype(np.int8)
-
-    def _without_friction_free(self, allowed: Bool) -> Bool:
+        """Allow all statuses (n, 4); faces without friction have FORWARD alone while they touch."""
+        allowed = np.ones((self.nodes, 4), bool)
         allowed[np.ix_(self.friction == 0.0, [STICK, BACKWARD])] = False
         return allowed
+
+    def _known(self, status: Status) -> Status:
+        """Replace the statuses (n,) of touching faces without friction by FORWARD."""
+        return np.where((self.friction == 0.0) & (status != OPEN_FACE), FORWARD, status).astype(np.int8)
 
     def rates(self, status: Status, x: Float, by_stress: Bool, rate: Float) -> tuple[Status, Float]:
         """Return the next statuses (n,) of a state x, and the rate (m,) of x under a rate (v,) of loads.
@@ -232,7 +225,7 @@ class CoulombFaces(FaceSystem):
         raise StuckError(INDEFINITE)
 
     def _at_limits(self, status: Status, x: Float) -> Bool:
-        """(n, 4) statuses with which nodes may go on: the present one, and others at a limit."""
+        """Allow the present statuses, and other statuses at the limits of the present ones: (n, 4)."""
         closed, gap = status != OPEN_FACE, x[: 2 * self.nodes : 2]
         (normal, tangential), noise = self.forces(x), self.noise(x)
         allowed = np.zeros((self.nodes, 4), bool)
@@ -241,7 +234,8 @@ class CoulombFaces(FaceSystem):
             limited = closed & ((status == sign) | (sign * tangential + self.friction * normal >= -noise))
             allowed[limited, sign] = allowed[limited, STICK] = True
         allowed[np.where(closed, normal >= -noise, gap <= noise)] = True
-        return self._without_friction_free(allowed)
+        allowed[np.ix_(self.friction == 0.0, [STICK, BACKWARD])] = False
+        return allowed
 
     def next_change(self, status: Status, x: Float, rate: Float) -> float:
         """Return the time until a status ends while x changes at `rate`, inf if none does."""
@@ -262,10 +256,7 @@ class CoulombFaces(FaceSystem):
         return float((tangential * (after - before)[1 : 2 * self.nodes : 2])[sliding].sum())
 
     def losses(self, status: Status, before: Float, after: Float) -> tuple[float, float]:
-        """Return the energy that faces lose in a step at constant load, and its share that is heat.
-
-        Along the way forces change in proportion to jumps.
-        """
+        """Return the energy that faces lose on a straight way at constant load, and the heat in this energy."""
         forces = -(self.product(before) + self.product(after)) / 2
         forces[self.loads] = 0.0
         return float(forces @ (after - before)), self.heat_behind(status, before, after)

@@ -22,8 +22,6 @@ FACTORIZATIONS = 12
 
 # Force on a free motion, relative to the forces of the loads, that counts as none.
 UNBALANCED = 1e-7
-# Rounding of forces and jumps, scaled by the stiffness of the node, relative to the terms of its rows of S x.
-NOISE = 1e-11
 
 
 @dataclass(frozen=True)
@@ -65,12 +63,12 @@ class FaceSystem:
 
     @property
     def nodes(self) -> int:
-        """n."""
+        """Number n of nodes."""
         return len(self.friction)
 
     @property
     def loads(self) -> slice:
-        """Places of the loads in x."""
+        """Indices of the loads in x."""
         return slice(2 * self.nodes, len(self.S))
 
     def forces(self, x: Float) -> tuple[Float, Float]:
@@ -145,10 +143,7 @@ class FaceSystem:
         return self._last[1]
 
     def settled(self, status: Status, load: Prescribed, x: Float) -> tuple[Status, Float]:
-        """Return the statuses, and x (m,) without the rounding of the way to it.
-
-        With a free motion, which rounding would drive, x stays.
-        """
+        """Solve for x (m,) again without accumulated rounding; keep x if a free motion exists."""
         return status, self.linear(status, load, x)[0] if self.sign(status, load.by_stress) else x
 
     def is_balanced(self, status: Status, load: Prescribed, x: Float) -> bool:
@@ -175,6 +170,6 @@ class FaceSystem:
         return x, rows
 
     def noise(self, x: Float) -> Float:
-        """(n,) rounding in each node's scaled force, and jump."""
+        """Return the rounding (n,) in the scaled force and jump of each node."""
         terms = self.terms(x)[: 2 * self.nodes].reshape(-1, 2)
-        return np.asarray(NOISE * terms.max(axis=1, initial=0.0))
+        return np.asarray(status_system.NOISE * terms.max(axis=1, initial=0.0))

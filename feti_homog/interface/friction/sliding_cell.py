@@ -22,13 +22,10 @@ from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status, coulomb_errors
 from feti_homog.interface.friction.coulomb_faces import CoulombFaces
-from feti_homog.interface.friction.status_system import HELD, OPEN_FACE, REFINEMENTS, STICK
+from feti_homog.interface.friction.status_system import HELD, OPEN_FACE, REFINEMENTS, STICK, UNRESISTED
 from feti_homog.interface.loads import Load, Macroscopic
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int
-
-# Stiffness, relative to the bonded one, that is rounding.
-NO_STIFFNESS = 1e-10
 
 
 class CondensedProblem:
@@ -124,8 +121,8 @@ class AxialFaces:
         diagonal, stiffness = L.diagonal(), L - b.T @ self.jumps
         roots = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
         values, vectors = np.linalg.eigh((stiffness + stiffness.T) / (2.0 * np.outer(roots, roots)))
-        positive = (vectors * np.where(values > NO_STIFFNESS, values, 0.0)) @ vectors.T
-        resists = positive.diagonal() > NO_STIFFNESS
+        positive = (vectors * np.where(values > UNRESISTED, values, 0.0)) @ vectors.T
+        resists = positive.diagonal() > UNRESISTED
         self.stiffness = np.asarray(positive * np.outer(resists * roots, resists * roots))
 
 
@@ -183,10 +180,7 @@ class SlidingCell:
             self.faces.follow(faces, np.concatenate([pairs, loads]), other)
 
     def begin(self, bonds: BondState, strain: Float) -> tuple[Status, Float]:
-        """Return statuses (n,) and scaled x (m,) from bonds and a strain (v,).  Collective.
-
-        Faces without a history just touch.
-        """
+        """Return statuses (n,) and scaled x (m,) of bonds, closed without a history, at a strain (v,).  Collective."""
         self.take(bonds)
         jump = np.zeros((len(bonds.status), 2)) if bonds.gap_and_slip is None else bonds.gap_and_slip
         apart = np.where(self._damaged, ~bonds.pressed, bonds.status == OPEN)
@@ -221,10 +215,7 @@ class SlidingCell:
         return np.asarray((x / self.faces.size)[: self.faces.loads.start])
 
     def traction(self, x: Float) -> Float:
-        """(k, 2) or, with the axial one, (k, 3) traction at this rank's bonds; 0 where they broke.
-
-        A damaged bond has its intact share's traction.
-        """
+        """Return the traction (k, 2), or (k, 3) with the axial one, in the intact fractions of this rank's bonds."""
         force = np.zeros((len(self.friction), sum(rows.shape[1] for rows in self._held_rows)))
         parts = zip(self._held_rows, self._parts(x), strict=True)
         force[self._held] = np.hstack([problem.some_multipliers(rows, *answer) for rows, (problem, answer) in parts])
@@ -259,7 +250,7 @@ class SlidingCell:
         scales, asked = [problem.scales for problem in self.cell.problems], list[Float]()
         for scale, of in zip(scales, of_problems, strict=True):
             asked.append(np.max([scale.asked(load) for load in of], axis=0))
-        # An unloaded problem has the rounding of the loaded one.
+        # An unloaded problem has the rounding of the loaded problem.
         largest = max(scale.imposed_strain(strain).max() for scale, strain in zip(scales, asked, strict=True))
         for of, strains, (problem, (jump, strain)) in zip(of_problems, asked, self._parts(x), strict=True):
             solution = problem.solution(bonds, jump, strain)

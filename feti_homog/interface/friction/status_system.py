@@ -35,8 +35,8 @@ BALANCED = 1e-9
 MOST_CHANGES = 32
 # Right-hand sides with no more entries use the columns of these alone.
 FEW = 8
-# Residual of a row, relative to its terms, that refinement may not leave; steps of refinement.
-TOO_MUCH, REFINEMENTS = 1e-11, 3
+# Rounding in a row of S x, relative to its terms: refinement may leave no more; and steps of refinement.
+NOISE, REFINEMENTS = 1e-11, 3
 
 
 def free_rows(status: Status, friction: Float, by_stress: Bool) -> tuple[Bool, Float]:
@@ -223,7 +223,7 @@ class FollowedStatuses:
             if error <= ROUNDED or error > before / 2 or step == REFINEMENTS:
                 break
             x = np.where(self.free, x + self._inverse(missing), x)
-        return (x, y) if error <= TOO_MUCH else None
+        return (x, y) if error <= NOISE else None
 
     def grow(self, S: Float, old: Int, other: Int, units: Float) -> bool:
         """Add prescribed entries, so that the present ones stand at the places `old` (m,) of S (m', m').

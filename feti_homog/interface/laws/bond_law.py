@@ -18,8 +18,8 @@ from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BondState
 from feti_homog.typing import Bool, Float, Int
 
-# Halvings of an interval of length one that exhaust double precision.
-BISECTIONS = 60
+# Halvings of an interval of length one, or steps of Newton's method, that exhaust double precision.
+MOST_STEPS = 60
 
 
 class KeyValues(Protocol):
@@ -85,17 +85,11 @@ class BondLaw(ABC):
         return np.full(p, self.is_convex)
 
     def after(self, bonds: BondState, which: Bool, traction: Float) -> tuple[Float, Bool]:
-        """(k, h) internal variables after the break of some bonds, and (k,) bonds that part.
-
-        The bonds `which` (k,) break, under tractions (k, c).
-        """
+        """Break the bonds `which` (k,) under tractions (k, c): internal variables (k, h), and (k,) bonds that part."""
         return bonds.history, which
 
     def softening(self, bonds: BondState, pulled: Bool) -> Float | None:
-        """(k, 3) C / C_0 of normal, tangential and axial springs, of bonds `pulled` (k,) or pressed.
-
-        None if C never changes.
-        """
+        """Return C / C_0 (k, 3) of all springs in bonds `pulled` (k,) or pressed; None if C never changes."""
         return None
 
     def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
@@ -130,12 +124,12 @@ class BondLaw(ABC):
     def crossing(self, before: Float, direction: Float, low: Float, high: Float) -> Float:
         """Bisect [`low`, `high`] for f (p,) at which `before` + f `direction` (p, c) breaks; double a low `high`."""
         high = high.copy()
-        for _ in range(BISECTIONS):
+        for _ in range(MOST_STEPS):
             below = self.share(before + high[:, None] * direction) < 1.0
             if not below.any():
                 break
             high[below] *= 2.0
-        for _ in range(BISECTIONS):
+        for _ in range(MOST_STEPS):
             middle = (low + high) / 2
             broken = self.share(before + middle[:, None] * direction) > 1.0
             low, high = np.where(broken, low, middle), np.where(broken, middle, high)

@@ -25,12 +25,12 @@ import numpy as np
 from feti_homog.errors import CaseError
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BondState
-from feti_homog.interface.laws.bond_law import KeyValues, SpringLaw
+from feti_homog.interface.laws.bond_law import MOST_STEPS, KeyValues, SpringLaw
 from feti_homog.interface.laws.strength import QuadraticStrength
 from feti_homog.typing import Bool, Float, Int
 
-# Teeth of the default at most; steps of Newton's method.
-MOST_TEETH, NEWTON_STEPS = 10_000, 60
+# Largest number of teeth that the program chooses.
+MOST_TEETH = 10_000
 # The last tooth begins where an exponential traction is this share of its peak.
 EXPONENTIAL_TAIL = 0.01
 NUMBERS = ("normal_stiffness", "tangential_stiffness", "normal_strength", "tangential_strength",
@@ -180,7 +180,7 @@ class CohesiveLaw(SpringLaw):
 
     @property
     def _damages(self) -> Float:
-        """(n + 1,) levels."""
+        """Damage levels (n + 1,)."""
         return np.array(self.levels)
 
     @property
@@ -285,7 +285,7 @@ class ExponentialLaw(CohesiveLaw):
         """(p,) root of u + ln(1 + s u) = -ln(1 - d), by Newton's method from below."""
         right = -np.log1p(-np.asarray(d))
         u = right / (1.0 + s)
-        for _ in range(NEWTON_STEPS):
+        for _ in range(MOST_STEPS):
             step = (right - u - np.log1p(s * u)) / (1.0 + s / (1.0 + s * u))
             u = u + step
             if np.abs(step).max(initial=0.0) <= 4.0 * np.finfo(float).eps * np.abs(u).max(initial=0.0):

@@ -17,21 +17,17 @@ from feti_homog.interface.friction.coulomb_faces import StuckError
 from feti_homog.interface.friction.face_system import Prescribed
 from feti_homog.interface.friction.sliding_cell import SlidingCell
 from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.interface.loads import Load, Macroscopic
-from feti_homog.interface.path.leg import Leg
+from feti_homog.interface.loads import ROUNDING, Load, Macroscopic
+from feti_homog.interface.path.leg import SAME_SHARE, Leg
 from feti_homog.interface.path.onsets import first_break
 from feti_homog.interface.path.path_points import Energies, PathState, Point
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.typing import Float
 
-# Share of a leg between points, after which a change of statuses is a point.
+# Fraction of a leg after the last point, beyond which a change of statuses is a point.
 LEAST_SHARE = 0.01
-# Relative accuracy of the largest load that the cell carries.
-LEAST_STEP = 1e-9
 # Changes at one load that count as a cycle.
 MOST_CHANGES_AT_A_LOAD = 200
-# Rounding of leg shares, and of vanishing jumps and strains relative to their last values.
-ROUNDING = 1e-12
 CYCLE = "friction: the statuses of the faces change without end at one load (a cycle)"
 
 
@@ -72,7 +68,7 @@ class CoulombLeg(Leg):
         return replace(super()._path_state(), stretched=self.sliding.stretched(self._x))
 
     def _on_root(self, find: Callable[..., tuple[Status, Float]], *arguments: Any) -> tuple[Status, Float]:
-        """Return statuses and x that rank 0 finds; every rank stores their product.  Collective."""
+        """Call `find` on rank 0; return its statuses and x, whose product all ranks store.  Collective."""
         faces = self.sliding.faces
 
         def found() -> tuple[Status, Float, Float]:
@@ -84,12 +80,12 @@ class CoulombLeg(Leg):
         return status, x
 
     def _given(self, share: float, x: Float) -> Prescribed:
-        """Return the load at a share of the leg, with the slips of scaled x."""
+        """Prescribe the load at a fraction of the leg, and the slips of scaled x."""
         load = self._load_at(share)
         return Prescribed(load.by_stress, self.sliding.given(load), x[1 : 2 * len(self.sliding.rows) : 2])
 
     def _stand(self, status: Status, x: Float, mean: Macroscopic, way: Energies) -> None:
-        """Take statuses and scaled x, after a way with these energies."""
+        """Set the state to statuses and scaled x, after a way with these energies."""
         self._energies = self._energies.plus(way)
         self._bonds = self.sliding.bonds(self._bonds, status, x)
         self._status, self._x, self._mean, self._state = status, x, mean, None
@@ -127,27 +123,14 @@ class CoulombLeg(Leg):
             NotCarriedError: nothing carries more, after a point at the largest load.
             StuckError: no statuses go on, or they change without end.
         """
-        faces, share = self.sliding.faces, self._share
-        velocity = self.sliding.given(self.end) - self.sliding.given(self.start)
+        sliding, faces, share = self.sliding, self.sliding.faces, self._share
+        velocity = sliding.given(self.end) - sliding.given(self.start)
         try:
             status, rate = self._on_root(faces.rates, self._status, self._x, self.end.by_stress, velocity)
         except NotCarriedError:
             if self._share > self._reported:
                 yield self._point(0, 0, self._path_state())
             raise
-        if self._follow(status, rate):
-            yield from self._break()
-            yield from self._break_overloaded()
-        elif self._share < 1.0 and (self._first or self._share - self._reported >= LEAST_SHARE):
-            self._first = False
-            yield self._point(0, 0, self._path_state())
-        self._changes = 0 if self._share > share + ROUNDING else self._changes + 1
-        if self._changes > MOST_CHANGES_AT_A_LOAD:
-            raise StuckError(CYCLE)
-
-    def _follow(self, status: Status, rate: Float) -> bool:
-        """Advance along a rate of x up to the next change, and return whether bonds break then.  Collective."""
-        faces, share, sliding = self.sliding.faces, self._share, self.sliding
         status, x = self._on_root(faces.settled, status, self._given(share, self._x), self._x)
         change, rest = self.cell.comm.bcast(faces.next_change(status, x, rate)), 1.0 - share
         if change >= rest - ROUNDING:
@@ -162,10 +145,18 @@ class CoulombLeg(Leg):
             faces.keep(after, faces.product(x) + way * faces.product(rate))
         self._go_straight(status, after, 0.0, faces.heat(status, x, after) / self.cell.area)
         self._share = 1.0 if breaks > 1.0 and change >= rest else share + way
-        return breaks <= 1.0
+        if breaks <= 1.0:
+            yield from self._break()
+            yield from self._break_overloaded()
+        elif self._share < 1.0 and (self._first or self._share - self._reported >= LEAST_SHARE):
+            self._first = False
+            yield self._point(0, 0, self._path_state())
+        self._changes = 0 if self._share > share + ROUNDING else self._changes + 1
+        if self._changes > MOST_CHANGES_AT_A_LOAD:
+            raise StuckError(CYCLE)
 
     def _go_to(self, share: float) -> None:
-        """Advance to a share of the leg in one step, or to the largest share that the cell carries.  Collective.
+        """Advance to a fraction of the leg in one step, or to the largest that the cell carries.  Collective.
 
         Raises:
             NotCarriedError: the cell carries nothing beyond the last step.
@@ -178,7 +169,7 @@ class CoulombLeg(Leg):
         self._stand(status, after, sliding.macroscopic(after), way)
 
     def _carried(self, share: float) -> tuple[float, NotCarriedError | None]:
-        """Return this share of the leg, or the largest one that the cell carries with the error beyond it."""
+        """Return the largest fraction up to `share` that the cell carries, and the error that limits it or None."""
         low, high, faces = self._share, share, self.sliding.faces
         try:
             faces.step(self._status, self._given(share, self._x), self._x)
@@ -188,10 +179,10 @@ class CoulombLeg(Leg):
             limit = error
         else:
             return share, None
-        while high - low > LEAST_STEP * share:
+        while high - low > SAME_SHARE * share:
             middle = (low + high) / 2
             carries = faces.carries(self._status, self._given(middle, self._x), self._x)
             low, high = (middle, high) if carries else (low, middle)
-        if low - self._share <= 10 * LEAST_STEP * share:
+        if low - self._share <= 10 * SAME_SHARE * share:
             raise limit
         return low, limit

@@ -12,17 +12,14 @@ from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BondState, Equilibrium
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.loads import Load, Macroscopic, Multipliers
-from feti_homog.interface.path.leg import Leg
+from feti_homog.interface.path.leg import SAME_SHARE, Leg
 from feti_homog.interface.path.onsets import first_break, first_change
 from feti_homog.interface.path.path_points import UTILISATION_TIE, PathState, Point, most_utilised
 from feti_homog.typing import Float
 
-# Shares of a leg that count as equal.
-LEAST_SHARE = 1e-9
-# A response is on a straight line up to this many relative tolerances of the Krylov method, or up to the rounding in
-# the best solves, both relative to the largest stress of the line.  The solver, which begins with the multipliers of
-# the line, had errors of a few hundredths of a tolerance.
-OFF_LINE_PER_RTOL, OFF_LINE_ROUNDING = 10.0, 1e-10
+# A response is on a straight line within the solver's error, or within this rounding of the best solves, relative to
+# the largest stress of the line.
+OFF_LINE_ROUNDING = 1e-10
 
 
 class FrictionlessLeg(Leg):
@@ -50,7 +47,7 @@ class FrictionlessLeg(Leg):
         self, cell: CoupledInterfaces, law: BondLaw, waypoints: Sequence[Load], leg: int, begin: PathState
     ) -> None:
         super().__init__(cell, law, waypoints, leg, begin)
-        # Share before which the line bends, and whether the last prediction was a false alarm.
+        # Fraction before which the line bends, and whether the last prediction was a false alarm.
         self._bends_before, self._false_alarm, self._from = np.inf, False, begin
 
     @property
@@ -77,7 +74,7 @@ class FrictionlessLeg(Leg):
         return self.cell.equilibrium(self._load_at(share), bonds, lam)
 
     def _stand(self, share: float, state: Equilibrium) -> None:
-        """Take the equilibrium at a share of the leg, and add the energies of the way."""
+        """Set the state to the equilibrium at a fraction of the leg, and add the energies of the way."""
         if share >= self._bends_before:
             self._bends_before = np.inf
         self._share, self._state, self._bonds = share, state, state.bonds
@@ -95,7 +92,7 @@ class FrictionlessLeg(Leg):
         try:
             end = self.cell.linear(self.end, state.bonds, state.multipliers)
         except NotCarriedError:
-            beyond = min(share + LEAST_SHARE, 1.0)
+            beyond = min(share + SAME_SHARE, 1.0)
             touching = self._solve(beyond, state.bonds, state.multipliers)
             self._stand(share, self._solve(share, touching.bonds, touching.multipliers))
             yield self._turn(beyond)
@@ -112,7 +109,7 @@ class FrictionlessLeg(Leg):
         before, share = self._state, self._share
         breaks, begins, certain = self._predict(end)
         target = min(breaks, begins, 1.0)
-        is_here = target - share <= LEAST_SHARE and (target == begins or (target == breaks and self._is_due()))
+        is_here = target - share <= SAME_SHARE and (target == begins or (target == breaks and self._is_due()))
         reached = is_here or self._approach(target, end)
         if reached and target == breaks and self._is_due():
             yield from self._break()
@@ -120,15 +117,12 @@ class FrictionlessLeg(Leg):
             yield from self._change(min(breaks, certain), before)
         elif self._differs(before):
             self._false_alarm = False
-            if self._share > self._reported + LEAST_SHARE:
+            if self._share > self._reported + SAME_SHARE:
                 yield from self._turned()
         yield from self._break_overloaded()
 
     def _predict(self, end: Sequence[DualSolution]) -> tuple[float, float, float]:
-        """Return the shares of the leg at which a bond breaks, contact begins to change, and is beyond doubt.
-
-        Shares are infinite without such an event on the leg.
-        """
+        """Return the fractions of the leg at which a bond breaks, contact begins to change, and surely has; or inf."""
         cell, state, rest = self.cell, self._state, 1.0 - self._share
         breaks = first_break(cell, self.law, state.bonds, cell.traction(state.solutions), cell.traction(end))
         begins, certain = (1.0, 1.0) if self._false_alarm else first_change(cell.plane, state, end[0])
@@ -137,16 +131,13 @@ class FrictionlessLeg(Leg):
         return self._share + rest * breaks, self._share + rest * begins, self._share + rest * certain
 
     def _is_due(self) -> bool:
-        """Return whether the worst bonds are at their strength."""
+        """Return whether the most utilised bonds are at their strength."""
         return self._used()[1] > 1.0 - UTILISATION_TIE
 
     def _approach(self, target: float, end: Sequence[DualSolution]) -> bool:
-        """Advance to the target, or to the first half, quarter, ... of the way with a straight response.
-
-        Return whether it is the target.
-        """
+        """Advance to the target if the response is straight, else halve the way; return whether it is reached."""
         start, begin, reached = self._share, self._state, True
-        nearest = min(start + LEAST_SHARE, 1.0)
+        nearest = min(start + SAME_SHARE, 1.0)
         target = max(target, nearest)
         if target >= self._bends_before:
             target, reached = max((start + self._bends_before) / 2, nearest), False
@@ -170,7 +161,7 @@ class FrictionlessLeg(Leg):
         error = np.abs((1.0 - way) * ends[0] + way * ends[1] - self._response(cell.macroscopic(state.solutions))).max()
         strains = np.stack([before.strain, after.strain])
         largest = max(np.abs(ends).max(), np.abs(cell.least_bonded_stress(strains)).max())
-        tolerance = max(OFF_LINE_PER_RTOL * cell.plane.solver.rtol, OFF_LINE_ROUNDING)
+        tolerance = max(cell.plane.scales.sign_noise, OFF_LINE_ROUNDING)
         return bool(used <= 1.0 + UTILISATION_TIE and error <= tolerance * largest)
 
     def _response(self, state: Macroscopic) -> Float:
@@ -183,8 +174,8 @@ class FrictionlessLeg(Leg):
         If a break or a waypoint is a point at this s, yield the state after the change instead.  Faces that touch
         without a force may have opened since `from_state`.
         """
-        before, beyond = self._state, min(max(beyond, self._share + LEAST_SHARE), 1.0)
-        there_is_one = self._share <= self._reported + LEAST_SHARE
+        before, beyond = self._state, min(max(beyond, self._share + SAME_SHARE), 1.0)
+        there_is_one = self._share <= self._reported + SAME_SHARE
         if not there_is_one:
             yield self._turn(beyond)
         self._stand(beyond, self._solve(beyond, before.bonds, before.multipliers))

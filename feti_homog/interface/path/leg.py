@@ -15,6 +15,9 @@ from feti_homog.interface.loads import Load, Macroscopic
 from feti_homog.interface.path import path_points
 from feti_homog.typing import Bool, Float
 
+# Fractions of a leg that differ by less are equal.
+SAME_SHARE = 1e-9
+
 
 class Leg(ABC):
     """Leg `leg` between two loads of equal kinds, at its rising share s.

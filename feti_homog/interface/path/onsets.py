@@ -79,7 +79,7 @@ class Onset:
 
 
 def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, before: Float, after: Float) -> float:
-    """Return the share of the way between tractions (k, c) at which the first bond breaks, or inf.  Collective.
+    """Return the fraction of the way between tractions (k, c) at which the first bond breaks, or inf.  Collective.
 
     A convex utilisation, below 1 at the beginning and above 1 at the end, passes 1 once: bisection.  Without convexity
     the first part of the way with a utilisation above 1 at its end is bisected.
@@ -97,9 +97,9 @@ def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, before:
 
 
 def first_change(interface: ContactProblem, state: Equilibrium, end: DualSolution) -> tuple[float, float]:
-    """Return the shares of the way to `end` at which contact begins to change, and is beyond doubt; or 1, 1.
+    """Return the fractions of the way to `end` at which contact begins to change, and surely has; or 1, 1.
 
-    Beyond doubt a tension or an overlap is twice the solver's error.  A closed node opens when its force vanishes; open
+    A tension or an overlap of twice the solver's error is sure.  A closed node opens when its force vanishes; open
     nodes of a fixed fibre close when their gap vanishes, open nodes of a free fibre when the fibre has no more room
     (its gaps are not unique).  Collective.
     """

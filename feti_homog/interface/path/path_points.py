@@ -1,4 +1,4 @@
-"""Load path points, states to restart from, and bond breaks."""
+"""Points of a load path, the states to continue from, and breaks of bonds."""
 
 from __future__ import annotations
 
@@ -14,14 +14,13 @@ from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.loads import Macroscopic, Multipliers
 from feti_homog.typing import Bool, Float
 
-# Bonds whose utilisation differs relatively by less break together: in a symmetric cell they differ by the solver's
-# error alone.
+# Bonds whose utilisations differ relatively by less break together: in a symmetric cell the solver errs by less.
 UTILISATION_TIE = 1e-6
 
 
 @dataclass(frozen=True)
 class PathState:
-    """Position on a path, sufficient to go on from.
+    """State from which a path can continue.
 
     Attributes:
         leg, position: the load is the share `position`, 0..1, of the way to waypoint `leg`; with increments, `leg` is
@@ -44,18 +43,13 @@ class PathState:
     stretched: float = 0.0
 
     def energies_to(self, after: Macroscopic) -> Energies:
-        """Return the energies between the last point and a state.
-
-        The response may bend with contact on the way, without losses: the work is stored or released."""
+        """Return the energies of the way from the last point to a state; changes of contact lose none."""
         lost = 0.0 if self.broken is None else self.last.released_to(after)
         return Energies(after.stored - self.last.stored + lost, lost, self.broken or 0.0)
 
 
 class Energies(NamedTuple):
-    """Energies of a path segment, per cell area.
-
-    Work of the loads, its part that breaks released, fracture energy of these breaks, heat of friction.
-    """
+    """Work, energy released by breaks, their fracture energy, and heat of friction on a way, per cell area."""
 
     work: float
     released: float
@@ -81,8 +75,8 @@ class Point:
         broke: number of bonds that part after this state; with increments, in the step before it.
         softened: number of bonds that lose teeth and hold.
         energies: energies since the last point.
-        used: (k,) share of their strength that bonds use, 0 without a bond.
-        after: state from which the path goes on.
+        used: (k,) utilisation of the bonds, 0 without a bond.
+        after: state from which the path continues.
     """
 
     load_factor: float
@@ -96,7 +90,7 @@ class Point:
 
 
 def unloaded(cell: CoupledInterfaces, bonds: BondState) -> PathState:
-    """Return the path's beginning with these bonds."""
+    """Return the beginning of a path with these bonds."""
     nothing = Macroscopic(np.zeros(len(cell.loads)), np.zeros(len(cell.loads)))
     return PathState(0, 0.0, bonds, cell.no_multipliers(), nothing, nothing)
 
@@ -104,7 +98,7 @@ def unloaded(cell: CoupledInterfaces, bonds: BondState) -> PathState:
 def break_bonds(
     cell: CoupledInterfaces, law: BondLaw, which: Bool, state: Equilibrium, place: PathState
 ) -> tuple[int, int, PathState]:
-    """Break the bonds `which` (k,) in the modes of an equilibrium, whatever its size.  Collective.
+    """Break the bonds `which` (k,) in the modes of an equilibrium of any size.  Collective.
 
     Return the numbers of bonds, on all ranks, that part and that soften, and the path state `place` with the break.
     """
@@ -123,10 +117,7 @@ def break_bonds(
 
 
 def most_utilised(cell: CoupledInterfaces, law: BondLaw, state: Equilibrium) -> tuple[Float, float, Bool]:
-    """Return the utilisation (k,) of this rank's nodes, 0 if debonded, its largest value, and (k,) nodes with it.
-
-    Collective, rank 0 decides.
-    """
+    """Return the utilisation (k,), 0 if debonded, its largest value, and the most utilised nodes (k,).  Collective."""
     comm = cell.comm
     used = law.in_state(cell, state.bonds).share(held_traction(cell, state))
     used = np.where(state.status == BONDED, used, 0.0)
