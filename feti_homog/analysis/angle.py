@@ -13,10 +13,10 @@ from feti_homog.homogenization import averaging
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Return `angle`, a point an angle.
+    """Return the `Result` entry `angle`, with a point for each debonding angle.  Collective.
 
-    A point is the stress under the case's strain, else the stiffness by unit loads.  Each angle begins with the
-    previous angle's multipliers.
+    A point has the stress under the strain of the case or, without a strain, the stiffness from unit loads.  The solve
+    at an angle starts from the multipliers at the angle before.
     """
     section = context.case.section
     assert isinstance(section, load_sections.Angle)

@@ -1,4 +1,4 @@
-"""`analysis.type = "load"`: equilibrium under given strains, stresses, temperature; nothing breaks."""
+"""`analysis.type = "load"`: equilibrium under given strains, stresses and temperature, without breaks."""
 
 from typing import Any
 
@@ -10,10 +10,10 @@ from feti_homog.analysis.tip_records import IN_PLANE_LOADS, tip_rates
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Return `load`, the state with faces debonded from the start.
+    """Return the `Result` entry `load`, the equilibrium of the prescribed debonded faces.  Collective.
 
-    Under the load they are open or in contact.  Adds `tips` on its arcs if only plane strains are there;
-    `sensitivities` if the case asks.
+    The point has `tips` on debonded arcs if the load has no strain but in the plane.  Adds `sensitivities` if the case
+    asks for them.
     """
     cell, (target,) = context.loads.interfaces, context.case.targets
     bonds = context.bonds(None)

@@ -1,4 +1,4 @@
-"""`analysis.type = "stiffness"`: L^ef, with contact secants under plus, minus unit loads."""
+"""`analysis.type = "stiffness"`: L^ef; with contact, secants under plus and minus the unit loads."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Return `effective_stiffness`, with stresses under the unit strains as columns, and entries that follow from it.
+    """Return the `Result` entry `effective_stiffness` and the constants that follow from it.  Collective.
 
-    With contact between debonded faces also `effective_stiffness_compression`, columns -Sigma(-E); `tips` on debonded
-    arcs under each load; `mesh_error`; `sensitivities` if the case asks for them.  If a temperature
-    is a load, `thermal_stress` under a unit temperature, and `thermal_stress_compression`.
+    Contact between debonded faces adds `effective_stiffness_compression`, with columns -Sigma(-E); debonded arcs add
+    `tips` under each load; a temperature among the loads adds `thermal_stress` under a unit temperature, with contact
+    `thermal_stress_compression`.  `mesh_error` and `sensitivities` are there if the case asks for them.
     """
     bonds = context.bonds(None)
     starts = context.loads.zero_multipliers()
