@@ -15,8 +15,7 @@ from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import MeshErrors
 from feti_homog.errors import NotCarriedError
 from feti_homog.homogenization import averaging, phase_laws, unit_cell
-from feti_homog.materials import engineering_constants as named_constants
-from feti_homog.materials import laws, phase_bounds
+from feti_homog.materials import engineering_constants, laws, phase_bounds
 from feti_homog.microstructure import phase_names
 from feti_homog.system.runtime import records
 from feti_homog.typing import Float
@@ -58,14 +57,14 @@ def stiffness_constants(stiffness: Float, thermal: Float | None) -> dict[str, An
     The stiffness is (3, 3) or (6, 6), the thermal stress (6,).
     """
     if len(stiffness) == 3:
-        return {"moduli": named_constants.engineering_moduli(stiffness)}
+        return {"moduli": engineering_constants.engineering_moduli(stiffness)}
     compliance = np.linalg.inv(stiffness)
     strains = None if thermal is None else -compliance @ thermal
     entries = {
         "compliance": compliance,
-        "constants": named_constants.engineering_constants(stiffness),
-        "transversely_isotropic": named_constants.transversely_isotropic_part(stiffness, strains),
-        "transverse_moduli": named_constants.transverse_moduli(stiffness),
+        "constants": engineering_constants.engineering_constants(stiffness),
+        "transversely_isotropic": engineering_constants.transversely_isotropic_part(stiffness, strains),
+        "transverse_moduli": engineering_constants.transverse_moduli(stiffness),
     }
     return entries if strains is None else entries | {"thermal_expansion": strains}
 
@@ -85,7 +84,7 @@ def _comparisons(cell: unit_cell.TornCell, fractions: Mapping[str, float]) -> di
     for phase in fractions:
         material = case.material_of(phase)
         stiffness, expansion = laws.spatial_stiffness(material), laws.expansion(material)
-        phases[phase] = named_constants.transversely_isotropic_part(stiffness, expansion)
+        phases[phase] = engineering_constants.transversely_isotropic_part(stiffness, expansion)
     entries: dict[str, Any] = {}
     is_plain = phase_names.COATING not in phases and all(bond.between is None for bond in case.interfaces)
     is_round = not any(np.isnan(radii[phase]).any() for phase in fibre_phases)  # the radii of other fibres are NaN
@@ -101,7 +100,7 @@ def _comparisons(cell: unit_cell.TornCell, fractions: Mapping[str, float]) -> di
                 springs = phase_bounds.Springs(normal, tangential, axial, float(radii[phase][0]))
             fibres.append(phase_bounds.Fibres(fractions[phase], phases[phase], springs))
         entries["estimates"] = estimates.estimates(phases[matrix], fibres)
-    if not has_springs and all(map(named_constants.is_transversely_isotropic, phases.values())):
+    if not has_springs and all(map(engineering_constants.is_transversely_isotropic, phases.values())):
         entries["fibre_bounds"] = phase_bounds.fibre_bounds(list(fractions.values()), list(phases.values()))
     return entries
 

@@ -177,13 +177,8 @@ class AnalysisContext:
         """Record one state for each unit load, in its problem.  Collective."""
         in_plane = len(self.plane.loads)
         for number, (name, response) in enumerate(zip(self.loads.names, responses, strict=True)):
-            plane, axial = (response, None) if number < in_plane else (None, response)
-            self.states.record(plane, axial, load_factor, f"{label}{name}", point)
-
-    def record_state(self, responses: Sequence[averaging.Response], load_factor: float, label: str, point: int) -> None:
-        """Record one state with its responses in all problems.  Collective."""
-        plane, *axial = responses
-        self.states.record(plane, axial[0] if axial else None, load_factor, label, point)
+            pair = (response, None) if number < in_plane else (None, response)
+            self.states.record(pair, load_factor, f"{label}{name}", point)
 
     @cached_property
     def release_rates(self) -> energy_release.EnergyReleaseRates:

@@ -209,7 +209,7 @@ def _completed(
                 if context.states.has_place:
                     error, responses = state_error(context, responses)
                     entries[number] |= error
-                    context.record_state(responses, point.load_factor, _label(path, number), number)
+                    context.states.record(responses, point.load_factor, _label(path, number), number)
             line.append(f"{len(numbers)} of {len(entries)} points")
         states = {"states": numbers} if context.states.has_place else {}
     else:

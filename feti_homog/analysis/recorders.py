@@ -1,8 +1,7 @@
 """Recorders of a run: convergence and law errors of responses, states with fields."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import count
 
 from feti_homog.analysis.result import Fields
 from feti_homog.errors import FetiHomogError
@@ -95,27 +94,24 @@ class StateRecorder:
         self, cell: unit_cell.TornCell, file: field_file.FieldFile | None, keep: bool, say: Callable[[str], object]
     ) -> None:
         self._cell, self._file, self._keep = cell, file, keep
-        self._number, self._states, self._say = count(), list[field_layout.StatePart](), say
+        self._number, self._states, self._say = 0, list[field_layout.StatePart](), say
         self.has_place = keep or file is not None
         self.error: FetiHomogError | None = None
 
     def record(
-        self,
-        plane: averaging.Response | None,
-        axial: averaging.Response | None,
-        load_factor: float,
-        label: str,
-        point: int,
+        self, responses: Sequence[averaging.Response | None], load_factor: float, label: str, point: int
     ) -> None:
-        """Record the next state from its plane and axial responses.  Collective."""
+        """Record the next state from its response in each problem, or None.  Collective."""
         if self._file is None and not self._keep:
             return
+        plane, axial = (*responses, None)[:2]
         state: field_layout.StatePart
         if plane is None or len(self._cell.problems) > 1:
             state = field_parts.spatial_state_part(self._cell, plane, axial, load_factor, label, point)
         else:
             state = field_parts.state_part(self._cell, plane, load_factor, label, point)
-        self._write(lambda file: file.write_state(next(self._number), state))
+        self._write(lambda file: file.write_state(self._number, state))
+        self._number += 1
         if self._keep:
             self._states.append(state)
 

@@ -1,15 +1,10 @@
 """`analysis.type = "stiffness"`: L^ef; with contact, secants under plus and minus the unit loads."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from feti_homog.analysis.constants import constants, mesh_error, unit_errors
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.homogenization import averaging
-
-if TYPE_CHECKING:
-    from feti_homog.homogenization import mesh_estimate
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
@@ -24,7 +19,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     one_sided = context.plane.interface.contact and context.plane.counts(bonds.status)["open"] > 0
     columns, responses = context.unit_responses("", bonds, starts, 1.0)
     errors, responses = unit_errors(context, responses)
-    errors_of_minus: list[mesh_estimate.EnergyErrors] = []
+    errors_of_minus = errors[:0]
     context.record_unit_states(responses, 1.0, "", 0)
     document: dict[str, Any] = {"effective_stiffness": columns.pop("stiffness")} | columns
     under, loads, first = list(responses), list(context.loads.names), responses
