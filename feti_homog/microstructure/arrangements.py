@@ -11,7 +11,6 @@ from scipy.spatial import cKDTree
 
 from feti_homog.errors import MeshError
 from feti_homog.microstructure.phase_names import COATING, MATRIX, VOID
-from feti_homog.microstructure.shapes.convex_sums import ConvexSums
 from feti_homog.microstructure.shapes.ellipses import Discs
 from feti_homog.microstructure.shapes.outlines import Outlines, directions
 from feti_homog.typing import Bool, Float, Int
@@ -183,6 +182,8 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
 
 def in_voids(arrangement: Arrangement, corners: Float) -> Bool:
     """(n,) which corners (n, 2) are in voids, for cells with polygons; other meshes need no node at a corner."""
+    from feti_homog.microstructure.shapes.convex_sums import ConvexSums  # only tables have polygons
+
     result = np.zeros(len(corners), bool)
     if isinstance(arrangement.outlines, ConvexSums):
         voids = arrangement.outlines[arrangement.is_void | arrangement.is_hollow]
