@@ -21,8 +21,6 @@ from mpi4py import MPI
 from feti_homog.errors import NotCarriedError
 from feti_homog.feti import DualSolution, FetiSolver
 from feti_homog.feti.decomposition import constraint_layout
-from feti_homog.interface.contact import mixed_load
-from feti_homog.interface.contact.floating_bodies import FloatingBodies
 from feti_homog.interface.contact.load_scales import LoadScales
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status, kkt_errors
 from feti_homog.interface.loads import Load
@@ -139,6 +137,8 @@ class ContactProblem:
         Raises:
             NotCarriedError: nothing carries the load's stresses.
         """
+        from feti_homog.interface.contact import mixed_load  # unit loads are solved together
+
         self.prepare(bonds)
         return mixed_load.solve(self.scales, load, start)
 
@@ -198,6 +198,8 @@ class ContactProblem:
         has_history, by_stress = state.bonds.gap_and_slip is not None, state.load.by_stress
         if has_history or not by_stress.any() or not self._any(state.status != BONDED):
             return np.zeros(len(by_stress), bool)
+        from feti_homog.interface.contact import mixed_load  # few loads prescribe stresses
+
         self.prepare(state.bonds)
         stiffness = self.scales.mean_stiffness * float(self.size.prod())
         return mixed_load.unresisted(self.solver, by_stress, stiffness)
@@ -214,6 +216,8 @@ class ContactProblem:
             return solution, pressed
         coarse, noise = self.solver.natural, self.scales.gap_noise(solution.strain)
         if self.contact and coarse.unconstrained_modes.shape[1]:
+            from feti_homog.interface.contact.floating_bodies import FloatingBodies  # few fibres are free
+
             bodies = FloatingBodies(self.solver.comm, coarse, self.nodes, status == OPEN, noise)
             moved, pressed = bodies.place(solution)
             alpha = None if solution.alpha is None else moved + solution.alpha
