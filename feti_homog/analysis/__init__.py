@@ -1,4 +1,4 @@
-"""Analyses on a torn cell: `run(context)` by [analysis] type.
+"""Analyses of a torn cell: one module with `run(context)` for each [analysis] type, and the result of a case.
 
 Imports `case`, `feti`, `homogenization`, `interface`, `materials`, `mesh`, `microstructure`, `report`, `results`
 and `system`.

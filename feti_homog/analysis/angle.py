@@ -13,10 +13,10 @@ from feti_homog.homogenization import averaging
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Return `angle`, a point an angle.
+    """Return the `Result` entry `angle`, with a point for each debonding angle.  Collective.
 
-    A point is the stress under the case's strain, else the stiffness by unit loads.  Each angle begins with the
-    previous angle's multipliers.
+    A point has the stress under the strain of the case or, without a strain, the stiffness from unit loads.  The solve
+    at an angle starts from the multipliers at the angle before.
     """
     section = context.case.section
     assert isinstance(section, load_sections.Angle)
@@ -40,7 +40,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
             error, responses = state_error(context, responses)
             point |= error | {"strain": responses[0].strain, "stress": responses[0].stress}
             point |= {"stored": responses[0].stored, "stored_in_springs": responses[0].in_springs}
-            context.record_state(responses, 1.0, label, number)
+            context.states.record(responses, 1.0, label, number)
         starts = [r.state.solution.lam for r in responses]
         point["tips"] = tip_rates(context, responses, context.loads.names if unit else ("strain",))
         points.append(AnglePoint(**point | context.point(responses)))

@@ -1,4 +1,4 @@
-"""Records about cell, fibres, solver, checks and sensitivities in result.json."""
+"""Records of the cell, fibres, solver, checks and sensitivities in result.json."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -60,7 +60,7 @@ class FibreInfo:
 
 @dataclass(frozen=True)
 class SolverInfo:
-    """Dual problem solution, in numbers."""
+    """Sizes, iterations and convergence of the dual problem."""
 
     ranks: int = described("MPI ranks")
     bodies: int = described("bodies, the matrix and the fibres")
@@ -80,7 +80,7 @@ class SolverInfo:
 
 @dataclass(frozen=True)
 class Checks:
-    """The largest relative error in each law over all states."""
+    """The largest relative error of each law over all states."""
 
     strain: float = described("mean strain, with the opening of debonded faces, equals E")
     hill: float = described("Hill's lemma: mean of stress times strain equals Sigma E")
@@ -100,14 +100,14 @@ class Checks:
     symmetry: float | None = described("L^ef is symmetric; of bonded or frictionless free faces only", default=None)
 
     def by_law(self) -> dict[str, float]:
-        """Return each checked law's error by name."""
+        """Return the errors of the checked laws by name."""
         errors: dict[str, float] = records.plain(self)
         return errors
 
 
 @dataclass(frozen=True)
 class StiffnessBounds:
-    """Phase bounds on L^ef, whatever the phases' arrangement."""
+    """Bounds on L^ef from the phases and their fractions, for any arrangement."""
 
     voigt: Float = described("upper bound of the stiffness: uniform strain", records.STRESS, "(3, 3)")
     reuss: Float = described("lower bound of the stiffness: uniform stress", records.STRESS, "(3, 3)")
@@ -118,7 +118,7 @@ class StiffnessBounds:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sensitivities:
-    """Derivatives of n cell constants by p constants of the case, at fixed geometry."""
+    """Derivatives of n cell constants by p case constants, at fixed geometry."""
 
     parameters: tuple[str, ...] = described("constants of the case, such as `material.fibre.young`")
     parameter_values: Float = described("their values, each in its unit", "", "(p,)")
@@ -134,6 +134,6 @@ class Sensitivities:
 
     @property
     def elasticities(self) -> Float:
-        """(n, p) d ln constant / d ln parameter; NaN for constants that are 0."""
+        """(n, p) d ln constant / d ln parameter; NaN if zero."""
         values = np.where(self.constant_values == 0.0, np.nan, self.constant_values)
         return np.asarray(self.derivatives * self.parameter_values / values[:, None])

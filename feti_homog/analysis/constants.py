@@ -1,4 +1,4 @@
-"""Constants from a linear cell's stiffness: bounds, estimates, mesh errors."""
+"""Constants that follow from the stiffness of a linear cell, with bounds, estimates and mesh errors."""
 
 from __future__ import annotations
 
@@ -13,11 +13,9 @@ from scipy.linalg import eigh
 from feti_homog.analysis.cell_records import StiffnessBounds
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import MeshErrors
-from feti_homog.case import Case
 from feti_homog.errors import NotCarriedError
 from feti_homog.homogenization import averaging, phase_laws, unit_cell
-from feti_homog.materials import engineering_constants as named_constants
-from feti_homog.materials import laws, phase_bounds
+from feti_homog.materials import engineering_constants, laws, phase_bounds
 from feti_homog.microstructure import phase_names
 from feti_homog.system.runtime import records
 from feti_homog.typing import Float
@@ -27,17 +25,14 @@ if TYPE_CHECKING:
 
 Named = Mapping[str, Float]
 PARTS = ("absolute", "signed", "least")
-OFF = 3.0  # largest ratio of true errors of the energy to estimated ones
-ROUNDING = 1e-9  # of bounds, relative
-# Relative difference of equal radii: fibres of users' meshes are fitted to nodes.
-SAME_RADIUS = 1e-6
+OFF = 3.0  # largest ratio of the true energy error to the estimated one
 
 
 def constants(cell: unit_cell.TornCell, secants: Mapping[str, Any]) -> dict[str, Any]:
-    """Return `Result` entries that follow from `effective_stiffness` and `thermal_stress`.  Collective.
+    """Return the `Result` entries that follow from `effective_stiffness` and `thermal_stress`.  Collective.
 
-    None where faces touch without tension: each column is a secant under its own load.  None in the plane with
-    interfaces.
+    There are no entries where faces touch without tension, because each column is then a secant under its own load,
+    nor for a plane cell with interfaces.
     """
     case, is_spatial = cell.case, len(cell.problems) > 1
     if "effective_stiffness_compression" in secants or (case.interfaces and not is_spatial):
@@ -57,27 +52,30 @@ def constants(cell: unit_cell.TornCell, secants: Mapping[str, Any]) -> dict[str,
 
 
 def stiffness_constants(stiffness: Float, thermal: Float | None) -> dict[str, Any]:
-    """Return constants from a stiffness (3, 3) or (6, 6), with the thermal stress (6,), as `Result` entries."""
+    """Return the constants of a stiffness as `Result` entries.
+
+    The stiffness is (3, 3) or (6, 6), the thermal stress (6,).
+    """
     if len(stiffness) == 3:
-        return {"moduli": named_constants.engineering_moduli(stiffness)}
+        return {"moduli": engineering_constants.engineering_moduli(stiffness)}
     compliance = np.linalg.inv(stiffness)
     strains = None if thermal is None else -compliance @ thermal
     entries = {
         "compliance": compliance,
-        "constants": named_constants.engineering_constants(stiffness),
-        "transversely_isotropic": named_constants.transversely_isotropic_part(stiffness, strains),
-        "transverse_moduli": named_constants.transverse_moduli(stiffness),
+        "constants": engineering_constants.engineering_constants(stiffness),
+        "transversely_isotropic": engineering_constants.transversely_isotropic_part(stiffness, strains),
+        "transverse_moduli": engineering_constants.transverse_moduli(stiffness),
     }
     return entries if strains is None else entries | {"thermal_expansion": strains}
 
 
 def _comparisons(cell: unit_cell.TornCell, fractions: Mapping[str, float]) -> dict[str, Any]:
-    """Return closed-form estimates for round fibres, bounds for rigidly bonded ones.
+    """Return closed-form estimates and bounds for a cell without debonded faces.
 
-    Estimates exist for fibres without coatings, held in the matrix by the same bonds, with springs of one radius;
-    bounds for transversely isotropic phases.
+    Estimates exist for round fibres without coatings, held in the matrix by the same bonds; springs need fibres of
+    one radius.  Bounds exist for rigid bonds between transversely isotropic phases.
     """
-    from feti_homog.materials import estimates, phase_bounds  # bonded cells in the plane have no estimates
+    from feti_homog.materials import estimates  # bonded cells in the plane have no estimates
 
     summary, case, has_springs = cell.summary, cell.case, phase_laws.has_springs(cell.case)
     matrix, *fibre_phases = summary.phases
@@ -86,9 +84,13 @@ def _comparisons(cell: unit_cell.TornCell, fractions: Mapping[str, float]) -> di
     for phase in fractions:
         material = case.material_of(phase)
         stiffness, expansion = laws.spatial_stiffness(material), laws.expansion(material)
-        phases[phase] = named_constants.transversely_isotropic_part(stiffness, expansion)
+        phases[phase] = engineering_constants.transversely_isotropic_part(stiffness, expansion)
     entries: dict[str, Any] = {}
-    if _has_estimates(case, summary.phases, [radii[phase] for phase in fibre_phases], has_springs):
+    is_plain = phase_names.COATING not in phases and all(bond.between is None for bond in case.interfaces)
+    is_round = not any(np.isnan(radii[phase]).any() for phase in fibre_phases)  # the radii of other fibres are NaN
+    # Fibres of users' meshes are fitted to nodes: equal radii differ by rounding.
+    is_like = not has_springs or all(np.allclose(radii[phase], radii[phase][0], atol=0.0) for phase in fibre_phases)
+    if is_plain and is_round and is_like:
         fibres = []
         for phase in fibre_phases:
             springs = None
@@ -98,24 +100,18 @@ def _comparisons(cell: unit_cell.TornCell, fractions: Mapping[str, float]) -> di
                 springs = phase_bounds.Springs(normal, tangential, axial, float(radii[phase][0]))
             fibres.append(phase_bounds.Fibres(fractions[phase], phases[phase], springs))
         entries["estimates"] = estimates.estimates(phases[matrix], fibres)
-    if not has_springs and all(map(named_constants.is_transversely_isotropic, phases.values())):
+    if not has_springs and all(map(engineering_constants.is_transversely_isotropic, phases.values())):
         entries["fibre_bounds"] = phase_bounds.fibre_bounds(list(fractions.values()), list(phases.values()))
     return entries
-
-
-def _has_estimates(case: Case, phases: Sequence[str], radii: Sequence[Float], has_springs: bool) -> bool:
-    """Return whether estimates exist for fibre `radii`, NaN if not round."""
-    if phase_names.COATING in phases or any(interface.between is not None for interface in case.interfaces):
-        return False
-    return not any(np.isnan(r).any() or (has_springs and np.ptp(r) > SAME_RADIUS * r.max()) for r in radii)
 
 
 def unit_errors(
     context: AnalysisContext, responses: list[averaging.Response]
 ) -> tuple[list[mesh_estimate.EnergyErrors], list[averaging.Response]]:
-    """Estimate unit load errors by problem; return responses with element shares.
+    """Estimate the mesh errors of the unit loads, problem by problem.  Collective.
 
-    Without `mesh_error` no errors; without a use for shares the responses as they are.  Collective.
+    Also returns the responses, with the error of each element where a later step uses it.  There are no errors if the
+    case has `mesh_error = false`.
     """
     if not context.case.output.mesh_error:
         return [], responses
@@ -136,13 +132,13 @@ def mesh_error(
     of_plus: list[mesh_estimate.EnergyErrors],
     of_minus: list[mesh_estimate.EnergyErrors],
 ) -> dict[str, Any]:
-    """Return the `Result` entry `mesh_error`, empty without errors.
+    """Return the `Result` entry `mesh_error`; nothing without estimated errors.  Collective.
 
-    A constant f(C) errs by max(|f(C - signed) - f(C)|, |f(C - least) - f(C)|).  Notes errors above the accuracy of the
-    case, and values outside their bounds, which are faults beyond any mesh error.
+    The error of a constant f(C) is max(|f(C - signed) - f(C)|, |f(C - least) - f(C)|).  Notes an energy error above
+    the accuracy of the case and constants outside their bounds.
 
     Args:
-        secants: `effective_stiffness` and entries that follow from it, as in `Result`.
+        secants: `effective_stiffness` and the entries that follow from it, as in `Result`.
         of_plus, of_minus: errors under plus and, where faces touch, minus the unit loads.
     """
     if not of_plus:
@@ -180,10 +176,10 @@ def note_accuracy(context: AnalysisContext, energy: float) -> None:
 def _note_bounds(
     context: AnalysisContext, secants: Mapping[str, Any], values: Named, errors: Named, energy: float
 ) -> None:
-    """Note constants outside their bounds; report faults beyond any possible mesh error.
+    """Note constants outside their bounds; faults beyond any mesh error.
 
-    No constant errs relatively by more than `energy`, the largest relative strain energy error, of which the
-    estimate counts OFF times.  Bounds apply to cells with their symmetry, and follow from the meshed phase shares.
+    No relative error of a constant exceeds `energy`, the largest relative error of the strain energy; the true error
+    is at most OFF times the estimate.  A bound applies to a cell with its symmetry.
     """
     limits: dict[str, Sequence[float]] = {}
     plane = secants.get("bounds")
@@ -198,7 +194,7 @@ def _note_bounds(
     for name, (lower, upper) in limits.items():
         value, error = float(values[name]), float(errors[name])
         outside = max(lower - value, value - upper)
-        if outside <= ROUNDING * abs(upper):
+        if outside <= 0.0 or math.isclose(value, lower) or math.isclose(value, upper):
             continue
         line = f"{name} = {value:.6g} is outside its bounds, {lower:.6g} and {upper:.6g}, by {outside:.1e}"
         possible = OFF * max(error, energy * abs(value))
@@ -211,9 +207,10 @@ def _note_bounds(
 def state_error(
     context: AnalysisContext, responses: Sequence[averaging.Response]
 ) -> tuple[dict[str, float], list[averaging.Response]]:
-    """Return `mesh_error`, one state's relative energy error, and its responses with element shares.
+    """Estimate the relative energy error of one state, `mesh_error`.  Collective.
 
-    Without `mesh_error` no error; without a use for shares the responses as they are.  Collective.
+    Also returns the responses, with the error of each element where a later step uses it.  There is no error if the
+    case has `mesh_error = false`.
     """
     if not context.case.output.mesh_error:
         return {}, list(responses)
@@ -229,25 +226,25 @@ def state_error(
 
 
 def check_accuracy(context: AnalysisContext) -> None:
-    """Note the first load's mesh error if accuracy is asked.  Collective."""
+    """Note the mesh error under the first load if `accuracy` is set.  Collective."""
     if context.case.cell.accuracy is None or not context.case.output.mesh_error:
         return
     cell, target = context.loads.interfaces, next(target for target in context.case.targets if any(target.values()))
     try:
         state = cell.equilibrium(context.loads.load(target), context.bonds(None), cell.no_multipliers())
     except NotCarriedError:
-        return  # the path will meet it, unless friction carries its loads
+        return  # the path will report the fault, unless friction carries the loads
     error, _ = state_error(context, context.loads.responses(state, 1.0))
     note_accuracy(context, error["mesh_error"])
 
 
 def energy_error(stiffness: Float, errors: list[mesh_estimate.EnergyErrors]) -> dict[str, float]:
-    """Return `mesh_error` for a secant stiffness, the largest relative strain energy error."""
+    """Return `mesh_error`, the largest relative strain energy error of a secant stiffness."""
     return {"mesh_error": _energy(stiffness, {name: _secants(errors, name) for name in PARTS})} if errors else {}
 
 
 def _secants(errors: Sequence[mesh_estimate.EnergyErrors], name: str) -> dict[str, Float]:
-    """Return one kind of errors in `effective_stiffness` and `thermal_stress`."""
+    """Return errors of one kind, from PARTS, in `effective_stiffness` and `thermal_stress`."""
     if not errors:
         return {}
     entries = phase_laws.secants(*(getattr(error, name) for error in errors))
@@ -255,13 +252,13 @@ def _secants(errors: Sequence[mesh_estimate.EnergyErrors], name: str) -> dict[st
 
 
 def _constants(stiffness: Float, heat: Float | None) -> dict[str, Float]:
-    """Return a stiffness's constants by name, and the `thermal_expansion`."""
+    """Return the constants of a stiffness by name, with `thermal_expansion`."""
     entries = stiffness_constants(stiffness, heat)
     compliance = entries.pop("compliance", None)
     named: dict[str, Any] = {}
     for key, record in entries.items():
         named |= {key: record} if key == "thermal_expansion" else records.plain(record)
-    if compliance is not None:  # nu12 and nu13 of the material
+    if compliance is not None:  # nu12 and nu13 in the axes of a ply
         named |= {f"nu3{k + 1}": -compliance[2, k] / compliance[2, 2] for k in range(2)}
     return {name: np.asarray(value) for name, value in named.items() if value is not None}
 
@@ -269,7 +266,7 @@ def _constants(stiffness: Float, heat: Float | None) -> dict[str, Float]:
 def _energy(stiffness: Float, parts: Mapping[str, Mapping[str, Float]]) -> float:
     """Return the largest relative strain energy error under any strain.
 
-    If the stiffness is not positive definite, the largest under unit strains.
+    If the stiffness is not positive definite, return the largest error under a unit strain.
     """
     symmetric = (stiffness + stiffness.T) / 2
     if np.linalg.eigvalsh(symmetric)[0] <= 0:

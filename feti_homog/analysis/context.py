@@ -1,4 +1,4 @@
-"""One analysis run: the cell under loads, checks, states, points, progress."""
+"""The state of one analysis run: the cell under its loads, checks, recorded states, points and progress."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 
 
 class CellLoads:
-    """Cell loads, and the averages under them.
+    """The loads of a cell, and its averages under them.
 
     Attributes:
-        problems: the plane problem, in which faces may touch, then the axial one in generalized plane strain.
-        interfaces: the interfaces in all problems together.
-        names: unit loads in all problems.
+        problems: the plane problem, in which faces may touch; in generalized plane strain also the axial problem.
+        interfaces: the interfaces, coupled in all problems.
+        names: names of the unit loads of all problems.
     """
 
     def __init__(self, cell: unit_cell.TornCell, contact: bool) -> None:
@@ -45,49 +45,50 @@ class CellLoads:
         return self.problems[0]
 
     def load(self, target: Mapping[str, float]) -> Load:
-        """Return the load, in all problems, that a waypoint names."""
+        """Return the load of a waypoint, a mapping of strains and stresses."""
         stress = dict(zip(voigt.SPATIAL_STRAINS, voigt.SPATIAL_STRESSES, strict=True)) | {"temperature": "temperature"}
         values = [target.get(name, target.get(stress[name], 0.0)) for name in self.names]
         return Load(np.array(values), np.array([name not in target for name in self.names]))
 
     def zero_multipliers(self) -> list[Float]:
-        """Zero first multipliers for each unit load."""
+        """Return zero multipliers for each unit load, to start from."""
         return [np.zeros(problem.cell.solver.rows) for problem in self.problems for _ in problem.loads]
 
     def by_problem(self, responses: Sequence[averaging.Response]) -> list[list[averaging.Response]]:
-        """Group the unit load responses by problem."""
+        """Group the responses to the unit loads by problem."""
         rest = iter(responses)
         return [[next(rest) for _ in problem.loads] for problem in self.problems]
 
     def responses(self, state: Equilibrium, scale: float, brief: bool = False) -> list[averaging.Response]:
-        """Average `scale` times the equilibrium in all problems.
+        """Return the responses to `scale` times an equilibrium, one for each problem.  Collective.
 
-        Collective; arguments and errors as in `Homogenization.response`.
+        Arguments and errors are as in `Homogenization.response`.
         """
         pairs = zip(self.problems, state.problems, strict=True)
         return [problem.response(part, scale, brief) for problem, part in pairs]
 
     def undetermined(self, responses: Sequence[averaging.Response]) -> list[str]:
-        """Return the strains under a load that nothing determines.  Collective."""
+        """Return the names of strains that a load leaves undetermined.  Collective."""
         pairs = zip(self.problems, responses, strict=True)
         masks = np.concatenate([problem.interface.undetermined(response.state) for problem, response in pairs])
         return [name for name, is_free in zip(self.names, masks, strict=True) if is_free]
 
     def excess(self, responses: Sequence[averaging.Response]) -> float:
-        """Return the ratio of strains under a load to strains in the bonded cell.  Collective."""
+        """Return the ratio of strains to strains of the bonded cell.  Collective."""
         pairs = zip((problem.interface.scales for problem in self.problems), (r.state for r in responses), strict=True)
         return max(scales.excess(state.solution.strain, state.asked) for scales, state in pairs)
 
     def secants(self, responses: Sequence[averaging.Response], sign: float) -> dict[str, Float]:
-        """Return `stiffness`, Eq. (39), and `thermal_stress` (6,) under a temperature.
+        """Return the secant `stiffness`, Eq. (39), and `thermal_stress` (6,).
 
-        Stiffness is (3, 3) or (6, 6); `responses` are to plus or minus each unit load, by their `sign`.
+        The stiffness is (3, 3) or (6, 6).  `responses` belong to `sign` times each unit load; the thermal stress needs
+        a temperature among the loads.
         """
         groups = self.by_problem(responses)
         return phase_laws.secants(*(np.stack([sign * r.stress for r in group], axis=1) for group in groups))
 
     def means(self, responses: Sequence[averaging.Response]) -> dict[str, Float | float]:
-        """Return macroscopic `strain` and `stress` in all problems, and `temperature` if it is a load."""
+        """Return macroscopic `strain` and `stress`, and `temperature` if it is a load."""
         strain = phase_laws.components(*(response.strain for response in responses))
         stress = phase_laws.components(*(response.stress for response in responses))
         heat = {"temperature": float(responses[0].strain[-1])} if "temperature" in self.names else {}
@@ -100,12 +101,15 @@ class AnalysisContext:
 
     Attributes:
         loads: the cell under its loads.
-        checks: checks on all responses so far.
-        states: state recorder.
-        checkpoint: stores the events on a path; `resume` goes on from it.
-        log: called with a line about each event on a path; `events` names the file with all lines.
-        undetermined: strains that nothing determines, for every point under one load.
-        excess: largest ratio of strains under one load to strains in the bonded cell.
+        checks: checks of all responses so far.
+        states: recorder of states.
+        progress: printed lines and bars.
+        checkpoint: store of path events.
+        resume: whether a path goes on from the checkpoint.
+        log: function that is called with a line about each path event.
+        events: name of the file with all these lines.
+        undetermined: undetermined strains at each point under one load.
+        excess: largest ratio of the strains under one load to the strains of the bonded cell.
         notes: remarks on the result.
     """
 
@@ -125,7 +129,7 @@ class AnalysisContext:
     def of(
         cls, cell: unit_cell.TornCell, progress: progress_bar.Progress, states: StateRecorder | None = None
     ) -> AnalysisContext:
-        """Make a context without checkpoint; `states` = None records no states."""
+        """Return a context without checkpoint; `states` = None records no states."""
         contact = cell.case.interface is not None and cell.case.interface.contact
         recorder = StateRecorder(cell, None, False, progress.say) if states is None else states
         checks, checkpoint = CheckRecorder(cell.solver.rtol), checkpoints.EventsInMemory(cell.comm, 0)
@@ -138,27 +142,27 @@ class AnalysisContext:
 
     @property
     def cell(self) -> unit_cell.TornCell:
-        """The cell in the plane problem."""
+        """The torn cell in the plane problem."""
         return self.plane.cell
 
     @property
     def case(self) -> Case:
-        """The case that is analysed."""
+        """The case of the cell."""
         return self.cell.case
 
     @property
     def recovers_again(self) -> bool:
-        """True if displacements inside bodies are found more than once, so that interior factors pay."""
+        """Whether interior displacements are solved for repeatedly, so that factors pay."""
         return self.states.has_place or self.case.output.sensitivities or self.case.analysis.type == "angle"
 
     def bonds(self, opening: float | None) -> BondState:
-        """Interface state before any load: prescribed debonded nodes are open."""
+        """Return the initial bond state, with the prescribed debonded nodes open."""
         return self.plane.intact.with_status(np.where(self.cell.debonded(opening), OPEN, 0).astype(np.int8))
 
     def unit_responses(
         self, label: str, bonds: BondState, starts: Sequence[Float], sign: float
     ) -> tuple[dict[str, Float], list[averaging.Response]]:
-        """Return `CellLoads.secants` and responses to plus or minus unit loads.  Collective."""
+        """Return `CellLoads.secants` and the responses to `sign` times the unit loads.  Collective."""
         responses = list[averaging.Response]()
         for problem in self.loads.problems:
             first, count = len(responses), len(problem.loads)
@@ -170,31 +174,26 @@ class AnalysisContext:
     def record_unit_states(
         self, responses: Sequence[averaging.Response], load_factor: float, label: str, point: int
     ) -> None:
-        """Record the state under each unit load.  Collective."""
+        """Record one state for each unit load, in its problem.  Collective."""
         in_plane = len(self.plane.loads)
         for number, (name, response) in enumerate(zip(self.loads.names, responses, strict=True)):
-            plane, axial = (response, None) if number < in_plane else (None, response)
-            self.states.record(plane, axial, load_factor, f"{label}{name}", point)
-
-    def record_state(self, responses: Sequence[averaging.Response], load_factor: float, label: str, point: int) -> None:
-        """Record the state with these responses.  Collective."""
-        plane, *axial = responses
-        self.states.record(plane, axial[0] if axial else None, load_factor, label, point)
+            pair = (response, None) if number < in_plane else (None, response)
+            self.states.record(pair, load_factor, f"{label}{name}", point)
 
     @cached_property
     def release_rates(self) -> energy_release.EnergyReleaseRates:
-        """Energy release rates at debonded arc tips.  Collective when first read."""
+        """Energy release rates at the tips of debonded arcs.  Collective when first read."""
         from feti_homog.homogenization import energy_release  # bonded cells have no tips
 
         return energy_release.EnergyReleaseRates(self.cell, self.plane.interface)
 
     @cached_property
     def fibre_interfaces(self) -> averaging.FibreInterfaces:
-        """Fibre interfaces in the cell.  Collective when first read."""
+        """The fibre interfaces of the cell.  Collective when first read."""
         return averaging.FibreInterfaces(self.cell)
 
     def point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
-        """Return the debonding of a point under the last plane strain, and all iterations.  Collective."""
+        """Return the debonding under the last plane strain, and all iterations.  Collective."""
         last = responses[: len(voigt.STRAINS)][-1]
         length = self.fibre_interfaces.length(last.state.status != BONDED)
         debonding = {
@@ -207,7 +206,7 @@ class AnalysisContext:
         return debonding | last.counts | {"iterations": sum(r.state.iterations for r in responses)}
 
     def loaded_point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
-        """Return means, energies and debonding at a result.json point under one load.  Collective."""
+        """Return means, energies and debonding of a point under one load.  Collective."""
         self.undetermined.append(self.loads.undetermined(responses))
         self.excess = max(self.excess, self.loads.excess(responses))
         energies = {
@@ -218,10 +217,11 @@ class AnalysisContext:
         return self.loads.means(responses) | energies | self.point(responses[:1]) | {"iterations": iterations}
 
     def remarks(self) -> list[str]:
-        """List the notes, and a line each on undetermined and on absurd strains."""
-        lines, points, label = [*self.notes], sum(map(bool, self.undetermined)), f"[{self.case.analysis.type}]"
+        """Return the notes and remarks on undetermined and absurd strains."""
+        lines, label = [*self.notes], f"[{self.case.analysis.type}]"
         if names := [name for name in voigt.SPATIAL_STRAINS if any(name in free for free in self.undetermined)]:
-            where = f" at {points} of {len(self.undetermined)} points" if self.case.section.is_followed else ""
+            points = f" at {sum(map(bool, self.undetermined))} of {len(self.undetermined)} points"
+            where = points if self.case.section.is_followed else ""
             reason = "with a given stress nothing resists them, and the result has one value of many"
             lines.append(f"{label} {', '.join(names)}: undetermined{where}: {reason}")
         if self.excess > load_scales.ABSURD:
@@ -230,6 +230,6 @@ class AnalysisContext:
         return lines
 
     def warnings(self) -> list[str]:
-        """List the warnings about probably unintended settings."""
+        """Return the warnings about settings that are probably unintended."""
         summary = self.cell.summary
         return [*cell_remarks.warnings(self.case, summary.width, summary.interface_edge), *self.checks.warnings()]

@@ -1,6 +1,6 @@
-"""`analysis.type = "envelope"`: debonding onset in a macroscopic stress or strain plane.
+"""`analysis.type = "envelope"`: debonding onset in a plane of macroscopic stresses or strains.
 
-The cell is linear, so tractions under all loads are superposed from unit loads: no direction costs a solve.
+The cell is linear, so the tractions under any load are superposed from unit loads: a direction costs no solve.
 """
 
 from collections.abc import Iterator, Sequence
@@ -22,20 +22,18 @@ from feti_homog.interface.path import onsets, path_points
 from feti_homog.materials import voigt
 from feti_homog.typing import Float, Int
 
-# Bonds times directions that are looked at together.
+# Bonds times directions that are evaluated together, to bound memory.
 CHUNK = 200_000
-# A cosine that is smaller than this is what rounding leaves of zero.
-COSINE_ROUNDING = 1e-15
 
 
 @dataclass(frozen=True)
 class Rays:
-    """Macroscopic states on n rays: a start plus f times a direction, f >= 0.
+    """Macroscopic states on n rays, start + f direction, f >= 0.
 
     Attributes:
         strain, stress: (n, m) directions.
-        strain_before, stress_before: (m,) starts, after the temperature change.
-        temperature: the change.
+        strain_before, stress_before: (m,) starts, after the change of temperature.
+        temperature: change of temperature.
     """
 
     strain: Float
@@ -44,16 +42,11 @@ class Rays:
     stress_before: Float
     temperature: float
 
-    def at(self, number: int, factor: float) -> dict[str, Any]:
-        """Return factor, strain (m,) and stress (m,) on a ray."""
-        strain = self.strain_before + factor * self.strain[number]
-        return {"factor": factor, "strain": strain, "stress": self.stress_before + factor * self.stress[number]}
-
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Return `envelope`, `effective_stiffness` and, if a temperature is a load, `thermal_stress`.
+    """Return the `Result` entries `envelope`, `effective_stiffness` and its constants.  Collective.
 
-    `envelope` lists directions with the load at which the first bond breaks; the other entries follow from unit loads.
+    `envelope` lists directions with the load at which the first bond breaks; all other entries follow from unit loads.
 
     Raises:
         CaseError: faces in the mesh are debonded and may touch.
@@ -84,16 +77,17 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 def rays_of(
     plane: Sequence[str], angles: Float, stiffness: Float, thermal_stress: Float | None, temperature: float
 ) -> Rays:
-    """Return the rays in directions (n,), degrees, between axes `plane`.
+    """Return the rays at angles (n,), in degrees, from the first axis.
 
-    Stress rays have E = C^-1 S and begin at zero stress after a temperature change, strain rays begin at zero strain.
+    `plane` names both axes.  Stress rays have E = C^-1 S and begin at zero stress after the change of temperature;
+    strain rays begin at zero strain.
     """
     strains, stresses = voigt.voigt_names(len(stiffness))
     by_stress = plane[0] in stresses
     names = stresses if by_stress else strains
     unit = np.stack([np.cos(np.radians(angles)), np.sin(np.radians(angles))], axis=1)
     loads, zero = np.zeros((len(angles), len(names))), np.zeros(len(names))
-    loads[:, [names.index(name) for name in plane]] = np.where(np.abs(unit) < COSINE_ROUNDING, 0.0, unit)
+    loads[:, [names.index(name) for name in plane]] = np.where(np.abs(unit) < np.finfo(float).eps, 0.0, unit)
     heat_stress = zero if thermal_stress is None else temperature * thermal_stress
     if by_stress:
         heat_strain = -np.linalg.solve(stiffness, heat_stress)
@@ -102,12 +96,12 @@ def rays_of(
 
 
 class _Finder:
-    """Finds the first bond that breaks on each ray."""
+    """Search for the first bond that breaks on each ray."""
 
     def __init__(
         self, context: AnalysisContext, responses: Sequence[averaging.Response], law: BondLaw, onset: onsets.Onset
     ) -> None:
-        """Take the responses to the unit loads.  Collective."""
+        """Collect the tractions on this rank's bonds under the unit loads.  Collective."""
         cell = context.cell
         self._comm, self._law, self._onset, self._loads = cell.comm, law, onset, context.loads.names
         self._problems, self._noise = context.loads.interfaces.problems, context.plane.interface.scales.sign_noise
@@ -119,7 +113,7 @@ class _Finder:
             tractions += [np.pad(problem.interface.traction(r.state.solution), padding) for r in group]
             column += c
         self._unit = np.stack(tractions)
-        # Keys of a break under a traction with this number of components.
+        # The law's numbers of a break, as many as tractions have components.
         self._break_names = tuple(law.break_names)[: self._unit.shape[2]]
         self._chunk = max(1, CHUNK // max(1, self._comm.allreduce(self._unit.shape[1], MPI.MAX)))
         nodes = cell.solver.jump_operator.nodes
@@ -128,7 +122,7 @@ class _Finder:
         self._order = np.lexsort((np.round(self._direction, DIRECTION_DIGITS), self._pair, self._fibre))
 
     def points(self, rays: Rays) -> Iterator[dict[str, Any]]:
-        """Yield each ray's entry in result.json, without its direction.  Collective."""
+        """Yield the fields of each ray's `EnvelopePoint` but its angle.  Collective."""
         names = voigt.voigt_names(rays.strain.shape[1])[0]
         start = np.tensordot(self._unit_loads(rays.strain_before[None], rays.temperature, names), self._unit, axes=1)[0]
         used = self._onset.utilisation(start, np.arange(len(start)))
@@ -137,42 +131,48 @@ class _Finder:
             loads = self._unit_loads(rays.strain[first : first + self._chunk], 0.0, names)
             directions = np.tensordot(loads, self._unit, axes=1)
             if largest < 1.0:
-                before = start if rays.temperature else None
-                factors = self._onset.factors(directions, self._noise * self._error_utilisation(loads), before)
+                # (n, k) utilisations by the bond stresses of the bonded cell, which scale the solver's noise.
+                total, column = np.zeros((len(loads), len(self._fibre))), 0
+                for problem, components in zip(self._problems, ((0, 1), (2,)), strict=False):
+                    end = column + len(problem.solver.problem.loads)
+                    unit = np.zeros((len(self._fibre), self._unit.shape[2]))
+                    unit[:, components] = 1.0
+                    total += problem.scales.bond_stress(loads[:, column:end].T).T * self._law.share(unit)
+                    column = end
+                factors = self._onset.factors(directions, self._noise * total, start if rays.temperature else None)
             else:
-                factors = np.tile(
-                    np.where(used >= largest * (1.0 - path_points.UTILISATION_TIE), 0.0, np.inf), (len(directions), 1)
-                )
+                breaks = used >= largest * (1.0 - path_points.UTILISATION_TIE)
+                factors = np.tile(np.where(breaks, 0.0, np.inf), (len(directions), 1))
             for ray, (factor, fibre, pair, angle, *shares) in enumerate(self._first(factors, start, directions), first):
                 if np.isinf(factor):
                     yield {}
                     continue
+                point = {
+                    "factor": factor,
+                    "strain": rays.strain_before + factor * rays.strain[ray],
+                    "stress": rays.stress_before + factor * rays.stress[ray],
+                    "fibre": int(fibre),
+                    "bond_angle": angle,
+                }
                 section = {"interface": int(pair) + 1} if self._interfaces > 1 else {}
-                place = {"fibre": int(fibre)} | section | {"bond_angle": float(angle)}
-                yield rays.at(ray, float(factor)) | place | dict(zip(self._break_names, shares, strict=True))
+                yield point | section | dict(zip(self._break_names, shares, strict=True))
 
     def _unit_loads(self, strain: Float, temperature: float, names: Sequence[str]) -> Float:
-        """(n, l) each unit load's share in strains (n, m) with these names and a temperature change."""
+        """(n, l) coefficients of unit loads in strains (n, m) and temperature."""
         column = {name: strain[:, number] for number, name in enumerate(names)}
         column["temperature"] = np.full(len(strain), temperature)
         return np.stack([column[load] for load in self._loads], axis=1)
 
-    def _error_utilisation(self, loads: Float) -> Float:
-        """(n, k) utilisations by bond stresses under unit loads (n, l).  Collective."""
-        first, total = 0, np.zeros((len(loads), len(self._fibre)))
-        for problem, part in zip(self._problems, ((0, 1), (2,))[: len(self._problems)], strict=True):
-            end = first + len(problem.solver.problem.loads)
-            unit = np.zeros((len(self._fibre), self._unit.shape[2]))
-            unit[:, part] = 1.0
-            total += problem.scales.bond_stress(loads[:, first:end].T).T * self._law.share(unit)
-            first = end
-        return total
-
     def _first(self, factors: Float, before: Float, directions: Float) -> list[list[float]]:
-        """Return each ray's least factor, its bond and break shares.
+        """Return the first break on each ray as a row.  Collective.
 
-        In a row: factor, then fibre, interface and direction of the bond, then shares of the break.  Bonds that break
-        together: lowest fibre, then interface, then angle.  Collective.
+        A row has the least factor, fibre, interface and direction of the bond, and the law's numbers of the break.
+        Ties: lowest fibre, then interface, then direction.
+
+        Args:
+            factors: (n, k) factors at which each bond breaks.
+            before: (k, c) tractions at the starts of the rays.
+            directions: (n, k, c) changes of traction per unit of the factor.
         """
         n = len(factors)
         smallest = factors.min(axis=1, initial=np.inf)

@@ -1,4 +1,4 @@
-"""`analysis.type = "load"`: equilibrium under given strains, stresses, temperature; nothing breaks."""
+"""`analysis.type = "load"`: equilibrium under given strains, stresses and temperature, without breaks."""
 
 from typing import Any
 
@@ -10,10 +10,10 @@ from feti_homog.analysis.tip_records import IN_PLANE_LOADS, tip_rates
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Return `load`, the state with faces debonded from the start.
+    """Return the `Result` entry `load`, the equilibrium of the prescribed debonded faces.  Collective.
 
-    Under the load they are open or in contact.  Adds `tips` on its arcs if only plane strains are there;
-    `sensitivities` if the case asks.
+    The point has `tips` on debonded arcs if the load has no strain but in the plane.  Adds `sensitivities` if the case
+    asks for them.
     """
     cell, (target,) = context.loads.interfaces, context.case.targets
     bonds = context.bonds(None)
@@ -23,7 +23,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
         context.progress.say(context.checks.record(problem, response))
     error, responses = state_error(context, responses)
     note_accuracy(context, max(error.values(), default=0.0))
-    context.record_state(responses, 1.0, "load", 0)
+    context.states.record(responses, 1.0, "load", 0)
     point = context.loaded_point(responses) | error | {"free_motions": state.free_motions}
     strains = zip(cell.loads, cell.macroscopic(state.solutions).strain.tolist(), strict=True)
     only_in_plane = not any(strain for name, strain in strains if name not in IN_PLANE_LOADS)

@@ -1,4 +1,4 @@
-"""`analysis.type = "path"`: debonding along a strain path, Section III.F, Fig. 5."""
+"""`analysis.type = "path"`: debonding along a path of loads, Section III.F, Fig. 5."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -26,16 +26,17 @@ LEAST_STRESS = 1e-9  # in a fault, relative to the largest
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Follow the case's path until its bonds break; see `follow`."""
+    """Follow the path of the case with its bond law; see `follow`.  Collective."""
     section = context.case.section
     assert isinstance(section, load_sections.LoadPath)
     return follow(context, section, criterion_of(context.cell, grows=True))
 
 
 def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw) -> dict[str, Any]:
-    """Return `path`, a point an event (or increment), each written to the checkpoint at once.
+    """Follow a path and return its `Result` entries.  Collective.
 
-    `states` numbers the points with recorded fields, chosen when all points are found.
+    `path` has a point for each event or increment, `states` the numbers of points with fields.  Each point is written
+    to the checkpoint at once.
     """
     check_accuracy(context)
     count = _events_in_checkpoint(context, law)
@@ -43,8 +44,8 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
     with path_events.EventProgress(context.progress, path_events.BARS[path.method], context.events) as progress:
         for number, (point, energies, responses) in enumerate(_points(context, path, law, count)):
             place = f"at {point.load_factor:.6f}, {responses[0].leading}"
-            place += "" if energies is None else ", from the checkpoint"
             if energies is not None:
+                place += ", from the checkpoint"
                 work.resume_from(*energies, point)
             else:
                 work.arrive(point)
@@ -62,36 +63,19 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
             bonds = f"{entry['bonded']} bonded, {entry['open'] + entry['closed']} broken"
             progress.advance(point.load_factor, f"{len(entries)} {path.method}, {bonds}")
             last = point
-            if not _goes_on(context, path, point, number + 1):
+            if not point.state.converged:  # an unconverged state chose the next break
                 break
-    if last is None:
-        return {"path": (), "resumed": count}
-    states: dict[str, Any] = {}
-    document = {"case": context.case.resolved(), "path": entries}  # by which points are marked
-    if law.has_tips or context.states.has_place:
-        states = _recorded(context, path, law, document, last)
-    else:
-        _checked(context, last, _label(path, len(entries) - 1))
-    _remark_loose_fibres(context, last)
-    for number, mark in landmarks.marks(document).items():
-        entries[number]["mark"] = mark
-    points = tuple(PathPoint(**entry) for entry in entries)
-    return {"path": points, "peak": Peak(**landmarks.peak_of(document)), "resumed": count} | states
-
-
-def _remark_loose_fibres(context: AnalysisContext, last: path_points.Point) -> None:
-    """Remark fibres that no bond holds in the end, if faces have friction.  Collective."""
-    if context.case.has_friction and (loose := context.fibre_interfaces.loose(last.after.bonds.status)):
-        names = ", ".join(map(str, loose[:NAMED_FIBRES])) + (", ..." if len(loose) > NAMED_FIBRES else "")
-        fibres = f"{len(loose)} fibres ({names})" if len(loose) > 1 else f"fibre {names}"
-        context.notes.append(
-            f"[path] no bond of {fibres} holds: with friction such a fibre may have several equilibria under one load, "
-            "and the path has one of them, by the order of nodes"
-        )
+            if len(entries) == path.max_events and point.load_factor < 1.0:
+                context.checks.faults.append(
+                    f"[path] max_events = {path.max_events}: the path was not finished: "
+                    'result.json has status "not converged"; --resume with a higher max_events goes on'
+                )
+                break
+    return {"resumed": count} | ({"path": ()} if last is None else _completed(context, path, law, entries, last))
 
 
 def _events_in_checkpoint(context: AnalysisContext, law: BondLaw) -> int:
-    """Count usable checkpoint events; clear the checkpoint unless the run resumes.
+    """Count the valid checkpoint events; drop them unless the run resumes.  Collective.
 
     Raises:
         CaseError: the checkpoint cannot be used.
@@ -112,12 +96,14 @@ def _events_in_checkpoint(context: AnalysisContext, law: BondLaw) -> int:
 def _points(
     context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw, stored_events: int
 ) -> Iterator[tuple[path_points.Point, tuple[path_points.Energies, float] | None, list[averaging.Response]]]:
-    """Yield points with responses: first from the checkpoint, with energies up to each, then new ones.
+    """Yield each point with its responses.  Collective.
 
-    Where nothing carries the stresses any more, or faces with friction cannot go on, the path ends with a fault.
+    Points come first from the checkpoint, then from the load path.  Points from the checkpoint also have the energies
+    up to them.  The path ends with a fault where the cell carries the stresses no longer, or where friction has no
+    equilibrium.
 
     Raises:
-        NotCarriedError: nothing carries them from the beginning.
+        NotCarriedError: the cell carries the stresses of no point.
     """
     cell, waypoints = context.loads.interfaces, [context.loads.load(target) for target in context.case.targets]
     begin = path_points.unloaded(cell, context.bonds(None))
@@ -131,8 +117,8 @@ def _points(
         yield point, energies, responses
     engine: type[frictionless_leg.FrictionlessLeg] | partial[coulomb_leg.CoulombLeg] = frictionless_leg.FrictionlessLeg
     if context.case.has_friction:
-        pairs = np.array([(each.friction, each.friction_on_damage) for each in context.case.interfaces])
-        friction, on_damage = pairs[cell.nodes.pair].T
+        coefficients = np.array([(face.friction, face.friction_on_damage) for face in context.case.interfaces])
+        friction, on_damage = coefficients[cell.nodes.pair].T
         engine = partial(coulomb_leg.CoulombLeg, sliding=sliding_cell.SlidingCell(cell, friction, friction * on_damage))
     if path.method == "events":
         points = path_following.events(cell, law, waypoints, begin, engine)
@@ -148,19 +134,18 @@ def _points(
     except NotCarriedError as error:
         if count == 0:
             raise _with_advice(error, "", path) from error
-        context.checks.faults.append(str(_with_advice(error, _end_of(context, responses), path)))
-
-
-def _end_of(context: AnalysisContext, responses: list[averaging.Response]) -> str:
-    """Return where a path ends: beyond its last point, with the stresses there."""
-    stress = np.asarray(context.loads.means(responses)["stress"])
-    pairs = zip(voigt.voigt_names(len(stress))[1], stress, strict=True)
-    large = [f", {name} {value:.6g}" for name, value in pairs if abs(value) > LEAST_STRESS * np.abs(stress).max()]
-    return f" beyond the last point{''.join(large)}"
+        stress = np.asarray(context.loads.means(responses)["stress"])
+        named = zip(voigt.voigt_names(len(stress))[1], stress, strict=True)
+        large = [f", {name} {value:.6g}" for name, value in named if abs(value) > LEAST_STRESS * np.abs(stress).max()]
+        place = f" beyond the last point{''.join(large)}"
+        context.checks.faults.append(str(_with_advice(error, place, path)))
 
 
 def _with_advice(error: NotCarriedError, place: str, path: load_sections.LoadPath) -> NotCarriedError:
-    """Return the error that ends a path, with a remedy and `place`, empty before the first point."""
+    """Return the error that ends a path, with a remedy.
+
+    `place` is empty before the first point.
+    """
     if isinstance(error, coulomb_faces.StuckError):
         more = "" if path.method == "events" else " or more increments"
         return coulomb_faces.StuckError(f"[path]: {error}{place}; a smaller friction{more} may lead further")
@@ -178,7 +163,7 @@ def _entry(
     responses: Sequence[averaging.Response],
     work: path_events.Work,
 ) -> dict[str, Any]:
-    """Return a point's entry in result.json.  Collective."""
+    """Return the fields of a point's `PathPoint`.  Collective."""
     energies, damage = work.all_equilibria, law.damage(point.state.bonds)
     entry: dict[str, Any] = {
         "load_factor": point.load_factor,
@@ -199,51 +184,55 @@ def _entry(
     return entry | context.loaded_point(responses)
 
 
-def _goes_on(context: AnalysisContext, path: load_sections.LoadPath, point: path_points.Point, count: int) -> bool:
-    """Return whether the path goes on after `count` points."""
-    if not point.state.converged:  # an unconverged state chose the next break
-        return False
-    if count == path.max_events and point.load_factor < 1.0:
-        context.checks.faults.append(
-            f"[path] max_events = {count}: the path was not finished: "
-            'result.json has status "not converged"; --resume with a higher max_events goes on'
-        )
-        return False
-    return True
-
-
-def _recorded(
+def _completed(
     context: AnalysisContext,
     path: load_sections.LoadPath,
     law: BondLaw,
-    document: dict[str, Any],
+    entries: list[dict[str, Any]],
     last: path_points.Point,
 ) -> dict[str, Any]:
-    """Record tips and fields at kept points, all but the last from the checkpoint.  Collective.
+    """Mark main points, record tips and fields, and return the entries.  Collective.
 
-    Returns `states`, the point numbers with recorded fields.
+    Tips and fields belong to the kept points, all but the last of which are read from the checkpoint.
     """
-    legs = len(context.case.targets) if path.method == "events" else 0
-    entries = document["path"]
-    numbers = landmarks.kept(entries, context.case.output.states, legs, landmarks.marks(document))
-    with context.progress.stage("states") as line:
-        for number in context.progress.bar(numbers, "states"):
-            point = last if number == len(entries) - 1 else path_events.read(context, law, number)[1]
-            point, responses = _checked(context, point, _label(path, number))
-            if law.has_tips:
-                entries[number]["tips"] = tips(context, law, point)
-            if context.states.has_place:
-                error, responses = state_error(context, responses)
-                entries[number] |= error
-                context.record_state(responses, point.load_factor, _label(path, number), number)
-        line.append(f"{len(numbers)} of {len(entries)} points")
-    return {"states": numbers} if context.states.has_place else {}
+    document = {"case": context.case.resolved(), "path": entries}
+    marks, states = landmarks.marks(document), dict[str, Any]()
+    if law.has_tips or context.states.has_place:
+        legs = len(context.case.targets) if path.method == "events" else 0
+        numbers = landmarks.kept(entries, context.case.output.states, legs, marks)
+        with context.progress.stage("states") as line:
+            for number in context.progress.bar(numbers, "states"):
+                point = last if number == len(entries) - 1 else path_events.read(context, law, number)[1]
+                point, responses = _checked(context, point, _label(path, number))
+                if law.has_tips:
+                    entries[number]["tips"] = tips(context, law, point)
+                if context.states.has_place:
+                    error, responses = state_error(context, responses)
+                    entries[number] |= error
+                    context.states.record(responses, point.load_factor, _label(path, number), number)
+            line.append(f"{len(numbers)} of {len(entries)} points")
+        states = {"states": numbers} if context.states.has_place else {}
+    else:
+        _checked(context, last, _label(path, len(entries) - 1))
+    if context.case.has_friction and (loose := context.fibre_interfaces.loose(last.after.bonds.status)):
+        names = ", ".join(map(str, loose[:NAMED_FIBRES])) + (", ..." if len(loose) > NAMED_FIBRES else "")
+        fibres = f"{len(loose)} fibres ({names})" if len(loose) > 1 else f"fibre {names}"
+        context.notes.append(
+            f"[path] no bond of {fibres} holds: with friction such a fibre may have several equilibria under one load, "
+            "and the path has one of them, by the order of nodes"
+        )
+    for number, mark in marks.items():
+        entries[number]["mark"] = mark
+    return {
+        "path": tuple(PathPoint(**entry) for entry in entries),
+        "peak": Peak(**landmarks.peak_of(document)),
+    } | states
 
 
 def _checked(
     context: AnalysisContext, point: path_points.Point, name: str
 ) -> tuple[path_points.Point, Sequence[averaging.Response]]:
-    """Return a point completed by F lambda with its responses, and record their checks.  Collective."""
+    """Complete a point by F lambda, and check its responses.  Collective."""
     point = replace(point, state=context.loads.interfaces.completed(point.state))
     responses = context.loads.responses(point.state, point.scale)
     for response in responses:

@@ -1,4 +1,4 @@
-"""Path events: energies, form in the checkpoint, and printed lines."""
+"""Path events: accumulated energies, arrays in the checkpoint, printed lines and progress bar."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -12,7 +12,7 @@ from feti_homog.analysis.context import AnalysisContext, CellLoads
 from feti_homog.feti import DualSolution
 from feti_homog.homogenization import averaging
 from feti_homog.interface import Load, Macroscopic
-from feti_homog.interface.contact import BondState, Equilibrium, contact_problem, coupled_interfaces
+from feti_homog.interface.contact import BondState, Equilibrium, coupled_interfaces
 from feti_homog.interface.laws import BondLaw
 from feti_homog.interface.path import path_points
 from feti_homog.results import checkpoints
@@ -23,24 +23,27 @@ SECONDS_A_LINE = 1.0
 STEPS_BAR = "{l_bar}{bar}| {elapsed}, {remaining} left{postfix}"
 EVENTS_BAR = "{l_bar}{bar}| {elapsed}{postfix}"
 BARS = {"events": EVENTS_BAR, "increments": STEPS_BAR}
-# Conditions of contact; the last only with friction.
+# Errors of the contact conditions; the last exists only with friction.
 KKT_LAWS = ("kkt_complementarity", "kkt_penetration", "kkt_tension", "kkt_friction")
-# Laws whose errors a response may have.
+# Laws that a response may have been checked against.
 LAWS = ("strain", "hill", "jump", "stress", *KKT_LAWS)
 UNCHECKED = -1.0  # the error of a law that was not checked
 EMPTY = np.zeros(0)
-# Behind the names of what belongs to each problem.
+# Endings of the array names of the plane and the axial problem.
 SUFFIXES = ("", "_axial")
 
 
 @dataclass
 class Work:
-    """Energies per cell area up to a point; breaks lose the work of the loads less the stored energy.
+    """Energies per cell area up to a point.
+
+    Breaks lose the work of the loads less the stored energy.
 
     Attributes:
-        all_equilibria: every bond breaks at its own load, the first leg with its snap-back.
-        load_controlled: loss if the load only rises on the first leg, as in a test: a bond in a snap-back breaks at the
-            largest load t so far, and loses (t / its load)^2 times as much, as all is of degree one in the load.
+        all_equilibria: energies where every bond breaks at its own load, through the snap-back of the first leg.
+        load_controlled: loss where the load only rises on the first leg, as in a test.  A bond in a snap-back then
+            breaks at the largest load t so far and loses (t / its own load)^2 times as much, because the response
+            has degree one in the load.
     """
 
     all_equilibria: path_points.Energies = path_points.NO_ENERGIES
@@ -49,8 +52,8 @@ class Work:
     _largest_load: float = 0.0
 
     def arrive(self, point: path_points.Point) -> None:
-        """Add the energies on the way from the last point to this one."""
-        # Beyond the first leg loads do not fall.
+        """Add the energies between the last point and this one."""
+        # Loads never fall after the first leg.
         rise = self._largest_load / self._load if self._load else 1.0
         controlled = self.load_controlled + rise**2 * point.energies.released
         self.resume_from(self.all_equilibria.plus(point.energies), controlled, point)
@@ -58,7 +61,7 @@ class Work:
     def resume_from(
         self, all_equilibria: path_points.Energies, load_controlled: float, point: path_points.Point
     ) -> None:
-        """Go on from a point with the energies up to it."""
+        """Continue from a point with the energies up to it."""
         self.all_equilibria, self.load_controlled = all_equilibria, load_controlled
         self._load, self._largest_load = point.load_factor, max(point.load_factor, self._largest_load)
 
@@ -69,9 +72,9 @@ def stored(
     work: Work,
     cell: coupled_interfaces.CoupledInterfaces,
 ) -> tuple[dict[str, Any], checkpoints.Arrays]:
-    """Take a point with its responses apart, into plain numbers and distributed arrays for the checkpoint.
+    """Split a point into plain numbers and distributed arrays for the checkpoint.
 
-    A path goes on from its last state's multipliers.
+    A path goes on from the multipliers of its last state.
     """
     after = point.after
     numbers: dict[str, Any] = {
@@ -85,28 +88,50 @@ def stored(
     for suffix, interface, response, state in zip(
         SUFFIXES, cell.problems, responses, point.state.problems, strict=False
     ):
-        apart, arrays = _taken_apart(state, interface.solver.natural.kernel_dimension)
-        # Numbers of a response that follow from the multipliers.
-        apart["means"] = np.stack([response.strain, response.stress])
-        apart["energies_of"] = [response.stored, response.in_springs]
-        apart["errors"] = [response.checks.get(law, UNCHECKED) for law in LAWS]
-        numbers |= {f"{name}{suffix}": value for name, value in apart.items()}
-        distributed |= {f"{name}{suffix}": value for name, value in arrays.items()}
+        solution = state.solution
+        alpha = solution.alpha  # None: F lambda did not confirm the solution
+        of_problem = {
+            "numbers": [state.iterations, state.solves, state.free_motions, solution.iterations, solution.reason],
+            "load": np.stack([state.load.values, state.load.by_stress]),
+            "strain": solution.strain,
+            "alpha": np.full(interface.solver.natural.kernel_dimension, np.nan) if alpha is None else alpha,
+            "confirmed": alpha is not None,
+            "residual": solution.residual,
+            "asked": state.asked,
+            "certificate": [state.certificate.get(law, np.nan) for law in KKT_LAWS],
+            # These numbers follow from the multipliers.
+            "means": np.stack([response.strain, response.stress]),
+            "energies_of": [response.stored, response.in_springs],
+            "errors": [response.checks.get(law, UNCHECKED) for law in LAWS],
+        }
+        numbers |= {f"{name}{suffix}": value for name, value in of_problem.items()}
+        distributed |= {f"lam{suffix}": solution.lam, f"jump{suffix}": solution.jump}
+        distributed |= _bond_arrays(state.bonds, suffix)
     return numbers, distributed
 
 
 def restored(
     event: checkpoints.Arrays, cell: coupled_interfaces.CoupledInterfaces
 ) -> tuple[path_points.Point, tuple[path_points.Energies, float]]:
-    """Rebuild a point, and the energies up to it, from the event that `stored` made.
+    """Rebuild a point, and the energies up to it, from its event.
 
-    A lean event has empty arrays, which `found_again` fills.
+    Arrays that the checkpoint has no room for are empty; `found_again` computes them.
     """
+    states = list[Equilibrium]()
+    for suffix, interface in zip(SUFFIXES, cell.problems, strict=False):
+        lam, jump, alpha = (event.get(f"{name}{suffix}", EMPTY) for name in ("lam", "jump", "alpha"))
+        iterations, solves, free_motions, last, reason = event[f"numbers{suffix}"].tolist()
+        errors = zip(KKT_LAWS, event[f"certificate{suffix}"].tolist(), strict=True)
+        certificate = {law: error for law, error in errors if not np.isnan(error)}
+        values, by_stress = event[f"load{suffix}"]
+        bonds, residual = _bond_state(event, suffix), float(event[f"residual{suffix}"])
+        amplitudes = None if np.isnan(alpha).any() else alpha
+        compliance = interface.compliance(bonds)
+        solution = DualSolution(event[f"strain{suffix}"], lam, jump, amplitudes, last, reason, residual, compliance)
+        load, asked = Load(values, by_stress.astype(bool)), event[f"asked{suffix}"]
+        states.append(Equilibrium(load, bonds, solution, iterations, solves, free_motions, certificate, asked))
+    state = replace(states[0], axial=states[1]) if len(states) > 1 else states[0]
     load_factor, scale, leg, position, *counts = event["path"].tolist()
-    energies = event["energies"].tolist()
-    pairs = zip(cell.problems, SUFFIXES, strict=False)
-    state, *axial = (_put_together(event, interface, suffix) for interface, suffix in pairs)
-    state = replace(state, axial=axial[0]) if axial else state
     origin_strain, origin_stress, strain, stress = event["macroscopic"]
     broken = float(event["broken"])
     after = path_points.PathState(
@@ -119,17 +144,15 @@ def restored(
         None if np.isnan(broken) else broken,
         float(event["stretched"]),
     )
+    n, energies = len(path_points.NO_ENERGIES), event["energies"].tolist()
+    since_last, up_to_point = path_points.Energies(*energies[:n]), path_points.Energies(*energies[n : 2 * n])
     broke, softened = map(int, counts)
-    n = len(path_points.NO_ENERGIES)
-    used = event.get("used", EMPTY)
-    point = path_points.Point(
-        load_factor, scale, state, broke, softened, path_points.Energies(*energies[:n]), used, after
-    )
-    return point, (path_points.Energies(*energies[n : 2 * n]), energies[2 * n])
+    point = path_points.Point(load_factor, scale, state, broke, softened, since_last, event.get("used", EMPTY), after)
+    return point, (up_to_point, energies[2 * n])
 
 
 def averages(event: checkpoints.Arrays, point: path_points.Point, loads: CellLoads) -> list[averaging.Response]:
-    """Return a restored event's stored responses.  Collective."""
+    """Restore the responses of an event.  Collective."""
     responses = list[averaging.Response]()
     for suffix, problem, state in zip(SUFFIXES, loads.problems, point.state.problems, strict=False):
         strain, stress = event[f"means{suffix}"]
@@ -144,28 +167,28 @@ def averages(event: checkpoints.Arrays, point: path_points.Point, loads: CellLoa
 def found_again(
     point: path_points.Point, cell: coupled_interfaces.CoupledInterfaces, law: BondLaw
 ) -> path_points.Point:
-    """Return a lean event's point with the equilibrium under its load and bonds.  Collective."""
+    """Solve for the equilibrium of a point whose event has no multipliers.  Collective."""
     loads = ((problem.load.values, problem.load.by_stress) for problem in point.state.problems)
     values, by_stress = zip(*loads, strict=True)
     load = Load(np.concatenate(values), np.concatenate(by_stress))
     state = cell.equilibrium(load, point.state.bonds, cell.no_multipliers())
-    # An equilibrium under the whole load is scaled, and so are its utilisations.
+    # The state belongs to the whole load; the point is `scale` times the state, and so are its utilisations.
     used = point.scale * path_points.most_utilised(cell, law, state)[0]
     return replace(point, state=state, used=used, after=replace(point.after, lam=state.multipliers))
 
 
 def read(context: AnalysisContext, law: BondLaw, number: int) -> tuple[checkpoints.Arrays, path_points.Point]:
-    """Read a checkpoint event and its point, whose multipliers are found again if missing.  Collective."""
+    """Read an event and its point; solve for missing multipliers.  Collective."""
     event, cell = context.checkpoint.read(number), context.loads.interfaces
     point, _ = restored(event, cell)
     return event, point if checkpoints.has_multipliers(event) else found_again(point, cell, law)
 
 
 def holding(context: AnalysisContext, law: BondLaw, count: int) -> int:
-    """Return how many of `count` checkpoint events hold.
+    """Count the valid events among the first `count` of the checkpoint.  Collective.
 
-    Confirms the last events, after which F lambda did not confirm all problems, up to a failed check or a wrong mean.
-    Collective.
+    Completes and checks the last events, back to the point at which F lambda has confirmed every problem.  Events from
+    a failed check or a wrong mean onwards are not valid.
     """
     first, waiting = count, set(SUFFIXES[: len(context.loads.problems)])
     while first:
@@ -186,58 +209,27 @@ def holding(context: AnalysisContext, law: BondLaw, count: int) -> int:
     return count
 
 
-def _taken_apart(state: Equilibrium, kernel: int) -> tuple[dict[str, Any], checkpoints.Arrays]:
-    """Take one problem's equilibrium apart; `kernel` amplitudes are NaN if not confirmed."""
-    solution = state.solution
-    numbers: dict[str, Any] = {
-        "numbers": [state.iterations, state.solves, state.free_motions, solution.iterations, solution.reason],
-        "load": np.stack([state.load.values, state.load.by_stress]),
-        "strain": solution.strain,
-        "alpha": np.full(kernel, np.nan) if solution.alpha is None else solution.alpha,
-        "confirmed": solution.alpha is not None,
-        "residual": solution.residual,
-        "asked": state.asked,
-        "certificate": [state.certificate.get(law, np.nan) for law in KKT_LAWS],
-    }
-    return numbers, {"lam": solution.lam, "jump": solution.jump} | _bond_arrays(state.bonds, "")
-
-
-def _put_together(event: checkpoints.Arrays, interface: contact_problem.ContactProblem, suffix: str) -> Equilibrium:
-    """Rebuild the equilibrium from the parts that `_taken_apart` made."""
-    lam, jump, alpha = (event.get(f"{name}{suffix}", EMPTY) for name in ("lam", "jump", "alpha"))
-    strain = event[f"strain{suffix}"]
-    iterations, solves, free_motions, last, reason = event[f"numbers{suffix}"].tolist()
-    errors = zip(KKT_LAWS, event[f"certificate{suffix}"].tolist(), strict=True)
-    certificate = {law: error for law, error in errors if not np.isnan(error)}
-    values, by_stress = event[f"load{suffix}"]
-    load = Load(values, by_stress.astype(bool))
-    bonds = _bond_state(event, suffix)
-    residual, C = float(event[f"residual{suffix}"]), interface.compliance(bonds)
-    solution = DualSolution(strain, lam, jump, None if np.isnan(alpha).any() else alpha, last, reason, residual, C)
-    asked = event[f"asked{suffix}"]
-    return Equilibrium(load, bonds, solution, iterations, solves, free_motions, certificate, asked)
-
-
 def _bond_arrays(bonds: BondState, suffix: str) -> checkpoints.Arrays:
-    """Return the bond state as distributed arrays with this suffix."""
+    """Return the arrays of a bond state, with suffixed names."""
     return {f"{name}{suffix}": values for name, values in vars(bonds).items() if values is not None}
 
 
 def _bond_state(event: checkpoints.Arrays, suffix: str) -> BondState:
-    """Rebuild the bond state from the arrays that `_bond_arrays` made."""
+    """Rebuild a bond state from the arrays that `_bond_arrays` made."""
     return BondState(*(event.get(f"{field.name}{suffix}") for field in fields(BondState)))  # type: ignore[arg-type]
 
 
 class EventProgress:
     """Context manager that prints path events and a progress bar.
 
-    The first, the last and urgent lines are printed, other lines once a second at most; the bar on terminals alone.
+    The first, the last and urgent lines are always printed, other lines at most once a second.  The bar appears only
+    on a terminal.
     """
 
     def __init__(
         self, progress: progress_bar.Progress, layout: str, file: str, clock: Callable[[], float] = time.monotonic
     ) -> None:
-        """Take the bar layout, STEPS_BAR or EVENTS_BAR, and the lines' file."""
+        """Set the bar layout, STEPS_BAR or EVENTS_BAR, and the event file's name."""
         self._progress, self._layout, self._file, self._clock = progress, layout, file, clock
         self._next_line, self._held_back, self._left_out = float("-inf"), "", 0
         self._bar: Any = None
@@ -261,7 +253,7 @@ class EventProgress:
             self._held_back = line
 
     def advance(self, share: float, text: str) -> None:
-        """Move the bar to the share of the path at an event, with a text."""
+        """Move the bar to a fraction of the path, with a text."""
         if self._bar is not None:
             self._bar.set_postfix_str(text, refresh=False)
             self._bar.update(max(share - self._bar.n, 0.0))

@@ -1,8 +1,8 @@
-"""Scaling of paths with the toughness: one run calibrates it.
+"""Scaling of a path with the toughness, so that one run calibrates the toughness.
 
-On springs with fixed stiffness a bond breaks by energy at tractions that grow as the root of the toughness, and the
-cell with contact is homogeneous of degree one in its loads.  So a toughness s^2 times as large, under s times the
-loads, has the same events at s times the strains and stresses, and s^2 times the energies.
+Springs of fixed stiffness break by energy at tractions proportional to the root of the toughness, and the response of
+a cell with contact has degree one in the loads.  With s^2 times the toughness and s times the loads the same events
+therefore occur at s times the strains and stresses, with s^2 times the energies.
 """
 
 import math
@@ -26,11 +26,10 @@ Record = TypeVar("Record", PathPoint, Peak, Tips)
 def scaled(
     document: Mapping[str, Any], points: Sequence[PathPoint], old_peak: Peak | None, toughness: float
 ) -> tuple[dict[str, Any], tuple[PathPoint, ...], Peak | None]:
-    """Return case, points and peak at toughness s^2 times the case's.
+    """Return case, points and peak for another toughness of the first interface.
 
-    The case has s times its loads; s = sqrt(toughness / case toughness), alike for all interfaces.
-
-    Raises ValueError for a result that does not scale, and for a toughness that is not positive.
+    With s = sqrt(toughness / toughness in the case) the case gets s times its loads, and every interface s^2 times its
+    toughness.  Raises ValueError for a result that does not scale, and for a toughness that is not positive.
     """
     if not path_curves.scales_with_toughness(document):
         raise ValueError("only a path whose bonds break by energy on springs scales with the toughness")
@@ -50,7 +49,7 @@ def scaled(
 
 
 def _scaled(old: Record, names: tuple[str, ...], factor: float) -> Record:
-    """Multiply a record's named numbers and arrays; None stays."""
+    """Multiply the fields `names` of a record by a factor; None stays."""
     values = {name: getattr(old, name) for name in names}
     changes = {name: _times(value, factor) for name, value in values.items() if value is not None}
     return replace(old, **changes)

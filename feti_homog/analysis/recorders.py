@@ -1,8 +1,7 @@
-"""Run recorders: convergence, errors in response laws, states with fields."""
+"""Recorders of a run: convergence and law errors of responses, states with fields."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import count
 
 from feti_homog.analysis.result import Fields
 from feti_homog.errors import FetiHomogError
@@ -10,23 +9,24 @@ from feti_homog.homogenization import averaging, unit_cell
 from feti_homog.results import field_file, field_layout, field_parts, result_json
 from feti_homog.system.parallel import mpi_errors
 
-# Largest relative error of a check that passes, in relative tolerances of the Krylov method: sums over the cell and
-# jumps of stiffness make so much of the solver's error.
+# Largest error of a passed check / relative tolerance of the Krylov method: sums over the cell and jumps of stiffness
+# amplify the error of the solver by up to this factor.
 CHECK_ERROR_PER_RTOL = 1e3
-# Largest error that passes with any tolerance: a check that is wrong by more has no result.
+# Largest error of a passed check at any tolerance.
 MAX_CHECK_ERROR = 1e-4
-# Largest error of the KKT conditions that passes, relative to the scales of `contact_certificate.kkt_errors`.
+# Largest error of the KKT conditions that passes, relative to the scales of `contact.states.kkt_errors`.
 CONTACT_TOLERANCE = 1e-6
 
 
 @dataclass
 class CheckRecorder:
-    """Checks on all responses in a run.
+    """Recorder of the checks of all responses.
 
     Attributes:
-        rtol: the Krylov method's relative tolerance.
-        iterations, reasons: from every dual solve so far.
-        errors: largest error in each law so far.
+        rtol: relative tolerance of the Krylov method.
+        iterations: Krylov iterations of each state so far.
+        reasons: KSPConvergedReason of each state so far.
+        errors: largest error of each law so far.
         faults: lines about solves that did not converge and checks that failed.
     """
 
@@ -37,9 +37,9 @@ class CheckRecorder:
     faults: list[str] = field(default_factory=list)
 
     def record(self, name: str, response: averaging.Response) -> str:
-        """Record a response's checks and return a line about it.
+        """Record the checks of a response and return a line about it.
 
-        There is a fault if the response breaks a law.
+        A solve without convergence and a failed check are faults.
         """
         state, error = response.state, response.checks.get("jump")
         self.iterations.append(state.iterations)
@@ -60,14 +60,14 @@ class CheckRecorder:
         return f"  {name}: {line}"
 
     def require(self, name: str, errors: Mapping[str, float]) -> None:
-        """Record largest errors; a fault for each NaN or exceeded tolerance."""
+        """Record the errors of laws; NaN and exceeded tolerances are faults."""
         for law, error in errors.items():
             self.errors[law] = max(error, self.errors.get(law, 0.0))
             if not error <= (tolerance := self.tolerance(law)):
                 self.faults.append(f"{name}: check {law}: {error:.1e}, expected at most {tolerance:.1e}; result marked")
 
     def tolerance(self, law: str) -> float:
-        """Return the largest error with which a check passes."""
+        """Return the largest error with which the check of a law passes."""
         if law.startswith("kkt_"):
             return CONTACT_TOLERANCE
         return min(CHECK_ERROR_PER_RTOL * self.rtol, MAX_CHECK_ERROR)
@@ -83,48 +83,45 @@ class CheckRecorder:
 
 
 class StateRecorder:
-    """Record the states of a run in a file, in memory, or nowhere.
+    """Recorder of states in a file, in memory, or nowhere.
 
     Attributes:
-        has_place: whether states go anywhere.
-        error: why the file was given up; the numbers are computed without it.
+        has_place: whether states are recorded.
+        error: the error at which the file was given up; the run goes on without the file.
     """
 
     def __init__(
         self, cell: unit_cell.TornCell, file: field_file.FieldFile | None, keep: bool, say: Callable[[str], object]
     ) -> None:
         self._cell, self._file, self._keep = cell, file, keep
-        self._number, self._states, self._say = count(), list[field_layout.StatePart](), say
+        self._number, self._states, self._say = 0, list[field_layout.StatePart](), say
         self.has_place = keep or file is not None
         self.error: FetiHomogError | None = None
 
     def record(
-        self,
-        plane: averaging.Response | None,
-        axial: averaging.Response | None,
-        load_factor: float,
-        label: str,
-        point: int,
+        self, responses: Sequence[averaging.Response | None], load_factor: float, label: str, point: int
     ) -> None:
-        """Record the next state, in the plane, along fibres, or both.  Collective."""
+        """Record the next state from its response in each problem, or None.  Collective."""
         if self._file is None and not self._keep:
             return
+        plane, axial = (*responses, None)[:2]
         state: field_layout.StatePart
         if plane is None or len(self._cell.problems) > 1:
             state = field_parts.spatial_state_part(self._cell, plane, axial, load_factor, label, point)
         else:
             state = field_parts.state_part(self._cell, plane, load_factor, label, point)
-        self._write(lambda file: file.write_state(next(self._number), state))
+        self._write(lambda file: file.write_state(self._number, state))
+        self._number += 1
         if self._keep:
             self._states.append(state)
 
     def seal(self) -> result_json.FileSeal | None:
-        """Complete the file; returns its seal, None without a file.  Collective."""
+        """Complete the file and return its seal; None without a file.  Collective."""
         self._write(field_file.FieldFile.close)
         return None if self._file is None else mpi_errors.on_root(self._cell.comm, result_json.seal, self._file.path)
 
     def _write(self, write: Callable[[field_file.FieldFile], object]) -> None:
-        """Write to the file if there is one; give it up on all ranks if that fails."""
+        """Write to the file if there is one; give it up on errors."""
         if self._file is not None:
             try:
                 write(self._file)
@@ -133,7 +130,7 @@ class StateRecorder:
                 self._say(f"warning: {error}; the remaining results are computed without it")
 
     def fields(self) -> Fields | None:
-        """Return this rank's fields; None unless they go to memory."""
+        """Return this rank's fields; None unless the run keeps fields in memory."""
         if not self._keep:
             return None
         cell = self._cell

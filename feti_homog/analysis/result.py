@@ -1,4 +1,4 @@
-"""A case's result: Python object, result.json content, and fields in memory."""
+"""The result of a case: a Python object, the content of result.json, and fields in memory."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ Part = TypeVar(
 
 @dataclass(frozen=True, repr=False)
 class Fields:
-    """This rank's part in the fields; `gathered` has all parts.
+    """This rank's part of the fields; `gathered` joins all parts.
 
     Attributes:
         header: cell size, phases, units.
         mesh: points (n, 2), triangles (m, 3 or 6), their bodies and phases; nodes are torn between subdomains.
         fibres: number as in case files (f,), body, phase, centre (f, 2) and radius (f,), on rank 0.
-        interface: points (k, 2), normal (k, 2), length (k,) and fibre (k,) at the fibre-matrix interface nodes, and the
-            numbers that their nodes have in the gathered mesh.
-        states: for each load case, or point on an angle or path: displacement (n, 2), stress (m, 3), traction, jump
-            (k, 2) and status (k,), with strain, mean stress, load factor and label.
+        interface: points (k, 2), normal (k, 2), length (k,) and fibre (k,) at the fibre-matrix interface nodes, and
+            the numbers of these nodes in the gathered mesh.
+        states: for each load, angle or kept point of a path: displacement (n, 2), stress (m, 3), traction and jump
+            (k, 2), status (k,), with strain, mean stress, load factor and label.
     """
 
     comm: Intracomm
@@ -49,7 +49,7 @@ class Fields:
         return f"Fields({len(self.mesh.points)} nodes, {len(self.mesh.triangles)} elements, {len(self.states)} states)"
 
     def gathered(self) -> Fields | None:
-        """Gather all fields as one part on rank 0, else None.  Collective."""
+        """Gather all parts as one on rank 0; None on other ranks.  Collective."""
         first = self.comm.exscan(len(self.mesh.points)) or 0
         mesh = _gathered(self.comm, replace(self.mesh, triangles=self.mesh.triangles + np.int64(first)))
         fibres, interface = _gathered(self.comm, self.fibres), _gathered(self.comm, self.interface)
@@ -61,7 +61,7 @@ class Fields:
 
 
 def _gathered(comm: Intracomm, part: Part) -> Part | None:
-    """Gather all ranks' rows, in rank order, on rank 0."""
+    """Gather all rows on rank 0, in rank order; None elsewhere.  Collective."""
     parts = {name: comm.gather(getattr(part, name)) for name in field_layout.tables(part)}
     if comm.rank:
         return None
@@ -71,21 +71,22 @@ def _gathered(comm: Intracomm, part: Part) -> Part | None:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)  # arrays have no single answer to "equal"
 class Result:
-    """Result of a case, alike on all ranks except for `fields`.
+    """Result of a case, equal on all ranks except for `fields`.
 
-    Printed, it is a short summary; in a notebook, tables.  The manual lists all written keys.
+    A printed result is a short summary, in a notebook it is tables.  The manual lists all keys of result.json; entries
+    that the analysis does not compute are None.
 
     Attributes:
-        effective_stiffness: (3, 3), in generalized plane strain (6, 6), L^ef, with stresses under the unit strains as
-            columns; for analysis "stiffness".
+        effective_stiffness: L^ef, (3, 3) or in generalized plane strain (6, 6); its columns are the stresses under the
+            unit strains.
         effective_stiffness_compression: L^ef under minus the unit strains, if debonded faces touch without tension.
-        compliance, thermal_stress, thermal_expansion: in generalized plane strain, (6, 6) and (6,), else None.
-        moduli, bounds: for perfectly bonded cells, else None.
-        mesh_error: estimated mesh errors in a stiffness and its constants, unless the case forgoes them.
-        sensitivities: derivatives of a stiffness by the case's constants, if it asks for them, else None.
-        tips: energy release rates for a stiffness with debonded arcs, else None; angle points have their own.
-        angle, path, envelope: these analyses' points, else None; `points` has angles and paths as arrays.
-        fields: mesh, interface and states on this rank if they were asked for, else None; not written to result.json.
+        compliance, thermal_stress, thermal_expansion: in generalized plane strain, (6, 6) and (6,).
+        moduli, bounds: for perfectly bonded cells.
+        mesh_error: estimated mesh errors of a stiffness and its constants.
+        sensitivities: derivatives of a stiffness by the constants of the case.
+        tips: energy release rates for a stiffness with debonded arcs; the points of an angle have `tips` too.
+        angle, path, envelope: points of these analyses; `points` has angles and paths as arrays.
+        fields: mesh, interface and states on this rank, if the run keeps them; not in result.json.
     """
 
     schema: int = described("version of this layout", default=result_json.SCHEMA)
@@ -191,32 +192,32 @@ class Result:
 
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> Result:
-        """Build the result from result.json content; KeyError for missing keys."""
+        """Build a result from the content of result.json.  Raises KeyError for a missing key."""
         return records.restored(cls, document)
 
     @property
     def document(self) -> dict[str, Any]:
-        """Return the result.json content, in its order; arrays are NumPy's."""
+        """The content of result.json, in its order, with NumPy arrays."""
         document: dict[str, Any] = records.plain(self)
         return document
 
     @property
     def points(self) -> dict[str, NDArray[Any]]:
-        """Return arrays over n angle or path points by name, empty for other analyses.
+        """Arrays over n angle or path points by name.
 
         `angle` or `load_factor` (n,), `strain` and `stress` (n, 3) or (n, 6), `stiffness` (n, 3, 3) or (n, 6, 6),
-        `debonded_length` (n, f), `bonded`, `open`, `closed`, ... (n,); NaN where a point has no such number; no tips.
+        `debonded_length` (n, f), `bonded`, `open`, `closed`, ... (n,), without tips; NaN where a point has no number.
+        Empty for other analyses.
         """
         documents = [records.plain(point) for point in (*(self.angle or ()), *(self.path or ()))]
         names = dict.fromkeys(name for point in documents for name in point if name != "tips")
         return {name: np.array([point.get(name, np.nan) for point in documents]) for name in names}
 
     def rising_strain(self) -> dict[str, Float]:
-        """Return corners (v,) for the leading strain, first, and all stresses, by name, on a one-leg path.
+        """Return the response of a one-leg path to a rising load.
 
-        In a test with rising load the stress drops where bonds break, or under a given stress the strain jumps, to the
-        next branch that holds.
-
+        These are corners (v,) of the curves by name: the leading strain comes first, then all stresses.  As in a test,
+        the stress drops where bonds break, or under a prescribed stress the strain jumps, to the next stable branch.
         Raises ValueError for any other result, and if the strain does not rise with the load.
         """
         from feti_homog.results import path_curves  # of no use to other analyses
@@ -230,13 +231,12 @@ class Result:
         return {self.peak.strain_name: columns.pop(self.peak.strain_name)} | columns
 
     def path_scaled(self, *, toughness: float) -> Result:
-        """Scale a path's result to another first interface toughness and s times the loads.
+        """Return the path for another toughness of the first interface.
 
-        s = sqrt(toughness / case toughness), alike for all interfaces.  Strains and stresses are s times,
-        energies s^2 times as large, at equal events and load factors: bonds break by energy on springs with given
-        stiffness.  Fields, states and digest belong to no run, and are left out.
-
-        Raises ValueError for any other result, and for a toughness that is not positive.
+        With s = sqrt(toughness / toughness in the case), s times the loads and s^2 times the toughness of every
+        interface, the same events have s times the strains and stresses and s^2 times the energies, provided that
+        bonds break by energy on springs of fixed stiffness.  Fields, states and digest are left out, for no run made
+        them.  Raises ValueError for any other result, and for a toughness that is not positive.
         """
         from feti_homog.analysis import path_scaling  # of paths by energy alone
 
@@ -245,9 +245,10 @@ class Result:
         return replace(changed, states=None, result_h5=None, fields=None)
 
     def first_drop(self) -> tuple[Float, int]:
-        """Return the stress (3,) or (6,) after a one-leg path's first break, under the breaking load.
+        """Return the stress after the first break of a one-leg path.
 
-        Under the breaking load; also returns the point's number on its branch.  Raises ValueError for any other result.
+        The stress, (3,) or (6,), belongs to the load of the break.  Also returns the number of the point whose branch
+        has this stress.  Raises ValueError for any other result.
         """
         from feti_homog.results import path_curves
 
@@ -259,13 +260,12 @@ class Result:
     def __repr__(self) -> str:
         return f"Result({self.case.get('name', '')!r}, {self.case['analysis']['type']}, {self.status})"
 
-    # Most runs print neither: the tables are imported by those that do.
     def __str__(self) -> str:
-        from feti_homog.report.text import summary
+        from feti_homog.report.text import summary  # few runs print a result
 
         return summary.short_summary(self.document)
 
     def _repr_html_(self) -> str:
-        from feti_homog.report.text import summary  # notebooks alone show it
+        from feti_homog.report.text import summary  # only notebooks show tables
 
         return summary.notebook(self.document)

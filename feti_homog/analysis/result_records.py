@@ -1,4 +1,4 @@
-"""Point and tip records in result.json; `result.Result` has them.
+"""Records of points, tips and mesh errors in result.json; fields of `result.Result`.
 
 Strains are [E11, E22, gamma12], stresses [S11, S22, S12], in the moduli's unit, per unit depth; in generalized
 plane strain [E11, E22, E33, gamma23, gamma13, gamma12] and [S11, S22, S33, S23, S13, S12].
@@ -26,7 +26,7 @@ DEBONDED_SHARES = "the same of the interfaces of each section [[interface]], in 
 
 @dataclass(frozen=True, kw_only=True, eq=False)  # arrays have no single answer to "equal"
 class MeshErrors:
-    """Estimated mesh errors, by the distance between recovered and element stresses."""
+    """Estimated mesh errors, from the distance between recovered and element stresses."""
 
     effective_stiffness: Float = described("error of each entry", records.STRESS, EITHER_STIFFNESS)
     effective_stiffness_compression: Float | None = described(
@@ -45,10 +45,10 @@ class MeshErrors:
 
 @dataclass(frozen=True, eq=False)  # arrays have no single answer to "equal"
 class Tips:
-    """The t debonding tips at a point, by fibre, interface and direction.
+    """The t tips at a path point, by fibre, interface and direction.
 
-    Tips are bonds that hold next to broken ones.  An energy per area drives them, compared with G_c(psi): the energy of
-    their spring or, where `growth` is "released", the energy that their break would release.
+    A tip is an intact bond next to a broken bond.  Its driving energy per area is compared with G_c(psi): the energy of
+    its spring or, where `growth` is "released", the energy that its break would release.
     """
 
     fibre: tuple[int, ...] = described("number of the fibre of each tip")
@@ -63,9 +63,9 @@ class Tips:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TipRates:
-    """Energy release rates at tips of arcs on round fibres, at constant macroscopic strain.
+    """Energy release rates at tips of arcs, at constant macroscopic strain.
 
-    Has t pairs, each a load and a tip, by load, fibre, interface and direction.
+    The fibres are round.  There are t pairs of a load and a tip, by load, fibre, interface and direction.
     """
 
     load: tuple[str, ...] = described(
@@ -199,7 +199,7 @@ class PathPoint:
 class Peak:
     """The largest stress on a path up to its deepest fall.
 
-    It is the stress component of the leading strain, the largest one that the loads change.
+    The component is that of the leading strain, the largest strain that the loads change.
     """
 
     stress_name: str = described("name of the component")
@@ -253,9 +253,9 @@ class LoadPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class EnvelopePoint:
-    """Debonding onset along one direction in a stress or strain plane.
+    """Debonding onset along one direction in a plane of stresses or strains.
 
-    All but the direction is absent where no load along it breaks a bond.
+    Only `angle` is there if no load in this direction breaks a bond.
     """
 
     angle: float = described(

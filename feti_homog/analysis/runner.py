@@ -1,4 +1,4 @@
-"""Tear, solve, homogenize and check one case, and write its result if there is a folder."""
+"""Run one case: tear the cell, solve, homogenize and check; write the result if there is a folder."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager, nullcontext
@@ -25,22 +25,21 @@ from feti_homog.system.petsc import options_database
 from feti_homog.system.runtime import process_memory, progress_bar
 from feti_homog.version import __version__
 
-# Bytes kept between cases of a process; releasing them costs a small case 10 % of its time.
+# Bytes that a process keeps between cases; to release them costs a small case 10 % of its time.
 SPARE_BYTES = 256 << 20
 AROUND_FIBRES = ("matrix", "coating")
-REMARKABLE_LOSS = 0.005  # of the fibres' area, by polygons
+REMARKABLE_LOSS = 0.005  # fraction of the fibre area that straight edges cut off
 
 
 def run(
     case: Case, directory: Path, comm: MPI.Intracomm, quiet: bool, resume: bool = False, keep_fields: bool = False
 ) -> Result:
-    """Run the case, write its results to `directory`, and return them.  Collective.
+    """Run a case, write its result to `directory`, and return the result.  Collective.
 
-    `resume` goes on from a path's checkpoint, or reads the finished result; `keep_fields` returns a run's fields too.
+    `resume` goes on from the checkpoint of a path, or reads the finished result; `keep_fields` adds the fields.
 
     Raises:
-        CaseError, MeshError: before any result is written; also for another run's checkpoint, and for a folder
-            that another run writes to.
+        CaseError, MeshError: before any result is written; also for another run's checkpoint and a folder in use.
         ConvergenceError: after the result has been written and marked.
     """
     progress = _begun(case, comm, quiet)
@@ -60,7 +59,7 @@ def run(
 
 
 def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: bool = True) -> Result:
-    """Return a case's result on every rank, without a file.  Collective.
+    """Return the result of a case on every rank, without files.  Collective.
 
     Raises:
         CaseError, MeshError: the case cannot be run.
@@ -81,7 +80,7 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
 
 
 def _begun(case: Case, comm: MPI.Intracomm, quiet: bool) -> progress_bar.Progress:
-    """Print warnings and remarks about a case; return its run's progress."""
+    """Print warnings and remarks about a case; return the run's progress."""
     progress = progress_bar.Progress(comm, quiet)
     for label, lines in (("warning", case.warnings()), ("remark", case.remarks())):
         for line in lines:
@@ -90,14 +89,15 @@ def _begun(case: Case, comm: MPI.Intracomm, quiet: bool) -> progress_bar.Progres
 
 
 def _warn(context: AnalysisContext) -> None:
+    """Print the warnings about probably unintended settings."""
     for warning in context.warnings():
         context.progress.say(f"warning: {warning}")
 
 
 @contextmanager
 def _torn(case: Case, comm: MPI.Intracomm, progress: progress_bar.Progress) -> Iterator[unit_cell.TornCell]:
-    """Provide the torn cell with the case's options set, while the block lasts."""
-    PETSc.garbage_cleanup(comm)  # parallel objects of earlier cases, which all ranks free together
+    """Tear the cell while the PETSc options of the case are set.  Collective."""
+    PETSc.garbage_cleanup(comm)  # all ranks free the parallel objects of earlier cases together
     process_memory.forget_peak(kept=SPARE_BYTES)
     with options_database.case_options(case.petsc):
         cell = unit_cell.tear(case, comm, progress, policy=partition_policy.BY_COST)
@@ -105,16 +105,16 @@ def _torn(case: Case, comm: MPI.Intracomm, progress: progress_bar.Progress) -> I
             options_database.refuse_unused()
             yield cell
         except BaseException as error:
-            if mpi_errors.all_raise(comm, error):  # else the ranks that go on would not come to destroy it
+            if mpi_errors.all_raise(comm, error):  # destroy is collective, and ranks without an error go on
                 cell.destroy()
             raise
         cell.destroy()
 
 
 def room_of(case: Case) -> int | None:
-    """Return the bytes up to which a path keeps multipliers; None with friction, or if all fields are kept.
+    """Return the bytes of events up to which checkpoints have multipliers.
 
-    With friction many equilibria exist under one load.
+    There is no limit, None, if all fields are kept, and with friction, where one load has many equilibria.
     """
     return None if case.has_friction or case.output.states == "all" else checkpoints.WHOLE_BYTES
 
@@ -122,7 +122,7 @@ def room_of(case: Case) -> int | None:
 def _run_and_write(
     cell: unit_cell.TornCell, directory: Path, progress: progress_bar.Progress, resume: bool, keep_fields: bool
 ) -> Result:
-    """Analyse and write; the result may have faults."""
+    """Analyse a torn cell, write the files, and return the result.  Collective."""
     output, file = cell.case.output, None
     if output.fields:
         with progress.stage("output") as line:
@@ -160,7 +160,7 @@ def _run_and_write(
 
 
 def _analyse(context: AnalysisContext) -> dict[str, Any]:
-    """Run the analysis asked for and return its `Result` entries."""
+    """Run the analysis of the case and return its `Result` entries.  Collective."""
     with context.progress.stage("solve") as line:
         module = import_module(f"feti_homog.analysis.{context.case.analysis.type}")
         analysis: dict[str, Any] = module.run(context)
@@ -172,7 +172,7 @@ def _analyse(context: AnalysisContext) -> dict[str, Any]:
 
 
 def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields | None) -> Result:
-    """Build the result with an analysis's entries, counts and timings.  Collective."""
+    """Build the result from the entries of an analysis, counts and timings.  Collective."""
     cell, progress, checks = context.cell, context.progress, context.checks
     fractions = cell.fractions()
     # Straight edges cut off a part of the fibres.
@@ -220,7 +220,7 @@ def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Field
 
 
 def _fibres(cell: unit_cell.TornCell) -> tuple[FibreInfo, ...]:
-    """Return the cell's fibre records."""
+    """Return the records of the fibres, in the order of their numbers."""
     summary, factors = cell.summary, cell.strength_factors
     bodies, varies = summary.fibre_bodies, not (factors == 1.0).all()
     ellipses = Ellipses(summary.centres, summary.frames)
@@ -241,7 +241,7 @@ def _fibres(cell: unit_cell.TornCell) -> tuple[FibreInfo, ...]:
 
 
 def _solver_info(context: AnalysisContext) -> SolverInfo:
-    """Return one record for the solvers in all problems.  Collective."""
+    """Return the record of the solvers in all problems.  Collective."""
     cell = context.cell
     plan, solver = cell.summary, cell.solver
     solvers = [problem.solver for problem in cell.problems]
@@ -264,7 +264,7 @@ def _solver_info(context: AnalysisContext) -> SolverInfo:
 
 
 def _write(result: Result, directory: Path, cell: unit_cell.TornCell) -> None:
-    """Write result.json, then files made from it; remove an earlier result's other files."""
+    """Write result.json and its companions; remove files of earlier results.  Collective."""
     mpi_errors.on_root_only(cell.comm, result_json.write, directory, result.document)
     written = {result_json.NAME}
     if result.result_h5 is not None:
@@ -278,14 +278,14 @@ def _write(result: Result, directory: Path, cell: unit_cell.TornCell) -> None:
 
 
 def _draw(directory: Path) -> list[Path]:
-    """Draw the pictures; only a rank that draws loads Matplotlib."""
-    from feti_homog.report.plots import figures
+    """Draw the pictures and return their files."""
+    from feti_homog.report.plots import figures  # with Matplotlib, which other ranks do not load
 
     return figures.plot(directory)
 
 
 def _print_summary(result: Result, progress: progress_bar.Progress) -> None:
-    """Print the summary on rank 0, which alone loads its tables.  Collective."""
+    """Print the summary on rank 0, which alone loads the tables.  Collective."""
     timings = progress.timings()
     if progress.prints:
         from feti_homog.report.text import summary
@@ -294,6 +294,7 @@ def _print_summary(result: Result, progress: progress_bar.Progress) -> None:
 
 
 def _report(directory: Path) -> list[Path]:
+    """Write report.html and return its file."""
     from feti_homog.report import page  # with tables that other ranks do not load
 
     return [page.write(directory)]

@@ -1,4 +1,4 @@
-"""Derivatives of a stiffness with its constants, and of a state."""
+"""Derivatives of a stiffness and its constants, and of one state, by the constants of the case."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -21,12 +21,13 @@ Constant = tuple[str, float]
 def sensitivities(
     context: AnalysisContext, document: Mapping[str, Any], responses: Sequence[averaging.Response], one_sided: bool
 ) -> dict[str, Any]:
-    """Return the `Result` entry `sensitivities` from all unit load responses.  Collective.
-
-    If faces touch without tension, `one_sided`, each column is differentiated at its own load's status.
+    """Return the `Result` entry `sensitivities` of a stiffness.  Collective.
 
     Args:
         document: the entries `effective_stiffness` and, if a temperature is a load, `thermal_stress`.
+        responses: the responses to all unit loads.
+        one_sided: debonded faces touch without tension; each column is then differentiated with the faces fixed as
+            under its load.
     """
     C, thermal = document["effective_stiffness"], document.get("thermal_stress")
     groups, columns = context.loads.by_problem(responses), dict[Constant, list[float]]()
@@ -48,10 +49,10 @@ def sensitivities(
 
 
 def load_sensitivities(context: AnalysisContext, load: Load, responses: Sequence[averaging.Response]) -> dict[str, Any]:
-    """Return `sensitivities` for the state under one load, at its status.  Collective.
+    """Return the `Result` entry `sensitivities` of the state under one load.  Collective.
 
-    With the cell stiffness A at this status, A x = s, where the load prescribes each component in x or in s,
-    A dx = -dA x for the free strains, and the stored energy changes by d(x.s / 2).
+    The faces stay fixed as in the state.  With the cell stiffness A for these faces A x = s, where the load prescribes
+    each component of x or of s.  The free strains follow from A dx = -dA x, the stored energy changes by d(x.s / 2).
     """
     fixed = _at_status(context, "load", responses, range(len(context.loads.problems)))
     A = block_diag(*(np.stack([r.stress for r in group], axis=1) for group in fixed))
@@ -78,7 +79,7 @@ def load_sensitivities(context: AnalysisContext, load: Load, responses: Sequence
 def _entry(
     values: Mapping[str, float], columns: Mapping[Constant, Sequence[float]], at_fixed_status: bool
 ) -> dict[str, Any]:
-    """Return the `Result` entry `sensitivities`, from derivatives by constant."""
+    """Build the `Result` entry `sensitivities` from values and, for each parameter, their derivatives."""
     matrix = np.array([*columns.values()]).T
     record = Sensitivities(
         parameters=tuple(name for name, _ in columns),
@@ -96,12 +97,13 @@ def _cells(context: AnalysisContext) -> list[unit_cell.TornCell]:
 
 
 def _secants(energies: Sequence[Float]) -> tuple[Float, Float | None]:
+    """Return stiffness and thermal stress from the energies in each problem."""
     changed = phase_laws.secants(*energies)
     return changed["stiffness"], changed.get("thermal_stress")
 
 
 def _entries(C: Float, thermal: Float | None) -> dict[str, float]:
-    """Return named entries of an unsymmetric secant stiffness and thermal stress."""
+    """Name all entries of an unsymmetric stiffness, and normal thermal stresses."""
     entries = {f"C{i + 1}{j + 1}": float(value) for (i, j), value in np.ndenumerate(C)}
     return entries | dict(zip(voigt.THERMAL_STRESSES[:3], map(float, [] if thermal is None else thermal), strict=False))
 
@@ -109,7 +111,10 @@ def _entries(C: Float, thermal: Float | None) -> dict[str, float]:
 def _at_status(
     context: AnalysisContext, name: str, states: Sequence[averaging.Response], problems: Sequence[int]
 ) -> list[list[averaging.Response]]:
-    """Return unit load responses at one state's fixed status, by problem.  Collective."""
+    """Return unit load responses with the faces fixed as in one state.  Collective.
+
+    `states` are the responses of the state `name`; the result has a list for each of the `problems`, by number.
+    """
     groups, bonds = list[list[averaging.Response]](), states[0].state.bonds
     for problem in (context.loads.problems[k] for k in problems):
         count, zero = len(problem.loads), np.zeros(problem.cell.solver.rows)
@@ -117,7 +122,7 @@ def _at_status(
         equilibria = problem.interface.equilibria(np.eye(count), bonds, [zero] * count)
         for load, state in zip(problem.loads, equilibria, strict=True):
             response = problem.response(state, 1.0)
-            # Faces of fixed status may pull and overlap: the laws of contact hold for the state itself.
+            # Fixed faces may pull and overlap; the laws of contact are checked for the state itself.
             checks = {law: error for law, error in response.checks.items() if not law.startswith("kkt_")}
             groups[-1].append(replace(response, checks=checks))
             context.checks.record(f"{name}, derivatives, {load}", groups[-1][-1])

@@ -1,30 +1,25 @@
-"""`analysis.type = "stiffness"`: L^ef, with contact secants under plus, minus unit loads."""
+"""`analysis.type = "stiffness"`: L^ef; with contact, secants under plus and minus the unit loads."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from feti_homog.analysis.constants import constants, mesh_error, unit_errors
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.homogenization import averaging
 
-if TYPE_CHECKING:
-    from feti_homog.homogenization import mesh_estimate
-
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Return `effective_stiffness`, with stresses under the unit strains as columns, and entries that follow from it.
+    """Return the `Result` entry `effective_stiffness` and the constants that follow from it.  Collective.
 
-    With contact between debonded faces also `effective_stiffness_compression`, columns -Sigma(-E); `tips` on debonded
-    arcs under each load; `mesh_error`; `sensitivities` if the case asks for them.  If a temperature
-    is a load, `thermal_stress` under a unit temperature, and `thermal_stress_compression`.
+    Contact between debonded faces adds `effective_stiffness_compression`, with columns -Sigma(-E); debonded arcs add
+    `tips` under each load; a temperature among the loads adds `thermal_stress` under a unit temperature, with contact
+    `thermal_stress_compression`.  `mesh_error` and `sensitivities` are there if the case asks for them.
     """
     bonds = context.bonds(None)
     starts = context.loads.zero_multipliers()
     one_sided = context.plane.interface.contact and context.plane.counts(bonds.status)["open"] > 0
     columns, responses = context.unit_responses("", bonds, starts, 1.0)
     errors, responses = unit_errors(context, responses)
-    errors_of_minus: list[mesh_estimate.EnergyErrors] = []
+    errors_of_minus = errors[:0]
     context.record_unit_states(responses, 1.0, "", 0)
     document: dict[str, Any] = {"effective_stiffness": columns.pop("stiffness")} | columns
     under, loads, first = list(responses), list(context.loads.names), responses

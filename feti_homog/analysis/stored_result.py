@@ -1,4 +1,4 @@
-"""The result in a folder, complete and from one run."""
+"""Results in a folder: read them again, and check that they are complete and from one run."""
 
 import os
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ from feti_homog.results import checkpoints, field_file, result_json
 
 
 def read(directory: Path) -> dict[str, Any]:
-    """Read result.json, and check result.h5 if fields are kept.  Call on one rank.
+    """Read result.json, and check result.h5 if the case keeps fields.  Call on one rank.
 
     Raises:
         CaseError: a file is missing, damaged, or from another program or run.
@@ -25,9 +25,9 @@ def read(directory: Path) -> dict[str, Any]:
 
 
 def check_to_draw(directory: Path) -> None:
-    """Check that `directory` has one run's files.  Call on one rank.
+    """Check that `directory` has the files of one run for a picture.  Call on one rank.
 
-    They are result.h5 and result.json; result.h5 may be alone.
+    result.h5 must be there; result.json may be missing.
 
     Raises:
         CaseError: result.h5 is missing, or a file is damaged, or from another program or run.
@@ -39,7 +39,9 @@ def check_to_draw(directory: Path) -> None:
 
 
 def finished(directory: Path, case: Case) -> bool:
-    """Return whether `directory` has a case's complete result and no checkpoint.  Call on one rank.
+    """Return whether a folder has the complete result of a case.  Call on one rank.
+
+    A folder with a checkpoint has no complete result.
 
     Raises:
         CaseError: the result is damaged, or belongs to another case.

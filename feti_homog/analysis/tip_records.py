@@ -1,4 +1,4 @@
-"""Debonding tips in result.json: law, driving energies, release rates, modes."""
+"""Debonding tips in result.json: their bond law, driving energies, release rates and modes."""
 
 from collections.abc import Sequence
 
@@ -14,14 +14,16 @@ from feti_homog.interface.path import path_points
 from feti_homog.materials import voigt
 from feti_homog.typing import Float, Int
 
-# Loads with energy release rates; "strain" is a prescribed strain.
+# Loads under which tips have energy release rates; "strain" is a prescribed strain.
 IN_PLANE_LOADS = (*voigt.STRAINS, "strain")
-# Directions of nodes differ by rounding from rank to rank, and so would their order.
+# Decimals by which directions are sorted: rounding differs from rank to rank, and must not change the order.
 DIRECTION_DIGITS = 9
 
 
 def criterion_of(cell: unit_cell.TornCell, grows: bool = False) -> BondLaw:
-    """Return a cell's bond law; debonding that `grows` makes its own tips.  Collective.
+    """Return the bond law of a cell.  Collective.
+
+    The law of released energies needs tips: debonding that `grows` makes tips, prescribed debonded faces have them.
 
     Raises:
         CaseError: tips need the inverse dual operator, which the solver does not have.
@@ -39,7 +41,7 @@ def criterion_of(cell: unit_cell.TornCell, grows: bool = False) -> BondLaw:
 
 
 def tip_rates(context: AnalysisContext, responses: Sequence[averaging.Response], loads: Sequence[str]) -> TipRates:
-    """Return rates at all tips under each load in the plane; none while all is bonded.  Collective."""
+    """Return energy release rates at all tips under in-plane loads.  Collective."""
     rates = [
         (context.release_rates.of(response), load)
         for response, load in zip(responses, loads, strict=True)
@@ -62,10 +64,10 @@ def tip_rates(context: AnalysisContext, responses: Sequence[averaging.Response],
 
 
 def tips(context: AnalysisContext, law: BondLaw, point: path_points.Point) -> Tips:
-    """Return a point's tips, by fibre, interface and direction.  Collective.
+    """Return the tips at a path point, by fibre, interface and direction.  Collective.
 
-    Tips are bonds that hold next to broken ones.  G_I and G_II are energies per area with the sum used^2 G_c(psi),
-    where used = sqrt(G / G_c(psi)), parted by tan^2 psi = G_II / G_I.
+    A tip is an intact bond next to a broken bond.  Its utilisation sqrt(G / G_c(psi)) and mode tan^2 psi = G_II / G_I
+    determine G_I and G_II, energies per area.
     """
     cell, loaded, bonds = context.cell, context.loads.interfaces, point.state.bonds
     traction = point.scale * loaded.traction(point.state.solutions)
@@ -85,14 +87,14 @@ def tips(context: AnalysisContext, law: BondLaw, point: path_points.Point) -> Ti
 
 
 def _sections(cell: unit_cell.TornCell, pair: Float | Int) -> tuple[int, ...] | None:
-    """Return [[interface]] section numbers from 1; None if there is one section."""
+    """Return [[interface]] section numbers, from 1; None if there is one."""
     return tuple((pair + 1).astype(int).tolist()) if len(cell.case.interfaces) > 1 else None
 
 
 def bond_directions(cell: unit_cell.TornCell) -> Float:
-    """(k,) directions in degrees, above -180, from fibre centres to this rank's interface nodes.
+    """(k,) directions from fibre centres to this rank's interface nodes.
 
-    A fibre without centre has its normals' directions.
+    In degrees above -180.  The nodes of a fibre without centre have the directions of their normals.
     """
     normal = cell.solver.jump_operator.nodes.normal
     of_normals = np.degrees(np.arctan2(normal[:, 1], normal[:, 0]))

@@ -13,7 +13,6 @@ from feti_homog.case.cell_section import TOUCHING, Cell
 from feti_homog.case.cell_sizes import mix_faults
 from feti_homog.case.section_values import MESH_SUFFIXES, TABLE_SUFFIXES
 from feti_homog.errors import CaseError
-from feti_homog.microstructure.shapes import shapes
 from feti_homog.schema import wording
 from feti_homog.typing import Bool
 
@@ -109,6 +108,7 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
 def _with_table(cell: Cell, faults: list[str]) -> Cell:
     """Return the cell with its table, which has the cell size."""
     from feti_homog.microstructure import fibre_table  # which few cases need
+    from feti_homog.microstructure.shapes import shapes
 
     try:
         table = (
@@ -167,6 +167,8 @@ HOLLOW_WORDS = f"expected inner_radius / radius from {WIDEST_CORE[0]:g} to {WIDE
 
 def check_shapes(table: fibre_table.FibreTable, faults: list[str]) -> None:
     """Add shape and hollow fibre faults to `faults`."""
+    from feti_homog.microstructure.shapes import shapes  # which few cases need
+
     rows, before = table.columns, len(faults)
     _tell(table, shapes.have_both_sizes(rows), shapes.BOTH_SIZES, faults)
     for shape in shapes.SHAPES:

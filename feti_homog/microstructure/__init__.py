@@ -4,9 +4,23 @@ Imports `microstructure.shapes`, `schema` and `system`.  Main entries: `arrangem
 `periodic_table.table_arrangement`, `random_fibres`.
 """
 
-from feti_homog.microstructure.arrangements import Arrangement
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from feti_homog.microstructure.arrangements import Arrangement
 
 __all__ = [
     "Arrangement", "arrangements", "fibre_pattern", "fibre_table", "periodic_table", "phase_names", "random_fibres",
     "table_columns",
 ]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    """Import `Arrangement` on first access, for case files are read without SciPy's trees."""
+    if name != "Arrangement":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from feti_homog.microstructure.arrangements import Arrangement
+
+    return Arrangement

@@ -12,7 +12,7 @@ from feti_homog.case import cell_section, cell_sizes
 from feti_homog.errors import MeshError
 from feti_homog.mesh.sizes.graded_size import MAX_GROWTH, MIN_EDGES_AROUND
 from feti_homog.microstructure import Arrangement
-from feti_homog.microstructure.shapes import Ellipses, shapes
+from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.typing import Float
 
 # Elements that are meshed in some minutes on one rank, and by all ranks together.
@@ -51,6 +51,8 @@ class ElementEstimate:
     def of(cls, cell: cell_section.Cell, listed: Arrangement | None) -> ElementEstimate:
         """Estimate the elements of a cell, with the arrangement of its table if it has one."""
         if listed is not None:
+            from feti_homog.microstructure.shapes import shapes  # only tables have shapes
+
             ellipses, radius = shapes.elliptic(listed.outlines), float(listed.radii.mean())
             ovals = ellipses[~ellipses.are_round]
             length = math.fsum(ellipses.perimeters) if len(ovals) else 2 * math.pi * radius * listed.fibres
