@@ -141,7 +141,6 @@ class ContactProblem:
         Raises:
             NotCarriedError: nothing carries the stresses of the load.
         """
-        from feti_homog.interface.contact import mixed_load  # unit loads are solved together
 
         self.prepare(bonds)
         return mixed_load.solve(self.scales, load, start)
@@ -203,7 +202,6 @@ class ContactProblem:
         has_history, by_stress = state.bonds.gap_and_slip is not None, state.load.by_stress
         if has_history or not by_stress.any() or not self._any(state.status != BONDED):
             return np.zeros(len(by_stress), bool)
-        from feti_homog.interface.contact import mixed_load  # few loads prescribe stresses
 
         self.prepare(state.bonds)
         stiffness = self.scales.mean_stiffness * float(self.size.prod())
