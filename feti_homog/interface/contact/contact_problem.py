@@ -27,7 +27,6 @@ from feti_homog.errors import NotCarriedError
 from feti_homog.feti import DualSolution, FetiSolver
 from feti_homog.feti.decomposition import constraint_layout
 from feti_homog.interface.contact import mixed_load
-from feti_homog.interface.contact.floating_bodies import FloatingBodies
 from feti_homog.interface.contact.load_scales import NEGLIGIBLE, LoadScales
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status, kkt_errors
 from feti_homog.interface.loads import Load
@@ -216,6 +215,8 @@ class ContactProblem:
         coarse = self.solver.natural
         if not (self.contact and coarse.unconstrained_modes.shape[1]):
             return solution, np.zeros(len(bonds.status), bool)
+        from feti_homog.interface.contact.floating_bodies import FloatingBodies  # few cells have free fibres
+
         noise = self.scales.gap_noise(solution.strain)
         bodies = FloatingBodies(self.solver.comm, coarse, self.nodes, bonds.status == OPEN, noise)
         motion, squeezes = bodies.place(solution)
