@@ -13,7 +13,9 @@ GROUPS = tomllib.loads((ROOT / "tests/mutations.toml").read_text(encoding="utf-8
 @pytest.mark.parametrize("group", GROUPS, ids=lambda group: group["tests"])
 def test_each_error_has_its_one_place_and_tests(group):
     for name, old, new in group["lines"]:
-        assert (ROOT / name).read_text(encoding="utf-8").count(old) == 1 and old != new, f"{name}: {old}"
+        text = (ROOT / name).read_text(encoding="utf-8")
+        assert text.count(old) == 1 and old != new, f"{name}: {old}"
+        compile(text.replace(old, new), name, "exec")
     files = [word for word in shlex.split(group["tests"]) if word.startswith("tests/")]
     assert all((ROOT / file).exists() for file in files)
     assert files or group["tests"].startswith("hostile ")
