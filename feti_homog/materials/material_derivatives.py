@@ -56,7 +56,14 @@ def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawCh
         yield LawChange("angle", material.angle, turn.T @ C + C @ turn, none if free is None else -TURN @ free)
     if len(C) == 6 and free is not None:
         to_cell = strain_rotation(-material.angle if isinstance(material, material_forms.Orthotropic) else 0.0)[:, :3]
-        for name, value, axes in _expansions(material):
+        if isinstance(material.expansion, tuple):
+            terms = [(f"expansion.{k + 1}", value, np.eye(3)[k]) for k, value in enumerate(material.expansion)]
+        elif material.expansion is not None:
+            terms = [("expansion", material.expansion, np.ones(3))]
+        else:  # of a transversely isotropic phase
+            pair = zip(material_forms.EXPANSION_PAIR, ([0.0, 0.0, 1.0], [1.0, 1.0, 0.0]), strict=True)
+            terms = [(name, getattr(material, name), np.array(axes)) for name, axes in pair]
+        for name, value, axes in terms:
             yield LawChange(name, value, np.zeros((6, 6)), to_cell @ axes)
 
 
@@ -101,18 +108,6 @@ def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
     if plane == condensed:
         block = block - np.outer(M[IN_PLANE, 2], M[IN_PLANE, 2]) / M[2, 2]
     return np.asarray(block.imag / STEP)
-
-
-def _expansions(material: material_forms.Material) -> Iterator[tuple[str, float, Float]]:
-    """Yield each expansion that is given, and (3,) along which material axes it is."""
-    if isinstance(material.expansion, tuple):
-        for axis, value in enumerate(material.expansion):
-            yield f"expansion.{axis + 1}", value, np.eye(3)[axis]
-    elif material.expansion is not None:
-        yield "expansion", material.expansion, np.ones(3)
-    elif isinstance(material, material_forms.TransverselyIsotropic):
-        for name, axes in zip(material_forms.EXPANSION_PAIR, ([0.0, 0.0, 1.0], [1.0, 1.0, 0.0]), strict=True):
-            yield name, getattr(material, name), np.array(axes)
 
 
 def constant_changes(C: Float, thermal: Float | None, dC: Float, dthermal: Float | None) -> dict[str, float]:

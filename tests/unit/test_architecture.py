@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import connected_components
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "feti_homog"
 FOLDERS = ("feti_homog", "drivers", "scripts", "tests")
-LONGEST_MODULE, LONGEST_FUNCTION, MOST_COMPLEX = 300, 60, 12
+LONGEST_MODULE, LONGEST_FUNCTION, MOST_COMPLEX = 300, 60, 15
 
 # From the ground up: each line may import from itself and from the lines above it.  A package that has floors of its
 # own is listed by them; its name alone stands for the modules that lie flat in it, and its `__init__`.
