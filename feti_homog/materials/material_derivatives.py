@@ -45,7 +45,7 @@ class LawChange:
 
 
 def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawChange]:
-    """Yield the derivatives by every given constant; expansions, (6, 6) alone, come last."""
+    """Yield the derivatives by each given constant; in space expansions come last."""
     C, none = stiffness_of(material, plane), np.zeros(6)
     is_general = isinstance(material, material_forms.General)
     for name, value, change in (_of_entries if is_general else _of_constants)(material, plane, C):
@@ -98,9 +98,9 @@ def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, floa
 
 
 def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
-    """Differentiate the part that a plane state has in a complex stiffness or compliance.
+    """Differentiate a complex stiffness or compliance, reduced to a plane state.
 
-    That is all of it, the plane's block or, in the state `condensed`, this less the share of 33.
+    In space it is the whole matrix, in the plane its block; the state `condensed` eliminates component 33.
     """
     if PLANE_STATES[plane].is_spatial:
         return np.asarray(M.imag / STEP)
@@ -111,7 +111,7 @@ def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
 
 
 def constant_changes(C: Float, thermal: Float | None, dC: Float, dthermal: Float | None) -> dict[str, float]:
-    """Return the derivatives of `constants` where C and the thermal stress have these."""
+    """Return the derivatives of `constants` along the changes dC and dthermal."""
     size = float(np.abs(dC).max() / np.abs(C).max()) or 1.0
     h = STEP / size
     heat = None if thermal is None or dthermal is None else thermal + 1j * h * dthermal

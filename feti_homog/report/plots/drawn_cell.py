@@ -25,7 +25,7 @@ BONDED, CLOSED, OPEN, DAMAGED = 0, 1, 2, 3
 STATE_NAMES = {BONDED: "bonded", DAMAGED: "damaged", CLOSED: "in contact", OPEN: "open"}
 STATE_COLOURS = {BONDED: "black", CLOSED: "#ff7f0e", OPEN: "#00a14b", DAMAGED: "#9467bd"}
 STATE_WIDTHS = {BONDED: 0.8, CLOSED: 2.6, OPEN: 2.0, DAMAGED: 2.0}
-# The state of an edge is the one of its ends that comes last here.
+# An edge has the later of its ends' states in this order.
 ORDER = np.array(list(STATE_NAMES))
 
 

@@ -109,7 +109,7 @@ def loads(points: Sequence[Document]) -> Array:
 
 
 def modes(points: Sequence[Document]) -> Array:
-    """(n,) mode in degrees, 0 opens and 90 shears: psi, or by the used shares of strengths; NaN without onset."""
+    """(n,) mode in degrees, 0 opens and 90 shears: psi, or by traction / strength; NaN without onset."""
     if any("psi" in point for point in points):
         return np.array([point.get("psi", np.nan) for point in points])
     normal, tangential, axial = (

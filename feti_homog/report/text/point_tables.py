@@ -90,7 +90,7 @@ def energies(point: Point, label: str) -> list[str]:
 
 
 def debonded(document: Document, point: Point) -> list[str]:
-    """Return the debonded share of the interfaces, and of each phase pair if there are several."""
+    """Return the debonded percentage of the interfaces, and of each phase pair if there are several."""
     text = f"Debonded: {100 * point['debonded_share']:.1f} % of the interfaces"
     if "debonded_shares" in point:
         shares = zip(document["case"]["interface"], point["debonded_shares"], strict=True)
