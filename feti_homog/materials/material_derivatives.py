@@ -45,7 +45,7 @@ class LawChange:
 
 
 def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawChange]:
-    """Yield the derivatives by every given constant; expansions, (6, 6) alone, come last."""
+    """Yield the derivatives by each given constant; in space expansions come last."""
     C, none = stiffness_of(material, plane), np.zeros(6)
     is_general = isinstance(material, material_forms.General)
     for name, value, change in (_of_entries if is_general else _of_constants)(material, plane, C):
@@ -56,7 +56,14 @@ def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawCh
         yield LawChange("angle", material.angle, turn.T @ C + C @ turn, none if free is None else -TURN @ free)
     if len(C) == 6 and free is not None:
         to_cell = strain_rotation(-material.angle if isinstance(material, material_forms.Orthotropic) else 0.0)[:, :3]
-        for name, value, axes in _expansions(material):
+        if isinstance(material.expansion, tuple):
+            terms = [(f"expansion.{k + 1}", value, np.eye(3)[k]) for k, value in enumerate(material.expansion)]
+        elif material.expansion is not None:
+            terms = [("expansion", material.expansion, np.ones(3))]
+        else:  # of a transversely isotropic phase
+            pair = zip(material_forms.EXPANSION_PAIR, ([0.0, 0.0, 1.0], [1.0, 1.0, 0.0]), strict=True)
+            terms = [(name, getattr(material, name), np.array(axes)) for name, axes in pair]
+        for name, value, axes in terms:
             yield LawChange(name, value, np.zeros((6, 6)), to_cell @ axes)
 
 
@@ -91,9 +98,9 @@ def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, floa
 
 
 def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
-    """Differentiate the part that a plane state has in a complex stiffness or compliance.
+    """Differentiate a complex stiffness or compliance, reduced to a plane state.
 
-    That is all of it, the plane's block or, in the state `condensed`, this less the share of 33.
+    In space it is the whole matrix, in the plane its block; the state `condensed` eliminates component 33.
     """
     if PLANE_STATES[plane].is_spatial:
         return np.asarray(M.imag / STEP)
@@ -103,20 +110,8 @@ def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
     return np.asarray(block.imag / STEP)
 
 
-def _expansions(material: material_forms.Material) -> Iterator[tuple[str, float, Float]]:
-    """Yield each expansion that is given, and (3,) along which material axes it is."""
-    if isinstance(material.expansion, tuple):
-        for axis, value in enumerate(material.expansion):
-            yield f"expansion.{axis + 1}", value, np.eye(3)[axis]
-    elif material.expansion is not None:
-        yield "expansion", material.expansion, np.ones(3)
-    elif isinstance(material, material_forms.TransverselyIsotropic):
-        for name, axes in zip(material_forms.EXPANSION_PAIR, ([0.0, 0.0, 1.0], [1.0, 1.0, 0.0]), strict=True):
-            yield name, getattr(material, name), np.array(axes)
-
-
 def constant_changes(C: Float, thermal: Float | None, dC: Float, dthermal: Float | None) -> dict[str, float]:
-    """Return the derivatives of `constants` where C and the thermal stress have these."""
+    """Return the derivatives of `constants` along the changes dC and dthermal."""
     size = float(np.abs(dC).max() / np.abs(C).max()) or 1.0
     h = STEP / size
     heat = None if thermal is None or dthermal is None else thermal + 1j * h * dthermal

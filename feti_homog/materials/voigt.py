@@ -54,7 +54,7 @@ class PlaneState:
 
     @property
     def normals(self) -> int:
-        """Return how many components, the first ones, are normal strains that are loads."""
+        """The number of normal strains, the first components, that are loads."""
         return len(self.strains) - (3 if self.is_spatial else 1)
 
 
@@ -72,7 +72,7 @@ def plane_state_of(document: Mapping[str, Any]) -> PlaneState:
 
 
 def voigt_names(count: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Strain and stress names, 3 in the plane or 6 in space."""
+    """Return the names of strains and stresses, 3 in the plane or 6 in space."""
     return (STRAINS, STRESSES) if count == len(STRAINS) else (SPATIAL_STRAINS, SPATIAL_STRESSES)
 
 
@@ -125,7 +125,7 @@ def principal(stress: Float, S33: Float) -> Float:
 
 
 def spatial_von_mises(stress: Float, S33: Float, axial: Float) -> Float:
-    """(m,) the same with the stresses [S23, S13] (m, 2)."""
+    """(m,) von Mises stress as by `von_mises`, with the axial stresses [S23, S13] (m, 2)."""
     return np.asarray(np.hypot(von_mises(stress, S33), np.sqrt(3) * np.hypot(*axial.T)))
 
 

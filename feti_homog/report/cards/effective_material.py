@@ -180,7 +180,7 @@ def _stiffness(document: Document) -> Float:
 
 
 def _numbers(value: Any, shape: tuple[int, ...]) -> Float:
-    """Return the array of this shape. Raises TypeError or ValueError if it is none, or not finite."""
+    """Return the value as an array (shape).  Raises TypeError or ValueError unless it is one, with finite numbers."""
     array = np.array(value, float)
     if array.shape != shape or not np.isfinite(array).all():
         raise ValueError(f"expected {' x '.join(map(str, shape))} finite numbers")
@@ -206,7 +206,7 @@ def comments(material: EffectiveMaterial, mark: str) -> list[str]:
 
 
 def number(value: float, width: int = 24) -> str:
-    """Return the value in at most `width` characters, at least 12: all 17 digits if they fit, else as many as do."""
+    """Return the value in at most `width` characters, at least 12, rounded if 17 digits do not fit."""
     value = float(value) + 0.0  # no -0.0
     forms = [repr(value), *(f"{value:.{digits}E}" for digits in range(16, 3, -1))]
     return next(form for form in forms if len(form) <= width)

@@ -66,7 +66,7 @@ def abaqus(material: effective_material.EffectiveMaterial) -> str:
 
 
 def elastic(material: effective_material.EffectiveMaterial, anisotropic: str) -> Iterator[str]:
-    """*MATERIAL and *ELASTIC; `anisotropic` is the TYPE of all 21 entries."""
+    """Yield the lines of *MATERIAL and *ELASTIC; `anisotropic` is the TYPE of all 21 entries."""
     yield f"*MATERIAL, NAME={effective_material.identifier(material.name)}"
     if material.is_orthotropic:
         yield "*ELASTIC, TYPE=ENGINEERING CONSTANTS"
@@ -84,7 +84,7 @@ def elastic(material: effective_material.EffectiveMaterial, anisotropic: str) ->
 
 
 def expansion(kind: str, values: Float) -> list[str]:
-    """*EXPANSION of this TYPE."""
+    """Return the lines of *EXPANSION with TYPE `kind`."""
     return [f"*EXPANSION, TYPE={kind}", *data_lines(values)]
 
 

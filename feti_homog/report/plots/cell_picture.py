@@ -64,8 +64,8 @@ def partition(cell: drawn_cell.DrawnCell) -> Figure:
 def mesh_error(cell: drawn_cell.DrawnCell) -> Figure | None:
     """Return the cell coloured by its mesh error density; None without estimates.
 
-    Density: share of the strain energy error over share of the area, the largest in all states.  Singular tips lie
-    above the colour range, otherwise the rest would have one colour.
+    Density: fraction of the strain energy error / fraction of the area, the largest over all states.  Singular tips
+    lie above the colour range, otherwise the rest would have one colour.
     """
     file, drawn = cell.file, cell.drawn
     tables = [state["mesh_error"] for state in file.get("state", {}).values() if "mesh_error" in state]

@@ -16,7 +16,7 @@ from feti_homog.typing import Array
 
 LEAST_AREA = 0.5  # area of a triangle in a picture / its own: at zero it would be turned over
 TRIANGLE_LIMIT = 100_000  # triangles in a picture
-SAME_PLACE = 1e-6  # of the size of the cell
+SAME_PLACE = 1e-6  # distance of nodes at one place / size of the cell
 QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # of a six-node triangle
 
 
@@ -113,7 +113,7 @@ def outline_edges(drawn: DrawnMesh, label: Array) -> Array:
     _, first, count = np.unique(keys, return_index=True, return_counts=True)
     border, owner = ordered[first[count == 1]], owner[first[count == 1]]
     middle = drawn.points[border].mean(axis=1)
-    twins = cKDTree(middle).query_pairs(1e-6 * np.ptp(drawn.points, axis=0).max(), output_type="ndarray")
+    twins = cKDTree(middle).query_pairs(SAME_PLACE * np.ptp(drawn.points, axis=0).max(), output_type="ndarray")
     is_border = np.ones(len(border), dtype=bool)
     is_border[twins[owner[twins[:, 0]] == owner[twins[:, 1]]].ravel()] = False
     return np.asarray(border[is_border])

@@ -97,12 +97,7 @@ class DeformedCell(drawn_cell.DrawnCell):
 
 
 def draw_state(
-    axes: Axes,
-    out: str | Path,
-    number: int = 0,
-    stress: str = "auto",
-    scale: float = 1.0,
-    most: float | None = None,
+    axes: Axes, out: str | Path, number: int = 0, stress: str = "auto", scale: float = 1.0, most: float | None = None
 ) -> str:
     """Draw the deformed cell in a state of `out`/result.h5 into Matplotlib's axes; returns the caption.  On one rank.
 

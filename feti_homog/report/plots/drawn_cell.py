@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from scipy.spatial import cKDTree
 
 from feti_homog.materials import voigt
-from feti_homog.report.plots.decimation import TRIANGLE_LIMIT, DrawnMesh, drawn_mesh, outline_edges
+from feti_homog.report.plots.decimation import SAME_PLACE, TRIANGLE_LIMIT, DrawnMesh, drawn_mesh, outline_edges
 from feti_homog.report.plots.plot_helpers import SYMBOLS, draw_segments, unit_label
 from feti_homog.report.text.summary import reported
 from feti_homog.results import path_curves
@@ -25,9 +25,8 @@ BONDED, CLOSED, OPEN, DAMAGED = 0, 1, 2, 3
 STATE_NAMES = {BONDED: "bonded", DAMAGED: "damaged", CLOSED: "in contact", OPEN: "open"}
 STATE_COLOURS = {BONDED: "black", CLOSED: "#ff7f0e", OPEN: "#00a14b", DAMAGED: "#9467bd"}
 STATE_WIDTHS = {BONDED: 0.8, CLOSED: 2.6, OPEN: 2.0, DAMAGED: 2.0}
-# The state of an edge is the one of its ends that comes last here.
+# An edge has the later of its ends' states in this order.
 ORDER = np.array(list(STATE_NAMES))
-SAME_PLACE = 1e-6  # of the width of the cell
 
 
 @dataclass(frozen=True)

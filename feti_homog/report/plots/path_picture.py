@@ -158,7 +158,15 @@ def energies(document: Document) -> Figure | None:
     if "work" not in points[0]:
         return None
     case, legs = document["case"], path_curves.legs(document)
-    work, parts = _column(points, "work"), _energy_parts(points)
+    names = ("work", "stored", "stored_in_springs", "dissipated", "fracture_energy", "friction_heat")
+    work, stored, springs, lost, fracture, heat = (_column(points, name) for name in names)
+    fracture = np.minimum(fracture, lost)
+    rest = "lost in breaks" + (" beyond it" if fracture.any() else "")
+    # Their sum is the work, but for rounding.
+    parts = {"stored in the bodies": stored - springs, "stored in springs": springs, "fracture energy": fracture}
+    parts |= {rest: lost - fracture, "heat of friction": heat}
+    threshold = path_curves.ZERO * np.abs(stored).max()
+    parts = {name: values for name, values in parts.items() if np.abs(values).max() > threshold}
     place, words = _column(points, "load_factor", 1) * legs, "leg of the path" if legs > 1 else "share of the load"
     if (np.diff(place) < 0.0).any():
         place, legs = np.append(UNLOADED - 1.0, np.arange(float(len(points)))), 0
@@ -175,20 +183,9 @@ def energies(document: Document) -> Figure | None:
     axes.set_ylabel(f"energy per area {plot_helpers.stress_unit(case)}")
     axes.set_title(plot_helpers.title_of(case, "energies along the path"))
     axes.spines[["top", "right"]].set_visible(False)
-    handles, names = axes.get_legend_handles_labels()
-    axes.legend(handles[::-1], names[::-1], frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    handles, labels = axes.get_legend_handles_labels()
+    axes.legend(handles[::-1], labels[::-1], frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return picture
-
-
-def _energy_parts(points: Sequence[Mapping[str, Any]]) -> dict[str, Array]:
-    """Return visible parts of the work by name, in stacking order; their sum is the work, but for rounding."""
-    stored, springs, lost = (_column(points, name) for name in ("stored", "stored_in_springs", "dissipated"))
-    fracture = np.minimum(_column(points, "fracture_energy"), lost)
-    rest = "lost in breaks" + (" beyond it" if fracture.any() else "")
-    parts = {"stored in the bodies": stored - springs, "stored in springs": springs, "fracture energy": fracture}
-    parts |= {rest: lost - fracture, "heat of friction": _column(points, "friction_heat")}
-    threshold = path_curves.ZERO * np.abs(stored).max()
-    return {name: values for name, values in parts.items() if np.abs(values).max() > threshold}
 
 
 def _column(points: Sequence[Mapping[str, Any]], name: str, power: int = 2) -> Array:

@@ -37,14 +37,14 @@ STRESS_TABLES: dict[str, tuple[str, int | None]] = {
     "S33": ("stress_33", None),
     **{name: ("axial_stress", column) for column, name in enumerate(voigt.AXIAL_STRESSES)},
 }
-OUTLIERS = 0.005  # share of the area that may lie outside of a colour range, at either end
+OUTLIERS = 0.005  # fraction of the area that may lie outside of a colour range, at either end
 INK = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d", "#8a6d00", "#0f7c8c", "#8c1d40")  # of curves
 STYLE = {"font.size": 10, "axes.titlesize": 11, "axes.linewidth": 0.8}
 DPI, PADDING, CUT = 200, 0.08, 0.02  # dots per inch; inches, the last of what may lie beyond the sides of a figure
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write the figure as PNG without the white around it; only one with words beyond its sides is drawn twice.
+    """Write the figure as PNG without white margins; a figure with words beyond its sides is drawn twice.
 
     Raises FetiHomogError if it cannot be written.
     """
@@ -131,7 +131,7 @@ def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, 
 
 
 def value_range(values: Array, areas: Array | None = None) -> tuple[Normalize, str]:
-    """Return colour range and the ends with values outside: at either end the extreme 0.5 % by area may be.
+    """Return the colour range and the ends beyond which values lie, at most 0.5 % of the area each.
 
     A field uniform to 1 % has one colour.
     """

@@ -40,7 +40,12 @@ def angle(document: Document) -> Figure:
     figure = Figure(figsize=(6.4, 4.2), layout="constrained")
     axes = figure.subplots()
     angles = [point["angle"] for point in points]
-    for (name, column), ink, mark in zip(_angle_columns(points, stiff), plot_helpers.INK, MARKS, strict=False):
+    responses = np.array([point["stiffness" if stiff else "stress"] for point in points])
+    if stiff:
+        curves = {f"C_{{{i + 1}{j + 1}}}": responses[:, i, j] for i, j in shown_entries(points).values()}
+    else:
+        curves = dict(zip((plot_helpers.SYMBOLS[name] for name in voigt.STRESSES), responses.T, strict=True))
+    for (name, column), ink, mark in zip(curves.items(), plot_helpers.INK, MARKS, strict=False):
         axes.plot(angles, column, color=ink, marker=mark, markersize=4, linewidth=1.5, label=f"${name}$")
     axes.set_xlabel("debonding angle (degrees)")
     axes.set_ylabel(f"{'effective stiffness' if stiff else 'macroscopic stress'} {plot_helpers.stress_unit(case)}")
@@ -53,15 +58,6 @@ def angle(document: Document) -> Figure:
     if stiff:
         axes.set_ylim(bottom=0.0)
     return figure
-
-
-def _angle_columns(points: Sequence[Document], stiff: bool) -> list[tuple[str, Array]]:
-    """Return name and values (points,) for each curve."""
-    if not stiff:
-        stress = np.array([point["stress"] for point in points])
-        return list(zip((plot_helpers.SYMBOLS[name] for name in voigt.STRESSES), stress.T, strict=True))
-    stiffness = np.array([point["stiffness"] for point in points])
-    return [(f"C_{{{i + 1}{j + 1}}}", stiffness[:, i, j]) for i, j in shown_entries(points).values()]
 
 
 def envelope(document: Document) -> Figure:
@@ -113,7 +109,7 @@ def loads(points: Sequence[Document]) -> Array:
 
 
 def modes(points: Sequence[Document]) -> Array:
-    """(n,) mode in degrees, 0 opens and 90 shears: psi, or by the used shares of strengths; NaN without onset."""
+    """(n,) mode in degrees, 0 opens and 90 shears: psi, or by traction / strength; NaN without onset."""
     if any("psi" in point for point in points):
         return np.array([point.get("psi", np.nan) for point in points])
     normal, tangential, axial = (

@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import connected_components, depth_first_order
 from scipy.spatial import cKDTree
 
 from feti_homog.report.plots import drawn_cell, plot_helpers
+from feti_homog.report.plots.decimation import SAME_PLACE
 from feti_homog.report.text.summary import reported
 from feti_homog.results import landmarks
 from feti_homog.typing import Array, Document
@@ -170,16 +171,30 @@ def coordinate(cell: drawn_cell.DrawnCell, body: int) -> Coordinate:
 
 
 def _arc_length(points: Array, normal: Array, of_body: Array, chain: Array, period: Array) -> tuple[Array, float]:
-    """(k,) arc length of nodes `of_body`, and the total length of all boundaries; `chain`: boundary edges (e, 2)."""
-    starts, steps, before, total = [], [], [], 0.0
+    """Return the arc length (k,) of the nodes `of_body` on their nearest boundary edges, and the total length.
+
+    `chain` has the boundary edges (e, 2).
+    """
+    origins, sides_of_lines, lengths, total = list[Array](), list[Array](), list[Array](), 0.0
     for line in _lines(chain, normal, points, period):
         sides = _shortest(np.diff(points[line], axis=0), period)
         ends = total + np.cumsum(np.linalg.norm(sides, axis=1))
-        starts.append(points[line[:-1]])
-        steps.append(sides)
-        before.append(np.append(total, ends[:-1]))
+        origins.append(points[line[:-1]])
+        sides_of_lines.append(sides)
+        lengths.append(np.append(total, ends[:-1]))
         total = float(ends[-1])
-    return _along(points[of_body], np.concatenate(starts), np.concatenate(steps), np.concatenate(before), period), total
+    starts, steps, before = map(np.concatenate, (origins, sides_of_lines, lengths))
+    tree = cKDTree(np.mod(starts + 0.5 * steps, period) % period, boxsize=period)
+    nodes = points[of_body]
+    nearest = tree.query(np.mod(nodes, period) % period, k=min(8, len(starts)))[1].reshape(len(nodes), -1)
+    step = steps[nearest]
+    offset, length = _shortest(nodes[:, None] - starts[nearest] - 0.5 * step, period), np.linalg.norm(step, axis=2)
+    fraction = np.clip(0.5 + (offset * step).sum(axis=2) / length**2, 0.0, 1.0)
+    distance = np.linalg.norm(offset - (fraction - 0.5)[..., None] * step, axis=2)
+    # A vertex is the start of an edge, not an end.
+    best = (distance + SAME_PLACE * length * fraction).argmin(axis=1)
+    rows = np.arange(len(nodes))
+    return before[nearest[rows, best]] + (fraction * length)[rows, best], total
 
 
 def _lines(chain: Array, normal: Array, points: Array, period: Array) -> list[Array]:
@@ -204,21 +219,6 @@ def _lines(chain: Array, normal: Array, points: Array, period: Array) -> list[Ar
         step = _shortest(points[line[1]] - points[line[0]], period)
         lines.append(line if -n2 * step[0] + n1 * step[1] > 0 else line[::-1])
     return lines
-
-
-def _along(points: Array, starts: Array, steps: Array, before: Array, period: Array) -> Array:
-    """(k,) arc length of each point on its nearest edge; edges go from `starts` by `steps` (e, 2)."""
-    tree = cKDTree(np.mod(starts + 0.5 * steps, period) % period, boxsize=period)
-    nearest = tree.query(np.mod(points, period) % period, k=min(8, len(starts)))[1].reshape(len(points), -1)
-    offset, step = _shortest(points[:, None] - starts[nearest] - 0.5 * steps[nearest], period), steps[nearest]
-    length = np.linalg.norm(step, axis=2)
-    share = np.clip(0.5 + (offset * step).sum(axis=2) / length**2, 0.0, 1.0)
-    distance = np.linalg.norm(offset - (share - 0.5)[..., None] * step, axis=2)
-    best = (distance + drawn_cell.SAME_PLACE * length * share).argmin(
-        axis=1
-    )  # a vertex is the start of an edge, not an end
-    rows = np.arange(len(points))
-    return np.asarray(before[nearest[rows, best]] + (share * length)[rows, best])
 
 
 def _shortest(vectors: Array, period: Array) -> Array:

@@ -1,6 +1,5 @@
 """The table of a path: peak, energies, and rows of some points."""
 
-from collections.abc import Mapping
 from textwrap import wrap
 from typing import Any
 
@@ -53,8 +52,8 @@ def _path_columns(document: Document) -> dict[str, Any]:
     return curves | {strains[k]: strain[:, k] for k in more if stresses[k] in prescribed}
 
 
-def _peak_lines(document: Document, peak: Mapping[str, Any]) -> list[str]:
-    """Describe peak, first break, stress left after the peak, and scaling by the toughness."""
+def _peak_lines(document: Document, peak: Document) -> list[str]:
+    """Describe the peak, the first break, the path after the peak, and scaling by the toughness."""
     strain, stress = (without_noise(peak[name]) for name in ("strain", "stress"))
     largest, name = landmarks.name_of(document, peak), peak["stress_name"] + stress_label(document)
     begins = {landmarks.PEAK: f"Peak {name}", landmarks.LARGEST: f"Largest {name}"}
@@ -64,20 +63,7 @@ def _peak_lines(document: Document, peak: Mapping[str, Any]) -> list[str]:
     if "first_break_event" in peak:
         first, at = peak["first_break_stress"], peak["first_break_strain"]
         text += f"; first break {first:.6g} at {at:.6g} (point {peak['first_break_event']})"
-    text += _afterwards(document, peak, largest)
-    events = {"the first break": peak.get("first_break_event"), f"the {largest}": peak["event"]}
-    errors = {place: document["path"][event].get("mesh_error") for place, event in events.items() if event is not None}
-    parts = [f"{error:.1e} at {place}" for place, error in errors.items() if error is not None]
-    text += f"; mesh error of the energy {', '.join(parts)}" if parts else ""
-    lines = wrap(text, WIDTH, subsequent_indent="  ")
-    if path_curves.scales_with_toughness(document):
-        lines.append("Scaling: strains and stresses of the path are as the root of the toughness")
-    return lines
-
-
-def _afterwards(document: Document, peak: Mapping[str, Any], largest: str) -> str:
-    """Describe the path after the largest stress: a valley, still larger stresses, or an end near the peak."""
-    text, stresses = "", landmarks.stresses_of(document, peak)
+    stresses = landmarks.stresses_of(document, peak)
     if "event_left" in peak:
         lost = 1.0 - peak["stress_left"] / peak["stress"]
         rises = f" as the {path_curves.what_rises(document)} rises" if path_curves.is_proportional(document) else ""
@@ -89,7 +75,14 @@ def _afterwards(document: Document, peak: Mapping[str, Any], largest: str) -> st
         at_end = peak["event"] == len(stresses) - 1
         place = "there" if at_end else f"near its peak, {landmarks.fall_of(document, peak):.1%} below it"
         text += f"; the path ends {place}"
-    return text
+    events = {"the first break": peak.get("first_break_event"), f"the {largest}": peak["event"]}
+    errors = {place: document["path"][event].get("mesh_error") for place, event in events.items() if event is not None}
+    parts = [f"{error:.1e} at {place}" for place, error in errors.items() if error is not None]
+    text += f"; mesh error of the energy {', '.join(parts)}" if parts else ""
+    lines = wrap(text, WIDTH, subsequent_indent="  ")
+    if path_curves.scales_with_toughness(document):
+        lines.append("Scaling: strains and stresses of the path are as the root of the toughness")
+    return lines
 
 
 def _path_energies(document: Document, label: str) -> list[str]:

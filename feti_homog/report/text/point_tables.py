@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import cos, radians, sin
+from operator import itemgetter
 from textwrap import wrap
 from typing import Any
 
@@ -89,7 +90,7 @@ def energies(point: Point, label: str) -> list[str]:
 
 
 def debonded(document: Document, point: Point) -> list[str]:
-    """Return the debonded share of the interfaces, and of each phase pair if there are several."""
+    """Return the debonded percentage of the interfaces, and of each phase pair if there are several."""
     text = f"Debonded: {100 * point['debonded_share']:.1f} % of the interfaces"
     if "debonded_shares" in point:
         shares = zip(document["case"]["interface"], point["debonded_shares"], strict=True)
@@ -104,15 +105,19 @@ def counts(point: Point) -> list[int]:
 
 def envelope_table(document: Document, limit: int = ENVELOPE_ROWS) -> Table:
     """Return least and largest onset load, and the first bond to break in at most `limit` directions."""
-    axes, points = document["case"]["envelope"]["plane"], document["envelope"]
-    broken, title = [point for point in points if "factor" in point], _envelope_title(document)
+    section, points = document["case"]["envelope"], document["envelope"]
+    axes, temperature = section["plane"], section.get("temperature")
+    title = f"Onset of debonding in the plane {', '.join(axes)}"
+    title += f"{stress_label(document) * axes[0].startswith('S')}: {len(points)} directions"
+    title += "" if temperature is None else f", after a temperature of {temperature:g}"
+    broken = [point for point in points if "factor" in point]
     rest = len(points) - len(broken)
     above = [f"  no load breaks a bond in {rest} of them"] if rest else []
     if not broken:
         return Table(title, [], [], above)
     for extreme, choose in (("least", min), ("largest", max)):
-        point = choose(broken, key=_load)
-        above.append(f"  {extreme:<9}{_load(point):.7g} at {point['angle']:g} degrees")
+        point = choose(broken, key=itemgetter("factor"))
+        above.append(f"  {extreme:<9}{point['factor']:.7g} at {point['angle']:g} degrees")
     names = [name for name in ONSET if name in broken[0]]
     used = "traction / strength" if "normal" in names else "psi of its traction"
     above.append(f"  first bond: its fibre, its direction there (degrees), {used}")
@@ -120,38 +125,25 @@ def envelope_table(document: Document, limit: int = ENVELOPE_ROWS) -> Table:
     step = max(1, -(-len(points) // limit))
     while len(points) % step:  # directions are evenly spaced
         step += 1
-    return Table(title, columns, [_onset(point, names) for point in points[::step]], above)
-
-
-def _envelope_title(document: Document) -> str:
-    section, count = document["case"]["envelope"], len(document["envelope"])
-    unit = stress_label(document) if section["plane"][0].startswith("S") else ""
-    warmer = section.get("temperature")
-    after = "" if warmer is None else f", after a temperature of {warmer:g}"
-    return f"Onset of debonding in the plane {', '.join(section['plane'])}{unit}: {count} directions{after}"
-
-
-def _onset(point: Point, names: Sequence[str]) -> list[Any]:
-    """Return angle, both load components and `names` of a direction."""
-    if "factor" not in point:
-        return [point["angle"], "none", "none", *[""] * len(names)]
-    return [point["angle"], *components(point), *(without_noise(point[name]) for name in names)]
+    rows = [
+        [point["angle"], *components(point), *(without_noise(point[name]) for name in names)]
+        if "factor" in point
+        else [point["angle"], "none", "none", *[""] * len(names)]
+        for point in points[::step]
+    ]
+    return Table(title, columns, rows, above)
 
 
 def components(point: Point) -> tuple[float, float]:
     """Return both components of the onset load."""
-    angle, load = radians(point["angle"]), _load(point)
+    angle, load = radians(point["angle"]), float(point["factor"])
     return without_noise(load * cos(angle), load), without_noise(load * sin(angle), load)
-
-
-def _load(point: Point) -> float:
-    return float(point["factor"])
 
 
 def tip_table(document: Document, tips: Document | None) -> list[Table]:
     """Return the tip with the largest G for each load; nothing without tips."""
     largest = _largest(tips)
-    rows = [[load, *_rates(tip)] for load, tip in largest.items()]
+    rows = [list(tip.values()) for tip in largest.values()]
     columns = [Column("load", 9), *_rate_columns(largest)]
     return [Table(f"{TIP_TITLE}{toughness_label(document)}", columns, rows)] if rows else []
 
@@ -161,7 +153,7 @@ def angle_tip_table(document: Document) -> list[Table]:
     largest = [(point["angle"], tips) for point in document["angle"] if (tips := _largest(point.get("tips")))]
     loads, title = dict.fromkeys(load for _, tips in largest for load in tips), TIP_TITLE + toughness_label(document)
     if len(loads) == 1:
-        rows = [[angle, *_rates(tip)] for angle, tips in largest for tip in tips.values()]
+        rows = [[angle, *list(tip.values())[1:]] for angle, tips in largest for tip in tips.values()]
         return [Table(title, [Column("angle", 9), *_rate_columns(largest[0][1])], rows)]
     rows = [[angle, *(tip["G"] for tip in tips.values())] for angle, tips in largest]
     return [Table(f"{title} under each load", [Column("angle", 9), *map(Column, loads)], rows)] if rows else []
@@ -182,7 +174,3 @@ def _largest(tips: Document | None) -> dict[str, Document]:
 def _rate_columns(tips: Mapping[str, Document]) -> list[Column]:
     rate_columns = [replace(column, name="at") if column.name == "angle" else column for column in RATES]
     return [*rate_columns, *([SECTION] if any(SECTION.name in tip for tip in tips.values()) else [])]
-
-
-def _rates(tip: Document) -> list[Any]:
-    return [value for name, value in tip.items() if name != "load"]

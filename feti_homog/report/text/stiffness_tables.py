@@ -145,15 +145,11 @@ def _estimates(document: Document) -> Table:
     below += [f"  closed-form estimates exist for {why} only" for why in _why_no_estimates(document)]
     deviation = 100 * document["transversely_isotropic"]["deviation"]
     title = f"Along the fibres and across them{stress_label(document)}; {deviation:.2g} % from transversely isotropic"
-    return Table(title, columns, rows, _ranges(document), below, most_columns=5)
-
-
-def _ranges(document: Document) -> list[str]:
-    """Return the range of moduli over all directions across the fibres, if known."""
-    if (across := document.get("transverse_moduli")) is None:
-        return []
-    ranges = (f"{n} from {_short(across[f'{n}_least'])} to {_short(across[f'{n}_largest'])}" for n in ("E", "G"))
-    return [f"  over all directions across: {', '.join(ranges)}"]
+    above = []
+    if (across := document.get("transverse_moduli")) is not None:
+        ranges = (f"{n} from {_short(across[f'{n}_least'])} to {_short(across[f'{n}_largest'])}" for n in ("E", "G"))
+        above.append(f"  over all directions across: {', '.join(ranges)}")
+    return Table(title, columns, rows, above, below, most_columns=5)
 
 
 def _sources(document: Document) -> dict[str, Document]:

@@ -74,7 +74,7 @@ def allgather_rows(comm: MPI.Intracomm, part: Array, counts: Int) -> Array:
     """Return the rows of all ranks below each other, on every rank. Collective.
 
     Args:
-        own: (counts[rank],) or (counts[rank], k) rows of this rank.
+        part: (counts[rank],) or (counts[rank], k) rows of this rank.
         counts: (ranks,) number of rows of each rank.
 
     Returns:
@@ -86,7 +86,7 @@ def allgather_rows(comm: MPI.Intracomm, part: Array, counts: Int) -> Array:
 
 
 def share_columns(comm: MPI.Intracomm, solve: Callable[[Float], Float], B: Float) -> Float:
-    """solve(B) for B (n,) or (n, k), equal on all ranks: each rank solves for some columns.  Collective."""
+    """Return solve(B) for B (n,) or (n, k), equal on all ranks, each of which solves for some columns.  Collective."""
     columns = B.shape[1] if B.ndim == 2 else 1
     if comm.size == 1 or columns == 1:
         return solve(B)
@@ -97,11 +97,9 @@ def share_columns(comm: MPI.Intracomm, solve: Callable[[Float], Float], B: Float
 
 
 def exchange(comm: MPI.Intracomm, to: Int, *columns: Array) -> list[Array]:
-    """Return the rows of the columns, each (k,) or (k, ...), that the ranks have for this one.
+    """Send row i of each column, (k,) or (k, ...), to rank `to[i]`; return the received rows.
 
-    Row i goes to rank `to[i]`.
-
-    They come in the order of the ranks that sent them, and of one rank in that rank's order.  Collective.
+    Rows are ordered by the rank that sent them, and rows of one rank as on that rank.  Collective.
     """
     order = np.argsort(to, kind="stable")
     sent = np.bincount(to, minlength=comm.size)
@@ -117,6 +115,5 @@ def exchange(comm: MPI.Intracomm, to: Int, *columns: Array) -> list[Array]:
 
 
 def scale_rows(weights: Float, x: Float) -> Float:
-    """diag(weights) x for weights (m,) and x (m,) or (m, k)."""
-    scaled: Float = (weights if x.ndim == 1 else weights[:, None]) * x
-    return scaled
+    """Return diag(weights) x for weights (m,) and x (m,) or (m, k)."""
+    return np.asarray((weights if x.ndim == 1 else weights[:, None]) * x)

@@ -8,7 +8,7 @@ from feti_homog.typing import AnyInt, Int
 
 
 def balanced(load: AnyInt, n_ranks: int) -> Int:
-    """(n,) rank of each of these loads (n,): the largest goes first, each to the least loaded rank."""
+    """Assign loads (n,) to ranks (n,): the largest load first, each to the least loaded rank."""
     ranks = np.zeros(len(load), np.int64)
     heap = [(0, rank) for rank in range(n_ranks)]
     for k in np.argsort(-load, kind="stable"):
@@ -19,15 +19,12 @@ def balanced(load: AnyInt, n_ranks: int) -> Int:
 
 
 def even(count: int, parts: int) -> Int:
-    """(parts + 1,) where ranges of the numbers 0 .. count - 1 begin, and the last ends.
-
-    Their lengths differ by one at most.
-    """
+    """Return the bounds (parts + 1,) of ranges that divide 0 .. count - 1; their lengths differ by at most one."""
     return np.arange(parts + 1) * count // parts
 
 
 def ranges(start: Int, count: Int) -> Int:
-    """start[0] .. start[0] + count[0] - 1, start[1] .. and so on."""
+    """Concatenate the ranges start[i] .. start[i] + count[i] - 1."""
     ends = np.cumsum(count)
     shift: Int = np.repeat(start - ends + count, count)
     return shift + np.arange(count.sum(), dtype=np.int64)

@@ -37,7 +37,7 @@ def error_words(error: PETSc.Error) -> str:
 
 
 def finalize() -> int:
-    """End PETSc, which prints its logs; the error code, 0 if it could.  Collective over all ranks."""
+    """End PETSc, which prints its logs; return the error code, 0 on success.  Collective over all ranks."""
     return int(_library().PetscFinalize())
 
 

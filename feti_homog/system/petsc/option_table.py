@@ -25,7 +25,7 @@ def _direct_solver(prefix: str, matrix: str, library: str = "cholmod") -> tuple[
 
 
 def _coarse_solver(prefix: str, matrix: str) -> tuple[Option, ...]:
-    """Return the options of a matrix of all ranks."""
+    """Return the options of the solver of a matrix distributed over all ranks."""
     library = f"library of {matrix}; on one rank cholmod by default"
     return (
         Option(f"{prefix}ksp_type", "preonly|cg|...", "preonly", f"one factor of {matrix}, or an iterative method"),
@@ -108,7 +108,7 @@ CLOSE = 0.9
 
 
 def unknown_options(names: Iterable[str]) -> list[str]:
-    """One fault for each name (without dash) of neither the solver's options nor PETSc's own."""
+    """Return one fault for each name (without dash) that neither the solver nor PETSc knows."""
     faults = []
     for name in names:
         hint = ""
@@ -130,7 +130,7 @@ def only_prints(name: str) -> bool:
 
 
 def almost_in_table(name: str) -> bool:
-    """Return whether the name is probably one of OPTIONS misspelt, behind the prefix of a PETSc solver."""
+    """Return whether the name is probably a misspelt one of OPTIONS with the same solver prefix."""
     prefix = solver_prefix(name)
     table = [other for other in TABLE if solver_prefix(other) == prefix]
     return bool(prefix and name not in TABLE and difflib.get_close_matches(name, table, 1, CLOSE))
@@ -143,7 +143,7 @@ def suggestion(name: str) -> str:
 
 
 def solver_prefix(name: str) -> str:
-    """Return the longest of PREFIXES that the name goes on from, empty if there is none."""
+    """Return the longest of PREFIXES with which the name begins; empty without one."""
     return max((prefix for prefix in PREFIXES if name.startswith(prefix) and name != prefix), key=len, default="")
 
 

@@ -45,7 +45,7 @@ def can_be_written(file: str) -> bool:
 
 
 def faulty_values(options: Mapping[str, Value]) -> list[str]:
-    """One fault for each option (name without dash) that cannot have its value."""
+    """Return one fault for each option (name without dash) with an impossible value."""
     texts = {name: _text(value) for name, value in options.items()}
     return sorted(
         f"{in_words(name, text)}: expected {rule[0]}"
@@ -183,7 +183,7 @@ def split_argv(argv: Sequence[str]) -> tuple[list[str], list[str]]:
 
 
 def named_values(words: Sequence[str]) -> dict[str, str]:
-    """PETSc's words of the command line by name without dash; the text is empty where there is no value."""
+    """Return the values of PETSc's options on the command line by name without dash; empty without a value."""
     values: dict[str, str] = {}
     name = ""
     for word in words:

@@ -18,7 +18,7 @@ READ_WHEN_SOLVING = {
 
 @contextmanager
 def case_options(options: Mapping[str, values.Value]) -> Iterator[None]:
-    """Insert the options that the command line does not give, and take them out afterwards.
+    """Insert the case's options below those of the command line, and remove them afterwards.
 
     PETSc has no flags that are true or false, but flags that are there or not: false ones are taken out meanwhile.
 
@@ -38,7 +38,11 @@ def case_options(options: Mapping[str, values.Value]) -> Iterator[None]:
     try:
         for name in changed:
             _set(database, name, settled[name])
-        _refuse_early(given_options())
+        given = given_options()
+        if faults := faults_of_solvers(given):
+            raise CaseError(*faults)
+        # Larger solvers alone read some options: names that are not almost ours are left to `refuse_unused`.
+        _refuse_unread([name for name in given if table.almost_in_table(name) and not values.is_flag(name)])
         yield
     finally:
         for name in changed:
@@ -69,14 +73,6 @@ def without_iterations() -> str:
     return f"{', '.join(printing)}: the run has no iterations to print" if printing else ""
 
 
-def _refuse_early(options: Mapping[str, str]) -> None:
-    """Refuse options that solvers of a 1 x 1 matrix cannot be made with, and misspelt names that they do not read."""
-    if faults := faults_of_solvers(options):
-        raise CaseError(*faults)
-    # Larger solvers alone read some options: names that are not almost ours are left to `refuse_unused`.
-    _refuse_unread([name for name in options if table.almost_in_table(name) and not values.is_flag(name)])
-
-
 def refuse_unused() -> None:
     """Call when all solvers are set up.
 
@@ -103,10 +99,11 @@ NO_SUCH_METHOD = "requested KSP type"
 
 
 def faults_of_solvers(options: Mapping[str, str]) -> list[str]:
-    """Faults of the options in the database (names without dash) with which PETSc's solvers cannot be made.
+    """Return the faults of options in the database with which PETSc's solvers cannot be made.
 
-    Each solver is made and applied once: a method may lack something only then.  PETSc marks options that
-    they read, and prints all that they could read with -help.  Options that print are hidden meanwhile.
+    `options` has their names without dash.  Each solver is made for a 1 x 1 matrix and applied once: some methods fail
+    only then.  PETSc marks the options that the solvers read, and prints all readable ones with -help.  Options that
+    print are hidden meanwhile.
     """
     faults, viewers, database = [], [*filter(values.is_viewer, options)], PETSc.Options()
     for name in viewers:
@@ -134,7 +131,7 @@ class _Identity:
 
 
 def _complaint(prefix: str) -> str:
-    """PETSc's complaint about the options of a solver of a 1 x 1 matrix, empty if there is none."""
+    """Return PETSc's complaint about the options of a solver of a 1 x 1 matrix; empty without one."""
     is_krylov, comm = prefix == "feti_", PETSc.COMM_SELF
     if is_krylov:
         A = PETSc.Mat().createPython((1, 1), _Identity(), comm=comm)

@@ -33,7 +33,7 @@ def prefer_own_toolkits() -> None:
 
 
 def ignore_settings_of_the_folder() -> None:
-    """Let a program draw files as it does elsewhere: without `matplotlibrc` of the current folder, and without windows.
+    """Load Matplotlib without the current folder's `matplotlibrc`, and let it draw without windows.
 
     Matplotlib looks for that file first, when it is imported, and ends with a traceback where it is damaged.
     """
@@ -50,7 +50,7 @@ def ignore_settings_of_the_folder() -> None:
 
 
 def prepare(environment: MutableMapping[str, str]) -> None:
-    """Set variables that are not yet set; who asks for threads may have them."""
+    """Set the variables of SETTINGS that are unset; OMP_THREAD_LIMIT only for one thread."""
     for name, value in SETTINGS.items():
         if name != "OMP_THREAD_LIMIT" or environment["OMP_NUM_THREADS"] == "1":
             environment.setdefault(name, value)

@@ -27,7 +27,7 @@ files: set[Path] = set()
 
 
 class LockHeld(Exception):
-    """Somebody else holds the lock; the text names the holder."""
+    """Another process holds the lock; the text names it."""
 
 
 class LocksUnsupported(FetiHomogError):
@@ -35,9 +35,9 @@ class LocksUnsupported(FetiHomogError):
 
 
 class Lock:
-    """A lock on the file `path`, which its last holder removes; `shared` ones exclude the others only.
+    """A lock on the file `path`, removed by its last holder; shared locks exclude exclusive locks only.
 
-    It is tried for during `timeout` seconds.  As a context manager it is held while the block lasts.
+    `acquire` tries for `timeout` seconds.  As a context manager the lock is held during the block.
     """
 
     def __init__(self, path: Path, shared: bool = False, timeout: float = LOCK_TIMEOUT_S) -> None:
@@ -48,8 +48,8 @@ class Lock:
         """Take the lock.
 
         Raises:
-            LockHeld: somebody else has it.
-            LocksUnsupported: nobody can have one on this file system.
+            LockHeld: another process has it.
+            LocksUnsupported: the file system has no locks.
             FetiHomogError: the file cannot be made or locked.
         """
         self._take()
@@ -109,7 +109,7 @@ class Lock:
 
 
 def _is_taken(file: int, kind: int) -> bool:
-    """Lock an open file; False if somebody else holds it.  Raises OSError where locks fail otherwise."""
+    """Lock an open file; False if another process holds the lock.  Raises OSError where locks fail otherwise."""
     try:
         fcntl.flock(file, kind | fcntl.LOCK_NB)
     except OSError as error:
@@ -120,14 +120,14 @@ def _is_taken(file: int, kind: int) -> bool:
 
 
 def holder(path: Path) -> str | None:
-    """Who holds the lock exclusively just now, in words; None if nobody does."""
+    """Describe the process that holds the lock exclusively; None without one."""
     with contextlib.suppress(OSError), path.open("rb+") as stream:
         return None if _is_taken(stream.fileno(), fcntl.LOCK_SH) else _written(stream.fileno())
     return None
 
 
 def this_process() -> str:
-    """Machine, process and, under SLURM or PBS, job: how a lock's file names its holder."""
+    """Name the machine, the process and the SLURM or PBS job, as in lock files."""
     names = [socket.gethostname(), f"process {os.getpid()}"]
     job = os.environ.get("SLURM_JOB_ID") or os.environ.get("PBS_JOBID")
     return ", ".join([*names, f"job {job}"] if job else names)
@@ -138,7 +138,7 @@ def _written(file: int) -> str:
 
 
 def tag() -> str:
-    """Return the name of this process, for names of files: no other process has it, neither now nor later."""
+    """Return a name for files of this process that no other process has, neither now nor later."""
     return f"{socket.gethostname()}.{os.getpid()}.{_began(os.getpid())}"
 
 

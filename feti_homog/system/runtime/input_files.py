@@ -30,10 +30,10 @@ def opened(path: Path, pipes: bool = False) -> BinaryIO:
 
 
 def read(path: Path, most: int = MOST_BYTES, pipes: bool = False) -> bytes:
-    """Return the content of such a file.
+    """Return the content of a file opened by `opened`.
 
     Raises:
-        OSError: as `opened`; also for one of more than `most` bytes.
+        OSError: as `opened`; also for a file of more than `most` bytes.
     """
     with opened(path, pipes) as stream:
         size = os.fstat(stream.fileno()).st_size  # 0 of pipes

@@ -18,7 +18,7 @@ STATM = Path("/proc/self/statm")
 def in_own_process(
     path: Path, function: Callable[[Path], T], patience: float = PATIENCE, memory: int | None = None
 ) -> T:
-    """Return function(path), which may need `memory` further bytes.
+    """Return function(path), computed in a child process with at most `memory` further bytes.
 
     Raises:
         FetiHomogError: from the function.

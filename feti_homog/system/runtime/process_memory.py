@@ -15,16 +15,13 @@ STACK, ADDRESSES = 1 << 20, 1 << 30
 
 
 def trim(kept: int = 0) -> None:
-    """Give freed memory back to the system, which glibc keeps where it lies between blocks in use.
-
-    Up to `kept` freed bytes stay for later.
-    """
+    """Return the freed memory that glibc keeps to the system, if it is more than `kept` bytes."""
     if spare() > kept:
         ctypes.CDLL(None).malloc_trim(0)
 
 
 def peak() -> int:
-    """Largest resident memory in bytes since `forget_peak`."""
+    """Return the largest resident memory (bytes) since `forget_peak`."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
@@ -35,7 +32,7 @@ class _Heap(ctypes.Structure):
 
 
 def spare() -> float:
-    """Freed bytes that glibc keeps; infinite where it does not count them, before 2.33."""
+    """Return the freed bytes that glibc keeps; infinite before version 2.33, which does not count them."""
     try:
         count = ctypes.CDLL(None).mallinfo2
     except AttributeError:
@@ -45,10 +42,7 @@ def spare() -> float:
 
 
 def forget_peak(clear_refs: Path = CLEAR_REFS, kept: int = 0) -> None:
-    """Trim, and let the peak begin anew; where the system refuses that, it stays the one of the whole process.
-
-    Up to `kept` freed bytes stay for later, and in its peak.
-    """
+    """Trim the memory as `trim`, and reset its peak; where the system refuses that, the old peak stays."""
     trim(kept)
     with suppress(OSError):
         clear_refs.write_text(RESET_PEAK)

@@ -17,7 +17,7 @@ T = TypeVar("T")
 
 
 class Progress:
-    """Prints a line a stage and a line a solve on rank 0, unless quiet, and keeps the stages' times."""
+    """Print a line for each stage and solve on rank 0, unless quiet, and keep the times of stages."""
 
     def __init__(self, comm: MPI.Intracomm, quiet: bool) -> None:
         self.comm = comm
@@ -65,10 +65,9 @@ class Progress:
         return iter(tqdm(items, desc=label, leave=False))
 
     def timings(self) -> dict[str, float]:
-        """Seconds of each stage, the maximum over ranks."""
+        """Return the seconds of each stage, the maximum over ranks.  Collective."""
         return {name: self.comm.allreduce(took, MPI.MAX) for name, took in self.seconds.items()}
 
     def memory(self) -> int:
-        """Peak resident memory of the case in bytes, the maximum over ranks."""
-        peak: int = self.comm.allreduce(process_memory.peak(), MPI.MAX)
-        return peak
+        """Return the peak resident memory of the case (bytes), the maximum over ranks.  Collective."""
+        return int(self.comm.allreduce(process_memory.peak(), MPI.MAX))
