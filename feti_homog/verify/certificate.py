@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.errors import CaseError
-from feti_homog.system.runtime import own_process
+from feti_homog.system.runtime import input_files
 from feti_homog.verify.check_constants import check_constants
 from feti_homog.verify.check_loads import StateNumbers, States, check_loads
 from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh, check_mesh_error, check_rates
@@ -60,7 +60,7 @@ class Certificate:
 
 def verify(directory: Path) -> Certificate:
     """Check the laws on all states of a result folder. Raises CaseError, one line, if it is unreadable."""
-    return own_process.in_own_process(directory, _verified) if altered(directory) else _verified(directory)
+    return input_files.in_own_process(directory, _verified) if altered(directory) else _verified(directory)
 
 
 def _verified(directory: Path) -> Certificate:

@@ -22,7 +22,7 @@ from feti_homog.errors import CaseError, MeshError
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, Block, RawMesh, assembled, at, first_of
 from feti_homog.mesh.tiles.tile_filling import gmsh_session
 from feti_homog.schema import wording
-from feti_homog.system.runtime import input_files, own_process
+from feti_homog.system.runtime import input_files
 from feti_homog.typing import Float, Int
 
 # Types of points, lines and triangles, which quadrilaterals are cut into.
@@ -100,7 +100,7 @@ def load(path: Path) -> RawMesh:
             b"".join(b"$%b%b\n$End%b\n" % (k.encode(), sections[k], k.encode()) for k in GIVEN if k in sections)
         )
         try:
-            content = own_process.in_own_process(copy, _read_by_gmsh, memory=max(MOST_BYTES, MOST_RATIO * len(data)))
+            content = input_files.in_own_process(copy, _read_by_gmsh, memory=max(MOST_BYTES, MOST_RATIO * len(data)))
         except CaseError:
             raise MeshError("the file is damaged: gmsh crashes on it, or needs too much time or memory") from None
     read = sum(len(numbers) for numbers, *_ in content.elements.values())

@@ -1,14 +1,25 @@
-"""Files that users name: regular ones, of bounded size; files that wait for a writer or have no end are refused."""
+"""Files that users name: regular ones, of bounded size; files that wait for a writer or have no end are refused.
+
+A library that may crash on a damaged file reads it in a process of its own.
+"""
 
 import errno
+import multiprocessing
 import os
+import resource
+import signal
 import stat
+from collections.abc import Callable
+from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, TypeVar
 
 from feti_homog.errors import CaseError, FetiHomogError
 
+T = TypeVar("T")
 MOST_BYTES = 1 << 30
+PATIENCE = 300.0  # seconds
+STATM = Path("/proc/self/statm")
 
 
 def opened(path: Path, pipes: bool = False) -> BinaryIO:
@@ -47,3 +58,51 @@ def unreadable(path: Path, error: OSError) -> FetiHomogError:
     """Return the error to raise for a file of results: bad input where it is missing or no file, else a failure."""
     kind = FetiHomogError if isinstance(error, PermissionError) else CaseError
     return kind(f"cannot read {path}: {error.strerror or error}")
+
+
+def in_own_process(
+    path: Path, function: Callable[[Path], T], patience: float = PATIENCE, memory: int | None = None
+) -> T:
+    """Return function(path), computed in a child process with at most `memory` further bytes.
+
+    Raises:
+        FetiHomogError: from the function.
+        CaseError: its process crashes or outlasts `patience`.
+    """
+    context = multiprocessing.get_context("fork")
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(target=_send, args=(sender, function, path, memory), daemon=True)
+    process.start()
+    sender.close()
+    try:
+        if not receiver.poll(patience):
+            raise CaseError(f"{path}: its files are damaged: reading them does not come to an end")
+        answer = receiver.recv()
+    except EOFError:
+        raise CaseError(f"{path}: its files are damaged: the library that reads them crashes") from None
+    finally:
+        process.kill()
+        process.join()
+    if isinstance(answer, FetiHomogError):
+        raise answer
+    result: T = answer
+    return result
+
+
+def _send(end: Connection, function: Callable[[Path], T], path: Path, memory: int | None) -> None:
+    # The parent's thread listens for signals; Ctrl-C ends both processes.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    # Handlers of PETSc, in a program that has started it, would not come to an end here.
+    for crash in (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT):
+        signal.signal(crash, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_SETMASK, ())
+    if memory is not None:
+        limits, used = resource.getrlimit(resource.RLIMIT_AS), int(STATM.read_text().split()[0])
+        most = used * resource.getpagesize() + memory
+        resource.setrlimit(resource.RLIMIT_AS, (min({most, *limits} - {resource.RLIM_INFINITY}), limits[1]))
+    try:
+        end.send(function(path))
+    except FetiHomogError as error:
+        end.send(error)
+    except MemoryError as error:
+        end.send(CaseError(f"{path}: its files are damaged: {error}"))

@@ -6,7 +6,7 @@ import signal
 import pytest
 
 from feti_homog.errors import CaseError
-from feti_homog.system.runtime.own_process import in_own_process
+from feti_homog.system.runtime.input_files import in_own_process
 
 
 def crash(_):
