@@ -54,14 +54,7 @@ def load(path: Path) -> RawMesh:
         OSError: the file cannot be read.
         MeshError: it is damaged, or has other cells or no phases.
     """
-    file = Scanner(input_files.read(path))
-    if file.line()[:4] != ["#", "vtk", "DataFile", "Version"]:
-        file.refuse("expected # vtk DataFile Version, with which a file of VTK begins")
-    file.place = file.content.find(b"\n", file.place) + 1 or len(file.content)  # the title, which may be empty
-    form = " ".join(file.line()).upper()
-    if form not in ("ASCII", "BINARY"):
-        file.refuse(f"{wording.toml_value(form)}: expected ASCII or BINARY")
-    file.is_binary = form == "BINARY"
+    file = _behind_header(input_files.read(path))
     none, data, sections, are_of_cells, length = np.zeros(0, np.int64), dict[str, Numbers](), set[str](), False, 0
     grid = Grid(np.zeros((0, 3)), none, none, none, data)
     while words := file.line():
@@ -87,6 +80,19 @@ def load(path: Path) -> RawMesh:
                     if are_of_cells:
                         data[unquote(name)] = values if width == 1 else values.reshape(-1, max(width, 1))
     return mesh_of(grid)
+
+
+def _behind_header(content: bytes) -> Scanner:
+    """Return the scanner of a VTK file, behind its version, title and form."""
+    file = Scanner(content)
+    if file.line()[:4] != ["#", "vtk", "DataFile", "Version"]:
+        file.refuse("expected # vtk DataFile Version, with which a file of VTK begins")
+    file.place = file.content.find(b"\n", file.place) + 1 or len(file.content)  # the title, which may be empty
+    form = " ".join(file.line()).upper()
+    if form not in ("ASCII", "BINARY"):
+        file.refuse(f"{wording.toml_value(form)}: expected ASCII or BINARY")
+    file.is_binary = form == "BINARY"
+    return file
 
 
 def _cells(file: Scanner, count: int, size: int) -> tuple[Int, Int]:
