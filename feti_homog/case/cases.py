@@ -178,9 +178,18 @@ def check_stored(values: Mapping[str, Any]) -> None:
 
 
 def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[str, Any], list[str]]:
-    """Return the contents of sections, with [cell]'s files in `folder` if one is given, and their faults."""
-    reader = TableReader(_selected(document), sections.KEY_OWNERS, _top_level_faults(document))
-    selected, faults = reader.selected, reader.faults
+    """Return the section contents and their faults; without a folder, leave the files of [cell] unread."""
+    first = next(iter(interface_tables(document)), None)
+    if isinstance(first, dict) and "law" in first:
+        first = first | {"criterion": first["law"]}
+    tables, selected = document | {"interface": first}, dict[keys.Selector, str | None]()
+    for selector in (GEOMETRY, ANALYSIS_TYPE, PLANE, METHOD, CRITERION):
+        section, table = sections.SECTIONS[selector.section], tables.get(selector.section)
+        default = getattr(section, selector.key, None)
+        value = table.get(selector.key, default) if isinstance(table, Mapping) else default
+        selected[selector] = value if keys.keys_of(section)[selector.key].type.accepts(value) else None
+    faults = _top_level_faults(document)
+    reader = TableReader(selected, sections.KEY_OWNERS, faults)
     of_rules = [[*rule.faults(document, selected)] for rule in RULES]
     foreign = {rule.path[0] for rule, lines in zip(RULES, of_rules, strict=True) if lines and rule.holds is None}
     cell = _read_section(document, "cell", reader)
@@ -198,21 +207,6 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
     # What has keys of other cases is not looked into.
     faults += relation_faults(contents | {FIELDS.get(name, name): None for name in foreign}, document, selected[PLANE])
     return contents, faults
-
-
-def _selected(document: Mapping[str, Any]) -> keys.Selected:
-    """Return the values that decide which keys belong to the case."""
-    selectors = (GEOMETRY, ANALYSIS_TYPE, PLANE, METHOD, CRITERION)
-    first = next(iter(interface_tables(document)), None)
-    if isinstance(first, dict) and "law" in first:
-        first = first | {"criterion": first["law"]}
-    tables, selected = dict(document) | {"interface": first}, dict[keys.Selector, str | None]()
-    for selector in selectors:
-        section, table = sections.SECTIONS[selector.section], tables.get(selector.section)
-        default = getattr(section, selector.key, None)
-        value = table.get(selector.key, default) if isinstance(table, Mapping) else default
-        selected[selector] = value if keys.keys_of(section)[selector.key].type.accepts(value) else None
-    return selected
 
 
 def _top_level_faults(document: Mapping[str, Any]) -> list[str]:

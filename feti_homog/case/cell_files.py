@@ -128,8 +128,13 @@ def _with_table(cell: Cell, faults: list[str]) -> Cell:
     for shape in [] if cell.tip_size is None else shapes.given_shapes(table.columns, has_tips=False):
         words = f"{table.name} has {shape.name}, and with them no nodes at tips"
         faults.append(f"[cell] tip_size = {cell.tip_size:g}: {words}")
-    width, height = (_size(name, getattr(cell, name), table, faults) for name in ("width", "height"))
-    table = replace(table, width=width, height=height)
+    for name in ("width", "height"):
+        asked, stored = getattr(cell, name), getattr(table, name)
+        if asked is None and stored is None and table.name != LIST:
+            faults.append(f"[cell] {name}: missing; {table.name} has no line such as # width = 120, height = 80")
+        elif None not in (asked, stored) and asked != stored:
+            faults.append(f"[cell] {name} = {asked:g}: {table.name} says {stored:g}; give one")
+        table = replace(table, **{name: stored if asked is None else asked})
     return replace(cell, table=_within(table) if cell.window == "cut" else table)
 
 
@@ -148,16 +153,6 @@ def _within(table: fibre_table.FibreTable) -> fibre_table.FibreTable:
     left = "1 row with its centre" if len(rows) == 1 else f"{len(rows)} rows with centres"
     line = f'[cell] window = "cut": leaves out {left} outside: {listed}'
     return replace(retained, remarks=(*table.remarks, line))
-
-
-def _size(name: str, asked: float | None, table: fibre_table.FibreTable, faults: list[str]) -> float | None:
-    """Cell width or height, from the case or from the table, which must not differ."""
-    stored: float | None = getattr(table, name)
-    if asked is None and stored is None and table.name != LIST:
-        faults.append(f"[cell] {name}: missing; {table.name} has no line such as # width = 120, height = 80")
-    elif None not in (asked, stored) and asked != stored:
-        faults.append(f"[cell] {name} = {asked:g}: {table.name} says {stored:g}; give one")
-    return stored if asked is None else asked
 
 
 # Inner / outer radius of hollow fibres.

@@ -47,16 +47,12 @@ def _above(limit: float, materials: Mapping[str, material_forms.Material], plane
     """List the phases with a larger ratio that keep their volume: not in plane stress."""
     if voigt.PLANE_STATES[plane].is_sheet:
         return []
-    ratios = {phase: laws.isotropic_ratio(material) for phase, material in materials.items()}
-    names = {
-        phase: "poisson" if isinstance(m, material_forms.Isotropic) else "Poisson's ratio"
-        for phase, m in materials.items()
-    }
-    return [
-        f"[material.{wording.toml_key(phase)}] {names[phase]} = {nu}"
-        for phase, nu in ratios.items()
-        if nu and nu > limit
-    ]
+    lines = []
+    for phase, material in materials.items():
+        name = "poisson" if isinstance(material, material_forms.Isotropic) else "Poisson's ratio"
+        if (ratio := laws.isotropic_ratio(material)) and ratio > limit:
+            lines.append(f"[material.{wording.toml_key(phase)}] {name} = {ratio}")
+    return lines
 
 
 CHOSEN = ("mesh_size", "interface_size", "tip_size", "refine")
@@ -109,23 +105,18 @@ def sized(
             f"[cell] accuracy = {cell.accuracy:g}: would need elements split {refinements[order]} times, more than "
             f"{MOST_REFINED}; expected {better}"
         )
-    return replace(cell, mesh_size=_coarsest(cell), refine=refinements[order], order=order)
+    fibres, height = fibres_and_height(cell)
+    mesh_size = min(LARGEST, float(f"{PITCH_SHARE * sqrt(height / fibres):.2g}"))
+    return replace(cell, mesh_size=mesh_size, refine=refinements[order], order=order)
 
 
 def fibres_and_height(cell: Cell) -> tuple[int, float]:
-    """Return the number of fibres and height / width of a lattice or a random cell."""
-    lattice = LATTICES.get(cell.geometry)
-    return (len(lattice.centres), lattice.height) if lattice else (sum(fibre_counts(cell).values()), 1.0)
-
-
-def _coarsest(cell: Cell) -> float:
-    """mesh_size of the coarsest mesh: half the distance between as many fibres on a square lattice, in two digits."""
+    """Return the number of fibres and height / width of a cell without its own mesh."""
     if cell.table is not None:
         assert cell.table.width is not None and cell.table.height is not None
-        fibres, height = len(cell.table.row), cell.table.height / cell.table.width
-    else:
-        fibres, height = fibres_and_height(cell)
-    return min(LARGEST, float(f"{PITCH_SHARE * sqrt(height / fibres):.2g}"))
+        return len(cell.table.row), cell.table.height / cell.table.width
+    lattice = LATTICES.get(cell.geometry)
+    return (len(lattice.centres), lattice.height) if lattice else (sum(fibre_counts(cell).values()), 1.0)
 
 
 def coarse_error(materials: Mapping[str, material_forms.Material], plane: str, order: int, free_faces: bool) -> float:

@@ -40,10 +40,14 @@ def read_materials(
     known = None if fibres is None else (phase_names.MATRIX, *fibres, phase_names.COATING)
     materials = {}
     for phase, constants in table.items():
-        fault = _phase_fault(phase, known, geometry, reader.owners)
-        material = None if fault else _read_material(constants, f"material.{wording.toml_key(phase)}", plane, reader)
-        reader.faults += [fault] if fault else []
-        if material is not None:
+        section = f"material.{wording.toml_key(phase)}"
+        is_unknown = known is not None and ":" not in phase and phase not in known
+        if is_unknown or not phase_names.PHASE.fullmatch(phase) or phase in FORMS_OF:
+            owners = {} if phase == phase_names.FIBRE else reader.owners
+            reader.faults.append(f"[{section}]: unknown phase; {wording.suggestion(phase, known or SUGGESTED, owners)}")
+        elif ":" in phase and geometry in CIRCULAR:
+            reader.faults.append(f'[{section}]: belongs to geometry = "mesh", not {wording.toml_value(geometry)}')
+        elif (material := _read_material(constants, section, plane, reader)) is not None:
             materials[phase] = material
     needed = (phase_names.MATRIX, *(fibres or ()))
     reader.faults += [f"[material.{phase}]: missing section" for phase in needed if phase not in table]
@@ -74,21 +78,6 @@ def coating_faults(cell: Cell | None, materials: object) -> list[str]:
     return []
 
 
-def _phase_fault(phase: str, known: tuple[str, ...] | None, geometry: str | None, owners: Mapping[str, str]) -> str:
-    """Return the fault in a phase name, empty if there is none.
-
-    `known` are a cell's phases, None if any may occur.
-    """
-    section = f"[material.{wording.toml_key(phase)}]"
-    is_unknown = known is not None and ":" not in phase and phase not in known
-    if is_unknown or not phase_names.PHASE.fullmatch(phase) or phase in FORMS_OF:
-        elsewhere = {} if phase == phase_names.FIBRE else owners
-        return f"{section}: unknown phase; {wording.suggestion(phase, known or SUGGESTED, elsewhere)}"
-    if ":" in phase and geometry in CIRCULAR:
-        return f'{section}: belongs to geometry = "mesh", not {wording.toml_value(geometry)}'
-    return ""
-
-
 def _read_material(
     table: object, section: str, plane: str | None, reader: TableReader
 ) -> material_forms.Material | None:
@@ -104,12 +93,10 @@ def _read_material(
         return None
     material: material_forms.Material | None = reader.read(material_forms.MATERIAL_FORMS[forms[0]], table, section)
     if material is not None:
-        checked: list[Callable[[], Any]] = [partial(laws.expansion, material)]
-        if plane is not None:
-            checked.insert(0, partial(laws.stiffness_of, material, plane))
-        for law in checked:
+        checks: list[Callable[[Any], object]] = [] if plane is None else [partial(laws.stiffness_of, plane=plane)]
+        for check in (*checks, laws.expansion):
             try:
-                law()
+                check(material)
             except ValueError as error:
                 reader.faults.append(f"[{section}] {error}")
     return material

@@ -51,17 +51,14 @@ def _load_faults(
     elif path is not None:
         placed = path.placed
         if plane is not None and [path.strain, path.to, path.waypoints].count(None) == 2:
-            loads, last = (
-                load_sections.completed(tuple(placed.values()), plane),
-                ["zero, where the path begins", *placed],
-            )
-            repeats = [not any(loads[0].values()), *(before == after for before, after in pairwise(loads))]
-            for k, (place, given) in enumerate(placed.items()):
-                noun, value = (
-                    ("load", given.named) if isinstance(given, load_sections.MixedLoad) else ("strain", list(given))
-                )
-                if repeats[k]:
-                    yield f"[path] {place} = {wording.toml_value(value)}: expected a {noun} other than {last[k]}"
+            loads = load_sections.completed(tuple(placed.values()), plane)
+            repeats = not any(loads[0].values()), *(before == after for before, after in pairwise(loads))
+            formers = "zero, where the path begins", *[*placed][:-1]
+            for (place, entry), former, is_repeat in zip(placed.items(), formers, repeats, strict=True):
+                value = entry.named if isinstance(entry, load_sections.MixedLoad) else entry
+                noun = "load" if isinstance(value, dict) else "strain"
+                if is_repeat:
+                    yield f"[path] {place} = {wording.toml_value(value)}: expected a {noun} other than {former}"
         if path.increments is not None and path.increments < len(placed):
             yield f"[path] increments = {path.increments}: expected at least one for each waypoint"
 
@@ -127,7 +124,7 @@ def _faults_between(interfaces: Sequence[InterfaceSection], tables: Sequence[Map
             continue
         other = first.setdefault(frozenset(interface.between), number)
         if other != number:
-            pair = wording.toml_value(list(interface.between))
+            pair = wording.toml_value(interface.between)
             faults.append(f"[{label}] between = {pair}: expected another pair than [interface {other + 1}] has")
         for name in COMMON:
             value, common = getattr(interface, name), getattr(interfaces[0], name)
@@ -140,9 +137,7 @@ def _faults_between(interfaces: Sequence[InterfaceSection], tables: Sequence[Map
 
 def _written(value: Any) -> str:
     """Return the value of a key that interfaces agree in, as TOML has it."""
-    table = (
-        keys.to_table(value, {}) if isinstance(value, Scatter) else list(value) if isinstance(value, tuple) else value
-    )
+    table = keys.to_table(value, {}) if isinstance(value, Scatter) else value
     return "none" if table is None else wording.toml_value(table)
 
 
@@ -195,10 +190,9 @@ def _branch_faults(interface: InterfaceSection) -> Iterator[str]:
     if len(openings) != len(tractions):
         yield f"openings, tractions: {len(openings)} and {len(tractions)} numbers; expected as many of both"
     elif openings[0] <= 0.0 or sorted({*openings}) != [*openings]:
-        yield f"openings = {wording.toml_value(list(openings))}: expected a rising list of numbers above 0"
+        yield f"openings = {wording.toml_value(openings)}: expected a rising list of numbers above 0"
     elif tractions[0] <= 0.0 or tractions[-1] != 0.0 or sorted(tractions) != [*tractions[::-1]]:
-        branch = wording.toml_value(list(tractions))
-        yield f"tractions = {branch}: expected a softening branch, which falls from its peak to 0"
+        yield f"tractions = {wording.toml_value(tractions)}: expected a softening branch, which falls from its peak to 0"
     else:
         bare = replace(interface, normal_stiffness=None, normal_strength=None, normal_toughness=None)
         for name, number in _of_branch(bare).items():

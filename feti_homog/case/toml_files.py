@@ -38,19 +38,14 @@ def read_document(path: str | Path) -> dict[str, Any]:
         raise CaseError(f"{path}: not TOML: {str(error).replace('end of document', place)}") from None
     except OSError as error:
         raise CaseError(f"{path}: cannot be read: {error.strerror}") from None
-    if _is_deeper(document, MAX_DEPTH):
+    level: list[Any] = [document]
+    for _ in range(MAX_DEPTH):
+        entries = (entry for each in level for entry in (each.values() if isinstance(each, dict) else each))
+        level = [entry for entry in entries if isinstance(entry, dict | list)]
+    if level:
         raise CaseError(f"{path}: {TOO_DEEP}")
     # Where the locale has no UTF-8, Python escapes the bytes of names of files.
     return {"name": os.fsencode(path.stem).decode("utf-8", "replace")} | document
-
-
-def _is_deeper(document: dict[str, Any], depth: int) -> bool:
-    """Return whether tables and arrays stand in each other more than so deep."""
-    level: list[Any] = [document]
-    for _ in range(depth):
-        entries = (entry for each in level for entry in (each.values() if isinstance(each, dict) else each))
-        level = [entry for entry in entries if isinstance(entry, dict | list)]
-    return bool(level)
 
 
 def to_document(values: object) -> dict[str, Any]:

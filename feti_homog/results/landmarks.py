@@ -149,17 +149,13 @@ def kept(points: Sequence[Point], states: int | str, legs: int, marked: Collecti
     for _, *pair in sorted(around, key=lambda drop: -drop[0]):
         if len(chosen.union(pair)) <= room:
             chosen = chosen.union(pair)
-    return _filled(sorted(chosen), states)
-
-
-def _filled(numbers: list[int], count: int) -> list[int]:
-    """Return `numbers` and points between them, `count` in all: the widest gap is divided next."""
-    gaps: list[tuple[float, int, int, int]] = [(a - b, 1, a, b) for a, b in pairwise(numbers)]
+    # Each further point divides the widest gap anew.
+    gaps: list[tuple[float, int, int, int]] = [(a - b, 1, a, b) for a, b in pairwise(sorted(chosen))]
     heapify(gaps)
-    for _ in range(count - len(numbers)):
+    for _ in range(states - len(chosen)):
         _, parts, a, b = gaps[0]
         heapreplace(gaps, ((a - b) / (parts + 1), parts + 1, a, b))
-    return sorted({a + (b - a) * k // parts for _, parts, a, b in gaps for k in range(parts)} | {numbers[-1]})
+    return sorted({a + (b - a) * k // parts for _, parts, a, b in gaps for k in range(parts)} | ends)
 
 
 def drops(points: Sequence[Point], legs: int) -> list[Drop]:

@@ -83,7 +83,9 @@ def refuse_files_of_others(directory: Path) -> None:
             if kind:
                 raise CaseError(f"--out {directory}: {path.name} is {kind}, and a run writes a file of that name")
         checkpoints.refuse_others(directory)
-        others = _foreign(paths)
+        signs = [path for path in paths if path.name in SIGNS]
+        # Without any sign of a run, all files that are not empty are foreign.
+        others = [path for path in signs or paths if path.stat().st_size and not (signs and _is_own(path))]
     except OSError as error:
         raise CaseError(f"--out {directory}: its files cannot be read: {error.strerror}") from error
     if others:
@@ -96,12 +98,6 @@ def foreign(directory: Path, name: str, kind: str) -> CaseError:
         f"--out {directory}: no {kind} of this program wrote {name}, and this one would replace it; "
         "move it away or choose another folder"
     )
-
-
-def _foreign(paths: list[Path]) -> list[Path]:
-    """Return files without the marks of a run; without any sign of a run, all that are not empty."""
-    signs = [path for path in paths if path.name in SIGNS]
-    return [path for path in signs or paths if path.stat().st_size and not (signs and _is_own(path))]
 
 
 def _is_own(path: Path) -> bool:
