@@ -1,4 +1,4 @@
-"""Cell files: a mesh, a fibre table with the cell size, or a table that the cell matches."""
+"""Read and check the files of [cell]: a mesh, a fibre table with the cell size, or a table to match."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 
 SUFFIXES = {"mesh": MESH_SUFFIXES, "table": TABLE_SUFFIXES}
 LIST = "fibre_list"
-# Of a radius, up to which centres outside of a cut window are taken as on its border.
+# Distance from a cut window / radius, up to which a centre outside counts as on the border.
 LEFT_OUT = 0.01
 MOST_LISTED = 20
-FEWEST_MATCHED = 10  # fibres: of fewer, distances have no distribution
+FEWEST_MATCHED = 10  # fibres: the distances between fewer fibres have no distribution
 
 
 def checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """Return the cell with its file contents; their faults and faults between its keys go to `faults`."""
+    """Return the cell with the contents of its files, and add all faults to `faults`."""
     cell = _with_match(cell, folder, faults)
     if cell.fibre_fraction is not None:
         spacing = (cell.coating or 0.0) + (cell.min_gap if cell.geometry == "random" else 0.0)
@@ -53,13 +53,13 @@ def checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
 
 
 def _with_files(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """Return the cell with its file's path completed and its table read; faults are added to `faults`."""
+    """Return the cell with its full file path and its fibre table; add faults to `faults`."""
     if cell.geometry not in SUFFIXES or (cell.file is not None and cell.fibre_list is not None):
         return cell
     if cell.file is None:
         return cell if cell.fibre_list is None else _with_table(cell, faults)
-    named = folder / cell.file  # a link's own suffix counts
-    file = Path(os.path.realpath(named.parent)) / named.name  # unlike resolve, no error for links in a circle
+    named = folder / cell.file  # the suffix of a link itself counts
+    file = Path(os.path.realpath(named.parent)) / named.name  # unlike Path.resolve, without an error for circular links
     if file.suffix not in SUFFIXES[cell.geometry]:
         return cell
     if words := missing(file):
@@ -70,8 +70,8 @@ def _with_files(cell: Cell, folder: Path, faults: list[str]) -> Cell:
 
 
 def missing(file: Path) -> str:
-    """Why there is no such file, empty if there is."""
-    if os.path.isfile(file):  # false, not an error, for a name too long
+    """Return the reason why a file is missing, empty if the file exists."""
+    if os.path.isfile(file):  # False, not an error, if the name is too long
         return ""
     if not os.path.exists(file):
         return f"no such file (expected at {file})"
@@ -79,10 +79,9 @@ def missing(file: Path) -> str:
 
 
 def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """Return the cell with its table read, its number of fibres and its fraction.
+    """Return the cell with the window that it matches, and add faults to `faults`.
 
-    The table's path is completed; number and fraction come from the table's fibres where the cell has none of
-    its own; faults are added to `faults`.
+    Where the cell gives no number of fibres or no fibre fraction, the window provides the value.
     """
     if cell.match is None:
         return cell
@@ -90,7 +89,7 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     if words := missing(file):
         faults.append(f"{given}: {words}")
         return cell
-    from feti_homog.microstructure import fibre_pattern, random_fibres  # SciPy's trees, which few cases need
+    from feti_homog.microstructure import fibre_pattern, random_fibres  # import SciPy's trees, which few cases need
 
     try:
         window = fibre_pattern.read_window(file)
@@ -107,8 +106,8 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
 
 
 def _with_table(cell: Cell, faults: list[str]) -> Cell:
-    """Return the cell with its table, which has the cell size."""
-    from feti_homog.microstructure import fibre_table  # which few cases need
+    """Return the cell with its fibre table and the cell size, and add faults to `faults`."""
+    from feti_homog.microstructure import fibre_table  # few cases need it
 
     try:
         table = (
@@ -139,7 +138,10 @@ def _with_table(cell: Cell, faults: list[str]) -> Cell:
 
 
 def _within(table: fibre_table.FibreTable) -> fibre_table.FibreTable:
-    """Return the table without rows whose centres are outside the cell by more than LEFT_OUT of their radii."""
+    """Return the table without fibres whose centres lie outside the cell.
+
+    A centre may lie outside by at most LEFT_OUT times its radius.
+    """
     if table.width is None or table.height is None:
         return table
     corner = np.array([table.left, table.bottom], float)
@@ -155,13 +157,13 @@ def _within(table: fibre_table.FibreTable) -> fibre_table.FibreTable:
     return replace(retained, remarks=(*table.remarks, line))
 
 
-# Inner / outer radius of hollow fibres.
+# Smallest and largest ratio of inner to outer radius of hollow fibres.
 WIDEST_CORE = 0.05, 0.98
 HOLLOW_WORDS = f"expected inner_radius / radius from {WIDEST_CORE[0]:g} to {WIDEST_CORE[1]:g}, or 0"
 
 
 def check_shapes(table: fibre_table.FibreTable, faults: list[str]) -> None:
-    """Add shape and hollow fibre faults to `faults`."""
+    """Check the shapes and inner radii of fibres, and add faults to `faults`."""
     rows, before = table.columns, len(faults)
     _tell(table, shapes.have_both_sizes(rows), shapes.BOTH_SIZES, faults)
     for shape in shapes.SHAPES:
