@@ -73,10 +73,7 @@ class Case:
 
     @property
     def interface(self) -> InterfaceSection | None:
-        """Return the first interface, None for perfect bonding.
-
-        All interfaces agree in contact, criterion and growth.
-        """
+        """Return the first interface, which has the common contact, criterion and growth."""
         return self.interfaces[0] if self.interfaces else None
 
     @property

@@ -138,10 +138,7 @@ def _with_table(cell: Cell, faults: list[str]) -> Cell:
 
 
 def _within(table: fibre_table.FibreTable) -> fibre_table.FibreTable:
-    """Return the table without fibres whose centres lie outside the cell.
-
-    A centre may lie outside by at most LEFT_OUT times its radius.
-    """
+    """Return the table without fibres whose centres lie outside by LEFT_OUT radii or more."""
     if table.width is None or table.height is None:
         return table
     corner = np.array([table.left, table.bottom], float)

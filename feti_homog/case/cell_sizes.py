@@ -44,10 +44,7 @@ def remarks(materials: Mapping[str, material_forms.Material], plane: str) -> tup
 
 
 def _above(limit: float, materials: Mapping[str, material_forms.Material], plane: str) -> list[str]:
-    """List the phases with a Poisson's ratio above a limit; none in plane stress.
-
-    In plane stress the thickness adapts, so elements do not lock.
-    """
+    """List the phases with a Poisson's ratio above a limit; none in plane stress."""
     if voigt.PLANE_STATES[plane].is_sheet:
         return []
     lines = []
@@ -167,10 +164,7 @@ def fibre_counts(cell: Cell) -> dict[str, int]:
 
 
 def _expected_counts(cell: Cell) -> dict[str, float]:
-    """Return the expected numbers of fibres per phase, before they are rounded.
-
-    Their sum is `fibres`, or follows from the width.
-    """
+    """Return the expected fibre numbers per phase; their sum is `fibres` or follows from the width."""
     radii = cell.radii or dict.fromkeys(cell.fractions, 1.0)
     per_area = {phase: share / (pi * radii[phase] ** 2) for phase, share in cell.fractions.items()}
     area = cell.fibres / fsum(per_area.values()) if cell.fibres is not None else (cell.width or 1.0) ** 2

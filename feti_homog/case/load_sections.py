@@ -87,10 +87,7 @@ def completed(loads: Sequence[Strain | MixedLoad], plane: str) -> tuple[dict[str
 
 
 def first_named(loads: Sequence[Strain | MixedLoad], plane: str) -> dict[str, int]:
-    """Return the index of the first load that names each component, by stress name.
-
-    The index is len(loads) for a component that no load names.
-    """
+    """Return the first load that names each component, by stress name; len(loads) if none does."""
     return {
         names[1]: next((k for k, load in enumerate(loads) if not named(load).keys().isdisjoint(names)), len(loads))
         for names in voigt.PLANE_STATES[plane].components
@@ -124,10 +121,7 @@ class AnalysisSection:
         return {}
 
     def solves(self, loads: int, one_sided: bool) -> int:
-        """Return the number of solves for a problem with `loads` unit loads.
-
-        With one-sided contact, each load needs both signs.
-        """
+        """Return the number of solves for unit loads; one-sided contact needs both signs."""
         return 2 * loads if one_sided else loads
 
 

@@ -66,10 +66,7 @@ def _load_faults(
 def axes_lines(
     kind: str, section: load_sections.AnalysisSection, materials: Mapping[str, material_forms.Material], plane: str
 ) -> tuple[str, ...]:
-    """Return one line on axes that could be mistaken for ply axes.
-
-    In plane strain and plane stress there is no such line.
-    """
+    """Return a line on axes that could be mistaken for ply axes; none in the plane."""
     if not voigt.PLANE_STATES[plane].is_spatial:
         return ()
     from feti_homog.materials import engineering_constants  # needed in generalized plane strain alone

@@ -242,10 +242,7 @@ def _bonds() -> Iterator[Rule]:
 
 
 def _any_section(test: types.Test, document: Any) -> bool:
-    """Return whether any [interface] section passes a test.
-
-    Without sections, or with a section that is no table, the result is True: other rules report such faults.
-    """
+    """Return whether an [interface] section passes a test, or has a fault of other rules."""
     tables = interface_tables(document)
     return "interface" not in document or any(not isinstance(table, dict) or test(table) for table in tables)
 
@@ -256,10 +253,7 @@ def _some_arc(table: Any) -> bool:
 
 
 def _breaks(strengths: Sequence[str], table: Any) -> bool:
-    """Return whether the bonds of an interface section can break.
-
-    Bonds break by a finite strength, or by a law that always has a limit.
-    """
+    """Return whether bonds can break: a finite strength, or a law with a fixed limit."""
     unlimited = [law.name for law in REGISTRY if not law.limits]
     is_finite = (has(table, name) and table[name] not in (math.inf, types.INF) for name in strengths)
     return any(is_finite) or any(has(table, key) and table[key] in unlimited for key in ("criterion", "law"))

@@ -80,10 +80,7 @@ def rename(old: Path, new: Path) -> None:
 
 
 def remove_unfinished(folder: Path, names: re.Pattern[str], alone: bool = True) -> None:
-    """Remove the unfinished files of killed writers.
-
-    If this process `alone` may write to the folder, all unfinished files go, also those from other machines.
-    """
+    """Remove unfinished files of killed writers; on any machine if this process writes `alone`."""
     part = re.compile(rf"({names.pattern})\.(?P<tag>.+\.\d+)\.part")
     for path in folder.glob("*.part"):
         if (match := part.fullmatch(path.name)) and (alone or file_locks.has_ended(match["tag"])):
@@ -98,10 +95,7 @@ def write_errors(path: Path) -> contextlib.AbstractContextManager[None]:
 
 @contextlib.contextmanager
 def file_errors(verb: str, path: Path) -> Iterator[None]:
-    """Turn OSError and RuntimeError in a block into FetiHomogError "cannot VERB PATH".
-
-    HDF5 raises RuntimeError.
-    """
+    """Turn OSError, and RuntimeError of HDF5, into FetiHomogError "cannot VERB PATH"."""
     try:
         yield
     except (OSError, RuntimeError) as error:

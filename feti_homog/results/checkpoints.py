@@ -42,9 +42,7 @@ Arrays = dict[str, NDArray[Any]]
 
 
 class EventsInMemory:
-    """Keep events in memory, distributed over the ranks, for runs without files.
-
-    Every method is collective.
+    """Keep distributed events in memory, for runs without files; every method is collective.
 
     Attributes:
         room: bytes of events, after which further events have no multipliers; None without a limit.
@@ -215,10 +213,7 @@ def records(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
 
 
 def _head(line: bytes, path: Path) -> bytes:
-    """Check the first line of an event file, and return the line.
-
-    The result is empty if the run was killed while it wrote the line.
-    """
+    """Check the first line of an event file; return b"" for an unfinished line."""
     expected = begin("").partition(b"\n")[0] + b"\n"
     if line != expected and expected.startswith(line):
         return b""
@@ -274,9 +269,7 @@ def refuse_others(directory: Path) -> None:
 
 
 def remove(directory: Path) -> None:
-    """Remove the checkpoint folder in `directory`.  Call on one rank.
-
-    The folder is renamed first, so that no run finds a part of its events.
+    """Rename the checkpoint folder, then remove it: no run finds a part.  Call on one rank.
 
     Raises:
         FetiHomogError: the folder cannot be renamed.

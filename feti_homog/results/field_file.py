@@ -164,10 +164,7 @@ class FieldFile:
             raise
 
     def _remove(self) -> None:
-        """Close and remove the file.
-
-        The file is truncated first: on a full disk HDF5 cannot close it otherwise.
-        """
+        """Truncate, close and remove the file; on a full disk HDF5 closes only empty files."""
         self._is_open = False
         file_locks.files.discard(self.part)
         if self._comm.rank == 0:
@@ -188,10 +185,7 @@ def _with_write_errors(path: Path, function: Callable[..., Any], *args: Any) -> 
 
 
 def _create(part: Path, size: int) -> None:
-    """Create an empty HDF5 file with `size` reserved bytes.
-
-    Plain system calls write the file: where they fail, HDF5 may crash or hang.
-    """
+    """Create an empty HDF5 file by system calls: where they fail, HDF5 may crash or hang."""
     part.parent.mkdir(parents=True, exist_ok=True)
     try:
         with h5py.File("empty", "w", driver="core", backing_store=False) as file:
@@ -207,10 +201,7 @@ def _create(part: Path, size: int) -> None:
 
 
 def _complete(part: Path, path: Path) -> None:
-    """Add views to the file, and rename it.  Call on one rank.
-
-    Written by all ranks, a view would cost as much as a table.
-    """
+    """Add views and rename the file, on one rank: on all, views cost as much as tables."""
     # No lock: only this process has the file open, and some file systems have no locks.
     with h5py.File(part, "r", locking=False) as file:
         size = bytes_of_views(file)
@@ -235,10 +226,7 @@ def _arrays(group: str, count: int, part: Any, described: Mapping[str, records.D
 
 
 def _reserve(part: Path, start: int, size: int) -> None:
-    """Reserve disk space for a file.
-
-    If MPI-IO ran out of space while it writes, some ranks might wait for ever.
-    """
+    """Reserve disk space for a file: without space, MPI-IO may wait for ever."""
     with part.open("r+b") as stream:
         os.posix_fallocate(stream.fileno(), start, size)
 

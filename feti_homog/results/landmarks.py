@@ -78,19 +78,13 @@ def stresses_of(document: Document, peak: Document) -> list[float]:
 
 
 def fall_of(document: Document, peak: Document) -> float:
-    """Return the stress fall after the peak / the largest stress.
-
-    The fall ends in the valley or at the end of the path, whichever is lower.
-    """
+    """Return the stress fall, to the valley or the end, / the largest stress."""
     remaining = (stresses_of(document, peak)[-1], peak.get("stress_left", peak["stress"]))
     return max(1.0 - stress / peak["stress"] for stress in remaining) if peak["stress"] else 0.0
 
 
 def name_of(document: Document, peak: Document) -> str:
-    """Return the name of the largest stress on a path.
-
-    PEAK if the stress falls afterwards, SO_FAR if the path stopped early, else LARGEST.
-    """
+    """Return PEAK if the stress falls afterwards, SO_FAR for an unfinished path, else LARGEST."""
     if "so_far" in peak:
         return SO_FAR
     return LARGEST if fall_of(document, peak) < LEAST_FALL else PEAK

@@ -172,10 +172,7 @@ def write_product(path: Path, text: str) -> Path:
 
 
 def _hold(lock: file_locks.Lock, directory: Path) -> tuple[list[Path], str]:
-    """Create and lock the folder; return new folders, innermost first, and a warning.
-
-    The warning is empty unless the file system has no locks.
-    """
+    """Create and lock the folder; return new folders, innermost first, and a lock warning or an empty text."""
     made = [path for path in (directory, *directory.parents) if not path.exists()]
     try:
         directory.mkdir(parents=True, exist_ok=True)
