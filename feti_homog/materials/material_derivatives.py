@@ -1,4 +1,4 @@
-"""Derivatives of phase laws by their constants, and of composite constants by the stiffness.
+"""Differentiate phase laws by their constants, and composite constants by the stiffness.
 
 Stiffnesses are (3, 3) or (6, 6) in Voigt order with engineering shears, as in `laws.stiffness_of`.  Functions without
 absolute values are differentiated by an imaginary step, f'(x) = Im f(x + i h) / h, which is exact to rounding (Squire
@@ -18,7 +18,7 @@ from feti_homog.materials.laws import COUPLINGS, expansion, known_compliance, st
 from feti_homog.materials.voigt import IN_PLANE, IN_PLANE_BLOCK, PLANE_STATES, strain_rotation
 from feti_homog.typing import Float
 
-STEP = 1e-30  # its square is lost beside 1
+STEP = 1e-30  # the square vanishes beside 1 in rounding
 ISOTROPIC_COMPLIANCE = {"E_axial": "young", "E_transverse": "young", "nu_axial": "poisson", "nu_transverse": "poisson"}
 # Derivative of `strain_rotation` by the angle in degrees, at 0.
 TURN = np.zeros((6, 6))
@@ -45,7 +45,7 @@ class LawChange:
 
 
 def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawChange]:
-    """Yield the derivatives by every given constant; expansions, (6, 6) alone, come last."""
+    """Yield the derivatives by every given constant, in space the expansions last."""
     C, none = stiffness_of(material, plane), np.zeros(6)
     is_general = isinstance(material, material_forms.General)
     for name, value, change in (_of_entries if is_general else _of_constants)(material, plane, C):
@@ -79,7 +79,7 @@ def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, fl
 
 
 def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:
-    """Entries of a stiffness, on both sides of its diagonal."""
+    """Yield the derivatives by the entries of a stiffness, on both sides of the diagonal."""
     given = np.array(material.stiffness)
     for i, j in zip(*np.triu_indices(len(given)), strict=True):
         if (i, j) in COUPLINGS and len(given) == 6:
@@ -116,7 +116,7 @@ def _expansions(material: material_forms.Material) -> Iterator[tuple[str, float,
 
 
 def constant_changes(C: Float, thermal: Float | None, dC: Float, dthermal: Float | None) -> dict[str, float]:
-    """Return the derivatives of `constants` where C and the thermal stress have these."""
+    """Return the derivatives of `constants`, by the derivatives of C and the thermal stress."""
     size = float(np.abs(dC).max() / np.abs(C).max()) or 1.0
     h = STEP / size
     heat = None if thermal is None or dthermal is None else thermal + 1j * h * dthermal
