@@ -1,7 +1,7 @@
-"""Registry of bond laws: their names in a case, their keys, and their descriptions.
+"""Register the bond laws: their names in a case, their keys, and their descriptions.
 
-Two classes with the same name implement a law, `implementation`: in `interface/laws`, which runs use, and in
-`verify`, which checks results by its own formulas.
+Two classes with the same name, `implementation`, implement a law: runs use the class in `interface/laws`, and checks of
+results use the class in `verify`, with its own formulas.
 """
 
 from dataclasses import dataclass
@@ -9,18 +9,18 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class BondLawEntry:
-    """Bond law as a case names it.
+    """A bond law of a case.
 
     Attributes:
-        name: value of [interface] law, or criterion.
+        name: value of [interface] law or criterion.
         implementation: "module.Class".
-        keys: keys of [interface] that belong to this law and others that list them.
-        needs: keys of all laws that must be given with this one.
-        limits: keys; one at least must be finite for any bond to break; none if the law always has a limit.
-        description: describes, for the key `law`, the utilisation that reaches 1 when a bond breaks, or the softening.
-        symbols: that label the law in pictures: symbol, key, and whether its unit is a stress.
-        softens: spring compliance grows before a bond parts.
-        has_process_zone: elements must resolve the length along which bonds break.
+        keys: keys of [interface] that only some laws have, and this law has.
+        needs: keys that this law requires.
+        limits: keys, one of which must be finite for bonds to break; empty if the law always has a limit.
+        description: the utilisation that reaches 1 when a bond breaks, or the softening, for the reference.
+        symbols: labels in pictures: symbol, key, and whether the unit is a stress.
+        softens: whether the spring compliance grows before a bond breaks.
+        has_process_zone: whether elements must resolve the length along which bonds break.
     """
 
     name: str
@@ -39,7 +39,7 @@ STRENGTHS = ("normal_strength", "tangential_strength", "axial_strength")
 OF_SOFTENING = ("mixing_exponent", "teeth", "softening_tolerance")
 COHESIVE = (*STRENGTHS[:2], "normal_toughness", "tangential_toughness")
 BRANCH = ("openings", "tractions")
-"""Keys of one cohesive law: the numbers of all of them, and the softening branch of a table."""
+"""Keys of cohesive laws: STRENGTHS, COHESIVE and OF_SOFTENING of all laws, BRANCH of the law "table" alone."""
 OF_STRENGTHS = ((r"R^\mathrm{n}", "normal_strength", True), (r"R^\mathrm{t}", "tangential_strength", True))
 
 REGISTRY = (
@@ -82,5 +82,5 @@ DEFAULT = REGISTRY[0].name
 
 
 def laws_with(key: str) -> tuple[str, ...]:
-    """Law names to which a key of [interface] belongs."""
+    """Return the names of the laws that have a key of [interface]."""
     return tuple(entry.name for entry in REGISTRY if key in entry.keys)

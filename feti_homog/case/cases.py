@@ -1,4 +1,4 @@
-"""A case: the checked contents of its file as frozen dataclasses, with every fault reported at once."""
+"""Read a case file into frozen dataclasses, check its contents, and report all faults at once."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from feti_homog.materials import laws, material_forms
 from feti_homog.schema import TableReader, keys, types, wording
 from feti_homog.system.runtime import input_files
 
-FIELDS = {"load": "single_load"}  # of a section whose name is that of a method
+FIELDS = {"load": "single_load"}  # the field of [load]: Case.load is a method
 STUDIES = {
     sections.SWEEP: "this file describes many cases; `feti-homog sweep` runs them",
     sections.UNCERTAINTY: "a run takes no scatter; `feti-homog uncertainty` passes it on to results",
 }
-"""Sections of files with many cases, each with the command that takes them."""
+"""Sections of files with many cases, and the command for each."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,10 +37,10 @@ class Case:
     """A checked case.
 
     Attributes:
-        materials: by phase, in the file's order.
-        interfaces: none if the bonding is perfect; if several, each has its pair of phases.
-        angle, path, single_load, envelope: there if the analysis has that type; single_load is the section [load].
-        petsc: options without dash.
+        materials: materials by phase, in file order.
+        interfaces: empty for perfect bonding; each of several interfaces has its pair of phases.
+        angle, path, single_load, envelope: the analysis section, None for other types; single_load is [load].
+        petsc: PETSc options without dash.
     """
 
     name: str
@@ -58,55 +58,58 @@ class Case:
 
     @classmethod
     def load(cls, path: str | Path) -> Case:
-        """Return the case in a file; see `load`."""
+        """Return the case in a file, as the function `load`."""
         return load(path)
 
     @classmethod
     def parse(cls, document: Mapping[str, Any], folder: str | Path = ".") -> Case:
-        """Return the case from nested dictionaries as in the file, with Python's or NumPy's values; see `parse`."""
+        """Return the case of nested dictionaries, as the function `parse`."""
         return parse(document, Path(folder))
 
     @property
     def arcs(self) -> tuple[Arc, ...]:
-        """Return the arcs that are debonded from the start; none if the bonding is perfect."""
+        """Return the initially debonded arcs of all interfaces."""
         return tuple(arc for interface in self.interfaces for arc in interface.debonded)
 
     @property
     def interface(self) -> InterfaceSection | None:
-        """The first interface, None for perfect bonding; all have its contact, criterion and growth."""
+        """Return the first interface, which has the common contact, criterion and growth."""
         return self.interfaces[0] if self.interfaces else None
 
     @property
     def has_friction(self) -> bool:
-        """Return True if some debonded faces resist sliding."""
+        """Return whether debonded faces of any interface have friction."""
         return any(interface.friction for interface in self.interfaces)
 
     @property
     def targets(self) -> tuple[Mapping[str, float], ...]:
-        """The loads of a path after its unloaded start, or the one load of the case, in full.
+        """Return the loads of the case with all components.
 
-        By name: each component's strain or stress, in the order of the plane state's strains; in generalized
-        plane strain then the temperature.
+        A load maps names to values: the strain or stress of each component, in Voigt order; in generalized plane
+        strain then the temperature. The unloaded start of a path is left out.
         """
         return completed(tuple(self.section.placed.values()), self.analysis.plane)
 
     @property
     def section(self) -> AnalysisSection:
-        """The analysis section."""
+        """Return the section that belongs to the analysis type."""
         return self.angle or self.path or self.single_load or self.envelope or Stiffness()
 
     def material_of(self, phase: str) -> material_forms.Material:
-        """Return a phase's material; "fibre:2" without its own takes it from "fibre". Raises KeyError."""
+        """Return the material of a phase. Raises KeyError.
+
+        A phase "fibre:2" without a section has the material of "fibre".
+        """
         return self.materials[provider(phase, self.materials)]
 
     def warnings(self) -> tuple[str, ...]:
-        """List settings that are valid but probably unintended, a line each."""
+        """List valid but probably unintended settings, in one line each."""
         of_elements = cell_sizes.warnings(self.materials, self.analysis.plane)
         _, contrast = laws.contrast_lines(self.materials, self.analysis.plane)
         return (*of_elements, *contrast, *idle_friction_keys(self.interfaces))
 
     def remarks(self) -> tuple[str, ...]:
-        """List the assumptions about settings that are not given, a line each."""
+        """List assumptions about missing settings, in one line each."""
         kind, section, plane = self.analysis.type, self.section, self.analysis.plane
         of_elements = cell_sizes.remarks(self.materials, plane)
         of_table = () if self.cell.table is None else self.cell.table.remarks
@@ -114,7 +117,7 @@ class Case:
         return *of_elements, *of_table, *of_load
 
     def resolved(self) -> dict[str, Any]:
-        """Return the case with its defaults as a plain document, of which `parse` makes an equal case."""
+        """Return the case with its defaults as a document; `parse` turns it into an equal case."""
         selected: keys.Selected = {
             GEOMETRY: self.cell.geometry,
             ANALYSIS_TYPE: self.analysis.type,
@@ -133,7 +136,10 @@ class Case:
         return document | {"petsc": dict(self.petsc)}
 
     def digest(self, with_output: bool = True) -> str:
-        """Hash everything that the case computes, and writes if `with_output`; not its name, options, max_events."""
+        """Return a digest of all settings that change results.
+
+        Name, PETSc options and max_events are left out; without `with_output` so is [output].
+        """
         document = {k: v for k, v in self.resolved().items() if k not in ("name", "output", "petsc")}
         if with_output:
             computed = [name for name, entry in keys.keys_of(sections.Output).items() if not entry.presentation]
@@ -145,14 +151,14 @@ class Case:
 
 
 def load(path: str | Path) -> Case:
-    """Return the case in a file, named after the file unless it has a name. Raises CaseError with all faults."""
+    """Return the case in a file, by default named after the file. Raises CaseError with all faults."""
     return parse(read_document(path), Path(path).parent)
 
 
 def parse(values: Mapping[str, Any], folder: Path) -> Case:
-    """Return the case from nested dictionaries; its files are relative to `folder`.
+    """Return the case of nested dictionaries; file names are relative to `folder`.
 
-    NumPy's scalars and arrays, tuples and paths are as good as TOML's values.
+    Values may be NumPy scalars, arrays, tuples and paths, besides TOML types.
 
     Raises:
         CaseError: with all faults.
@@ -172,15 +178,24 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
 
 
 def check_stored(values: Mapping[str, Any]) -> None:
-    """Check the case that a result holds; its files may be gone, and are not looked at. Raises CaseError as `parse`."""
+    """Check the case in a result, without its files. Raises CaseError with all faults."""
     if faults := _read_sections(to_document(values), None)[1]:
         raise CaseError(*faults)
 
 
 def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[str, Any], list[str]]:
-    """Return the contents of sections, with [cell]'s files in `folder` if one is given, and their faults."""
-    reader = TableReader(_selected(document), sections.KEY_OWNERS, _top_level_faults(document))
-    selected, faults = reader.selected, reader.faults
+    """Return the section contents and their faults; without a folder, leave the files of [cell] unread."""
+    first = next(iter(interface_tables(document)), None)
+    if isinstance(first, dict) and "law" in first:
+        first = first | {"criterion": first["law"]}
+    tables, selected = document | {"interface": first}, dict[keys.Selector, str | None]()
+    for selector in (GEOMETRY, ANALYSIS_TYPE, PLANE, METHOD, CRITERION):
+        section, table = sections.SECTIONS[selector.section], tables.get(selector.section)
+        default = getattr(section, selector.key, None)
+        value = table.get(selector.key, default) if isinstance(table, Mapping) else default
+        selected[selector] = value if keys.keys_of(section)[selector.key].type.accepts(value) else None
+    faults = _top_level_faults(document)
+    reader = TableReader(selected, sections.KEY_OWNERS, faults)
     of_rules = [[*rule.faults(document, selected)] for rule in RULES]
     foreign = {rule.path[0] for rule, lines in zip(RULES, of_rules, strict=True) if lines and rule.holds is None}
     cell = _read_section(document, "cell", reader)
@@ -195,28 +210,13 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
         "petsc": sections.read_petsc(document.get("petsc", {}), faults),
     }
     faults += chain.from_iterable(of_rules)
-    # What has keys of other cases is not looked into.
+    # Sections that do not belong to the analysis have no further checks.
     faults += relation_faults(contents | {FIELDS.get(name, name): None for name in foreign}, document, selected[PLANE])
     return contents, faults
 
 
-def _selected(document: Mapping[str, Any]) -> keys.Selected:
-    """Return the values that decide which keys belong to the case."""
-    selectors = (GEOMETRY, ANALYSIS_TYPE, PLANE, METHOD, CRITERION)
-    first = next(iter(interface_tables(document)), None)
-    if isinstance(first, dict) and "law" in first:
-        first = first | {"criterion": first["law"]}
-    tables, selected = dict(document) | {"interface": first}, dict[keys.Selector, str | None]()
-    for selector in selectors:
-        section, table = sections.SECTIONS[selector.section], tables.get(selector.section)
-        default = getattr(section, selector.key, None)
-        value = table.get(selector.key, default) if isinstance(table, Mapping) else default
-        selected[selector] = value if keys.keys_of(section)[selector.key].type.accepts(value) else None
-    return selected
-
-
 def _top_level_faults(document: Mapping[str, Any]) -> list[str]:
-    """Faults in section names and in the keys before the first section."""
+    """List faults in section names and in the keys before the first section."""
     faults = [f"[{section}]: missing section" for section in sections.REQUIRED if section not in document]
     for name, value in document.items():
         hint = wording.suggestion(name, sections.TOP_LEVEL, sections.KEY_OWNERS)
@@ -236,14 +236,14 @@ def _top_level_faults(document: Mapping[str, Any]) -> list[str]:
 
 
 def _read_section(document: Mapping[str, Any], section: str, reader: TableReader) -> Any:
-    """Return a section's dataclass, or None if it is faulty or absent."""
+    """Return the dataclass of a section, None if the section is faulty or absent."""
     if section not in document and section in (*sections.REQUIRED, *sections.SECTIONS_OF_AN_ANALYSIS):
         return None
     return reader.read(sections.SECTIONS[section], document.get(section, {}), section)
 
 
 def check_phases(case: Case, phases: Iterable[str]) -> None:
-    """Raise CaseError if a mesh phase has no material, or a material no phase."""
+    """Check that mesh phases and materials match. Raises CaseError with all faults."""
     sources = {phase: provider(phase, case.materials) for phase in phases}
     without = [phase for phase, source in sources.items() if source not in case.materials]
     faults = [f"[material.{wording.toml_key(phase)}]: missing section; the mesh has this phase" for phase in without]

@@ -1,4 +1,4 @@
-"""Cell files: a mesh, a fibre table with the cell size, or a table that the cell matches."""
+"""Read and check the files of [cell]: a mesh, a fibre table with the cell size, or a table to match."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 
 SUFFIXES = {"mesh": MESH_SUFFIXES, "table": TABLE_SUFFIXES}
 LIST = "fibre_list"
-# Of a radius, up to which centres outside of a cut window are taken as on its border.
+# Distance from a cut window / radius, up to which a centre outside counts as on the border.
 LEFT_OUT = 0.01
 MOST_LISTED = 20
-FEWEST_MATCHED = 10  # fibres: of fewer, distances have no distribution
+FEWEST_MATCHED = 10  # fibres: the distances between fewer fibres have no distribution
 
 
 def checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """Return the cell with its file contents; their faults and faults between its keys go to `faults`."""
+    """Return the cell with the contents of its files, and add all faults to `faults`."""
     cell = _with_match(cell, folder, faults)
     if cell.fibre_fraction is not None:
         spacing = (cell.coating or 0.0) + (cell.min_gap if cell.geometry == "random" else 0.0)
@@ -52,13 +52,13 @@ def checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
 
 
 def _with_files(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """Return the cell with its file's path completed and its table read; faults are added to `faults`."""
+    """Return the cell with its full file path and its fibre table; add faults to `faults`."""
     if cell.geometry not in SUFFIXES or (cell.file is not None and cell.fibre_list is not None):
         return cell
     if cell.file is None:
         return cell if cell.fibre_list is None else _with_table(cell, faults)
-    named = folder / cell.file  # a link's own suffix counts
-    file = Path(os.path.realpath(named.parent)) / named.name  # unlike resolve, no error for links in a circle
+    named = folder / cell.file  # the suffix of a link itself counts
+    file = Path(os.path.realpath(named.parent)) / named.name  # unlike Path.resolve, without an error for circular links
     if file.suffix not in SUFFIXES[cell.geometry]:
         return cell
     if words := missing(file):
@@ -69,8 +69,8 @@ def _with_files(cell: Cell, folder: Path, faults: list[str]) -> Cell:
 
 
 def missing(file: Path) -> str:
-    """Why there is no such file, empty if there is."""
-    if os.path.isfile(file):  # false, not an error, for a name too long
+    """Return the reason why a file is missing, empty if the file exists."""
+    if os.path.isfile(file):  # False, not an error, if the name is too long
         return ""
     if not os.path.exists(file):
         return f"no such file (expected at {file})"
@@ -78,10 +78,9 @@ def missing(file: Path) -> str:
 
 
 def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """Return the cell with its table read, its number of fibres and its fraction.
+    """Return the cell with the window that it matches, and add faults to `faults`.
 
-    The table's path is completed; number and fraction come from the table's fibres where the cell has none of
-    its own; faults are added to `faults`.
+    Where the cell gives no number of fibres or no fibre fraction, the window provides the value.
     """
     if cell.match is None:
         return cell
@@ -89,7 +88,7 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     if words := missing(file):
         faults.append(f"{given}: {words}")
         return cell
-    from feti_homog.microstructure import fibre_pattern, random_fibres  # SciPy's trees, which few cases need
+    from feti_homog.microstructure import fibre_pattern, random_fibres  # import SciPy's trees, which few cases need
 
     try:
         window = fibre_pattern.read_window(file)
@@ -128,13 +127,18 @@ def _with_table(cell: Cell, faults: list[str]) -> Cell:
     for shape in [] if cell.tip_size is None else shapes.given_shapes(table.columns, has_tips=False):
         words = f"{table.name} has {shape.name}, and with them no nodes at tips"
         faults.append(f"[cell] tip_size = {cell.tip_size:g}: {words}")
-    width, height = (_size(name, getattr(cell, name), table, faults) for name in ("width", "height"))
-    table = replace(table, width=width, height=height)
+    for name in ("width", "height"):
+        asked, stored = getattr(cell, name), getattr(table, name)
+        if asked is None and stored is None and table.name != LIST:
+            faults.append(f"[cell] {name}: missing; {table.name} has no line such as # width = 120, height = 80")
+        elif None not in (asked, stored) and asked != stored:
+            faults.append(f"[cell] {name} = {asked:g}: {table.name} says {stored:g}; give one")
+        table = replace(table, **{name: stored if asked is None else asked})
     return replace(cell, table=_within(table) if cell.window == "cut" else table)
 
 
 def _within(table: fibre_table.FibreTable) -> fibre_table.FibreTable:
-    """Return the table without rows whose centres are outside the cell by more than LEFT_OUT of their radii."""
+    """Return the table without fibres whose centres lie outside by LEFT_OUT radii or more."""
     if table.width is None or table.height is None:
         return table
     corner = np.array([table.left, table.bottom], float)
@@ -150,17 +154,7 @@ def _within(table: fibre_table.FibreTable) -> fibre_table.FibreTable:
     return replace(retained, remarks=(*table.remarks, line))
 
 
-def _size(name: str, asked: float | None, table: fibre_table.FibreTable, faults: list[str]) -> float | None:
-    """Cell width or height, from the case or from the table, which must not differ."""
-    stored: float | None = getattr(table, name)
-    if asked is None and stored is None and table.name != LIST:
-        faults.append(f"[cell] {name}: missing; {table.name} has no line such as # width = 120, height = 80")
-    elif None not in (asked, stored) and asked != stored:
-        faults.append(f"[cell] {name} = {asked:g}: {table.name} says {stored:g}; give one")
-    return stored if asked is None else asked
-
-
-# Inner / outer radius of hollow fibres.
+# Smallest and largest ratio of inner to outer radius of hollow fibres.
 WIDEST_CORE = 0.05, 0.98
 HOLLOW_WORDS = f"expected inner_radius / radius from {WIDEST_CORE[0]:g} to {WIDEST_CORE[1]:g}, or 0"
 

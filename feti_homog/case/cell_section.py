@@ -1,4 +1,4 @@
-"""The section [cell] in a case file: the periodic cell's geometry and mesh."""
+"""Define the section [cell] of a case file: geometry and mesh of the periodic cell."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from feti_homog.case import section_values as kinds
 from feti_homog.microstructure import phase_names
 from feti_homog.schema import key, keys, types
 
-MOST_FIBRES = 100_000  # of a cell, and as many voids
+MOST_FIBRES = 100_000  # largest number of fibres, and of voids, in a cell
 
 if TYPE_CHECKING:
     from feti_homog.microstructure import fibre_pattern, fibre_table
@@ -46,8 +46,8 @@ random_key, meshed_key = partial(key, only=RANDOM), partial(key, only=MESHED)
 class Cell:
     """Geometry of the periodic cell and its mesh. Keys of another geometry keep their defaults.
 
-    `table` is what `file` or `fibre_list` of geometry = "table" have, with the size of the cell, and `matched` the
-    fibres of `match`; they are no keys.
+    Two fields are no keys: `table` has the contents of `file` or `fibre_list` for geometry = "table", with the cell
+    size, and `matched` has the fibres of `match`.
     """
 
     geometry: str = key(
@@ -243,18 +243,18 @@ class Cell:
 
     @property
     def fractions(self) -> dict[str, float]:
-        """Fibre fraction for each round fibre phase, in name order; none where files give it."""
+        """Return the fibre fraction of each phase, in name order; empty for cells from a file."""
         if self.mix is not None:
             return dict(sorted(self.mix.items()))
         return {} if self.fibre_fraction is None else {phase_names.FIBRE: self.fibre_fraction}
 
     @property
     def has_voids(self) -> bool:
-        """Return whether there are voids, as far as is known before a user's mesh is read."""
+        """Return whether the cell has voids, as far as the case tells without a user's mesh."""
         table = self.table
         return bool(self.voids) or (table is not None and bool(table.is_void.any() or table.inner_radius.any()))
 
     @property
     def has_own_mesh(self) -> bool:
-        """Return whether the user brings the mesh."""
+        """Return whether the user provides the mesh."""
         return self.geometry == "mesh"

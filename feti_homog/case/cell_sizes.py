@@ -1,7 +1,7 @@
-"""Sizes that follow from a cell: its numbers of fibres, its width, its element order and size.
+"""Derive numbers of fibres and voids, cell width, element order and element size from a cell section.
 
-Fibres of several phases have a fraction and a radius each: `mix` and `radii`.  Element order and size follow where
-a cell gives its accuracy.  Mixed elements have their own bubble and pressure.
+Each fibre phase has a fraction, `mix`, and a radius, `radii`.  If the cell gives an accuracy, element order and size
+follow from an error estimate.  Mixed elements have a bubble and a pressure inside each element.
 """
 
 from collections.abc import Mapping
@@ -17,59 +17,55 @@ from feti_homog.materials import laws, material_forms, voigt
 from feti_homog.microstructure import phase_names
 from feti_homog.schema import wording
 
-FEWEST = 0.5  # fibres of a phase, below which one would be another phase's worth
+FEWEST = 0.5  # expected fibres of a phase; fewer are nearer to no fibre than to one
 LOCKING_POISSON = 0.49
-"""Linear triangles lock above it."""
-# Rounding takes checks to their tolerance beside fibres of a thousandth of the matrix: from 2e-4 to 1e-9 of energies
-# at 0.4999999, with products that are refined.
+"""Largest Poisson's ratio of linear triangles; above it they lock."""
+# Above it rounding brings checks to their tolerance: at 0.4999999, beside fibres a thousandth as stiff as the matrix,
+# products with iterative refinement lower the error of energies from 2e-4 to 1e-9.
 ROUNDING_POISSON = 0.49999999
 
 
 def is_mixed(order: int, material: material_forms.Material, plane: str) -> bool:
-    """Return whether a phase's elements have their own bubble and pressure in the plane problem."""
+    """Return whether the elements of a material are mixed in the plane problem."""
     return order == 2 and laws.isotropic_ratio(material) is not None and not voigt.PLANE_STATES[plane].is_sheet
 
 
 def warnings(materials: Mapping[str, material_forms.Material], plane: str) -> list[str]:
-    """List the phases whose elements err by rounding, a line each."""
+    """List the phases too near to incompressible for the rounding, in one line each."""
     words = "so near to 0.5 that rounding may exceed the tolerance of the checks"
     lines = _above(ROUNDING_POISSON, materials, plane)
     return [f"{line}: {words}; use at most {ROUNDING_POISSON:.10g}" for line in lines]
 
 
 def remarks(materials: Mapping[str, material_forms.Material], plane: str) -> tuple[str, ...]:
-    """List the phases for which elements are quadratic, a line each."""
+    """List the phases that require quadratic elements, in one line each."""
     lines = _above(LOCKING_POISSON, materials, plane)
     return tuple(f"{line}: elements are quadratic, for linear ones lock above {LOCKING_POISSON}" for line in lines)
 
 
 def _above(limit: float, materials: Mapping[str, material_forms.Material], plane: str) -> list[str]:
-    """List the phases with a larger ratio that keep their volume: not in plane stress."""
+    """List the phases with a Poisson's ratio above a limit; none in plane stress."""
     if voigt.PLANE_STATES[plane].is_sheet:
         return []
-    ratios = {phase: laws.isotropic_ratio(material) for phase, material in materials.items()}
-    names = {
-        phase: "poisson" if isinstance(m, material_forms.Isotropic) else "Poisson's ratio"
-        for phase, m in materials.items()
-    }
-    return [
-        f"[material.{wording.toml_key(phase)}] {names[phase]} = {nu}"
-        for phase, nu in ratios.items()
-        if nu and nu > limit
-    ]
+    lines = []
+    for phase, material in materials.items():
+        name = "poisson" if isinstance(material, material_forms.Isotropic) else "Poisson's ratio"
+        if (ratio := laws.isotropic_ratio(material)) and ratio > limit:
+            lines.append(f"[material.{wording.toml_key(phase)}] {name} = {ratio}")
+    return lines
 
 
 CHOSEN = ("mesh_size", "interface_size", "tip_size", "refine")
-"""Keys that an accuracy excludes."""
+"""Keys that an accuracy chooses, and so excludes."""
 
-# Error of the coarsest mesh of elements of each order with stiff inclusions / (kappa beta^2), and how much larger it is
-# with soft ones: 1.5 times the largest that `scripts/measure_accuracy.py` finds.
+# By element order, the error of the coarsest mesh with stiff inclusions / (kappa beta^2), and the factor by which soft
+# inclusions raise it: 1.5 times the largest values that `scripts/measure_accuracy.py` finds.
 COARSE_ERROR = {1: 0.12, 2: 0.0075}
 SOFT_FACTOR = 6.0
-# Largest kappa s of cells of mixed elements.
+# Upper bound of kappa s in cells with mixed elements alone.
 MIXED_CONDITION = 33.0
-# Of the coarsest mesh: largest elements / distance of fibres on a square lattice, and / width of the cell. Circles and
-# gaps have smaller ones; still coarser meshes have hardly less elements.
+# Element size of the coarsest mesh / fibre distance on a square lattice, and its bound / cell width. Circles and gaps
+# have smaller elements, so still coarser meshes have hardly fewer elements.
 PITCH_SHARE, LARGEST = 0.5, 0.5
 MOST_REFINED = 8
 
@@ -82,15 +78,16 @@ def sized(
     free_faces: bool,
     faults: list[str],
 ) -> Cell:
-    """Return the cell with the mesh_size, the refine and the order that its accuracy asks for.
+    """Return the cell with mesh size, refinement and element order for its accuracy.
 
-    For an accuracy eps, the coarsest mesh is refined r times, r the least for which `coarse_error` / 4^(p r) <= eps
-    for elements of order p; the order taken has the fewest nodes, about p^2 4^r. It is a fault if more than
-    MOST_REFINED were needed, and so is a linear order in the table if its elements lock.
+    For an accuracy eps and elements of order p, the coarsest mesh is refined r times, with the least r such that
+    `coarse_error` / 4^(p r) <= eps. Of two orders, the result has the one with fewer nodes, about p^2 4^r. Faults go to
+    `faults`: r above MOST_REFINED, and a given linear order whose elements lock. The size of the coarsest mesh is half
+    the distance between equally many fibres on a square lattice, in two digits.
 
     Args:
-        table: [cell] as it is given, with the order or without.
-        free_faces: whether there are faces that no other phase holds firmly: at voids, at bonds that are soft or part.
+        table: the [cell] table of the file, with or without an order.
+        free_faces: whether the cell has voids, or interfaces with soft or breaking bonds.
     """
     locking, is_given = _above(LOCKING_POISSON, materials, plane), "order" in table
     if is_given and cell.order == 1:
@@ -109,23 +106,18 @@ def sized(
             f"[cell] accuracy = {cell.accuracy:g}: would need elements split {refinements[order]} times, more than "
             f"{MOST_REFINED}; expected {better}"
         )
-    return replace(cell, mesh_size=_coarsest(cell), refine=refinements[order], order=order)
+    fibres, height = fibres_and_height(cell)
+    mesh_size = min(LARGEST, float(f"{PITCH_SHARE * sqrt(height / fibres):.2g}"))
+    return replace(cell, mesh_size=mesh_size, refine=refinements[order], order=order)
 
 
 def fibres_and_height(cell: Cell) -> tuple[int, float]:
-    """Return the number of fibres and height / width of a lattice or a random cell."""
-    lattice = LATTICES.get(cell.geometry)
-    return (len(lattice.centres), lattice.height) if lattice else (sum(fibre_counts(cell).values()), 1.0)
-
-
-def _coarsest(cell: Cell) -> float:
-    """mesh_size of the coarsest mesh: half the distance between as many fibres on a square lattice, in two digits."""
+    """Return the number of fibres and height / width of a cell without its own mesh."""
     if cell.table is not None:
         assert cell.table.width is not None and cell.table.height is not None
-        fibres, height = len(cell.table.row), cell.table.height / cell.table.width
-    else:
-        fibres, height = fibres_and_height(cell)
-    return min(LARGEST, float(f"{PITCH_SHARE * sqrt(height / fibres):.2g}"))
+        return len(cell.table.row), cell.table.height / cell.table.width
+    lattice = LATTICES.get(cell.geometry)
+    return (len(lattice.centres), lattice.height) if lattice else (sum(fibre_counts(cell).values()), 1.0)
 
 
 def coarse_error(materials: Mapping[str, material_forms.Material], plane: str, order: int, free_faces: bool) -> float:
@@ -133,9 +125,9 @@ def coarse_error(materials: Mapping[str, material_forms.Material], plane: str, o
 
         C_p kappa max s beta^2,  beta = |lambda - 1| / (lambda + 1),
 
-    lambda the eigenvalues of a phase's stiffness relative to the one around it, 0 at free faces, s SOFT_FACTOR where
-    lambda < 1 and else 1, and kappa the condition of the plane stiffness in the phase nearest to incompressible,
-    for mixed elements at most MIXED_CONDITION, as is kappa s where all are mixed.
+    where lambda are the eigenvalues of a phase stiffness relative to the stiffness around the phase, 0 at free faces;
+    s is SOFT_FACTOR where lambda < 1 and 1 elsewhere; kappa is the largest condition number of a plane stiffness.
+    MIXED_CONDITION bounds kappa in mixed elements, and kappa s if all elements are mixed.
     """
     stiffness = {phase: laws.stiffness_of(material, plane) for phase, material in materials.items()}
     ratios = [
@@ -157,10 +149,11 @@ def coarse_error(materials: Mapping[str, material_forms.Material], plane: str, o
 
 
 def fibre_counts(cell: Cell) -> dict[str, int]:
-    """Return how many fibres per phase a random cell has.
+    """Return the number of fibres of each phase in a random cell.
 
-    Fibres of fraction c_p and radius r_p are as many as e_p ~ c_p / r_p^2. Each phase has one, and each further
-    fibre goes to the phase with the largest e_p / (2 n_p + 1), the rule of Sainte-Lague: whole numbers next to e_p.
+    A phase with fraction c_p and radius r_p has the expected number e_p ~ c_p / r_p^2. Each phase gets one fibre, and
+    each further fibre goes to the phase with the largest e_p / (2 n_p + 1), where n_p is its number so far: the method
+    of Sainte-Lague, which rounds all e_p to whole numbers with the given sum.
     """
     expected = _expected_counts(cell)
     count = max(len(expected), round(fsum(expected.values())))
@@ -171,7 +164,7 @@ def fibre_counts(cell: Cell) -> dict[str, int]:
 
 
 def _expected_counts(cell: Cell) -> dict[str, float]:
-    """Numbers of fibres per phase that are not whole; their sum is `fibres`, or follows from the width."""
+    """Return the expected fibre numbers per phase; their sum is `fibres` or follows from the width."""
     radii = cell.radii or dict.fromkeys(cell.fractions, 1.0)
     per_area = {phase: share / (pi * radii[phase] ** 2) for phase, share in cell.fractions.items()}
     area = cell.fibres / fsum(per_area.values()) if cell.fibres is not None else (cell.width or 1.0) ** 2
@@ -179,9 +172,9 @@ def _expected_counts(cell: Cell) -> dict[str, float]:
 
 
 def void_count(cell: Cell, fibre_radius: float) -> int:
-    """Return the number of voids in a random cell of width 1 whose fibres have this mean radius.
+    """Return the number of voids in a random cell of width 1.
 
-    It is the whole number nearest to the fraction, at least one.
+    The result is the whole number nearest to the void fraction, at least one.
     """
     if not cell.voids:
         return 0
@@ -190,7 +183,7 @@ def void_count(cell: Cell, fibre_radius: float) -> int:
 
 
 def fractions_in_words(cell: Cell) -> str:
-    """Return the keys with the fractions in a cell without a file, and their values."""
+    """Write the fibre and void fractions of a cell without a file as keys."""
     fibres = (
         f"fibre_fraction = {cell.fibre_fraction:g}"
         if cell.mix is None
@@ -200,9 +193,9 @@ def fractions_in_words(cell: Cell) -> str:
 
 
 def mixed_width(cell: Cell) -> float | None:
-    """Cell width, or None where `fibre_radius` or the default make it.
+    """Return the cell width, None if it follows from `fibre_radius` or is the default.
 
-    In it `fibres` fibres have these radii and fractions, W^2 = sum n_p pi r_p^2 / sum c_p.
+    With radii and a number of fibres, W^2 = sum n_p pi r_p^2 / sum c_p.
     """
     if cell.radii is None or cell.fibres is None:
         return cell.width
@@ -211,7 +204,7 @@ def mixed_width(cell: Cell) -> float | None:
 
 
 def mix_faults(cell: Cell) -> list[str]:
-    """List the faults in the numbers of a mix together."""
+    """List contradictions between fractions, radii and numbers of fibres in a mix."""
     if cell.mix is None:
         return []
     faults, given = [], f"[cell] mix = {wording.toml_value(dict(cell.mix))}"

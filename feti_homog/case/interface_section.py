@@ -1,4 +1,4 @@
-"""The section [interface]: arcs that are debonded from the start, and bonds that hold or break."""
+"""Define the section [interface]: initially debonded arcs, and bonds that hold or break."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,14 +10,14 @@ from feti_homog.case.bond_laws import DEFAULT, LAWS, REGISTRY
 from feti_homog.schema import key, types
 
 pair_key = partial(key, by_pair=True)
-"""A key in which several sections [[interface]] may differ; they agree in all others."""
+"""Return a key in which several [[interface]] sections may differ; they agree in all other keys."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Arc:
     """An arc of a fibre's interface that is debonded from the start, any number of them. Its tips stay bonded.
 
-    In type = "angle" the opening is None: [angle] values takes its place.
+    In type = "angle" the opening is None: [angle] values has the openings.
     """
 
     fibre: str | tuple[int, ...] = key(
@@ -65,7 +65,7 @@ class InterfaceSection:
     Without this section bonding is perfect. Several sections [[interface]], each with its pair of phases, have the same
     contact, law with its teeth, branch and growth, and scatter.
 
-    A strength of None is unlimited.
+    None stands for an unlimited strength.
     """
 
     contact: bool = key(
@@ -244,11 +244,11 @@ class InterfaceSection:
 
 
 def interface_tables(document: Mapping[str, Any]) -> list[Any]:
-    """Return the section [interface], or all from several sections [[interface]]; none if there is none."""
+    """Return all [interface] sections of a document as a list."""
     given = document.get("interface", [])
     return given if isinstance(given, list) else [given]
 
 
 def interface_label(number: int, count: int) -> str:
-    """Return an interface's label in messages; numbers begin at 0, labels at 1."""
+    """Return the label of an interface in messages; numbers begin at 0, labels at 1."""
     return "interface" if count == 1 else f"interface {number + 1}"

@@ -1,6 +1,6 @@
-"""Loads by name, and the analysis sections: [angle], [path], [load] and [envelope].
+"""Define loads by name, and the analysis sections [angle], [path], [load] and [envelope].
 
-A load gives for each component its strain or its stress; along a path it is completed by the load before.
+A load gives the strain or the stress of each component; on a path, the former load provides missing components.
 """
 
 import dataclasses
@@ -54,7 +54,7 @@ class MixedLoad:
 
     @property
     def named(self) -> dict[str, float]:
-        """The values that are given, by name."""
+        """Return the given values by name."""
         values = ((each.name, getattr(self, each.name)) for each in dataclasses.fields(self))
         return {name: value for name, value in values if value is not None}
 
@@ -68,10 +68,10 @@ WAYPOINTS = types.list_of(
 
 
 def completed(loads: Sequence[Strain | MixedLoad], plane: str) -> tuple[dict[str, float], ...]:
-    """Return a path's loads in full.
+    """Complete the loads of a path: name and value for each component.
 
-    One name and value for each component, and the temperature in generalized plane strain. Components that a load does
-    not name stay as in the load before, at first a stress of zero.
+    In generalized plane strain a load also has the temperature. Components that a load does not name keep the values of
+    the former load; before the first load, all stresses are zero.
     """
     state = voigt.PLANE_STATES[plane]
     unloaded = dict.fromkeys((*state.stresses, *[TEMPERATURE] * state.is_spatial), 0.0)
@@ -87,7 +87,7 @@ def completed(loads: Sequence[Strain | MixedLoad], plane: str) -> tuple[dict[str
 
 
 def first_named(loads: Sequence[Strain | MixedLoad], plane: str) -> dict[str, int]:
-    """By its stress name, which load is the first to name each component; len(loads) if none does."""
+    """Return the first load that names each component, by stress name; len(loads) if none does."""
     return {
         names[1]: next((k for k, load in enumerate(loads) if not named(load).keys().isdisjoint(names)), len(loads))
         for names in voigt.PLANE_STATES[plane].components
@@ -95,16 +95,16 @@ def first_named(loads: Sequence[Strain | MixedLoad], plane: str) -> dict[str, in
 
 
 def named(load: Strain | MixedLoad) -> dict[str, float]:
-    """Return a load's named components, [E11, E22, gamma12] if it is a strain."""
+    """Return the named components of a load; a strain names E11, E22 and gamma12."""
     return load.named if isinstance(load, MixedLoad) else dict(zip(voigt.STRAINS, load, strict=True))
 
 
 class AnalysisSection:
-    """The section of an analysis; by default the load breaks no bonds.
+    """The section of an analysis; by default no bond breaks.
 
     Attributes:
-        breaks: whether bonds break under its loads.
-        is_followed: whether it goes from event to event, debonding as it goes, and can be resumed.
+        breaks: whether bonds break under the loads of the analysis.
+        is_followed: whether the analysis follows debonding from event to event, and can be resumed.
     """
 
     breaks: ClassVar[bool] = False
@@ -112,21 +112,21 @@ class AnalysisSection:
 
     @property
     def openings(self) -> tuple[float, ...]:
-        """Openings of the arcs without an angle of their own, one after the other; none if they have angles."""
+        """Return the successive openings of all arcs; empty if each arc has its angle."""
         return ()
 
     @property
     def placed(self) -> Mapping[str, Strain | MixedLoad]:
-        """The loads as they are given, by their places in the section; none of unit loads."""
+        """Return the given loads by their keys in the section; empty for unit loads."""
         return {}
 
     def solves(self, loads: int, one_sided: bool) -> int:
-        """Equilibria of a problem with so many unit loads, under plus and minus each where faces touch one-sidedly."""
+        """Return the number of solves for unit loads; one-sided contact needs both signs."""
         return 2 * loads if one_sided else loads
 
 
 class Stiffness(AnalysisSection):
-    """The effective stiffness, which has no section."""
+    """The analysis of the effective stiffness, which has no section in the file."""
 
 
 FAMILIES = (voigt.SPATIAL_STRESSES, voigt.SPATIAL_STRAINS)
@@ -151,11 +151,11 @@ class Angle(AnalysisSection):
 
     @property
     def openings(self) -> tuple[float, ...]:
-        """All of them."""
+        """Return the successive openings of all arcs."""
         return self.values
 
     def solves(self, loads: int, one_sided: bool) -> int:
-        """Return the number of solves of all openings."""
+        """Return the number of solves for all openings."""
         return len(self.values) * (loads if self.strain is None else 1)
 
 
@@ -239,7 +239,7 @@ class LoadPath(AnalysisSection):
 
     @property
     def placed(self) -> Mapping[str, Strain | MixedLoad]:
-        """The waypoints by their places in the section."""
+        """Return the waypoints by their keys in the section."""
         if self.waypoints is not None:
             return {f"waypoints[{k}]": load for k, load in enumerate(self.waypoints)}
         return {name: load for name, load in (("strain", self.strain), ("to", self.to)) if load is not None}
@@ -256,5 +256,5 @@ class SingleLoad(AnalysisSection):
 
     @property
     def placed(self) -> Mapping[str, Strain | MixedLoad]:
-        """The load."""
+        """Return the load by its key in the section."""
         return {"to": self.to}

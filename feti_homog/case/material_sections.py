@@ -1,4 +1,4 @@
-"""Reading the sections [material.PHASE], and which material a mesh phase has."""
+"""Read the [material.PHASE] sections, and find the material of each mesh phase."""
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -17,15 +17,16 @@ FORMS_OF = {
     for contents in material_forms.MATERIAL_FORMS.values()
     for name in keys.keys_of(contents)
 }
-"""Forms with each constant."""
+"""Material forms that have each constant, by the constant's name."""
 
 
 def read_materials(
     document: Mapping[str, Any], plane: str | None, reader: TableReader
 ) -> dict[str, material_forms.Material]:
-    """Return the materials by phase, without checks that depend on a faulty geometry, mix or plane state.
+    """Return the valid materials by phase, and report faults to the reader.
 
-    Empty without a section [material]: that is a fault of the whole document.
+    A faulty geometry, mix or plane state turns off the checks that depend on it. Without a section [material] the
+    result is empty: another check reports the missing section.
     """
     if "material" not in document:
         return {}
@@ -40,10 +41,14 @@ def read_materials(
     known = None if fibres is None else (phase_names.MATRIX, *fibres, phase_names.COATING)
     materials = {}
     for phase, constants in table.items():
-        fault = _phase_fault(phase, known, geometry, reader.owners)
-        material = None if fault else _read_material(constants, f"material.{wording.toml_key(phase)}", plane, reader)
-        reader.faults += [fault] if fault else []
-        if material is not None:
+        section = f"material.{wording.toml_key(phase)}"
+        is_unknown = known is not None and ":" not in phase and phase not in known
+        if is_unknown or not phase_names.PHASE.fullmatch(phase) or phase in FORMS_OF:
+            owners = {} if phase == phase_names.FIBRE else reader.owners
+            reader.faults.append(f"[{section}]: unknown phase; {wording.suggestion(phase, known or SUGGESTED, owners)}")
+        elif ":" in phase and geometry in CIRCULAR:
+            reader.faults.append(f'[{section}]: belongs to geometry = "mesh", not {wording.toml_value(geometry)}')
+        elif (material := _read_material(constants, section, plane, reader)) is not None:
             materials[phase] = material
     needed = (phase_names.MATRIX, *(fibres or ()))
     reader.faults += [f"[material.{phase}]: missing section" for phase in needed if phase not in table]
@@ -51,7 +56,7 @@ def read_materials(
 
 
 def fibre_phases(cell: object) -> tuple[str, ...] | None:
-    """Return the fibre phases in a section [cell] without a file, None if its mix is faulty."""
+    """Return the fibre phases of a [cell] table without a file; None if its mix is faulty."""
     mix = cell.get("mix") if isinstance(cell, dict) else None
     if mix is None:
         return (phase_names.FIBRE,)
@@ -59,7 +64,7 @@ def fibre_phases(cell: object) -> tuple[str, ...] | None:
 
 
 def coating_faults(cell: Cell | None, materials: object) -> list[str]:
-    """Faults: coatings without a material, and a coating material where there are none."""
+    """List coatings without a material, and coating materials without a coating."""
     if cell is None or cell.has_own_mesh or not isinstance(materials, dict):
         return []
     has_coatings = cell.coating is not None
@@ -74,25 +79,10 @@ def coating_faults(cell: Cell | None, materials: object) -> list[str]:
     return []
 
 
-def _phase_fault(phase: str, known: tuple[str, ...] | None, geometry: str | None, owners: Mapping[str, str]) -> str:
-    """Return the fault in a phase name, empty if there is none.
-
-    `known` are a cell's phases, None if any may occur.
-    """
-    section = f"[material.{wording.toml_key(phase)}]"
-    is_unknown = known is not None and ":" not in phase and phase not in known
-    if is_unknown or not phase_names.PHASE.fullmatch(phase) or phase in FORMS_OF:
-        elsewhere = {} if phase == phase_names.FIBRE else owners
-        return f"{section}: unknown phase; {wording.suggestion(phase, known or SUGGESTED, elsewhere)}"
-    if ":" in phase and geometry in CIRCULAR:
-        return f'{section}: belongs to geometry = "mesh", not {wording.toml_value(geometry)}'
-    return ""
-
-
 def _read_material(
     table: object, section: str, plane: str | None, reader: TableReader
 ) -> material_forms.Material | None:
-    """Return a section's material, in the form of its keys; None if it is faulty."""
+    """Return the material of a section, in the form that its keys select; None if faulty."""
     given: dict[str, list[str]] = {}
     for name, (form, *further) in FORMS_OF.items():
         if isinstance(table, dict) and name in table and not further:
@@ -104,21 +94,19 @@ def _read_material(
         return None
     material: material_forms.Material | None = reader.read(material_forms.MATERIAL_FORMS[forms[0]], table, section)
     if material is not None:
-        checked: list[Callable[[], Any]] = [partial(laws.expansion, material)]
-        if plane is not None:
-            checked.insert(0, partial(laws.stiffness_of, material, plane))
-        for law in checked:
+        checks: list[Callable[[Any], object]] = [] if plane is None else [partial(laws.stiffness_of, plane=plane)]
+        for check in (*checks, laws.expansion):
             try:
-                law()
+                check(material)
             except ValueError as error:
                 reader.faults.append(f"[{section}] {error}")
     return material
 
 
 def missing_expansions(materials: Mapping[str, material_forms.Material], needed_by: str) -> list[str]:
-    """Faults of materials without thermal expansion, which something needs.
+    """List materials without the thermal expansion that the key `needed_by` requires.
 
-    Their other faults are reported elsewhere.
+    Materials with other faults are skipped: `read_materials` reports them.
     """
     faults = []
     for phase, material in materials.items():
@@ -129,5 +117,5 @@ def missing_expansions(materials: Mapping[str, material_forms.Material], needed_
 
 
 def provider(phase: str, materials: Mapping[str, material_forms.Material]) -> str:
-    """Return the phase whose material a phase has: itself, or "fibre" for "fibre:2"."""
+    """Return the phase that provides the material: the phase itself, or "fibre" for "fibre:2"."""
     return phase if phase in materials else phase.partition(":")[0]

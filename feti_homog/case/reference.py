@@ -1,4 +1,4 @@
-"""The case file reference, made from its keys alone: `feti-homog keys`."""
+"""Generate the case file reference, `feti-homog keys`, from the definitions of the keys."""
 
 import inspect
 import textwrap
@@ -28,15 +28,15 @@ MATERIAL_MEANING = (
 
 @dataclass(frozen=True)
 class KeyRow:
-    """One case file key, in words.
+    """A row of the reference: one key of the case file, in words.
 
     Attributes:
-        key: its name.
-        accepts: requirement on its value.
-        unit: the value's, empty if it has none.
-        default: as TOML writes it or in a word; "required" if the key must be given where it applies; else empty.
-        applies: for which geometry, analysis type or method it may be given; empty: for all.
-        meaning: a sentence or two.
+        key: name of the key.
+        accepts: requirement on the value.
+        unit: unit of the value, may be empty.
+        default: default as in TOML or in words, or "required"; may be empty.
+        applies: geometry, analysis type or method to which the key belongs; empty: all.
+        meaning: one or two sentences.
     """
 
     key: str
@@ -49,11 +49,11 @@ class KeyRow:
 
 @dataclass(frozen=True)
 class TableReference:
-    """A table of the case file: its purpose and its keys.
+    """A table of the case file, with its purpose and keys.
 
     Attributes:
-        section: the section's name: "cell", "material", ...; "name" for the key before the first section.
-        place: its place in the file: "[cell]", "[material.PHASE], isotropic", ...
+        section: name of the section: "cell", "material", ...; "name" for the key before the first section.
+        place: position in the file: "[cell]", "[material.PHASE], isotropic", ...
     """
 
     section: str
@@ -86,7 +86,7 @@ AXIS = KeyRow("SECTION.KEY", sections.AXIS_EXPECTED, "", "", "", sections.AXIS_M
 
 
 def tables() -> list[TableReference]:
-    """All tables of the case file, ordered as in `ORDER`."""
+    """Return all tables of the case file, in the order of `ORDER`."""
     ranges = _rows(sections.SWEEP, sections.RANGE_KEYS)
     references = [
         TableReference("name", "before the first section", "the case as a whole.", (NAME,)),
@@ -107,7 +107,7 @@ def tables() -> list[TableReference]:
 
 
 def tables_of(section: str) -> list[TableReference]:
-    """Return a section's tables. Raises CaseError if no section has the name."""
+    """Return the tables of a section. Raises CaseError if no section has this name."""
     result = [table for table in tables() if table.section == section]
     if not result:
         raise CaseError(f"{section}: unknown section; expected one of {', '.join(ORDER)}")
@@ -140,7 +140,7 @@ def _rows(section: str, keys: Mapping[str, keys.Key]) -> tuple[KeyRow, ...]:
 
 
 def as_text(references: Sequence[TableReference]) -> str:
-    """Return the tables in plain text: each key with its values, its conditions and its meaning."""
+    """Format tables as plain text: each key with its values, conditions and meaning."""
     blocks = []
     for table in references:
         lines = [textwrap.fill(f"{table.place}: {table.meaning}", WIDTH)]

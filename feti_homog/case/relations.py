@@ -1,4 +1,4 @@
-"""Reading the sections [interface], and relations between section values: faults, and remarks on loads."""
+"""Read the [interface] sections, and check relations between section values: faults, and remarks on loads."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,14 +14,14 @@ from feti_homog.case.section_values import PAIR
 from feti_homog.materials import material_forms, voigt
 from feti_homog.schema import TableReader, keys, wording
 
-# Relative difference of numbers that a table and other keys give alike.
+# Relative tolerance between a softening branch and the keys that repeat its numbers.
 SAME = 1e-6
 COMMON = tuple(name for name, entry in keys.keys_of(InterfaceSection).items() if not entry.by_pair)
-"""The keys in which all sections [[interface]] agree."""
+"""Keys that must have the same value in all [[interface]] sections."""
 
 
 def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], plane: str | None) -> list[str]:
-    """List the faults between section values that are not faulty themselves; a `plane` of None is faulty."""
+    """List contradictions between valid section values; `plane` is None if the case has no valid plane state."""
     path, load, angle, envelope = (sections[name] for name in ("path", "single_load", "angle", "envelope"))
     faults = [*_load_faults(path, load, plane)]
     heated = []
@@ -45,23 +45,20 @@ def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], pl
 def _load_faults(
     path: load_sections.LoadPath | None, load: load_sections.SingleLoad | None, plane: str | None
 ) -> Iterator[str]:
-    """Yield loads that are zero or repeat the load before, and too few increments."""
+    """Yield faults for zero loads, repeated loads and too few increments."""
     if load is not None and not any(load.to.named.values()):
         yield f"[load] to = {wording.toml_value(load.to.named)}: expected a load other than zero"
     elif path is not None:
         placed = path.placed
         if plane is not None and [path.strain, path.to, path.waypoints].count(None) == 2:
-            loads, last = (
-                load_sections.completed(tuple(placed.values()), plane),
-                ["zero, where the path begins", *placed],
-            )
-            repeats = [not any(loads[0].values()), *(before == after for before, after in pairwise(loads))]
-            for k, (place, given) in enumerate(placed.items()):
-                noun, value = (
-                    ("load", given.named) if isinstance(given, load_sections.MixedLoad) else ("strain", list(given))
-                )
-                if repeats[k]:
-                    yield f"[path] {place} = {wording.toml_value(value)}: expected a {noun} other than {last[k]}"
+            loads = load_sections.completed(tuple(placed.values()), plane)
+            repeats = not any(loads[0].values()), *(before == after for before, after in pairwise(loads))
+            formers = "zero, where the path begins", *[*placed][:-1]
+            for (place, entry), former, is_repeat in zip(placed.items(), formers, repeats, strict=True):
+                value = entry.named if isinstance(entry, load_sections.MixedLoad) else entry
+                noun = "load" if isinstance(value, dict) else "strain"
+                if is_repeat:
+                    yield f"[path] {place} = {wording.toml_value(value)}: expected a {noun} other than {former}"
         if path.increments is not None and path.increments < len(placed):
             yield f"[path] increments = {path.increments}: expected at least one for each waypoint"
 
@@ -69,10 +66,10 @@ def _load_faults(
 def axes_lines(
     kind: str, section: load_sections.AnalysisSection, materials: Mapping[str, material_forms.Material], plane: str
 ) -> tuple[str, ...]:
-    """Return the axes of loads and of phase constants that could be a ply's, in a line; none in a plane."""
+    """Return a line on axes that could be mistaken for ply axes; none in the plane."""
     if not voigt.PLANE_STATES[plane].is_spatial:
         return ()
-    from feti_homog.materials import engineering_constants  # which nothing in a plane needs
+    from feti_homog.materials import engineering_constants  # needed in generalized plane strain alone
 
     loaded = [name for load in section.placed.values() for name, value in load_sections.named(load).items() if value]
     of_loads = engineering_constants.axes_line(section.plane if isinstance(section, load_sections.Envelope) else loaded)
@@ -87,7 +84,7 @@ def axes_lines(
 def stress_free(
     section: str, placed: Mapping[str, load_sections.Strain | load_sections.MixedLoad], plane: str
 ) -> tuple[str, ...]:
-    """List the components free of stress because no load in a section names them, or none so far; a line each."""
+    """List the components that loads leave free of stress, in one line for each waypoint."""
     first = load_sections.first_named(tuple(placed.values()), plane)
     words = ["", *(f"stress-free until {place}" for place in [*placed][1:]), "never named: stress-free"]
     unnamed = {k: [name for name, number in first.items() if number == k] for k in range(1, len(words))}
@@ -97,7 +94,7 @@ def stress_free(
 def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[InterfaceSection, ...] | None:
     """Return the interface sections in file order; None if one is faulty.
 
-    Each has its law as `criterion`, and the numbers that follow from its softening branch.
+    Each section gets its law as `criterion`, and the numbers that follow from its softening branch.
     """
     tables = interface_tables(document)
     if document.get("interface") == []:
@@ -117,7 +114,7 @@ def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[I
 
 
 def _faults_between(interfaces: Sequence[InterfaceSection], tables: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Faults in several sections, from these tables: pairs that are missing or named twice, keys that must agree."""
+    """List missing pairs, repeated pairs, and keys in which the interface sections must agree."""
     faults: list[str] = []
     first: dict[frozenset[str], int] = {}
     for number, interface in enumerate(interfaces[: None if len(interfaces) > 1 else 0]):
@@ -127,7 +124,7 @@ def _faults_between(interfaces: Sequence[InterfaceSection], tables: Sequence[Map
             continue
         other = first.setdefault(frozenset(interface.between), number)
         if other != number:
-            pair = wording.toml_value(list(interface.between))
+            pair = wording.toml_value(interface.between)
             faults.append(f"[{label}] between = {pair}: expected another pair than [interface {other + 1}] has")
         for name in COMMON:
             value, common = getattr(interface, name), getattr(interfaces[0], name)
@@ -139,15 +136,17 @@ def _faults_between(interfaces: Sequence[InterfaceSection], tables: Sequence[Map
 
 
 def _written(value: Any) -> str:
-    """Return the value of a key that interfaces agree in, as TOML has it."""
-    table = (
-        keys.to_table(value, {}) if isinstance(value, Scatter) else list(value) if isinstance(value, tuple) else value
-    )
+    """Write the value of a common interface key as in TOML."""
+    table = keys.to_table(value, {}) if isinstance(value, Scatter) else value
     return "none" if table is None else wording.toml_value(table)
 
 
 def _of_branch(interface: InterfaceSection) -> dict[str, Any]:
-    """Return normal stiffness, strength and toughness of a branch that begins at its peak, where they are not given."""
+    """Derive missing normal stiffness, strength and toughness from a softening branch.
+
+    The branch begins at its peak, with opening delta_1 and traction t_1: k_n = t_1 / delta_1, N = t_1, and G_n is the
+    area under the elastic line and the branch.
+    """
     openings, tractions = interface.openings, interface.tractions
     if BRANCH[0] not in LAWS[interface.criterion].keys:
         return {}
@@ -161,7 +160,10 @@ def _of_branch(interface: InterfaceSection) -> dict[str, Any]:
 
 
 def _faults_within(interface: InterfaceSection, table: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the faults of numbers in a section: its softening law, without keys that `table` lacks, and friction."""
+    """Yield the faults of an interface section: softening numbers and friction.
+
+    `table` is the section as in the file; a separate rule reports its missing keys.
+    """
     law, words = LAWS[interface.criterion], f"friction = {interface.friction:g}: expected 0 with"
     if law.softens:
         needed = [name for name in law.needs if name not in COHESIVE[2:] and getattr(interface, name) is None]
@@ -178,7 +180,7 @@ def _faults_within(interface: InterfaceSection, table: Mapping[str, Any]) -> Ite
 
 
 def idle_friction_keys(interfaces: tuple[InterfaceSection, ...]) -> list[str]:
-    """List the friction keys that have no effect because there is none, a line each."""
+    """List the friction keys without effect at zero friction, in one line each."""
     lines = []
     for number, each in enumerate(interfaces):
         if each.friction_on_damage and each.friction == 0.0:
@@ -188,16 +190,16 @@ def idle_friction_keys(interfaces: tuple[InterfaceSection, ...]) -> list[str]:
 
 
 def _branch_faults(interface: InterfaceSection) -> Iterator[str]:
-    """Yield the faults in a softening branch, or the numbers that contradict it."""
+    """Yield the faults of a softening branch, and numbers that contradict the branch."""
     openings, tractions = interface.openings, interface.tractions
     if openings is None or tractions is None or BRANCH[0] not in LAWS[interface.criterion].keys:
         return
     if len(openings) != len(tractions):
         yield f"openings, tractions: {len(openings)} and {len(tractions)} numbers; expected as many of both"
     elif openings[0] <= 0.0 or sorted({*openings}) != [*openings]:
-        yield f"openings = {wording.toml_value(list(openings))}: expected a rising list of numbers above 0"
+        yield f"openings = {wording.toml_value(openings)}: expected a rising list of numbers above 0"
     elif tractions[0] <= 0.0 or tractions[-1] != 0.0 or sorted(tractions) != [*tractions[::-1]]:
-        branch = wording.toml_value(list(tractions))
+        branch = wording.toml_value(tractions)
         yield f"tractions = {branch}: expected a softening branch, which falls from its peak to 0"
     else:
         bare = replace(interface, normal_stiffness=None, normal_strength=None, normal_toughness=None)
@@ -207,7 +209,7 @@ def _branch_faults(interface: InterfaceSection) -> Iterator[str]:
 
 
 def _short_of_energy(interface: InterfaceSection) -> Iterator[str]:
-    """Yield the toughnesses below the triangle under the elastic line."""
+    """Yield the toughnesses below the elastic energy that a bond stores at its peak."""
     for kind in ("normal", "tangential"):
         stiffness, strength, toughness = (
             getattr(interface, f"{kind}_{what}") for what in ("stiffness", "strength", "toughness")

@@ -21,7 +21,7 @@ from feti_homog.schema import keys, types, wording
 
 TablePath = tuple[str, ...]
 ITEMS = "items"
-"""In a path: the entries of a list."""
+"""Path entry that stands for every item of a list."""
 CELL, INTERFACE, LOADS = ("cell",), ("interface",), ("strain", "to", "waypoints")
 PLACES_OF_LOADS: tuple[TablePath, ...] = (("path", "to"), ("path", "waypoints", ITEMS), ("load", "to"))
 PLACES_OF_TABLES: tuple[tuple[TablePath, type[Any]], ...] = (
@@ -34,14 +34,14 @@ PLACES_OF_TABLES: tuple[tuple[TablePath, type[Any]], ...] = (
 
 @dataclass(frozen=True)
 class Rule:
-    """Requirement at a document path under some conditions.
+    """A requirement on the value at a document path, under some conditions.
 
     Attributes:
-        path: from the section to a table or value; where there is none, the rule holds. Empty: the whole document.
-        holds: whether the value there is valid; None if no value may stand there.
-        words: expectation that an invalid value fails, or the end of the line made of the value and the selection.
-        when: conditions all of which must hold.
-        names: table keys that the fault names, the given ones if there are any; empty: it names the value.
+        path: from the section to a table or value; the rule holds if nothing is there. Empty: the whole document.
+        holds: tests the value; None if the path may have no value.
+        words: the expectation that an invalid value fails, or a function of value and selection that ends the line.
+        when: conditions; the rule applies if all hold.
+        names: keys in the fault, reduced to those in the table if the table has any; empty: the fault shows the value.
     """
 
     path: TablePath
@@ -51,7 +51,7 @@ class Rule:
     names: tuple[str, ...] = ()
 
     def faults(self, document: Mapping[str, Any], selected: keys.Selected) -> Iterator[str]:
-        """Yield a line for each invalid place in the document."""
+        """Yield one line for each invalid value in the document."""
         if not all(condition.holds(selected) for condition in self.when):
             return
         for section, place, value in _places(document, self.path):
@@ -60,7 +60,7 @@ class Rule:
                 yield f"[{section}]{self._keys(place, value)}{words}" if self.path else words[2:]
 
     def _keys(self, place: str, value: Any) -> str:
-        """Return the keys of a table, or a value with its key, as the fault of a place names them."""
+        """Return the part of a fault that names the keys of a table, or a key and its value."""
         if not self.names:
             return f" {place} = {wording.toml_value(value)}" if place else ""
         above, names = f"{place}." if place else "", [name for name in self.names if name in value] or self.names
@@ -68,19 +68,22 @@ class Rule:
 
 
 def has(table: Any, *names: str) -> bool:
-    """Return whether the value is a table with all these keys."""
+    """Return whether a value is a table that has all these keys."""
     return isinstance(table, dict) and {*names} <= table.keys()
 
 
 def exclusive(path: TablePath, *names: str, words: str = "exclude each other; give one") -> Rule:
-    """Allow at most one of these keys."""
+    """Return the rule that a table has at most one of these keys."""
     return Rule(path, lambda table: sum(has(table, name) for name in names) < 2, words, names=names)
 
 
 def needed(
     path: TablePath, name: str, words: str, *when: keys.Condition, beside: str = "", unless: Sequence[str] = ()
 ) -> Rule:
-    """Require a key, or one of others in its place, under some conditions or beside another key."""
+    """Return the rule that a table has a key, or one of its substitutes.
+
+    The rule applies under the conditions `when`, and, if `beside` is given, only to tables with that key.
+    """
 
     def holds(table: Any) -> bool:
         is_asked = isinstance(table, dict) and (not beside or beside in table)
@@ -92,7 +95,10 @@ def needed(
 def belonging(
     path: TablePath, condition: keys.Condition, values: Sequence[str], *when: keys.Condition, instead: str = ""
 ) -> Rule:
-    """Refuse the key or section at the end of the path where the selector has other values than the condition."""
+    """Return the rule that refuses a key or section unless a condition holds.
+
+    `values` are all values of the condition's selector; `instead` names a replacement.
+    """
     others = tuple(value for value in values if value not in condition.values)
 
     def words(_: Any, selected: keys.Selected) -> str:
@@ -103,7 +109,10 @@ def belonging(
 
 
 def _places(document: Mapping[str, Any], path: TablePath) -> Iterator[tuple[str, str, Any]]:
-    """Yield section, place there and value at a path; of a list of sections, numbered from 1, each one's."""
+    """Yield section, key within the section, and value at each match of a path.
+
+    Sections in a list are numbered from 1.
+    """
 
     def within(section: str, place: str, value: Any, rest: TablePath) -> Iterator[tuple[str, str, Any]]:
         if not rest:
@@ -125,12 +134,12 @@ def _places(document: Mapping[str, Any], path: TablePath) -> Iterator[tuple[str,
 
 
 def _values(selector: keys.Selector) -> Sequence[str]:
-    """Return the values that a selector may have."""
+    """Return all values of a selector."""
     return keys.keys_of(SECTIONS[selector.section])[selector.key].type.options
 
 
 def _conditional_keys() -> Iterator[Rule]:
-    """Require or refuse sections and keys by selector values."""
+    """Yield the rules by which selector values require or refuse sections and keys."""
     for section, condition in SECTIONS_OF_AN_ANALYSIS.items():
         line = f"[{section}]: missing section; {condition.in_words(section)} needs it"
         yield needed((), section, line, condition)
@@ -146,7 +155,7 @@ def _conditional_keys() -> Iterator[Rule]:
 
 
 def _cell() -> Iterator[Rule]:
-    """Yield the requirements and exclusions among the keys of [cell]."""
+    """Yield the requirements and exclusions between keys of [cell]."""
     yield exclusive(CELL, "width", "fibre_radius")
     names, line = ("accuracy", *CHOSEN), "exclude each other; accuracy chooses the sizes"
     yield Rule(CELL, lambda cell: not has(cell, "accuracy") or {*CHOSEN}.isdisjoint(cell), line, names=names)
@@ -178,7 +187,7 @@ def _cell() -> Iterator[Rule]:
 
 
 def _files() -> Iterator[Rule]:
-    """Require a mesh file, and a fibre file or list beside the cell size."""
+    """Yield the rules for mesh files, fibre tables and fibre lists."""
     yield exclusive(CELL, "file", "fibre_list")
     yield needed(CELL, "file", f"missing; expected the name of a {kinds.MESH_FILE}", MESH)
     line = "missing; expected the name of a .csv file, or fibre_list"
@@ -202,12 +211,12 @@ def _has_other_end(suffixes: tuple[str, ...], name: Any) -> bool:
 
 
 def _bonds() -> Iterator[Rule]:
-    """Yield the rules for debonded arcs, and the requirements for energies and envelopes."""
+    """Yield the rules for debonded arcs, bond laws and envelopes."""
     start = "[interface] debonded: missing"
     line = f"{start}; {kinds.ANGLE_ANALYSIS.in_words('interface')} needs {ARCS.expected}"
     cracked = partial(_any_section, _some_arc)
     yield Rule((), lambda document: "interface" in document and cracked(document), line, (kinds.ANGLE_ANALYSIS,))
-    # An empty list is meant; of a user's mesh a curve may be debonded.
+    # An empty list is a decision of the user. In a user's mesh a curve may be debonded instead.
     ways = ("debonded", *STIFFNESSES, "axial_stiffness")
     line = f"{start}; expected {ARCS.expected}, or []: nothing else can open"
     opens = partial(_any_section, lambda table: any(name in table for name in ways))
@@ -233,25 +242,25 @@ def _bonds() -> Iterator[Rule]:
 
 
 def _any_section(test: types.Test, document: Any) -> bool:
-    """Return whether [interface], or one of several, passes a test; other types are faults elsewhere."""
+    """Return whether an [interface] section passes a test, or has a fault of other rules."""
     tables = interface_tables(document)
     return "interface" not in document or any(not isinstance(table, dict) or test(table) for table in tables)
 
 
 def _some_arc(table: Any) -> bool:
-    """Return whether a section has debonded arcs."""
+    """Return whether an interface section has debonded arcs."""
     return has(table, "debonded") and table["debonded"] != []
 
 
 def _breaks(strengths: Sequence[str], table: Any) -> bool:
-    """Return whether bonds of a section break under some load: a finite strength, or a law without one."""
+    """Return whether bonds can break: a finite strength, or a law with a fixed limit."""
     unlimited = [law.name for law in REGISTRY if not law.limits]
     is_finite = (has(table, name) and table[name] not in (math.inf, types.INF) for name in strengths)
     return any(is_finite) or any(has(table, key) and table[key] in unlimited for key in ("criterion", "law"))
 
 
 def _loads_and_outputs() -> Iterator[Rule]:
-    """Yield the rules for loads, and for outputs that an analysis or a plane state lacks."""
+    """Yield the rules for loads, and for outputs that some analyses do not have."""
     yield replace(needed(("path",), LOADS[0], "missing; give one", unless=LOADS), names=LOADS)
     yield exclusive(("path",), *LOADS)
     line = f"expected a table such as {{E11 = 0.01}} in {kinds.GENERALIZED.in_words('path')}"
@@ -275,4 +284,4 @@ RULES = (
     *_bonds(),
     *_loads_and_outputs(),
 )
-"""In the order of their faults."""
+"""All rules, in the order in which their faults are printed."""

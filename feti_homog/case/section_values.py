@@ -1,4 +1,4 @@
-"""Types of values in the sections of a case file, and the keys whose values decide which other keys belong to it."""
+"""Define the value types of case sections, and the selectors that decide which keys belong to a case."""
 
 import math
 from dataclasses import replace
@@ -18,7 +18,7 @@ MESH_FILE = ".msh, .inp, .vtu, .vtk or .mesh file"
 
 
 def _by_phase(words: str, example: str, number: types.ValueType) -> types.ValueType:
-    """Return a table of numbers by the phases of fibres."""
+    """Return the type of tables with a number for each fibre phase."""
 
     def accepts(value: Any) -> bool:
         is_table = isinstance(value, dict) and value != {}
@@ -34,7 +34,7 @@ def _by_phase(words: str, example: str, number: types.ValueType) -> types.ValueT
 
 
 def _positive_or_inf(what: str) -> types.ValueType:
-    """Return a number above 0; inf is read as None."""
+    """Return the type of numbers above 0; inf is stored as None."""
     number = types.real(above=0.0)
     return types.ValueType(
         f"{what} above 0, or inf",

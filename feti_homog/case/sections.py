@@ -1,7 +1,7 @@
-"""Sections of a case file, [sweep] and the tables of a fit among them: their keys, accepted values and meanings.
+"""Define the sections of a case file, with [sweep] and the tables of a fit: keys, values and meanings.
 
-[petsc] has PETSc's options of the solver without their dash.  What PETSc itself takes, as -log_view, it reads when it
-starts and ends, which is on the command line alone.
+[petsc] has the PETSc options of the solver without their dash.  PETSc reads its own options, such as -log_view, when it
+starts, so they belong on the command line.
 """
 
 import re
@@ -23,7 +23,7 @@ OPTION_EXPECTED = "a text, a number, true or false"
 SWEEP = "sweep"
 UNCERTAINTY, CORRELATION = "uncertainty", "correlation"
 DIFFERENTIABLE = ("stiffness", "load")
-"""Types of analyses that have derivatives."""
+"""Analysis types with sensitivities."""
 UNKNOWN, MEASURED, TEST, CURVE = "unknown", "measured", "test", "curve"
 FIT_SECTIONS = (UNKNOWN, MEASURED, TEST)
 STD = types.real(above=0.0)
@@ -49,7 +49,7 @@ RANGE_KEYS = {
         types.choice("linear", "log"), '"log": values of even ratios, from a number above 0.', default='"linear"'
     ),
 }
-"""A range is no dataclass: `from` is a word of Python's."""
+"""Keys of a range; not a dataclass, because `from` is a keyword of Python."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -220,7 +220,7 @@ SECTIONS: dict[str, type[Any]] = {
 }
 
 SECTIONS_OF_AN_ANALYSIS = {name: ANALYSIS_TYPE.among(name) for name in ("angle", "path", "load", "envelope")}
-"""Sections that must be given for one type of analysis, and belong to no other."""
+"""Sections that one analysis type requires, and no other type has."""
 
 REQUIRED = ("cell", "material", "analysis")
 TOP_LEVEL = (*SECTIONS, "material", "petsc", "name")
@@ -228,12 +228,12 @@ TOP_LEVEL = (*SECTIONS, "material", "petsc", "name")
 
 @dataclass(frozen=True)
 class SectionTable:
-    """A table.
+    """A table of the case file.
 
     Attributes:
-        section: the section in which it stands.
-        place: its place in the file, in words, with its form if there are several.
-        contents: the dataclass that lists its keys.
+        section: name of its section.
+        place: position in the file, in words, with the form if there are several.
+        contents: dataclass with the keys of the table.
     """
 
     section: str
@@ -261,11 +261,11 @@ KEY_OWNERS = {
     for table in TABLES
     for name in keys.keys_of(table.contents)
 }
-"""By key, the tables to which it belongs, in words."""
+"""The tables of each key, in words."""
 
 
 def read_petsc(table: object, faults: list[str]) -> dict[str, Scalar]:
-    """PETSc's options by name; only the run checks options of prefix feti_."""
+    """Read PETSc options by name; the run itself checks options with the prefix feti_."""
     if not isinstance(table, dict):
         faults.append(f"petsc = {wording.toml_value(table)}: expected a section [petsc]")
         return {}

@@ -1,4 +1,4 @@
-"""The document of a case: nested tables of TOML types, from a file or from Python and NumPy values."""
+"""Read the document of a case, nested tables of TOML types, from a file or from Python and NumPy values."""
 
 import hashlib
 import os
@@ -21,7 +21,7 @@ TomlPath = tuple[str, ...]
 
 
 def read_document(path: str | Path) -> dict[str, Any]:
-    """Return the TOML document in a file, named after the file. Raises CaseError if it is none."""
+    """Return the TOML document in a file, by default named after the file. Raises CaseError."""
     path = Path(path)
     if "\0" in str(path):
         raise CaseError(f"{str(path)!r}: no file has a name with a null character")
@@ -33,30 +33,26 @@ def read_document(path: str | Path) -> dict[str, Any]:
         raise CaseError(f"{path}: not UTF-8 text (line {line})") from None
     except RecursionError:
         raise CaseError(f"{path}: {TOO_DEEP}") from None
-    except ValueError as error:  # of too long a number too
+    except ValueError as error:  # also for a number with too many digits
         place = f"line {content.count(chr(10)) + 1}, the end"
         raise CaseError(f"{path}: not TOML: {str(error).replace('end of document', place)}") from None
     except OSError as error:
         raise CaseError(f"{path}: cannot be read: {error.strerror}") from None
-    if _is_deeper(document, MAX_DEPTH):
+    level: list[Any] = [document]
+    for _ in range(MAX_DEPTH):
+        entries = (entry for each in level for entry in (each.values() if isinstance(each, dict) else each))
+        level = [entry for entry in entries if isinstance(entry, dict | list)]
+    if level:
         raise CaseError(f"{path}: {TOO_DEEP}")
-    # Where the locale has no UTF-8, Python escapes the bytes of names of files.
+    # Without a UTF-8 locale, Python escapes the bytes of file names.
     return {"name": os.fsencode(path.stem).decode("utf-8", "replace")} | document
 
 
-def _is_deeper(document: dict[str, Any], depth: int) -> bool:
-    """Return whether tables and arrays stand in each other more than so deep."""
-    level: list[Any] = [document]
-    for _ in range(depth):
-        entries = (entry for each in level for entry in (each.values() if isinstance(each, dict) else each))
-        level = [entry for entry in entries if isinstance(entry, dict | list)]
-    return bool(level)
-
-
 def to_document(values: object) -> dict[str, Any]:
-    """Return the values with TOML's types: NumPy's scalars as numbers, arrays and tuples as lists, paths as texts.
+    """Convert Python and NumPy values to TOML types.
 
-    Values of other types are left as they are: the keys refuse them.
+    NumPy scalars become numbers, arrays and tuples become lists, paths become texts. Values of other types stay as they
+    are: the keys refuse them.
 
     Raises:
         TypeError: the values are no mapping.
@@ -90,7 +86,10 @@ def _to_toml(value: Any, path: TomlPath, faults: list[str]) -> Any:
 def leaves(
     table: Mapping[str, Any], is_value: Callable[[TomlPath, Any], bool] | None = None, above: TomlPath = ()
 ) -> Iterator[tuple[TomlPath, Any]]:
-    """Yield the paths and values in a nested table with dotted keys; empty tables and `is_value` ones are values."""
+    """Yield path and value of each leaf of a nested table.
+
+    Dotted keys are split. An empty table, or a table that passes `is_value`, is a leaf.
+    """
     for name, value in table.items():
         path = (*above, *name.split("."))
         if isinstance(value, dict) and value and not (is_value and is_value(path, value)):
@@ -100,12 +99,12 @@ def leaves(
 
 
 def short_digest(content: bytes) -> str:
-    """Return 16 hexadecimal digits that differ for different contents."""
+    """Return the first 16 hexadecimal digits of the SHA-256 digest of a content."""
     return hashlib.sha256(content).hexdigest()[:16]
 
 
 def _named_items(table: Mapping[Any, Any], path: TomlPath, faults: list[str]) -> list[tuple[str, Any]]:
-    """Return a table's items; a key that is no text is a fault."""
+    """Return the items of a table, and report each key that is no text."""
     wrong = [name for name in table if not isinstance(name, str)]
     place = f"[{wording.dotted_key(path)}] " if path else ""
     faults += [f"{place}{name!r}: expected a text as key, not {_article(name)}" for name in wrong]
@@ -113,6 +112,6 @@ def _named_items(table: Mapping[Any, Any], path: TomlPath, faults: list[str]) ->
 
 
 def _article(value: object) -> str:
-    """Return a value's type in words: "an int", "a list"."""
+    """Return the type of a value with its article: "an int", "a list"."""
     name = type(value).__name__
     return f"{'an' if name[0] in 'aeiou' else 'a'} {name}"

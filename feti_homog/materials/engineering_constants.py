@@ -1,4 +1,4 @@
-"""Stiffness constants by name: one table, and records, symbols and axes for its names.
+"""Compute the named constants of a stiffness, with their records, symbols and axes.
 
 Stiffnesses C are (3, 3) in Voigt order [11, 22, 12], or (6, 6) in the order [11, 22, 33, 23, 13, 12] with x3 along the
 fibres; engineering shears, any stress unit.  Expansions are strains per unit of temperature, (6,) in the same order.
@@ -146,13 +146,13 @@ def about_fibres(C: Array) -> dict[str, Any]:
 
 
 def transverse_constants(E_axial: float, nu_axial: float, bulk: float, shear: float) -> tuple[float, float]:
-    """E_T and nu_T: 4/E_T = 1/k + 1/m + 4 nu_A^2/E_A and nu_T = E_T/(2 m) - 1 (Hill 1964)."""
+    """Return E_T and nu_T: 4/E_T = 1/k + 1/m + 4 nu_A^2/E_A and nu_T = E_T/(2 m) - 1 (Hill 1964)."""
     E_transverse = 4 / (1 / bulk + 1 / shear + 4 * nu_axial**2 / E_axial)
     return E_transverse, E_transverse / (2 * shear) - 1
 
 
 def engineering_moduli(stiffness: ArrayLike) -> Moduli:
-    """Return the moduli from a stiffness (3, 3). Raises numpy.linalg.LinAlgError if it is singular."""
+    """Return the moduli of a stiffness (3, 3). Raises numpy.linalg.LinAlgError if C is singular."""
     C = np.asarray(stiffness, dtype=float)
     S, (bulk, shear) = np.linalg.inv(C), isotropic_part(C)
     table = _along_axes(S) | {"eta1": S[2, 0] / S[0, 0], "eta2": S[2, 1] / S[1, 1], "bulk": bulk, "shear": shear}
@@ -160,9 +160,10 @@ def engineering_moduli(stiffness: ArrayLike) -> Moduli:
 
 
 def isotropic_part(stiffness: ArrayLike) -> tuple[float, float]:
-    """Plane bulk modulus k and shear modulus mu for the isotropic stiffness nearest in the Frobenius norm.
+    """Return bulk modulus k and shear modulus mu of the nearest isotropic plane stiffness.
 
-    k = (C11 + C22 + C12 + C21)/4, mu = (C11 + C22 - C12 - C21 + 4 C33)/8; rotating the axes changes neither.
+    k = (C11 + C22 + C12 + C21)/4, mu = (C11 + C22 - C12 - C21 + 4 C33)/8,
+    nearest in the Frobenius norm. Both are the same in all axes.
     """
     c = np.asarray(stiffness, dtype=float)
     bulk = (c[0, 0] + c[1, 1] + c[0, 1] + c[1, 0]) / 4
@@ -171,7 +172,7 @@ def isotropic_part(stiffness: ArrayLike) -> tuple[float, float]:
 
 
 def isotropic_stiffness(bulk: float, shear: float) -> Float:
-    """C11 = C22 = k + mu, C12 = k - mu, C33 = mu."""
+    """Return the isotropic stiffness C11 = C22 = k + mu, C12 = k - mu, C33 = mu."""
     plus, minus = bulk + shear, bulk - shear
     return np.array([[plus, minus, 0.0], [minus, plus, 0.0], [0.0, 0.0, shear]])
 
@@ -188,7 +189,7 @@ def _distance(C: Float, nearest: Float) -> float:
 
 
 def engineering_constants(stiffness: ArrayLike) -> EngineeringConstants:
-    """Return the constants of a stiffness (6, 6). Raises numpy.linalg.LinAlgError if it is singular."""
+    """Return the constants of a stiffness (6, 6). Raises numpy.linalg.LinAlgError if C is singular."""
     table = _along_axes(np.linalg.inv(np.asarray(stiffness, dtype=float)))
     return EngineeringConstants(**{name: float(value) for name, value in table.items()})
 
@@ -242,7 +243,7 @@ CELL_AXES = "axes of the cell, x3 along the fibres"
 MATERIAL_AXES = "Material axes: 1 along the fibres (x3 of the cell), 2 and 3 across (x1, x2)"
 ALONG, ACROSS = "along", "across"
 MATERIAL_EXPANSIONS = ("expansion_axial", "expansion_x1", "expansion_x2", *EXPANSIONS[3:])
-"""Expansions in the order of material axes; `voigt.EXPANSIONS` has them in the order of the cell."""
+"""Names of the expansions in material axes; `voigt.EXPANSIONS` has the names in cell axes."""
 
 
 class Constant(NamedTuple):
@@ -267,7 +268,7 @@ ABOUT_FIBRES = {
 """Constants of the nearest transversely isotropic material, by name."""
 OF_THE_CELL = {"E1": "E3", "E2": "E1", "E3": "E2", "G12": "G13", "G13": "G23", "G23": "G12",
                "nu12": "nu31", "nu13": "nu32", "nu23": "nu12"}  # fmt: skip
-"""By the name of a constant in material axes, its name in the axes of the cell."""
+"""Names of constants in cell axes, by their names in material axes."""
 _PLACES = (("expansion.", EXPANSIONS), ("thermal_stress.", THERMAL_STRESSES), ("alpha", MATERIAL_EXPANSIONS))
 FORMER = {f"{former}{k + 1}": names[k] for former, names in _PLACES for k in range(3)}
 """Removed names, each with its replacement."""
@@ -286,7 +287,7 @@ _READ_EITHER_WAY = {
 
 
 def axes_line(names: Iterable[str]) -> str:
-    """Return the axes of names, such as `S12` or `onset_S12`, that a ply has the other way; empty without any."""
+    """Describe the axes of names, such as `S12`, that mean something else in a ply; may be empty."""
     bare = dict.fromkeys(name.rpartition("_")[2] for name in names)
     return ". ".join(
         f"{name} is {kind} {way} the fibres; {ALONG if way == ACROSS else ACROSS} them {others}"

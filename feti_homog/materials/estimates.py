@@ -1,4 +1,4 @@
-"""Closed estimates for a unidirectional composite's constants, from its phases and their fractions alone.
+"""Estimate the constants of a unidirectional composite by closed formulas from its phases and fractions.
 
 E_A, E_T, nu_A, nu_T: Young's moduli and contractions along and across the fibres; G_A, G_T, k: shear moduli along and
 across them and the bulk modulus across them; alpha: expansions; c: fractions; f, m: fibre and matrix.
@@ -135,7 +135,7 @@ def _phases(
 def _in_parallel(
     matrix: engineering_constants.TransverseIsotropy, fibres: Sequence[phase_bounds.Fibres]
 ) -> dict[str, Any]:
-    """Tabulate E_A, nu_A, alpha_A and alpha_T by the rule of mixtures; no alpha if a phase has none."""
+    """Return E_A, nu_A, alpha_A and alpha_T by the rule of mixtures; alpha if all phases have it."""
     phases = _phases(matrix, fibres)
     E, nu = sum(c * x.E_axial for c, x in phases), sum(c * x.nu_axial for c, x in phases)
     axial = transverse = 0.0

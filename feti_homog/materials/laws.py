@@ -1,7 +1,7 @@
-"""The law of each phase: its stiffness in the plane and in space, its thermal expansion, and how far phases are apart.
+"""Derive the law of each phase, plane and spatial stiffness and thermal expansion, and the contrast between phases.
 
 Voigt order [11, 22, 12] in the plane, [11, 22, 33, 23, 13, 12] in space, with engineering shears. x3 is normal to a
-plane of symmetry of every phase, so that [23, 13] are coupled to each other alone.
+plane of symmetry of every phase, so 23 and 13 couple only with each other.
 """
 
 import math
@@ -27,9 +27,9 @@ NEEDED: dict[
         voigt.GENERALIZED.name: ("E_axial", "nu_axial", "G_axial"),
     },
 }
-"""The optional constants that a plane state needs."""
+"""Optional constants that each plane state requires."""
 OF_DATA_SHEETS = "axis 3 is along the fibres: with constants of a data sheet give E_axial, E_transverse, nu_axial, ..."
-# Relative difference of constants of one material.
+# Relative tolerance for isotropic constants of a material.
 ISOTROPY = 1e-9
 # Beyond the first, rounding of displacements makes stresses as large as those of the soft phase are allowed to be off;
 # beyond the second, it leaves nothing of them.
@@ -146,7 +146,7 @@ def out_of_plane(material: material_forms.Material, plane: str) -> tuple[Float, 
 
 
 def _lame(material: material_forms.Isotropic, plane: str) -> tuple[float, float]:
-    """Lame's constant, in plane stress the reduced one, and the shear modulus."""
+    """Return Lame's constant, reduced in plane stress, and the shear modulus."""
     state = voigt.PLANE_STATES[plane]
     if not state.is_sheet and material.poisson >= 0.5:
         raise ValueError(f"poisson = {material.poisson}: expected less than 0.5 in {state.title}; 0.49999999 serves")
@@ -156,12 +156,12 @@ def _lame(material: material_forms.Isotropic, plane: str) -> tuple[float, float]
 
 
 def _angle(material: material_forms.Material) -> float:
-    """Direction of the first material axis, degrees from x1 towards x2."""
+    """Return the angle from x1 to the first material axis, in degrees, positive towards x2."""
     return material.angle if isinstance(material, material_forms.Orthotropic) else 0.0
 
 
 def _checked_stiffness(material: material_forms.General) -> Float:
-    """Return the stiffness that a phase gives, (3, 3) or (6, 6), checked."""
+    """Check and return the given stiffness of a phase, (3, 3) or (6, 6)."""
     given = np.array(material.stiffness)
     noise = 1e-9 * np.abs(given).max()
     if not np.allclose(given, given.T, rtol=0.0, atol=noise):
@@ -180,7 +180,7 @@ def _checked_stiffness(material: material_forms.General) -> Float:
 
 
 def stable_compliance(material: material_forms.Orthotropic | material_forms.TransverselyIsotropic, plane: str) -> Float:
-    """Compliance (6, 6) in the material axes, checked as far as the plane state needs it."""
+    """Return the compliance (6, 6) in material axes, with the checks of the plane state."""
     compliance, state = known_compliance(material), voigt.PLANE_STATES[plane]
     if not voigt.is_positive_definite(compliance[:2, :2]):
         if isinstance(material, material_forms.Orthotropic):
@@ -204,7 +204,7 @@ def stable_compliance(material: material_forms.Orthotropic | material_forms.Tran
 
 
 def known_compliance(material: material_forms.Orthotropic | material_forms.TransverselyIsotropic) -> Float:
-    """Compliance (6, 6) in the material axes; NaN where the constants leave it open."""
+    """Return the compliance (6, 6) in material axes; NaN for undetermined entries."""
     if isinstance(material, material_forms.TransverselyIsotropic):
         E1, E3, G13, nu31 = _numbers(material.E_transverse, material.E_axial, material.G_axial, material.nu_axial)
         nu12, nu13 = material.nu_transverse, nu31 * E1 / E3
@@ -221,12 +221,12 @@ def known_compliance(material: material_forms.Orthotropic | material_forms.Trans
 
 
 def _numbers(*constants: float | None) -> list[float]:
-    """Return the constants, NaN for missing ones."""
+    """Return the constants, with NaN for each missing constant."""
     return [np.nan if constant is None else constant for constant in constants]
 
 
 def contrast_lines(materials: Mapping[str, material_forms.Material], plane: str) -> tuple[list[str], list[str]]:
-    """Return a fault if the stiffnesses of two stable phases are too far apart, a warning if rounding may matter."""
+    """Return faults and warnings for a large stiffness contrast between two stable phases."""
     with np.errstate(over="ignore"):
         sizes = {phase: float(np.abs(stiffness_of(material, plane)).max()) for phase, material in materials.items()}
     stiffest, softest = max(sizes, key=sizes.__getitem__), min(sizes, key=sizes.__getitem__)

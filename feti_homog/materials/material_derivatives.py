@@ -1,4 +1,4 @@
-"""Derivatives of phase laws by their constants, and of composite constants by the stiffness.
+"""Differentiate phase laws by their constants, and composite constants by the stiffness.
 
 Stiffnesses are (3, 3) or (6, 6) in Voigt order with engineering shears, as in `laws.stiffness_of`.  Functions without
 absolute values are differentiated by an imaginary step, f'(x) = Im f(x + i h) / h, which is exact to rounding (Squire
@@ -18,7 +18,7 @@ from feti_homog.materials.laws import COUPLINGS, expansion, known_compliance, st
 from feti_homog.materials.voigt import IN_PLANE, IN_PLANE_BLOCK, PLANE_STATES, strain_rotation
 from feti_homog.typing import Float
 
-STEP = 1e-30  # its square is lost beside 1
+STEP = 1e-30  # the square vanishes beside 1 in rounding
 ISOTROPIC_COMPLIANCE = {"E_axial": "young", "E_transverse": "young", "nu_axial": "poisson", "nu_transverse": "poisson"}
 # Derivative of `strain_rotation` by the angle in degrees, at 0.
 TURN = np.zeros((6, 6))
@@ -86,7 +86,7 @@ def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, fl
 
 
 def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:
-    """Entries of a stiffness, on both sides of its diagonal."""
+    """Yield the derivatives by the entries of a stiffness, on both sides of the diagonal."""
     given = np.array(material.stiffness)
     for i, j in zip(*np.triu_indices(len(given)), strict=True):
         if (i, j) in COUPLINGS and len(given) == 6:

@@ -1,4 +1,4 @@
-"""Bounds and closed estimates for composites: their records, and the aligned cylinders that both are made of.
+"""Compute bounds on composite constants, and the aligned cylinders behind bounds and estimates.
 
 Stiffnesses of the plane are (3, 3) in Voigt order [11, 22, 12] with engineering shear, in any stress unit.  Phases
 of cylinders have Hill's moduli k, l = 2 nu_A k, n = E_A + 4 nu_A^2 k, m = G_T and p = G_A, so that under an axial
@@ -116,12 +116,12 @@ class Estimates:
 
 
 def voigt(fractions: ArrayLike, stiffnesses: ArrayLike) -> Float:
-    """Upper bound sum c_i C_i, (3, 3), from fractions (n,) and stiffnesses (n, 3, 3)."""
+    """Return the upper bound sum c_i C_i, (3, 3), from fractions (n,) and stiffnesses (n, 3, 3)."""
     return np.asarray(np.einsum("i,ijk->jk", np.asarray(fractions, float), np.asarray(stiffnesses, float)))
 
 
 def reuss(fractions: ArrayLike, stiffnesses: ArrayLike) -> Float:
-    """Lower bound (sum c_i C_i^-1)^-1, (3, 3), from fractions (n,) and stiffnesses (n, 3, 3)."""
+    """Return the lower bound (sum c_i C_i^-1)^-1, (3, 3), from fractions (n,) and stiffnesses (n, 3, 3)."""
     return np.asarray(np.linalg.inv(voigt(fractions, np.linalg.inv(np.asarray(stiffnesses, dtype=float)))))
 
 
@@ -201,7 +201,7 @@ def aligned_cylinders(
 
 
 def expansions(phase: engineering_constants.TransverseIsotropy) -> Pair | None:
-    """Axial and transverse expansion, if the phase has both."""
+    """Return axial and transverse expansion, if the phase has both."""
     if phase.expansion_axial is None or phase.expansion_transverse is None:
         return None
     return phase.expansion_axial, phase.expansion_transverse

@@ -1,4 +1,4 @@
-"""Voigt orders with engineering shears: names of components, plane states, tensors, rotations, stress measures.
+"""Define Voigt orders with engineering shears: component names, plane states, rotations, stress measures.
 
 [11, 22, 12] in plane strain and plane stress, [11, 22, 33, 23, 13, 12] in space and generalized plane strain.
 """
@@ -21,7 +21,7 @@ THERMAL_STRESSES = tuple(f"thermal_{name}" for name in SPATIAL_STRESSES)
 EXPANSIONS = ("expansion_x1", "expansion_x2", "expansion_axial", *(f"expansion_{name}" for name in SPATIAL_STRAINS[3:]))
 """Names of the strains per unit of temperature, x3 along the fibres."""
 IN_PLANE = [0, 1, 5]
-"""Where [11, 22, 12] stand in the order of space."""
+"""Indices of [11, 22, 12] in the spatial order."""
 IN_PLANE_BLOCK = np.ix_(IN_PLANE, IN_PLANE)
 
 
@@ -49,7 +49,7 @@ class PlaneState:
 
     @property
     def components(self) -> tuple[tuple[str, str], ...]:
-        """Strain and stress name for each component."""
+        """Return strain name and stress name of each component."""
         return tuple(zip(self.strains, self.stresses, strict=True))
 
     @property
@@ -67,7 +67,7 @@ PLANE_STATES = {state.name: state for state in (PLANE_STRAIN, PLANE_STRESS, GENE
 
 
 def plane_state_of(document: Mapping[str, Any]) -> PlaneState:
-    """Return the plane state of a result.json."""
+    """Return the plane state of a document of result.json."""
     return PLANE_STATES[document["case"]["analysis"]["plane"]]
 
 
@@ -77,7 +77,7 @@ def voigt_names(count: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def strain_tensor(strain: Float) -> Float:
-    """(2, 2) tensor for a strain (3,): E12 = gamma12 / 2."""
+    """Return the tensor (2, 2) of a strain (3,): E12 = gamma12 / 2."""
     return np.array([[strain[0], strain[2] / 2], [strain[2] / 2, strain[1]]])
 
 
@@ -92,7 +92,7 @@ def rotated(stiffness: Float, angle: float) -> Float:
 
 
 def strain_rotation(angle: float) -> Float:
-    """T (6, 6) that takes strains to axes turned about x3 by `angle` degrees, from x1 towards x2."""
+    """Return T (6, 6), which transforms strains to axes turned about x3 by `angle` degrees."""
     c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
     rotation = np.eye(6)
     rotation[IN_PLANE_BLOCK] = [[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]]
@@ -110,14 +110,14 @@ def is_positive_definite(matrix: Float) -> bool:
 
 
 def von_mises(stress: Float, S33: Float) -> Float:
-    """(m,) sqrt(3/2 s:s), s the deviator of stresses [S11, S22, S12] (m, 3) and S33 (m,); unit of stress."""
+    """Return sqrt(3/2 s:s) (m,), s the deviator of [S11, S22, S12] (m, 3) and S33 (m,)."""
     S11, S22, S12 = stress.T
     between_11 = np.hypot(S11 - S22, S33 - S11)
     return np.asarray(np.hypot(between_11, np.hypot(S22 - S33, np.sqrt(6) * S12)) / np.sqrt(2))
 
 
 def principal(stress: Float, S33: Float) -> Float:
-    """(m, 3) principal stresses, the largest first, for the stresses in `von_mises`; NaN where S33 is."""
+    """Return principal stresses (m, 3), largest first, of [S11, S22, S12] and S33; NaN as S33."""
     S11, S22, S12 = stress.T
     middle, radius = (S11 + S22) / 2, np.hypot((S11 - S22) / 2, S12)
     ordered = np.sort(np.stack([middle - radius, middle + radius, S33], axis=1), axis=1)[:, ::-1]
@@ -130,7 +130,7 @@ def spatial_von_mises(stress: Float, S33: Float, axial: Float) -> Float:
 
 
 def spatial_principal(stress: Float, S33: Float, axial: Float) -> Float:
-    """(m, 3) principal stresses, the largest first, for the stresses in `spatial_von_mises`."""
+    """Return principal stresses (m, 3), largest first, of the stresses in `spatial_von_mises`."""
     tensor = np.empty((len(stress), 3, 3))
     tensor[:, :2, :2], tensor[:, 2, 2] = stress[:, [[0, 2], [2, 1]]], S33
     tensor[:, :2, 2] = tensor[:, 2, :2] = axial[:, ::-1]

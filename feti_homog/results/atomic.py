@@ -1,6 +1,6 @@
-"""Files that appear complete or not at all, whenever their writer ends.
+"""Write files that appear complete or not at all, even if the writer is killed.
 
-File and folder are synchronised: content and name are on the disk before the writer goes on.
+The writer waits until both the content and the name of a file are on the disk.
 """
 
 import contextlib
@@ -14,7 +14,9 @@ from feti_homog.system.runtime import file_locks
 
 
 def replace(path: Path, write: Callable[[Path], object]) -> Path:
-    """Let `write` make a file beside `path`, which then takes its place in one step; returns `path`.
+    """Replace the file `path` by the output of `write`, in one step; return `path`.
+
+    `write` gets the name of an unfinished file in the same folder.
 
     Raises:
         FetiHomogError: the file cannot be written; an earlier file at `path` is untouched.
@@ -35,25 +37,26 @@ def replace(path: Path, write: Callable[[Path], object]) -> Path:
 
 
 def replace_text(path: Path, text: str) -> Path:
-    """Write a text file as `replace` does, with its errors."""
+    """Replace a file by a text, as `replace`."""
     return replace(path, lambda part: part.write_text(text, encoding="utf-8"))
 
 
 def part_of(path: Path) -> Path:
-    """Return the name of an unfinished file beside `path`, which no other process writes."""
+    """Return a name for the unfinished file of `path`, unique to this process."""
     return path.with_name(f"{path.name}.{file_locks.tag()}.part")
 
 
 def commit(part: Path, path: Path) -> None:
-    """Give the finished file `part` the name `path`, in one step that lasts.  Raises OSError."""
+    """Rename the finished file `part` to `path`, once its content is on the disk.  Raises OSError."""
     _synchronise(part)
     rename(part, path)
 
 
 def append(path: Path, start: int, content: bytes, lasts: bool) -> None:
-    """Write bytes from byte `start` of a file on, in place of all that follows; if it `lasts`, they are on the disk.
+    """Write bytes at position `start` of a file, and drop the former end of the file.
 
-    A reader must recognize unfinished bytes at the end of the file: the writer may be killed.
+    If the content `lasts`, the function waits until the bytes are on the disk. A killed writer leaves unfinished bytes
+    at the end of the file, which a reader must recognize.
 
     Raises:
         FetiHomogError: the file cannot be written.
@@ -70,14 +73,14 @@ def append(path: Path, start: int, content: bytes, lasts: bool) -> None:
 
 
 def rename(old: Path, new: Path) -> None:
-    """Rename a file or folder within its folder, in one step that lasts.  Raises OSError."""
+    """Rename a file or folder, and wait until the name is on the disk.  Raises OSError."""
     os.replace(old, new)
     with contextlib.suppress(OSError):  # not every file system synchronises folders
         _synchronise(new.parent)
 
 
 def remove_unfinished(folder: Path, names: re.Pattern[str], alone: bool = True) -> None:
-    """Remove unfinished files from killed writers, on any machine if this process may write there `alone`."""
+    """Remove unfinished files of killed writers; on any machine if this process writes `alone`."""
     part = re.compile(rf"({names.pattern})\.(?P<tag>.+\.\d+)\.part")
     for path in folder.glob("*.part"):
         if (match := part.fullmatch(path.name)) and (alone or file_locks.has_ended(match["tag"])):
@@ -86,13 +89,13 @@ def remove_unfinished(folder: Path, names: re.Pattern[str], alone: bool = True) 
 
 
 def write_errors(path: Path) -> contextlib.AbstractContextManager[None]:
-    """Report failed writes in the block as FetiHomogError about `path`, RuntimeErrors of HDF5 too."""
+    """Turn write errors in a block into FetiHomogError, as `file_errors`."""
     return file_errors("write", path)
 
 
 @contextlib.contextmanager
 def file_errors(verb: str, path: Path) -> Iterator[None]:
-    """Report failures in the block as FetiHomogError "cannot `verb` `path`", RuntimeErrors of HDF5 too."""
+    """Turn OSError, and RuntimeError of HDF5, into FetiHomogError "cannot VERB PATH"."""
     try:
         yield
     except (OSError, RuntimeError) as error:
@@ -101,7 +104,7 @@ def file_errors(verb: str, path: Path) -> Iterator[None]:
 
 
 def _synchronise(path: Path) -> None:
-    """Wait until a file, or the names in a folder, are on the disk."""
+    """Wait until a file, or the list of names in a folder, is on the disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)

@@ -1,7 +1,7 @@
-"""Checkpoints of a path: events appended to one file, or kept in memory.
+"""Store the events of a path as checkpoints, in one file or in memory.
 
-An event holds load, bond states and scalars.  As long as there is room it also holds multipliers and jumps; afterwards
-an equilibrium under its load, with its bonds, finds them again.
+An event holds load, bond states and scalars.  While there is room, the event also holds multipliers and jumps; without
+them, a resumed run computes the equilibrium of the event again.
 
 The file is `checkpoint/events` in the result folder, one record per event: a prefix, content length and CRC-32
 checksums of content and prefix, then the content.  The first content is the run's signature, every other an event
@@ -28,36 +28,36 @@ from feti_homog.results import atomic
 from feti_homog.system.parallel import mpi_errors
 
 FOLDER, DROPPED, NAME = "checkpoint", "checkpoint.dropped", "events"  # the second folder while it is removed
-FORMAT = 11  # to be raised when the content of an event changes
+FORMAT = 11  # raise when the content of an event changes
 HEAD = re.compile(rb"feti-homog checkpoint, format (\d+)\n")
-# Also files that formats up to 10 had, one an event, and unfinished ones among them.
+# Formats up to 10 had one file for each event; the pattern matches them too, and their unfinished files.
 EVENT_FILE = re.compile(rf"{NAME}|\d{{6,}}\.h5(\..+\.\d+\.part)?")
 PREFIX = struct.Struct("<QII")
-# Bytes of events up to which they have their multipliers.
+# Bytes of events, after which further events have no multipliers.
 WHOLE_BYTES = 64 * 2**20
-# Arrays that an equilibrium with the bonds of the event has again.
+# Arrays that the equilibrium of an event computes again.
 FOUND_AGAIN = re.compile(r"(lam|jump|used|alpha)(_axial)?(_ends)?")
 
 Arrays = dict[str, NDArray[Any]]
 
 
 class EventsInMemory:
-    """Keep the events in memory, each rank its part, for runs that leave no files; every method is collective.
+    """Keep distributed events in memory, for runs without files; every method is collective.
 
     Attributes:
-        room: bytes up to which events have their multipliers; None without a limit.
+        room: bytes of events, after which further events have no multipliers; None without a limit.
     """
 
     def __init__(self, comm: MPI.Intracomm, room: int | None = WHOLE_BYTES) -> None:
         self.comm, self.room, self._events, self._bytes = comm, room, list[bytes](), 0
 
     def clear(self) -> int:
-        """Forget all events; returns their number."""
+        """Remove all events; return their number."""
         number, self._events, self._bytes = len(self._events), [], 0
         return number
 
     def count(self) -> int:
-        """Return the number of events, after a check of each.
+        """Check all events, and return their number.
 
         Raises:
             CaseError: an event is unreadable or of another run.
@@ -65,20 +65,20 @@ class EventsInMemory:
         return len(self._events)
 
     def read(self, number: int) -> Arrays:
-        """Return an event: this rank's part of distributed arrays, other arrays in full.
+        """Return an event, with this rank's part of each distributed array.
 
         Raises:
-            CaseError: it is unreadable.
+            CaseError: the event is unreadable.
         """
         return unpacked(self._events[number])
 
     def write(self, number: int, shared: Mapping[str, Any], distributed: Arrays, light: bool = False) -> None:
-        """Add event `number`, in place of all events from this number on.
+        """Add event `number`; drop former events from this number on.
 
         Args:
-            shared: numbers that are the same on all ranks.
-            distributed: arrays, each with this rank's part.
-            light: the event is cheap to compute again; a power failure may lose it.
+            shared: values, equal on all ranks.
+            distributed: this rank's parts of distributed arrays.
+            light: whether the event is cheap to compute again, so that a power failure may lose it.
 
         Raises:
             FetiHomogError: the file cannot be written.
@@ -89,22 +89,22 @@ class EventsInMemory:
         self._bytes += len(self._events[number])
 
     def _kept(self, event: Arrays, size: int) -> Arrays:
-        """Return the arrays to keep of an event behind `size` bytes of events."""
+        """Return the arrays of an event to keep after `size` bytes of events."""
         has_room = self.room is None or size < self.room
         return event if has_room else {name: v for name, v in event.items() if not FOUND_AGAIN.fullmatch(name)}
 
 
 class Checkpoint(EventsInMemory):
-    """Keep the events in `directory`/checkpoint/events, which rank 0 writes.
+    """Keep events in the file `directory`/checkpoint/events; rank 0 writes the file.
 
     Attributes:
-        signature: text of case, subdomains and ranks, by which events belong to this run.
+        signature: text of case, subdomains and ranks; a run resumes only from events with its own signature.
     """
 
     def __init__(self, directory: Path, comm: MPI.Intracomm, signature: str, room: int | None = WHOLE_BYTES) -> None:
         super().__init__(comm, room)
         self.path, self.signature = directory / FOLDER / NAME, signature
-        self._ends: list[int] = []  # of the records, on rank 0; the signature's first
+        self._ends: list[int] = []  # ends of the records on rank 0; the first record is the signature
 
     def clear(self) -> int:
         return mpi_errors.on_root(self.comm, self._clear)
@@ -127,7 +127,7 @@ class Checkpoint(EventsInMemory):
     def _clear(self) -> int:
         try:
             number = self._count_records()
-        except CaseError:  # whatever another run left there
+        except CaseError:  # the file of another run counts as one event
             number = 1
         remove(self.path.parents[1])
         self._ends = []
@@ -163,29 +163,31 @@ class Checkpoint(EventsInMemory):
 
 
 def has_multipliers(event: Arrays) -> bool:
-    """Return whether an event has its multipliers."""
+    """Return whether an event holds its multipliers."""
     return "lam" in event
 
 
 def _part(event: Arrays, rank: int) -> Arrays:
-    """Return an event with the distributed arrays cut to the part of `rank`."""
+    """Return the part of an event for one rank: distributed arrays are cut."""
     ends = {name: event.get(f"{name}_ends") for name in event if not name.endswith("_ends")}
     return {name: event[name] if at is None else np.split(event[name], at[:-1])[rank] for name, at in ends.items()}
 
 
 def begin(signature: str) -> bytes:
-    """Return the first bytes of an event file: its format, and the record of the signature."""
+    """Return the beginning of an event file: the format, and the signature as a record."""
     return b"feti-homog checkpoint, format %d\n" % FORMAT + record(signature.encode())
 
 
 def record(content: bytes) -> bytes:
-    """Return a content behind its prefix."""
+    """Return a record: a content after its prefix."""
     numbers = len(content), zlib.crc32(content)
     return PREFIX.pack(*numbers, zlib.crc32(b"%d %d" % numbers)) + content
 
 
 def records(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
-    """Yield end and content of each record, from the file's beginning or from the end `start` of a record.
+    """Yield the end position and the content of each record in an event file.
+
+    Reading begins at the first record, or at `start`, the end position of a record.
 
     Raises:
         CaseError: the file has another format or is damaged.
@@ -211,7 +213,7 @@ def records(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
 
 
 def _head(line: bytes, path: Path) -> bytes:
-    """Check the first line of an event file; empty if its run was killed while writing it."""
+    """Check the first line of an event file; return b"" for an unfinished line."""
     expected = begin("").partition(b"\n")[0] + b"\n"
     if line != expected and expected.startswith(line):
         return b""
@@ -230,13 +232,13 @@ def _other_format(path: Path, number: int | str) -> CaseError:
 
 
 def packed(event: Arrays) -> bytes:
-    """Return an event as the content of a record."""
+    """Compress an event into the content of a record."""
     layout = [(name, value.dtype.str, value.shape) for name, value in event.items()]
     return zlib.compress(b"\n".join([json.dumps(layout).encode(), b"".join(v.tobytes() for v in event.values())]), 1)
 
 
 def unpacked(content: bytes) -> Arrays:
-    """Return the event of a record."""
+    """Return the event in the content of a record."""
     layout, _, data = zlib.decompress(content).partition(b"\n")
     event, start = Arrays(), 0
     for name, kind, shape in json.loads(layout):
@@ -246,11 +248,11 @@ def unpacked(content: bytes) -> Arrays:
 
 
 def refuse_others(directory: Path) -> None:
-    """Check that a run may write its events to `directory`/checkpoint, and remove them.  Call on one rank.
+    """Check that `directory`/checkpoint is free, or holds events alone.  Call on one rank.
 
     Raises:
-        CaseError: it is no folder, or has other files than events.
-        OSError: it cannot be read.
+        CaseError: the name belongs to a file, or the folder has files other than events.
+        OSError: the folder cannot be read.
     """
     for folder in (directory / FOLDER, directory / DROPPED):
         if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
@@ -267,7 +269,7 @@ def refuse_others(directory: Path) -> None:
 
 
 def remove(directory: Path) -> None:
-    """Remove the events in `directory`; their folder exists complete or not at all.  Call on one rank.
+    """Rename the checkpoint folder, then remove it: no run finds a part.  Call on one rank.
 
     Raises:
         FetiHomogError: the folder cannot be renamed.
@@ -281,7 +283,7 @@ def remove(directory: Path) -> None:
 
 
 def _remove_events(folder: Path) -> None:
-    """Remove the events of a folder as far as possible: the next run removes the rest."""
+    """Remove the events of a folder as far as possible; the next run removes the rest."""
     with contextlib.suppress(OSError):
         for path in folder.iterdir():
             if _is_event(path):

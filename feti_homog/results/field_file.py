@@ -1,4 +1,4 @@
-"""result.h5: mesh, interface and states, written by all ranks together (parallel HDF5)."""
+"""Write result.h5, with mesh, interface and states, by parallel HDF5 from all ranks."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 
 
 NAME = "result.h5"
-PURE_NUMBER = "1"  # the unit of what has none
-RESERVE = 1 << 17  # bytes that HDF5 itself adds to the file
+PURE_NUMBER = "1"  # unit of dimensionless tables
+RESERVE = 1 << 17  # bytes of disk space for the headers that HDF5 adds
 
 
 @dataclass(frozen=True)
 class _Rows:
-    """This rank's rows in a shared table, ranks in order."""
+    """Range of this rank's rows in a shared table, which has the ranks in order."""
 
     start: int
     count: int
@@ -44,15 +44,16 @@ class _Rows:
 
 
 class FieldFile:
-    """The file `directory`/result.h5 while it is being written; every method is collective over `comm`.
+    """The unfinished file `directory`/result.h5; every method is collective over `comm`.
 
-    `field_layout` lists its tables and attributes, `field_views` which of them show others.
+    `field_layout` lists tables and attributes, `field_views` lists views of tables.
 
-    Until `close` the file is called `part`.  As a context manager it closes when the block ends well; an error that
-    all ranks raise removes it, any other exception leaves the unfinished file.  Empty parts need their columns: (0, 2).
+    Until `close` the file has the name `part`.  A context manager closes the file at the end of its block.  An error
+    that all ranks raise removes the file; any other exception leaves it unfinished.  Empty parts need their columns:
+    (0, 2).
 
     Raises:
-        FetiHomogError: the file cannot be written; on every rank, after its unfinished file is removed.
+        FetiHomogError: the file cannot be written; raised on every rank, after the unfinished file is removed.
     """
 
     def __init__(
@@ -81,7 +82,7 @@ class FieldFile:
         mpi_errors.on_root(comm, _with_write_errors, self.path, _create, self.part, size)
         self._is_open = True
         self._opened = contextlib.ExitStack()
-        # By a descriptor of its folder: MPI-IO has short name buffers.
+        # MPI-IO has short name buffers: a descriptor of the folder shortens the name.
         folder = self._agreed(mpi_errors.agree, os.open, self.part.parent, os.O_RDONLY)
         self._opened.callback(os.close, folder)
         path = f"/proc/self/fd/{folder}/{self.part.name}"
@@ -100,14 +101,14 @@ class FieldFile:
         self._write_part("interface", interface)
 
     def write_state(self, number: int, state: field_layout.StatePart) -> None:
-        """Add state `number` (0, 1, ...) and flush; cell means are equal on all ranks."""
+        """Add state `number` (0, 1, ...) and flush the file; cell means are equal on all ranks."""
         group = f"state/{number}"
         self._write_part(group, state)
         self._agreed(mpi_errors.agree_after, _set_attributes, self._file, group, field_layout.attributes(state))
         self._agreed(mpi_errors.agree_after, self._file.flush)
 
     def close(self) -> Path:
-        """Complete the file under its final name; returns its path."""
+        """Complete the file, give it its final name, and return its path."""
         self._agreed(mpi_errors.agree_after, self._opened.close)
         self._agreed(mpi_errors.on_root_only, _complete, self.part, self.path)
         self._is_open = False
@@ -128,9 +129,9 @@ class FieldFile:
             self._remove()
 
     def _bytes(self, part: Any) -> int:
-        """Return the bytes of a part's tables, summed over ranks."""
+        """Return the total size of the tables of a part, in bytes, over all ranks."""
         return sum(
-            (1 << 12)  # HDF5's own, of which 0.6 KB were measured
+            (1 << 12)  # HDF5's header of a table; 0.6 KB were measured
             + np.dtype(d.dtype).itemsize
             * int(np.prod(np.shape(getattr(part, name))[1:]))
             * self._rows[field_layout.rows_of(d)].total
@@ -138,7 +139,7 @@ class FieldFile:
         )
 
     def _write_part(self, group: str, part: Any) -> None:
-        """Write the tables of a group, each rank its rows."""
+        """Write the tables of a group; each rank writes its own rows."""
         size = self._bytes(part)
         self._agreed(mpi_errors.on_root_only, _reserve, self.part, self._reserved, size)
         self._reserved += size
@@ -152,9 +153,9 @@ class FieldFile:
                 self._agreed(mpi_errors.agree_after, _write_rows, self._file, f"{group}/{name}", rows, array, texts)
 
     def _agreed(self, agreed: Callable[..., Any], function: Callable[..., Any], *args: Any) -> Any:
-        """function(*args) by `agree_after` where HDF5 communicates.
+        """Call a function, and agree on its errors by the collective call `agreed`.
 
-        If it cannot write, the file is removed and all raise.
+        After an error the file is removed, and all ranks raise FetiHomogError.
         """
         try:
             return agreed(self._comm, _with_write_errors, self.path, function, *args)
@@ -163,7 +164,7 @@ class FieldFile:
             raise
 
     def _remove(self) -> None:
-        """Close and remove the file, once; on a full disk HDF5 closes a file only if cut to nothing before."""
+        """Truncate, close and remove the file; on a full disk HDF5 closes only empty files."""
         self._is_open = False
         file_locks.files.discard(self.part)
         if self._comm.rank == 0:
@@ -178,13 +179,13 @@ class FieldFile:
 
 
 def _with_write_errors(path: Path, function: Callable[..., Any], *args: Any) -> Any:
-    """Return function(*args); write errors name `path`."""
+    """Call a function, and turn its write errors into FetiHomogError about `path`."""
     with atomic.write_errors(path):
         return function(*args)
 
 
 def _create(part: Path, size: int) -> None:
-    """Make an empty HDF5 file with `size` bytes of space, by plain calls: HDF5 may crash or hang where they fail."""
+    """Create an empty HDF5 file by system calls: where they fail, HDF5 may crash or hang."""
     part.parent.mkdir(parents=True, exist_ok=True)
     try:
         with h5py.File("empty", "w", driver="core", backing_store=False) as file:
@@ -200,8 +201,8 @@ def _create(part: Path, size: int) -> None:
 
 
 def _complete(part: Path, path: Path) -> None:
-    """Add views and give the file its name, on one rank: on all ranks a view would cost as much as a table."""
-    # Nobody else has the file, and some file systems cannot lock.
+    """Add views and rename the file, on one rank: on all, views cost as much as tables."""
+    # No lock: only this process has the file open, and some file systems have no locks.
     with h5py.File(part, "r", locking=False) as file:
         size = bytes_of_views(file)
     _reserve(part, part.stat().st_size, size)
@@ -225,13 +226,13 @@ def _arrays(group: str, count: int, part: Any, described: Mapping[str, records.D
 
 
 def _reserve(part: Path, start: int, size: int) -> None:
-    """Reserve disk space: if it ends while MPI-IO writes, some ranks may wait for ever."""
+    """Reserve disk space for a file: without space, MPI-IO may wait for ever."""
     with part.open("r+b") as stream:
         os.posix_fallocate(stream.fileno(), start, size)
 
 
 def _write_rows(file: Any, name: str, rows: _Rows, array: NDArray[Any], texts: Mapping[str, str]) -> None:
-    """Make a table and write this rank's rows; an empty rank takes part with an empty selection."""
+    """Create a table and write this rank's rows; a rank without rows selects none.  Collective."""
     table = file.create_dataset(name, (rows.total, *array.shape[1:]), array.dtype)
     _set_attributes(file, name, texts)
     memory, place = h5py.h5s.create_simple(array.shape), table.id.get_space()

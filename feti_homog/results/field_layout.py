@@ -1,7 +1,7 @@
-"""Layout of result.h5: the parts that ranks hand over, and their places in the file.
+"""Define the layout of result.h5: the parts that ranks write, and their paths in the file.
 
-Lengths have the cell's unit, stresses the moduli's.  The file has n nodes, m elements, k interface nodes, f fibres, of
-which each rank holds a part; nodes are torn: each body in a subdomain has its own.
+Lengths have the unit of the cell, stresses the unit of the moduli.  The file has n nodes, m elements, k interface nodes
+and f fibres, distributed over the ranks.  Nodes are torn: each body in each subdomain has its own nodes.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ PROGRAM = "feti_homog"
 
 @dataclass(frozen=True)
 class Header:
-    """The file's attributes."""
+    """Attributes of the file."""
 
     title: str = described("name of the case")
     version: str = described("version of the program")
@@ -147,12 +147,12 @@ class StatePart:
 
 
 def tables(part: Any) -> dict[str, records.Description]:
-    """Return the fields of a part that are datasets: with a row per node, element, interface node or fibre."""
+    """Return the fields of a part with rows, which are datasets."""
     return {name: d for name, d in records.descriptions(part).items() if rows_of(d)}
 
 
 def attributes(part: Any) -> dict[str, Any]:
-    """Return the other fields as attributes, values by name."""
+    """Return the fields of a part without rows, which are attributes: values by name."""
     return {d.name or name: getattr(part, name) for name, d in records.descriptions(part).items() if not rows_of(d)}
 
 

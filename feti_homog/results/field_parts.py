@@ -1,4 +1,4 @@
-"""The torn cell and its responses as the parts of result.h5 that this rank writes."""
+"""Convert the torn cell and its responses into the parts of result.h5 from this rank."""
 
 import json
 import os
@@ -13,7 +13,7 @@ from feti_homog.version import __version__
 
 
 def header(cell: unit_cell.TornCell) -> Header:
-    """Return the attributes of the whole cell."""
+    """Return the file attributes of a cell."""
     case, plan = cell.case, cell.summary
     return Header(
         title=case.name,
@@ -30,7 +30,7 @@ def header(cell: unit_cell.TornCell) -> Header:
 
 
 def mesh_part(cell: unit_cell.TornCell) -> MeshPart:
-    """Concatenate the refined meshes of this rank's parts."""
+    """Concatenate the refined meshes of this rank's subdomains."""
     subdomains = cell.parts
     nodes = np.cumsum([0, *(len(s.mesh.points) for s in subdomains)])
     columns = 3 * cell.case.cell.order
@@ -48,7 +48,7 @@ def mesh_part(cell: unit_cell.TornCell) -> MeshPart:
 
 
 def fibre_part(cell: unit_cell.TornCell) -> FibrePart:
-    """Return the fibres on rank 0, none on the others."""
+    """Return all fibres on rank 0, and no fibre on other ranks."""
     summary = cell.summary
     body = summary.fibre_bodies[: None if cell.comm.rank == 0 else 0]
     return FibrePart(
@@ -62,7 +62,7 @@ def fibre_part(cell: unit_cell.TornCell) -> FibrePart:
 
 
 def interface_part(cell: unit_cell.TornCell) -> InterfacePart:
-    """Return the interface nodes whose multipliers this rank owns. Collective."""
+    """Return the interface nodes with multipliers of this rank. Collective."""
     jumps, nodes = cell.jumps, cell.jumps.nodes
     first = cell.comm.exscan(sum(len(s.mesh.points) for s in cell.parts)) or 0
     numbers = first + cell.class_nodes
@@ -107,7 +107,7 @@ def spatial_state_part(
 ) -> SpatialStatePart:
     """Return the fields in generalized plane strain, from responses of the plane and the axial problem.
 
-    A problem without response has zero fields.  Collective when first called.
+    A problem without a response has zero fields.  Collective when first called.
 
     Raises:
         ValueError: there is no response, or no axial problem.
@@ -140,9 +140,9 @@ def _at_nodes(
     in_plane: recovered_fields.RecoveredFields,
     along: recovered_fields.RecoveredFields | None = None,
 ) -> dict[str, Any]:
-    """Return displacements, and tractions, jumps, status, damage and sliding at the interface nodes.
+    """Return displacements, and the fields at interface nodes, by their dataset names.
 
-    No interface node of a cell cut across has parted.
+    If subdomains extend across materials, all interface nodes are bonded.
     """
     nodes, more = cell.jumps.nodes, [None] * 3 if along is None else [along.displacement, along.traction, along.jump]
     opening = _vectors(_in_axes(nodes.normal, in_plane.jump), more[2])
@@ -164,17 +164,17 @@ def _at_nodes(
 
 
 def _relative(shares: Float, *responses: averaging.Response | None) -> Float32:
-    """(m,) element shares of the error, relative to E . Sigma summed over all responses."""
+    """Divide the element errors (m,) by E . Sigma, summed over all responses."""
     energy = sum(2 * response.stored for response in responses if response is not None)
     return (shares / (energy if energy > 0 else 1.0)).astype(np.float32)
 
 
 def _in_axes(normal: Float, pairs: Float) -> Float:
-    """(k, 2) components along x and y of normal and tangential `pairs` (k, 2); normals (k, 2)."""
+    """Turn normal and tangential components (k, 2) into components along x and y (k, 2)."""
     tangent = np.column_stack([-normal[:, 1], normal[:, 0]])
     return np.asarray(pairs[:, :1] * normal + pairs[:, 1:] * tangent)
 
 
 def _vectors(in_plane: Float, along: Float | None = None) -> Float:
-    """(k, 3) vectors from components (k, 2) in the plane and (k, 1) along x3, by default 0."""
+    """Join components in the plane (k, 2) and along x3 (k, 1), by default 0, to vectors (k, 3)."""
     return np.pad(in_plane, [(0, 0), (0, 1)]) if along is None else np.hstack([in_plane, along])

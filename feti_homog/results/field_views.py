@@ -1,6 +1,6 @@
-"""Datasets of result.h5 for viewers: vectors with three components, tensors, single columns.
+"""Add datasets for viewers to result.h5: vectors with three components, tensors, single columns.
 
-They are virtual and nearly free: HDF5 fills them from other datasets when they are read.
+The datasets are virtual and nearly free: HDF5 fills them from other datasets when a viewer reads them.
 """
 
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ import numpy as np
 from feti_homog.materials import voigt
 
 GROUP_OF_STATES = "state/K"
-WHOLE = -1  # instead of a column: all of a dataset that has none
+WHOLE = -1  # column number of a dataset without columns
 
 
 @dataclass(frozen=True)
@@ -21,10 +21,10 @@ class View:
     """A virtual dataset /`kind`/GROUP/`name` over datasets of /GROUP.
 
     Attributes:
-        components: its columns; 0 if it has rows alone.
-        source: the dataset that its type and unit are from.
-        columns: its columns that are not 0: for each the dataset and the column there.
-        meaning: in words.
+        components: number of columns; 0 for a dataset with one dimension.
+        source: dataset that provides type and unit.
+        columns: for each column that is not zero, its dataset and the column number there.
+        meaning: description in words.
     """
 
     kind: str
@@ -36,11 +36,11 @@ class View:
 
     @property
     def words(self) -> str:
-        """Its meaning, and that it is virtual."""
+        """Return the description for the file, which says that the view is virtual."""
         return f"{self.meaning}; virtual"
 
     def path(self, group: str) -> str:
-        """Its place in the file."""
+        """Return the path of the view in the file."""
         return f"{self.kind}/{group}/{self.name}"
 
 
@@ -51,7 +51,7 @@ def _vector(name: str, third: str = "") -> View:
 
 
 def _tensor(name: str, source: str, entries: Mapping[tuple[int, int], tuple[str, int]]) -> View:
-    """Return the symmetric tensor [11, 12, 13, 21, 22, 23, 31, 32, 33] with these entries."""
+    """Return the view of a symmetric tensor [11, 12, 13, 21, 22, 23, 31, 32, 33]."""
     places = [(3 * i + j, (min(i, j), max(i, j))) for i in range(3) for j in range(3)]
     columns = {place: entries[pair] for place, pair in places if pair in entries}
     sentence = f"tensor of `{source}`, rows of [[11, 12, 13], [12, 22, 23], [13, 23, 33]]"
@@ -68,10 +68,10 @@ COLUMNS = (
     *(_column(name, "stress", column) for column, name in enumerate(voigt.STRESSES)),
     *(_column(f"{table}_{name}", table, k) for table in ("traction", "jump") for k, name in enumerate("nt")),
 )
-AXIAL = "axial_displacement"  # that states of generalized plane strain have, and only they
+AXIAL = "axial_displacement"  # dataset that only states of generalized plane strain have
 AXIAL_PLACES = ((1, 2), (0, 2))  # of 23, 13
 
-# The views of each group; those of /state/K are made for every state.
+# The views of each group; /state/K stands for every state.
 VIEWS: dict[str, tuple[View, ...]] = {
     "interface": (_vector("normal"),),
     GROUP_OF_STATES: (
@@ -81,7 +81,7 @@ VIEWS: dict[str, tuple[View, ...]] = {
     ),
 }
 
-# The same of a state of generalized plane strain.
+# The views of a state in generalized plane strain.
 SPATIAL_VIEWS: tuple[View, ...] = (
     _vector("displacement", AXIAL),
     _tensor("stress", "stress", STRESS_TENSOR | {at: ("axial_stress", k) for k, at in enumerate(AXIAL_PLACES)}),
@@ -91,7 +91,7 @@ SPATIAL_VIEWS: tuple[View, ...] = (
 
 
 def add_views(file: Any) -> None:
-    """Add the views to an open file with complete tables; empty tables have no views."""
+    """Add all views to an open file with complete tables; empty tables have no views."""
     for group, view in _views_of(file):
         original = file[f"{group}/{view.source}"]
         shape = (len(original), view.components) if view.components else (len(original),)
@@ -107,12 +107,12 @@ def add_views(file: Any) -> None:
 
 
 def bytes_of_views(file: Any) -> int:
-    """Return the most bytes that `add_views` takes."""
-    return (1 << 12) * (1 + len(_views_of(file)))  # 0.9 KB a view in the mean were measured
+    """Return an upper bound of the bytes that `add_views` adds."""
+    return (1 << 12) * (1 + len(_views_of(file)))  # measured: 0.9 KB for each view on average
 
 
 def _views_of(file: Any) -> list[tuple[str, View]]:
-    """Return group and view for all views whose tables are in the file, and not empty."""
+    """Return group and view for each view with existing, non-empty tables."""
     groups = {"interface": VIEWS["interface"]}
     for group in (f"state/{number}" for number in sorted(file.get("state", ()), key=int)):
         groups[group] = SPATIAL_VIEWS if AXIAL in file[group] else VIEWS[GROUP_OF_STATES]

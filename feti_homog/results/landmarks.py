@@ -1,7 +1,8 @@
-"""Landmarks of a path: first break, peak, stress left after it, end; points whose fields are kept, points to show.
+"""Find the landmarks of a path, and choose the points to keep and to show.
 
-The peak is the largest stress before a fall, in the component whose strain leads; points are entries of `path` in
-result.json.  At the end of the path fields are kept for its ends, for points around drops, and evenly between.
+Landmarks are first break, peak, valley after the peak, and end.  The peak is the largest stress before a fall, in the
+component with the largest strain.  Points are entries of `path` in result.json.  At the end of a path, fields are kept
+for both ends, for points around drops, and for evenly spaced points between them.
 """
 
 from collections.abc import Collection, Sequence
@@ -16,18 +17,18 @@ from feti_homog.results import path_curves
 from feti_homog.results.path_curves import SAME_LOAD, Document, Point
 from feti_homog.typing import Float
 
-# A fall of the stress, or a jump of the strain, by more than this share of the largest is a drop: saw teeth of single
-# nodes are none.
+# A drop is a fall of the stress, or a jump of the strain, by more than this fraction of the largest value; the saw
+# teeth of single nodes are smaller.
 LEAST_DROP = 0.01
-# A path whose stress ends by less than this share below its largest ends near its peak.
+# A path has a peak if its stress falls by at least this fraction of the largest stress.
 LEAST_FALL = 0.05
 PEAK, LARGEST, SO_FAR = "peak", "largest stress", "largest so far"
 
 
 def turning_points(values: Float, threshold: float) -> list[int]:
-    """Return numbers of peaks and valleys of a curve (n,), in turn, more than `threshold` apart.
+    """Return the alternating peaks and valleys of a curve (n,), as point numbers.
 
-    Ends count if the curve falls or rises by more than `threshold` from or to them.
+    Neighbours differ by more than `threshold`.  An end of the curve counts if it differs by more from its neighbour.
     """
     entries, low, high, rises, falls = list[int](), 0, 0, True, True
     for number, value in enumerate(values):
@@ -43,14 +44,14 @@ def turning_points(values: Float, threshold: float) -> list[int]:
 
 
 def peak_of(document: Document) -> dict[str, Any]:
-    """Return the fields of `result_records.Peak` for a path with points.
+    """Return the fields of `result_records.Peak` for a non-empty path.
 
-    The peak is the largest stress up to the deepest fall in which bonds break, or on the path if it has no fall: once
-    all fibres have come off, the matrix alone may carry more than the composite did.  A path cut off without a fall has
-    a largest stress `so_far`, and no peak.
+    The peak is the largest stress up to the deepest fall in which bonds break, or on the whole path without such a
+    fall: after all fibres debond, the matrix alone may carry a larger stress than the composite did.  A path that
+    stopped early without a fall has no peak, but a largest stress `so_far`.
     """
     points, component = document["path"], path_curves.leading_component(document)
-    # 0.0 is added, for a zero may have a sign.
+    # The sum with 0.0 turns -0.0 into 0.0.
     stress, strain = (np.array([p[name] for p in points], float)[:, component] + 0.0 for name in ("stress", "strain"))
     event, remaining, valley = _deepest_fall(document, stress)
     names = [names[component] for names in voigt.voigt_names(len(points[0]["stress"]))]
@@ -77,25 +78,25 @@ def stresses_of(document: Document, peak: Document) -> list[float]:
 
 
 def fall_of(document: Document, peak: Document) -> float:
-    """Return the fall after the largest stress, to the valley or the end, as a share of that stress."""
+    """Return the stress fall, to the valley or the end, / the largest stress."""
     remaining = (stresses_of(document, peak)[-1], peak.get("stress_left", peak["stress"]))
     return max(1.0 - stress / peak["stress"] for stress in remaining) if peak["stress"] else 0.0
 
 
 def name_of(document: Document, peak: Document) -> str:
-    """Return PEAK if the path falls after its largest stress, SO_FAR if it was cut off, else LARGEST."""
+    """Return PEAK if the stress falls afterwards, SO_FAR for an unfinished path, else LARGEST."""
     if "so_far" in peak:
         return SO_FAR
     return LARGEST if fall_of(document, peak) < LEAST_FALL else PEAK
 
 
 def _deepest_fall(document: Document, stress: Float) -> tuple[int, float, int | None]:
-    """Return the point with the largest stress up to the deepest fall in which bonds break.
+    """Return peak number, valley stress and valley number of the deepest fall.
 
-    Also the stress in the valley and the point on whose branch it lies; without a fall 0 and None, and the largest
-    stress (n,) is sought on the path.
+    The peak is the largest stress (n,) up to the deepest fall in which bonds break.  Without a fall, the peak is the
+    largest stress on the path, the valley stress is 0, and the valley number is None.
 
-    On one leg the load only rises: at the load of a point the cell comes to the branch of the next point that holds.
+    On a path with one leg the load only rises: where bonds break, the cell drops to the next stable branch.
     """
     number, broke = np.arange(len(stress)), np.array([point["broke"] for point in document["path"]])
     if path_curves.is_proportional(document):
@@ -114,7 +115,7 @@ def _deepest_fall(document: Document, stress: Float) -> tuple[int, float, int | 
 
 
 def marks(document: Document) -> dict[int, str]:
-    """Return words for the main points by rising number: first break, peak, valley after it, end."""
+    """Return the titles of all landmarks, by rising point number."""
     peak = peak_of(document)
     largest = name_of(document, peak)
     places = {"first break": "first_break_event", largest: "event", f"after the {largest}": "event_left"}
@@ -127,15 +128,16 @@ def marks(document: Document) -> dict[int, str]:
 
 
 Drop = tuple[float, int, int]
-"""Stress fall (a strain jump scaled to stress), and the points before and after."""
+"""Stress fall, or strain jump scaled to a stress, and the point numbers before and after."""
 
 
 def kept(points: Sequence[Point], states: int | str, legs: int, marked: Collection[int] = ()) -> list[int]:
-    """Return rising numbers of the points to keep.
+    """Return the rising numbers of the points to keep.
 
-    `states`: "all"; "peaks": ends, `marked` points and points around every drop; or a count: ends, marked points unless
-    too many, half the other places for points around drops, the deepest first, and evenly spaced points.
-    The first of `legs` legs goes through all equilibria; 0 for increments.
+    Args:
+        states: "all"; "peaks": ends, `marked` points and points around every drop; or a number of points: the ends, the
+            marked points if they all fit, points around the deepest drops for half the rest, and evenly spaced points.
+        legs: number of legs of an event path, whose first leg passes all equilibria; 0 for increments.
     """
     if states == "all" or not points:
         return list(range(len(points)))
@@ -149,24 +151,21 @@ def kept(points: Sequence[Point], states: int | str, legs: int, marked: Collecti
     for _, *pair in sorted(around, key=lambda drop: -drop[0]):
         if len(chosen.union(pair)) <= room:
             chosen = chosen.union(pair)
-    return _filled(sorted(chosen), states)
-
-
-def _filled(numbers: list[int], count: int) -> list[int]:
-    """Return `numbers` and points between them, `count` in all: the widest gap is divided next."""
-    gaps: list[tuple[float, int, int, int]] = [(a - b, 1, a, b) for a, b in pairwise(numbers)]
+    # Each further point divides the widest gap anew.
+    gaps: list[tuple[float, int, int, int]] = [(a - b, 1, a, b) for a, b in pairwise(sorted(chosen))]
     heapify(gaps)
-    for _ in range(count - len(numbers)):
+    for _ in range(states - len(chosen)):
         _, parts, a, b = gaps[0]
         heapreplace(gaps, ((a - b) / (parts + 1), parts + 1, a, b))
-    return sorted({a + (b - a) * k // parts for _, parts, a, b in gaps for k in range(parts)} | {numbers[-1]})
+    return sorted({a + (b - a) * k // parts for _, parts, a, b in gaps for k in range(parts)} | ends)
 
 
 def drops(points: Sequence[Point], legs: int) -> list[Drop]:
     """Return the stress drops, and the strain jumps at constant load.
 
-    Drops go from each peak to the next valley, and on a first leg of events also from each load at which bonds break to
-    the next point that a rising load comes to; the strain jumps where a prescribed stress cannot drop.
+    A drop leads from a peak to the next valley.  On the first leg of an event path, a drop also leads from each load at
+    which bonds break to the next point that a rising load reaches.  A prescribed stress cannot drop: the strain jumps
+    instead.
     """
     stress, strain = (np.array([point[name] for point in points], float) for name in ("stress", "strain"))
     size, length = _norm(stress, 2.0), _norm(strain, 0.5)
@@ -178,13 +177,13 @@ def drops(points: Sequence[Point], legs: int) -> list[Drop]:
     per_strain = largest / (float(length.max()) or 1.0)
     load = np.array([point["load_factor"] for point in points])
     of_first_leg = int((load * legs <= 1.0 + SAME_LOAD).sum()) if legs else 0
-    # A rising load goes along rays through zero: stress and strain after a drop are scaled to the load before it.
+    # Branches are rays through zero: stress and strain after a drop are scaled to the load before the drop.
     rising, scaled, later = load[:of_first_leg], per_strain * strain, list[Drop]()
     for a, b in pairwise(np.flatnonzero(rising >= np.maximum.accumulate(rising)).tolist()):
         scale = load[a] / load[b]
         jump = _norm((scaled[b] * scale - scaled[a])[None], 0.5)[0]
         later += [(max(float(size[a] - size[b] * scale), float(jump)), a, b)] * (b > a + 1)
-    # Later, strain jumps over the points at one load, between which bonds break.
+    # On later legs the strain jumps across all points at one load, between which bonds break.
     starts = of_first_leg + np.flatnonzero(np.abs(np.diff(load[of_first_leg:], prepend=-1.0)) > SAME_LOAD)
     for a, b in pairwise([*starts.tolist(), len(load)]):
         jump = float(_norm((scaled[b - 1] - scaled[a])[None], 0.5)[0])
@@ -193,17 +192,17 @@ def drops(points: Sequence[Point], legs: int) -> list[Drop]:
 
 
 def _norm(values: Float, shear: float) -> Float:
-    """(n,) size of tensors (n, 3) or (n, 6); squared shears have weight `shear`."""
+    """Return the norms (n,) of tensors (n, 3) or (n, 6); squared shears have weight `shear`."""
     tensions = 2 if values.shape[1] == len(voigt.STRAINS) else 3
     square = np.square(values)
     return np.asarray(np.sqrt(square[:, :tensions].sum(axis=1) + shear * square[:, tensions:].sum(axis=1)))
 
 
 def chosen(document: Document, rows: int, among: Sequence[int] | None = None) -> list[int]:
-    """Return numbers of at most `rows` points of a path, or of its points `among` (rising).
+    """Choose at most `rows` points of a path, or of its points `among` (rising).
 
-    First and last point; then main points, deepest drop and leg ends, each group unless too many; between them points
-    spaced evenly by broken bonds.
+    The choice has the first and last point, then landmarks, deepest drop and leg ends, each group if it fits, and
+    further points at evenly spaced numbers of broken bonds.
     """
     points = document["path"]
     numbers = np.arange(len(points)) if among is None else np.asarray(among, int)
@@ -223,14 +222,14 @@ def chosen(document: Document, rows: int, among: Sequence[int] | None = None) ->
 
 
 def kept_points(document: Document) -> list[int]:
-    """Return the numbers of the points with kept fields, in state order; all points if no fields are kept."""
+    """Return the points with kept fields, in state order; all points if no fields are kept."""
     return list(document.get("states") or range(len(document["path"])))
 
 
 def landmark_states(document: Document, rows: int, count: int) -> list[int]:
-    """Return the states, among the first `count`, at main points: first break, peak, valley after it, end.
+    """Return the states at landmarks, among the first `count` states.
 
-    With fewer than three main points: at most `rows` states from `chosen_states`.
+    With fewer than three such states, return at most `rows` states from `chosen_states`.
     """
     among, marked = kept_points(document)[:count], marks(document)
     entries = [state for state, point in enumerate(among) if point in marked]
@@ -238,6 +237,6 @@ def landmark_states(document: Document, rows: int, count: int) -> list[int]:
 
 
 def chosen_states(document: Document, rows: int, count: int) -> list[int]:
-    """Return at most `rows` states among the first `count`, at points from `chosen`."""
+    """Choose at most `rows` states among the first `count`, as `chosen` does for points."""
     among = kept_points(document)[:count]
     return [among.index(number) for number in chosen(document, rows, among)]

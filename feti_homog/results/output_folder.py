@@ -1,6 +1,7 @@
-"""The result folder and its events.log: one run at a time writes there, and no foreign file is replaced.
+"""Lock and check the result folder, and write its events.log.
 
-A run recognizes its own files by content, not by a marker: somebody may later put a file with one of their names there.
+One run at a time writes to the folder, and replaces no foreign file.  A run recognizes result files by content, not by
+a marker in the folder: a user may add a foreign file with the name of a result file later.
 """
 
 from __future__ import annotations
@@ -26,10 +27,10 @@ if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
 LOCK = "result.lock"
-LOG = "events.log"  # a line an event of a path, there to be followed while the path goes on
-LOG_HEADER = "# feti-homog: events"  # the beginning of the first line, by which a log is known as one of this program
-LONGEST = "case_minus_temperature.png"  # of a run's files the one of the longest name
-# The files of a result, those of all analyses and of what `plot` and `fields` make.
+LOG = "events.log"  # one line for each event, for users to follow a running path
+LOG_HEADER = "# feti-homog: events"  # beginning of the first line, which identifies a log of this program
+LONGEST = "case_minus_temperature.png"  # longest file name of a run
+# All files of a result, for all analyses and the commands `plot` and `fields`.
 RESULT_FILE = re.compile(
     r"report\.html|events\.log|result\.(json|h5|xdmf)|interface\.xdmf"
     r"|(angle|path|load|envelope)\.csv|path\.gif"
@@ -37,22 +38,22 @@ RESULT_FILE = re.compile(
     r"|(cell|interface)(_\d{4,}\.vtu|\.pvd|\.vtkhdf)"
     rf"|case_(minus_)?({'|'.join(voigt.SPATIAL_STRAINS)}|temperature)\.png|state_\d+\.png"
 )
-# Of these those that show that a run has written to the folder.
+# Files that show that a run has written to the folder.
 SIGNS = (result_json.NAME, field_file.NAME, LOG, LOCK)
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 def usable(directory: Path) -> None:
-    """Check that `directory` is a folder or can be made, is writable, and that no run writes there now.
+    """Check that a run can use `directory`: writable or still to be made, and not in use.
 
-    Makes nothing.
+    The check creates no file or folder.
 
     Raises:
-        CaseError: it cannot be used.
+        CaseError: the folder cannot be used.
     """
     try:
         with contextlib.suppress(FileNotFoundError, NotADirectoryError):
-            os.stat(atomic.part_of(directory / LONGEST))  # is such a name too long?
+            os.stat(atomic.part_of(directory / LONGEST))  # raises an error if the name is too long
         existing = next(p for p in (directory.absolute(), *directory.absolute().parents) if os.path.lexists(p))
         if existing.is_symlink() and not existing.exists():
             raise CaseError(f"--out {directory}: expected a folder, but {existing} is a link that leads nowhere")
@@ -62,17 +63,17 @@ def usable(directory: Path) -> None:
             raise CaseError(f"--out {directory}: expected a folder that can be written to; {existing} cannot")
     except OSError as error:
         raise CaseError(f"--out {directory}: cannot be used: {error.strerror}") from error
-    if (directory / LOCK).is_symlink():  # whose file elsewhere would get the name of the holder
+    if (directory / LOCK).is_symlink():  # the lock would write to the target of the link
         raise CaseError(f"--out {directory}: {LOCK} is a link there; move it away or choose another folder")
     if (who := file_locks.holder(directory / LOCK)) is not None:
         raise _busy(directory, who)
 
 
 def refuse_files_of_others(directory: Path) -> None:
-    """Check that a run may write all its files to `directory`, and replace existing ones.  Call on one rank.
+    """Check that a run may replace the files in `directory`.  Call on one rank.
 
     Raises:
-        CaseError: a folder has the name of a file, a file the name of a folder, or no run wrote a file of that name.
+        CaseError: a folder has the name of a result file, or the reverse, or a file with such a name is foreign.
     """
     if not directory.is_dir():
         return
@@ -83,7 +84,9 @@ def refuse_files_of_others(directory: Path) -> None:
             if kind:
                 raise CaseError(f"--out {directory}: {path.name} is {kind}, and a run writes a file of that name")
         checkpoints.refuse_others(directory)
-        others = _foreign(paths)
+        signs = [path for path in paths if path.name in SIGNS]
+        # Without any sign of a run, all files that are not empty are foreign.
+        others = [path for path in signs or paths if path.stat().st_size and not (signs and _is_own(path))]
     except OSError as error:
         raise CaseError(f"--out {directory}: its files cannot be read: {error.strerror}") from error
     if others:
@@ -91,21 +94,15 @@ def refuse_files_of_others(directory: Path) -> None:
 
 
 def foreign(directory: Path, name: str, kind: str) -> CaseError:
-    """Return the error for a file of others under a name that a run or a study writes."""
+    """Return the error for a foreign file with the name of a result."""
     return CaseError(
         f"--out {directory}: no {kind} of this program wrote {name}, and this one would replace it; "
         "move it away or choose another folder"
     )
 
 
-def _foreign(paths: list[Path]) -> list[Path]:
-    """Return files without the marks of a run; without any sign of a run, all that are not empty."""
-    signs = [path for path in paths if path.name in SIGNS]
-    return [path for path in signs or paths if path.stat().st_size and not (signs and _is_own(path))]
-
-
 def _is_own(path: Path) -> bool:
-    """Return whether a run wrote this result.json, of whatever version, result.h5 or events.log."""
+    """Return whether any version of the program wrote this result.json, result.h5 or events.log."""
     if path.name == result_json.NAME:
         try:
             document = json.loads(input_files.read(path))
@@ -113,7 +110,7 @@ def _is_own(path: Path) -> bool:
             return False
         return isinstance(document, dict) and {"version", "case", "solver"} <= document.keys()
     with input_files.opened(path) as stream:
-        head = stream.read(1 << 20)  # which has the attributes of result.h5
+        head = stream.read(1 << 20)  # contains the attributes of result.h5
     if path.name == field_file.NAME:
         return head.startswith(HDF5_SIGNATURE) and PROGRAM.encode() in head
     return path.name != LOG or head.startswith(LOG_HEADER.encode())
@@ -121,13 +118,13 @@ def _is_own(path: Path) -> bool:
 
 @contextmanager
 def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iterator[None]:
-    """Make the folder with its parents and lock it for this run while the block lasts.  Collective.
+    """Create and lock the result folder during a block.  Collective.
 
-    Removes unfinished files from earlier runs and, at the end, new folders that are empty.  On a file system without
-    locks `say` gets a warning and the run goes on without one.
+    Unfinished files from earlier runs are removed, and at the end new folders that stayed empty.  On a file system
+    without locks, `say` gets a warning and the run continues without a lock.
 
     Raises:
-        CaseError: it cannot be made, or another run has it.
+        CaseError: the folder cannot be made, or another run has locked it.
     """
     lock = file_locks.Lock(directory / LOCK)
     made, warning = mpi_errors.on_root(comm, _hold, lock, directory)
@@ -139,12 +136,13 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
         lock.release()
         if comm.rank == 0:
             _remove_empty(made)
-    # No rank goes on while rank 0's lock is still to be seen; after an error of one rank the others may not come.
+    # No rank continues before rank 0 has released the lock. Not in `finally`: after an error of one rank, other ranks
+    # may never reach the barrier.
     comm.Barrier()
 
 
 def remove_other_results(directory: Path, written: Collection[str]) -> None:
-    """Remove result files from an earlier run, except for names in `written`.  Call on one rank."""
+    """Remove result files with names that are not in `written`.  Call on one rank."""
     for path in directory.iterdir():
         if RESULT_FILE.fullmatch(path.name) and path.name not in written and not path.is_dir():
             with contextlib.suppress(OSError):
@@ -152,15 +150,15 @@ def remove_other_results(directory: Path, written: Collection[str]) -> None:
 
 
 def write_product(path: Path, text: str) -> Path:
-    """Write the product of a command, a card or a fibre table, to a file; returns its path.
+    """Write the output of a command, a card or a fibre table, to a file; return its path.
 
-    A link stays; the file that it leads to is written.
+    If `path` is a link, the function replaces the file at its target.
 
     Raises:
-        CaseError: `path` is a folder, a device or a pipe, in no folder, or a file of a result.
-        FetiHomogError: it cannot be written; nothing is left half-written.
+        CaseError: `path` is a folder, a device or a pipe, lies in no folder, or has the name of a result file.
+        FetiHomogError: the file cannot be written; no unfinished file remains.
     """
-    if path.exists() and not path.is_file():  # a device would be replaced, not written to
+    if path.exists() and not path.is_file():  # the function would replace a device
         kind = "a folder" if path.is_dir() else "a device or a pipe"
         raise CaseError(f"--out {path}: expected a file, but it is {kind}")
     target = Path(os.path.realpath(path))
@@ -174,7 +172,7 @@ def write_product(path: Path, text: str) -> Path:
 
 
 def _hold(lock: file_locks.Lock, directory: Path) -> tuple[list[Path], str]:
-    """Make and lock the folder; returns new folders, innermost first, and a warning if it has no lock."""
+    """Create and lock the folder; return new folders, innermost first, and a lock warning or an empty text."""
     made = [path for path in (directory, *directory.parents) if not path.exists()]
     try:
         directory.mkdir(parents=True, exist_ok=True)
@@ -195,7 +193,7 @@ def _hold(lock: file_locks.Lock, directory: Path) -> tuple[list[Path], str]:
 
 
 def _remove_empty(folders: list[Path]) -> None:
-    """Remove nested folders, innermost first, as far as they are empty."""
+    """Remove nested folders, innermost first, up to the first non-empty folder."""
     with contextlib.suppress(OSError):
         for folder in folders:
             folder.rmdir()
@@ -206,9 +204,9 @@ def _busy(directory: Path, who: str) -> CaseError:
 
 
 class EventLog:
-    """The event log in `directory`, written by rank 0; its first line replaces an earlier log.
+    """The event log in `directory`, which rank 0 writes; the first line replaces an earlier log.
 
-    If it cannot be written `say` gets one warning, and the path goes on without it: the log holds no results.
+    After a write error `say` gets one warning, and the path continues without the log, which holds no results.
     """
 
     def __init__(self, directory: Path, comm: Intracomm, title: str, say: Callable[[str], object]) -> None:
@@ -217,7 +215,7 @@ class EventLog:
         self._stream: TextIO | None = None
 
     def write(self, line: str) -> None:
-        """Add a line."""
+        """Append a line to the log."""
         if not self._wanted:
             return
         try:
@@ -231,8 +229,8 @@ class EventLog:
             self.close()
 
     def close(self) -> None:
-        """End the log."""
+        """Close the log."""
         self._wanted = False
         if self._stream is not None:
-            with contextlib.suppress(OSError):  # every line was written when it was given
+            with contextlib.suppress(OSError):  # the stream has no unwritten line
                 self._stream.close()

@@ -1,4 +1,4 @@
-"""Curves of stress-strain paths: the response to a rising load, first leg, components to show.
+"""Derive stress-strain curves from a path: response to a rising load, legs, components to show.
 
 Points are entries of `path` in result.json: mappings with `load_factor`, `strain` and `stress`, c components in Voigt
 order: [11, 22, 12], or [11, 22, 33, 23, 13, 12] in generalized plane strain; stresses in the moduli's unit.
@@ -14,8 +14,8 @@ from feti_homog.case import bond_laws, load_sections
 from feti_homog.materials import voigt
 from feti_homog.typing import Float
 
-SAME_LOAD = 1e-9  # load factors that differ by less, relatively, are one
-# Of the largest component: what the solver leaves of zero is less, and what would not be seen beside it.
+SAME_LOAD = 1e-9  # relative tolerance for equal load factors
+# Fractions of the largest component, below which a component is zero for the solver, or invisible in a plot.
 ZERO, FAINT = 1e-7, 1e-4
 
 Point = Mapping[str, Any]
@@ -23,7 +23,7 @@ Document = Mapping[str, Any]
 
 
 def targets(document: Document) -> tuple[dict[str, float], ...]:
-    """Return the waypoints of a path, or the one load, with strain or stress of each component by name."""
+    """Return the waypoints of a path, or the single load, with all components by name."""
     return load_sections.completed(_given(document), document["case"]["analysis"]["plane"])
 
 
@@ -35,7 +35,7 @@ def named_components(document: Document) -> list[int]:
 
 
 def _given(document: Document) -> list[load_sections.Strain | load_sections.MixedLoad]:
-    """Return the loads as the case gives them."""
+    """Return the loads of a case, without the components that they leave out."""
     section = document["case"].get("path") or document["case"]["load"]
     as_written = section.get("waypoints") or [section[name] for name in ("strain", "to") if name in section]
     return [load_sections.MixedLoad(**load) if isinstance(load, Mapping) else tuple(load) for load in as_written]
@@ -54,9 +54,9 @@ def changed_components(document: Document) -> list[int]:
 
 
 def leading_component(document: Document) -> int:
-    """Return the component with the largest strain among components that the waypoints change.
+    """Return the component with the largest strain among those that the waypoints change.
 
-    Among all if they change nothing but the temperature.
+    If the waypoints change the temperature alone, all components are compared.
     """
     largest = np.abs([point["strain"] for point in document["path"]]).max(axis=0)
     changed = changed_components(document) or list(range(len(largest)))
@@ -64,31 +64,31 @@ def leading_component(document: Document) -> int:
 
 
 def components_above(share: float, values: Float) -> list[int]:
-    """Return the columns of (n, c) with entries above a share of the largest entry."""
+    """Return the columns of (n, c) with entries above a fraction of the largest entry."""
     largest = np.abs(values).max(axis=0, initial=0.0)
     return [int(column) for column in np.flatnonzero(largest > share * largest.max(initial=0.0))]
 
 
 def shown_stresses(document: Document) -> list[int]:
-    """Return the components with visible stress on a path; the leading one if no stress acts."""
+    """Return the components with visible stress on a path, or the leading component."""
     matches = components_above(FAINT, np.array([point["stress"] for point in document["path"]], float))
     return matches or [leading_component(document)]
 
 
 def what_rises(document: Document) -> str:
-    """Return "strain" if nothing but strains rises on the first leg of a path, else "load"."""
+    """Return "strain" if only strains rise on the first leg of a path, else "load"."""
     first = targets(document)[0]
     other_loads = {*voigt.plane_state_of(document).stresses, load_sections.TEMPERATURE}
     return "load" if any(first[name] for name in other_loads & first.keys()) else "strain"
 
 
 def legs(document: Document) -> int:
-    """Return the number of straight legs in the path of a case."""
+    """Return the number of straight legs of a path."""
     return len(document["case"]["path"].get("waypoints", [0]))
 
 
 def first_leg(document: Document) -> int:
-    """Return the number of points on the first leg; all of increments, which are drawn alike."""
+    """Return the number of points on the first leg; for increments, of all points."""
     points = document["path"]
     if document["case"]["path"]["method"] == "increments":
         return len(points)
@@ -97,19 +97,19 @@ def first_leg(document: Document) -> int:
 
 
 def ends_of_legs(document: Document) -> list[int]:
-    """Return the numbers of the points at waypoints."""
+    """Return the point numbers at waypoints."""
     position = np.array([point["load_factor"] for point in document["path"]]) * (count := legs(document))
     matches = (np.flatnonzero(np.abs(position - leg) <= SAME_LOAD * count) for leg in range(1, count + 1))
     return [int(numbers[-1]) for numbers in matches if len(numbers)]
 
 
 def is_proportional(document: Document) -> bool:
-    """Return whether every point lies on a ray from zero: events along one leg, where the response is homogeneous."""
+    """Return whether every branch is a ray from zero: a path of events with one leg."""
     return document["case"]["path"]["method"] == "events" and legs(document) == 1
 
 
 def interface_sections(document: Document) -> Sequence[Mapping[str, Any]]:
-    """Return the [interface] sections of a case, none for perfect bonding."""
+    """Return the [interface] sections of a case, empty for perfect bonding."""
     sections = document["case"].get("interface", [])
     return sections if isinstance(sections, list) else [sections]
 
@@ -125,11 +125,11 @@ def scales_with_toughness(document: Document) -> bool:
 
 
 def load_controlled(points: Sequence[Point]) -> Float:
-    """(v, 2 c) stresses and strains at the corners of a proportional path under a rising load.
+    """Return stresses and strains (v, 2 c) at the corners of a proportional path under a rising load.
 
-    At a load t where bonds break, all break whose load is lower once the first are gone: at that load the cell comes to
-    the next branch that holds, each branch being a ray through zero: Sigma(t) = Sigma(t') t / t', and so the strains.
-    Where a strain is given its stress falls, where a stress is given its strain jumps.
+    At a load t where bonds break, all bonds break that cannot carry t without the first ones. The cell then follows the
+    next stable branch, with a point at load t'. Each branch is a ray through zero, Sigma(t) = Sigma(t') t / t', and so
+    for the strains. Under a prescribed strain the stress falls; under a prescribed stress the strain jumps.
     """
     load = np.array([point["load_factor"] for point in points])
     values = np.array([[*point["stress"], *point["strain"]] for point in points])
@@ -141,9 +141,9 @@ def load_controlled(points: Sequence[Point]) -> Float:
 
 
 def rising_strain(document: Document) -> Float | None:
-    """(v, c + 1) stresses and leading strain, made positive, along a one-leg path under a rising load.
+    """Return stresses and leading strain (v, c + 1) of a one-leg path under a rising load.
 
-    None for other results, and where the strain does not rise with the load.
+    The strain is made positive. The result is None for other paths, or if the strain does not rise with the load.
     """
     points = document.get("path")
     if not points or legs(document) != 1:
@@ -162,9 +162,9 @@ def rising_strain(document: Document) -> Float | None:
 
 
 def first_drop(points: Sequence[Point]) -> tuple[Float, int]:
-    """Return the stress (c,) left after the first break of a proportional path at constant load.
+    """Return the stress (c,) after the first break of a proportional path, at constant load.
 
-    Also the number of the point on whose branch the stress lies.
+    Return also the number of the point on the branch of that stress.
     """
     load = points[0]["load_factor"]
     number = next((n for n, point in enumerate(points) if n and point["load_factor"] >= load), len(points) - 1)

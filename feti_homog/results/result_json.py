@@ -1,7 +1,7 @@
-"""result.json, the document of a run, and its points as CSV tables, each written whole or not at all.
+"""Read and write result.json, write points as CSV tables, and seal files by checksums.
 
-Checksums tell damaged or edited files: in a JSON document, and of a large file.  HDF5 may crash on wrong bytes, so a
-large file is checked before it is opened.
+Each file is written completely or not at all.  A checksum in a JSON document, or beside a large file, reveals damage
+and edits.  HDF5 may crash on wrong bytes, so readers check a large file before they open it.
 """
 
 import csv
@@ -23,12 +23,12 @@ from feti_homog.system.runtime import described, input_files, records
 
 NAME = "result.json"
 KEY = "checksum"
-BLOCK = 1 << 26  # bytes of a file that are read at once
-SCHEMA = 1  # version of the layout: to be raised when a key is renamed, removed or changes its meaning
+BLOCK = 1 << 26  # bytes of one read
+SCHEMA = 1  # version of the layout: raise when a key changes its name or meaning, or goes
 
 
 def write(directory: Path, document: Mapping[str, Any]) -> Path:
-    """Write `directory`/result.json, whose folder is made if needed; returns its path.
+    """Write `directory`/result.json, with its folder if needed; return its path.
 
     NumPy arrays and scalars become lists and numbers, tuples lists, paths text. The file is replaced in one
     step: a reader finds the old document or the new one. Call on one rank.
@@ -52,7 +52,7 @@ def read(directory: Path) -> dict[str, Any]:
     """Return the document of `directory`/result.json.
 
     Raises:
-        CaseError: it is missing, not JSON, no table or changed, or its layout has another version.
+        CaseError: the file is missing, not JSON, no table or changed, or its layout has another version.
     """
     path = Path(directory) / NAME
     try:
@@ -68,9 +68,9 @@ def read(directory: Path) -> dict[str, Any]:
 
 
 def _json_value(value: Any, place: str, faults: list[str]) -> Any:
-    """Return the value in JSON's own types; numbers that are not finite add their faults.
+    """Convert a value to JSON types; add a fault for each number that is not finite.
 
-    Raises TypeError with the place of a value that has none.
+    Raises TypeError with the path of a value without a JSON type.
     """
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
@@ -96,9 +96,9 @@ class DescribedColumn(NamedTuple):
 
 
 def columns(kind: type) -> Iterator[DescribedColumn]:
-    """Yield the columns that records of a class fill: the reference table of their file."""
+    """Yield the columns of a CSV file with records of a class, for the reference."""
     for name, description in _in_columns(kind).items():
-        # Those in the plane are among those in space, in the same order.
+        # The components in the plane are among the spatial components, in the same order.
         for component in description.spatial_components or _names(name, description):
             sentence = f"{component}, {description.meaning}" if description.components else description.meaning
             yield DescribedColumn(component, description.unit, sentence)
@@ -145,16 +145,18 @@ def _in_columns(kind: type) -> dict[str, records.Description]:
 
 
 def dumps(document: Mapping[str, Any]) -> str:
-    """Return the text of a document with its checksum as last key.  Raises ValueError for NaN."""
+    """Serialize a document, with its checksum as last key.  Raises ValueError for NaN."""
     text = _text({key: value for key, value in document.items() if key != KEY})
     return _sealed(text, _checksum(text))
 
 
 def loads(text: str) -> dict[str, Any]:
-    """Return the document of a text, without its checksum; a text without one is read unchecked.
+    """Parse a document and verify its checksum, which is removed.
+
+    A text without a checksum is not verified.
 
     Raises:
-        ValueError: it is not JSON, no table, or changed since it was written.
+        ValueError: the text is not JSON, no table, or does not match its checksum.
     """
     try:
         document = json.loads(text)
@@ -185,10 +187,12 @@ class FileSeal:
 
 
 def seal(path: Path, block: int = BLOCK) -> FileSeal:
-    """Seal a file.  Call on the rank that completed it: others may still see an earlier file of its name.
+    """Return size and checksum of a file.
+
+    Call on the rank that completed the file: other ranks may still see an earlier file of that name.
 
     Raises:
-        FetiHomogError: it cannot be read.
+        FetiHomogError: the file cannot be read.
     """
     with atomic.file_errors("read", path), path.open("rb", buffering=0) as stream:
         size = os.fstat(stream.fileno()).st_size
@@ -197,11 +201,11 @@ def seal(path: Path, block: int = BLOCK) -> FileSeal:
 
 
 def check(path: Path, expected: FileSeal, block: int = BLOCK) -> None:
-    """Check that a file is the one of this seal.  Call on one rank.
+    """Check a file against its seal.  Call on one rank.
 
     Raises:
-        CaseError: it is not.
-        FetiHomogError: it cannot be read.
+        CaseError: size or checksum differ.
+        FetiHomogError: the file cannot be read.
     """
     with atomic.file_errors("read", path):
         size = os.stat(path).st_size
@@ -216,7 +220,7 @@ def _checksum(text: str) -> str:
 
 
 def _sealed(text: str, checksum: Any) -> str:
-    """Return the text of a document with a last key, as `_text` would write it."""
+    """Append the checksum to the text of a document, in the format of `_text`."""
     begin = "{" if text == "{}" else text.removesuffix("\n}") + ","
     return f'{begin}\n "{KEY}": {json.dumps(checksum)}\n}}\n'
 

@@ -1,6 +1,6 @@
-"""States of result.h5 for viewers, with derived fields, and as VTK files.
+"""Read the states of result.h5 with derived fields, and write them as VTK files.
 
-VTK's file formats, .vtu, a file for each state, and .vtkhdf: https://docs.vtk.org/en/latest/vtk_file_formats.
+The formats are .vtu, with one file for each state, and .vtkhdf, with all states in one file: https://docs.vtk.org/en/latest/vtk_file_formats.
 """
 
 import base64
@@ -26,7 +26,7 @@ from feti_homog.verify import constitutive_law
 
 @dataclass(frozen=True, repr=False)
 class ViewedState:
-    """One state on its mesh: the cell, or the interface as points.
+    """One state on its mesh: elements of the cell, or interface points.
 
     Attributes:
         points: (n, 3) node positions; nodes are torn between subdomains.
@@ -46,15 +46,15 @@ class ViewedState:
 
 
 def read_state(out: str | Path, number: int = 0) -> ViewedState:
-    """Return a state of the cell from a result folder.  Call on one rank.
+    """Read a state of the cell from a result folder.  Call on one rank.
 
-    `nodes` has displacement and fluctuation, the periodic part of the displacement (length); `elements` stress and
-    strain, tensors of means over the elements, S11, S22, S12, S33, von_mises and principal_1 to 3, the largest first
-    (stress), body, fibre_number, phase and subdomain.  Strains include thermal ones.  Values that the constants of a
-    material do not determine are NaN.
+    `nodes` has displacement and fluctuation, the periodic part of the displacement (length).  `elements` has element
+    means: the tensors stress and strain; S11, S22, S12, S33, von_mises, and principal_1 to principal_3, largest first
+    (stress); body, fibre_number, phase and subdomain.  Strains include thermal strains.  A value is NaN if the material
+    constants do not determine it.
 
     Raises:
-        CaseError: there is no result.h5, it cannot be read, or has no such state.
+        CaseError: result.h5 is missing or cannot be read, or has no such state.
     """
     path = Path(out) / field_file.NAME
     try:
@@ -68,19 +68,19 @@ def read_state(out: str | Path, number: int = 0) -> ViewedState:
 
 
 def cell_state(file: Any, state: int) -> ViewedState:
-    """Return a state of the cell from an open result.h5, as `read_state`."""
+    """Read a state of the cell from an open result.h5, as `read_state`."""
     group = file[f"state/{state}"]
     more = xdmf.SPATIAL_ELEMENTS if AXIAL_DISPLACEMENT in group else {}
     nodes, elements = (_tables(file, state, names) for names in (xdmf.CELL_NODES, xdmf.CELL_ELEMENTS | more))
     points, triangles, strain = file["mesh/points"][()], file["mesh/triangles"][()], group.attrs["strain"]
-    # H of the displacements H x of the macroscopic strain, in the plane and along the fibres
+    # The macroscopic strain has the displacement H x, in the plane and along the fibres.
     along = strain[[4, 3]] if more else np.zeros(2)
     gradient = np.vstack([PLANE.gradient(strain[[0, 1, -1]]), AXIAL.gradient(along)])
     nodes["fluctuation"] = nodes["displacement"] - points @ gradient.T
     in_plane = group["stress"][()]
     if more:
         E33 = np.full(len(in_plane), strain[2])
-    else:  # as the materials make it, in plane strain and stress
+    else:  # from the constitutive laws, in plane strain and plane stress
         rules = constitutive_law.out_of_plane(json.loads(file.attrs["case"]), tuple(map(str, file.attrs["phases"])))
         E33 = np.einsum("ei,ei->e", rules[file["mesh/phase"][()], 1], in_plane)
     every, displacement = np.arange(len(points), dtype=np.int32), nodes["displacement"]
@@ -97,7 +97,7 @@ def cell_state(file: Any, state: int) -> ViewedState:
 
 
 def interface_state(file: Any, state: int) -> ViewedState:
-    """Return a state of the interface nodes: displacements of both faces, tractions, jumps."""
+    """Read a state of the interface nodes: displacements of both faces, tractions, jumps."""
     group = file[f"state/{state}"]
     more = xdmf.SPATIAL_POINTS if AXIAL_DISPLACEMENT in group else {}
     nodes = _tables(file, state, xdmf.INTERFACE_POINTS | more)
@@ -106,27 +106,27 @@ def interface_state(file: Any, state: int) -> ViewedState:
 
 
 def _tables(file: Any, state: int, places: Mapping[str, str]) -> dict[str, Array]:
-    """Return the tables of a state that exist; files from earlier versions have fewer."""
+    """Read the existing tables of a state; files from earlier versions have fewer tables."""
     existing = {name: place.replace("/K/", f"/{state}/") for name, place in places.items()}
     return {name: file[place][()] for name, place in existing.items() if place in file}
 
 
 IN_SPACE = ((0, 0), (0, 1))  # of points (n, 2)
 FORMATS = ("vtu", "vtkhdf")
-KINDS = {1: 1, 3: 5, 6: 22}  # VTK's numbers of a vertex and of triangles, by their nodes
+KINDS = {1: 1, 3: 5, 6: 22}  # VTK's cell types, vertex and triangles, by number of nodes
 TYPES = {"f4": "Float32", "f8": "Float64", "i1": "Int8", "i4": "Int32", "i8": "Int64", "u1": "UInt8"}
 PARTS = {"cell": cell_state, "interface": interface_state}
 
 
 def write_vtk(directory: Path, kind: str) -> list[Path]:
-    """Write the states of `directory`/result.h5 as `kind`, one of `FORMATS`; returns the paths.  Call on one rank.
+    """Write the states of `directory`/result.h5 in a VTK format; return the paths.  Call on one rank.
 
-    `vtu`: cell_0000.vtu, ... and cell.pvd, which lists them; `vtkhdf`: cell.vtkhdf with all states as steps.  With
-    interface nodes interface_0000.vtu, ... or interface.vtkhdf too.
+    `kind` is one of `FORMATS`.  `vtu` writes cell_0000.vtu, ... and their list cell.pvd; `vtkhdf` writes cell.vtkhdf,
+    with all states as steps.  A cell with interface nodes also has interface_0000.vtu, ... or interface.vtkhdf.
 
     Raises:
-        CaseError: there is no result.h5.
-        FetiHomogError: it cannot be read, or a file cannot be written.
+        CaseError: result.h5 is missing.
+        FetiHomogError: result.h5 cannot be read, or a file cannot be written.
     """
     path = directory / field_file.NAME
     if not path.is_file():
@@ -149,7 +149,7 @@ def write_vtk(directory: Path, kind: str) -> list[Path]:
 
 
 def _grid(state: ViewedState) -> ET.Element:
-    """Return a state as VTK's XML, its arrays in base64."""
+    """Convert a state into VTK's XML, with arrays in base64."""
     form = {"type": "UnstructuredGrid", "version": "1.0", "byte_order": "LittleEndian", "header_type": "UInt64"}
     root = ET.Element("VTKFile", form)
     m, columns = state.cells.shape
@@ -173,7 +173,7 @@ def _grid(state: ViewedState) -> ET.Element:
 
 
 def _write_vtkhdf(read: Any, file: Any, path: Path) -> None:
-    """Write the mesh, which all states share, and the fields, one state after the other."""
+    """Write a .vtkhdf file: the common mesh, and the fields of each state."""
     count = len(file["state"])
     with h5py.File(path, "w") as out:
         root = out.create_group("VTKHDF")

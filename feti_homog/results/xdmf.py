@@ -1,8 +1,8 @@
-"""result.xdmf and interface.xdmf, by which ParaView reads cell, interface and states from result.h5.
+"""Write result.xdmf and interface.xdmf, by which ParaView reads result.h5.
 
-All readers in ParaView and VTK understand them: undivided datasets, points with a connectivity, tensors with nine
-components, one collection per file.  Readers take no texts: a state label is the name of its block, which two readers
-show, and an array with the bytes of its letters, equally long in all states.
+The files use only features that all XDMF readers of ParaView and VTK support: whole datasets, points with a
+connectivity, tensors with nine components, one collection per file.  Readers load no texts: a state label is therefore
+the name of a block, which two readers show, and an array of bytes, with the same length in all states.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,10 +19,10 @@ from feti_homog.results.field_layout import StatePart, tables
 from feti_homog.results.field_views import AXIAL
 
 CELL, INTERFACE = "result.xdmf", "interface.xdmf"
-TENSOR = np.array([0, 5, 4, 5, 1, 3, 4, 3, 2])  # places of the tensor's rows in [11, 22, 33, 23, 13, 12]
+TENSOR = np.array([0, 5, 4, 5, 1, 3, 4, 3, 2])  # tensor rows, as indices into [11, 22, 33, 23, 13, 12]
 NUMBERS = {"f": "Float", "i": "Int"}
 SHAPES = {1: "Scalar", 3: "Vector", 9: "Tensor"}  # by the number of components
-# The arrays of the cell and of the interface, and the datasets of result.h5, or of one of its states, that they are.
+# Arrays of the cell and the interface, each with its dataset in result.h5; K stands for a state.
 CELL_NODES = {"displacement": "vector/state/K/displacement"}
 CELL_ELEMENTS = {
     **{name: f"mesh/{name}" for name in ("body", "fibre_number", "phase", "subdomain")},
@@ -40,14 +40,14 @@ INTERFACE_POINTS = {
     "normal": "vector/interface/normal",
     **{name: f"interface/{name}" for name in ("length", "fibre", "fibre_number", "pair")},
 }
-# Of generalized plane strain there are these too.
+# Further arrays in generalized plane strain.
 SPATIAL_ELEMENTS = {name: f"column/state/K/{name}" for name in voigt.AXIAL_STRESSES}
 SPATIAL_POINTS = {f"{name}_a": f"state/K/axial_{name}" for name in ("traction", "jump")}
 LISTED = {*CELL_ELEMENTS.values(), *INTERFACE_POINTS.values(), *SPATIAL_POINTS.values()}
 
 
 def _described(*shapes: str) -> dict[str, str]:
-    """Return state fields in `field_layout` that no table above names, under their own names."""
+    """Return the datasets of further state fields, with these shapes, by field name."""
     fields = {name: d.shape for name, d in tables(StatePart).items() if f"state/K/{name}" not in LISTED}
     return {name: f"state/K/{name}" for name, shape in fields.items() if shape in shapes}
 
@@ -57,10 +57,10 @@ INTERFACE_POINTS |= _described("(k,)", "(k, 3)")
 
 
 def write(directory: Path) -> list[Path]:
-    """Write result.xdmf and, with interface nodes, interface.xdmf for `directory`/result.h5; returns their paths.
+    """Write the XDMF files for `directory`/result.h5; return their paths.  Call on one rank.
 
-    Each has one temporal collection with state numbers as times: fields on nodes and elements of the cell, or at
-    interface points.  Call on one rank.
+    result.xdmf has the fields on nodes and elements of the cell.  A cell with interface nodes also gets interface.xdmf,
+    with the fields at interface points.  Each file has one temporal collection, with state numbers as times.
 
     Raises:
         FetiHomogError: result.h5 cannot be read or a file cannot be written.
@@ -72,7 +72,7 @@ def write(directory: Path) -> list[Path]:
 
 
 def _write(path: Path, file: h5py.File) -> Path:
-    """Write one file: mesh and fields of each state, for the cell or the interface."""
+    """Write the XDMF file of the cell or the interface; return its path."""
     root = ET.Element("Xdmf", Version="3.0")
     name = "cell" if path.name == CELL else "interface"
     collection = ET.SubElement(
@@ -82,7 +82,7 @@ def _write(path: Path, file: h5py.File) -> Path:
     labels = [str(file[f"state/{state}"].attrs["label"]) for state in states]
     longest = max((len(label.encode()) for label in labels), default=0)
     for state, label in zip(states, labels, strict=True):
-        # A collection for each state: readers pass on names of grids in one alone.
+        # One collection for each state: readers show grid names only inside a spatial collection.
         kind = {"Name": f"state {state}", "GridType": "Collection", "CollectionType": "Spatial"}
         block = ET.SubElement(collection, "Grid", kind)
         ET.SubElement(block, "Time", Value=state)
@@ -112,7 +112,7 @@ def _write(path: Path, file: h5py.File) -> Path:
 
 
 def _numbers(grid: ET.Element, name: str, kind: str, values: Sequence[float]) -> None:
-    """Numbers of the state as a whole, written out."""
+    """Add an attribute of a whole state, with its values in the XML text."""
     size = f"1 {len(values)}" if kind != "Scalar" else str(len(values))
     number, precision = ("Float", "8") if isinstance(values[0], float) else ("Int", "4")
     item = ET.Element("DataItem", Dimensions=size, Format="XML", NumberType=number, Precision=precision)
@@ -136,7 +136,7 @@ def _attributes(grid: ET.Element, file: h5py.File, state: str, arrays: Mapping[s
 
 
 def _table(table: Any) -> ET.Element:
-    """Return a whole dataset of result.h5."""
+    """Return the XML reference to a whole dataset of result.h5."""
     number = "Char" if table.dtype == np.int8 else NUMBERS[table.dtype.kind]
     form = {"Format": "HDF", "NumberType": number, "Precision": str(table.dtype.itemsize)}
     item = ET.Element("DataItem", form, Dimensions=" ".join(map(str, table.shape)))

@@ -1,4 +1,4 @@
-"""Reading case file tables into frozen dataclasses whose fields carry their rules."""
+"""Read case file tables into frozen dataclasses, whose fields hold the rules of their keys."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Selector:
-    """A section's key whose value decides which other keys belong to the case.
+    """A key whose value decides which other keys belong to the case.
 
-    `word` is the key that messages name, if it has several names.
+    `word` is the name of the key in messages, if different.
     """
 
     section: str
@@ -27,30 +27,30 @@ class Selector:
     word: str = ""
 
     def among(self, *values: str) -> Condition:
-        """Return the condition that the key has one of these values."""
+        """Return the condition that the selector has one of these values."""
         return Condition(self, values)
 
 
 @dataclass(frozen=True)
 class Condition:
-    """Condition that a selector has one of some values."""
+    """The condition that a selector has one of several values."""
 
     selector: Selector
     values: tuple[str, ...]
 
     def holds(self, selected: Selected) -> bool:
-        """Return whether the condition holds; not, if the selector is faulty."""
+        """Return whether the condition holds; False if the selector is faulty."""
         return selected.get(self.selector) in self.values
 
     def in_words(self, section: str) -> str:
-        """Return the condition as a fault in a section names it."""
+        """Write the condition for a fault in a section."""
         word = self.selector.word or self.selector.key
         name = word if section == self.selector.section else f"[{self.selector.section}] {word}"
         return f"{name} = {' or '.join(map(toml_value, self.values))}"
 
 
 Selected = Mapping[Selector, str | None]
-"""The value of each selector, None if it is faulty: then nothing that depends on it is checked."""
+"""The value of each selector; None if faulty, which turns off all checks that depend on the selector."""
 
 
 @dataclass(frozen=True)
@@ -58,16 +58,16 @@ class Key:
     """A key of a table.
 
     Attributes:
-        type: its value's type.
-        meaning: a sentence or two for the reference.
-        unit: unit symbol, empty if it has none.
-        default: in words; empty if there is none.
-        only: conditions under all of which it belongs to the table.
-        required: whether it must be there where it belongs.
-        instead: replacement where it does not belong; empty if there is none.
-        unless: other keys of the table; beside any of them it is not required.
-        by_pair: whether it may differ between several sections [[interface]].
-        presentation: whether it decides how results are drawn and labelled, and changes no number.
+        type: type of the value.
+        meaning: one or two sentences for the reference.
+        unit: unit symbol, may be empty.
+        default: default value in words, may be empty.
+        only: conditions; the key belongs to the table if all hold.
+        required: whether a table must have the key if the conditions hold.
+        instead: replacement if a condition fails, may be empty.
+        unless: other keys of the table, any of which makes the key optional.
+        by_pair: whether several [[interface]] sections may differ in the key.
+        presentation: whether the key changes only how results look, and no number.
     """
 
     type: ValueType
@@ -82,7 +82,10 @@ class Key:
     presentation: bool = False
 
     def fault(self, name: str, table: Mapping[str, Any]) -> str:
-        """Return the fault of the key with this name in a table, whatever the case; empty if there is none."""
+        """Return the fault of the key in a table, empty if there is none.
+
+        Conditions on other sections are not checked.
+        """
         if name not in table:
             return f": missing; expected {self.type.expected}" if self.required and not self.only else ""
         words = self.type.complaint(table[name])
@@ -99,10 +102,10 @@ def key(
     only: Condition | tuple[Condition, ...] = (),
     **attributes: Any,
 ) -> Any:
-    """Return a dataclass field read from the key with its name; required where it belongs if it has no default.
+    """Return a dataclass field for the key of the same name.
 
-    Without the key its value is None if `absent` says the meaning; `default_words` stand for another default, and
-    `attributes` are further `Key` attributes.
+    A key with neither `default` nor `absent` is required. `absent` describes what a missing key means, whose value is
+    None; `default_words` describe a default. `attributes` are further `Key` attributes.
     """
     conditions = only if isinstance(only, tuple) else (only,)
     default = None if absent else default
@@ -116,18 +119,18 @@ def key(
 
 
 def keys_of(table_class: type[Any]) -> dict[str, Key]:
-    """Return a table's keys by name; derived fields are none."""
+    """Return the keys of a table class by name; derived fields are left out."""
     return {each.name: each.metadata["key"] for each in dataclasses.fields(table_class) if "key" in each.metadata}
 
 
 @dataclass
 class TableReader:
-    """Reads tables and gathers their faults.
+    """A reader of tables that gathers their faults.
 
     Attributes:
-        selected: the values that decide which keys belong to the case.
-        owners: where keys belong that are unknown in a table.
-        faults: one line each.
+        selected: values of the selectors.
+        owners: sections of each key, in words, to place keys that are unknown in a table.
+        faults: one line for each fault.
     """
 
     selected: Selected = field(default_factory=dict)
@@ -135,9 +138,9 @@ class TableReader:
     faults: list[str] = field(default_factory=list)
 
     def read(self, table_class: type[T], table: object, section: str, prefix: str = "") -> T | None:
-        """Return the table as a `table_class` instance; None, and a line for each fault, if it is faulty.
+        """Return the table as a `table_class` instance; None if the table is faulty.
 
-        `prefix` stands before a table's keys within a section.
+        Each fault adds a line to `faults`, where `prefix` precedes the keys of a table within a section.
         """
         if not isinstance(table, dict):
             self.faults.append(f"{section} = {toml_value(table)}: expected a section [{section}]")
@@ -155,7 +158,7 @@ class TableReader:
         return table_class(**values) if len(self.faults) == before else None
 
     def _stored(self, type_: ValueType, value: Any, section: str, place: str) -> Any:
-        """Return a valid value as its dataclass keeps it, with its tables read."""
+        """Convert a valid value, with its tables, to the form in the dataclass."""
         if type_.item is not None:
             return tuple(self._stored(type_.item, item, section, f"{place}[{k}]") for k, item in enumerate(value))
         if type_.table is not None and isinstance(value, dict):
@@ -164,9 +167,9 @@ class TableReader:
 
 
 def to_table(instance: Any, selected: Selected) -> dict[str, Any]:
-    """Return the table, of TOML's values, that `TableReader.read` makes the instance of.
+    """Convert an instance to a table of TOML values, the inverse of `TableReader.read`.
 
-    It has neither the keys that do not belong to the case nor keys without a value.
+    Keys without a value, and keys that do not belong to the case, are left out.
     """
 
     def to_toml(value: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Value types in a case file: each in words, as a test, and as it is stored."""
+"""Define the value types of a case file, each by its description, test and stored form."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from typing import Any
 from feti_homog.schema.wording import toml_value
 
 SMALLEST, LARGEST = 1e-100, 1e100
-"""Magnitudes of numbers other than 0: no product of a few over- or underflows."""
+"""Limits for the magnitude of nonzero numbers: products of a few numbers neither overflow nor underflow."""
 Test = Callable[[Any], bool]
 INF = "inf"
-"""An infinite number in resolved cases, which are written as JSON."""
+"""Form of an infinite number in resolved cases, which JSON requires."""
 MAGNITUDES = f"; numbers other than 0 have magnitudes from {SMALLEST:g} to {LARGEST:g}"
 
 
 @dataclass(frozen=True)
 class ValueType:
-    """A value's type.
+    """The type of a value.
 
     Attributes:
-        expected: in words, for faults and for the reference.
-        accepts: whether a value, of TOML's types, is valid.
-        store: the form in which its table's dataclass keeps a valid value.
-        table: the value's dataclass if it is a table; `TableReader` reads it.
-        item: the entry type of a list with tables in it.
-        options: of a choice, the texts that it may be.
+        expected: description for faults and the reference.
+        accepts: tests whether a value of a TOML type is valid.
+        store: converts a valid value to its form in the dataclass.
+        table: dataclass of a table, which `TableReader` reads; None for other values.
+        item: entry type of a list that has tables.
+        options: valid texts of a choice.
     """
 
     expected: str
@@ -40,12 +40,12 @@ class ValueType:
     options: tuple[str, ...] = ()
 
     def complaint(self, value: Any) -> str:
-        """Return the expectation that a value fails, empty if it is valid."""
+        """Return the expectation that a value fails, empty for a valid value."""
         return "" if self.accepts(value) else f"expected {self.expected}{magnitudes_in_words(value)}{_scatter(value)}"
 
 
 def _scatter(value: Any) -> str:
-    """Return a hint to `feti-homog uncertainty` for a value {mean, std} or {mean, cv}; else empty."""
+    """Return a hint to `feti-homog uncertainty` for values {mean, std} or {mean, cv}; else empty."""
     if isinstance(value, list):
         return next(filter(None, map(_scatter, value)), "")
     has_scatter = isinstance(value, dict) and set(value) in ({"mean", "std"}, {"mean", "cv"})
@@ -53,7 +53,7 @@ def _scatter(value: Any) -> str:
 
 
 def magnitudes_in_words(value: Any) -> str:
-    """Return the magnitude limits, where a number in a value is beyond them; else empty."""
+    """Return the magnitude limits in words if a number exceeds them; else empty."""
     if isinstance(value, list | tuple):
         return next(filter(None, map(magnitudes_in_words, value)), "")
     is_of_type = isinstance(value, int | float) and not isinstance(value, bool)
@@ -61,19 +61,22 @@ def magnitudes_in_words(value: Any) -> str:
 
 
 def is_number(value: object) -> bool:
-    """Return whether the value is a finite number of sensible magnitude (true and false are none)."""
+    """Return whether a value is a number, no truth value, within the magnitude limits."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     return value == 0 or SMALLEST <= abs(value) <= LARGEST
 
 
 def real(**limits: float) -> ValueType:
-    """Return a number within limits: `above` and `below` are outside, `least` and `most` inside."""
+    """Return the type of numbers within limits.
+
+    The limits `above` and `below` are excluded, `least` and `most` included.
+    """
     return _within("a number", is_number, float, limits)
 
 
 def integer(**limits: float) -> ValueType:
-    """Return an integer within limits, as `real`."""
+    """Return the type of integers within limits, as `real`."""
     return _within("an integer", lambda value: is_number(value) and isinstance(value, int), int, limits)
 
 
@@ -93,7 +96,10 @@ def _within(name: str, is_of_type: Test, store: Callable[[Any], Any], limits: Ma
 def list_of(
     item: ValueType, expected: str, *, least: int = 0, count: int | None = None, unique: bool = False
 ) -> ValueType:
-    """Return a list of values of one type: at least so many or just so many, none twice if they are unique."""
+    """Return the type of lists with entries of one type.
+
+    A list has at least `least` or exactly `count` entries, all different if `unique`.
+    """
     fewest = least if count is None else count
 
     def accepts(value: Any) -> bool:
@@ -105,7 +111,7 @@ def list_of(
 
 
 def either(expected: str, *types: ValueType) -> ValueType:
-    """Return a value that may have any of some types."""
+    """Return the union of several types."""
     table = next((each.table for each in types if each.table is not None), None)
     return ValueType(
         expected,
@@ -116,17 +122,17 @@ def either(expected: str, *types: ValueType) -> ValueType:
 
 
 def table_of(table: type[Any], expected: str, *, least: int = 0) -> ValueType:
-    """Return a table with at least so many keys, which `TableReader` reads."""
+    """Return the type of tables with at least `least` keys, which `TableReader` reads."""
     return ValueType(expected, lambda v: isinstance(v, dict) and len(v) >= least, lambda v: v, table)
 
 
 def file_name(expected: str, *suffixes: str) -> ValueType:
-    """Return a file name with one of some suffixes."""
+    """Return the type of file names with one of these suffixes."""
     return ValueType(expected, lambda value: text.accepts(value) and value.endswith(suffixes), Path)
 
 
 def choice(*options: str) -> ValueType:
-    """One of some texts."""
+    """Return the type of values that equal one of these texts."""
     words = "one of " + ", ".join(map(toml_value, options))
     return ValueType(words, lambda value: value in options, str, options=options)
 
@@ -134,6 +140,6 @@ def choice(*options: str) -> ValueType:
 POSITIVE_OR_INF = ValueType(
     "a positive number, or inf", lambda value: value in (math.inf, INF) or (is_number(value) and value > 0), float
 )
-"""Where inf is another thing than no value."""
+"""For keys in which inf differs from a missing value."""
 boolean = ValueType("true or false", lambda value: isinstance(value, bool), bool)
 text = ValueType("a text in one line", lambda value: isinstance(value, str) and value.isprintable(), str)

@@ -1,4 +1,4 @@
-"""Fault wording: values and keys as TOML writes them, and where an unknown name may belong."""
+"""Word the faults of a case: values and keys as in TOML, and suggestions for unknown names."""
 
 import difflib
 import json
@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 
 LONGEST_VALUE = 60  # characters of a value in a message
-# Keys that other programs and textbooks name otherwise, in lower case; known ones count.
+# Names for keys in other programs and textbooks, in lower case, each with keys of this program.
 SYNONYMS: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(("e", "youngs_modulus", "young_modulus", "modulus"), ("young", "E1")),
     **dict.fromkeys(("nu", "v", "poisson_ratio", "poissons_ratio"), ("poisson", "nu12")),
@@ -20,7 +20,7 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(("gc", "g_c", "gic", "fracture_energy"), ("toughness",)),
     **dict.fromkeys(("vf", "fraction", "volume_fraction", "fibre_volume_fraction"), ("fibre_fraction",)),
 }
-# What there is none of, and what there is in its place.
+# Names without a key, each with an explanation.
 ABSENT = {
     "strength": "phases do not break; bonds do, see normal_strength and tangential_strength in [interface]",
     "g": "it follows from young and poisson",
@@ -30,14 +30,14 @@ ABSENT = {
     "element": "leave it out: quadratic elements of isotropic phases have a pressure of their own",
     "element_size": "give mesh_size and refine: elements have the size mesh_size / 2^refine",
 }
-# What a key takes the place of, by the key and how it follows.
+# Names of constants that another key replaces: the key, and the formula for its value.
 IN_PLACE = dict.fromkeys(
     ("g_transverse", "g23", "gt"), ("nu_transverse", "give nu_transverse = E_transverse / (2 G_transverse) - 1")
 )
 
 
 def toml_value(value: object) -> str:
-    """Return the value nearly as TOML writes it, in one short line."""
+    """Write a value nearly as in TOML, in one short line."""
     line = _line(value)
     return line if len(line) <= LONGEST_VALUE else line[: LONGEST_VALUE - 3] + "..."
 
@@ -53,20 +53,20 @@ def _line(value: object) -> str:
 
 
 def toml_key(name: str) -> str:
-    """Return a key nearly as TOML writes it, in one short line: quoted if it is not bare."""
+    """Write a key nearly as in TOML, in one short line, with quotes if needed."""
     is_bare = re.fullmatch(rf"[A-Za-z0-9_-]{{1,{LONGEST_VALUE}}}", name)
     return name if is_bare else toml_value(name)
 
 
 def dotted_key(path: Iterable[str]) -> str:
-    """Nested keys as TOML writes them: a.b.c."""
+    """Join nested keys as in TOML: a.b.c."""
     return ".".join(map(toml_key, path))
 
 
 def suggestion(name: str, known: Iterable[str], owners: Mapping[str, str]) -> str:
-    """Return the end of a fault on an unknown name: where it belongs, the nearest known name, or all known names.
+    """Return a hint for an unknown name: its section, the nearest known name, or all known names.
 
-    `owners` gives the place of each key that belongs elsewhere.
+    `owners` maps each key of the file to its sections, in words.
     """
     known = list(known)
     nearest = difflib.get_close_matches(name, known, n=1)
@@ -86,6 +86,6 @@ def suggestion(name: str, known: Iterable[str], owners: Mapping[str, str]) -> st
 
 
 def limit_in_words(limit: float, value: float, digits: int) -> str:
-    """Return a limit that a value is not below, in at least so many digits and in as many as show that."""
+    """Write a limit with the fewest digits, at least `digits`, that show `value` >= limit."""
     texts = (f"{limit:.{count}g}" for count in range(digits, 18))
     return next((text for text in texts if value >= float(text)), repr(limit))
