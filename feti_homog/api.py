@@ -15,10 +15,9 @@ from feti_homog.errors import EXIT_DONE, CaseError, LibraryError
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.petsc import libraries, option_table, option_values
 from feti_homog.system.runtime import environment, standard_streams
+from feti_homog.typing import Intracomm
 
 if TYPE_CHECKING:
-    from mpi4py.MPI import Intracomm
-
     from feti_homog.analysis import result
     from feti_homog.studies import sweep_table
 

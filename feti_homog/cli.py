@@ -3,22 +3,17 @@
 Options with a double dash are ours, with a single dash PETSc's.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NoReturn
+from typing import NoReturn
 
 from feti_homog.api import parsed, start
 from feti_homog.commands import products, run, studies
 from feti_homog.errors import EXIT_DONE, CaseError
 from feti_homog.system.petsc import option_table, option_values
+from feti_homog.typing import Intracomm
 from feti_homog.version import __version__
-
-if TYPE_CHECKING:
-    from mpi4py.MPI import Intracomm
-
 
 LAUNCHER_HELP = "Switches of Open MPI go to mpirun: --allow-run-as-root, --oversubscribe (more ranks than cores)."
 GONE = {"statistics": "is drivers/fibre_statistics.py now", "schema": "is gone: `feti-homog keys` has all keys"}

@@ -1,10 +1,15 @@
-"""Aliases for NumPy's array types, whose shapes stand in docstrings, and for documents such as result.json."""
+"""Aliases: NumPy's array types, whose shapes stand in docstrings, documents such as result.json, communicators."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm as Intracomm
+else:
+    Intracomm = Any  # importing mpi4py.MPI starts MPI
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,7 @@ from feti_homog.analysis import cell_records, result_records
 from feti_homog.materials import engineering_constants, phase_bounds, voigt
 from feti_homog.results import field_layout, result_json
 from feti_homog.system.runtime import described, records
-from feti_homog.typing import Float
-
-if TYPE_CHECKING:
-    from mpi4py.MPI import Intracomm
-
+from feti_homog.typing import Float, Intracomm
 
 Part = TypeVar(
     "Part", field_layout.MeshPart, field_layout.FibrePart, field_layout.InterfacePart, field_layout.StatePart

@@ -10,15 +10,13 @@ import json
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from feti_homog.api import folder
 from feti_homog.errors import EXIT_DEFECT, EXIT_DONE, EXIT_UNCONVERGED, CaseError, FetiHomogError
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.runtime import standard_streams
-
-if TYPE_CHECKING:
-    from mpi4py.MPI import Intracomm
+from feti_homog.typing import Intracomm
 
 FIBRES_HELP = (
     'Print a row for each fibre, with centre, radius or semi-axes, and phase: the file of [cell] geometry = "table". '

@@ -5,16 +5,14 @@ from __future__ import annotations
 import argparse
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from feti_homog.api import folder
 from feti_homog.errors import CaseError
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.petsc import option_table
 from feti_homog.system.runtime import standard_streams
-
-if TYPE_CHECKING:
-    from mpi4py.MPI import Intracomm
+from feti_homog.typing import Intracomm
 
 
 def add(actions: argparse._SubParsersAction[Any]) -> None:

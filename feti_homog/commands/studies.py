@@ -6,17 +6,15 @@ import argparse
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from feti_homog.api import folder
 from feti_homog.errors import CaseError
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.runtime import standard_streams
+from feti_homog.typing import Intracomm
 
-if TYPE_CHECKING:
-    from mpi4py.MPI import Intracomm
-
-Action = Callable[[argparse.Namespace, "Intracomm"], None]
+Action = Callable[[argparse.Namespace, Intracomm], None]
 SWEEP_HELP = (
     "Expand the file into numbered cases, check all of them, and run them one after the other. Finished cases are "
     "skipped: the same command resumes. Failed cases are kept and reported at the end, with exit code 3."

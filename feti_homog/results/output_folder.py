@@ -4,8 +4,6 @@ One run at a time writes to the folder, and replaces no foreign file.  A run rec
 a marker in the folder: a user may add a foreign file with the name of a result file later.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os
@@ -13,7 +11,7 @@ import re
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TextIO
 
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.materials import voigt
@@ -21,10 +19,8 @@ from feti_homog.results import atomic, checkpoints, field_file, result_json
 from feti_homog.results.field_layout import PROGRAM
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.runtime import file_locks, input_files
+from feti_homog.typing import Intracomm
 from feti_homog.version import __version__
-
-if TYPE_CHECKING:
-    from mpi4py.MPI import Intracomm
 
 LOCK = "result.lock"
 LOG = "events.log"  # one line for each event, for users to follow a running path

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum, auto
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from feti_homog.analysis import runner
 from feti_homog.case import Case
@@ -19,9 +19,7 @@ from feti_homog.studies.first_case import check_options
 from feti_homog.studies.sweep_cases import Sweep, SweepCase
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.runtime import file_locks, standard_streams
-
-if TYPE_CHECKING:
-    from mpi4py.MPI import Intracomm
+from feti_homog.typing import Intracomm
 
 
 def list_cases(sweep: Sweep, directory: Path | None) -> list[str]:

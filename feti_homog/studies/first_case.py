@@ -1,10 +1,8 @@
 """Text for `feti-homog check`: a case, or the first case of a sweep."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from feti_homog.analysis import description
 from feti_homog.case import cases, sections
@@ -13,9 +11,7 @@ from feti_homog.studies import sweep_cases
 from feti_homog.studies.sweep_cases import Sweep, case_names
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.petsc import options_database
-
-if TYPE_CHECKING:
-    from mpi4py.MPI import Intracomm
+from feti_homog.typing import Intracomm
 
 
 def of_document(document: dict[str, Any], folder: Path, comm: Intracomm) -> str:

@@ -6,15 +6,13 @@ DIR/EVALUATION                as of a sweep: a folder for each case
 Finished cases are kept, so that the same command resumes.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from feti_homog.case import toml_files
 from feti_homog.errors import CaseError, ConvergenceError
@@ -23,10 +21,8 @@ from feti_homog.studies import case_folders, case_runs, first_case
 from feti_homog.studies.sweep_cases import Sweep
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.runtime import input_files, standard_streams
+from feti_homog.typing import Intracomm
 from feti_homog.version import __version__
-
-if TYPE_CHECKING:
-    from mpi4py.MPI import Intracomm
 
 SILENT = {"fields": False, "pictures": False, "report": False}
 

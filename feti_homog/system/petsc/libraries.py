@@ -1,7 +1,5 @@
 """The libraries that are built on one MPI, which pip does not bring: found, started, or reported in a sentence."""
 
-from __future__ import annotations
-
 import atexit
 import importlib
 import re
@@ -9,13 +7,10 @@ import resource
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from feti_homog.errors import EXIT_DEFECT, LibraryError
 from feti_homog.system.runtime.standard_streams import complain
-
-if TYPE_CHECKING:
-    from mpi4py.MPI import Intracomm
+from feti_homog.typing import Intracomm
 
 DEBIAN_PETSC = Path("/usr/lib/petscdir")
 DEBIAN_MODULES = "/usr/lib/python3/dist-packages"
