@@ -72,9 +72,9 @@ class CrackExtension:
         # An element moves as one to the image of its node that is nearest to the tip.
         nearest = np.argmin((away**2).sum(axis=2), axis=1)[:, None, None]
         away = points + np.take_along_axis(away - points, nearest, axis=1)
-        share = np.clip((reach - np.linalg.norm(away, axis=2)) / (reach * (1 - CORE)), 0.0, 1.0)[..., None]
+        fraction = np.clip((reach - np.linalg.norm(away, axis=2)) / (reach * (1 - CORE)), 0.0, 1.0)[..., None]
         total = u.reshape(-1, 2)[mesh.node_class[nodes]] + away @ E
-        moved, changed = share * ((away + spoke) @ QUARTER_TURN.T), share * (total @ QUARTER_TURN.T)
+        moved, changed = fraction * ((away + spoke) @ QUARTER_TURN.T), fraction * (total @ QUARTER_TURN.T)
         return point_fields.energy_change(
             points, total, self.subdomain.L[:3, :3], moved, changed, self.subdomain.is_mixed
         )
@@ -168,8 +168,8 @@ class EnergyReleaseRates:
         modes = np.where(is_rigid, closing, traction**2 / (2 * stiffness))
         rigid = np.flatnonzero(is_rigid.all(axis=1))
         work = closing[rigid].sum(axis=1, keepdims=True)
-        share = np.divide(closing[rigid], work, out=np.zeros_like(closing[rigid]), where=work > 0)
-        modes[rigid] = share * np.maximum(0.0, self._released(tips.chosen(rigid), response))[:, None]
+        fraction = np.divide(closing[rigid], work, out=np.zeros_like(closing[rigid]), where=work > 0)
+        modes[rigid] = fraction * np.maximum(0.0, self._released(tips.chosen(rigid), response))[:, None]
         return EnergyRelease(
             fibre=self._numbers(tips),
             pair=self.pair[tips.node],

@@ -69,9 +69,9 @@ class EnergyErrors:
     def absolute(self) -> Float:
         """(k, k) estimated |computed - exact|."""
         size = np.sqrt(np.abs(np.diag(self.elements)) + np.abs(np.diag(self.arcs)))
-        share = np.full((len(size),) * 2, self.least_of_two)
-        np.fill_diagonal(share, LEAST_SHARE)
-        return np.asarray(np.maximum(np.abs(self.signed), share * np.outer(size, size)))
+        fraction = np.full((len(size),) * 2, self.least_of_two)
+        np.fill_diagonal(fraction, LEAST_SHARE)
+        return np.asarray(np.maximum(np.abs(self.signed), fraction * np.outer(size, size)))
 
 
 def energy_errors(

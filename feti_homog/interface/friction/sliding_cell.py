@@ -151,20 +151,20 @@ class SlidingCell:
         more = np.hstack([problem.gained(bonds) for problem in problems])
         self._more = more[:, 1]
         self._damaged = (bonds.status == BONDED) & (more[:, :2] > 0.0).any(axis=1)
-        self._own = np.flatnonzero((bonds.status != BONDED) | self._damaged)
+        self._face_nodes = np.flatnonzero((bonds.status != BONDED) | self._damaged)
         self._held = np.flatnonzero(bonds.status == BONDED)
         self._held_rows = [problem.rows_of(self._held) for problem in problems]
         pulled = (more > 0.0) & self._damaged[:, None]
         self._springs = springs = np.divide(1.0, more, out=np.zeros_like(more), where=pulled)
         self._mu = np.where(self._damaged, self.friction_of_damage, self.friction)
         along = [problem.first + problem.interface.nodes.row for problem in self._axial]
-        table = np.column_stack([first + row, self._mu, *along, springs])[self._own]
+        table = np.column_stack([first + row, self._mu, *along, springs])[self._face_nodes]
         table = np.concatenate(comm.allgather(table))
         table = table[np.argsort(table[:, 0])]
         faces, before, old = self.faces, self.rows, self.springs
         self.rows, springs = table[:, 0].astype(np.int64), table[:, -more.shape[1] :]
         self.springs = springs[:, :2].ravel()
-        self._place = np.searchsorted(self.rows, first + row[self._own])
+        self._position = np.searchsorted(self.rows, first + row[self._face_nodes])
         K, b, L = self._plane.take((self.rows[:, None] + np.arange(2)).ravel(), self.springs)
         self._along = [AxialFaces(problem, table[:, 2].astype(np.int64), springs[:, 2]) for problem in self._axial]
         S = block_diag(L, *(problem.stiffness for problem in self._along))
@@ -186,22 +186,22 @@ class SlidingCell:
         self.take(bonds)
         jump = np.zeros((len(bonds.status), 2)) if bonds.gap_and_slip is None else bonds.gap_and_slip
         apart = np.where(self._damaged, ~bonds.pressed, bonds.status == OPEN)
-        table = np.column_stack([np.where(apart, OPEN_FACE, bonds.sliding_signs), jump])[self._own]
-        table = np.concatenate(self.solver.comm.allgather(np.column_stack([self._place, table])))
+        table = np.column_stack([np.where(apart, OPEN_FACE, bonds.sliding_signs), jump])[self._face_nodes]
+        table = np.concatenate(self.solver.comm.allgather(np.column_stack([self._position, table])))
         table = table[np.argsort(table[:, 0])]
         status: Status = table[:, 1].astype(np.int8)
         return status, np.concatenate([table[:, 2:].ravel(), strain]) * self.faces.size
 
     def bonds(self, before: BondState, status: Status, x: Float) -> BondState:
         """Return this rank's bonds with the statuses (n,) and jumps of scaled x."""
-        face, jump = status[self._place], np.zeros((len(before.status), 2))
-        jump[self._own] = self._jumps_of(x).reshape(-1, 2)[self._place]
+        face, jump = status[self._position], np.zeros((len(before.status), 2))
+        jump[self._face_nodes] = self._jumps_of(x).reshape(-1, 2)[self._position]
         nodes, sliding = before.status.copy(), np.zeros(len(before.status), np.int8)
-        holds, pressed = self._damaged[self._own], before.pressed.copy()
-        nodes[self._own] = np.where(holds, BONDED, np.where(face == OPEN_FACE, OPEN, CLOSED))
-        rubs = self.faces.friction[self._place] > 0.0
-        sliding[self._own] = np.where((face != OPEN_FACE) & rubs, face, STICK)
-        pressed[self._own] = np.where(holds, face != OPEN_FACE, pressed[self._own])
+        holds, pressed = self._damaged[self._face_nodes], before.pressed.copy()
+        nodes[self._face_nodes] = np.where(holds, BONDED, np.where(face == OPEN_FACE, OPEN, CLOSED))
+        rubs = self.faces.friction[self._position] > 0.0
+        sliding[self._face_nodes] = np.where((face != OPEN_FACE) & rubs, face, STICK)
+        pressed[self._face_nodes] = np.where(holds, face != OPEN_FACE, pressed[self._face_nodes])
         return replace(before, status=nodes, pressed=pressed, gap_and_slip=jump, sliding=sliding)
 
     def stored(self, x: Float) -> float:
@@ -221,8 +221,11 @@ class SlidingCell:
         force = np.zeros((len(self.friction), sum(rows.shape[1] for rows in self._held_rows)))
         parts = zip(self._held_rows, self._parts(x), strict=True)
         force[self._held] = np.hstack([problem.some_multipliers(rows, *answer) for rows, (problem, answer) in parts])
-        damaged, slip = self._damaged[self._own], self._jumps_of(x)[1::2][self._place]
-        node, C = self._own[damaged], self.solver.intact_compliance[self.interface.nodes.row[self._own[damaged]] + 1]
+        damaged, slip = self._damaged[self._face_nodes], self._jumps_of(x)[1::2][self._position]
+        node, C = (
+            self._face_nodes[damaged],
+            self.solver.intact_compliance[self.interface.nodes.row[self._face_nodes[damaged]] + 1],
+        )
         force[node, 1] = (C * force[node, 1] + slip[damaged]) / (C + self._more[node])
         return np.asarray(force / self.interface.nodes.length[:, None])
 
@@ -276,8 +279,8 @@ class SlidingCell:
         # The jumps come from x: the jumps of F lambda would be divided by a vanishing compliance.
         parts = zip(self._parts(x), components, strict=True)
         jumps = np.hstack([jump.reshape(-1, c) for (_, (jump, _)), c in parts])
-        force, node = traction.copy(), self._own
-        force[node] -= jumps[self._place] * self._springs[node] / self.interface.nodes.length[node, None]
+        force, node = traction.copy(), self._face_nodes
+        force[node] -= jumps[self._position] * self._springs[node] / self.interface.nodes.length[node, None]
         excess = coulomb_errors(force, self._mu, bonds.sliding_signs)
         largest = self.interface.scales.over_interface(np.abs(traction).max(axis=1, initial=0.0))
         for problem, state in zip(self.cell.problems, states, strict=True):

@@ -148,7 +148,7 @@ class FollowedStatuses:
         """Prescribe all entries: M is the identity."""
         m = len(S)
         self.S, self.free, self.slope, self.sign = S, np.zeros(m, bool), np.zeros(m), 1
-        self._place: Int = np.arange(m)
+        self._index: Int = np.arange(m)
         self._size, self._R = m, np.stack([np.eye(m), S])
         self._forget()
 
@@ -170,10 +170,10 @@ class FollowedStatuses:
 
     def _exchange(self, j: int, free: bool, slope: float) -> bool:
         """Exchange row j; return False if its pivot is too small."""
-        at = int(self._place[j])
+        at = int(self._index[j])
         w = self._row(int(free), at)
         if slope:
-            w += slope * self._row(1, int(self._place[j - 1]))
+            w += slope * self._row(1, int(self._index[j - 1]))
         pivot = w[at]
         if abs(pivot) < LEAST_PIVOT:
             return False
@@ -201,11 +201,11 @@ class FollowedStatuses:
     def _inverse(self, c: Float) -> Float:
         """Return M^-1 c (m,)."""
         size, permuted = self._size, np.empty(self._size)
-        permuted[self._place] = c
+        permuted[self._index] = c
         few = np.flatnonzero(permuted)
         some = few if len(few) <= FEW else slice(size)
         change = self._U[0, :size, : self._count] @ (self._V[: self._count, :size][:, some] @ permuted[some])
-        return np.asarray((self._R[0, :size, :size][:, some] @ permuted[some] - change)[self._place])
+        return np.asarray((self._R[0, :size, :size][:, some] @ permuted[some] - change)[self._index])
 
     def solve(self, x: Float, rhs: Float, terms: Callable[[Float], Float]) -> tuple[Float, Float] | None:
         """Return x and S x (m,) with the right-hand side (m,), from a start with the prescribed entries.
@@ -237,8 +237,8 @@ class FollowedStatuses:
         if len(entries) and not self.turn(free, slope):
             return False
         self._flush()
-        some, at = np.flatnonzero(units != 1.0), self._place[entries]
-        places, unit = self._place[some], units[some]
+        some, at = np.flatnonzero(units != 1.0), self._index[entries]
+        places, unit = self._index[some], units[some]
         self._R[:, : self._size, places] *= np.where(self.free[some], 1.0 / unit, unit)
         self._R[:, places, : self._size] *= np.stack([1.0 / unit, unit])[:, :, None]
         before = self.S[entries[:, None], entries] * np.outer(units[entries], units[entries])
@@ -246,8 +246,8 @@ class FollowedStatuses:
         size, m = self._size, len(S)
         new = np.setdiff1d(np.arange(m), old)
         free, slope, place = np.zeros(m, bool), np.zeros(m), np.empty(m, np.int64)
-        free[old], slope[old], place[old], place[new] = self.free, self.slope, self._place, np.arange(size, m)
-        self.S, self.free, self.slope, self._place = S, free, slope, place
+        free[old], slope[old], place[old], place[new] = self.free, self.slope, self._index, np.arange(size, m)
+        self.S, self.free, self.slope, self._index = S, free, slope, place
         if m > self._R.shape[1]:
             # Leave room for more entries.
             R = np.empty((2, m + m // 4, m + m // 4))

@@ -206,9 +206,9 @@ def released_energy(H: Float, lam: Float, stiffness: Float, contact: bool) -> Fl
     can act.  With `contact` the faces that would overlap keep the normal force.
     """
     root = np.sqrt(stiffness)
-    share, vectors = np.linalg.eigh(H / (root[:, :, None] * root[:, None, :]))
+    ratio, vectors = np.linalg.eigh(H / (root[:, :, None] * root[:, None, :]))
     along = np.einsum("mij,mi->mj", vectors, lam / root)
-    inverse = np.where(share > RIGID, 1.0 / np.where(share > RIGID, share, 1.0), 0.0)
+    inverse = np.where(ratio > RIGID, 1.0 / np.where(ratio > RIGID, ratio, 1.0), 0.0)
     opens = (np.einsum("mj,mj->m", vectors[:, 0], inverse * along) >= 0.0) | (not contact)
     both, tangential = (inverse * along**2).sum(axis=1), H[:, 1, 1] / stiffness[:, 1]
     slides = tangential > RIGID
