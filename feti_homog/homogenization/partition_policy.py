@@ -65,8 +65,8 @@ class PartitionPolicy:
         across_piece_dofs: such a piece's size, with as many multipliers as a smaller piece within a body.
         whole_dofs: such a cell on one rank is not cut up to this size: one sparse factor takes less time than dense
             piece matrices, which need half its memory.
-        whole_ranks: up to so many ranks have one piece each in such a cell, with Schur complements factored together;
-            for more ranks these are too large.
+        whole_ranks: largest number of ranks with one piece each in such a cell, whose Schur complements are factored
+            together; for more ranks these are too large.
         strip_dofs: cells from this size on are halved into strips: smaller ones have short boundaries anyway, and
             mesh errors, estimated up to boundaries, depend less on the direction that METIS cuts in.
 

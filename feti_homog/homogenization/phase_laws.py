@@ -86,12 +86,12 @@ def secants(plane: Float, *axial: Float) -> dict[str, Float]:
 
 
 def components(plane: Float, *axial: Float) -> Float:
-    """(3,) or, with an axial problem, (6,) strain or stress components from their parts in each problem."""
+    """Join the strain or stress components of each problem: (3,) or, with an axial problem, (6,)."""
     return spatial_vector(plane, *axial) if axial else plane
 
 
 def spatial_vector(plane: Float | None, axial: Float | None) -> Float:
-    """(6,) from numbers [11, 22, 12, 33, ...] in the plane problem and [13, 23] in the axial one; None is zero."""
+    """Join [11, 22, 12, 33, ...] of the plane problem and [13, 23] of the axial one to a vector (6,); None is zero."""
     vector = np.zeros(6)
     if plane is not None:
         vector[IN_PLANE] = plane[:4]

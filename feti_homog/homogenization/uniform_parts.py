@@ -184,7 +184,7 @@ class NestedInterior:
         return cls(members, mesh, fixed, place[fixed], interior, loads)
 
     def displacement(self, u: Float, loads: Float) -> Float:
-        """(classes, c, k) u* from u (boundary dofs, k) on all boundaries under the loads (v, k)."""
+        """Return u* (classes, c, k) from u (boundary dofs, k) on all boundaries under the loads (v, k)."""
         problem = self.members[0].problem
         on_boundary = np.vstack([u, np.zeros((1, u.shape[1]))])[self.place]  # the last row for NONE
         all_dofs = np.empty((len(self.fixed) + len(self.interior.dofs), u.shape[1]))
