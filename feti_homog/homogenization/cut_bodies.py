@@ -1,7 +1,7 @@
-"""Bodies in several pieces: shared vertices, sums over pieces, stress fits.
+"""Bodies in several pieces: shared vertices, sums over pieces, and stress fits across cuts.
 
-Each vertex and each coarse edge on a cut has a home rank, which knows all pieces that have it.  Element patches
-about shared vertices belong to the body, not to its pieces.
+Each vertex and each coarse edge on a cut has a home rank, which knows all pieces with this vertex or edge.  An element
+patch about a shared vertex belongs to the body, not to a piece.
 """
 
 from __future__ import annotations
@@ -20,23 +20,22 @@ from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Array, Bool, Float, Int, Int32
 
 NO_ROWS = np.zeros((0, 3), np.int64)
-# Layers of elements about shared vertices: shared vertices, their neighbours, and the neighbours of these have all of
-# their elements.
+# Number of element layers about shared vertices: vertices at most two edges from these have all of their elements.
 LAYERS = 3
 
 
 class SharedVertices:
-    """Shared vertices in this rank's meshes; each mesh joins some pieces.
+    """The shared vertices in this rank's meshes, each of which joins some pieces.
 
     Attributes:
-        meshes: which of this rank's meshes have shared vertices.
+        meshes: indices of this rank's meshes with shared vertices.
         classes: (n,) shared vertex classes in each such mesh.
-        sides: (f, 2) vertices on element sides along cuts, in each.
-        is_first: (f,) whether each side belongs to the first of its two pieces.
+        sides: (f, 2) vertices of the element sides along cuts, in each such mesh.
+        is_first: (f,) whether a side belongs to the first of its two pieces.
     """
 
     def __init__(self, comm: MPI.Intracomm, meshes: Sequence[tuple[Sequence[Submesh], FineMesh]]) -> None:
-        """Find the vertices and edges that several pieces have.  Collective."""
+        """Find the common vertices and edges of several pieces.  Collective."""
         self._comm = comm
         borders = [_border(pieces, mesh) for pieces, mesh in meshes]
         vertex_copies, edge_copies = (self._copies([border[k] for border in borders]) for k in (0, 2))
@@ -52,7 +51,7 @@ class SharedVertices:
                 self.is_first.append(np.repeat(edge_copies[mesh][on_cut, 1] == 1, line.shape[1] - 1))
 
     def sum(self, parts: Sequence[Float]) -> list[Float]:
-        """(n, k) sums over pieces for values `parts` (n, k) at each mesh's shared vertices.  Collective."""
+        """Sum values (n, k) at each mesh's shared vertices over all pieces.  Collective."""
 
         def sums(number: Int, values: Float) -> Float:
             totals = np.zeros((int(number.max(initial=-1)) + 1, values.shape[1]))
@@ -63,7 +62,7 @@ class SharedVertices:
         return _split(self._at_home(self._rows, np.concatenate([np.zeros((0, width)), *parts]), sums), self.classes)
 
     def _copies(self, rows: Sequence[Int]) -> list[Int]:
-        """(n, 2) copy counts for each mesh's rows (n, 3), and 1 at the first copy, else 0.  Collective."""
+        """Return the copy count of each row (n, 3) in the meshes, and 1 at the first copy, else 0.  Collective."""
 
         def copies(number: Int, _: Int) -> Int:
             _, first, count = np.unique(number, return_index=True, return_counts=True)
@@ -73,7 +72,7 @@ class SharedVertices:
         return _split(self._at_home(all_rows, all_rows, copies), rows)
 
     def _at_home(self, rows: Int, values: Array, combine: Callable[[Int, Array], Array]) -> Array:
-        """Call `combine` with row numbers (n, 3) and their values (n, k), on all ranks.  Collective."""
+        """Call `combine` on the home ranks with the numbers of rows (n, 3) and with values (n, k).  Collective."""
         comm, home = self._comm, rows[:, 1:].sum(axis=1) // 2 % self._comm.size
         rows, values, source, place = distributed_arrays.exchange(
             comm, home, rows, values, np.full(len(rows), comm.rank), np.arange(len(rows))
@@ -88,15 +87,15 @@ class SharedVertices:
 
 
 def _split(values: Array, parts: Sequence[Array]) -> list[Array]:
-    """Split rows of values into arrays as long as the parts."""
+    """Split the rows of values into arrays with the lengths of the parts."""
     return [values[a:b] for a, b in pairwise(np.cumsum([0, *map(len, parts)]).tolist())]
 
 
 def _border(pieces: Sequence[Submesh], mesh: FineMesh) -> tuple[Int, Int, Int, Int]:
-    """Return vertices and coarse edges on the piece borders of a joined mesh.
+    """Return the vertices and coarse edges on the piece borders of a joined mesh.
 
-    These are vertices (n, 3) by body, entity and position, their classes (n,), coarse edges (e, 3) alike, and the
-    vertex classes along the edges (e, m).
+    The result has the vertices (n, 3) by body, entity and position, the vertex classes (n,), the coarse edges (e, 3) by
+    body, entity and position, and the vertex classes (e, m) along these edges.
     """
     first, borders = 0, []
     for s in pieces:
@@ -120,7 +119,7 @@ def _border(pieces: Sequence[Submesh], mesh: FineMesh) -> tuple[Int, Int, Int, I
 
 
 def border_lines(s: Submesh, mesh: FineMesh, classes: Int32) -> tuple[Int, Int, Int]:
-    """Return triangles (e,) at a piece border, their edges (e,), and classes (e, M + 1) along the edges.
+    """Return the triangles (e,) at a piece border, their border edges (e,), and classes (e, M + 1) along the edges.
 
     `classes` (t, q) are the lattice node classes of all triangles.
     """
@@ -136,7 +135,7 @@ def border_lines(s: Submesh, mesh: FineMesh, classes: Int32) -> tuple[Int, Int, 
 def fits_across_cuts(
     shared: SharedVertices, bodies: Sequence[stress_recovery.RecoveredStress]
 ) -> dict[int, tuple[Int, Float]]:
-    """Return, by mesh, vertex classes (n,) and fits (n, p, m k) that cuts change.  Collective."""
+    """Return, by mesh, the vertex classes (n,) and fits (n, p, m k) that cuts change.  Collective."""
     pieces = zip(shared.meshes, shared.classes, shared.sides, shared.is_first, strict=True)
     strips = [_Strip.of(bodies[mesh], classes, sides, first) for mesh, classes, sides, first in pieces]
     patches = _over_pieces(shared, strips, [strip.stress.patch_sums() for strip in strips])
@@ -158,14 +157,15 @@ def fits_across_cuts(
 
 @dataclass(frozen=True)
 class _Strip:
-    """Elements about one mesh's shared vertices; their vertices are numbered from 0.
+    """The elements about one mesh's shared vertices, with vertex numbers from 0.
 
     Attributes:
-        stress: on these elements alone.
-        is_vertex: (classes,) whether a class is a vertex in these elements.
-        shared: (n,) the shared vertices.
-        sides: (f, 2) element sides, each once in its body; `vector` (f, 2) from the first vertex to the second.
-        bounds: (b,) vertices at which a side has no other element in the body.
+        stress: recovered stress on these elements.
+        is_vertex: (classes,) whether a class is a vertex of these elements.
+        shared: (n,) shared vertices.
+        sides: (f, 2) vertices of the element sides, each side once in its body.
+        vector: (f, 2) vectors from the first to the second vertex of a side.
+        bounds: (b,) vertices of sides with one element in the body.
     """
 
     stress: stress_recovery.RecoveredStress
@@ -177,7 +177,7 @@ class _Strip:
 
     @classmethod
     def of(cls, body: stress_recovery.RecoveredStress, classes: Int, cut: Int, is_first: Bool) -> _Strip:
-        """Find the elements; other pieces count the sides `cut` (c, 2) on cuts, but for the first copies."""
+        """Find the elements; of the sides `cut` (c, 2) on cuts, this piece counts the first copies."""
         is_vertex, at = np.zeros(len(body.u), bool), body.node_class[body.triangles[:, :3]]
         is_vertex[classes] = True
         for _ in range(LAYERS):
@@ -195,7 +195,7 @@ class _Strip:
         return cls(stress, is_vertex, stress.numbers[classes], sides[once], vector[once], np.unique(sides[single]))
 
     def neighbours(self, at_boundary: Bool) -> local_fits.PatchNeighbours:
-        """Return pairs whose first is on the body boundary, as shared vertices (n,) are if `at_boundary`."""
+        """Return vertex pairs with the first on the body boundary; `at_boundary` (n,) tells it of shared vertices."""
         is_bound = np.zeros(int(self.is_vertex.sum()), bool)
         is_bound[self.bounds] = True
         is_bound[self.shared] = at_boundary

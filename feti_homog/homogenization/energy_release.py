@@ -1,12 +1,12 @@
-"""Energy release rate G = -d(energy) / d(debonded length) at tips, constant strain.
+"""Energy release rate G = -d(energy) / d(debonded length) at tips, at constant strain.
 
-For rigid bonds G follows from a virtual crack extension, and errs like the energy, on any mesh.  The nodes around the
-tip turn about the fibre centre by s q, and their displacements with them; q is 1 near the tip and falls to 0 farther
-away.  The tip moves along the interface by s R, bonded nodes stay bonded, and gaps stay as they are: an admissible
-variation of the equilibrium, whose energy changes with the element energies.
+For rigid bonds G follows from a virtual crack extension, with an error like the energy error on any mesh.  The nodes
+around the tip, and the displacements of these nodes, turn about the fibre centre by s q; q is 1 near the tip and falls
+to 0 farther away.  The tip moves along the interface by s R, bonded nodes stay bonded, and gaps stay constant.  This is
+an admissible variation of the equilibrium, and G follows from the change of the element energies.
 
-Its modes have their shares in the work that closes the crack's last part (virtual crack closure).  Shares depend on
-the length of this part, because between two materials the stress oscillates towards the tip.
+G is split into modes in the ratio of the work that closes the crack's last part (virtual crack closure).  This ratio
+depends on the length of this part, because between two materials the stress oscillates towards the tip.
 
 For elastic bonds G = <t_n>^2 / (2 k_n) + t_t^2 / (2 k_t) is the spring energy at the tip.
 """
@@ -30,22 +30,22 @@ from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Array, Float, Int
 
 DIRECTION_DIGITS = 9
-# Length at which the modes are separated, at least one element / radius of the fibre.
+# Length at which the modes are separated / radius of the fibre; this length is one element at least.
 MODE_LENGTH = 1e-3
 QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
-# Radius around a tip beyond which nothing turns / distance to boundaries, and at most / a period of the cell; radius
-# within which all turns alike / this radius.
+# Radius around a tip beyond which no node turns / distance to boundaries; largest such radius / a period of the cell;
+# radius within which all nodes turn by the same angle / the first radius.
 REACH, REACH_OF_A_PERIOD, CORE = 0.8, 0.32, 0.5
-# Relative distance from a circle beyond which a node of the same bodies is on another boundary or image of them.
+# Relative distance from a circle beyond which a node of both bodies is on another boundary, or on another image.
 OFF_CIRCLE = 1e-4
 VOID = -1
 
 
 class CrackExtension:
-    """Elements of a subdomain around points, over which the energy of a crack extension is summed."""
+    """The elements of a subdomain around a tip, and the energy change of a crack extension in these elements."""
 
     def __init__(self, subdomain: Subdomain, period: Float) -> None:
-        """Find the elements around points; the cell has `period` (2,)."""
+        """Prepare the search for elements around points; `period` (2,) is the period of the cell."""
         mesh = subdomain.mesh
         self.subdomain, self._period = subdomain, period
         self._tree = cKDTree(in_cell(mesh.points, period), boxsize=period)
@@ -54,12 +54,12 @@ class CrackExtension:
         self._elements_of = csr_matrix(entries, shape=(len(mesh.points), len(mesh.triangles)))
 
     def energy_change(self, tip: Float, spoke: Float, reach: float, u: Float, E: Float) -> float:
-        """Return the energy change when a tip's crack turns by a unit angle.
+        """Return the energy change when a crack tip turns by a unit angle.
 
         Args:
-            tip, spoke: (2,) position, and position relative to the circle centre.
-            reach: distance beyond which nothing turns.
-            u: (dofs,) u*.
+            tip, spoke: (2,) position of the tip, and position relative to the circle centre.
+            reach: distance beyond which no node turns.
+            u: (dofs,) displacements u*.
             E: (2, 2) macroscopic strain.
         """
         inside = self._tree.query_ball_point(in_cell(tip, self._period), reach)
@@ -69,12 +69,12 @@ class CrackExtension:
         nodes = mesh.triangles[np.unique(self._elements_of[inside].indices)]
         points = mesh.points[nodes]
         away = nearest_image(points - tip, self._period)
-        # An element moves as one to the image of its node that is nearest to the tip.
+        # All nodes of an element take the image of the element's node that is nearest to the tip.
         nearest = np.argmin((away**2).sum(axis=2), axis=1)[:, None, None]
         away = points + np.take_along_axis(away - points, nearest, axis=1)
-        share = np.clip((reach - np.linalg.norm(away, axis=2)) / (reach * (1 - CORE)), 0.0, 1.0)[..., None]
+        fraction = np.clip((reach - np.linalg.norm(away, axis=2)) / (reach * (1 - CORE)), 0.0, 1.0)[..., None]
         total = u.reshape(-1, 2)[mesh.node_class[nodes]] + away @ E
-        moved, changed = share * ((away + spoke) @ QUARTER_TURN.T), share * (total @ QUARTER_TURN.T)
+        moved, changed = fraction * ((away + spoke) @ QUARTER_TURN.T), fraction * (total @ QUARTER_TURN.T)
         return point_fields.energy_change(
             points, total, self.subdomain.L[:3, :3], moved, changed, self.subdomain.is_mixed
         )
@@ -89,7 +89,7 @@ class EnergyRelease:
         pair: (t,) interface sections.
         direction: (t,) degrees in (-180, 180] about the fibre centre.
         modes: (t, 2) G_I and G_II.
-        length: (t,) closed length by which rigid bonds have these modes.
+        length: (t,) closed length that determines the modes of rigid bonds.
     """
 
     fibre: Int
@@ -100,27 +100,27 @@ class EnergyRelease:
 
     @property
     def total(self) -> Float:
-        """(t,) G."""
+        """The energy release rate G (t,)."""
         return np.asarray(self.modes.sum(axis=1))
 
     @property
     def mode_angle(self) -> Float:
-        """(t,) degrees psi, tan^2 psi = G_II / G_I; 0 is opening, 90 shear."""
+        """The mode angle psi (t,) in degrees, tan^2 psi = G_II / G_I; 0 is opening, 90 shear."""
         roots = np.sqrt(np.maximum(self.modes, 0.0))
         return np.asarray(np.degrees(np.arctan2(roots[:, 1], roots[:, 0])))
 
 
 class EnergyReleaseRates:
-    """Energy release rates in a torn cell, response by response.
+    """The energy release rates in a torn cell, response by response.
 
     Attributes:
-        interface: the responses' contact problem.
-        points, bodies, pair, direction, length: (n, 2) and (n,) at all ranks' interface nodes: positions, outer
-            and inner constituents, interface sections, degrees about the inner one's centre, lengths.
+        interface: contact problem of the responses.
+        points, bodies, pair, direction, length: (n, 2) and (n,) at all ranks' interface nodes: positions, outer and
+            inner constituents, interface sections, degrees about the centre of the inner constituent, lengths.
     """
 
     def __init__(self, cell: TornCell, interface: contact_problem.ContactProblem) -> None:
-        """Find the tips and their neighbours.  Collective."""
+        """Gather the interface nodes, and find the boundaries that limit a crack extension.  Collective."""
         nodes = interface.nodes
         self.cell, self.interface, self._period = cell, interface, cell.summary.period
         self._chains = debonded_arcs.InterfaceChains(cell.neighbours.adjacency)
@@ -168,8 +168,8 @@ class EnergyReleaseRates:
         modes = np.where(is_rigid, closing, traction**2 / (2 * stiffness))
         rigid = np.flatnonzero(is_rigid.all(axis=1))
         work = closing[rigid].sum(axis=1, keepdims=True)
-        share = np.divide(closing[rigid], work, out=np.zeros_like(closing[rigid]), where=work > 0)
-        modes[rigid] = share * np.maximum(0.0, self._released(tips.chosen(rigid), response))[:, None]
+        fraction = np.divide(closing[rigid], work, out=np.zeros_like(closing[rigid]), where=work > 0)
+        modes[rigid] = fraction * np.maximum(0.0, self._released(tips.chosen(rigid), response))[:, None]
         return EnergyRelease(
             fibre=self._numbers(tips),
             pair=self.pair[tips.node],
@@ -179,20 +179,20 @@ class EnergyReleaseRates:
         )
 
     def _numbers(self, tips: debonded_arcs.CrackTips) -> Int:
-        """(t,) fibre numbers for tips, also for fibres within coatings."""
+        """Return the fibre numbers (t,) of tips, also for fibres within coatings."""
         return self.cell.summary.fibre_number(self.bodies[tips.node, 1])
 
     def _radius(self, tips: debonded_arcs.CrackTips) -> Float:
-        """(t,) circle radii at tips; NaN without a circle."""
+        """Return the circle radii (t,) at tips; NaN without a circle."""
         return np.asarray(self.cell.summary.radii[self.bodies[tips.node, 1]])
 
     def _released(self, tips: debonded_arcs.CrackTips, response: Response) -> Float:
-        """(t,) G from a virtual crack extension at each tip.  Collective."""
+        """Return G (t,) from a virtual crack extension at each tip.  Collective."""
         if not len(tips.node):
             return np.zeros(0)
         solution, bodies, place = response.state.solution, self.bodies[tips.node], self.points[tips.node]
         spokes = nearest_image(place - self.cell.summary.centres[bodies[:, 1]], self._period)
-        # Cracks may be extended within `reach`, which has no other tip, and no boundary but the tip's circle.
+        # Within `reach` of a tip there is no other tip, and no boundary except the circle of the tip.
         radius, (points, body), period = np.linalg.norm(spokes, axis=1), self._boundaries, self._period
         reach, places = np.minimum(radius, REACH_OF_A_PERIOD / REACH * period.min()), in_cell(place, period)
         if len(place) > 1:
@@ -216,9 +216,9 @@ class EnergyReleaseRates:
         return np.asarray(-outward * distributed_arrays.allreduce_sum(self.cell.comm, change) / self._radius(tips))
 
     def _closing(self, tips: debonded_arcs.CrackTips, status: Status, force: Float, jump: Float) -> tuple[Float, Float]:
-        """(t, 2) `closing_work` in opening and in shear, and (t,) closed lengths.
+        """Return `closing_work` (t, 2) in opening and in shear, and the closed lengths (t,).
 
-        Lengths are MODE_LENGTH radii, or the element behind the tip if it is longer.
+        A length is MODE_LENGTH times the radius, or the length of the element behind the tip if that is larger.
         """
         smallest, order = MODE_LENGTH * self._radius(tips), self.cell.case.cell.order
         work, length = np.zeros((len(smallest), 2)), np.zeros(len(smallest))
@@ -231,7 +231,7 @@ class EnergyReleaseRates:
         for t, (behind, front) in enumerate(zip(*chains, strict=True)):
             debonded = (behind >= 0) & ((status[behind] != BONDED) | (behind == tips.node[t]))
             bonded = (front >= 0) & (status[front] == BONDED)
-            # The first debonded nodes behind, and the first bonded ones ahead.
+            # The first debonded nodes behind the tip, and the first bonded nodes ahead.
             behind, front = (
                 chain[: np.argmin(np.append(mask, False))] for chain, mask in ((behind, debonded), (front, bonded))
             )
@@ -244,7 +244,7 @@ class EnergyReleaseRates:
         return work, length
 
     def _gathered(self, values: Array) -> Array:
-        """Gather the interface node values, or other rows, from all ranks.  Collective."""
+        """Gather rows, such as the values at interface nodes, from all ranks.  Collective."""
         return np.concatenate(self.cell.comm.allgather(values))
 
 

@@ -1,6 +1,6 @@
-"""Mesh error in each response pair's energy, estimated by recovered stresses.
+"""Estimate of the mesh error in the energy of each pair of responses, by recovered stresses.
 
-Recovered body stresses obey the tractions on interfaces and voids: multiplier forces over lengths.
+The recovered stresses in a body satisfy the tractions on interfaces, which are multipliers over lengths, and on voids.
 """
 
 from __future__ import annotations
@@ -43,10 +43,10 @@ class EnergyErrors:
     """Errors (k, k) in E_i . Sigma_j; k responses have strains E_i.
 
     Attributes:
-        elements: 1/|UC| int ds_i : S : ds_j of recovered less element stresses, and spring energy beyond tips; the
-            stiffness is too high.
+        elements: 1/|UC| int ds_i : S : ds_j, with ds the recovered less the element stresses, plus the spring energy
+            beyond tips; this error makes the stiffness too high.
         arcs: errors from straight or parabolic sides along arcs, and from springs along sides, of either sign.
-        shares: (m, k) this rank's element shares in the `elements` diagonal; without rows if not asked for.
+        shares: (m, k) contribution of this rank's elements to the diagonal of `elements`; may have no rows.
         least_of_two: smallest ratio, off the diagonal, between the error and both parts without cancellation.
     """
 
@@ -57,21 +57,21 @@ class EnergyErrors:
 
     @property
     def signed(self) -> Float:
-        """(k, k) computed less exact."""
+        """The signed error (k, k): computed less exact."""
         return self.elements + self.arcs
 
     @property
     def least(self) -> Float:
-        """(k, k) smallest error that remains when both parts cancel."""
+        """The smallest error (k, k) that remains when both parts cancel."""
         return LEAST_SHARE * (self.elements - self.arcs)
 
     @property
     def absolute(self) -> Float:
-        """(k, k) estimated |computed - exact|."""
+        """The estimate (k, k) of |computed - exact|."""
         size = np.sqrt(np.abs(np.diag(self.elements)) + np.abs(np.diag(self.arcs)))
-        share = np.full((len(size),) * 2, self.least_of_two)
-        np.fill_diagonal(share, LEAST_SHARE)
-        return np.asarray(np.maximum(np.abs(self.signed), share * np.outer(size, size)))
+        fraction = np.full((len(size),) * 2, self.least_of_two)
+        np.fill_diagonal(fraction, LEAST_SHARE)
+        return np.asarray(np.maximum(np.abs(self.signed), fraction * np.outer(size, size)))
 
 
 def energy_errors(
@@ -121,11 +121,11 @@ def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
 
 
 def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
-    """Return whether a mesh refined less has the error.
+    """Return whether a mesh with fewer refinements gives the error.  Collective.
 
-    Not where errors fall more slowly, at corners and tips: false for cells with fibres other than circles and ellipses
-    or with voids bounded by straight sides; for debonded arcs with quadratic elements or with tips to which the mesh is
-    not graded: `tip_size` is given, or bonds break. Collective.
+    Errors fall more slowly at corners and tips.  The result is false for cells with fibres other than circles and
+    ellipses, or with straight sides at voids; and for debonded arcs with quadratic elements, or with tips to which the
+    mesh is not graded, because the case sets `tip_size` or bonds break.
     """
     lattice = cell.lattice
     pieces = (s.submesh for s in cell.subdomains)
@@ -133,7 +133,7 @@ def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
     if not lattice.halvings or _has_corners(cell) or cell.comm.allreduce(straight, MPI.LOR):
         return False
     if not cell.case.interfaces:
-        return lattice.order == 2  # with linear ones elements and arcs cancel too often
+        return lattice.order == 2  # with linear elements both parts of the error cancel too often
     graded = cell.case.cell.tip_size is None and not cell.case.section.breaks
     return (lattice.order == 1 and graded) or not any(response.debonded for response in responses)
 
@@ -204,7 +204,7 @@ def _displacements(
 
 
 class Group(NamedTuple):
-    """Recovered stresses and arcs of some subdomains, and (classes,) places of their boundary displacements."""
+    """The recovered stresses and arcs of some subdomains, and positions (classes,) of boundary displacements."""
 
     stress: stress_recovery.RecoveredStress
     sides: arc_error.ArcSides
@@ -214,10 +214,10 @@ class Group(NamedTuple):
 def boundary_tractions(
     cell: TornCell, responses: Sequence[Response], groups: Sequence[Group], shared: SharedVertices | None, nested: bool
 ) -> dict[int, local_fits.KnownTractions]:
-    """Return, by the group, tractions where two sides on arcs meet, and zero ones at voids.  Collective.
+    """Return, by group, the tractions where two sides on arcs meet, and zero tractions at voids.  Collective.
 
-    They vanish at voids, else are forces over node lengths; on the mesh that has the forces, which is not `nested`,
-    over side lengths, so that uniform stresses give exact tractions.
+    A traction is the force divided by the node length if the mesh is `nested`, and otherwise divided by the side
+    length, so that uniform stresses give exact tractions.
     """
     forces, lengths = _forces(cell, responses, groups)
     sums, of_node = list[Float](), np.append(lengths, 0.0)  # at NONE, the last
@@ -246,10 +246,10 @@ def boundary_tractions(
 
 
 def _forces(cell: TornCell, responses: Sequence[Response], groups: Sequence[Group]) -> tuple[Float, Float]:
-    """(boundary dofs, k) forces -B^T lam on bodies, and (boundary dofs,) lengths.
+    """Return the forces -B^T lam (boundary dofs, k) on bodies, and the lengths (boundary dofs,).  Collective.
 
-    Lengths are 0 where no tractions follow: if a phase locks, or rigid bonds end at debonded faces.  Subdomains across
-    materials have all dofs in their parts instead.  Collective.
+    Lengths are 0 where forces give no tractions: if a phase locks, or rigid bonds end at debonded faces.  For
+    subdomains across materials, the rows are all dofs of the parts.
     """
     k, state, nodes = len(responses), responses[0].state, cell.solver.jump_operator.nodes
     if cell.summary.across:

@@ -1,7 +1,7 @@
-"""Pieces that a cell is cut into, and their cost.
+"""The number of pieces of a cell, and the cost: memory, useful ranks, and applications of the dual operator.
 
-The memory it needs, the ranks it can use, and how often its dual operator is applied.  Memory is linear in the degrees
-of freedom, because bodies are cut into equally large pieces.  `scripts/measure_cost.py` measures its constants.
+The memory is linear in the degrees of freedom, because bodies are cut into equally large pieces.
+`scripts/measure_cost.py` measures the constants.
 """
 
 from collections.abc import Sequence
@@ -65,8 +65,8 @@ class PartitionPolicy:
         across_piece_dofs: such a piece's size, with as many multipliers as a smaller piece within a body.
         whole_dofs: such a cell on one rank is not cut up to this size: one sparse factor takes less time than dense
             piece matrices, which need half its memory.
-        whole_ranks: up to so many ranks have one piece each in such a cell, with Schur complements factored together;
-            for more ranks these are too large.
+        whole_ranks: largest number of ranks with one piece each in such a cell, whose Schur complements are factored
+            together; for more ranks these are too large.
         strip_dofs: cells from this size on are halved into strips: smaller ones have short boundaries anyway, and
             mesh errors, estimated up to boundaries, depend less on the direction that METIS cuts in.
 
@@ -129,7 +129,7 @@ def wanted_pieces(
     n_ranks: int,
     policy: PartitionPolicy = DEFAULT_POLICY,
 ) -> Int:
-    """(b,) pieces by body, at least one a rank: case, else policy.
+    """Return the number of pieces (b,) of each body, at least one per rank, by the case or else by the policy.
 
     Args:
         load: (b,) coarse triangles in each body.
@@ -156,7 +156,7 @@ def wanted_pieces(
 
 
 def applications(case: Case, problem: Problem, across: bool = False) -> int:
-    """Estimate applications of a problem's dual operator; coatings cost no iterations in pieces `across` phases."""
+    """Estimate the applications of a dual operator; pieces `across` phases need no iterations for coatings."""
     has_arcs = bool(case.arcs) or case.cell.has_own_mesh  # with a curve "debonded", perhaps
     touches = case.interface is not None and case.interface.contact and (has_arcs or case.section.is_followed)
     contact = touches and problem != AXIAL  # along the fibres nothing touches
@@ -172,7 +172,7 @@ def applications(case: Case, problem: Problem, across: bool = False) -> int:
 
 
 def memory(nodes: Sequence[int], subdomains: Sequence[int], components: Sequence[int], columns: int) -> float:
-    """Estimate the largest rank's bytes; `nodes` and `subdomains` are per rank.
+    """Estimate the bytes of the largest rank from the `nodes` and `subdomains` of each rank.
 
     Args:
         components: displacements at a node in each problem.
@@ -191,16 +191,16 @@ def memory_to_the_end(case: Case, few: float, multipliers: int, columns: int, ra
 
 
 def recommended_ranks(dofs: int, bodies: int) -> int:
-    """Return how many ranks a cell can use.
+    """Return the number of ranks that a cell can use.
 
-    No more than its bodies, because more ranks would cut them.  Cut bodies cost iterations; in cells that are cut
-    across materials coarse triangles stand for bodies.
+    The number is at most the number of bodies, because more ranks would cut bodies, which costs iterations.  In cells
+    that are cut across materials, coarse triangles stand for bodies.
     """
     return max(1, min(bodies, ceil(dofs / DOFS_OF_A_RANK)))
 
 
 def in_words(size: float) -> str:
-    """Return bytes in words."""
+    """Format a number of bytes for readers."""
     size /= 2**20
     digits = 1 if size < 10 else 0
     return f"{size:.{digits}f} MiB" if size < 1000 else f"{size / 1024:.1f} GiB"

@@ -20,7 +20,7 @@ from feti_homog.materials import laws, material_derivatives, voigt
 from feti_homog.typing import Float, Int
 
 IN_PLANE, AXIAL_SHEAR = [0, 1, 5, 2], [4, 3]
-"""Places of the strains of the plane problem, with E33, and of the axial problem in the order of space."""
+"""Indices of the plane problem's strains, with E33, and of the axial strains among the six strains in space."""
 # Power of a fibre's factor for keys of these endings: laws remain similar, for all openings grow by the factor too, and
 # the length of the process zone stays.
 POWERS = {"strength": 1, "toughness": 2}
@@ -36,7 +36,7 @@ def problems(case: Case) -> tuple[Problem, ...]:
 
 
 def law(case: Case, phase: str, problem: Problem) -> Float:
-    """(v, v) phase stiffness A in a problem."""
+    """Return the phase stiffness A (v, v) in a problem."""
     material = case.material_of(phase)
     if problem == PLANE:
         return laws.plane_stiffness(material, case.analysis.plane)
@@ -86,12 +86,12 @@ def secants(plane: Float, *axial: Float) -> dict[str, Float]:
 
 
 def components(plane: Float, *axial: Float) -> Float:
-    """(3,) or, with an axial problem, (6,) strain or stress components from their parts in each problem."""
+    """Join the strain or stress components of each problem: (3,) or, with an axial problem, (6,)."""
     return spatial_vector(plane, *axial) if axial else plane
 
 
 def spatial_vector(plane: Float | None, axial: Float | None) -> Float:
-    """(6,) from numbers [11, 22, 12, 33, ...] in the plane problem and [13, 23] in the axial one; None is zero."""
+    """Join [11, 22, 12, 33, ...] of the plane problem and [13, 23] of the axial one to a vector (6,); None is zero."""
     vector = np.zeros(6)
     if plane is not None:
         vector[IN_PLANE] = plane[:4]
@@ -101,7 +101,7 @@ def spatial_vector(plane: Float | None, axial: Float | None) -> Float:
 
 
 def springs(case: Case, problem: Problem = PLANE) -> jump_operator.InterfaceSprings:
-    """Return the springs of a problem: normal and tangential, or axial, by default as stiff as tangential springs."""
+    """Return the normal and tangential, or the axial springs; by default axial springs are tangential springs."""
     along = [(bond.axial_stiffness or bond.tangential_stiffness or math.inf,) for bond in case.interfaces]
     around = [(bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf) for bond in case.interfaces]
     return jump_operator.InterfaceSprings(tuple(along if problem == AXIAL else around), has_softening(case))
@@ -113,13 +113,13 @@ def has_softening(case: Case) -> bool:
 
 
 def has_springs(case: Case) -> bool:
-    """Return whether any bond gives way."""
+    """Return whether any bond has a finite stiffness."""
     stiffnesses = (*springs(case).stiffness, *springs(case, AXIAL).stiffness)
     return any(math.isfinite(stiffness) for row in stiffnesses for stiffness in row)
 
 
 def strength_factors(case: Case, fibres: int) -> Float:
-    """(fibres,) each fibre's bond strength / strength in the case.
+    """Return the bond strength of each fibre / strength in the case (fibres,).
 
     f = (-ln(1 - U))^(1/m) / Gamma(1 + 1/m) with uniform U, Weibull's distribution with modulus m and mean 1, times the
     column `strength` in a fibre table.  Fibre N takes the generator's N-th number in any cell.
@@ -139,9 +139,9 @@ def strength_factors(case: Case, fibres: int) -> Float:
 
 @dataclass(frozen=True)
 class SectionValues:
-    """Key values from [interface] sections `pair` (k,) at nodes (k,).
+    """The values of keys from the [interface] sections `pair` (k,) at nodes (k,).
 
-    `factor` (k,) of the fibre at each node multiplies strengths, its square toughnesses.
+    The factor (k,) of the fibre at each node multiplies strengths; the square of this factor multiplies toughnesses.
     """
 
     bonds: Sequence[interface_section.InterfaceSection]
@@ -149,20 +149,20 @@ class SectionValues:
     factor: float | Float
 
     def __call__(self, key: str, *more: str) -> float | Float:
-        """Return the first value among the keys, for all nodes or (k,) at each; else inf."""
+        """Return the value of the first key that is set, one for all nodes or (k,); inf if no key is set."""
         sections = self.everywhere(key, *more)
         values = float(sections[0]) if len(sections) == 1 else sections[self.pair]
         power = POWERS.get(key.rpartition("_")[2], 0)
         return values * self.factor**power if power else values
 
     def everywhere(self, key: str, *more: str) -> Float:
-        """(s,) values in all sections, for the factor 1."""
+        """Return the values (s,) in all sections, for the factor 1."""
         names = (key, *more)
         values = [next((v for n in names if (v := getattr(bond, n)) is not None), math.inf) for bond in self.bonds]
         return np.array(values or [math.inf], float)
 
     def common(self, key: str) -> Any:
-        """Return the value that all sections share."""
+        """Return the common value of all sections."""
         return getattr(self.bonds[0], key)
 
 

@@ -1,4 +1,4 @@
-"""Response fields: nodal displacements, element strains and stresses, tractions, jumps."""
+"""The fields of a response: nodal displacements, element strains and stresses, tractions and jumps."""
 
 from dataclasses import dataclass
 
@@ -13,13 +13,13 @@ from feti_homog.typing import Float
 
 @dataclass(frozen=True)
 class RecoveredFields:
-    """This rank's response fields, with c displacements and v loads.
+    """The fields of a response on this rank, with c displacements and v loads.
 
     Attributes:
-        displacement, fluctuation: (n, c) total H y + u*, Eq. (14), and u* at the parts' plane nodes.
-        strain, stress: (m, v) means over the elements: loads in each, and stresses that do work on them.
-        traction, jump: (k, c).
-        shares: (m,) element shares in the estimated error of E . Sigma; NaN without estimate.
+        displacement, fluctuation: (n, c) total H y + u*, Eq. (14), and u* at the plane nodes of the parts.
+        strain, stress: (m, v) means over each element of the local loads and of the conjugate stresses.
+        traction, jump: (k, c) at interface nodes.
+        shares: (m,) contribution of each element to the estimated error of E . Sigma; NaN without an estimate.
     """
 
     displacement: Float
@@ -32,7 +32,7 @@ class RecoveredFields:
 
 
 def recover(cell: TornCell, response: Response | None) -> RecoveredFields:
-    """Recover a response's fields; zero without one.  Collective."""
+    """Recover the fields of a response; all fields are zero without a response.  Collective."""
     nodes, problem = cell.jumps.nodes, cell.solver.problem
     m, (c, v) = problem.strains, (problem.components, len(problem.loads))
     if response is None:
@@ -63,7 +63,7 @@ def recover(cell: TornCell, response: Response | None) -> RecoveredFields:
 
 
 def out_of_plane_stress(cell: TornCell, stress: Float) -> Float:
-    """(m,) stresses 33 for stresses (m, 3) in the plane."""
+    """Return the stresses S33 (m,) from the stresses (m, 3) in the plane."""
     plane = cell.case.analysis.plane
     rules = [laws.out_of_plane(cell.case.material_of(s.submesh.phase), plane)[0] for s in cell.parts]
     sizes = [len(s.mesh.triangles) for s in cell.parts]

@@ -1,4 +1,4 @@
-"""Energy errors by springs at nodes, besides element and arc errors."""
+"""Energy errors of springs at nodes, which add to the element and arc errors."""
 
 from collections.abc import Sequence
 
@@ -14,12 +14,12 @@ from feti_homog.mesh import ReferenceLattice
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int
 
-# Gauss points of a side, by which ellipses and products of quadratic functions are exact to rounding or nearly so.
+# Gauss points of a side: integrals along ellipses and of products of quadratic functions are exact or nearly exact.
 POINTS, WEIGHTS = roots_legendre(6)
 
 
 class SpringSides:
-    """Element sides along springs, and the interface nodes of all ranks, which no state changes."""
+    """The element sides along springs and the interface nodes of all ranks, which are the same in all states."""
 
     def __init__(
         self,
@@ -29,7 +29,7 @@ class SpringSides:
         lattice: ReferenceLattice,
         period: Float,
     ) -> None:
-        """Find fibre sides in the `parts`; the cell has `period` (2,).  Collective."""
+        """Find the fibre sides in `parts`; `period` (2,) is the period of the cell.  Collective."""
         self._comm, self._jumps, self._order, self._period = neighbours.comm, jumps, lattice.order, period
         self._chains = debonded_arcs.InterfaceChains(neighbours.adjacency)
         nodes = jumps.nodes
@@ -49,7 +49,7 @@ class SpringSides:
         self._frame = np.stack([unit, np.stack([-unit[..., 1], unit[..., 0]], axis=2)], axis=2)
         self._ds = ds = speed * WEIGHTS / 2 * lattice.order / lattice.intervals
         length = ds.sum(axis=1)
-        # Functions of linear elements are linear in place on the chord, so nearly in length along the arc.
+        # Functions of linear elements are linear along the chord, and nearly linear in length along the arc.
         xi = np.broadcast_to((1 + POINTS) / 2, ds.shape)
         if lattice.order == 1:
             bend = 3 * (ds @ POINTS) / length
@@ -62,7 +62,7 @@ class SpringSides:
         self._share = np.where(turn > 0, length, 0.0) / {1: 12, 2: 60}[lattice.order]
 
     def errors(self, status: Status, compliance: Float, lam: Float) -> tuple[Float, Float]:
-        """(k, k) energies beyond tips, and on sides less `arc_energy`.  Collective.
+        """Return the energies (k, k) beyond tips, and the energies on sides less `arc_energy`.  Collective.
 
         Args:
             status: (n,) states at this rank's interface nodes.
@@ -71,14 +71,14 @@ class SpringSides:
         nodes = self._jumps.nodes
         rows = nodes.row[:, None] + np.arange(self._jumps.components)
         force, C = lam[rows], compliance[rows]
-        # Springs hold where all directions are bonded by them.
+        # A node is on springs where springs bond all directions.
         holds = (status == BONDED) & (C > 0).all(axis=1)
         stiffness = 1 / (np.where(holds[:, None], C, 1.0) * nodes.length[:, None])
         state = status, holds, stiffness, force, force * C[:, :, None]
         status, holds, stiffness, force, jump = (
             np.concatenate(table) for table in zip(*self._comm.allgather(state), strict=True)
         )
-        # A tip is bonded on its whole length; the part on its debonded side has no springs.
+        # The energy counts springs on the whole length of a tip, but the part on the debonded side has no springs.
         tips = self._chains.tips(status)
         ends = self._points[np.stack([tips.behind, tips.ahead])] - self._points[tips.node]
         behind, front = np.linalg.norm(ends - np.round(ends / self._period) * self._period, axis=2)
@@ -100,7 +100,7 @@ class SpringSides:
         return np.asarray(beyond), distributed_arrays.allreduce_sum(self._comm, lumped - on_sides - on_arcs - on_arcs.T)
 
     def _in_space(self, components: Float) -> Float:
-        """(n, 2, k) plane vectors from components (n, 2, k) along normal and tangent; (n, 1, k) stay."""
+        """Return plane vectors (n, 2, k) from normal and tangential components; (n, 1, k) stay unchanged."""
         if components.shape[1] == 1:
             return components
         normal = self._normal
@@ -111,8 +111,8 @@ class SpringSides:
 def _sides(part: UniformPart, number: Int, fibre: Int, lattice: ReferenceLattice) -> tuple[Int, Float, Float]:
     """Return the sides of a fibre: nodes (f, order + 1), normals (f, q, 2) at Gauss points, and turns (f,).
 
-    Normals are as long as the arc per unit of its parameter.  `number` (classes,) has the interface nodes of all ranks,
-    -1 elsewhere, and `fibre` (n,) the inner body of each interface node.
+    The length of a normal is the arc length per unit of the arc's parameter.  `number` (classes,) has the interface
+    nodes of all ranks, -1 elsewhere, and `fibre` (n,) the inner body of each interface node.
     """
     triangle, k, line = border_lines(part.submesh, part.mesh, part.mesh.node_class[part.mesh.nodes])
     nodes = number[line]

@@ -45,7 +45,7 @@ def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: Part
 def place_nodes(
     case: Case, comm: MPI.Intracomm, policy: tiling.TilePolicy
 ) -> gmsh_mesher.NodedCell | CoarseMesh | None:
-    """Return a user's mesh or the cell with nodes on its lines, on rank 0, else None.  Collective.
+    """Return a user's mesh, or the cell with nodes on its lines, on rank 0; None on all other ranks.  Collective.
 
     Raises:
         CaseError, MeshError: on every rank, as `begin_mesh`.
@@ -66,7 +66,7 @@ def place_nodes(
 
 
 def begin_mesh(case: Case, policy: tiling.TilePolicy) -> gmsh_mesher.UnmeshedCell | gmsh_mesher.NodedCell | CoarseMesh:
-    """Return a user's mesh, or the cell that rank 0 makes alone.
+    """Return a user's mesh, or the cell that rank 0 begins.
 
     Raises:
         CaseError: a phase has no material, or a material no phase.
@@ -90,7 +90,7 @@ def fill_tiles(cell: gmsh_mesher.NodedCell | CoarseMesh | None, comm: MPI.Intrac
     """Return the mesh on rank 0; all ranks fill its tiles.  Collective.
 
     Raises:
-        MeshError: on every rank, if one cannot fill a tile.
+        MeshError: on every rank, if a rank cannot fill a tile.
     """
     tiles = [] if cell is None or isinstance(cell, CoarseMesh) else [tile for _, tile in cell.parts]
     gathered = distributed_arrays.gather(
@@ -105,7 +105,7 @@ def fill_tiles(cell: gmsh_mesher.NodedCell | CoarseMesh | None, comm: MPI.Intrac
 
 
 def deal_tiles(tiles: list[T], loads: list[int], comm: MPI.Intracomm) -> list[tuple[int, T]]:
-    """Deal numbered tiles with sizes `loads` from rank 0 to all ranks, which fill them.  Collective."""
+    """Deal numbered tiles from rank 0 to all ranks, balanced by `loads`.  Collective."""
     parts: list[list[tuple[int, T]]] = [[] for _ in range(comm.size)]
     for k, rank in enumerate(dividing.balanced(np.array(loads, np.int64), comm.size).tolist()):
         parts[rank].append((k, tiles[k]))
@@ -116,7 +116,7 @@ def fill_own(tiles: list[tuple[int, tile_filling.Tile]]) -> list[tuple[int, tile
     """Fill numbered tiles.
 
     Raises:
-        MeshError: gmsh cannot fill one.
+        MeshError: gmsh cannot fill a tile.
     """
     return [(k, tile_filling.fill(tile)) for k, tile in tiles]
 
@@ -124,10 +124,10 @@ def fill_own(tiles: list[tuple[int, tile_filling.Tile]]) -> list[tuple[int, tile
 def can_be_torn_by_tiles(
     case: Case, noded: gmsh_mesher.NodedCell | CoarseMesh | None, lattice: ReferenceLattice, policy: PartitionPolicy
 ) -> bool:
-    """Return whether the mesh need not be on one rank.
+    """Return whether each rank can cut its own tiles, so that no rank needs the whole mesh.
 
     Arc tips, bodies cut by the sides, a matrix in fewer pieces than tiles, and cells that are probably small enough for
-    cuts across materials need one rank.  A user's mesh is on one rank already.
+    cuts across materials need the whole mesh on one rank.  A user's mesh already is on one rank.
     """
     on_one_rank = case.arcs or case.cell.bodies == "plane" or case.decomposition.subdomains is not None
     if not isinstance(noded, gmsh_mesher.NodedCell) or len(noded.parts) < 2 or on_one_rank:
@@ -179,7 +179,7 @@ def tear_by_tiles(
 
 
 def _filled(noded: gmsh_mesher.NodedCell | None, regions: tiling.Regions, comm: MPI.Intracomm) -> tuple[Torus, Int]:
-    """Return the torus that the tiles of this rank fill, and the tile (m,) of each triangle.  Collective."""
+    """Fill the tiles of this rank; return their torus and the tile (m,) of each triangle.  Collective."""
     tiles = mpi_errors.on_root_only(comm, tiles_to_fill, noded) or []
     dealt = deal_tiles(tiles, [len(tile.nodes) for tile in tiles], comm)
     fillings = mpi_errors.agree(comm, fill_own, [(k, tile.tile) for k, tile in dealt])
@@ -204,9 +204,10 @@ def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) ->
 
 
 def _neighbours(torus: Torus, subdomain: Int) -> tuple[Int, Int, Int, Int]:
-    """Return subdomain pairs (n,) and (n,) that meet at this rank's edges, and its edges on other ranks' triangles.
+    """Return the neighbouring subdomains at this rank's edges, and the edges to triangles of other ranks.
 
-    These are edges (k,) with one triangle on this rank, and the subdomain (k,) of this triangle.
+    The result has both subdomains (n,) and (n,) at each edge inside the rank, the edges (k,) with one triangle on this
+    rank, and the subdomain (k,) of this triangle.
     """
     a, b, _ = torus.sides
     apart = subdomain[a] != subdomain[b]
@@ -217,7 +218,7 @@ def _neighbours(torus: Torus, subdomain: Int) -> tuple[Int, Int, Int, Int]:
 
 
 def _assigned(load: Int, neighbours: list[tuple[Int, Int, Int, Int]], n_ranks: int) -> Int:
-    """Assign a rank to each subdomain (s,), from all ranks' `neighbours`."""
+    """Assign a rank to each subdomain (s,) by the `neighbours` of all ranks."""
     a, b, edge, side = (np.concatenate(rows) for rows in zip(*neighbours, strict=True))
     side = side[np.argsort(edge, kind="stable")]
     return partition.assign_ranks(load, np.append(a, side[::2]), np.append(b, side[1::2]), n_ranks)

@@ -1,7 +1,7 @@
-"""Subdomain parts in one body each, and displacements on coarser meshes.
+"""Parts of subdomains in one body each, and displacements on coarser meshes.
 
-A subdomain in one material is a part itself; one across materials has a part for each body that it reaches.  The mesh
-that is refined less has a quarter or a sixteenth of the elements; its nodes are among the finer mesh's nodes.
+A subdomain in one material is one part; a subdomain across materials has one part for each body.  A coarser mesh has a
+quarter or a sixteenth of the elements, and its nodes are also nodes of the finer mesh.
 """
 
 from __future__ import annotations
@@ -27,26 +27,26 @@ from feti_homog.mesh import (
 )
 from feti_homog.typing import Float, Int
 
-# Elements of a group of subdomains: few enough for the processor's cache, many enough for NumPy.
+# Number of elements in a group of subdomains: small enough for the processor's cache, large enough for NumPy.
 ELEMENTS_AT_ONCE = 1 << 13
 # Halvings from which on the mesh that is refined twice less serves, but across materials and where a phase locks.
 REFINED_OFTEN = 3
 # Largest lambda / mu on that mesh, of a Poisson's ratio of 0.4: beyond, errors of coarse elements are no guide.
 LOCKING = 4.0
-# Position of a displacement that is not on a boundary: the last one, which is zero.
+# Position of a displacement that is not on a boundary: the last position, where the displacement is zero.
 NONE = -1
 
 
 @dataclass(frozen=True, eq=False)
 class UniformPart:
-    """Part of a subdomain, in one body.
+    """The part of a subdomain in one body.
 
     Attributes:
-        place: subdomain number on its rank.
-        submesh, mesh: the part's coarse share and refined mesh.
-        dofs: (cn,) its degrees of freedom in the subdomain.
+        place: subdomain number on this rank.
+        submesh, mesh: coarse triangles and refined mesh of the part.
+        dofs: (cn,) degrees of freedom of the part in the subdomain.
         L, problem: as in `Subdomain`.
-        is_mixed: whether its elements have their own bubble and pressure.
+        is_mixed: whether each element has a bubble and a pressure.
     """
 
     place: int
@@ -75,7 +75,7 @@ def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterat
 
 
 def nodes_of_parts(s: Subdomain) -> int:
-    """Count the plane nodes of all parts of a subdomain; each part counts its shared nodes."""
+    """Count the plane nodes in all parts of a subdomain; a shared node counts once in each part."""
     body, nodes = np.repeat(s.submesh.constituent, s.mesh.nodes.shape[1]), s.mesh.nodes.ravel()
     last = np.empty(len(s.mesh.points), np.int64)
     last[nodes] = body
@@ -84,7 +84,7 @@ def nodes_of_parts(s: Subdomain) -> int:
 
 
 def _restricted(mesh: FineMesh, members: Int) -> tuple[FineMesh, Int]:
-    """Restrict a mesh to coarse triangles (t,); return it and its classes (c,) in the whole mesh."""
+    """Return the mesh on some coarse triangles (t,), and its classes (c,) in the whole mesh."""
     nodes, local = periodic_topology.present(mesh.nodes[members], len(mesh.points))
     classes, node_class = periodic_topology.present(mesh.node_class[nodes], mesh.n_classes)
     numbers, curved = (local.astype(np.int32), node_class.astype(np.int32)), mesh.curved[members]
@@ -98,7 +98,7 @@ def share_parts(
     pairs: Int,
     lattice: ReferenceLattice,
 ) -> SharedEntities:
-    """Share the nodes of parts, as `share_entities` shares the nodes of subdomains.  Collective."""
+    """Find the shared nodes of parts, as `share_entities` does for subdomains.  Collective."""
     body = np.array([p.submesh.body for p in parts])
     member = np.repeat(np.arange(len(parts)), [len(p.mesh.nodes) for p in parts])
     index, phase = np.array([p.submesh.index for p in parts]), tuple(p.submesh.phase for p in parts)
@@ -110,10 +110,10 @@ def share_parts(
 
 
 class ForcesBetweenParts:
-    """Multipliers that keep each part in equilibrium with its displacements."""
+    """The multipliers that keep each part in equilibrium under given displacements."""
 
     def __init__(self, comm: MPI.Intracomm, parts: Sequence[UniformPart], jumps: JumpOperator) -> None:
-        """Assemble the coarse triangles at constraints.  Collective."""
+        """Assemble the coarse triangles with constrained nodes.  Collective."""
         self._jumps, problem = jumps, jumps.problem
         torn, nodes = refinement.joined([p.mesh for p in parts]), problem.nodes(np.flatnonzero(jumps.B.getnnz(axis=0)))
         is_shared = np.zeros(torn.n_classes, bool)
@@ -137,11 +137,11 @@ class ForcesBetweenParts:
 
 @dataclass(frozen=True)
 class NestedInterior:
-    """Coarser mesh for subdomains with one phase; c displacements a node.
+    """The factored interior of some subdomains with one phase on a coarser mesh, with c displacements per node.
 
     Attributes:
-        members: the subdomains.
-        mesh: their meshes, joined.
+        members: subdomains.
+        mesh: joined mesh of the subdomains.
         fixed: (c n,) prescribed displacements: on the boundary, and 0 where a class is pinned.
         place: (fixed,) positions among the displacements on all boundaries; NONE where a class is pinned.
         interior: the free displacements.
@@ -184,7 +184,7 @@ class NestedInterior:
         return cls(members, mesh, fixed, place[fixed], interior, loads)
 
     def displacement(self, u: Float, loads: Float) -> Float:
-        """(classes, c, k) u* from u (boundary dofs, k) on all boundaries under the loads (v, k)."""
+        """Return u* (classes, c, k) from u (boundary dofs, k) on all boundaries under the loads (v, k)."""
         problem = self.members[0].problem
         on_boundary = np.vstack([u, np.zeros((1, u.shape[1]))])[self.place]  # the last row for NONE
         all_dofs = np.empty((len(self.fixed) + len(self.interior.dofs), u.shape[1]))

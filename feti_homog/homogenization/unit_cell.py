@@ -83,7 +83,7 @@ class TornCell:
         return uniform_parts.ForcesBetweenParts(self.comm, self.parts, self.jumps)
 
     def displacement(self, solution: DualSolution) -> Float:
-        """(dofs,) u* on this rank's parts.  Collective."""
+        """Return u* (dofs,) on this rank's parts.  Collective."""
         u = self.solver.boundary_displacement(solution)
         return np.concatenate([np.zeros(0), *(part for _, part in self.displacements(u, solution.strain))])
 
@@ -96,7 +96,7 @@ class TornCell:
             yield part, extended[part.dofs]
 
     def across_bonds(self, solution: DualSolution, u: Float) -> tuple[Float, Float]:
-        """(owned rows of `jumps`,) lam and openings for the part displacements u.  Collective."""
+        """Return lam and openings (owned rows of `jumps`,) for the part displacements u.  Collective."""
         if not self.summary.across or not self.jumps.global_rows:  # without jumps there is a single part
             return solution.lam, solution.opening
         return self._forces.multipliers(u, solution.strain), self.jumps.sum(self.jumps.B @ u)

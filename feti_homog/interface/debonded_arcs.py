@@ -46,7 +46,7 @@ class InterfaceChains:
         return CrackTips(node, np.take_along_axis(pair, side[:, None], 1)[:, 0], pair[np.arange(len(node)), 1 - side])
 
     def onward(self, start: Int, through: Int, steps: int) -> Int:
-        """(t, steps + 1) chains from the nodes start and through (t,) on; -1 beyond their end."""
+        """Return the chains (t, steps + 1) from nodes `start` through nodes `through` (t,); -1 beyond the end."""
         nodes = [start, through]
         while len(nodes) <= steps:
             before, last = nodes[-2:]
@@ -75,7 +75,7 @@ class CrackTips:
 
 
 def closing_work(length: float, before: Float, force: Float, behind: Float, jump: Float) -> Float:
-    """(2,) work of closing the last part of a crack, over its length a (Irwin's integral):
+    """Return the work (2,) that closes the last part of a crack, over the length a of this part (Irwin's integral):
 
         sum_k F_k w(a - s_k) / (2 a)  ->  1 / (2 a) int_0^a t(s) w(a - s) ds,
 
@@ -130,7 +130,7 @@ def moved_tips(marks: Mapping[int, Sequence[float]], fibre: Int, direction: Floa
 def debonded(
     arcs: Sequence[interface_section.Arc], opening: float | None, fibre: Int, angle: Float, moved: MovedTips = NOT_MOVED
 ) -> Bool:
-    """(k,) True for nodes within an arc, on fibres (k,), numbered from 1, in directions (k,).
+    """Return whether nodes (k,) are within an arc, on fibres (k,), numbered from 1, in directions (k,).
 
     Arcs without an angle take `opening`; `moved` are the tips that the mesh has moved.
     """

@@ -131,7 +131,7 @@ class ContactProblem:
 
     @cached_property
     def _pairs(self) -> Int:
-        """(k, c) owned rows of the interface nodes."""
+        """Return the owned rows (k, c) of the interface nodes."""
         return self.nodes.row[:, None] + np.arange(self.solver.jump_operator.components)
 
     def linear(self, load: Load, bonds: BondState, start: Float) -> DualSolution:

@@ -10,8 +10,8 @@ A node is apart (f = 0), sticks (g_n = 0, g_t as it was), or slides (g_n = 0, f_
 the faces of a node, and f excludes their force: a damaged bond is a node without friction on springs 1 / (C - C_0),
 apart while it is pulled.
 
-Pivots change all wrong statuses at once while their number falls, and nearly always come to an end.  Otherwise all sets
-of statuses are tried, if they are few; then the coefficients rise from a share at which pivots find statuses.
+Pivots change all wrong statuses at once while their number falls, and nearly always end.  Otherwise the search tries
+all sets of statuses, if they are few, and then raises the coefficients from a fraction at which pivots find statuses.
 """
 
 from collections.abc import Iterator
@@ -28,7 +28,7 @@ from feti_homog.interface.friction.face_system import FaceSystem, Prescribed
 from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK
 from feti_homog.typing import Bool, Float
 
-# Pivots, and pivots a node, after which other searches take over; a continuation step takes at most SOLVES pivots.
+# Pivots, and pivots per node, after which other searches take over; a continuation step takes at most SOLVES pivots.
 SOLVES, SOLVES_PER_NODE = 50, 4
 # Largest number of status sets to try, and of equal continuation steps of mu.
 MOST_TRIED = 256.0
@@ -41,17 +41,19 @@ INDEFINITE = "friction: the sliding faces resist no more (an indefinite pivot)"
 
 
 class StuckError(NotCarriedError):
-    """No statuses of debonded faces go on from a state."""
+    """No admissible statuses of the debonded faces continue a state."""
 
 
 @dataclass(frozen=True)
 class StatusSearch:
-    """Search for admissible statuses (n,) and scaled x (m,); methods return None without a result.
+    """Search for the admissible statuses (n,) of the faces and their scaled x (m,).
+
+    A method returns None if its search finds no admissible statuses.
 
     Attributes:
-        allowed: (n, 4) statuses that a node may have, in the columns [STICK, FORWARD, OPEN_FACE, BACKWARD]; conditions
-            towards other statuses do not count.
-        start: (m,) x, which free motions keep.
+        allowed: (n, 4) statuses that a node may have, in the columns [STICK, FORWARD, OPEN_FACE, BACKWARD]; the search
+            ignores the conditions for a change to any other status.
+        start: (m,) scaled x before the load; free motions keep their amplitude in it.
     """
 
     faces: FaceSystem
@@ -60,24 +62,24 @@ class StatusSearch:
     start: Float
 
     def run(self, status: Status) -> Found:
-        """Search from a first guess by pivots, then trial, then continuation."""
+        """Search from a first guess by pivots, then by trial, then by continuation."""
         result = self.by_pivots(status)
         return result or self.by_trial(status) or self.by_continuation(status)
 
     def by_pivots(self, status: Status, solves: int | None = None) -> Found:
-        """Return the statuses to which pivots lead, if their forces balance."""
+        """Return the statuses at which the pivots end, if the forces balance."""
         result, balanced = self._pivoted(status, solves)
         return result if balanced else None
 
     def slides_freely(self, status: Status) -> bool:
-        """Return whether pivots lead to statuses whose forces drive a free motion."""
+        """Return whether the pivots end at statuses whose forces drive a free motion."""
         result, balanced = self._pivoted(status)
         return result is not None and not balanced
 
     def _pivoted(self, status: Status, solves: int | None = None) -> tuple[Found, bool]:
-        """Pivot at most `solves` times; return the statuses and x, and whether their forces balance.
+        """Pivot at most `solves` times; return the statuses, x, and whether the forces balance.
 
-        After some block pivots without progress single nodes change at random: a fixed order may end in a cycle.
+        After some block pivots without progress, one random node changes at a time: a fixed order may end in a cycle.
         """
         fewest, pivots, random = self.faces.nodes + 1, 0, np.random.default_rng(0)
         for _ in range(solves or SOLVES + SOLVES_PER_NODE * self.faces.nodes):
@@ -95,7 +97,7 @@ class StatusSearch:
         return None, False
 
     def jammed(self, status: Status) -> Iterator[tuple[Status, Float]]:
-        """Yield other admissible statuses: from all sliding faces stuck, from single ones stuck, and by trial."""
+        """Yield other admissible statuses: with all sliding faces stuck, with one face stuck, and by trial."""
         sliding = np.flatnonzero((np.abs(status) == 1) & self.allowed[:, STICK])
         for stuck in (sliding, *sliding):
             guess = status.copy()
@@ -105,39 +107,39 @@ class StatusSearch:
         yield from self._tried(status)
 
     def by_trial(self, status: Status) -> Found:
-        """Return the admissible statuses closest to a guess, if there are few to try."""
+        """Return the admissible statuses closest to a guess, if few sets are to be tried."""
         return next(self._tried(status), None)
 
     def _tried(self, status: Status) -> Iterator[tuple[Status, Float]]:
-        """Yield all admissible statuses, the closest to a guess first; none if there are many to try."""
+        """Yield all admissible statuses, the closest to a guess first; none if there are too many sets."""
         several = np.flatnonzero(self.allowed.sum(axis=1) > 1)
         if self.allowed[several].sum(axis=1).astype(float).prod() > MOST_TRIED:
             return
         choices = np.array(list(product(*(STATUSES[row] for row in self.allowed[several]))), np.int8)
         for choice in choices[np.argsort((choices != status[several]).sum(axis=1), kind="stable")]:
-            tried = status.copy()
-            tried[several] = choice
-            x, balanced = self.faces.linear(tried, self.load, self.start)
-            if balanced and self.faces.is_balanced(tried, self.load, x) and (self._improved(tried, x) == tried).all():
-                yield tried, x
+            trial = status.copy()
+            trial[several] = choice
+            x, balanced = self.faces.linear(trial, self.load, self.start)
+            if balanced and self.faces.is_balanced(trial, self.load, x) and (self._improved(trial, x) == trial).all():
+                yield trial, x
 
     def by_continuation(self, status: Status) -> Found:
-        """Raise the fraction of mu to 1, and pivot from the last statuses at each step."""
-        share, step, faces = 0.0, 0.5, copy(self.faces)
+        """Raise a fraction of mu to 1, and pivot from the last statuses at each step."""
+        fraction, step, faces = 0.0, 0.5, copy(self.faces)
         search = replace(self, faces=faces)
         while step >= 1.0 / MOST_TRIED:
-            faces.friction = min(share + step, 1.0) * self.faces.friction
+            faces.friction = min(fraction + step, 1.0) * self.faces.friction
             result = search.by_pivots(status, SOLVES)
             if result is None:
                 step /= 2.0
-            elif share + step >= 1.0:
+            elif fraction + step >= 1.0:
                 return result
             else:
-                share, status = share + step, result[0]
+                fraction, status = fraction + step, result[0]
         return None
 
     def _improved(self, status: Status, x: Float) -> Status:
-        """Return the statuses (n,) that the signs of forces and jumps require."""
+        """Return the statuses (n,) that the signs of the forces and jumps require."""
         faces, allowed, slip, last = self.faces, self.allowed, self.load.slip, 2 * self.faces.nodes
         normal, tangential = faces.forces(x)
         noise, gap, moved = faces.noise(x), x[:last:2], x[1:last:2] - slip
@@ -160,11 +162,11 @@ class CoulombFaces(FaceSystem):
     """Debonded faces with Coulomb friction."""
 
     def search(self, status: Status, allowed: Bool, load: Prescribed, start: Float) -> tuple[Status, Float]:
-        """Return admissible statuses (n,) and scaled x from a first guess; arguments as of `StatusSearch`.
+        """Return admissible statuses (n,) and scaled x from a first guess; arguments as in `StatusSearch`.
 
         Raises:
-            NotCarriedError: forces drive a free motion.
-            StuckError: the search found none.
+            NotCarriedError: the forces drive a free motion.
+            StuckError: the search found no admissible statuses.
         """
         search = StatusSearch(self, allowed, load, start)
         result = search.run(self._known(status))
@@ -173,20 +175,20 @@ class CoulombFaces(FaceSystem):
         return result
 
     def all_allowed(self) -> Bool:
-        """Allow all statuses (n, 4); faces without friction have FORWARD alone while they touch."""
+        """Allow all statuses (n, 4); a touching face without friction has the status FORWARD alone."""
         allowed = np.ones((self.nodes, 4), bool)
         allowed[np.ix_(self.friction == 0.0, [STICK, BACKWARD])] = False
         return allowed
 
     def _known(self, status: Status) -> Status:
-        """Replace the statuses (n,) of touching faces without friction by FORWARD."""
+        """Set the statuses (n,) of touching faces without friction to FORWARD."""
         return np.where((self.friction == 0.0) & (status != OPEN_FACE), FORWARD, status).astype(np.int8)
 
     def rates(self, status: Status, x: Float, by_stress: Bool, rate: Float) -> tuple[Status, Float]:
-        """Return the next statuses (n,) of a state x, and the rate (m,) of x under a rate (v,) of loads.
+        """Return the next statuses (n,) of a state x, and the rate (m,) of x under a load rate (v,).
 
         Raises:
-            StuckError: none exist, or the determinant of the sliding faces has lost its sign.
+            StuckError: no such statuses exist, or the determinant of the sliding faces has lost its sign.
         """
         load, status = Prescribed(by_stress, rate, np.zeros(self.nodes)), self._known(status)
         return self._resisting(status, self._at_limits(status, x), load, np.zeros(len(x)))
@@ -200,7 +202,7 @@ class CoulombFaces(FaceSystem):
         return self._resisting(status, self.all_allowed(), load, start)
 
     def carries(self, status: Status, load: Prescribed, start: Float) -> bool:
-        """Return whether an implicit step to `load` has admissible statuses; few pivots decide most cases."""
+        """Return whether an implicit step to `load` has admissible statuses; a few pivots decide most cases."""
         search = StatusSearch(self, self.all_allowed(), load, start)
         result = search.by_pivots(self._known(status), SOLVES)
         if result is not None or search.slides_freely(self._known(status)):
@@ -210,11 +212,11 @@ class CoulombFaces(FaceSystem):
     def _resisting(self, status: Status, allowed: Bool, load: Prescribed, start: Float) -> tuple[Status, Float]:
         """Return admissible statuses without a negative determinant, and scaled x; arguments as of `search`.
 
-        A fibre that few faces pinch is jammed where they stick, and is pushed through by a negative stiffness where
-        one of them slides: both are admissible.
+        A fibre that a few faces pinch jams if all of these faces stick, and snaps through with a negative stiffness if
+        one of these faces slides: both sets of statuses are admissible.
 
         Raises:
-            StuckError: the search found none, or negative determinants alone.
+            StuckError: the search found no admissible statuses, or only statuses with a negative determinant.
         """
         status, x = self.search(status, allowed, load, start)
         if self.sign(status, load.by_stress) >= 0:
@@ -225,7 +227,7 @@ class CoulombFaces(FaceSystem):
         raise StuckError(INDEFINITE)
 
     def _at_limits(self, status: Status, x: Float) -> Bool:
-        """Allow the present statuses, and other statuses at the limits of the present ones: (n, 4)."""
+        """Allow (n, 4) the present statuses and, at a limit of a status, the statuses beyond this limit."""
         closed, gap = status != OPEN_FACE, x[: 2 * self.nodes : 2]
         (normal, tangential), noise = self.forces(x), self.noise(x)
         allowed = np.zeros((self.nodes, 4), bool)
@@ -238,7 +240,7 @@ class CoulombFaces(FaceSystem):
         return allowed
 
     def next_change(self, status: Status, x: Float, rate: Float) -> float:
-        """Return the time until a status ends while x changes at `rate`, inf if none does."""
+        """Return the time until a status ends while x changes at `rate`; inf if no status ends."""
         noise, closed = self.noise(rate), status != OPEN_FACE
         (normal, tangential), (dn, dt) = self.forces(x), self.forces(rate)
         sticks, last = status == STICK, 2 * self.nodes
@@ -251,17 +253,17 @@ class CoulombFaces(FaceSystem):
         return float((np.maximum(margins[ends], 0.0) / -falls[ends]).min(initial=np.inf))
 
     def heat(self, status: Status, before: Float, after: Float) -> float:
-        """Return the heat of friction on a straight way between two states with these statuses."""
+        """Return the frictional heat on the straight path between two states with these statuses."""
         sliding, tangential = np.abs(status) == 1, (self.forces(before)[1] + self.forces(after)[1]) / 2
         return float((tangential * (after - before)[1 : 2 * self.nodes : 2])[sliding].sum())
 
     def losses(self, status: Status, before: Float, after: Float) -> tuple[float, float]:
-        """Return the energy that faces lose on a straight way at constant load, and the heat in this energy."""
+        """Return the energy lost on the straight path at constant load, and the heat in this energy."""
         forces = -(self.product(before) + self.product(after)) / 2
         forces[self.loads] = 0.0
         return float(forces @ (after - before)), self.heat_behind(status, before, after)
 
     def heat_behind(self, status: Status, before: Float, after: Float) -> float:
-        """Return the heat of an implicit step: final friction forces times slips of sliding faces."""
+        """Return the heat of an implicit step: the final friction forces times the slips of the sliding faces."""
         slips = (after - before)[1 : 2 * self.nodes : 2]
         return float((self.forces(after)[1] * slips)[np.abs(status) == 1].sum())

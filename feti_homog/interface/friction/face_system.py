@@ -1,6 +1,6 @@
 """The linear response of debonded faces with prescribed statuses; see `coulomb_faces`.
 
-It is updated from statuses to neighbouring ones; free motions, or lost digits, ask for a factored system.
+A change of a few statuses updates this response; after free motions, or a loss of digits, the system is factored anew.
 """
 
 from __future__ import annotations
@@ -15,22 +15,22 @@ from feti_homog.interface.contact.states import Status
 from feti_homog.interface.friction import status_system
 from feti_homog.typing import Bool, Float, Float32, Int
 
-# Arrays whose products are stored.
+# Number of arrays whose products with S are stored.
 PRODUCTS = 6
-# Factorizations that cost as much as the first followed response.
+# Number of factorizations that cost as much as the set-up of `FollowedStatuses`.
 FACTORIZATIONS = 12
 
-# Force on a free motion, relative to the forces of the loads, that counts as none.
+# Largest force on a free motion, relative to the forces of the loads, that counts as zero.
 UNBALANCED = 1e-7
 
 
 @dataclass(frozen=True)
 class Prescribed:
-    """Loads, and slips at sticking nodes.
+    """The prescribed loads, and the slips at the sticking nodes.
 
     Attributes:
-        by_stress: (v,) loads with prescribed stress.
-        values: (v,) strains, or (S x)_E where the stress is prescribed.
+        by_stress: (v,) whether a load prescribes the stress.
+        values: (v,) strains, or (S x)_E where a load prescribes the stress.
         slip: (n,) slip at sticking nodes.
     """
 
@@ -40,16 +40,16 @@ class Prescribed:
 
 
 class FaceSystem:
-    """Debonded faces, and their response to loads with given statuses.
+    """Debonded faces, and their response to loads with prescribed statuses.
 
     Attributes:
         friction: (n,) mu.
-        S: (m, m) scaled stiffness, whose nodes have 1 on the diagonal.
+        S: (m, m) scaled stiffness, with 1 as the largest diagonal entry of each node.
         size: (m,) units: the stiffness is S_ij size_i size_j.
     """
 
     def __init__(self, stiffness: Float, friction: Float) -> None:
-        """Scale the stiffness (m, m) of two jumps a node, normal and tangential, and v loads: m = 2n + v."""
+        """Scale the stiffness (m, m) of n normal and n tangential jumps and v loads: m = 2n + v."""
         n, diagonal = len(friction), stiffness.diagonal()
         self.friction = friction
         nodes = np.repeat(diagonal[: 2 * n].reshape(n, 2).max(axis=1, initial=0.0), 2)
@@ -63,21 +63,21 @@ class FaceSystem:
 
     @property
     def nodes(self) -> int:
-        """Number n of nodes."""
+        """The number n of nodes."""
         return len(self.friction)
 
     @property
     def loads(self) -> slice:
-        """Indices of the loads in x."""
+        """The indices of the loads in x."""
         return slice(2 * self.nodes, len(self.S))
 
     def forces(self, x: Float) -> tuple[Float, Float]:
-        """(n,) scaled normal and tangential forces."""
+        """Return the scaled normal and tangential forces (n,)."""
         f = -self.product(x)[: 2 * self.nodes]
         return f[::2], f[1::2]
 
     def follow(self, before: FaceSystem, old: Int, other: Int) -> None:
-        """Go on from faces whose entries stand at the places `old` (m',), as `FollowedStatuses.grow`."""
+        """Take over the response of faces whose entries have the indices `old` (m',); see `FollowedStatuses.grow`."""
         units = before.size / self.size[old]
         if before._followed is None:
             self._factored = before._factored
@@ -86,16 +86,16 @@ class FaceSystem:
 
     @cached_property
     def _absolute(self) -> Float32:
-        """(m, m) |S_ij|, in single precision."""
+        """The absolute values |S_ij| (m, m), in single precision."""
         return np.asarray(np.abs(self.S), np.float32)
 
     def terms(self, x: Float) -> Float:
-        """(m,) sum_j |S_ij x_j|, to which rounding in S x is relative."""
+        """Return sum_j |S_ij x_j| (m,), the scale of the rounding in S x."""
         largest = float(np.abs(x).max(initial=0.0)) or 1.0
         return np.asarray(largest * (self._absolute @ np.abs(x / largest).astype(np.float32)), float)
 
     def product(self, x: Float) -> Float:
-        """(m,) S x of an array that does not change; the last products are stored."""
+        """Return S x (m,) for an array that nothing changes later; the last products are stored."""
         for array, y in self._products:
             if array is x:
                 return y
@@ -107,7 +107,7 @@ class FaceSystem:
         return y
 
     def linear(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, bool]:
-        """(m,) scaled x with these statuses, and whether it is a solution; start as in `StatusSystem.solve`."""
+        """Return the scaled x (m,) with these statuses, and whether x is a solution; see `StatusSystem.solve`."""
         rows, (x, values) = (
             status_system.free_rows(status, self.friction, load.by_stress),
             self.prescribed(status, load, start),
@@ -122,12 +122,12 @@ class FaceSystem:
         return self._system(*rows).solve(x, values)
 
     def sign(self, status: Status, by_stress: Bool) -> int:
-        """Return the determinant's sign with these statuses, 0 with free motions."""
+        """Return the sign of the determinant with these statuses, 0 with free motions."""
         rows = status_system.free_rows(status, self.friction, by_stress)
         return (self._turned(*rows) or self._system(*rows)).sign
 
     def _turned(self, free: Bool, slope: Float) -> status_system.FollowedStatuses | None:
-        """Return `FollowedStatuses` with these free rows; None with free motions, or before it pays."""
+        """Return `FollowedStatuses` with these free rows; None with free motions, or before an update pays."""
         if self._followed is None:
             if self._factored < FACTORIZATIONS:
                 return None
@@ -135,7 +135,7 @@ class FaceSystem:
         return self._followed if self._followed.turn(free, slope) else None
 
     def _system(self, free: Bool, slope: Float) -> status_system.StatusSystem:
-        """Return the factored system of these rows; the last one is stored."""
+        """Return the factored system of these rows; the last system is stored."""
         key = free.tobytes() + slope.tobytes()
         if self._last is None or self._last[0] != key:
             self._last = key, status_system.StatusSystem(self.S, free, slope)
@@ -147,21 +147,21 @@ class FaceSystem:
         return status, self.linear(status, load, x)[0] if self.sign(status, load.by_stress) else x
 
     def is_balanced(self, status: Status, load: Prescribed, x: Float) -> bool:
-        """Return False if a force drives a free motion, such as a fibre that turns in its hole."""
+        """Return whether no force drives a free motion, such as a fibre that turns in its hole."""
         (free, slope), fixed = status_system.free_rows(status, self.friction, load.by_stress), np.zeros(len(x))
-        # Prescribed entries alone: a free motion is as large as its force over the stiffness HELD.
+        # Only prescribed entries: a free motion in x is as large as its force divided by the stiffness HELD.
         fixed[self.loads] = np.where(load.by_stress, 0.0, load.values)
         fixed[1 : 2 * self.nodes : 2] = np.where(status == status_system.STICK, load.slip, 0.0)
         rows = self.prescribed(status, load, x)[1]
         unbalanced = np.abs(status_system.residual(self.product(x), rows, free, slope))
         unbalanced = np.maximum(unbalanced - np.finfo(float).eps * np.abs(x).max(initial=0.0), 0.0)
-        # Relative to forces of prescribed entries, at a node and its neighbours in S.
+        # Relative to the forces of the prescribed entries at a node and at its neighbours in S.
         return (
             status_system.largest_share(unbalanced, np.abs(rows) + self.terms(self.terms(fixed)), slope) <= UNBALANCED
         )
 
     def prescribed(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, Float]:
-        """(m,) x with its prescribed entries, and (m,) S x on the rows of loads."""
+        """Return x (m,) with its prescribed entries, and S x (m,) in the rows of the loads."""
         last, loads, x, rows = 2 * self.nodes, self.loads, start.copy(), np.zeros(len(start))
         x[:last:2] = np.where(status == status_system.OPEN_FACE, x[:last:2], 0.0)
         x[1:last:2] = np.where(status == status_system.STICK, load.slip, x[1:last:2])

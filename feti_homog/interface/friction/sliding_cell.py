@@ -1,7 +1,7 @@
-"""Debonded faces in a cell, condensed to dense arrays for rank 0, and the multipliers on all ranks.
+"""The debonded faces of a cell, condensed to dense arrays for rank 0, and the multipliers on all ranks.
 
-A problem of the cell, in the plane or along the fibres, is condensed to jumps of some interface rows.  With H the
-inverse of the dual operator of the bonded cell, prescribed jumps g on rows D leave
+Each problem of the cell, in the plane or along the fibres, is condensed to the jumps in some interface rows.  With H
+the inverse of the dual operator of the bonded cell, prescribed jumps g in rows D leave
 
     lam = H (d E - g),      |UC| Sigma = L E - b^T g,      b = (H d)_D,
 
@@ -29,16 +29,16 @@ from feti_homog.typing import Float, Int
 
 
 class CondensedProblem:
-    """One problem, condensed to the rows of the last `take`.
+    """One problem of the cell, condensed to the rows of the last `take`.
 
     Attributes:
-        interface: its contact problem.
+        interface: contact problem of the plane or of the axial displacements.
         rows: (n,) global rows D.
         first: global number of the first row of this rank.
     """
 
     def __init__(self, interface: ContactProblem) -> None:
-        """Find the response of the bonded cell to its loads.  Collective.
+        """Compute the response of the bonded cell to unit loads.  Collective.
 
         Raises:
             CaseError: the solver has no inverse of the dual operator.
@@ -55,34 +55,34 @@ class CondensedProblem:
         self._some: tuple[Int, Float] | None = None
 
     def take(self, rows: Int, springs: Float) -> tuple[Float, Float, Float]:
-        """Return H_DD (n, n) plus springs (n,), b (n, v) and L (v, v) for some rows.  Collective."""
+        """Return H_DD (n, n) plus springs (n,), b (n, v) and L (v, v) for rows D.  Collective."""
         self.rows, self._some = rows, None
         self._columns, K = self._inverse.columns(rows)
         K[np.diag_indices(len(K))] += springs
         return K, distributed_arrays.gather_rows(self.solver.comm, self._response, self.first, rows), self._bonded
 
     def gained(self, bonds: BondState) -> Float:
-        """(k, c) compliance that damage adds to springs under tension."""
+        """Return the compliance (k, c) that damage adds to springs under tension."""
         interface, pulled = self.interface, replace(bonds, pressed=np.zeros(len(bonds.status), bool))
         more = interface.compliance(pulled) - self.solver.intact_compliance
         return np.asarray(more[self.rows_of(slice(None))])
 
     def rows_of(self, node: Int | slice) -> Int:
-        """(p, c) owned rows at nodes (p,)."""
+        """Return the owned rows (p, c) of nodes (p,)."""
         return self.interface.nodes.row[node][:, None] + np.arange(self.solver.jump_operator.components)
 
     def multipliers(self, jump: Float, strain: Float) -> Float:
-        """(owned rows,) lam under jumps (n,) and strains (v,)."""
+        """Return lam (owned rows,) under jumps (n,) and strains (v,)."""
         return np.asarray(self._response @ strain - self._columns @ jump)
 
     def some_multipliers(self, rows: Int, jump: Float, strain: Float) -> Float:
-        """(k, c) lam in owned rows (k, c), whose columns are stored for this array."""
+        """Return lam (k, c) in owned rows (k, c); the columns of H are stored for the last array of rows."""
         if self._some is None or self._some[0] is not rows:
             self._some = rows, self._columns[rows.ravel()]
         return self._response[rows] @ strain - (self._some[1] @ jump).reshape(rows.shape)
 
     def solution(self, bonds: BondState, jump: Float, strain: Float) -> DualSolution:
-        """Return the multipliers with their jumps by the dual operator.  Collective."""
+        """Return the multipliers, and their jumps from the dual operator.  Collective."""
         solver, lam = self.solver, self.multipliers(jump, strain)
         torn = solver.d @ strain
         jumps, opened = torn - solver.operator.apply(lam), np.zeros(len(lam))
@@ -100,18 +100,17 @@ class CondensedProblem:
 
 
 class AxialFaces:
-    """The axial problem: its rows and columns of the matrix S of `coulomb_faces`, without its jumps.
+    """The axial problem in the matrix S of `coulomb_faces`, with its jumps g = K^-1 b E eliminated.
 
-    The jumps g = K^-1 b E are eliminated.  A share of its own diagonal holds a row without springs: a share of the
-    largest diagonal would measure by the stiffest spring.
+    HELD times its diagonal entry holds a row without springs; the stiffest spring would dominate the largest entry.
 
     Attributes:
-        problem: the axial one.
-        jumps, stiffness: K^-1 b (n, v), and (v, v) of its strains, L - b^T K^-1 b.
+        problem: condensed axial problem.
+        jumps, stiffness: K^-1 b (n, v) and L - b^T K^-1 b (v, v).
     """
 
     def __init__(self, problem: CondensedProblem, rows: Int, springs: Float) -> None:
-        """Take rows (n,) with springs (n,), 0 for free faces.  Collective."""
+        """Condense the problem to rows (n,) with springs (n,), 0 for free faces.  Collective."""
         self.problem, (K, b, L) = problem, problem.take(rows, springs)
         factor = lu_factor(K + HELD * np.diag(K.diagonal()))
         self.jumps = np.zeros_like(b)
@@ -127,17 +126,17 @@ class AxialFaces:
 
 
 class SlidingCell:
-    """Debonded faces of a cell, one set at a time.
+    """The debonded faces of a cell, one set of faces at a time.
 
     Attributes:
         interface: plane contact problem.
-        friction, friction_of_damage: (k,) mu at this rank's nodes, and in the damaged share of bonds.
-        rows: (n,) global normal rows, rising, one a face.
-        faces: faces, on every rank.
+        friction, friction_of_damage: (k,) mu at this rank's nodes, and in the damaged fraction of bonds.
+        rows: (n,) global normal row of each face, in ascending order.
+        faces: dense system of these faces, on every rank.
     """
 
     def __init__(self, cell: CoupledInterfaces, friction: Float, friction_of_damage: Float) -> None:
-        """Find the bonded cell's response to its loads.  Collective; raises as `CondensedProblem`."""
+        """Compute the response of the bonded cell to unit loads.  Collective; raises as `CondensedProblem`."""
         self.cell, self.interface, self.solver = cell, cell.plane, cell.plane.solver
         self.friction, self.friction_of_damage = friction, friction_of_damage
         self._plane, *self._axial = (CondensedProblem(problem) for problem in cell.problems)
@@ -146,26 +145,26 @@ class SlidingCell:
         self.faces = CoulombFaces(np.zeros((0, 0)), np.zeros(0))
 
     def take(self, bonds: BondState) -> None:
-        """Take the faces of debonded nodes and, on springs, of damaged bonds.  Collective."""
+        """Condense the cell to debonded nodes and, on springs, to damaged bonds.  Collective."""
         comm, row, first = self.solver.comm, self.interface.nodes.row, self._plane.first
         problems = (self._plane, *self._axial)
         more = np.hstack([problem.gained(bonds) for problem in problems])
         self._more = more[:, 1]
         self._damaged = (bonds.status == BONDED) & (more[:, :2] > 0.0).any(axis=1)
-        self._own = np.flatnonzero((bonds.status != BONDED) | self._damaged)
+        self._face_nodes = np.flatnonzero((bonds.status != BONDED) | self._damaged)
         self._held = np.flatnonzero(bonds.status == BONDED)
         self._held_rows = [problem.rows_of(self._held) for problem in problems]
         pulled = (more > 0.0) & self._damaged[:, None]
         self._springs = springs = np.divide(1.0, more, out=np.zeros_like(more), where=pulled)
         self._mu = np.where(self._damaged, self.friction_of_damage, self.friction)
         along = [problem.first + problem.interface.nodes.row for problem in self._axial]
-        table = np.column_stack([first + row, self._mu, *along, springs])[self._own]
+        table = np.column_stack([first + row, self._mu, *along, springs])[self._face_nodes]
         table = np.concatenate(comm.allgather(table))
         table = table[np.argsort(table[:, 0])]
         faces, before, old = self.faces, self.rows, self.springs
         self.rows, springs = table[:, 0].astype(np.int64), table[:, -more.shape[1] :]
         self.springs = springs[:, :2].ravel()
-        self._place = np.searchsorted(self.rows, first + row[self._own])
+        self._position = np.searchsorted(self.rows, first + row[self._face_nodes])
         K, b, L = self._plane.take((self.rows[:, None] + np.arange(2)).ravel(), self.springs)
         self._along = [AxialFaces(problem, table[:, 2].astype(np.int64), springs[:, 2]) for problem in self._axial]
         S = block_diag(L, *(problem.stiffness for problem in self._along))
@@ -174,83 +173,89 @@ class SlidingCell:
         if len(before) and np.isin(before, self.rows).all():
             pairs = (2 * np.searchsorted(self.rows, before)[:, None] + np.arange(2)).ravel()
             loads = np.arange(self.faces.loads.start, self.faces.loads.stop)
-            # Entries on other springs, and loads whose stiffness all jumps change.
+            # Entries whose springs differ, and the axial loads, whose stiffness depends on all jumps.
             differs = np.repeat((self.springs[pairs] != old).reshape(-1, 2).any(axis=1), 2)
             other = np.concatenate([pairs[differs], loads[self._loads :]])
             self.faces.follow(faces, np.concatenate([pairs, loads]), other)
 
     def begin(self, bonds: BondState, strain: Float) -> tuple[Status, Float]:
-        """Return statuses (n,) and scaled x (m,) of bonds, closed without a history, at a strain (v,).  Collective."""
+        """Return the statuses (n,) and scaled x (m,) of bonds at a strain (v,).  Collective.
+
+        Without stored jumps all gaps and slips are zero.
+        """
         self.take(bonds)
         jump = np.zeros((len(bonds.status), 2)) if bonds.gap_and_slip is None else bonds.gap_and_slip
         apart = np.where(self._damaged, ~bonds.pressed, bonds.status == OPEN)
-        table = np.column_stack([np.where(apart, OPEN_FACE, bonds.sliding_signs), jump])[self._own]
-        table = np.concatenate(self.solver.comm.allgather(np.column_stack([self._place, table])))
+        table = np.column_stack([np.where(apart, OPEN_FACE, bonds.sliding_signs), jump])[self._face_nodes]
+        table = np.concatenate(self.solver.comm.allgather(np.column_stack([self._position, table])))
         table = table[np.argsort(table[:, 0])]
         status: Status = table[:, 1].astype(np.int8)
         return status, np.concatenate([table[:, 2:].ravel(), strain]) * self.faces.size
 
     def bonds(self, before: BondState, status: Status, x: Float) -> BondState:
-        """Return this rank's bonds with statuses (n,) and scaled x."""
-        face, jump = status[self._place], np.zeros((len(before.status), 2))
-        jump[self._own] = self._jumps_of(x).reshape(-1, 2)[self._place]
+        """Return this rank's bonds with the statuses (n,) and jumps of scaled x."""
+        face, jump = status[self._position], np.zeros((len(before.status), 2))
+        jump[self._face_nodes] = self._jumps_of(x).reshape(-1, 2)[self._position]
         nodes, sliding = before.status.copy(), np.zeros(len(before.status), np.int8)
-        holds, pressed = self._damaged[self._own], before.pressed.copy()
-        nodes[self._own] = np.where(holds, BONDED, np.where(face == OPEN_FACE, OPEN, CLOSED))
-        rubs = self.faces.friction[self._place] > 0.0
-        sliding[self._own] = np.where((face != OPEN_FACE) & rubs, face, STICK)
-        pressed[self._own] = np.where(holds, face != OPEN_FACE, pressed[self._own])
+        holds, pressed = self._damaged[self._face_nodes], before.pressed.copy()
+        nodes[self._face_nodes] = np.where(holds, BONDED, np.where(face == OPEN_FACE, OPEN, CLOSED))
+        rubs = self.faces.friction[self._position] > 0.0
+        sliding[self._face_nodes] = np.where((face != OPEN_FACE) & rubs, face, STICK)
+        pressed[self._face_nodes] = np.where(holds, face != OPEN_FACE, pressed[self._face_nodes])
         return replace(before, status=nodes, pressed=pressed, gap_and_slip=jump, sliding=sliding)
 
     def stored(self, x: Float) -> float:
-        """Return the energy that the cell stores, per area."""
+        """Return the stored energy of the cell, per area."""
         return float(x @ self.faces.product(x)) / (2.0 * self.cell.area)
 
     def stretched(self, x: Float) -> float:
-        """Return the energy per area in springs 1 / (C - C_0) that damage leaves."""
+        """Return the energy per area in the springs 1 / (C - C_0) of the damaged bonds."""
         return float(self.springs @ self._jumps_of(x) ** 2) / (2.0 * self.cell.area)
 
     def _jumps_of(self, x: Float) -> Float:
-        """(2n,) jumps in the plane."""
+        """Return the jumps (2n,) in the plane."""
         return np.asarray((x / self.faces.size)[: self.faces.loads.start])
 
     def traction(self, x: Float) -> Float:
-        """Return the traction (k, 2), or (k, 3) with the axial one, in the intact fractions of this rank's bonds."""
+        """Return the traction (k, 2), or (k, 3) with the axial one, in the intact fraction of each bond."""
         force = np.zeros((len(self.friction), sum(rows.shape[1] for rows in self._held_rows)))
         parts = zip(self._held_rows, self._parts(x), strict=True)
         force[self._held] = np.hstack([problem.some_multipliers(rows, *answer) for rows, (problem, answer) in parts])
-        damaged, slip = self._damaged[self._own], self._jumps_of(x)[1::2][self._place]
-        node, C = self._own[damaged], self.solver.intact_compliance[self.interface.nodes.row[self._own[damaged]] + 1]
+        damaged, slip = self._damaged[self._face_nodes], self._jumps_of(x)[1::2][self._position]
+        node, C = (
+            self._face_nodes[damaged],
+            self.solver.intact_compliance[self.interface.nodes.row[self._face_nodes[damaged]] + 1],
+        )
         force[node, 1] = (C * force[node, 1] + slip[damaged]) / (C + self._more[node])
         return np.asarray(force / self.interface.nodes.length[:, None])
 
     def _parts(self, x: Float) -> list[tuple[CondensedProblem, tuple[Float, Float]]]:
-        """Return each problem with its jumps and strains."""
+        """Return each condensed problem with its jumps and strains."""
         jump, plane, along = np.split(x / self.faces.size, 2 * len(self.rows) + np.array([0, self._loads]))
         return [(self._plane, (jump, plane)), *((axial.problem, (axial.jumps @ along, along)) for axial in self._along)]
 
     def released_along(self, before: Macroscopic, after: Macroscopic) -> float:
-        """Return the energy per area that a break at constant load releases along fibres."""
+        """Return the axial energy per area that a break at constant load releases."""
         parts = (Macroscopic(state.strain[self._loads :], state.stress[self._loads :]) for state in (before, after))
         return next(parts).released_to(next(parts))
 
     def macroscopic(self, x: Float) -> Macroscopic:
-        """Return strains and stresses (v,)."""
+        """Return the macroscopic strains and stresses (v,)."""
         loads, size = self.faces.loads, self.faces.size
         return Macroscopic((x / size)[loads], (self.faces.product(x) * size)[loads] / self.cell.area)
 
     def given(self, load: Load) -> Float:
-        """(v,) load values in the units of x and S x."""
+        """Return the load values (v,) in the units of x and S x."""
         size = self.faces.size[self.faces.loads]
         return np.where(load.by_stress, self.cell.area * load.values / size, load.values * size)
 
     def equilibrium(self, loads: Sequence[Load], bonds: BondState, x: Float) -> Equilibrium:
-        """Return the equilibrium under the last load, certified by all loads up to it.  Collective."""
+        """Return the equilibrium under the last of `loads`, certified on the scale of all loads.  Collective."""
         states, of_problems = list[Equilibrium](), list(zip(*map(self.cell.parts, loads), strict=True))
         scales, asked = [problem.scales for problem in self.cell.problems], list[Float]()
         for scale, of in zip(scales, of_problems, strict=True):
             asked.append(np.max([scale.asked(load) for load in of], axis=0))
-        # An unloaded problem has the rounding of the loaded problem.
+        # Rounding in an unloaded problem is as large as in the loaded problem.
         largest = max(scale.imposed_strain(strain).max() for scale, strain in zip(scales, asked, strict=True))
         for of, strains, (problem, (jump, strain)) in zip(of_problems, asked, self._parts(x), strict=True):
             solution = problem.solution(bonds, jump, strain)
@@ -258,7 +263,7 @@ class SlidingCell:
             certificate = problem.interface.certificate(bonds, solution, strains)
             states.append(Equilibrium(of[-1], bonds, solution, 0, 1, 0, certificate, strains))
         plane, *axial = states
-        # Bonds, compressed faces and their friction resist rigid motions.
+        # Bonds, compressed faces and the friction on these faces resist rigid motions.
         row, is_closed = self.interface.nodes.row, bonds.status == CLOSED
         is_pressed = is_closed & (plane.solution.lam[row] < -self.interface.scales.force_noise(plane.solution))
         active = self.interface.active(np.where(is_closed & ~is_pressed, OPEN, bonds.status).astype(np.int8))
@@ -271,11 +276,11 @@ class SlidingCell:
         """Return the largest of `coulomb_errors`, relative to the largest traction.  Collective."""
         traction = self.cell.traction([problem.solution for problem in states])
         components = [problem.solver.jump_operator.components for problem in self.cell.problems]
-        # Jumps of x, for jumps of F lambda would be divided by a vanishing compliance.
+        # The jumps come from x: the jumps of F lambda would be divided by a vanishing compliance.
         parts = zip(self._parts(x), components, strict=True)
         jumps = np.hstack([jump.reshape(-1, c) for (_, (jump, _)), c in parts])
-        force, node = traction.copy(), self._own
-        force[node] -= jumps[self._place] * self._springs[node] / self.interface.nodes.length[node, None]
+        force, node = traction.copy(), self._face_nodes
+        force[node] -= jumps[self._position] * self._springs[node] / self.interface.nodes.length[node, None]
         excess = coulomb_errors(force, self._mu, bonds.sliding_signs)
         largest = self.interface.scales.over_interface(np.abs(traction).max(axis=1, initial=0.0))
         for problem, state in zip(self.cell.problems, states, strict=True):

@@ -5,7 +5,7 @@ grows with the sign s.  Row r in place of row j changes R = [M^-1; S M^-1] by ra
 
     R <- R - R_:j (w - e_j)^T / w_j,      w = r M^-1,      det M <- w_j det M,
 
-w a row of R itself.  Changes are collected and added to R by blocks.
+w a row of R itself.  Changes are collected, and added to R in blocks.
 """
 
 from collections.abc import Callable
@@ -20,27 +20,27 @@ from feti_homog.typing import Bool, Float, Int
 STICK, FORWARD, OPEN_FACE, BACKWARD = 0, 1, 2, -1
 """Statuses of a debonded node: tied, sliding with a rising or a falling slip, apart."""
 
-# Stiffness, relative to a node's own, that holds free motions; steps of refinement remove it.
+# Stiffness, relative to the stiffness of a node, that holds free motions; iterative refinement removes its effect.
 HELD = 1e-9
-# A smaller pivot belongs to a free motion: its sign is rounding.
+# A smaller pivot belongs to a free motion, and its sign is rounding.
 LEAST_PIVOT = 1e-6
-# Smaller pivots ask for a search of free motions by inverse iteration, among some more vectors than such pivots; steps
-# of it, each of which leaves HELD of stiff motions; largest relative stiffness of a free motion.
+# Pivots below which inverse iteration searches for free motions, and the number of vectors beyond the number of such
+# pivots; iterations, each of which reduces stiff motions by HELD; largest relative stiffness of a free motion.
 SOFT_PIVOT, MORE_MOTIONS, INVERSE_ITERATIONS, UNRESISTED = 1e-3, 3, 3, 0.1 * HELD
-# Largest number of refinements, until the residual of each row is this share of its terms.
+# Largest number of refinements, and the residual of each row, relative to its terms, at which refinement ends.
 MOST_REFINEMENTS, ROUNDED = 20, 1e-14
-# Residuals of rows, relative to their terms, up to which no force drives a free motion.
+# Largest residual of a row, relative to its terms, at which no force drives a free motion.
 BALANCED = 1e-9
-# Changes that wait to be added to R.
+# Largest number of changes that wait for their addition to R.
 MOST_CHANGES = 32
-# Right-hand sides with no more entries use the columns of these alone.
+# Largest number of entries in a right-hand side for which only the columns of these entries are read.
 FEW = 8
-# Rounding in a row of S x, relative to its terms: refinement may leave no more; and steps of refinement.
+# Largest rounding in a row of S x, relative to its terms, that refinement may leave; largest number of refinements.
 NOISE, REFINEMENTS = 1e-11, 3
 
 
 def free_rows(status: Status, friction: Float, by_stress: Bool) -> tuple[Bool, Float]:
-    """(m,) unknown entries of x, and (m,) s mu at sliding nodes' slips, 0 elsewhere."""
+    """Return the unknown entries (m,) of x, and s mu (m,) at the slips of sliding nodes, 0 elsewhere."""
     free = np.concatenate([np.stack([status == OPEN_FACE, status != STICK], axis=1).ravel(), by_stress])
     slope = np.zeros(len(free))
     slope[1 : 2 * len(status) : 2] = np.where(np.abs(status) == 1, status * friction, 0.0)
@@ -48,7 +48,7 @@ def free_rows(status: Status, friction: Float, by_stress: Bool) -> tuple[Bool, F
 
 
 def residual(y: Float, rhs: Float, free: Bool, slope: Float) -> Float:
-    """(m,) residual of y = S x (m,) in the free rows with the right-hand side (m,); 0 in prescribed rows."""
+    """Return the residual (m,) of y = S x (m,) in the free rows, 0 in prescribed rows."""
     sliding = np.flatnonzero(slope)
     missing = rhs - y
     missing[sliding] -= slope[sliding] * y[sliding - 1]
@@ -56,24 +56,24 @@ def residual(y: Float, rhs: Float, free: Bool, slope: Float) -> Float:
 
 
 def largest_share(residuals: Float, terms: Float, slope: Float) -> float:
-    """Return the largest residual (m,), relative to its row's terms (m,)."""
+    """Return the largest of residuals (m,), relative to the terms (m,) of its row."""
     size, sliding = terms.copy(), np.flatnonzero(slope)
     size[sliding] += np.abs(slope[sliding]) * terms[sliding - 1]
     return float((np.abs(residuals) / np.where(size > 0.0, size, 1.0)).max(initial=0.0))
 
 
 class StatusSystem:
-    """S x = 0 on the rows that are free, with x given on the others, factored.
+    """The factored system S x = 0 in the free rows, with prescribed x in all other rows.
 
     Sliding nodes have the row S_t + s mu S_n: their traction is s mu times the pressure.
 
     Attributes:
         free: (m,) unknown entries of x.
-        sign: determinant's sign, 0 with a free motion.
+        sign: sign of the determinant, 0 with a free motion.
     """
 
     def __init__(self, S: Float, free: Bool, slope: Float) -> None:
-        """Factor the rows by `free_rows` in S (m, m), as in `CoulombFaces`."""
+        """Factor the rows from `free_rows` in S (m, m), as in `CoulombFaces`."""
         self.free = free
         sliding = np.flatnonzero(slope)
         place = np.cumsum(self.free) - 1
@@ -85,7 +85,7 @@ class StatusSystem:
 
     @property
     def sign(self) -> int:
-        """Sign of the determinant, 0 with a free motion."""
+        """The sign of the determinant, 0 with a free motion."""
         if self._factor is None:
             return 1
         lu, pivots = self._factor
@@ -95,10 +95,10 @@ class StatusSystem:
         return int(np.prod(np.sign(lu.diagonal()))) * (-1 if swaps % 2 else 1)
 
     def solve(self, x: Float, rhs: Float) -> tuple[Float, bool]:
-        """(m,) x with the right-hand side (m,) from a start with the prescribed entries, and whether it is a solution.
+        """Solve for x (m,) with the right-hand side (m,), and return whether x is a solution.
 
-        Free motions stay as they were at the start.  If forces drive them there is no solution: then springs of the
-        stiffness HELD bear the forces.
+        The start x has the prescribed entries, and free motions keep their amplitude in it.  If forces drive a free
+        motion, no solution exists: then springs of the stiffness HELD bear these forces.
         """
         start, x = x, x.copy()
         if self._factor is None:
@@ -106,23 +106,23 @@ class StatusSystem:
         terms, rows = np.abs(self._rows), rhs[self.free]
         for _ in range(MOST_REFINEMENTS):
             missing = rows - self._rows @ x
-            # Motions about as soft as HELD take more steps.
+            # Motions with a stiffness near HELD take more steps.
             if (np.abs(missing) <= ROUNDED * (terms @ np.abs(x) + np.abs(rows))).all():
                 break
             x[self.free] += lu_solve(self._factor, missing, check_finite=False)
         if not self._free_motions.shape[1]:
             return x, True
-        # Where forces balance, rounding divided by HELD has driven free motions, otherwise on other numbers of ranks.
+        # Where forces balance, rounding divided by HELD has driven free motions, which depend on the number of ranks.
         stays = x.copy()
         stays[self.free] -= self._free_motions @ (self._free_motions.T @ (x - start)[self.free])
-        # A row without any stiffness, as of shear along sliding fibres, has the rounding of other rows.
+        # A row without any stiffness, such as shear along sliding fibres, has the rounding of other rows.
         missing = np.abs(rows - self._rows @ stays) - np.finfo(float).eps * np.abs(stays).max(initial=0.0)
         balanced = bool((missing <= BALANCED * (terms @ np.abs(stays) + np.abs(rows))).all())
         return stays if balanced else x, balanced
 
     @cached_property
     def _free_motions(self) -> Float:
-        """(free rows, k) orthonormal free motions."""
+        """The orthonormal free motions (free rows, k)."""
         rows = np.count_nonzero(self.free)
         soft = 0 if self._factor is None else np.count_nonzero(np.abs(self._factor[0].diagonal()) < SOFT_PIVOT)
         if not soft:
@@ -135,7 +135,7 @@ class StatusSystem:
 
 
 class FollowedStatuses:
-    """R of m entries of x, which may arrive in any order.
+    """The matrix R = [M^-1; S M^-1] of m entries of x, which follows the changes of rows.
 
     Attributes:
         S: (m, m) as in `CoulombFaces`.
@@ -148,7 +148,7 @@ class FollowedStatuses:
         """Prescribe all entries: M is the identity."""
         m = len(S)
         self.S, self.free, self.slope, self.sign = S, np.zeros(m, bool), np.zeros(m), 1
-        self._place: Int = np.arange(m)
+        self._index: Int = np.arange(m)
         self._size, self._R = m, np.stack([np.eye(m), S])
         self._forget()
 
@@ -159,7 +159,7 @@ class FollowedStatuses:
         self._count = 0
 
     def turn(self, free: Bool, slope: Float) -> bool:
-        """Exchange rows for new ones; False if a pivot is too small."""
+        """Exchange all rows that differ; return False if a pivot is too small."""
         pending = np.flatnonzero((free != self.free) | (slope != self.slope))
         while len(pending):
             failed = [j for j in pending if not self._exchange(j, bool(free[j]), float(slope[j]))]
@@ -169,11 +169,11 @@ class FollowedStatuses:
         return True
 
     def _exchange(self, j: int, free: bool, slope: float) -> bool:
-        """Exchange row j, unless its pivot is too small."""
-        at = int(self._place[j])
+        """Exchange row j; return False if its pivot is too small."""
+        at = int(self._index[j])
         w = self._row(int(free), at)
         if slope:
-            w += slope * self._row(1, int(self._place[j - 1]))
+            w += slope * self._row(1, int(self._index[j - 1]))
         pivot = w[at]
         if abs(pivot) < LEAST_PIVOT:
             return False
@@ -188,7 +188,7 @@ class FollowedStatuses:
         return True
 
     def _row(self, kind: int, at: int) -> Float:
-        """(m,) row of M^-1 or S M^-1."""
+        """Return a row (m,) of M^-1 or S M^-1."""
         count, size = self._count, self._size
         return np.asarray(self._R[kind, at, :size] - self._U[kind, at, :count] @ self._V[:count, :size])
 
@@ -199,18 +199,18 @@ class FollowedStatuses:
         self._count = 0
 
     def _inverse(self, c: Float) -> Float:
-        """(m,) M^-1 c."""
+        """Return M^-1 c (m,)."""
         size, permuted = self._size, np.empty(self._size)
-        permuted[self._place] = c
+        permuted[self._index] = c
         few = np.flatnonzero(permuted)
         some = few if len(few) <= FEW else slice(size)
         change = self._U[0, :size, : self._count] @ (self._V[: self._count, :size][:, some] @ permuted[some])
-        return np.asarray((self._R[0, :size, :size][:, some] @ permuted[some] - change)[self._place])
+        return np.asarray((self._R[0, :size, :size][:, some] @ permuted[some] - change)[self._index])
 
     def solve(self, x: Float, rhs: Float, terms: Callable[[Float], Float]) -> tuple[Float, Float] | None:
-        """(m,) x and S x with the right-hand side (m,), from a start with the prescribed entries.
+        """Return x and S x (m,) with the right-hand side (m,), from a start with the prescribed entries.
 
-        None if R has lost too many digits, measured by each row's terms sum_j |S_ij x_j|.
+        None if R has lost too many digits, relative to the terms sum_j |S_ij x_j| of each row.
         """
         prescribed = np.where(self.free, rhs, x)
         if np.count_nonzero(prescribed) <= FEW:
@@ -226,19 +226,19 @@ class FollowedStatuses:
         return (x, y) if error <= NOISE else None
 
     def grow(self, S: Float, old: Int, other: Int, units: Float) -> bool:
-        """Add prescribed entries, so that the present ones stand at the places `old` (m,) of S (m', m').
+        """Add prescribed entries, so that the present entries have the indices `old` (m,) in S (m', m').
 
-        Present entries get other `units` (m,), and those at the places `other` another S between them.  False if a
-        pivot on the way is too small; then R is worthless.
+        The present entries change to the units `units` (m,), and S changes between the entries with the indices
+        `other`.  Return False if a pivot is too small; then R is worthless.
         """
-        # Prescribed entries have rows of the identity in M^-1, so that only their block of S M^-1 changes.
+        # Prescribed entries have rows of the identity in M^-1: only the block of S M^-1 between these entries changes.
         entries, free, slope = np.flatnonzero(np.isin(old, other)), self.free.copy(), self.slope.copy()
         free[entries], slope[entries] = False, 0.0
         if len(entries) and not self.turn(free, slope):
             return False
         self._flush()
-        some, at = np.flatnonzero(units != 1.0), self._place[entries]
-        places, unit = self._place[some], units[some]
+        some, at = np.flatnonzero(units != 1.0), self._index[entries]
+        places, unit = self._index[some], units[some]
         self._R[:, : self._size, places] *= np.where(self.free[some], 1.0 / unit, unit)
         self._R[:, places, : self._size] *= np.stack([1.0 / unit, unit])[:, :, None]
         before = self.S[entries[:, None], entries] * np.outer(units[entries], units[entries])
@@ -246,10 +246,10 @@ class FollowedStatuses:
         size, m = self._size, len(S)
         new = np.setdiff1d(np.arange(m), old)
         free, slope, place = np.zeros(m, bool), np.zeros(m), np.empty(m, np.int64)
-        free[old], slope[old], place[old], place[new] = self.free, self.slope, self._place, np.arange(size, m)
-        self.S, self.free, self.slope, self._place = S, free, slope, place
+        free[old], slope[old], place[old], place[new] = self.free, self.slope, self._index, np.arange(size, m)
+        self.S, self.free, self.slope, self._index = S, free, slope, place
         if m > self._R.shape[1]:
-            # With room for more entries.
+            # Leave room for more entries.
             R = np.empty((2, m + m // 4, m + m // 4))
             R[:, :size, :size] = self._R[:, :size, :size]
             self._R = R

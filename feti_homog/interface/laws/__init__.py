@@ -1,4 +1,4 @@
-"""Bond laws: breaks by tractions or energies, and their consequences.
+"""Bond laws: the tractions or energies at which bonds break, and the consequences of a break.
 
 Imports `case`, `feti` and `interface.contact`.  Main entries: `bond_law.BondLaw`, `bond_law.law_class`.
 """

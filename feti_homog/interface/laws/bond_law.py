@@ -1,6 +1,6 @@
-"""Bond laws: utilisation by tractions, the state after a break, and the energy that breaks take.
+"""Bond laws: utilisation by tractions, the state after a break, and the fracture energy.
 
-A law is a dataclass of constants, numbers or (k,) arrays by node; `BondState.history` has internal variables.
+A law is a dataclass of constants, numbers or arrays (k,) by node; `BondState.history` has the internal variables.
 """
 
 from __future__ import annotations
@@ -18,31 +18,31 @@ from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BondState
 from feti_homog.typing import Bool, Float, Int
 
-# Halvings of an interval of length one, or steps of Newton's method, that exhaust double precision.
+# Number of halvings of a unit interval, or of steps of Newton's method, that exhausts double precision.
 MOST_STEPS = 60
 
 
 class KeyValues(Protocol):
-    """Values of a key of [interface] at nodes; a section without it has an alternative key, or inf."""
+    """The values of a key of [interface] at nodes; a section without the key takes an alternative key, or inf."""
 
     def __call__(self, key: str, *alternatives: str) -> float | Float:
-        """Return one value for all nodes, or (k,) values."""
+        """Return one value for all nodes, or values (k,)."""
 
     def everywhere(self, key: str, *alternatives: str) -> Float:
-        """(s,) values of all sections, equal on every rank."""
+        """Return the values (s,) of all sections, equal on every rank."""
 
     def common(self, key: str) -> Any:
-        """Return the value that all sections share, as the case has it."""
+        """Return the common value of all sections, as in the case."""
 
 
 @dataclasses.dataclass(frozen=True)
 class BondLaw(ABC):
-    """Law for all bonds in a cell; the defaults suit laws without memory.
+    """A law for all bonds of a cell; the defaults suit laws without memory.
 
     Attributes:
-        has_toughness: bonds have a fracture energy, which `fracture` gives.
-        has_tips: results compare this energy with the energies that drive tips of debonding.
-        is_convex: `share` is convex, and so passes 1 once on a straight way.
+        has_toughness: whether bonds have a fracture energy, see `fracture`.
+        has_tips: whether results compare the fracture energy with the energy release rates at debonding tips.
+        is_convex: whether `share` is convex, and so passes 1 once on a straight path.
         break_names: column names in `breaks`, for tractions with two or three components.
     """
 
@@ -53,19 +53,20 @@ class BondLaw(ABC):
 
     @abstractmethod
     def share(self, traction: Float) -> Float:
-        """(p,) utilisation by tractions (p, c) at the law's nodes; 1 breaks.
+        """Return the utilisation (p,) by tractions (p, c); a bond breaks at 1.
 
-        c = 2 are normal, tension positive, and tangential, 3 also along the fibre.  Homogeneous of degree one.
+        The c components are normal, positive in tension, tangential and, if c = 3, along the fibre.  The utilisation is
+        homogeneous of degree one.
         """
 
     @abstractmethod
     def breaks(self, traction: Float) -> Float:
-        """(p, d) descriptions of breaks under tractions (p, c), by the first d of `break_names`."""
+        """Describe breaks under tractions (p, c) by (p, d) values for the first d of `break_names`."""
 
     @classmethod
     @abstractmethod
     def of_keys(cls, value: KeyValues) -> Self:
-        """Make the law from keys in [interface]."""
+        """Make the law from the keys in [interface]."""
 
     def at(self, node: Int) -> Self:
         """Return the law at the nodes (p,)."""
@@ -73,36 +74,39 @@ class BondLaw(ABC):
         return dataclasses.replace(self, **values)
 
     def begin(self, k: int) -> Float:
-        """(k, h) internal variables, k intact bonds."""
+        """Return the internal variables (k, h) of k intact bonds."""
         return np.zeros((k, 0))
 
     def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> BondLaw:
-        """Return the law at this rank's nodes in their state.  Collective; its methods are not."""
+        """Return the law at this rank's nodes in a bond state.  Collective; the methods of the result are not."""
         return self
 
     def convex(self, p: int) -> Bool:
-        """(p,) True for nodes with a convex `share`."""
+        """Return whether `share` is convex at each of the nodes (p,)."""
         return np.full(p, self.is_convex)
 
     def after(self, bonds: BondState, which: Bool, traction: Float) -> tuple[Float, Bool]:
-        """Break the bonds `which` (k,) under tractions (k, c): internal variables (k, h), and (k,) bonds that part."""
+        """Break the bonds `which` (k,) under tractions (k, c).
+
+        Return the internal variables (k, h), and the mask (k,) of bonds that part.
+        """
         return bonds.history, which
 
     def softening(self, bonds: BondState, pulled: Bool) -> Float | None:
-        """Return C / C_0 (k, 3) of all springs in bonds `pulled` (k,) or pressed; None if C never changes."""
+        """Return C / C_0 (k, 3) of the springs in bonds `pulled` (k,) or pressed; None if C never changes."""
         return None
 
     def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
-        """(p,) fracture energies per area, p bonds `which` (k,) in the modes of tractions (k, c)."""
+        """Return the fracture energies per area (p,) of bonds `which` (k,) in the modes of tractions (k, c)."""
         return np.zeros(int(which.sum()))
 
     def damage(self, bonds: BondState) -> Float | None:
-        """(k,) damage, 0 intact to 1 broken; None without softening."""
+        """Return the damage (k,), from 0, intact, to 1, broken; None without softening."""
         return None
 
     @property
     def overshoot(self) -> float:
-        """Excess of the first break's traction over the law's peak, relative to the peak."""
+        """The excess of the traction at the first break over the peak of the law, relative to this peak."""
         return 0.0
 
     def onset(self) -> BondLaw:
@@ -110,14 +114,14 @@ class BondLaw(ABC):
         return self
 
     def mode_angle(self, traction: Float) -> Float:
-        """(p,) psi of tractions (p, c), in radians: 0 opens, pi/2 shears, under pressure too."""
+        """Return psi (p,) of tractions (p, c), in radians: 0 is opening, pi/2 shear, also under pressure."""
         shear = np.linalg.norm(traction[:, 1:], axis=1)
         return np.asarray(np.arctan2(shear, np.maximum(traction[:, 0], 0.0)))
 
     def first_factor(self, before: Float, direction: Float) -> Float | None:
         """Return the smallest f >= 0 (p,) at which `before` + f `direction` (p, c) breaks each bond; inf if none.
 
-        None without a closed form.  `before` must break no bond.
+        Return None if the law has no closed form.  `before` must break no bond.
         """
         return None
 
@@ -137,7 +141,7 @@ class BondLaw(ABC):
 
 
 class SpringLaw(BondLaw):
-    """Law for bonds that break by the energies in their undamaged springs.
+    """A law for bonds that break at an energy in the undamaged springs.
 
     A traction along the fibre adds to the slip energy: all shear counts alike.
 
@@ -153,7 +157,7 @@ class SpringLaw(BondLaw):
     break_names: ClassVar[Sequence[str]] = ("psi",)
 
     def energies(self, traction: Float) -> tuple[Float, Float]:
-        """(p,) spring energies in opening and in slip, under tractions (p, c)."""
+        """Return the spring energies (p,) in opening and in slip, under tractions (p, c)."""
         opening = np.maximum(traction[:, 0], 0.0) ** 2 / (2.0 * self.normal_stiffness)
         slip = traction[:, 1] ** 2 / (2.0 * self.tangential_stiffness)
         if traction.shape[1] == 3:
@@ -161,17 +165,17 @@ class SpringLaw(BondLaw):
         return np.asarray(opening), np.asarray(slip)
 
     def mode_angle(self, traction: Float) -> Float:
-        """(p,) psi of tractions (p, c), in radians: sin^2 psi is the slip's energy share."""
+        """Return psi (p,) of tractions (p, c), in radians: sin^2 psi is the slip's fraction of the energy."""
         opening, slip = self.energies(traction)
         return np.asarray(np.arctan2(np.sqrt(slip), np.sqrt(opening)))
 
     def breaks(self, traction: Float) -> Float:
-        """(p, 1) psi of tractions (p, c), in degrees."""
+        """Return psi (p, 1) of tractions (p, c), in degrees."""
         return np.degrees(self.mode_angle(traction))[:, None]
 
 
 def law_class(name: str) -> type[BondLaw]:
-    """Return the class of a law by name, as in `case.bond_laws`."""
+    """Return the class of a law by its name in `case.bond_laws`."""
     module, cls = bond_laws.LAWS[name].implementation.split(".")
     law: type[BondLaw] = getattr(import_module(f"{__package__}.{module}"), cls)
     return law

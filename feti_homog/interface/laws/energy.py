@@ -1,11 +1,11 @@
-"""Break by energy of the bonds of an elastic interface (LEBIM).
+"""Energy criteria for the bonds of an elastic interface (LEBIM).
 
 Tavara, Mantic, Graciani, Paris, Eng. Anal. Bound. Elem. 35 (2011) 207; the mode-mixity law is Hutchinson and Suo's.
 
-At a tip of debonding the released energy counts.  The energy in the spring of a tip falls with the length of its node,
-so that growth by it depends on the mesh.  The energy that the break of bond i releases does not: with H the inverse of
-the dual operator on the active rows, its faces then part by j = H_ii^-1 lam_i, and the energy of the cell falls, at
-constant strain, by
+At a debonding tip the released energy is decisive.  The spring energy of a tip falls with the length of the tip's node,
+so that a criterion by spring energy depends on the mesh; a criterion by the released energy does not.  With H the
+inverse of the dual operator on the active rows, a break of bond i parts the faces by j = H_ii^-1 lam_i, and the energy
+of the cell falls, at constant strain, by
 
     1/2 lam_i . H_ii^-1 lam_i;  1/2 lam_t^2 / H_tt if they would overlap and the normal force stays.
 """
@@ -28,9 +28,9 @@ from feti_homog.typing import Bool, Float, Int
 if TYPE_CHECKING:
     from feti_homog.feti.exact import exact_inverse
 
-# Blocks of H are rounding if smaller than this share of the stiffness beside the bond.
+# Blocks of H are rounding below this fraction of the stiffness beside the bond.
 RIGID = 1e-9
-# Largest rounding of H with which energies are compared: bonds whose utilisation differs by less break together.
+# Largest rounding of H for a comparison of energies: bonds whose utilisations differ by less break together.
 MOST_ROUNDING = 1e-6
 
 
@@ -45,7 +45,7 @@ class SpringEnergy(SpringLaw):
 
     Attributes:
         toughness: G_Ic, energy per area.
-        mode_sensitivity: lambda; with 1 G_c is independent of the mode, with 0 shear alone breaks nothing.
+        mode_sensitivity: lambda; with 1 G_c is independent of the mode, with 0 pure shear breaks no bond.
     """
 
     normal_stiffness: float | Float
@@ -58,7 +58,7 @@ class SpringEnergy(SpringLaw):
 
     @classmethod
     def of_keys(cls, value: KeyValues) -> Self:
-        """Make the law from stiffnesses and toughness; the axial stiffness defaults to the tangential one."""
+        """Make the law from stiffnesses and toughness; by default the axial stiffness is the tangential stiffness."""
         return cls(
             value("normal_stiffness"),
             value("tangential_stiffness"),
@@ -68,35 +68,35 @@ class SpringEnergy(SpringLaw):
         )
 
     def mode_factor(self, traction: Float) -> Float:
-        """(p,) sqrt(G_Ic / G_c) under tractions (p, c)."""
+        """Return sqrt(G_Ic / G_c) (p,) under tractions (p, c)."""
         # 1 / (1 + tan^2 x) = cos^2 x
         return np.asarray(np.cos((1.0 - self.mode_sensitivity) * self.mode_angle(traction)))
 
     def share(self, traction: Float) -> Float:
-        """(p,) sqrt((G_I + G_II) / G_c) under tractions (p, c).
+        """Return sqrt((G_I + G_II) / G_c) (p,) under tractions (p, c).
 
-        Homogeneous of degree one in the traction, for psi is independent of its size, and convex.
+        This utilisation is convex, and homogeneous of degree one because psi is independent of the traction's size.
         """
         return np.asarray(np.sqrt(sum(self.energies(traction)) / self.toughness) * self.mode_factor(traction))
 
     def fracture_toughness(self, traction: Float) -> Float:
-        """(p,) G_c under tractions (p, c), energy per area."""
+        """Return G_c (p,) under tractions (p, c), energy per area."""
         return np.asarray(self.toughness / self.mode_factor(traction) ** 2)
 
     def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
-        """(p,) G_c of bonds `which` (k,) under tractions (k, c)."""
+        """Return G_c (p,) of bonds `which` (k,) under tractions (k, c)."""
         return self.at(np.flatnonzero(which)).fracture_toughness(traction[which])
 
 
 @dataclass(frozen=True)
 class TipEnergies:
-    """The bonds of this rank beside broken ones.
+    """The tips: this rank's intact bonds beside broken bonds.
 
     Attributes:
         H: (t, 2, 2) diagonal blocks of the inverse dual operator.
         length: (t,) tributary lengths.
         stiffness: (t, c) upper bound of H, as `ExactInverse.stiffness`.
-        axial: (t,) H for slip along the fibres; empty without this problem.
+        axial: (t,) H for slip along the fibres; empty without an axial problem.
     """
 
     H: Float
@@ -107,13 +107,13 @@ class TipEnergies:
 
 @dataclass(frozen=True, kw_only=True)
 class ReleasedEnergy(SpringEnergy):
-    """Bonds beside a broken one break when the break releases G_c l, with l their tributary length.
+    """A bond of tributary length l at a tip breaks when the break releases G_c l.
 
-    Other bonds break when their spring energy reaches G_c.
+    All other bonds break when the spring energy reaches G_c.
 
     Attributes:
-        influence: inverse dual operator, which couples neighbouring bonds.
-        axial: inverse for slip along the fibres, if that is a problem.
+        influence: inverse dual operator of the plane problem.
+        axial: inverse dual operator for slip along the fibres; None without an axial problem.
     """
 
     influence: exact_inverse.ExactInverse
@@ -126,11 +126,11 @@ class ReleasedEnergy(SpringEnergy):
         influence: exact_inverse.ExactInverse,
         axial: exact_inverse.ExactInverse | None = None,
     ) -> Self:
-        """Make the law from springs and the problems' inverses."""
+        """Make the law from springs and the inverse dual operators."""
         return cls(**vars(springs), influence=influence, axial=axial)
 
     def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> SpringsAndTips:
-        """Return the law at this rank's nodes with these bonds.  Collective; its methods are not.
+        """Return the law at this rank's nodes in a bond state.  Collective; the methods of the result are not.
 
         Raises:
             ConvergenceError: rounding hides the released energy.
@@ -156,7 +156,7 @@ class ReleasedEnergy(SpringEnergy):
 
     @staticmethod
     def _activate(influence: exact_inverse.ExactInverse, interface: ContactProblem, bonds: BondState) -> None:
-        """Update the inverse to these bonds.  Collective; raises as `in_state`."""
+        """Update the inverse dual operator to a bond state.  Collective; raises as `in_state`."""
         interface.prepare(bonds)
         if not influence.rounding <= MOST_ROUNDING:
             raise ConvergenceError(
@@ -168,11 +168,12 @@ class ReleasedEnergy(SpringEnergy):
 
 @dataclass(frozen=True, kw_only=True)
 class SpringsAndTips(SpringEnergy):
-    """Released energy in a state of the bonds: at tips sqrt(released / (G_c l)), at other nodes the springs.
+    """The law in a bond state: sqrt(released / (G_c l)) at tips, the spring criterion at all other nodes.
 
     Attributes:
+        tips: tips of this rank.
         number: (p,) tip number of a node, or -1.
-        contact: whether faces do not overlap.
+        contact: whether contact keeps faces from overlap.
     """
 
     tips: TipEnergies
@@ -180,7 +181,7 @@ class SpringsAndTips(SpringEnergy):
     contact: bool
 
     def share(self, traction: Float) -> Float:
-        """(p,) utilisation by tractions (p, c)."""
+        """Return the utilisation (p,) by tractions (p, c)."""
         used, at = super().share(traction), np.flatnonzero(self.number >= 0)
         springs, tips, t = self.at(at), self.tips, self.number[at]
         length, stiffness = tips.length[t], tips.stiffness[t]
@@ -194,20 +195,20 @@ class SpringsAndTips(SpringEnergy):
         return used
 
     def convex(self, p: int) -> Bool:
-        """(p,) False at tips, whose released energy need not be subadditive."""
+        """Return False (p,) at tips, because the released energy need not be subadditive."""
         return np.asarray(self.number < 0)
 
 
 def released_energy(H: Float, lam: Float, stiffness: Float, contact: bool) -> Float:
-    """(m,) energies that breaks of single bonds release, with blocks H (m, 2, 2) and forces lam (m, 2).
+    """Return the energy (m,) that each break releases, with blocks H (m, 2, 2) and forces lam (m, 2).
 
-    `stiffness` (m, 2) bounds H: where H is rounding beside it, as at the last bond of a fibre, no force can act.  With
-    `contact` faces that would overlap keep their normal force.
+    `stiffness` (m, 2) bounds H: where H is rounding relative to this bound, as at the last bond of a fibre, no force
+    can act.  With `contact` the faces that would overlap keep the normal force.
     """
     root = np.sqrt(stiffness)
-    share, vectors = np.linalg.eigh(H / (root[:, :, None] * root[:, None, :]))
+    ratio, vectors = np.linalg.eigh(H / (root[:, :, None] * root[:, None, :]))
     along = np.einsum("mij,mi->mj", vectors, lam / root)
-    inverse = np.where(share > RIGID, 1.0 / np.where(share > RIGID, share, 1.0), 0.0)
+    inverse = np.where(ratio > RIGID, 1.0 / np.where(ratio > RIGID, ratio, 1.0), 0.0)
     opens = (np.einsum("mj,mj->m", vectors[:, 0], inverse * along) >= 0.0) | (not contact)
     both, tangential = (inverse * along**2).sum(axis=1), H[:, 1, 1] / stiffness[:, 1]
     slides = tangential > RIGID

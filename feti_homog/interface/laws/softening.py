@@ -1,17 +1,17 @@
-"""Cohesive laws: bonds soften by damage, tooth by tooth, with exactly the energy of the law.
+"""Cohesive laws: damage softens the bonds tooth by tooth, and takes exactly the energy of the law.
 
 Camanho, Davila, NASA/TM-2002-211737 (mixed mode); Benzeggagh, Kenane, Compos. Sci. Technol. 56 (1996) 439 (toughness);
 Rots, Belletti, Invernizzi, Eng. Fract. Mech. 75 (2008) 590 (saw teeth).
 
-W is the energy that undamaged springs would store at the same opening and slip, B its share of shear:
+W is the energy that undamaged springs would store at the same opening and slip, B the fraction of W in shear:
 
     W_0 = 1 / ((1 - B) / W_n + B / W_t),  W_n = N^2 / (2 k_n),  W_t = S^2 / (2 k_t)     onset of damage,
     G_c = G_n + (G_t - G_n) B^eta                                                       energy of the law,
     traction / peak = tau(u),  sqrt(W / W_0) = x = 1 + s u,  s = (G_c / W_0 - 1) / (2 int tau)   softening,
     1 - d = tau / x                                                                     damage.
 
-So damage d takes the energy W_0 phi, phi = 2 int_0^x tau dx - tau x.  The tooth from the damage d_j to d_j+1
-breaks at W_j = W_0 (phi_j+1 - phi_j) / (d_j+1 - d_j) and takes W_j (d_j+1 - d_j): the energy of the law in between.
+So damage d takes the energy W_0 phi, phi = 2 int_0^x tau dx - tau x.  The tooth from the damage d_j to d_j+1 breaks at
+W_j = W_0 (phi_j+1 - phi_j) / (d_j+1 - d_j) and takes W_j (d_j+1 - d_j): the energy of the law between d_j and d_j+1.
 """
 
 import math
@@ -31,28 +31,28 @@ from feti_homog.typing import Bool, Float, Int
 
 # Largest number of teeth that the program chooses.
 MOST_TEETH = 10_000
-# The last tooth begins where an exponential traction is this share of its peak.
+# The last tooth begins where an exponential traction has fallen to this fraction of the peak.
 EXPONENTIAL_TAIL = 0.01
 NUMBERS = ("normal_stiffness", "tangential_stiffness", "normal_strength", "tangential_strength",
            "normal_toughness", "tangential_toughness", "mixing_exponent")  # fmt: skip
 
 
 def numbers(value: Callable[..., float | Float]) -> dict[str, Any]:
-    """Return the numbers of a law; the axial stiffness defaults to the tangential one."""
+    """Return the numbers of a law; by default the axial stiffness is the tangential stiffness."""
     axial = value("axial_stiffness", "tangential_stiffness")
     return {name: value(name) for name in NUMBERS} | {"axial_stiffness": axial}
 
 
 @dataclass(frozen=True)
 class CohesiveLaw(SpringLaw):
-    """A law that softens; the history of a bond counts broken teeth.
+    """A law with softening; the history of a bond counts the broken teeth.
 
     Attributes:
         normal_strength, tangential_strength: N and S.
         normal_toughness, tangential_toughness: G_n and G_t.
         mixing_exponent: eta.
         levels: damage d_0 = 0 < ... < d_n = 1 between teeth.
-        level: broken teeth.
+        level: number of broken teeth.
     """
 
     normal_stiffness: float | Float
@@ -70,9 +70,9 @@ class CohesiveLaw(SpringLaw):
 
     @classmethod
     def of_keys(cls, value: KeyValues) -> Self:
-        """Make the law of [interface], with the teeth that the case asks for."""
+        """Make the law from the keys in [interface], with the teeth of the case."""
         law, branch = cls(**numbers(value), levels=(0.0, 1.0)), cls.branch(value)
-        # All sections together, so that ranks agree.
+        # The levels follow from all sections, so that all ranks agree.
         everywhere = cls(**numbers(value.everywhere), levels=(0.0, 1.0), **branch)
         levels = everywhere.levels_for(value.common("teeth"), value.common("softening_tolerance"))
         return replace(law, levels=levels, **branch)
@@ -83,16 +83,17 @@ class CohesiveLaw(SpringLaw):
         return {}
 
     def levels_for(self, teeth: int | None, tolerance: float) -> tuple[float, ...]:
-        """Return damage levels with a constant ratio of openings, in the pure mode with the largest G_c / W_0.
+        """Return damage levels whose openings have a constant ratio in the pure mode with the largest G_c / W_0.
 
-        Without `teeth` the smallest number is taken whose first tooth exceeds the peak by at most `tolerance` of it.
+        By default the number of teeth is the smallest one with which the first tooth exceeds the peak traction by at
+        most the fraction `tolerance`.
 
         Raises:
-            CaseError: the number is above MOST_TEETH.
+            CaseError: more than MOST_TEETH teeth are necessary.
         """
         s = self._longest_branch
         for n in [teeth] if teeth else range(1, MOST_TEETH + 1):
-            # Without a branch all levels are reached at once.
+            # Without a softening branch the bond reaches all levels at once.
             x = (1.0 + s * self.last) ** (np.arange(n) / n)
             d = 1.0 - self.shape((x - 1.0) / s) / x if s > 0.0 else np.arange(n) / n
             levels = np.append(d, 1.0)
@@ -106,7 +107,7 @@ class CohesiveLaw(SpringLaw):
 
     @property
     def _longest_branch(self) -> float:
-        """Largest s of the pure modes at any node."""
+        """The largest s of both pure modes at all nodes."""
         onsets = self._onsets
         ratios = self.normal_toughness / onsets[0], self.tangential_toughness / onsets[1]
         largest = max(float(np.max(ratio, initial=0.0)) for ratio in map(np.asarray, ratios))
@@ -114,7 +115,7 @@ class CohesiveLaw(SpringLaw):
 
     @property
     def overshoot(self) -> float:
-        """Largest excess of the first tooth over the peak traction in pure modes, relative to the peak."""
+        """The largest excess of the first tooth over the peak traction in pure modes, relative to the peak."""
         return float(np.sqrt(self._taken(self._damages[1:2], self._longest_branch)[0] / self.levels[1])) - 1.0
 
     @property
@@ -132,43 +133,43 @@ class CohesiveLaw(SpringLaw):
 
     @abstractmethod
     def opening(self, d: Float, s: Float | float) -> Float:
-        """(p,) u with tau(u) = (1 - d) (1 + s u), for d < 1."""
+        """Return u (p,) with tau(u) = (1 - d) (1 + s u), for d < 1."""
 
     def begin(self, k: int) -> Float:
-        """(k, 1) no broken teeth."""
+        """Return the numbers (k, 1) of broken teeth in intact bonds, all zero."""
         return np.zeros((k, 1))
 
     def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> Self:
-        """Return the law of the next teeth."""
+        """Return the law with each bond's number of broken teeth."""
         return replace(self, level=bonds.history[:, 0])
 
     def share(self, traction: Float) -> Float:
-        """(p,) sqrt(W / W_j) under tractions (p, c) at bonds with j broken teeth.
+        """Return sqrt(W / W_j) (p,) under tractions (p, c) at bonds with j broken teeth.
 
-        Homogeneous of degree one, for B is independent of the traction's size.
+        This utilisation is homogeneous of degree one because B is independent of the traction's size.
         """
         first, second = self.energies(traction)
         tooth = np.minimum(np.asarray(self.level, np.int64), len(self.levels) - 2)
         return np.asarray(np.sqrt((first + second) / self._breaking(traction, tooth)) / (1.0 - self._damages[tooth]))
 
     def after(self, bonds: BondState, which: Bool, traction: Float) -> tuple[Float, Bool]:
-        """(k, 1) broken teeth with one more at the bonds `which`, and (k,) bonds that lost the last."""
+        """Add one broken tooth (k, 1) to the bonds `which`, and return the mask (k,) of bonds that lose the last."""
         history = bonds.history + which[:, None]
         return history, which & (history[:, 0] >= len(self.levels) - 1)
 
     def damage(self, bonds: BondState) -> Float:
-        """(k,) d, 1 for all parted bonds."""
+        """Return the damage d (k,), with 1 for all parted bonds."""
         d = self._damages[bonds.history[:, 0].astype(np.int64)]
         return np.asarray(np.where(bonds.status == 0, d, 1.0))
 
     def softening(self, bonds: BondState, pulled: Bool) -> Float:
-        """(k, 3) 1 / (1 - d); 1 for pressed normal springs and for parted bonds, whose faces press by them."""
+        """Return 1 / (1 - d) (k, 3); 1 for pressed normal springs, and for the pressed faces of parted bonds."""
         d = self._damages[bonds.history[:, 0].astype(np.int64)]
         factor = 1.0 / (1.0 - np.where(d < 1.0, d, 0.0))
         return np.column_stack([np.where(pulled, factor, 1.0), factor, factor])
 
     def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
-        """(p,) W_j (d_j+1 - d_j) of the breaking teeth."""
+        """Return the energies W_j (d_j+1 - d_j) (p,) of the breaking teeth."""
         law, selected = self.at(np.flatnonzero(which)), traction[which]
         tooth = bonds.history[which, 0].astype(np.int64)
         return np.asarray(law._breaking(selected, tooth) * np.diff(self._damages)[tooth])
@@ -180,17 +181,17 @@ class CohesiveLaw(SpringLaw):
 
     @property
     def _damages(self) -> Float:
-        """Damage levels (n + 1,)."""
+        """The damage levels (n + 1,)."""
         return np.array(self.levels)
 
     @property
     def _onsets(self) -> tuple[float | Float, float | Float]:
-        """W_n and W_t."""
+        """The onset energies W_n and W_t."""
         normal, tangential = self.normal_strength, self.tangential_strength
         return normal**2 / (2.0 * self.normal_stiffness), tangential**2 / (2.0 * self.tangential_stiffness)
 
     def _breaking(self, traction: Float, tooth: Int) -> Float:
-        """(p,) W_j for teeth, (p,) or one number, under tractions (p, c)."""
+        """Return W_j (p,) under tractions (p, c) for tooth numbers j, one for each bond or for all."""
         first, second = self.energies(traction)
         stored = first + second
         B = np.divide(second, stored, out=np.zeros(len(stored)), where=stored > 0.0)
@@ -202,7 +203,7 @@ class CohesiveLaw(SpringLaw):
         return np.asarray(onset * (self._taken(high, s) - self._taken(low, s)) / (high - low))
 
     def _taken(self, d: Float, s: Float | float) -> Float:
-        """(p,) phi at the damage d: energy that the law has taken, over W_0."""
+        """Return phi (p,) at the damage d: the energy that damage has taken, divided by W_0."""
         d, s = np.asarray(d, float), np.asarray(s)
         inside = d < 1.0
         below = np.where(inside, d, 0.0)
@@ -236,7 +237,7 @@ class PiecewiseLinear(CohesiveLaw):
         return np.asarray(areas[k] + (u - knots[k]) * (heights[k] + self.shape(np.asarray(u))) / 2.0)
 
     def opening(self, d: Float, s: Float | float) -> Float:
-        """(p,) u with tau(u) = (1 - d) (1 + s u), in the piece with a change of sign."""
+        """Return u (p,) with tau(u) = (1 - d) (1 + s u), from the linear piece with a change of sign."""
         if len(self.knots) == 2:
             return np.asarray(d / ((1.0 - d) * s + 1.0 / self.knots[1]))
         knots, heights = np.array(self.knots), np.array(self.heights)
@@ -244,22 +245,22 @@ class PiecewiseLinear(CohesiveLaw):
         above = heights - intact[..., None] * (1.0 + np.asarray(s)[..., None] * knots) >= 0.0
         k = np.clip(above.sum(axis=-1) - 1, 0, len(knots) - 2)
         slope = (heights[k + 1] - heights[k]) / (knots[k + 1] - knots[k])
-        # tau_k + slope (u - u_k) = kept + kept s u
+        # tau_k + slope (u - u_k) = intact + intact s u
         return np.asarray((heights[k] - slope * knots[k] - intact) / (intact * s - slope))
 
 
 @dataclass(frozen=True)
 class BilinearLaw(PiecewiseLinear):
-    """Traction falls in a straight line."""
+    """The traction falls in a straight line."""
 
 
 @dataclass(frozen=True)
 class TableLaw(PiecewiseLinear):
-    """Traction over opening in mode I from a table; other modes stretch the branch to their toughness."""
+    """A table gives the traction over the opening in mode I; all other modes stretch this branch to their toughness."""
 
     @classmethod
     def branch(cls, value: KeyValues) -> dict[str, Any]:
-        """Return knots and heights from openings and tractions, which begin at the peak."""
+        """Return the knots and heights from a table of openings and tractions that begins at the peak."""
         openings, tractions = np.array(value.common("openings")), np.array(value.common("tractions"))
         return {"knots": tuple(openings / openings[0] - 1.0), "heights": tuple(tractions / tractions[0])}
 
@@ -270,7 +271,7 @@ class ExponentialLaw(CohesiveLaw):
 
     @property
     def last(self) -> float:
-        """The u of the exponential tail."""
+        """The u at which the traction has fallen to EXPONENTIAL_TAIL."""
         return -math.log(EXPONENTIAL_TAIL)
 
     def shape(self, u: Float) -> Float:
@@ -282,7 +283,7 @@ class ExponentialLaw(CohesiveLaw):
         return np.asarray(-np.expm1(-np.asarray(u)))
 
     def opening(self, d: Float, s: Float | float) -> Float:
-        """(p,) root of u + ln(1 + s u) = -ln(1 - d), by Newton's method from below."""
+        """Return the root u (p,) of u + ln(1 + s u) = -ln(1 - d), by Newton's method from below."""
         right = -np.log1p(-np.asarray(d))
         u = right / (1.0 + s)
         for _ in range(MOST_STEPS):

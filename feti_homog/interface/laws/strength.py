@@ -1,4 +1,4 @@
-"""Bonds that break at a strength, a limit of their traction, force per area; compression breaks none."""
+"""Strength criteria: a bond breaks at a limit of its traction, force per area; compression breaks no bond."""
 
 import math
 from abc import abstractmethod
@@ -13,7 +13,7 @@ from feti_homog.typing import Float
 
 @dataclass(frozen=True)
 class Strength(BondLaw):
-    """Limits of the traction's components, combined.
+    """A criterion that combines the limits of the traction components.
 
     Attributes:
         normal, tangential: strengths R^n and R^t, inf for none.
@@ -26,40 +26,40 @@ class Strength(BondLaw):
 
     @classmethod
     def of_keys(cls, value: KeyValues) -> Self:
-        """Make the law from strengths; the axial one defaults to the tangential one."""
+        """Make the law from strengths; by default the axial strength is the tangential strength."""
         return cls(
             value("normal_strength"), value("tangential_strength"), value("axial_strength", "tangential_strength")
         )
 
     def share(self, traction: Float) -> Float:
-        """(p,) utilisation by tractions (p, c)."""
+        """Return the utilisation (p,) by tractions (p, c)."""
         return self.together(self.breaks(traction))
 
     @abstractmethod
     def together(self, shares: Float) -> Float:
-        """(p,) utilisation by component shares (p, c)."""
+        """Return the utilisation (p,) by `shares` (p, c), traction components relative to their strengths."""
 
     def breaks(self, traction: Float) -> Float:
-        """(p, c) traction components, relative to their strengths."""
+        """Return the traction components (p, c), relative to their strengths."""
         pulls = np.abs(traction)
         pulls[:, 0] = np.maximum(traction[:, 0], 0.0)
         return np.asarray(pulls / self.limits[..., : traction.shape[1]])
 
     @property
     def limits(self) -> Float:
-        """(3,) or (k, 3) strengths."""
+        """The strengths (3,) or (k, 3)."""
         return np.stack(np.broadcast_arrays(self.normal, self.tangential, self.axial), axis=-1)
 
 
 class MaxStrength(Strength):
-    """max(<t_n> / R^n, |t_t| / R^t, |t_a| / R^a) = 1 breaks: the paper's criterion."""
+    """The paper's criterion: a bond breaks at max(<t_n> / R^n, |t_t| / R^t, |t_a| / R^a) = 1."""
 
     def together(self, shares: Float) -> Float:
-        """(p,) largest of shares (p, c)."""
+        """Return the largest (p,) of `shares` (p, c)."""
         return np.asarray(shares.max(axis=1, initial=0.0))
 
     def first_factor(self, before: Float, direction: Float) -> Float:
-        """(p,) factors at which the first component reaches its strength."""
+        """Return the factors (p,) at which the first component reaches its strength."""
         limits = self.limits[..., : before.shape[1]]
         s, ds = before / limits, direction / limits
         towards = np.abs(ds)
@@ -69,14 +69,14 @@ class MaxStrength(Strength):
 
 
 class QuadraticStrength(Strength):
-    """(<t_n> / R^n)^2 + (t_t / R^t)^2 + (t_a / R^a)^2 = 1 breaks."""
+    """A bond breaks at (<t_n> / R^n)^2 + (t_t / R^t)^2 + (t_a / R^a)^2 = 1."""
 
     def together(self, shares: Float) -> Float:
-        """(p,) root of the sum of squared shares (p, c)."""
+        """Return the root (p,) of the sum of squared `shares` (p, c)."""
         return np.asarray(np.hypot.reduce(shares, axis=1))
 
     def first_factor(self, before: Float, direction: Float) -> Float:
-        """(p,) factors at which the sum of squares reaches 1, without the normal one under compression."""
+        """Return the factors (p,) at which the sum of squares is 1; a compressive normal traction is left out."""
         limits = self.limits[..., : before.shape[1]]
         s, ds = before / limits, direction / limits
         opening, shear = _largest_root(s, ds), _largest_root(s[:, 1:], ds[:, 1:])
@@ -86,7 +86,7 @@ class QuadraticStrength(Strength):
 
 
 def _largest_root(s: Float, ds: Float) -> Float:
-    """(k,) largest f with |s + f ds| = 1, for vectors (k, c); NaN without one, inf for ds = 0."""
+    """Return the largest f (k,) with |s + f ds| = 1, for vectors (k, c); NaN without a root, inf for ds = 0."""
     a, b, c = (ds * ds).sum(axis=1), (s * ds).sum(axis=1), (s * s).sum(axis=1) - 1.0
     with np.errstate(invalid="ignore", divide="ignore"):
         root = np.sqrt(b * b - a * c)

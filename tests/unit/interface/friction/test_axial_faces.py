@@ -52,7 +52,7 @@ def test_forces_that_no_face_may_bear_are_errors():
 def test_faces_without_friction_have_no_sign_of_slip():
     """Put a face without friction beside one that slides and one that sticks."""
     faces = SimpleNamespace(friction=np.array([0.3, 0.0, 0.3]))
-    of = {"_place": np.arange(3), "_own": np.arange(3), "_damaged": np.zeros(3, bool), "faces": faces}
+    of = {"_position": np.arange(3), "_face_nodes": np.arange(3), "_damaged": np.zeros(3, bool), "faces": faces}
     cell = SimpleNamespace(**of, _jumps_of=lambda x: x)
     bonds = torn_cells.bonds(np.full(3, OPEN, np.int8))
     found = SlidingCell.bonds(cell, bonds, np.array([FORWARD, FORWARD, STICK], np.int8), np.zeros(6))
