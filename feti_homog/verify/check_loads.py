@@ -162,7 +162,13 @@ def check_loads(findings: Findings, cell: DiscreteCell, states: States) -> None:
         findings.compare("tables", numbers, points, 1.0, lambda k: f"{states[k].name}, point")
     findings.compare("load", len(states), count, 1.0, f"{len(states)} states, {count} asked for")
     _check_states(findings, cell, pairs, scales)
-    for place, matrix in _linear_stiffnesses(document, cell.files.contact):
+    matrices = {}  # of cells without one-sided contact
+    if "effective_stiffness" in document and "effective_stiffness_compression" not in document:
+        matrices["effective_stiffness"] = np.array(document["effective_stiffness"])
+    for number, point in enumerate(document.get("angle", ())):
+        if "stiffness" in point and not (cell.files.contact and point["open"] + point["closed"]):
+            matrices[f"angle[{number}].stiffness"] = np.array(point["stiffness"])
+    for place, matrix in matrices.items():
         findings.compare("symmetry", matrix, matrix.T, np.abs(matrix).max(), place)
 
 
@@ -259,12 +265,3 @@ def _columns(
         names = (*OF_ARCS, *COUNTS) if load.values[v - 1] else OF_ARCS  # the state of gamma12 has the counts
         entries = {"stress": sign * stress} | {name: table[name] for name in names if name in table}
         yield replace(load, values=sign * load.values), entries
-
-
-def _linear_stiffnesses(document: Document, contact: bool) -> Iterator[tuple[str, Float]]:
-    """Yield names and stiffnesses in result.json for cells without one-sided contact."""
-    if "effective_stiffness" in document and "effective_stiffness_compression" not in document:
-        yield "effective_stiffness", np.array(document["effective_stiffness"])
-    for number, point in enumerate(document.get("angle", ())):
-        if "stiffness" in point and not (contact and point["open"] + point["closed"]):
-            yield f"angle[{number}].stiffness", np.array(point["stiffness"])

@@ -33,7 +33,8 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
     names = document["sensitivities"]["parameters"]
     missing = sorted({*_parameters(cell)}.difference(names))
     findings.record("tables", [np.inf] * len(missing), lambda k: f"sensitivities, {missing[k]}")
-    values = np.array([_place(dict(cell.files.case), name)[2] for name in names])
+    places = (_place(dict(cell.files.case), name) for name in names)
+    values = np.array([np.array(table[key], float)[index] for table, key, index in places])
     # Changes over which the laws are nearly linear.
     ratios = np.array([name.endswith(".poisson") for name in names]) & (values < 0.5)
     sizes = np.where(ratios, 0.5 - values, np.where(values == 0.0, 1.0, np.abs(values)))
@@ -142,30 +143,24 @@ def _check_linear(findings: Findings, document: Section, slope: Float, direction
         findings.compare("moduli", data["constant_values"][k], constants[name], size, f"sensitivities, {name}")
 
 
-def _place(case: Case, name: str) -> tuple[Any, Any, float]:
-    """Return the table and key of a parameter, and its value."""
+def _place(case: Case, name: str) -> tuple[Any, str, tuple[int, ...]]:
+    """Return the table and the key of a parameter, and its index in an array, () of a scalar."""
     section, *keys = name.split(".")
     table: Any = case[section]
     if section == "material" or isinstance(table, list):
         first = keys.pop(0)
         table = table[int(first) - 1] if isinstance(table, list) else table[first]
-    if len(keys) == 1:
-        return table, keys[0], float(table[keys[0]])
-    place = tuple(int(digit) - 1 for digit in keys[1] if digit.isdigit())
-    return table, (keys[0], place), float(np.array(table[keys[0]], float)[place])
+    return table, keys[0], tuple(int(digit) - 1 for digit in "".join(keys[1:]) if digit.isdigit())
 
 
 def _moved(cell: DiscreteCell, names: Sequence[str], values: Float) -> Case:
     """Return the case with other values of the parameters."""
     case: Case = copy.deepcopy(dict(cell.files.case))
     for name, value in zip(names, values, strict=True):
-        table, key, _ = _place(case, name)
-        if isinstance(key, str):
-            table[key] = float(value)
-        else:
-            numbers = np.array(table[key[0]], float)
-            numbers[key[1]] = numbers[key[1][::-1]] = value
-            table[key[0]] = numbers.tolist()
+        table, key, index = _place(case, name)
+        numbers = np.array(table[key], float)
+        numbers[index] = numbers[index[::-1]] = value
+        table[key] = numbers.tolist()
     return case
 
 
