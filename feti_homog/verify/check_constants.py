@@ -42,7 +42,7 @@ def check_constants(findings: Findings, cell: DiscreteCell, states: States) -> N
     for number, table in enumerate([document, *document.get("angle", ())], start=-1):
         of_table = [state for state in states if number < 0 or state.point == number]
         is_linear = not (cell.files.contact and any((state.status != BONDED).any() for state in of_table))
-        if "thermal_stress" in table and cell.expansions is not None and is_linear:
+        if "thermal_stress" in table and is_linear:
             thermal, place = np.array(table["thermal_stress"]), f"angle[{number}].thermal_stress"
             for state in of_table:
                 error = relative(thermal @ state.strain + state.expanding, np.abs(thermal).max())

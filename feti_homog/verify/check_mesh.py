@@ -219,13 +219,9 @@ def _averaged(cell: DiscreteCell, state: State) -> float:
 
     def stresses() -> Iterator[tuple[slice, Float, Float]]:
         """Yield elements in portions: weights (e, q), and stresses (e, q, v) at r."""
-        if is_linear:
-            w, stress = (np.repeat(of[:, None], 3, axis=1) for of in (elements.area / 3, state.stress))
-            yield slice(None), w, stress
-            return
-        free = cell.free_strains(state.temperature)
+        free = state.temperature * cell.expansions
         for part, _, w, _, _, stress in elements.responses(state.displacement, state.along, free):
-            yield part, w, stress
+            yield part, w * np.ones(len(r)) * w.shape[1] / len(r), stress * np.ones((len(r), 1))
 
     weights, sums = np.zeros(len(mesh.points)), np.zeros((len(mesh.points), v))
     for part, w, stress in stresses():

@@ -10,7 +10,7 @@ import numpy as np
 from feti_homog.typing import Float
 from feti_homog.verify.bonds import law_at
 from feti_homog.verify.check_constants import NOISE, constants_of
-from feti_homog.verify.check_loads import NAMES, SPATIAL_ORDER
+from feti_homog.verify.check_loads import NAMES
 from feti_homog.verify.constitutive_law import laws, mixed_phases
 from feti_homog.verify.discrete_cell import BONDED, CLOSED, DiscreteCell
 from feti_homog.verify.elements import Elements
@@ -175,12 +175,10 @@ def _energies(cell: DiscreteCell, states: list[State], case: Mapping[str, Any]) 
     none, lengths = np.zeros_like(states[0].jump), files.interface.length[:, None]
     flexibility = law_at(replace(files, document=Section({"case": case}))).jumps(none + 1.0)
     springs = np.divide(lengths, flexibility, out=none, where=flexibility > 0.0)
-    strains = [state for state in states if not state.temperature]
-    if len(strains) == 6:  # in the order of components
-        strains = [strains[SPATIAL_ORDER.index(k)] for k in range(6)]
-    columns = []
+    strains, columns = [state for state in states if not state.temperature], []
+    strains.sort(key=lambda state: int(np.abs(state.strain).argmax()))  # in the order of components
     for state in (*strains, *(state for state in states if state.temperature)):
-        free_strain = None if free is None else state.temperature * free
+        free_strain = state.temperature * free
         fields = elements.fields(state.displacement, np.abs(state.displacement), state.along, free_strain)
         out = float(elements.area @ fields.stress[:, 2]) if files.is_spatial else 0.0
         columns.append([float((other.displacement * fields.force).sum()) + other.along * out for other in strains])

@@ -69,7 +69,7 @@ class DiscreteCell:
 
     Attributes:
         stiffnesses: (phases, v, v), v = 3, or 6 in generalized plane strain.
-        expansions: (phases, v), None if unknown.
+        expansions: (phases, v), zero if unknown.
         constituent: (subdomains,) connected parts of phases.
         inner: (s,) True for torn sides on the inner face of bonds that may break.
         fractions: (phases,) area fractions.
@@ -78,7 +78,7 @@ class DiscreteCell:
 
     files: ResultFiles
     stiffnesses: Float
-    expansions: Float | None
+    expansions: Float
     elements: Elements
     sides: TornSides
     nodes: TornNodes
@@ -192,14 +192,9 @@ class DiscreteCell:
             add_at_nodes(sums, nodes, 0.5 * np.stack([-dy, dx], axis=1)[:, None] * shapes[:, None])
         return sums
 
-    def free_strains(self, temperature: float) -> Float | None:
-        """(phases, v) strains of stress-free phases at a temperature."""
-        return None if self.expansions is None else self.expansions * temperature
-
     def loads(self, strain: Float, temperature: float) -> Float:
         """(v,) strain plus the largest thermal strain of a phase."""
-        free = self.free_strains(temperature)
-        return strain if free is None else np.asarray(strain + np.abs(free).max(axis=0))
+        return np.asarray(strain + np.abs(self.expansions * temperature).max(axis=0))
 
     def scales(self, strain: Float, temperature: float, slip: float = 0.0) -> Scales:
         """Return the scales of a load and of a slip that friction holds; no scale vanishes with the load."""
