@@ -30,7 +30,8 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
         if cell.files.case.get("output", {}).get("sensitivities"):
             findings.record("tables", np.inf, "sensitivities, which the case asks for")
         return
-    names = document["sensitivities"]["parameters"]
+    data = document["sensitivities"]
+    names = data["parameters"]
     missing = sorted({*_parameters(cell)}.difference(names))
     findings.record("tables", [np.inf] * len(missing), lambda k: f"sensitivities, {missing[k]}")
     places = (_place(dict(cell.files.case), name) for name in names)
@@ -40,18 +41,31 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
     sizes = np.where(ratios, 0.5 - values, np.where(values == 0.0, 1.0, np.abs(values)))
     direction = sizes * np.resize(WEIGHTS, len(values))
     states = list(cell.files.states())
-    fixed_status = "load" not in document and document["sensitivities"].get("at_fixed_status")
+    fixed_status = "load" not in document and data.get("at_fixed_status")
     if fixed_status:
         states = states[: len(states) // 2]  # the second half is under minus the unit loads
     moved = [_moved(cell, names, values + sign * STEP * direction) for sign in (1, -1)]
     above, below = (_energies(cell, states, case) for case in moved)
     slope = (above - below) / (2 * STEP)
-    if "load" in document:
-        _check_load(findings, cell, states, slope, direction)
-    elif fixed_status:
-        _check_secants(findings, cell, states, slope, direction)
-    else:
-        _check_linear(findings, cell.files.document, slope, direction)
+    if "load" in document or fixed_status:
+        check = _check_secants if fixed_status else _check_load
+        check(findings, cell, states, slope, direction)
+        return
+    # All constants of a linear cell.
+    C, heat = np.array(document["effective_stiffness"]), document.get("thermal_stress")
+    heat = None if heat is None else np.array(heat)
+    constants, n = constants_of(C, heat), len(C)
+    step = STEP * np.abs(C).max() / max(float(np.abs(slope).max()), TINY)
+    ends = [
+        constants_of(C + change[:, :n], None if heat is None else heat + change[:, n])
+        for change in (step * slope, -step * slope)
+    ]
+    for k, name in enumerate(data["constants"]):
+        kind = NOISE * max(abs(value) for other, value in constants.items() if other[0] == name[0])
+        terms, size = np.array(data["derivatives"][k]) * direction, max(abs(constants[name]), kind)
+        expected, scale = (ends[0][name] - ends[1][name]) / (2 * step), max(float(np.abs(terms).max()), size)
+        findings.compare("sensitivities", terms.sum(), expected, scale, name)
+        findings.compare("moduli", data["constant_values"][k], constants[name], size, f"sensitivities, {name}")
 
 
 def _parameters(cell: DiscreteCell) -> Iterator[str]:
@@ -123,24 +137,6 @@ def _check_load(findings: Findings, cell: DiscreteCell, states: list[State], slo
     scale = max(float(np.abs(terms).max()), float(np.abs(of_stored).max()), abs(energy))
     off = [terms.sum() - slope[0, 0] / 2, rest.sum()]
     findings.record("sensitivities", relative(off, scale), lambda k: ("the load", "stored")[k])
-
-
-def _check_linear(findings: Findings, document: Section, slope: Float, direction: Float) -> None:
-    """Check the derivatives of all constants in a linear cell."""
-    data, C, heat = document["sensitivities"], np.array(document["effective_stiffness"]), document.get("thermal_stress")
-    heat = None if heat is None else np.array(heat)
-    constants, n = constants_of(C, heat), len(C)
-    step = STEP * np.abs(C).max() / max(float(np.abs(slope).max()), TINY)
-    ends = [
-        constants_of(C + change[:, :n], None if heat is None else heat + change[:, n])
-        for change in (step * slope, -step * slope)
-    ]
-    for k, name in enumerate(data["constants"]):
-        kind = NOISE * max(abs(value) for other, value in constants.items() if other[0] == name[0])
-        terms, size = np.array(data["derivatives"][k]) * direction, max(abs(constants[name]), kind)
-        expected, scale = (ends[0][name] - ends[1][name]) / (2 * step), max(float(np.abs(terms).max()), size)
-        findings.compare("sensitivities", terms.sum(), expected, scale, name)
-        findings.compare("moduli", data["constant_values"][k], constants[name], size, f"sensitivities, {name}")
 
 
 def _place(case: Case, name: str) -> tuple[Any, str, tuple[int, ...]]:

@@ -120,7 +120,7 @@ class Elements:
             if len(mixed):  # their pressure less lambda tr eps; bubbles add to the strains
                 lame = np.stack([self._stiffnesses[phase[mixed], 0, 1], self._stiffnesses[phase[mixed], -1, -1]], 1)
                 elastic = local[mixed] - own_free[mixed, None]
-                inner, pressure = inner_fields(quadrature_points(), gradients[mixed], weights[mixed], elastic, lame)
+                inner, pressure = inner_fields(gradients[mixed], weights[mixed], elastic, lame)
                 if v == 6:
                     inner = np.concatenate([inner, np.zeros((*inner.shape[:2], 1, 2))], axis=2)
                 bubble = _strains(inner, v, 0.0)
@@ -198,15 +198,13 @@ def add_at_nodes(sums: Float, nodes: Int, values: Float) -> None:
         sums[:, direction] += np.bincount(nodes.ravel(), values[..., direction].ravel(), len(sums))
 
 
-def inner_fields(
-    places: Float, gradients: Float, weights: Float, strain: Float, lame: Float
-) -> tuple[Float, Float]:  # fmt: skip
+def inner_fields(gradients: Float, weights: Float, strain: Float, lame: Float) -> tuple[Float, Float]:
     """Return du_i/dx_d (e, q, 2, 2) of the bubble, and the pressure (e, q).
 
-    Barycentric places (q, 3), gradients of the nodes' functions (e, q, 6, 2), weights (e, q), elastic strains of nodal
-    displacements (e, q, v), lambda and mu (e, 2).
+    Gradients of the nodes' functions (e, q, 6, 2), weights (e, q), elastic strains of nodal displacements (e, q, v),
+    lambda and mu (e, 2).
     """
-    first, shear = lame.T
+    (first, shear), places = lame.T, quadrature_points()
     slopes = np.einsum("ab,eqbd->eqad", OF_NODES, gradients)
     of_bubble = np.einsum("qa,eqad->eqd", places[:, [1, 2, 0]] * places[:, [2, 0, 1]], slopes)
     square = np.einsum("eq,eqd,eqk->edk", weights, of_bubble, of_bubble)

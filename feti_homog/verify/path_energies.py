@@ -197,11 +197,9 @@ def _check_losses(
     """
     by_events = cell.files.case["path"]["method"] == "events"
     C: Float = np.einsum("p,pij->ij", cell.fractions, cell.stiffnesses)  # Voigt's, of strains and temperature
-    if cell.files.is_spatial:
-        alpha = cell.expansions
-        thermal = np.einsum("p,pij,pj->i", cell.fractions, cell.stiffnesses, alpha)
-        square = np.einsum("p,pi,pij,pj->", cell.fractions, alpha, cell.stiffnesses, alpha)
-        C = np.block([[C, -thermal[:, None]], [-thermal[None], square]])
+    thermal = np.einsum("p,pij,pj->i", cell.fractions, cell.stiffnesses, cell.expansions)
+    square = np.einsum("p,pi,pij,pj->", cell.fractions, cell.expansions, cell.stiffnesses, cell.expansions)
+    C = np.block([[C, -thermal[:, None]], [-thermal[None], square]])
     for number, (point, now) in enumerate(zip(points, numbers, strict=True)):
         state, before = (numbers[number - 1] if number else None), points[number - 1]
         lost, low, high = point["dissipated"] - (before["dissipated"] if number else 0.0), 0.0, 0.0
