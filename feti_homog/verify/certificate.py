@@ -98,7 +98,7 @@ def laws_of_fields(findings: Findings, cell: DiscreteCell) -> list[StateNumbers]
         arrays = (state.displacement, state.fluctuation, state.stress, state.traction, state.jump, state.strain)
         findings.record("numbers", [np.count_nonzero(~np.isfinite(array)) for array in arrays], state.name)
         terms = np.abs(state.displacement) + np.abs(state.fluctuation)
-        fields = cell.elements.fields(state.displacement, terms, state.along, cell.free_strains(state.temperature))
+        fields = cell.elements.fields(state.displacement, terms, state.along, state.temperature * cell.expansions)
         check_state(findings, cell, state, fields)
         check_mesh_error(findings, cell, state)
         if before is not None and "path" in files.document:

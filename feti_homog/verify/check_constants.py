@@ -21,17 +21,28 @@ RATIOS = ("eta", "anisotropy", "deviation")
 def check_constants(findings: Findings, cell: DiscreteCell, states: States) -> None:
     """Check the numbers of result.json that sum up a run.
 
-    Thermal stresses obey reciprocity, which contact without tension breaks.
+    Tolerances follow from rtol, the status from checks, convergence and other faults.  Thermal stresses obey
+    reciprocity, which contact without tension breaks.
     """
-    document, has_contact = cell.files.document, cell.files.contact
-    _check_status(findings, cell)
+    document, solver = cell.files.document, cell.files.document["solver"]
+    # Options of the command line are in no file.
+    is_of_case = solver.hint("rtol") == float(cell.files.case.get("petsc", {}).get("feti_ksp_rtol", RTOL))
+    rtol = float(solver["rtol"] if is_of_case else solver.hint("rtol"))
+    tolerance, of_contact = document["check_tolerance"], document["kkt_tolerance"]
+    findings.record("status", abs(tolerance / solver_limit(rtol) - 1.0), "check_tolerance")
+    findings.record("status", abs(of_contact / KKT - 1.0), "kkt_tolerance")
+    checks, faults = document["checks"], document.hint("faults", [])
+    failed = [name for name in checks if not checks.hint(name) <= (of_contact if "kkt_" in name else tolerance)]
+    failed += [reason for reason in solver.hint("converged_reason") if reason < 0]
+    failed += [fault for fault in faults if "check " not in fault and "no convergence" not in fault]
+    findings.require("status", document["status"] == ("not converged" if failed else "done"), "status")
     _check_cell(findings, cell, document["cell"])
     if "effective_stiffness" in document:
         _check_stiffness(findings, cell, document)
     for number, table in enumerate([document, *document.get("angle", ())], start=-1):
         of_table = [state for state in states if number < 0 or state.point == number]
-        is_linear = not (has_contact and any((state.status != BONDED).any() for state in of_table))
-        if "thermal_stress" in table and cell.expansions is not None and is_linear:
+        is_linear = not (cell.files.contact and any((state.status != BONDED).any() for state in of_table))
+        if "thermal_stress" in table and is_linear:
             thermal, place = np.array(table["thermal_stress"]), f"angle[{number}].thermal_stress"
             for state in of_table:
                 error = relative(thermal @ state.strain + state.expanding, np.abs(thermal).max())
@@ -43,8 +54,21 @@ def _check_stiffness(findings: Findings, cell: DiscreteCell, document: Section) 
     """Check bounds, compliance, thermal expansion and constants of the stiffness."""
     C, heat = np.array(document["effective_stiffness"]), document.get("thermal_stress")
     heat = None if heat is None else np.array(heat)
-    if document.get("bounds") is not None:
-        _check_bounds(findings, cell, document["bounds"], C)
+    if (bounds := document.get("bounds")) is not None:
+        upper, lower = np.einsum("p,pij->ij", cell.fractions, cell.stiffnesses), cell.reuss
+        size = float(np.abs(upper).max())
+        findings.compare("bounds", bounds["voigt"], upper, size, "bounds.voigt")
+        findings.compare("bounds", bounds["reuss"], lower, size, "bounds.reuss")
+        for place, gap in (("Voigt - L", upper - C), ("L - Reuss", C - lower)):
+            least = float(np.linalg.eigvalsh((gap + gap.T) / 2).min())
+            findings.record("bounds", max(-least, 0.0) / size, f"the least eigenvalue of {place}")
+        if bounds["hashin_shtrikman"] is not None:
+            # 1 / <1 / (m + m*)> - m* with m* = mu0 for m = k, k0 mu0 / (k0 + 2 mu0) for m = mu (Walpole 1969).
+            bulk, shear = np.array([_isotropic_part(c) for c in cell.stiffnesses]).T
+            k0, mu0 = (np.array([phases.min(), phases.max()]) for phases in (bulk, shear))
+            for name, phases, added in (("bulk", bulk, mu0), ("shear", shear, k0 * mu0 / (k0 + 2 * mu0))):
+                pair = 1 / (cell.fractions @ (1 / (phases[:, None] + added))) - added
+                findings.compare("bounds", bounds["hashin_shtrikman"][name], pair, pair[1], f"hashin_shtrikman.{name}")
     if cell.files.is_spatial:
         # Columns that are secants of one load each have no meaningful inverse.
         is_linear = "effective_stiffness_compression" not in document
@@ -65,22 +89,6 @@ def _check_stiffness(findings: Findings, cell: DiscreteCell, document: Section) 
             else:
                 least = NOISE if name.startswith("nu") else float(name.startswith(RATIOS))
                 findings.compare("moduli", value, expected, max(abs(expected), least), place)
-
-
-def _check_status(findings: Findings, cell: DiscreteCell) -> None:
-    """Check tolerances by rtol, and the status by checks, convergence and other faults."""
-    document, solver = cell.files.document, cell.files.document["solver"]
-    # Options of the command line are in no file.
-    is_of_case = solver.hint("rtol") == float(cell.files.case.get("petsc", {}).get("feti_ksp_rtol", RTOL))
-    rtol = float(solver["rtol"] if is_of_case else solver.hint("rtol"))
-    tolerance, of_contact = document["check_tolerance"], document["kkt_tolerance"]
-    findings.record("status", abs(tolerance / solver_limit(rtol) - 1.0), "check_tolerance")
-    findings.record("status", abs(of_contact / KKT - 1.0), "kkt_tolerance")
-    checks, faults = document["checks"], document.hint("faults", [])
-    failed = [name for name in checks if not checks.hint(name) <= (of_contact if "kkt_" in name else tolerance)]
-    failed += [reason for reason in solver.hint("converged_reason") if reason < 0]
-    failed += [fault for fault in faults if "check " not in fault and "no convergence" not in fault]
-    findings.require("status", document["status"] == ("not converged" if failed else "done"), "status")
 
 
 def _check_cell(findings: Findings, cell: DiscreteCell, section: Section) -> None:
@@ -109,24 +117,6 @@ def _check_cell(findings: Findings, cell: DiscreteCell, section: Section) -> Non
             m = scatter["shape"]
             expected = np.exp(np.log(-np.log(1.0 - stream.random(len(strength)))) / m - gammaln(1.0 + 1.0 / m))
         findings.compare("tables", strength, expected, expected, "/fibre/strength at fibre {}".format)
-
-
-def _check_bounds(findings: Findings, cell: DiscreteCell, bounds: Section, stiffness: Float) -> None:
-    """Check Voigt's and Reuss' bounds, Hashin and Shtrikman's, and their order."""
-    upper, lower = np.einsum("p,pij->ij", cell.fractions, cell.stiffnesses), cell.reuss
-    size = float(np.abs(upper).max())
-    for name, bound in (("voigt", upper), ("reuss", lower)):
-        findings.compare("bounds", bounds[name], bound, size, f"bounds.{name}")
-    for place, gap in (("Voigt - L", upper - stiffness), ("L - Reuss", stiffness - lower)):
-        least = float(np.linalg.eigvalsh((gap + gap.T) / 2).min())
-        findings.record("bounds", max(-least, 0.0) / size, f"the least eigenvalue of {place}")
-    if bounds["hashin_shtrikman"] is not None:
-        # 1 / <1 / (m + m*)> - m* with m* = mu0 for m = k, k0 mu0 / (k0 + 2 mu0) for m = mu (Walpole 1969).
-        bulk, shear = np.array([_isotropic_part(c) for c in cell.stiffnesses]).T
-        k0, mu0 = (np.array([phases.min(), phases.max()]) for phases in (bulk, shear))
-        for name, phases, added in (("bulk", bulk, mu0), ("shear", shear, k0 * mu0 / (k0 + 2 * mu0))):
-            pair = 1 / (cell.fractions @ (1 / (phases[:, None] + added))) - added
-            findings.compare("bounds", bounds["hashin_shtrikman"][name], pair, pair[1], f"hashin_shtrikman.{name}")
 
 
 def constants_of(C: Float, heat: Float | None) -> dict[str, float]:

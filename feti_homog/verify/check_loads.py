@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -28,7 +28,7 @@ NAMES = {
 TEMPERATURE, COUNTS = "temperature", {"bonded": BONDED, "closed": CLOSED, "open": OPEN}
 SAME_SHARE = 1e-12  # rounding of shares of a leg
 OF_ARCS = "debonded_length", "damaged_length", "debonded_shares"  # of an angle, in all unit loads
-SPATIAL_ORDER = [0, 1, 5, 2, 4, 3]  # of unit strains in generalized plane strain; the fifth unit load is a temperature
+UNIT_LOADS = {3: [0, 1, 2], 6: [0, 1, 5, 2, 6, 4, 3]}  # components in the order of the states; 6 is the temperature
 FIELDS = ("displacement", "fluctuation", "stress", "mesh_error", "stress_33")  # of a state on its mesh
 
 
@@ -38,12 +38,6 @@ class Prescribed:
 
     values: Float
     by_stress: Bool
-
-    @classmethod
-    def strain(cls, strain: Float, temperature: float) -> Prescribed:
-        """Return a strain (v,), with a temperature in generalized plane strain."""
-        values = np.array([*strain, temperature] if len(strain) > 3 else strain, float)
-        return cls(values, np.zeros(len(values), bool))
 
 
 def targets(case: Document) -> list[Prescribed]:
@@ -105,7 +99,7 @@ class StateNumbers(State):
         released: (k,) True at tips that break by energy release.
         used: (k,) used strength share at bonded nodes, NaN at these tips.
         heat: conjugate of the temperature, - <alpha : sigma>.
-        expanding: <alpha : L : strain>, 0 if unknown.
+        expanding: <alpha : L : strain>.
     """
 
     stored: float
@@ -122,12 +116,11 @@ class StateNumbers(State):
         released = cell.tips(state.status) & law.grows_by_release
         traction = cohesive_traction(cell.files, state)
         used = np.where(released, np.nan, np.where(state.status == BONDED, law.utilisation(traction), 0.0))
-        in_springs, heat, expanding = energy_of_springs(cell.files, state) / cell.area, 0.0, 0.0
-        if cell.expansions is not None:
-            weights, phase = cell.elements.area / cell.area, cell.files.mesh.phase
-            heat = -float(weights @ (cell.expansions[phase] * state.stress).sum(axis=1))
-            thermal = np.einsum("pij,pj->pi", cell.stiffnesses, cell.expansions)[phase]
-            expanding = float(weights @ (thermal * fields.strain).sum(axis=1))
+        in_springs = energy_of_springs(cell.files, state) / cell.area
+        weights, phase = cell.elements.area / cell.area, cell.files.mesh.phase
+        heat = -float(weights @ (cell.expansions[phase] * state.stress).sum(axis=1))
+        thermal = np.einsum("pij,pj->pi", cell.stiffnesses, cell.expansions)[phase]
+        expanding = float(weights @ (thermal * fields.strain).sum(axis=1))
         stored = fields.energy / (2 * cell.area) + state.temperature * heat / 2 + in_springs
         numbers = dict(vars(state)) | dict.fromkeys(FIELDS, np.zeros(0)) | {"traction": traction}
         return cls(**numbers, stored=stored, in_springs=in_springs, released=released, used=used, heat=heat,
@@ -162,7 +155,13 @@ def check_loads(findings: Findings, cell: DiscreteCell, states: States) -> None:
         findings.compare("tables", numbers, points, 1.0, lambda k: f"{states[k].name}, point")
     findings.compare("load", len(states), count, 1.0, f"{len(states)} states, {count} asked for")
     _check_states(findings, cell, pairs, scales)
-    for place, matrix in _linear_stiffnesses(document, cell.files.contact):
+    matrices = {}  # of cells without one-sided contact
+    if "effective_stiffness" in document and "effective_stiffness_compression" not in document:
+        matrices["effective_stiffness"] = np.array(document["effective_stiffness"])
+    for number, point in enumerate(document.get("angle", ())):
+        if "stiffness" in point and not (cell.files.contact and point["open"] + point["closed"]):
+            matrices[f"angle[{number}].stiffness"] = np.array(point["stiffness"])
+    for place, matrix in matrices.items():
         findings.compare("symmetry", matrix, matrix.T, np.abs(matrix).max(), place)
 
 
@@ -237,34 +236,24 @@ def _rows(cell: DiscreteCell) -> Iterator[tuple[Prescribed, Document]]:
         strain = case["angle"].get("strain")
         for point in document["angle"]:
             if strain is None:
-                yield from _columns(cell, point, "stiffness", "", 1.0)
+                yield from _columns(point, "stiffness", "", 1.0)
             else:
-                yield Prescribed.strain(np.array(strain), 0.0), point
+                values = np.array([*strain, 0.0] if len(strain) > 3 else strain, float)
+                yield Prescribed(values, np.zeros(len(values), bool)), point
     else:
         for suffix, sign in (("", 1.0), ("_compression", -1.0)):
             if f"effective_stiffness{suffix}" in document:
-                yield from _columns(cell, document, "effective_stiffness", suffix, sign)
+                yield from _columns(document, "effective_stiffness", suffix, sign)
 
 
-def _columns(
-    cell: DiscreteCell, table: Document, stiffness: str, suffix: str, sign: float
-) -> Iterator[tuple[Prescribed, Document]]:
+def _columns(table: Document, stiffness: str, suffix: str, sign: float) -> Iterator[tuple[Prescribed, Document]]:
     """Yield the unit loads, or minus them, with their stresses: columns of a stiffness, and `thermal_stress`."""
-    order = np.eye(6)[SPATIAL_ORDER] if cell.files.is_spatial else np.eye(3)
-    unit, v = [Prescribed.strain(strain, 0.0) for strain in order], len(order)
-    unit[4:4] = [] if cell.expansions is None else [Prescribed.strain(np.zeros(6), 1.0)]
-    for load in unit:
-        matrix, is_thermal = np.array(table[f"{stiffness}{suffix}"]), load.values[v:].any()
-        stress = np.array(table[f"thermal_stress{suffix}"]) if is_thermal else matrix @ load.values[:v]
-        names = (*OF_ARCS, *COUNTS) if load.values[v - 1] else OF_ARCS  # the state of gamma12 has the counts
-        entries = {"stress": sign * stress} | {name: table[name] for name in names if name in table}
-        yield replace(load, values=sign * load.values), entries
-
-
-def _linear_stiffnesses(document: Document, contact: bool) -> Iterator[tuple[str, Float]]:
-    """Yield names and stiffnesses in result.json for cells without one-sided contact."""
-    if "effective_stiffness" in document and "effective_stiffness_compression" not in document:
-        yield "effective_stiffness", np.array(document["effective_stiffness"])
-    for number, point in enumerate(document.get("angle", ())):
-        if "stiffness" in point and not (contact and point["open"] + point["closed"]):
-            yield f"angle[{number}].stiffness", np.array(point["stiffness"])
+    columns = np.array(table[f"{stiffness}{suffix}"])
+    v = len(columns)
+    n = v + (v > 3)
+    if f"thermal_stress{suffix}" in table:
+        columns = np.column_stack([columns, table[f"thermal_stress{suffix}"]])
+    for k in [k for k in UNIT_LOADS[v] if k < columns.shape[1]]:
+        names = (*OF_ARCS, *COUNTS) if k == v - 1 else OF_ARCS  # the state of gamma12 has the counts
+        entries = {"stress": sign * columns[:, k]} | {name: table[name] for name in names if name in table}
+        yield Prescribed(sign * np.eye(n)[k], np.zeros(n, bool)), entries

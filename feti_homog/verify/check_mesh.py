@@ -43,7 +43,9 @@ def check_mesh(findings: Findings, cell: DiscreteCell) -> None:
     findings.compare("mesh", normals.sum(axis=0), [0, 0], cell.files.size.max(), "the sides at voids are closed")
     agrees = bool(sides.at_void.any()) == (porosity > 0)
     findings.require("mesh", agrees, f"cell.porosity = {porosity:g}, {len(normals)} sides at voids")
-    findings.record("mesh", sides.mismatch, lambda i: f"a side of element {sides.element[i]}")
+    sums = np.hypot(*(sides.normal + sides.normal[sides.partner]).T) / np.hypot(*sides.normal.T)
+    mismatch = np.where(sides.at_void, 0.0, np.where(sides.partner < 0, np.inf, sums))  # inf: several partners
+    findings.record("mesh", mismatch, lambda i: f"a side of element {sides.element[i]}")
 
 
 def check_interface(findings: Findings, cell: DiscreteCell) -> None:
@@ -82,8 +84,6 @@ def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
     each node; a node has the mean normal of its sides, weighted by these parts.
     """
     files, rows, nodes = cell.files, cell.files.interface, cell.sides.nodes[cell.inner]
-    row_of, k = np.full(len(files.mesh.points), -1), len(rows.length)
-    row_of[cell.nodes.node] = cell.faces.row
     is_fibre = np.asarray(rows.body == files.fibres.body[rows.fibre - 1])
     # Frames F of the circles or ellipses c + F p, |p| = 1, NaN if unknown.
     fibres = cell.files.document["fibres"]
@@ -94,7 +94,7 @@ def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
     of, coats = rows.fibre - 1, np.where(is_fibre, 0.0, thickness[rows.fibre - 1])
     frames = turn[of] * (np.array(axes, float).reshape(-1, 2)[of] + coats[:, None])[:, None]
     # A side whose nodes are no interface nodes belongs to none of them.
-    row, is_quadratic = row_of[nodes], nodes.shape[1] == 3
+    row, is_quadratic, k = cell.inner_rows, nodes.shape[1] == 3, len(rows.length)
     points, frame, (x, weights) = files.mesh.points[nodes], frames[row.max(axis=1)], roots_legendre(7)
     shares = np.stack([x * (x - 1), x * (x + 1), 2 - 2 * x * x]) / 2 if is_quadratic else np.full((2, len(x)), 0.5)
     parts = np.linalg.norm(_tangents(points, frame, x), axis=2) * weights / 2 @ shares.T
@@ -219,13 +219,9 @@ def _averaged(cell: DiscreteCell, state: State) -> float:
 
     def stresses() -> Iterator[tuple[slice, Float, Float]]:
         """Yield elements in portions: weights (e, q), and stresses (e, q, v) at r."""
-        if is_linear:
-            w, stress = (np.repeat(of[:, None], 3, axis=1) for of in (elements.area / 3, state.stress))
-            yield slice(None), w, stress
-            return
-        free = cell.free_strains(state.temperature)
+        free = state.temperature * cell.expansions
         for part, _, w, _, _, stress in elements.responses(state.displacement, state.along, free):
-            yield part, w, stress
+            yield part, w * np.ones(len(r)) * w.shape[1] / len(r), stress * np.ones((len(r), 1))
 
     weights, sums = np.zeros(len(mesh.points)), np.zeros((len(mesh.points), v))
     for part, w, stress in stresses():

@@ -38,7 +38,19 @@ def check_path(findings: Findings, cell: DiscreteCell, states: States) -> None:
     tolerance = max(STRENGTH, 10.0 * solver_limit(float(cell.files.document["solver"].hint("rtol"))))
     if law.has_tips:
         states = [_check_tips(findings, cell, state, points[state.point]["tips"]) for state in states]
-    _check_strength(findings, states, points, by_events, tolerance)
+    # Events break the worst bonds. No bond exceeds its strength unless a jump at this load overloads it and it breaks.
+    for number, state in enumerate(states):
+        used, where = np.nan_to_num(state.used), f"{state.name}, interface node {{}}".format
+        overloaded = by_events & overloaded_by_jump(state, points, tolerance)
+        findings.record("strength", np.where(overloaded, 0.0, np.maximum(used - 1.0, 0.0)), where)
+        largest, after = used.max(initial=1.0), states[min(number + 1, len(states) - 1)]
+        if by_events and (broke := damaged_at(points[state.point])):
+            # The next point has the bonds that break; here so many are as near to their strength as the worst.
+            worst = np.sort(np.where(np.isnan(state.used), np.inf, state.used))[-broke:]
+            findings.record("strength", np.maximum(1.0 - worst / largest, 0.0), f"{state.name}, bonds that break")
+        if by_events and after.point == state.point + 1:
+            broken = (after.damage > state.damage) & ~np.isnan(state.used)
+            findings.record("strength", np.where(broken, 1.0 - state.used / largest, 0.0), where)
     _check_steps(findings, cell, states, points, by_events)
     check_path_energies(findings, cell, states, points)
 
@@ -72,25 +84,6 @@ def _check_steps(findings: Findings, cell: DiscreteCell, states: States, points:
             grown = points[after.point]["fracture_energy"] - points[state.point]["fracture_energy"]
             off = max(low - grown, grown - high, 0.0) / scale
             findings.record("energy", off, f"{after.name}, fracture_energy")
-
-
-def _check_strength(findings: Findings, states: States, points: Points, by_events: bool, tolerance: float) -> None:
-    """Check that no bond exceeds its strength unless a jump at this load overloads it and it breaks at once.
-
-    Events break the worst bonds.
-    """
-    for number, state in enumerate(states):
-        used, where = np.nan_to_num(state.used), f"{state.name}, interface node {{}}".format
-        overloaded = by_events & overloaded_by_jump(state, points, tolerance)
-        findings.record("strength", np.where(overloaded, 0.0, np.maximum(used - 1.0, 0.0)), where)
-        largest, after = used.max(initial=1.0), states[min(number + 1, len(states) - 1)]
-        if by_events and (broke := damaged_at(points[state.point])):
-            # The next point has the bonds that break; here so many are as near to their strength as the worst.
-            worst = np.sort(np.where(np.isnan(state.used), np.inf, state.used))[-broke:]
-            findings.record("strength", np.maximum(1.0 - worst / largest, 0.0), f"{state.name}, bonds that break")
-        if by_events and after.point == state.point + 1:
-            broken = (after.damage > state.damage) & ~np.isnan(state.used)
-            findings.record("strength", np.where(broken, 1.0 - state.used / largest, 0.0), where)
 
 
 def overloaded_by_jump(state: StateNumbers, points: Points, tolerance: float) -> Bool:

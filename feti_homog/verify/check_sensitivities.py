@@ -10,7 +10,7 @@ import numpy as np
 from feti_homog.typing import Float
 from feti_homog.verify.bonds import law_at
 from feti_homog.verify.check_constants import NOISE, constants_of
-from feti_homog.verify.check_loads import NAMES, SPATIAL_ORDER
+from feti_homog.verify.check_loads import NAMES
 from feti_homog.verify.constitutive_law import laws, mixed_phases
 from feti_homog.verify.discrete_cell import BONDED, CLOSED, DiscreteCell
 from feti_homog.verify.elements import Elements
@@ -30,27 +30,42 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
         if cell.files.case.get("output", {}).get("sensitivities"):
             findings.record("tables", np.inf, "sensitivities, which the case asks for")
         return
-    names = document["sensitivities"]["parameters"]
+    data = document["sensitivities"]
+    names = data["parameters"]
     missing = sorted({*_parameters(cell)}.difference(names))
     findings.record("tables", [np.inf] * len(missing), lambda k: f"sensitivities, {missing[k]}")
-    values = np.array([_place(dict(cell.files.case), name)[2] for name in names])
+    places = (_place(dict(cell.files.case), name) for name in names)
+    values = np.array([np.array(table[key], float)[index] for table, key, index in places])
     # Changes over which the laws are nearly linear.
     ratios = np.array([name.endswith(".poisson") for name in names]) & (values < 0.5)
     sizes = np.where(ratios, 0.5 - values, np.where(values == 0.0, 1.0, np.abs(values)))
     direction = sizes * np.resize(WEIGHTS, len(values))
     states = list(cell.files.states())
-    fixed_status = "load" not in document and document["sensitivities"].get("at_fixed_status")
+    fixed_status = "load" not in document and data.get("at_fixed_status")
     if fixed_status:
         states = states[: len(states) // 2]  # the second half is under minus the unit loads
     moved = [_moved(cell, names, values + sign * STEP * direction) for sign in (1, -1)]
     above, below = (_energies(cell, states, case) for case in moved)
     slope = (above - below) / (2 * STEP)
-    if "load" in document:
-        _check_load(findings, cell, states, slope, direction)
-    elif fixed_status:
-        _check_secants(findings, cell, states, slope, direction)
-    else:
-        _check_linear(findings, cell.files.document, slope, direction)
+    if "load" in document or fixed_status:
+        check = _check_secants if fixed_status else _check_load
+        check(findings, cell, states, slope, direction)
+        return
+    # All constants of a linear cell.
+    C, heat = np.array(document["effective_stiffness"]), document.get("thermal_stress")
+    heat = None if heat is None else np.array(heat)
+    constants, n = constants_of(C, heat), len(C)
+    step = STEP * np.abs(C).max() / max(float(np.abs(slope).max()), TINY)
+    ends = [
+        constants_of(C + change[:, :n], None if heat is None else heat + change[:, n])
+        for change in (step * slope, -step * slope)
+    ]
+    for k, name in enumerate(data["constants"]):
+        kind = NOISE * max(abs(value) for other, value in constants.items() if other[0] == name[0])
+        terms, size = np.array(data["derivatives"][k]) * direction, max(abs(constants[name]), kind)
+        expected, scale = (ends[0][name] - ends[1][name]) / (2 * step), max(float(np.abs(terms).max()), size)
+        findings.compare("sensitivities", terms.sum(), expected, scale, name)
+        findings.compare("moduli", data["constant_values"][k], constants[name], size, f"sensitivities, {name}")
 
 
 def _parameters(cell: DiscreteCell) -> Iterator[str]:
@@ -124,48 +139,24 @@ def _check_load(findings: Findings, cell: DiscreteCell, states: list[State], slo
     findings.record("sensitivities", relative(off, scale), lambda k: ("the load", "stored")[k])
 
 
-def _check_linear(findings: Findings, document: Section, slope: Float, direction: Float) -> None:
-    """Check the derivatives of all constants in a linear cell."""
-    data, C, heat = document["sensitivities"], np.array(document["effective_stiffness"]), document.get("thermal_stress")
-    heat = None if heat is None else np.array(heat)
-    constants, n = constants_of(C, heat), len(C)
-    step = STEP * np.abs(C).max() / max(float(np.abs(slope).max()), TINY)
-    ends = [
-        constants_of(C + change[:, :n], None if heat is None else heat + change[:, n])
-        for change in (step * slope, -step * slope)
-    ]
-    for k, name in enumerate(data["constants"]):
-        kind = NOISE * max(abs(value) for other, value in constants.items() if other[0] == name[0])
-        terms, size = np.array(data["derivatives"][k]) * direction, max(abs(constants[name]), kind)
-        expected, scale = (ends[0][name] - ends[1][name]) / (2 * step), max(float(np.abs(terms).max()), size)
-        findings.compare("sensitivities", terms.sum(), expected, scale, name)
-        findings.compare("moduli", data["constant_values"][k], constants[name], size, f"sensitivities, {name}")
-
-
-def _place(case: Case, name: str) -> tuple[Any, Any, float]:
-    """Return the table and key of a parameter, and its value."""
+def _place(case: Case, name: str) -> tuple[Any, str, tuple[int, ...]]:
+    """Return the table and the key of a parameter, and its index in an array, () of a scalar."""
     section, *keys = name.split(".")
     table: Any = case[section]
     if section == "material" or isinstance(table, list):
         first = keys.pop(0)
         table = table[int(first) - 1] if isinstance(table, list) else table[first]
-    if len(keys) == 1:
-        return table, keys[0], float(table[keys[0]])
-    place = tuple(int(digit) - 1 for digit in keys[1] if digit.isdigit())
-    return table, (keys[0], place), float(np.array(table[keys[0]], float)[place])
+    return table, keys[0], tuple(int(digit) - 1 for digit in "".join(keys[1:]) if digit.isdigit())
 
 
 def _moved(cell: DiscreteCell, names: Sequence[str], values: Float) -> Case:
     """Return the case with other values of the parameters."""
     case: Case = copy.deepcopy(dict(cell.files.case))
     for name, value in zip(names, values, strict=True):
-        table, key, _ = _place(case, name)
-        if isinstance(key, str):
-            table[key] = float(value)
-        else:
-            numbers = np.array(table[key[0]], float)
-            numbers[key[1]] = numbers[key[1][::-1]] = value
-            table[key[0]] = numbers.tolist()
+        table, key, index = _place(case, name)
+        numbers = np.array(table[key], float)
+        numbers[index] = numbers[index[::-1]] = value
+        table[key] = numbers.tolist()
     return case
 
 
@@ -180,12 +171,10 @@ def _energies(cell: DiscreteCell, states: list[State], case: Mapping[str, Any]) 
     none, lengths = np.zeros_like(states[0].jump), files.interface.length[:, None]
     flexibility = law_at(replace(files, document=Section({"case": case}))).jumps(none + 1.0)
     springs = np.divide(lengths, flexibility, out=none, where=flexibility > 0.0)
-    strains = [state for state in states if not state.temperature]
-    if len(strains) == 6:  # in the order of components
-        strains = [strains[SPATIAL_ORDER.index(k)] for k in range(6)]
-    columns = []
+    strains, columns = [state for state in states if not state.temperature], []
+    strains.sort(key=lambda state: int(np.abs(state.strain).argmax()))  # in the order of components
     for state in (*strains, *(state for state in states if state.temperature)):
-        free_strain = None if free is None else state.temperature * free
+        free_strain = state.temperature * free
         fields = elements.fields(state.displacement, np.abs(state.displacement), state.along, free_strain)
         out = float(elements.area @ fields.stress[:, 2]) if files.is_spatial else 0.0
         columns.append([float((other.displacement * fields.force).sum()) + other.along * out for other in strains])

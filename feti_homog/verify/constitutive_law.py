@@ -15,11 +15,11 @@ VOIGT = {3: np.array([[0, 2], [2, 1]]), 6: np.array([[0, 5, 4], [5, 1, 3], [4, 3
 Constants = Mapping[str, Any]
 
 
-def laws(case: Mapping[str, Any], phases: Sequence[str]) -> tuple[Float, Float | None]:
+def laws(case: Mapping[str, Any], phases: Sequence[str]) -> tuple[Float, Float]:
     """Return stiffnesses (phases, v, v) in the plane state of a case, and strains (phases, v) per temperature.
 
     The axes are those of the cell.  Stiffnesses have no E33, gamma13 and gamma23, or in plane stress no S33, S13 and
-    S23.  Strains are R_ip R_jq alpha_pq; None except in generalized plane strain with expansions of all phases.  Raises
+    S23.  Strains are R_ip R_jq alpha_pq; zero except in generalized plane strain with expansions of all phases.  Raises
     CaseError for a phase of the mesh without a material.
     """
     plane, stiffnesses, expansions = case["analysis"]["plane"], list[Float](), list[Float]()
@@ -40,7 +40,7 @@ def laws(case: Mapping[str, Any], phases: Sequence[str]) -> tuple[Float, Float |
             tensor = turn @ np.diag(np.broadcast_to(np.array(strains, float), 3)) @ turn.T
             expansions.append(np.array([*np.diag(tensor), 2 * tensor[1, 2], 2 * tensor[0, 2], 2 * tensor[0, 1]]))
     known = plane == "generalized" and len(expansions) == len(phases)
-    return np.stack(stiffnesses), np.stack(expansions) if known else None
+    return np.stack(stiffnesses), np.stack(expansions) if known else np.zeros((len(phases), len(stiffnesses[0])))
 
 
 def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:

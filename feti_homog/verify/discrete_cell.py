@@ -69,7 +69,7 @@ class DiscreteCell:
 
     Attributes:
         stiffnesses: (phases, v, v), v = 3, or 6 in generalized plane strain.
-        expansions: (phases, v), None if unknown.
+        expansions: (phases, v), zero if unknown.
         constituent: (subdomains,) connected parts of phases.
         inner: (s,) True for torn sides on the inner face of bonds that may break.
         fractions: (phases,) area fractions.
@@ -78,7 +78,7 @@ class DiscreteCell:
 
     files: ResultFiles
     stiffnesses: Float
-    expansions: Float | None
+    expansions: Float
     elements: Elements
     sides: TornSides
     nodes: TornNodes
@@ -95,8 +95,7 @@ class DiscreteCell:
         stiffnesses, free = laws(files.case, files.phases)
         elements = Elements(mesh, stiffnesses, mixed_phases(files.case, files.phases))
         sides, nodes, radius = torus.torn(mesh, files.size)
-        parts = torus.constituents(mesh, sides)
-        inwards = torus.inwardness(mesh, files.phases, sides, parts)
+        parts, inwards = torus.bodies(mesh, files.phases, sides)
         # Places where exactly two bodies meet along one line, and the sections of their bonds.
         node_depth = inwards[parts[nodes.subdomain]]
         members = np.unique(np.column_stack([nodes.place, node_depth, nodes.phase]), axis=0)
@@ -143,18 +142,18 @@ class DiscreteCell:
         return np.asarray(np.linalg.inv(np.einsum("p,pij->ij", self.fractions, np.linalg.inv(self.stiffnesses))))
 
     @cached_property
-    def neighbours(self) -> Int:
-        """(e, 2) pairs of adjacent interface nodes."""
+    def inner_rows(self) -> Int:
+        """(s, 2 or 3) interface nodes on the inner torn sides, -1 for other nodes."""
         row_of = np.full(len(self.files.mesh.points), -1)
         row_of[self.nodes.node] = self.faces.row
-        rows = row_of[self.sides.nodes[self.inner]]
-        pairs = (rows[:, [0, 2, 2, 1]] if rows.shape[1] == 3 else rows).reshape(-1, 2)
-        return np.asarray(pairs[(pairs >= 0).all(axis=1)])
+        return np.asarray(row_of[self.sides.nodes[self.inner]])
 
     def tips(self, status: AnyInt) -> Bool:
         """(k,) bonds next to a broken one."""
-        broken, near_break = status != BONDED, np.zeros(len(status), bool)
-        for node, neighbour in (self.neighbours.T, self.neighbours.T[::-1]):
+        rows, broken, near_break = self.inner_rows, status != BONDED, np.zeros(len(status), bool)
+        pairs = (rows[:, [0, 2, 2, 1]] if rows.shape[1] == 3 else rows).reshape(-1, 2)
+        pairs = pairs[(pairs >= 0).all(axis=1)].T
+        for node, neighbour in (pairs, pairs[::-1]):
             near_break[node[broken[neighbour]]] = True
         return np.asarray(near_break & ~broken)
 
@@ -193,14 +192,9 @@ class DiscreteCell:
             add_at_nodes(sums, nodes, 0.5 * np.stack([-dy, dx], axis=1)[:, None] * shapes[:, None])
         return sums
 
-    def free_strains(self, temperature: float) -> Float | None:
-        """(phases, v) strains of stress-free phases at a temperature."""
-        return None if self.expansions is None else self.expansions * temperature
-
     def loads(self, strain: Float, temperature: float) -> Float:
         """(v,) strain plus the largest thermal strain of a phase."""
-        free = self.free_strains(temperature)
-        return strain if free is None else np.asarray(strain + np.abs(free).max(axis=0))
+        return np.asarray(strain + np.abs(self.expansions * temperature).max(axis=0))
 
     def scales(self, strain: Float, temperature: float, slip: float = 0.0) -> Scales:
         """Return the scales of a load and of a slip that friction holds; no scale vanishes with the load."""

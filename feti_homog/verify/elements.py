@@ -82,9 +82,7 @@ class Elements:
             add_at_nodes(sums, self._mesh.triangles[part], np.einsum("eqad,eq->ead", gradients, weights))
         return sums
 
-    def fields(
-        self, displacement: Float, terms_of_u: Float, along: float = 0.0, free: Float | None = None
-    ) -> ElementFields:
+    def fields(self, displacement: Float, terms_of_u: Float, along: float, free: Float) -> ElementFields:
         """Return the fields of displacements (n, c), sums of terms with these sizes (n, c).
 
         `along` is E33, `free` are the strains (phases, v) of stress-free phases.
@@ -100,7 +98,7 @@ class Elements:
             # |du/dx| sum |x_a| |dN_a/dx|: gradients are off by the rounding of places, in small elements most.
             lengths = np.einsum("eqad,ead->eq", np.abs(gradients), np.abs(self._mesh.points)[nodes])
             size[part] += (np.abs(slope).max(axis=(2, 3)) * lengths).max(axis=1) + abs(along)
-            size[part] += 0.0 if free is None else np.abs(free[phase]).max(axis=1)
+            size[part] += np.abs(free[phase]).max(axis=1)
             forces = np.einsum("eqad,eqid,eq->eai", gradients, answer[..., PLACES[v]], weights, optimize=True)
             add_at_nodes(force, nodes, forces)
             rounded = np.abs(self._stiffnesses).max(axis=(1, 2))[phase] * size[part]
@@ -110,19 +108,19 @@ class Elements:
         return ElementFields(strain, stress, size, force, terms.max(axis=1), largest, energy)
 
     def responses(
-        self, displacement: Float, along: float, free: Float | None
+        self, displacement: Float, along: float, free: Float
     ) -> Iterator[tuple[slice, Float, Float, Float, Float, Float]]:
         """Yield elements in portions: gradients, weights, du/dx of nodes (e, q, c, 2), strains, stresses (e, q, v)."""
-        v, none = self._stiffnesses.shape[1], np.zeros(self._stiffnesses.shape[:2])
+        v = self._stiffnesses.shape[1]
         for part, gradients, weights in self._parts():
             phase = self._mesh.phase[part]
             slope = np.einsum("eqad,eai->eqid", gradients, displacement[self._mesh.triangles[part]])
-            local, own_free = _strains(slope, v, along), (none if free is None else free)[phase]
+            local, own_free = _strains(slope, v, along), free[phase]
             excess, mixed = np.zeros(local.shape[:2]), np.flatnonzero(self.mixed[phase])
             if len(mixed):  # their pressure less lambda tr eps; bubbles add to the strains
                 lame = np.stack([self._stiffnesses[phase[mixed], 0, 1], self._stiffnesses[phase[mixed], -1, -1]], 1)
                 elastic = local[mixed] - own_free[mixed, None]
-                inner, pressure = inner_fields(quadrature_points(), gradients[mixed], weights[mixed], elastic, lame)
+                inner, pressure = inner_fields(gradients[mixed], weights[mixed], elastic, lame)
                 if v == 6:
                     inner = np.concatenate([inner, np.zeros((*inner.shape[:2], 1, 2))], axis=2)
                 bubble = _strains(inner, v, 0.0)
@@ -200,15 +198,13 @@ def add_at_nodes(sums: Float, nodes: Int, values: Float) -> None:
         sums[:, direction] += np.bincount(nodes.ravel(), values[..., direction].ravel(), len(sums))
 
 
-def inner_fields(
-    places: Float, gradients: Float, weights: Float, strain: Float, lame: Float
-) -> tuple[Float, Float]:  # fmt: skip
+def inner_fields(gradients: Float, weights: Float, strain: Float, lame: Float) -> tuple[Float, Float]:
     """Return du_i/dx_d (e, q, 2, 2) of the bubble, and the pressure (e, q).
 
-    Barycentric places (q, 3), gradients of the nodes' functions (e, q, 6, 2), weights (e, q), elastic strains of nodal
-    displacements (e, q, v), lambda and mu (e, 2).
+    Gradients of the nodes' functions (e, q, 6, 2), weights (e, q), elastic strains of nodal displacements (e, q, v),
+    lambda and mu (e, 2).
     """
-    first, shear = lame.T
+    (first, shear), places = lame.T, quadrature_points()
     slopes = np.einsum("ab,eqbd->eqad", OF_NODES, gradients)
     of_bubble = np.einsum("qa,eqad->eqd", places[:, [1, 2, 0]] * places[:, [2, 0, 1]], slopes)
     square = np.einsum("eq,eqd,eqk->edk", weights, of_bubble, of_bubble)

@@ -150,7 +150,7 @@ def _numbers(cell: DiscreteCell, states: States, points: Points) -> list[PointNu
             stored = float(point["stored"])
             heat = (2 * stored - float(strain @ stress)) / temperature
         else:
-            stored, heat = float(strain @ stress) / 2, 0.0 if cell.expansions is None else np.nan
+            stored, heat = float(strain @ stress) / 2, np.nan if cell.expansions.any() else 0.0
         n, scales = len(load.values), cell.scales(strain, temperature)
         pairs = np.array([*strain, temperature][:n]), np.array([*stress, heat][:n])
         numbers.append(PointNumbers(name, *pairs, stored, load, scales.stress * scales.strain))
@@ -197,11 +197,9 @@ def _check_losses(
     """
     by_events = cell.files.case["path"]["method"] == "events"
     C: Float = np.einsum("p,pij->ij", cell.fractions, cell.stiffnesses)  # Voigt's, of strains and temperature
-    if cell.files.is_spatial:
-        alpha = np.zeros(cell.stiffnesses.shape[:2]) if cell.expansions is None else cell.expansions
-        thermal = np.einsum("p,pij,pj->i", cell.fractions, cell.stiffnesses, alpha)
-        square = np.einsum("p,pi,pij,pj->", cell.fractions, alpha, cell.stiffnesses, alpha)
-        C = np.block([[C, -thermal[:, None]], [-thermal[None], square]])
+    thermal = np.einsum("p,pij,pj->i", cell.fractions, cell.stiffnesses, cell.expansions)
+    square = np.einsum("p,pi,pij,pj->", cell.fractions, cell.expansions, cell.stiffnesses, cell.expansions)
+    C = np.block([[C, -thermal[:, None]], [-thermal[None], square]])
     for number, (point, now) in enumerate(zip(points, numbers, strict=True)):
         state, before = (numbers[number - 1] if number else None), points[number - 1]
         lost, low, high = point["dissipated"] - (before["dissipated"] if number else 0.0), 0.0, 0.0

@@ -215,7 +215,34 @@ def opened(directory: Path) -> Iterator[ResultFiles]:
         file = h5py.File(path, "r")
     with file:
         with _reading(path):
-            files = _contents(Section(_document(directory / JSON)), file, changed)
+            n, m = len(file["mesh/points"]), len(file["mesh/triangles"])
+            k, f = len(file["interface/points"]), len(file["fibre/radius"])
+            columns = 6 if file["mesh/triangles"].shape[1:] == (6,) else 3
+            _expect(n > 0 and m > 0, "/mesh has no nodes or no elements")
+
+            def tables(group: str, **shapes: tuple[int, ...]) -> list[Any]:
+                return [_table(file, group, name, shape) for name, shape in shapes.items()]
+
+            mesh = Mesh(*tables("mesh", points=(n, 2), triangles=(m, columns), subdomain=(m,), phase=(m,), body=(m,)))
+            rows = tables("interface", points=(k, 2), normal=(k, 2), length=(k,), fibre_number=(k,), fibre=(k,))
+            # Older results have one section [interface] and bonds of one strength.
+            rows.append(_table(file, "interface", "pair", (k,), np.zeros(k, np.int32)))
+            interface = InterfaceRows(*rows)
+            fibres = tables("fibre", body=(f,), centre=(f, 2), radius=(f,))
+            fibres.append(_table(file, "fibre", "strength", (f,), np.ones(f)))
+            size = np.array([file.attrs["width"], file.attrs["height"]], float)
+            phases = tuple(map(str, file.attrs["phases"]))
+            document = Section(_document(directory / JSON))
+            files = ResultFiles(document, size, phases, mesh, interface, Fibres(*fibres), file, changed)
+            for name, table, low, high in (
+                ("/mesh/triangles names unknown nodes", mesh.triangles, 0, n),
+                ("/mesh/phase names unknown phases", mesh.phase, 0, len(phases)),
+                ("/interface/pair names unknown interfaces", interface.pair, 0, max(len(files.interfaces), 1)),
+                ("/interface/fibre_number names unknown fibres", interface.fibre, 1, f + 1),
+            ):
+                _expect(bool(((table >= low) & (table < high)).all()), name)
+            pairs = {name for section in files.interfaces for name in section.get("between", ())}
+            _expect(pairs <= set(phases), "the case has interfaces between unknown phases")
         yield files
 
 
@@ -229,37 +256,6 @@ def _document(path: Path) -> Mapping[str, Any]:
     if not isinstance(document, dict) or document.get("schema") != SCHEMA or not isinstance(document.get("case"), dict):
         raise CaseError(f"{path}: is no result of this version: expected schema {SCHEMA} and a case")
     return document
-
-
-def _contents(document: Section, file: h5py.File, altered: tuple[str, ...]) -> ResultFiles:
-    """Read the mesh, the interface and the fibres, and check their indices."""
-    n, m = len(file["mesh/points"]), len(file["mesh/triangles"])
-    k, f = len(file["interface/points"]), len(file["fibre/radius"])
-    columns = 6 if file["mesh/triangles"].shape[1:] == (6,) else 3
-    _expect(n > 0 and m > 0, "/mesh has no nodes or no elements")
-
-    def tables(group: str, **shapes: tuple[int, ...]) -> list[Any]:
-        return [_table(file, group, name, shape) for name, shape in shapes.items()]
-
-    mesh = Mesh(*tables("mesh", points=(n, 2), triangles=(m, columns), subdomain=(m,), phase=(m,), body=(m,)))
-    rows = tables("interface", points=(k, 2), normal=(k, 2), length=(k,), fibre_number=(k,), fibre=(k,))
-    # Older results have one section [interface] and bonds of one strength.
-    rows.append(_table(file, "interface", "pair", (k,), np.zeros(k, np.int32)))
-    interface = InterfaceRows(*rows)
-    fibres = tables("fibre", body=(f,), centre=(f, 2), radius=(f,))
-    fibres.append(_table(file, "fibre", "strength", (f,), np.ones(f)))
-    size, phases = np.array([file.attrs["width"], file.attrs["height"]], float), tuple(map(str, file.attrs["phases"]))
-    files = ResultFiles(document, size, phases, mesh, interface, Fibres(*fibres), file, altered)
-    for name, table, low, high in (
-        ("/mesh/triangles names unknown nodes", mesh.triangles, 0, n),
-        ("/mesh/phase names unknown phases", mesh.phase, 0, len(phases)),
-        ("/interface/pair names unknown interfaces", interface.pair, 0, max(len(files.interfaces), 1)),
-        ("/interface/fibre_number names unknown fibres", interface.fibre, 1, f + 1),
-    ):
-        _expect(bool(((table >= low) & (table < high)).all()), name)
-    pairs = {name for section in files.interfaces for name in section.get("between", ())}
-    _expect(pairs <= set(phases), "the case has interfaces between unknown phases")
-    return files
 
 
 def _table(file: h5py.File, group: str, name: str, shape: tuple[int, ...], default: Any = None) -> Any:

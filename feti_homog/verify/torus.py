@@ -33,12 +33,6 @@ class TornSides:
     partner: Int
     at_void: Bool
 
-    @property
-    def mismatch(self) -> Float:
-        """(s,) |normal + partner's normal| / |normal|, infinite for several partners, 0 at voids."""
-        sums = np.hypot(*(self.normal + self.normal[self.partner]).T) / np.hypot(*self.normal.T)
-        return np.asarray(np.where(self.at_void, 0.0, np.where(self.partner < 0, np.inf, sums)))
-
 
 @dataclass(frozen=True)
 class TornNodes:
@@ -116,30 +110,23 @@ def along_one_line(sides: TornSides, nodes: TornNodes, part: Int) -> Bool:
     return np.asarray((middle > 0) | ((facing + at_void == 4) & (facing > 0)))
 
 
-def constituents(mesh: Mesh, sides: TornSides) -> Int:
-    """(subdomains,) number of each subdomain's part: a connected region of one phase on the torus."""
-    paired = np.flatnonzero(sides.partner >= 0)
-    a, b = sides.element[paired], sides.element[sides.partner[paired]]
-    joined = mesh.phase[a] == mesh.phase[b]
-    n = int(mesh.subdomain.max()) + 1
-    links = (mesh.subdomain[a[joined]], mesh.subdomain[b[joined]])
-    graph = coo_matrix((np.ones(len(links[0])), links), shape=(n, n))
-    return np.asarray(connected_components(graph, directed=False)[1], np.int64)
+def bodies(mesh: Mesh, phases: tuple[str, ...], sides: TornSides) -> tuple[Int, Int]:
+    """Return the part (subdomains,) of each subdomain, and the rank (parts,) of each part, larger inwards.
 
-
-def inwardness(mesh: Mesh, phases: tuple[str, ...], sides: TornSides, part: Int) -> Int:
-    """(parts,) ranks of parts, larger inwards; `part` (subdomains,) is the part of each subdomain.
-
-    Ranks go by the bodies between a part and the matrix, then coatings before others, then labels.
+    A part is a connected region of one phase on the torus. Ranks go by the parts between it and the matrix, then
+    coatings before others, then labels.
     """
     paired = np.flatnonzero(sides.partner >= 0)
-    ends = (part[mesh.subdomain[sides.element[side]]] for side in (paired, sides.partner[paired]))
-    n = int(part.max()) + 1
+    ends = np.stack([sides.element[paired], sides.element[sides.partner[paired]]])
+    links = mesh.subdomain[ends[:, mesh.phase[ends[0]] == mesh.phase[ends[1]]]]
+    graph = coo_matrix((np.ones(links.shape[1]), tuple(links)), shape=(int(mesh.subdomain.max()) + 1,) * 2)
+    n, part = connected_components(graph, directed=False)
+    of_element = part[mesh.subdomain]
     phase, label = np.zeros(n, np.int64), np.zeros(n, np.int64)
-    phase[part[mesh.subdomain]], label[part[mesh.subdomain]] = mesh.phase, mesh.body
-    graph = csr_matrix((np.ones(len(paired)), tuple(ends)), shape=(n, n))
+    phase[of_element], label[of_element] = mesh.phase, mesh.body
+    graph = csr_matrix((np.ones(len(paired)), tuple(of_element[ends])), shape=(n, n))
     steps = dijkstra(graph, directed=False, indices=np.flatnonzero(phase == 0), unweighted=True, min_only=True)
     coats = np.array([name == COATING for name in phases])[phase]
     rank = np.empty(n, np.int64)
     rank[np.lexsort((label, ~coats, steps))] = np.arange(n)
-    return rank
+    return np.asarray(part, np.int64), rank

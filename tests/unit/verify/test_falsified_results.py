@@ -251,7 +251,7 @@ def test_displacements_that_fit_their_stresses_break_equilibrium_alone(results, 
         state.fluctuation[inner] += SMALL
         displacement = state.fluctuation + cell.files.mesh.points @ gradient(state.strain).T
         file["state/0/displacement"][()] = displacement
-        file["state/0/stress"][()] = cell.elements.fields(displacement, displacement).stress
+        file["state/0/stress"][()] = cell.elements.fields(displacement, displacement, 0.0, cell.expansions).stress
 
     assert broken(falsified(results("bonded"), tmp_path / "copy", edit)) - {"stress 33"} == {
         "equilibrium",
@@ -265,7 +265,7 @@ def test_the_held_place_may_collect_the_rounding_of_all_others_and_no_more(resul
     with opened(results("bonded")) as files:
         cell, state = DiscreteCell.of(files), next(files.states())
         displacement = state.displacement
-        fields = cell.elements.fields(displacement, np.abs(displacement))
+        fields = cell.elements.fields(displacement, np.abs(displacement), 0.0, cell.expansions)
         fields = replace(fields, force_size=1e6 * fields.force_size)
         inner = np.setdiff1d(np.arange(len(displacement)), cell.nodes.node)
         held = np.flatnonzero((state.fluctuation == 0).all(axis=1))[0]
