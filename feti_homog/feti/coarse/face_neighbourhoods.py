@@ -24,7 +24,7 @@ from feti_homog.feti.linalg.dense_matrices import schur_complement
 from feti_homog.feti.operators.one_subdomain import ExplicitInterfaceOperator
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.mesh import ReferenceLattice, Submesh, periodic_topology, submeshes
-from feti_homog.typing import Bool, Float, Int
+from feti_homog.typing import Float, Int
 
 
 def trace_space(
@@ -108,30 +108,23 @@ def face_neighbourhoods(
     triangles = np.flatnonzero(is_near)
     edges = body.submesh.edge_class[body.submesh.triangle_edges[triangles]]
     label = periodic_topology.components(len(triangles), *periodic_topology.edge_pairs(edges))
-    neighbourhoods = (
-        _neighbourhood(body, dofs, triangles[label == k], on_face, on_others, thresholds.min_trace_dofs)
-        for k in range(label.max() + 1)
-    )
-    return [neighbourhood for neighbourhood in neighbourhoods if neighbourhood is not None]
-
-
-def _neighbourhood(
-    body: Subdomain, dofs: Int, triangles: Int, on_face: Bool, on_others: Bool, min_trace_dofs: int
-) -> FaceNeighbourhood | None:
-    """Return the neighbourhood in coarse triangles if it has enough face nodes."""
-    outside = np.zeros_like(on_face)
-    outside[body.mesh.node_class[np.delete(body.mesh.nodes, triangles, axis=0)]] = True
-    piece = submeshes.part(body.submesh, triangles)
-    subdomain = Subdomain.build(piece, body.mesh.lattice, body.L, body.problem, is_thin=body.is_thin, mixed=body.mixed)
-    of_body = np.empty(subdomain.mesh.n_classes, np.int64)
-    of_body[subdomain.mesh.node_class[subdomain.mesh.nodes]] = body.mesh.node_class[body.mesh.nodes[triangles]]
-    nodes = np.flatnonzero(on_face[of_body])
-    if len(nodes) < 2:  # a single node has no soft mode: it can only translate
-        return None
-    all_of = body.problem.dofs
-    face, at = all_of(nodes), np.searchsorted(dofs, all_of(of_body[nodes]))
-    movable = all_of(np.flatnonzero(on_face[of_body] | ~(outside | on_others)[of_body]))
-    K = subdomain.take_stiffness()
-    S_fixed = schur_complement(K[movable][:, movable].tocsr(), np.searchsorted(movable, face))
-    P = trace_space(subdomain.submesh, subdomain.mesh.lattice, subdomain.problem, nodes, min_trace_dofs)
-    return FaceNeighbourhood(at, ExplicitInterfaceOperator(subdomain, K, face), subdomain.R[face], P, S_fixed)
+    neighbourhoods, lattice, all_of = [], body.mesh.lattice, body.problem.dofs
+    for k in range(label.max() + 1):
+        members = triangles[label == k]
+        outside = np.zeros_like(on_face)
+        outside[np.delete(classes, members, axis=0)] = True
+        piece = submeshes.part(body.submesh, members)
+        subdomain = Subdomain.build(piece, lattice, body.L, body.problem, is_thin=body.is_thin, mixed=body.mixed)
+        of_body = np.empty(subdomain.mesh.n_classes, np.int64)
+        of_body[subdomain.mesh.node_class[subdomain.mesh.nodes]] = classes[members]
+        nodes = np.flatnonzero(on_face[of_body])
+        if len(nodes) < 2:  # a single node has no soft mode: it can only translate
+            continue
+        face, at = all_of(nodes), np.searchsorted(dofs, all_of(of_body[nodes]))
+        movable = all_of(np.flatnonzero(on_face[of_body] | ~(outside | on_others)[of_body]))
+        K = subdomain.take_stiffness()
+        S_fixed = schur_complement(K[movable][:, movable].tocsr(), np.searchsorted(movable, face))
+        P = trace_space(piece, lattice, body.problem, nodes, thresholds.min_trace_dofs)
+        operator = ExplicitInterfaceOperator(subdomain, K, face)
+        neighbourhoods.append(FaceNeighbourhood(at, operator, subdomain.R[face], P, S_fixed))
+    return neighbourhoods

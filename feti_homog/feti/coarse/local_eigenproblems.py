@@ -22,7 +22,7 @@ from feti_homog.feti.coarse.face_neighbourhoods import face_neighbourhoods, trac
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.linalg.dense_matrices import cholesky
 from feti_homog.feti.operators.with_springs import BoundaryOperator, DenseOperator, is_dense
-from feti_homog.feti.thresholds import DEFAULTS, Thresholds
+from feti_homog.feti.thresholds import Thresholds
 from feti_homog.typing import Float, Float32, Int
 
 # Eigenvalues of a matrix in single precision, relative to its largest, that are rounding.
@@ -58,11 +58,7 @@ class SubdomainEigenproblem:
     """One eigenproblem on the whole boundary."""
 
     def __init__(
-        self,
-        block: SubdomainBlocks,
-        operator: DenseOperator,
-        common: Mapping[int, Int],
-        min_trace_dofs: int = DEFAULTS.min_trace_dofs,
+        self, block: SubdomainBlocks, operator: DenseOperator, common: Mapping[int, Int], min_trace_dofs: int
     ) -> None:
         """Store the rows of `common` that the subdomain shares with each subdomain, itself included."""
         self.block, self.common, self._operator = block, common, operator
@@ -94,7 +90,7 @@ class SubdomainEigenproblem:
 class FaceEigenproblems:
     """One eigenproblem on each face; see `SubdomainEigenproblem`."""
 
-    def __init__(self, block: SubdomainBlocks, common: Mapping[int, Int], thresholds: Thresholds = DEFAULTS) -> None:
+    def __init__(self, block: SubdomainBlocks, common: Mapping[int, Int], thresholds: Thresholds) -> None:
         self.block, self.common = block, common
         self._factor, self._decayed = thresholds.face_factor, thresholds.decayed
         problem = block.subdomain.problem
@@ -135,7 +131,7 @@ class FaceEigenproblems:
 
 
 def eigenproblem(
-    block: SubdomainBlocks, common: Mapping[int, Int], thresholds: Thresholds = DEFAULTS
+    block: SubdomainBlocks, common: Mapping[int, Int], thresholds: Thresholds
 ) -> SubdomainEigenproblem | FaceEigenproblems:
     """Return the eigenproblem of a subdomain, or one for each face.
 

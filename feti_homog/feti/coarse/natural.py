@@ -58,7 +58,7 @@ class NaturalCoarseSpace:
         self.G = assemble_owned_rows(comm, operators.B @ self.R, jump_operator.rows, columns, (owned, modes))
         self.factorizations, self._active = 0, np.ones(owned)
         self._diagonal = distributed_arrays.allreduce_sum(comm, np.asarray(self.G.power(2).sum(axis=0)).ravel())
-        self.unconstrained_modes = self._no_motions = csc_matrix((self.kernel_dimension, 0))
+        self.unconstrained_modes = csc_matrix((self.kernel_dimension, 0))
         self._reaching = np.union1d(self.G.indices, columns).astype(np.int64)
         self.solver = DistributedSolver(comm, self.kernel_dimension, "feti_natural_")
         self.factor()
@@ -70,7 +70,7 @@ class NaturalCoarseSpace:
         G^T G + s Z Z^T.
         """
         self._active, self._is_factored = active, False
-        self.unconstrained_modes = self._null_space(self._gram.entries(active))
+        self.unconstrained_modes = self.free_motions(active)
 
     @property
     def G_active(self) -> csr_matrix:
@@ -99,26 +99,25 @@ class NaturalCoarseSpace:
         return GramMatrix(self.comm, self.G)
 
     @cached_property
-    def _groups(self) -> list[tuple[Int, Int]]:
+    def _groups(self) -> list[tuple[Int, Int, Float, Float, Float]]:
         """Groups of coupled modes (groups, size), and the positions of their blocks in the entries of G^T G.
 
-        The pieces of the pinned body are glued to the pinned class and cannot move.  The other modes that are coupled
-        share an eigenproblem, which is about as large as the kernel of a fibre.
+        The blocks of the last `free_motions`, their eigenvalues and their eigenvectors follow.  The pieces of the
+        pinned body are glued to the pinned class and cannot move.  The other modes that G^T G couples have a common
+        eigenproblem, which is about as large as the kernel of a fibre.
         """
-        movable = np.flatnonzero(self.body != self.pinned_body)
-        return [(members, self._gram.places(members)) for members in self._gram.groups(movable)]
+        groups = []
+        for members in self._gram.groups(np.flatnonzero(self.body != self.pinned_body)):
+            places = self._gram.places(members)
+            nothing = np.full(places.shape, np.nan)
+            groups.append((members, places, nothing, nothing[..., 0].copy(), nothing.copy()))
+        return groups
 
-    @cached_property
-    def _eigenpairs(self) -> list[tuple[Float, Float, Float]]:
-        """Blocks of the groups at the last call, their eigenvalues and their eigenvectors."""
-        shapes = [places.shape for _, places in self._groups]
-        return [(np.full(shape, np.nan), np.empty(shape[:2]), np.empty(shape)) for shape in shapes]
-
-    def _null_space(self, entries: Float) -> csc_matrix:
-        """Compute the orthonormal null space (m, z) of G^T G with these entries."""
-        padded, columns, none = np.append(entries, 0.0), 0, np.zeros(0, np.int64)
+    def free_motions(self, active: Float) -> csc_matrix:
+        """Compute the `unconstrained_modes` (m, z) for these active rows: the null space of G^T G.  Collective."""
+        padded, columns, none = np.append(self._gram.entries(active), 0.0), 0, np.zeros(0, np.int64)
         rows, numbers, values = [none], [none], [np.zeros(0)]
-        for (members, places), (blocks, eigenvalues, vectors) in zip(self._groups, self._eigenpairs, strict=True):
+        for members, places, blocks, eigenvalues, vectors in self._groups:
             now = padded[places]
             # A break changes one group or two.
             if len(other := np.flatnonzero((now != blocks).any(axis=(1, 2)))):
@@ -132,8 +131,6 @@ class NaturalCoarseSpace:
             numbers.append(np.repeat(columns + np.arange(len(which)), members.shape[1]))
             values.append(vectors[which, :, mode].ravel())
             columns += len(which)
-        if not columns:
-            return self._no_motions
         entry = np.concatenate(values), (np.concatenate(rows), np.concatenate(numbers))
         Z = csc_matrix(entry, shape=(self.kernel_dimension, columns))
         Z.eliminate_zeros()
@@ -157,10 +154,6 @@ class NaturalCoarseSpace:
             self.factor()
         projected: Float = x - self._G @ self.solver.solve(self._GT @ x)
         return projected
-
-    def free_motions(self, active: Float) -> csc_matrix:
-        """Compute the `unconstrained_modes` (m, z) for other active rows.  Collective."""
-        return self._null_space(self._gram.entries(active))
 
     def rigid_body_motion(self, amplitudes: Float) -> Float:
         """Compute the motion R alpha of the boundary dofs for alpha (m,) or (m, k)."""

@@ -95,9 +95,20 @@ class InterfaceNeighbours:
         self.first = int(np.searchsorted(self.rows, rows[0])) if len(rows) else 0
         bodies, n = np.concatenate(comm.allgather(jump_operator.nodes.bodies)), len(self.rows)
         number = self.node_numbers(jump_operator)
+        # Outer sides of the subdomains of each body between interface nodes a < b, as codes a n + b.
+        none = np.zeros(0, np.int64)
+        codes, first = ([none], [none]), 0
+        for s in subdomains:
+            nodes = number[first + s.mesh.node_class[s.mesh.triangles]]
+            first += s.mesh.n_classes
+            ends = nodes[:, SIDES[nodes.shape[1]]].reshape(-1, 2)
+            ends = ends[(ends >= 0).all(axis=1)]
+            for body, of_body in zip(bodies.T, codes, strict=True):
+                low, high = np.sort(ends[(body[ends] == s.submesh.body).all(axis=1)], axis=1).T
+                of_body.append(_once(low * n + high))
         # Both bodies have the side of an interface once: twice is within a body that is cut, and a void has none.
-        outer, inner = (np.concatenate(comm.allgather(_sides(subdomains, number, body, n))) for body in bodies.T)
-        a, b = np.divmod(np.intersect1d(_once(outer), _once(inner)), n)
+        outer, inner = (_once(np.concatenate(comm.allgather(np.concatenate(of_body)))) for of_body in codes)
+        a, b = np.divmod(np.intersect1d(outer, inner), n)
         entries = np.ones(2 * len(a)), (np.concatenate([a, b]), np.concatenate([b, a]))
         self.adjacency: csr_matrix = coo_matrix(entries, shape=(n, n)).tocsr()
         self._components = jump_operator.components
@@ -127,22 +138,6 @@ class InterfaceNeighbours:
         B = jump_operator.B[normal[local]].tocoo()
         number[B.col // jump_operator.components] = local[B.row]
         return number
-
-
-def _sides(subdomains: Sequence[Subdomain], number: Int, body: Int, n: int) -> Int:
-    """(e,) codes a n + b, a < b, for outer sides of these subdomains between interface nodes a and b.
-
-    `body` (n,) is the one of each node whose subdomains count, `number` as of `node_numbers`.
-    """
-    codes, first = [np.zeros(0, np.int64)], 0
-    for s in subdomains:
-        nodes = number[first + s.mesh.node_class[s.mesh.triangles]]
-        first += s.mesh.n_classes
-        ends = nodes[:, SIDES[nodes.shape[1]]].reshape(-1, 2)
-        ends = ends[(ends >= 0).all(axis=1)]
-        low, high = np.sort(ends[(body[ends] == s.submesh.body).all(axis=1)], axis=1).T
-        codes.append(_once(low * n + high))
-    return np.concatenate(codes)
 
 
 def _once(values: Int) -> Int:

@@ -91,16 +91,21 @@ class InterfaceOperators:
         self.local_dofs = np.concatenate([np.zeros(0, np.int64), *numbers])
         self.B = jump_operator.B[:, self.local_dofs].tocsr()
         self.BT = self.B.T.tocsr()
-        can_condense = bool(PETSc.Sys.hasExternalPackage("mumps"))
         first_row, last_row = jump_operator.owned
         at = int(np.searchsorted(jump_operator.rows, first_row))
         owned = slice(at, at + last_row - first_row)
         self.springs = np.zeros(last_row - first_row) if compliance is None else compliance[owned]
         self.compliance = np.where((jump_operator.copies[owned] > 1).all(axis=1), self.springs, 0.0)
         self.of_inner = self._inner_dofs(jump_operator)
-        roots = self._compliance_roots(jump_operator.copies, compliance)
+        roots = [
+            None
+            if compliance is None
+            else compliance_root(self.B[:, span], compliance, jump_operator.copies, self.of_inner[span])
+            for span in self.slices
+        ]
         springs = [not s.is_outer and root is not None for s, root in zip(subdomains, roots, strict=True)]
         sizes = _sizes(jump_operator.shared, subdomains, self.dofs, springs)
+        can_condense = bool(PETSc.Sys.hasExternalPackage("mumps"))
         chosen = choose(sizes, kind, applications, soft_modes, can_condense, thresholds)
         self.facewise = [choice.facewise for choice in chosen]
         self.operators: list[InterfaceOperator] = []
@@ -117,13 +122,6 @@ class InterfaceOperators:
                 diagonal = 1.0 / (1.0 / diagonal + np.asarray(root.multiply(root).sum(axis=1)).ravel())
             diagonals.append(diagonal)
         self.body_diagonal, self.diagonal = np.concatenate(bodies), np.concatenate(diagonals)
-
-    def _compliance_roots(self, copies: Int, compliance: Float | None) -> list[csr_matrix | None]:
-        """Compute the root of the spring compliance for each subdomain; None without springs."""
-        if compliance is None:
-            return [None for _ in self.subdomains]
-        roots = [compliance_root(self.B[:, span], compliance, copies, self.of_inner[span]) for span in self.slices]
-        return [root if root.shape[1] else None for root in roots]
 
     @cached_property
     def slices(self) -> list[slice]:

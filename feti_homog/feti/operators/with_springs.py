@@ -131,17 +131,19 @@ class WithSprings:
         return self._softer * self._body.regularisation(P)
 
 
-def compliance_root(B: csr_matrix, compliance: Float, copies: Int, of_inner: Bool) -> csr_matrix:
-    """(n, r) T of the springs on one body, for its constraints B (rows, n) and their compliance C (rows,).
+def compliance_root(B: csr_matrix, compliance: Float, copies: Int, of_inner: Bool) -> csr_matrix | None:
+    """Compute T (n, r) of the springs on one body, None without springs.
 
-    A node's spring belongs to the inner of two bodies, but where that is cut, to the outer one: so it softens one body
-    alone.  Where both are cut it belongs to neither; see `exact.spring_update`.
+    A spring softens one body alone: the inner of two bodies, or the outer one if the inner one is cut there.  If both
+    are cut, the spring belongs to neither; see `exact.spring_update`.
 
     Args:
-        copies: (rows, 2) how many copies the outer and the inner body have there.
-        of_inner: (n,) on which of the dofs the body is the inner of two.
+        B: (rows, n) constraints of the body.
+        compliance: (rows,) diagonal C.
+        copies: (rows, 2) number of node copies in the outer and in the inner body.
+        of_inner: (n,) whether the body is the inner one of two at each degree of freedom.
     """
     inner_is_whole = copies[:, 1] == 1
     belongs = np.where(abs(B) @ of_inner > 0, inner_is_whole, ~inner_is_whole & (copies[:, 0] == 1))
     rows = np.flatnonzero((compliance > 0) & belongs & (B.getnnz(axis=1) > 0))
-    return (diags(np.sqrt(compliance[rows])) @ B[rows]).T.tocsr()
+    return (diags(np.sqrt(compliance[rows])) @ B[rows]).T.tocsr() if len(rows) else None
