@@ -60,6 +60,7 @@ class ConstraintLayout:
         first: (n,) the first of them among the local rows.
         rows: (local rows,) their global numbers.
         dofs: (subdomains + 1,) where each subdomain begins among the local dofs.
+        owned: first global row of this rank and the one after its last.
         base: for each sharer, its first fine node on the entity, as this rank numbers them; -1 if the sharer is on
             another rank.
     """
@@ -69,6 +70,11 @@ class ConstraintLayout:
     ) -> None:
         self.shared, self.subdomains, self.lattice = shared, subdomains, lattice
         self.components = components
+        begin, end = shared.owned
+        self.owned = components * begin, components * end
+        # Whether this rank owns the rows of each entity, and the first of them, counted from this rank's first row.
+        self._is_owned = (shared.first >= begin) & (shared.first < end)
+        self._owned_row = components * (shared.first - begin)
         copies = shared.copies
         self.count = components * shared.nodes * (copies - 1)
         self.first = np.cumsum(self.count) - self.count
@@ -84,22 +90,6 @@ class ConstraintLayout:
             place = np.searchsorted(submesh.edge_keys, key)
             edge = refinement.edge_node(len(submesh.class_keys), place, np.ones_like(key), lattice)
             self.base[mine] = offset + np.where(is_edge, edge, np.searchsorted(submesh.class_keys, key))
-
-    @property
-    def owned(self) -> tuple[int, int]:
-        """First global row of this rank and the one after its last."""
-        return self.components * self.shared.owned[0], self.components * self.shared.owned[1]
-
-    @property
-    def _owned(self) -> Bool:
-        """(n,) whether this rank owns the rows of each entity."""
-        first, last = self.shared.owned
-        return (self.shared.first >= first) & (self.shared.first < last)
-
-    @property
-    def _owned_row(self) -> Int:
-        """(n,) first row of each entity, counted from this rank's first."""
-        return self.components * (self.shared.first - self.shared.owned[0])
 
     def matrix(self) -> csr_matrix:
         """B (local rows, local dofs)."""
@@ -159,7 +149,7 @@ class ConstraintLayout:
     def node_rows(self) -> tuple[Int, Int]:
         """First owned row and row count for each fine node whose rows are owned."""
         shared = self.shared
-        mine = np.flatnonzero(self._owned)
+        mine = np.flatnonzero(self._is_owned)
         size = self.components * (shared.copies[mine] - 1)
         entity, p = expand(np.arange(len(mine)), shared.nodes[mine])
         return self._owned_row[mine][entity] + p * size[entity], size[entity]
@@ -167,7 +157,7 @@ class ConstraintLayout:
     def interface_nodes(self) -> InterfaceNodes:
         """Return the breakable nodes whose rows are owned."""
         shared = self.shared
-        breakable = np.flatnonzero(self._owned & (shared.fibre >= 0))
+        breakable = np.flatnonzero(self._is_owned & (shared.fibre >= 0))
         entity, p = expand(breakable, shared.nodes[breakable])
         k = shared.copies[entity]
         positions = np.zeros((self.dofs[-1] // self.components, 2))

@@ -142,29 +142,26 @@ class InterfaceOperators:
         """Compute S x for x (n,) or (n, k)."""
         return self._each([o.apply_schur for o in self.operators], x)
 
-    def apply_with_springs(self, x: Float) -> Float:
-        """Compute S~ x, the stiffness with springs, for x (n,) or (n, k)."""
-        return self._each([o.apply_schur for o in self.with_springs], x)
+    def apply_with_springs(self, x: Float, which: Sequence[bool] | None = None) -> Float:
+        """Compute S~ x, the stiffness with springs, for x (n,) or (n, k).
 
-    def apply_some_with_springs(self, which: Sequence[bool], x: Float) -> Float:
-        """Compute S~ x for x (n,) or (n, k) on the subdomains in `which`, 0 on the others."""
-        x = np.asfortranarray(x)
-        y = np.zeros(x.shape, order="F")
-        for operator, span, is_wanted in zip(self.with_springs, self.slices, which, strict=True):
-            if is_wanted and x[span].any():
-                operator.apply_schur(x[span], y[span])
-        return y
+        With `which`, the result is 0 on subdomains for which this is false or x is 0.
+        """
+        some = None if which is None else [k for k, span in enumerate(self.slices) if which[k] and x[span].any()]
+        return self._each([o.apply_schur for o in self.with_springs], x, some)
 
     def apply_flexibility(self, x: Float) -> Float:
         """Compute the boundary part of K+ x for x (n,) or (n, k)."""
         return self._each([o.apply_flexibility for o in self.operators], x)
 
-    def _each(self, applied: Sequence[Callable[[Float, Float], Float]], x: Float) -> Float:
-        """Apply the operator of each subdomain to its part of x (n,) or (n, k)."""
+    def _each(
+        self, applied: Sequence[Callable[[Float, Float], Float]], x: Float, some: Sequence[int] | None = None
+    ) -> Float:
+        """Apply the operators of `some` subdomains, or of all, to their parts of x (n,) or (n, k)."""
         x = np.asfortranarray(x)
-        y = np.empty(x.shape, order="F")
-        for apply, span in zip(applied, self.slices, strict=True):
-            apply(x[span], y[span])
+        y = np.zeros(x.shape, order="F")
+        for k in range(len(applied)) if some is None else some:
+            applied[k](x[self.slices[k]], y[self.slices[k]])
         return y
 
     @cached_property
