@@ -1,15 +1,15 @@
-"""Face neighbourhoods on long boundaries, and trace spaces, linear between some nodes.
+"""Face neighbourhoods on long boundaries, and trace spaces of piecewise linear displacements.
 
-For face displacements p the body energy is at least the energy in the face neighbourhood N, whatever else
-moves:
+For face displacements p, the body energy is at least the energy in the face neighbourhood N, for any other
+displacements:
 
     min { x^T S x : x = p on the face } >= p^T S_N p.
 
-So displacements that are soft in the body, x, are soft in some neighbourhood, on its face; there may be more of these.
-With all but the face held fixed, the neighbourhood is stiffer than the body:  S restricted to the face <= S_fixed.
+So each soft displacement x of the body is soft in a neighbourhood, on its face; the neighbourhood may have more soft
+displacements.  With all nodes off the face fixed, it is stiffer than the body:  S restricted to the face <= S_fixed.
 
-Refinement hardly changes the soft modes of a subdomain, so a fine boundary is searched for them on the coarsest trace
-space of enough dofs: P q for the values q at the vertices of the coarse mesh and at every k-th node along its edges.
+Refinement hardly changes the soft modes of a subdomain.  So the search uses the coarsest trace space with enough degrees
+of freedom: P q for the values q at the vertices of the coarse mesh and at every k-th node along its edges.
 """
 
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ def trace_space(
 ) -> csr_matrix:
     """Return the prolongation P (cn, cm) to n boundary `nodes`, with cm >= min(cn, `min_dofs`).
 
-    Nodes are sorted classes of the refined piece; edge ends missing from them have zero displacement.
+    Nodes are sorted classes of the refined piece; edge ends that are not boundary nodes have zero displacement.
     """
     vertices, inner, c = len(submesh.class_keys), lattice.intervals - 1, problem.components
     on_edge = nodes >= vertices
@@ -71,10 +71,10 @@ class FaceNeighbourhood:
     """A face neighbourhood in its body, as a subdomain, condensed to the n face dofs.
 
     Attributes:
-        at: (n,) positions of these dofs among the body's boundary dofs.
-        operator: its dense boundary operators.
-        R: (n, k) its kernel on the face.
-        P: (n, m) its trace space.
+        at: (n,) positions of the face dofs among the boundary dofs of the body.
+        operator: dense boundary operators of the neighbourhood.
+        R: (n, k) kernel on the face.
+        P: (n, m) trace space.
         S_fixed: (n, n) stiffness of the face if other faces and all nodes outside the neighbourhood are fixed.
     """
 
@@ -88,7 +88,7 @@ class FaceNeighbourhood:
 def face_neighbourhoods(
     body: Subdomain, dofs: Int, face: Int, thresholds: Thresholds = DEFAULTS
 ) -> list[FaceNeighbourhood]:
-    """Return the face neighbourhoods: connected parts of the triangles near it with enough face nodes.
+    """Build the neighbourhoods of a face: connected parts of the triangles near it with several face nodes.
 
     Args:
         dofs: (n,) boundary dofs of the body, sorted.

@@ -32,7 +32,7 @@ class AssembledSchur:
 
     The shared nodes of the cell with the bonds of its active rows move by u = Z y: B Z = 0 on these rows.
 
-    All copies of a node move together, but along rows that are not active copies of the inner body move on their own.
+    All copies of a node move together.  But along inactive rows, copies of the inner body move independently.
 
     Attributes:
         size: columns of Z, on all ranks.
@@ -52,7 +52,7 @@ class AssembledSchur:
         self._Z, self._ZT = Z, Z.T.tocsr()
 
     def relieving_displacement(self, forces: Float) -> Float:
-        """-Z (Z^T S Z)^-1 Z^T f for boundary forces f (n,) or (n, k): it takes them off the shared nodes.
+        """Compute u = -Z (Z^T S Z)^-1 Z^T f, which balances boundary forces f (n,) or (n, k) on Z.
 
         Collective.
         """
@@ -66,7 +66,7 @@ class AssembledSchur:
 
 
 def assembled_stiffness(operators: InterfaceOperators, active: Float) -> tuple[csr_matrix, csr_matrix | Float]:
-    """Return Z (n, columns) and Z^T S Z of all ranks for the owned rows where `active` is 1.  Collective.
+    """Assemble Z (n, columns) and Z^T S Z over all ranks, for rows where `active` is 1.  Collective.
 
     The rows must leave no rigid-body motion free.  The sum is dense, in Fortran order, where all ranks' blocks have
     as many entries as the whole matrix and there are no options `feti_bonded_`; sparse otherwise.
@@ -97,16 +97,15 @@ def assembled_stiffness(operators: InterfaceOperators, active: Float) -> tuple[c
 
 
 def _released(operators: InterfaceOperators, active: Float) -> csr_matrix:
-    """(n, columns) Z, from the one with all rows active.
+    """Build Z (n, columns) from the matrix Z with all rows active.  Collective.
 
-    u_f = y - e (e . y) + e w along the direction e of each row that is not active, with an extra column for w.
-    Collective.
+    u_f = y - e (e . y) + e w along the direction e of each inactive row, with an extra column for w.
     """
     released, comm, jump_operator = active == 0, operators.comm, operators.jump_operator
     starts, sizes = jump_operator.node_rows
     first = comm.exscan(len(starts)) or 0
     node = jump_operator.gather(np.repeat(first + np.arange(len(starts)), sizes[np.argsort(starts)]).astype(float))
-    # Each copy of a node takes part in some row of it, and its dofs are neighbours.
+    # Each node copy has an entry in some row of the node, and its dofs are consecutive.
     row = operators.BT.indices[operators.BT.indptr[:-1]]
     n, c = len(row), jump_operator.components
     shared = c * node[row].astype(np.int64) + np.arange(n) % c
@@ -115,7 +114,7 @@ def _released(operators: InterfaceOperators, active: Float) -> csr_matrix:
     number = np.where(released, sum(counts[: comm.rank]) + np.cumsum(released), 0)
     number = jump_operator.gather(number.astype(float)).astype(np.int64) - 1
     rows = np.flatnonzero(number >= 0)
-    # A row takes the mean of the inner copies, with the sign of minus.
+    # A row has the mean of the inner copies, with a minus sign.
     minus_copies, of_inner = -jump_operator.copies[rows, 1].astype(float), operators.of_inner.astype(float)
     e = diags(minus_copies) @ operators.B[rows] @ diags(of_inner)
     square = np.asarray(e.multiply(e).sum(axis=1)).ravel()
