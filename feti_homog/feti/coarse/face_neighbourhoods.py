@@ -8,8 +8,8 @@ displacements:
 So each soft displacement x of the body is soft in a neighbourhood, on its face; the neighbourhood may have more soft
 displacements.  With all nodes off the face fixed, it is stiffer than the body:  S restricted to the face <= S_fixed.
 
-Refinement hardly changes the soft modes of a subdomain.  So the search uses the coarsest trace space with enough degrees
-of freedom: P q for the values q at the vertices of the coarse mesh and at every k-th node along its edges.
+Refinement hardly changes the soft modes of a subdomain.  So the search uses the coarsest trace space with enough dofs:
+P q for the values q at the vertices of the coarse mesh and at every k-th node along its edges.
 """
 
 from dataclasses import dataclass
