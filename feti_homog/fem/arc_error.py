@@ -21,12 +21,12 @@ class ArcSides:
     """The f element sides of order p on arcs; the body is on their left.
 
     Attributes:
-        element, side: (f,) the element side from corner `side` to the next.
-        nodes: (f, p + 1) plane nodes along it.
-        points: (f, p + 1, 2) these.
-        normals: (f, p + 1, 2) unit normals of the arc at these, out of the body.
-        area: (f,) between side and arc that the body lacks.
-        at_void: (f,) whether a void is on their right.
+        element, side: (f,) element, and its side from corner `side` to the next corner.
+        nodes: (f, p + 1) plane nodes along the side.
+        points: (f, p + 1, 2) node positions.
+        normals: (f, p + 1, 2) unit normals of the arc at the nodes, out of the body.
+        area: (f,) area between side and arc that the body lacks.
+        at_void: (f,) whether a void is on the right.
     """
 
     element: Int
@@ -73,12 +73,12 @@ class ArcSides:
 
     @property
     def ends(self) -> Int:
-        """(f, 2) element corners, 0 to 2, at which they begin and end."""
+        """(f, 2) element corners, 0 to 2, at the start and the end of each side."""
         return np.stack([self.side, (self.side + 1) % 3], axis=1)
 
 
 def arc_energy(body: RecoveredStress, sides: ArcSides) -> Float:
-    """(k, k) how much larger int sigma_i : eps_j is with the sides in place of the arcs, twice the energy for i = j.
+    """Estimate the excess (k, k) of int sigma_i : eps_j by sides in place of arcs; i = j is twice the energy.
 
         -int V (sigma_i : eps_j - t_i . du_j/dn - t_j . du_i/dn) ds - c sum_sides h (D t_i . D u_j + D t_j . D u_i)
 
@@ -119,7 +119,7 @@ def arc_energy(body: RecoveredStress, sides: ArcSides) -> Float:
 
 
 def _at(body: RecoveredStress, sides: ArcSides, place: float) -> Float:
-    """Return recovered stresses (f, m, k) at the fraction `place` of each side."""
+    """Evaluate recovered stresses (f, m, k) at the fraction `place` of each side."""
     result = np.empty((len(sides.element), body.problem.strains, body.loads.shape[1]))
     for k in range(3):
         members = np.flatnonzero(sides.side == k)
@@ -129,17 +129,17 @@ def _at(body: RecoveredStress, sides: ArcSides, place: float) -> Float:
 
 
 def _along(tensors: Float, vectors: Float) -> Float:
-    """(.., c, k) tensors (.., c, 2, k) times vectors (.., 2)."""
+    """Multiply tensors (.., c, 2, k) by vectors (.., 2): (.., c, k)."""
     x, y = vectors[..., None, 0, None], vectors[..., None, 1, None]
     return np.asarray(tensors[..., 0, :] * x + tensors[..., 1, :] * y)
 
 
 def _summed(weights: Float, left: Float, right: Float) -> Float:
-    """(k, k) sum_f w_f left_f^T right_f of (f, c, k) each."""
+    """Sum w_f left_f^T right_f over f, (k, k), for factors (f, c, k)."""
     k = left.shape[2]
     return np.asarray((left * weights[:, None, None]).reshape(-1, k).T @ right.reshape(-1, k))
 
 
 def _cross(a: Float, b: Float) -> Float:
-    """(f,) cross products a x b of vectors (f, 2)."""
+    """Compute cross products a x b (f,) of vectors (f, 2)."""
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

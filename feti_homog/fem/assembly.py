@@ -21,7 +21,7 @@ from feti_homog.typing import Bool, Float, Int, Int32
 
 # Elements that are integrated at once: bounds the memory of their gradients, about 100 MB of quadratic ones.
 ELEMENTS_AT_ONCE = 1 << 16
-# int N_i dN_j along a side: of two nodes, and of two and the one between them.
+# int N_i dN_j along a side with two nodes, and along a side with a third node in the middle.
 LINEAR = np.array([[-0.5, 0.5], [-0.5, 0.5]])
 QUADRATIC = np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6
 Mixed = bool | tuple[bool, ...]
@@ -29,14 +29,14 @@ Mixed = bool | tuple[bool, ...]
 
 @dataclass(frozen=True)
 class Assembly:
-    """Contribution from a subdomain with area |Omega| and materials L.
+    """The matrices of a subdomain with area |Omega| and materials L.
 
     Attributes:
         K: (dofs, dofs) stiffness, Eq. (28), force per length.
         Q: (dofs, v) int B^T L, so that the macroscopic strain E has the load f = -Q E, Eq. (29), and the
             stress integral is |Omega| L E + Q^T u*.
         slopes: (classes, 2) int dN/dx.
-        areas: (materials,) with the sum |Omega|.
+        areas: (materials,) areas of the materials, with the sum |Omega|.
     """
 
     K: csr_matrix
@@ -48,10 +48,10 @@ class Assembly:
 def assemble(
     mesh: FineMesh, laws: Float, problem: Problem = PLANE, mixed: Mixed = False, material: Int | None = None
 ) -> Assembly:
-    """Assemble the subdomain `mesh` with one stiffness L (v, v) or several.
+    """Assemble a subdomain with one material stiffness L (v, v) or with several.
 
-    Its first rows and columns belong to displacement strains, the others to uniform strains.  Quadratic
-    elements whose stiffness is isotropic in the plane may be mixed: with a bubble and a pressure (`fem.bubble`).
+    The first rows and columns of L belong to displacement strains, the last to uniform strains.  Quadratic elements
+    with isotropic stiffness in the plane may be mixed: with a bubble and a pressure (`fem.bubble`).
 
     Args:
         laws: L (v, v), or (materials, v, v) with each coarse triangle's `material` (t,).
@@ -93,7 +93,7 @@ def assemble(
 def element_strain(
     points: Float, triangles: Int32, node_class: Int32, u: Float, problem: Problem = PLANE
 ) -> tuple[Float, Float]:
-    """Mean element strains (e, m) under nodal displacements u (classes, c), and their areas (e,)."""
+    """Compute mean strains (e, m) of elements under displacements u (classes, c), and element areas (e,)."""
     strain, area = np.empty((len(triangles), problem.strains)), np.empty(len(triangles))
     parts_of = [np.nonzero(problem.voigt == number) for number in range(problem.strains)]
     for part in _chunks(np.arange(len(triangles)), ELEMENTS_AT_ONCE):
@@ -113,9 +113,9 @@ def _chunks(numbers: Int, size: int) -> list[Int]:
 def _affine(
     macro: MacroElement, mesh: FineMesh, part: Int, tensor: Float, mixed: Float | None
 ) -> tuple[Float, Float, float]:
-    """Couples (t, p, c^2), loads (t, q, 2) and area for affine coarse triangles: pulled back to the unit triangle.
+    """Compute couples (t, p, c^2), loads (t, q, 2) and area of affine coarse triangles, on the unit triangle.
 
-    Elements with a stiffness `mixed` are mixed.
+    With a stiffness `mixed`, the elements are mixed.
     """
     g, w = gradients(mesh.points[mesh.nodes[part, :3]])
     # The last two of the three linear functions are the reference coordinates: inverse_rk = dr_r / dx_k.
@@ -131,7 +131,7 @@ def _affine(
 def _curved(
     macro: MacroElement, mesh: FineMesh, part: Int, tensor: Float, mixed: Float | None
 ) -> tuple[Float, Float, float]:
-    """Assemble coarse triangles with curved edges: integrate over each element, for no two are alike."""
+    """Integrate coarse triangles with curved edges, element by element; arguments as of `_affine`."""
     elements = mesh.lattice.triangles
     points = mesh.points[mesh.nodes[part][:, elements].reshape(-1, elements.shape[1])]
     g, w = gradients(points)
@@ -147,8 +147,8 @@ class GroupedSum:
     """Sums over element matrix entries that belong together in one coarse triangle.
 
     Attributes:
-        entries: all entries, flat, sum after sum.
-        first: where each sum begins in `entries`.
+        entries: all entry numbers, flat, sum after sum.
+        first: first position of each sum in `entries`.
     """
 
     entries: Int
@@ -156,22 +156,22 @@ class GroupedSum:
 
     @classmethod
     def of(cls, target: Int) -> GroupedSum:
-        """Group entries by `target`, the number of the sum that they join, ascending."""
+        """Group entries by `target`, the sum number of each entry."""
         entries = np.argsort(target, axis=None, kind="stable")
         return cls(entries, np.unique(target.ravel()[entries], return_index=True)[1])
 
     def __call__(self, values: Float) -> Float:
-        """(t, sums, k) from t coarse triangles' entries (.., k)."""
+        """Sum the entries (.., k) of t coarse triangles: (t, sums, k)."""
         each = values.reshape(-1, len(self.entries), values.shape[-1])
         return np.add.reduceat(each[:, self.entries], self.first, axis=1)
 
 
 @dataclass(frozen=True)
 class MacroElement:
-    """The lattice with q nodes as an element whose nodes couple in the p ordered pairs that share an element.
+    """The lattice with q nodes as one element: p ordered pairs of nodes have a common element, and couple.
 
     Attributes:
-        rows, columns: (p,) each couple's lattice nodes, in row-major order.
+        rows, columns: (p,) lattice nodes of each couple, in row-major order.
         couples: from the entries (4**refine, a, a) of the element matrices to the couples.
         nodes: from the nodes (4**refine, a) of the elements to the lattice nodes.
         products: (p, 4) int dN_A/dr_k dN_B/dr_l over the unit triangle, with (k, l) flat.
@@ -191,7 +191,7 @@ class MacroElement:
     @classmethod
     @lru_cache(maxsize=4)
     def of(cls, lattice: ReferenceLattice) -> MacroElement:
-        """Return a lattice's element."""
+        """Build the element of a lattice."""
         elements, q = lattice.triangles, len(lattice.nodes)
         pair = elements[:, :, None] * q + elements[:, None, :]
         couples, nodes, each = GroupedSum.of(pair), GroupedSum.of(elements), np.unique(pair)
@@ -206,7 +206,7 @@ class MacroElement:
 
 
 def products(g: Float, w: Float) -> Float:
-    """(e, a, a, 4) int dN_a/dx_k dN_b/dx_l, with (k, l) flat, from gradients (e, q, a, 2) and weights (e, q)."""
+    """Integrate dN_a/dx_k dN_b/dx_l, (e, a, a, 4), from gradients (e, q, a, 2) and weights (e, q); (k, l) flat."""
     e, q, a, _ = g.shape
     flat = g.reshape(e, q, 2 * a)
     outer = np.matmul((flat * w[..., None]).transpose(0, 2, 1), flat)
@@ -214,13 +214,13 @@ def products(g: Float, w: Float) -> Float:
 
 
 def integrals(g: Float, w: Float) -> Float:
-    """(e, a, 2) int dN_a/dx_k, from the same."""
+    """Integrate dN_a/dx_k, (e, a, 2), from gradients (e, q, a, 2) and weights (e, q)."""
     integral: Float = np.einsum("eqak,eq->eak", g, w)
     return integral
 
 
 def void_integrals(submesh: Submesh, mesh: FineMesh) -> Float:
-    """(classes, 2) int N n ds along the sides at voids, n outward from the void: u^T of it is int grad u there."""
+    """Integrate N n ds along void sides, (classes, 2), n outward from the void; u^T times this is int grad u."""
     sums, nodes = np.zeros((mesh.n_classes, 2)), nodes_along(submesh, mesh, submesh.at_void)
     products = LINEAR if mesh.lattice.triangles.shape[1] == 3 else QUADRATIC
     step = len(products) - 1
@@ -234,7 +234,7 @@ def void_integrals(submesh: Submesh, mesh: FineMesh) -> Float:
 
 
 def nodes_along(submesh: Submesh, mesh: FineMesh, edges: Bool) -> Int:
-    """(sides, M + 1) the nodes of each triangle side on one of the marked torus `edges`, the body on the left."""
+    """Return the nodes (sides, M + 1) of triangle sides on marked torus `edges`, with the body on the left."""
     triangle, side = np.nonzero(edges[submesh.edge_class[submesh.triangle_edges]])
     lattice, sides = mesh.lattice.nodes, []
     for k in range(3):  # from vertex k to vertex k + 1

@@ -25,12 +25,12 @@ T = np.array([[2.0, 1.0], [1.0, 2.0]])
 
 
 def lame(L: Float) -> tuple[float, float]:
-    """lambda and mu from a stiffness (v, v) that is isotropic in the plane."""
+    """Return lambda and mu of a stiffness (v, v) that is isotropic in the plane."""
     return float(L[0, 1]), float(L[2, 2])
 
 
 def affine_couples(L: Float, inverse: Float, determinant: Float) -> Float:
-    """(t, 9, 4) X with which H_a,r H_b,s X_(r s)(i j), H the `HESSIANS`, is the bubble's share in K_(a i)(b j).
+    """Compute X (t, 9, 4), with the bubble part H_a,r H_b,s X_(r s)(i j) of K_(a i)(b j) for the `HESSIANS` H.
 
     The stress of a quadratic u has a constant divergence f on an affine element, and div u is linear.  So the bubble's
     force is -int b f, and its stiffness alone differs from that without pressure:
@@ -80,19 +80,19 @@ class Elements:
         return cls(lame(L), g, w, (linear @ np.linalg.solve(mass, moments)).reshape(g.shape))
 
     def couples(self) -> Float:
-        """(e, 6, 6, 4) nodal stiffness, with (i, j) flat."""
+        """Compute the nodal stiffness (e, 6, 6, 4), with (i, j) flat."""
         K, n = self._stiffness(slice(None)), 2 * BUBBLE
         nodes = K[:, :n, :n] - K[:, :n, n:] @ np.linalg.solve(K[:, n:, n:], K[:, n:, :n])
         return np.asarray(nodes.reshape(-1, BUBBLE, 2, BUBBLE, 2).transpose(0, 1, 3, 2, 4).reshape(-1, 6, 6, 4))
 
     def with_bubble(self, u: Float) -> Float:
-        """(e, 7, 2, k) displacements (e, 6, 2, k) at nodes, and the bubble's, which follows them."""
+        """Append the bubble displacement to nodal displacements (e, 6, 2, k): (e, 7, 2, k)."""
         K, n = self._stiffness(slice(BUBBLE, None)), 2 * BUBBLE
         bubble = np.linalg.solve(K[:, :, n:], K[:, :, :n] @ u.reshape(len(u), n, -1))
         return np.concatenate([u, -bubble[:, None]], axis=1)
 
     def strain(self, u: Float) -> Float:
-        """(e, q, 3, k) under displacements (e, 7, 2, k)."""
+        """Compute strains (e, q, 3, k) under displacements (e, 7, 2, k)."""
         e, q, a, _ = self.gradients.shape
         slope = self.gradients.transpose(0, 1, 3, 2).reshape(e, 2 * q, a) @ u.reshape(e, a, -1)
         slope = slope.reshape(e, q, 2, 2, -1)
@@ -100,19 +100,19 @@ class Elements:
         return np.stack([slope[:, :, 0, 0], slope[:, :, 1, 1], shear], axis=2)
 
     def dilatation(self, u: Float) -> Float:
-        """(e, q, k) Pi div u, p / lambda, under displacements (e, 7, 2, k)."""
+        """Compute Pi div u = p / lambda, (e, q, k), under displacements (e, 7, 2, k)."""
         e, q, a, _ = self.gradients.shape
         return np.asarray(self.projected.reshape(e, q, 2 * a) @ u.reshape(e, 2 * a, -1))
 
     def stress(self, u: Float) -> Float:
-        """(e, q, 3, k) 2 mu eps + p under displacements (e, 7, 2, k)."""
+        """Compute stresses 2 mu eps + p, (e, q, 3, k), under displacements (e, 7, 2, k)."""
         first, shear = self.lame
         stress = shear * np.array([2.0, 2.0, 1.0])[:, None] * self.strain(u)
         stress[:, :, :2] += first * self.dilatation(u)[:, :, None]
         return np.asarray(stress)
 
     def _stiffness(self, functions: slice) -> Float:
-        """(e, 2n, 14) some functions' rows in the stiffness before the bubble is eliminated:
+        """Compute stiffness rows (e, 2n, 14) of some functions, before the bubble is eliminated:
 
         mu (delta_ij dN_a/dx_k dN_b/dx_k + dN_a/dx_j dN_b/dx_i) + lambda Pi dN_a/dx_i dN_b/dx_j.
         """

@@ -25,11 +25,11 @@ NO_NORMAL = 0.1
 
 @dataclass(frozen=True)
 class PatchNeighbours:
-    """Neighbour pairs, the first on the boundary, where vertices have few elements of their own.
+    """Pairs of a boundary vertex, which has few elements, and a neighbour vertex.
 
     Attributes:
-        at, other: (n,) vertices.
-        vector: (n, 2) from the first to the second.
+        at, other: (n,) boundary vertex and neighbour.
+        vector: (n, 2) vector from the boundary vertex to the neighbour.
     """
 
     at: Int
@@ -38,7 +38,7 @@ class PatchNeighbours:
 
     @classmethod
     def of(cls, vertices: Int, corners: Float) -> PatchNeighbours:
-        """Find the neighbours in elements of vertices (e, 3) at `corners` (e, 3, 2); boundary sides have one."""
+        """Find the neighbours of boundary vertices, in elements of vertices (e, 3) at `corners` (e, 3, 2)."""
         start, stop = vertices.T.ravel(), vertices.T[[1, 2, 0]].ravel()
         size, e = int(vertices.max()) + 1, len(vertices)
         # Elsewhere the sides around a vertex lead to the vertices that they come from; such numbers add up exactly.
@@ -55,12 +55,12 @@ class PatchNeighbours:
         return cls(at[is_start], other[is_start], np.concatenate([vector, -vector])[is_start])
 
     def shared(self, sums: Float, order: int) -> Float:
-        """(vertices, p, k) shares that boundary vertices have in the sums (vertices, p, k) of their neighbours."""
+        """Return the parts (vertices, p, k) that boundary vertices add from neighbour `sums` (vertices, p, k)."""
         moved = _translations(self.vector, order) @ sums[self.other]
         return NEIGHBOURS[order] * gathered(self.at, moved, len(sums))
 
     def shared_moments(self, moments: Float) -> Float:
-        """(6, vertices) shares that boundary vertices have in the moments (6, vertices) of neighbours."""
+        """Return the parts (6, vertices) that boundary vertices add from neighbour `moments` (6, vertices)."""
         one, x, y, xx, xy, yy = moments[:, self.other]
         a, b = self.vector.T
         moved_x, moved_y = x + a * one, y + b * one
@@ -68,21 +68,21 @@ class PatchNeighbours:
         return NEIGHBOURS[1] * np.stack([np.bincount(self.at, row, moments.shape[1]) for row in moved])
 
     def shared_matrices(self, moments: Float, order: int) -> Float:
-        """(vertices, p, p) sums of neighbour moments (vertices, p, p), moved to each vertex."""
+        """Sum neighbour moments (vertices, p, p) after a translation to each boundary vertex."""
         T = _translations(self.vector, order)
         moved = T @ moments[self.other] @ T.transpose(0, 2, 1)
         return NEIGHBOURS[order] * gathered(self.at, moved, len(moments))
 
 
 def linear_values(vertices: Int, away: Float, weights: Float, values: Float, neighbours: PatchNeighbours) -> Float:
-    """(vertices, k) linear fits at the vertices, from uniform element values (e, k).
+    """Fit linear functions at vertices (vertices, k) to uniform element values (e, k).
 
-    Each is a weighted mean of values around it, so that sums over elements are not made, but where neighbours share
-    them.
+    Each fit is a weighted mean of the values around the vertex, so that sums over elements are needed only for
+    neighbours.
 
     Args:
-        vertices: (3, e) of the elements.
-        away: (2, 3, e) vectors from these to the element's middle.
+        vertices: (3, e) vertices of the elements.
+        away: (2, 3, e) vectors from the vertices to the middle of the element.
         weights: (e,) areas.
     """
     at, size, e = vertices.ravel(), int(vertices.max()) + 1, len(weights)
@@ -113,14 +113,14 @@ def linear_values(vertices: Int, away: Float, weights: Float, values: Float, nei
 
 
 def polynomials(x: Float, order: int) -> Float:
-    """(.., p) 1, x, y and in order 2 also x^2, x y, y^2 at the places x (.., 2)."""
+    """Evaluate 1, x, y, and for order 2 also x^2, x y, y^2, at positions x (.., 2): (.., p)."""
     one, first, second = np.ones(x.shape[:-1]), x[..., 0], x[..., 1]
     quadratic = (first * first, first * second, second * second) if order == 2 else ()
     return np.stack([one, first, second, *quadratic], axis=-1)
 
 
 def _translations(d: Float, order: int) -> Float:
-    """(n, p, p) T with polynomials(x + d) = T polynomials(x) for d (n, 2)."""
+    """Compute T (n, p, p) with polynomials(x + d) = T polynomials(x) for d (n, 2)."""
     x, y = d.T
     T = np.tile(np.eye(3 * order), (len(d), 1, 1))
     T[:, 1, 0], T[:, 2, 0] = x, y
@@ -132,14 +132,14 @@ def _translations(d: Float, order: int) -> Float:
 
 
 def gathered(place: Int, values: Float, size: int) -> Float:
-    """(size, ..) sums over the values (n, .., p, q) at the places (n, ..)."""
+    """Sum values (n, .., p, q) at the positions `place` (n, ..): (size, p, q)."""
     n, shape = place.size, values.shape[-2:]
     sums = csc_matrix((np.ones(n), place.ravel(), np.arange(n + 1)), (size, n)) @ values.reshape(n, math.prod(shape))
     return np.asarray(sums.reshape(size, *shape))
 
 
 def fitted(moments: Float, sums: Float) -> Float:
-    """(n, p, k) coefficients of the polynomials with these moments (n, p, p) and sums (n, p, k)."""
+    """Solve for polynomial coefficients (n, p, k) from moments (n, p, p) and sums (n, p, k)."""
     scale = 1 / np.sqrt(np.einsum("nii->ni", moments))[..., None]
     normalized = moments * scale * scale.transpose(0, 2, 1) + RIDGE * np.eye(moments.shape[1])
     return np.asarray(scale * np.linalg.solve(normalized, scale * sums))
@@ -150,9 +150,9 @@ class KnownTractions:
     """Tractions under k loads at n vertices.
 
     Attributes:
-        node: (n,) their node classes.
-        normal: (n, 2) unit vectors out of the body.
-        traction: (n, c, k).
+        node: (n,) node classes of the vertices.
+        normal: (n, 2) unit normals out of the body.
+        traction: (n, c, k) tractions.
     """
 
     node: Int
@@ -167,9 +167,9 @@ class KnownTractions:
         return cls(node[rows], mean[rows] / length[rows, None], traction[rows])
 
     def imposed(self, stress: Float, vertex: Int, voigt: Int, flexibility: Float) -> Float:
-        """Return stresses (vertices, m, k) with these tractions at `vertex` (n,).
+        """Change stresses (vertices, m, k) at `vertex` (n,) to the known tractions.
 
-        For components `voigt` (c, 2) and a flexibility (m, m).
+        Components are `voigt` (c, 2), and the flexibility is (m, m).
 
         sigma + d n + n d - (d . n) n n + a t t in the plane, with d = traction - sigma n and a such that the strain
         along the boundary stays, as it is known on both its sides; along the fibres sigma + d n.

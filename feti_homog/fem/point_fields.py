@@ -1,6 +1,6 @@
-"""Element fields at quadrature points, with mixed elements' bubble and pressure, and crack energies.
+"""Element fields at quadrature points, with bubble and pressure of mixed elements, and energies of moved nodes.
 
-A growing crack releases the energy that elements lose when their nodes are moved.
+A growing crack releases the energy that elements lose if their nodes move.
 """
 
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class PointFields:
 
 
 def point_fields(points: Float, u: Float, L: Float, is_mixed: bool = False) -> PointFields:
-    """Fields in elements with nodes and displacements (e, a, 2) and the stiffness L (3, 3)."""
+    """Compute fields in elements with nodes and displacements (e, a, 2) and the stiffness L (3, 3)."""
     if not is_mixed:
         g, weights = gradients(points)
         strain = voigt(np.einsum("eai,eqad->eqid", u, g))
@@ -48,7 +48,7 @@ def point_fields(points: Float, u: Float, L: Float, is_mixed: bool = False) -> P
 
 
 def voigt(gradient: Float) -> Float:
-    """(e, q, 3) strains [11, 22, 12] from displacement gradients (e, q, 2, 2)."""
+    """Return strains [11, 22, 12], (e, q, 3), of displacement gradients (e, q, 2, 2)."""
     shear = gradient[..., 0, 1] + gradient[..., 1, 0]
     return np.stack([gradient[..., 0, 0], gradient[..., 1, 1], shear], axis=-1)
 
@@ -58,14 +58,14 @@ def energy_change(points: Float, u: Float, L: Float, moved: Float, changed: Floa
 
         int sigma : (grad du - grad u grad dx) + W div dx.
 
-    Exact for the elements as they are (deLorenzi, Int. J. Fract. 19 (1982) 183): at the bubble and the pressure of
-    mixed ones, which stay as they are, the energy is stationary.
+    The derivative is exact for the discrete elements (deLorenzi, Int. J. Fract. 19 (1982) 183): bubble and pressure of
+    mixed elements stay constant, for the energy is stationary in both.
 
     Args:
         points, u: (e, a, 2) element nodes and their displacements.
         L: (3, 3) stiffness.
         moved, changed: (e, a, 2) dx and du.
-        is_mixed: whether the elements have their own bubble and pressure.
+        is_mixed: whether the elements have a bubble and a pressure.
     """
     fields, nodes = point_fields(points, u, L, is_mixed), points.shape[1]
     grad_u = np.einsum("eai,eqad->eqid", fields.u, fields.gradients)

@@ -1,7 +1,7 @@
-"""Unknowns on the plane mesh: the displacements, the strains that they make, and the unit loads.
+"""Unknowns on the plane mesh: displacements, their strains, and the unit loads.
 
-For long fibres strains do not vary along x3, and x3 is a plane of symmetry of every phase.  Then the displacements in
-the plane and the one along x3 have a problem each: generalized plane strain and axial shear.
+With long fibres, strains do not vary along x3, and the plane x3 = 0 is a plane of symmetry of every phase.  Then the
+displacements in the plane and along x3 have separate problems: generalized plane strain and axial shear.
 """
 
 from dataclasses import dataclass, replace
@@ -33,30 +33,30 @@ class Problem:
 
     @property
     def strains(self) -> int:
-        """m, strains that displacements make."""
+        """m, number of strains of the displacements."""
         return int(self.voigt.max()) + 1
 
     @property
     def stresses(self) -> int:
-        """Loads that work on stresses: displacement strains first."""
+        """Number of loads that do work on stresses: displacement strains first."""
         return len(self.loads) - ("temperature" in self.loads)
 
     @cached_property
     def voigt(self) -> Int:
-        """(c, 2) `strain`."""
+        """The array (c, 2) of `strain`."""
         return np.array(self.strain)
 
     def gradient(self, strain: Float) -> Float:
-        """(c, 2) H of the displacements u = H y, without rotation, that make the strains (m,)."""
+        """Return H (c, 2) of the displacements u = H y without rotation that have the strains (m,)."""
         shared = np.bincount(self.voigt.ravel())
         return np.asarray(strain[self.voigt] / shared[self.voigt])
 
     def dofs(self, nodes: Int) -> Int:
-        """(cn,) degrees of freedom at the nodes (n,)."""
+        """Return the degrees of freedom (cn,) at nodes (n,)."""
         return np.asarray((self.components * nodes[:, None] + np.arange(self.components)).ravel())
 
     def nodes(self, dofs: Int) -> Int:
-        """(n,) each degree of freedom's node (n,)."""
+        """Return the nodes (n,) of degrees of freedom (n,)."""
         return np.asarray(dofs // self.components)
 
 

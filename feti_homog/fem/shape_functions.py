@@ -1,4 +1,4 @@
-"""Shape functions on linear and quadratic triangles, and gradients, also a bubble's, at quadrature points."""
+"""Shape functions of linear and quadratic triangles and of the bubble, and gradients at quadrature points."""
 
 from functools import cache
 
@@ -17,7 +17,7 @@ _P2_WEIGHTS = np.tile([0.223381589678011, 0.109951743655322], 3) / 2
 
 @cache
 def quadrature(functions: int) -> tuple[Float, Float]:
-    """(q, a, 2) reference gradients for 3, 6 or, with the bubble 27 r_0 r_1 r_2, 7 functions, and (q,) weights."""
+    """Return reference gradients (q, a, 2) and weights (q,) for 3, 6 or, with bubble 27 r_0 r_1 r_2, 7 functions."""
     if functions == 3:
         return np.array([[[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]]), np.array([0.5])
     x, y = _P2_POINTS.T
@@ -28,7 +28,7 @@ def quadrature(functions: int) -> tuple[Float, Float]:
 
 
 def gradients(corners: Float, with_bubble: bool = False) -> tuple[Float, Float]:
-    """Physical gradients (e, q, a, 2) and weights times Jacobian (e, q) in elements with nodes (e, a, 2)."""
+    """Compute physical gradients (e, q, a, 2) and weights times Jacobian (e, q) for nodes (e, a, 2)."""
     nodes = corners.shape[1]
     reference, weights = quadrature(nodes + with_bubble)
     (xr, xs), (yr, ys) = np.moveaxis(np.tensordot(corners, reference[:, :nodes], (1, 1)), (1, 3), (0, 1))
@@ -41,14 +41,14 @@ def gradients(corners: Float, with_bubble: bool = False) -> tuple[Float, Float]:
 
 
 def barycentric(nodes: int) -> Float:
-    """(q, 3) barycentric coordinates of quadrature points in the 3- or 6-node triangle."""
+    """Return barycentric coordinates (q, 3) of the quadrature points in the 3- or 6-node triangle."""
     if nodes == 3:
         return np.full((1, 3), 1 / 3)
     return np.column_stack([1 - _P2_POINTS.sum(axis=1), _P2_POINTS])
 
 
 def shape_functions(nodes: int, lam: Float) -> Float:
-    """(q, nodes) values of the 3 or 6 shape functions at the barycentric coordinates lam (q, 3)."""
+    """Evaluate the 3 or 6 shape functions (q, nodes) at barycentric coordinates lam (q, 3)."""
     if nodes == 3:
         return lam
     return np.hstack([lam * (2 * lam - 1), 4 * lam * np.roll(lam, -1, axis=1)])

@@ -1,4 +1,4 @@
-"""Stresses recovered in each subdomain from its element stresses, and the energy of their difference.
+"""Recovered stresses in each subdomain from element stresses, and the energy of their difference.
 
 Zienkiewicz and Zhu (IJNME 33 (1992) 1331): about each vertex a polynomial of the elements' order is fitted to the
 stresses at the integration points in the elements around it; within an element its three vertices' fits are
@@ -27,7 +27,7 @@ LINEAR_AT_ONCE = 1 << 12
 
 @dataclass(frozen=True)
 class ElementStresses:
-    """Stresses in the elements `part` under k loads at q points.
+    """Stresses in the elements `part` at q points under k loads.
 
     `points` (e, q, 2), `weights` (e, q), `stress` (e, q, m, k).
     """
@@ -43,15 +43,15 @@ class RecoveredStress:
     """Element stresses and recovered stresses in some one-phase subdomains under k loads.
 
     Attributes:
-        points: (n, 2) all their plane nodes.
-        triangles: (e, 3 or 6) each element's plane nodes.
-        node_class: (n,) each plane node's class.
+        points: (n, 2) plane nodes of the subdomains.
+        triangles: (e, 3 or 6) plane nodes of each element.
+        node_class: (n,) class of each plane node.
         L, problem: as in `Subdomain`; m displacement strains, v loads.
         u: (classes, c, k) fluctuating displacements.
         loads: (v, k) the strains and other loads.
-        is_mixed: whether the elements have their own bubble and pressure.
+        is_mixed: whether the elements have a bubble and a pressure.
         known: tractions that the recovered stresses in linear elements obey.
-        shared: (n,) vertex classes whose fits (n, p, m k) take in elements from their body's other pieces.
+        shared: (n,) vertex classes, and their fits (n, p, m k), which include elements of other pieces of the body.
     """
 
     points: Float
@@ -69,7 +69,7 @@ class RecoveredStress:
     def on(
         cls, mesh: FineMesh, L: Float, problem: Problem, u: Float, loads: Float, is_mixed: bool = False
     ) -> RecoveredStress:
-        """Set up the stress recovery of one mesh; arguments are named as the attributes."""
+        """Set up the stress recovery on one mesh, with arguments named as the attributes."""
         return cls(mesh.points, mesh.triangles, mesh.node_class, L, problem, u, loads, is_mixed)
 
     @property
@@ -101,7 +101,7 @@ class RecoveredStress:
 
     @cached_property
     def flexibility(self) -> Float:
-        """(m, m) inverse of the stiffness that displacement strains meet."""
+        """(m, m) inverse of the stiffness for displacement strains."""
         m = self.problem.strains
         return np.asarray(np.linalg.inv(self.L[:m, :m]))
 
@@ -113,7 +113,7 @@ class RecoveredStress:
         return [self._uniform(part) if self.order == 1 else self._varying(part) for part in parts]
 
     def _varying(self, part: slice) -> ElementStresses:
-        """Return the stresses in quadratic elements."""
+        """Compute the stresses in quadratic elements."""
         m, nodes = self.problem.strains, self.triangles[part]
         corners, u = self.points[nodes], self.u[self.node_class[nodes]]
         if self.is_mixed:
@@ -131,7 +131,7 @@ class RecoveredStress:
         return ElementStresses(part, points, weights, stress + self.L[:m] @ self.loads)
 
     def _uniform(self, part: slice) -> ElementStresses:
-        """Return the stresses in linear elements; NumPy loops run over the elements."""
+        """Compute the stresses in linear elements; NumPy loops run over the elements."""
         (c, k), m, triangles = self.u.shape[1:], self.problem.strains, self._rows[:, part]
         (x, y), at = (np.take(row, triangles) for row in self._coordinates), np.take(self.node_class, triangles)
         by_node = self.u.reshape(len(self.u), -1).T.copy()
@@ -171,7 +171,7 @@ class RecoveredStress:
         return self._with_shared(fitted(moments, sums + neighbours.shared(sums, self.order)))
 
     def patch_sums(self) -> tuple[Float, Float]:
-        """(vertices, p, p) moments from the elements around each vertex, and (vertices, p, m k) from their stresses."""
+        """Sum moments (vertices, p, p) and stress moments (vertices, p, m k) of elements around each vertex."""
         moments, sums, size = np.zeros(()), np.zeros(()), int(self.vertices.max()) + 1
         for chunk in self.elements:
             corners = self.points[self.triangles[chunk.part, :3]]
@@ -183,13 +183,13 @@ class RecoveredStress:
         return moments, sums
 
     def _with_shared(self, fits: Float) -> Float:
-        """Return fits (vertices, p, m k) with the shared ones in their places."""
+        """Replace fits (vertices, p, m k) at shared vertices by the shared fits."""
         if self.shared is not None:
             fits[self.numbers[self.shared[0]]] = self.shared[1][:, : fits.shape[1]]
         return fits
 
     def recovered(self, part: Int | slice, lam: Float) -> Float:
-        """(e, q, m, k) recovered stresses in the elements `part` at the barycentric coordinates lam (q, 3)."""
+        """Evaluate recovered stresses (e, q, m, k) in elements `part` at barycentric coordinates lam (q, 3)."""
         vertices, shape = self.vertices[part], (self.problem.strains, self.loads.shape[1])
         if self.order == 1:
             return np.asarray((lam @ self.fits[:, 0][vertices]).reshape(len(vertices), len(lam), *shape))
@@ -201,9 +201,9 @@ class RecoveredStress:
         return result.reshape(*points.shape[:2], *shape)
 
     def difference(self, with_shares: bool = True) -> tuple[Float, Float]:
-        """(k, k) int ds_i : S : ds_j, ds recovered less own stress; (e, k) each element's shares in its diagonal.
+        """Integrate ds_i : S : ds_j, (k, k), for recovered less element stresses ds; also diagonals of elements (e, k).
 
-        Without shares (0, k).
+        Without shares, the diagonals are (0, k).
         """
         m, k = self.problem.strains, self.loads.shape[1]
         total, shares = np.zeros((m * k, m * k)), [np.zeros((0, k))]

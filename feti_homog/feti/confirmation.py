@@ -80,34 +80,27 @@ class InfluenceSolutions:
             ConvergenceError: the multipliers by columns have a larger error than the checks of a run allow.
         """
         if solutions and self._expected is not None:
-            self._check(d, solutions)
+            lam, opening = (np.stack(x, axis=1) for x in zip(*((s.lam, s.jump) for s in solutions), strict=True))
+            # Multipliers that F lambda confirms are off by no less than their residuals.
+            lam_error, drift = self._errors(lam, opening, np.array([solution.residual for solution in solutions]))
+            if not lam_error <= thresholds.MOST_UNCONFIRMED_ERROR:
+                raise ConvergenceError(
+                    f"influence columns: multipliers of the last {self._granted} solves: {lam_error:.1e} off"
+                )
+            error, most = float(np.max([lam_error, drift])), thresholds.MOST_FOLLOWED_ERROR
+            if not error <= max(most, 2.0 * self._rounding):
+                # If renewed multipliers stay the same, the error is rounding of F lambda.
+                self._inverse.renew_answer(d)
+                strains = np.stack([solution.strain for solution in solutions], axis=1)
+                again = self._inverse.answer(d, strains, self._natural.unconstrained_modes.shape[1])
+                is_same = again is not None and float(np.max(self._errors(*again))) <= most
+                self._rounding = min(error, thresholds.MOST_ROUNDING) if is_same else 0.0
         confirmed = bool(solutions) and all(solution.iterations == 0 and solution.reason > 0 for solution in solutions)
         self._granted = min(2 * self._granted + 1, thresholds.MOST_UNCONFIRMED) if confirmed else 0
         self._left, self._residual = self._granted, max((solution.residual for solution in solutions), default=0.0)
         if confirmed:
             seen = self._jumps.projected(d)
             self._squares = distributed_arrays.allreduce_sum(self._comm, np.stack([seen.T @ seen, d.T @ d]))
-
-    def _check(self, d: Float, solutions: list[DualSolution]) -> None:
-        """Compare the expected multipliers with solutions by F lambda; renew them if more than rounding differs.
-
-        Collective; raises as `record`.
-        """
-        lam, opening = (np.stack(x, axis=1) for x in zip(*((s.lam, s.jump) for s in solutions), strict=True))
-        # Multipliers that F lambda confirms are off by no less than their residuals.
-        lam_error, drift = self._errors(lam, opening, np.array([solution.residual for solution in solutions]))
-        if not lam_error <= thresholds.MOST_UNCONFIRMED_ERROR:
-            raise ConvergenceError(
-                f"influence columns: multipliers of the last {self._granted} solves: {lam_error:.1e} off"
-            )
-        if (error := float(np.max([lam_error, drift]))) <= max(thresholds.MOST_FOLLOWED_ERROR, 2.0 * self._rounding):
-            return
-        # If renewed multipliers stay the same, the error is rounding of F lambda.
-        self._inverse.renew_answer(d)
-        strains = np.stack([solution.strain for solution in solutions], axis=1)
-        again = self._inverse.answer(d, strains, self._natural.unconstrained_modes.shape[1])
-        is_same = again is not None and float(np.max(self._errors(*again))) <= thresholds.MOST_FOLLOWED_ERROR
-        self._rounding = min(error, thresholds.MOST_ROUNDING) if is_same else 0.0
 
     def _errors(self, lam: Float, opening: Float, residuals: Float | float = 0.0) -> tuple[float, float]:
         """Compare the expected multipliers and jumps on inactive rows with `lam` and `opening`, (owned rows, k) each.

@@ -120,14 +120,17 @@ def build(
         CaseError: an option has no such value, or two exclude each other; a library has no such factorization.
     """
     options = database_options(thresholds)
-    soft = options.want_soft_modes(_are_cut(comm, subdomains))
-    one_each = _has_one_each(comm, subdomains)
+    bodies = comm.allreduce(max((s.submesh.body for s in subdomains), default=-1), MPI.MAX) + 1
+    are_cut = bool(comm.allreduce(len(subdomains)) > bodies)
+    soft = options.want_soft_modes(are_cut)
+    across = comm.allreduce(any(s.material is not None for s in subdomains), MPI.LOR)
+    one_each = comm.size > 1 and comm.allreduce(len(subdomains) == 1, MPI.LAND) and across
     springs = jump_operator.gather(compliance) if comm.allreduce(bool(compliance.any()), MPI.LOR) else None
     operator = "explicit" if one_each and options.operator == "auto" else options.operator
     how = operator, applications, soft, thresholds, springs, recovers and one_each
     with PETSc.Log.Event("FETISubdomains"):
         operators = mpi_errors.agree(comm, InterfaceOperators, jump_operator, subdomains, *how)
-    plan = choose(_sizes(operators, applications, one_each), options, thresholds)
+    plan = choose(_sizes(operators, applications, are_cut, one_each), options, thresholds)
     preconditioner = construct(plan.preconditioner, operators)
     with PETSc.Log.Event("FETINatural"):
         natural = NaturalCoarseSpace(operators)
@@ -148,27 +151,15 @@ def build(
     return SolverParts(operators, preconditioner, natural, adaptive, inverse)
 
 
-def _sizes(operators: InterfaceOperators, applications: int, one_each: bool) -> ProblemSizes:
+def _sizes(operators: InterfaceOperators, applications: int, are_cut: bool, one_each: bool) -> ProblemSizes:
     """Collect the sizes that the choice depends on.  Collective."""
     comm, dense = operators.comm, [o.is_dense for o in operators.operators]
     return ProblemSizes(
         applications=applications,
-        bodies_are_cut=_are_cut(comm, operators.subdomains),
+        bodies_are_cut=are_cut,
         all_dense=comm.allreduce(all(dense), MPI.LAND),
         all_searchable=comm.allreduce(all(np.logical_or(dense, operators.facewise)), MPI.LAND),
         shared_dofs=operators.jump_operator.shared_dofs,
         has_thin=comm.allreduce(any(s.is_thin for s in operators.subdomains), MPI.LOR),
         one_each=one_each,
     )
-
-
-def _has_one_each(comm: MPI.Intracomm, subdomains: Sequence[Subdomain]) -> bool:
-    """Return whether each of several ranks has one subdomain, and some have several materials.  Collective."""
-    across = comm.allreduce(any(s.material is not None for s in subdomains), MPI.LOR)
-    return comm.size > 1 and comm.allreduce(len(subdomains) == 1, MPI.LAND) and across
-
-
-def _are_cut(comm: MPI.Intracomm, subdomains: Sequence[Subdomain]) -> bool:
-    """Return whether there are more subdomains than bodies.  Collective."""
-    bodies = comm.allreduce(max((s.submesh.body for s in subdomains), default=-1), MPI.MAX) + 1
-    return bool(comm.allreduce(len(subdomains)) > bodies)

@@ -123,18 +123,16 @@ def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds =
     if preconditioner == "influence" and not sizes.all_dense:
         raise CaseError("-feti_pc_type influence: needs -feti_dual_operator explicit")
     if preconditioner == "auto":
-        preconditioner = _fastest(sizes, options.coarse_space, thresholds)
+        pays = sizes.applications >= thresholds.influence_applications
+        is_wanted = sizes.has_thin or (pays and sizes.shared_dofs <= thresholds.assembled_schur_dofs)
+        is_small = 0 < sizes.shared_dofs <= thresholds.dense_boundary_dofs
+        if options.coarse_space != "adaptive" and sizes.all_dense and is_wanted:
+            preconditioner = "influence"
+        elif options.coarse_space == "auto" and sizes.one_each and sizes.all_dense and is_small:
+            preconditioner = BONDED
+        else:
+            preconditioner = "dirichlet"
     can_balance = sizes.all_searchable and preconditioner == "dirichlet"
     if options.coarse_space == "adaptive" and sizes.shared_dofs and not can_balance:
         raise CaseError("-feti_coarse_space adaptive: needs -feti_pc_type dirichlet, -feti_dual_operator not implicit")
     return SolverPlan(preconditioner, can_balance and options.want_soft_modes(sizes.bodies_are_cut))
-
-
-def _fastest(sizes: ProblemSizes, coarse_space: str, thresholds: Thresholds) -> str:
-    """Choose the preconditioner where no option names one."""
-    pays = sizes.applications >= thresholds.influence_applications
-    is_wanted = sizes.has_thin or (pays and sizes.shared_dofs <= thresholds.assembled_schur_dofs)
-    if coarse_space != "adaptive" and sizes.all_dense and is_wanted:
-        return "influence"
-    is_small = 0 < sizes.shared_dofs <= thresholds.dense_boundary_dofs
-    return BONDED if coarse_space == "auto" and sizes.one_each and sizes.all_dense and is_small else "dirichlet"

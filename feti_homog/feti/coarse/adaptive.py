@@ -4,10 +4,10 @@ With the coarse displacements Z_0 (`geneo.AveragedModes`) the boundary stiffness
 
     S_0 = S - S Z_0 (Z_0^T S Z_0)^+ Z_0^T S,
 
-the part that is left where the coarse displacements are in equilibrium.  As B Z_0 = 0, S_0 in place of S in the
-preconditioner M^-1 = B_D S B_D^T makes the exact inverse dual operator if Z_0 spans all displacements of the
-glued cell (T9), and takes the soft modes away from the Krylov method if it spans theirs (Spillane & Rixen, IJNME 95,
-2013).  Z_0^T S Z_0 is positive semi-definite, and couples subdomains that share a neighbour.
+the stiffness with the coarse displacements in equilibrium.  The preconditioner is M^-1 = B_D S_0 B_D^T.  As B Z_0 = 0,
+it is the exact inverse of the dual operator if Z_0 spans all displacements of the glued cell (T9).  If Z_0 spans the
+soft modes, the preconditioner removes these from the Krylov method (Spillane & Rixen, IJNME 95, 2013).  Z_0^T S Z_0 is
+positive semi-definite, and couples subdomains that have a common neighbour.
 """
 
 from __future__ import annotations
@@ -32,18 +32,17 @@ from feti_homog.typing import Float, Int
 
 
 class AdaptiveCoarseSpace:
-    """The adaptive coarse space.  Every rank has S Z_0 on its subdomains, and its share in a factor.
+    """The adaptive coarse space: S Z_0 on the local subdomains, and a factor of Z_0^T S Z_0.
 
-    A rank has the u coarse displacements, of all n, that reach its subdomains.
-
-    Per subdomain S Z_0 is dense: an uncut outer body has a column for every mode of every inner one.
+    Of all n coarse displacements, a rank has the u that reach its subdomains.  S Z_0 of a subdomain is dense: an uncut
+    outer body has a column for every mode of every inner body.
 
     Attributes:
         threshold: tau.
         counts: number of soft modes for each local subdomain.
-        coarse_dimension: coarse displacements, n.
-        factorizations: of Z_0^T S Z_0 so far.
-        solver: of Z_0^T S Z_0, scaled.
+        coarse_dimension: number n of coarse displacements.
+        factorizations: number of factorizations of Z_0^T S Z_0.
+        solver: solver for the scaled matrix Z_0^T S Z_0.
     """
 
     def __init__(
@@ -53,13 +52,13 @@ class AdaptiveCoarseSpace:
         threshold: float,
         thresholds: Thresholds = DEFAULTS,
     ) -> None:
-        """Find the modes below the threshold tau and factor.  Collective.
+        """Compute the modes below the threshold tau, and factor.  Collective.
 
-        All boundary operators must be dense, but on large bodies.  Options under `feti_coarse_` as in
+        All boundary operators must be dense, except on large bodies.  Options under `feti_coarse_` as in
         `DistributedSolver`.
 
         Raises:
-            MeshError: the neighbourhood of a face, on any rank, is no subdomain.
+            MeshError: a face neighbourhood on some rank is not a valid subdomain.
             LinAlgError, CaseError: as `factor`.
         """
         comm, jump_operator = operators.comm, operators.jump_operator
@@ -75,7 +74,7 @@ class AdaptiveCoarseSpace:
         self.solver = DistributedSolver(comm, self.coarse_dimension, "feti_coarse_")
         self._columns = [np.searchsorted(self._modes.reaching, columns) for columns in self._modes.columns]
         self._translations = self._modes.translations(comm)
-        # Of each subdomain S Z_0 on its boundary dofs, and Z_0^T S Z_0.
+        # S Z_0 on the boundary dofs of each subdomain, and Z_0^T S Z_0.
         self._forces: list[Float] = [np.zeros((0, 0)) for _ in blocks]
         self._energies: list[Float] = [np.zeros((0, 0)) for _ in blocks]
         self._mask = np.ones(len(jump_operator.rows))
@@ -87,9 +86,9 @@ class AdaptiveCoarseSpace:
         self.factor(self.part())
 
     def activate(self, active: Float) -> None:
-        """Average over the copies, and factor.  Collective.
+        """Average the modes over node copies on the active rows, and factor.  Collective.
 
-        Owned rows where `active` is 1 hold copies together, as in the scaling.  Raises as `factor`.
+        Rows are active where `active` (owned rows,) is 1, as in the scaling.  Raises as `factor`.
         """
         mask = self._jump_operator.gather(active).copy()
         changed = mask != self._mask
@@ -101,14 +100,14 @@ class AdaptiveCoarseSpace:
         self.factor(self.part())
 
     def _update(self, which: Sequence[int], BW: Sequence[csr_matrix]) -> None:
-        """S Z_0 and Z_0^T S Z_0 of some subdomains, for their scaled constraints."""
+        """Compute S Z_0 and Z_0^T S Z_0 of the subdomains `which`, from scaled constraints `BW`."""
         for i, constraints in zip(which, BW, strict=True):
             Z = self._modes.of_subdomain(i, constraints)
             self._forces[i] = self._operators.with_springs[i].apply_schur(Z)
             self._energies[i] = Z.T @ self._forces[i]
 
     def part(self) -> csr_matrix:
-        """(u, u) this rank's part of Z_0^T S Z_0."""
+        """Sum this rank's part (u, u) of Z_0^T S Z_0."""
         total = DenseBlockSum((len(self._modes.reaching),) * 2)
         for columns, energy in zip(self._columns, self._energies, strict=True):
             total.add(columns, columns, energy)
@@ -119,13 +118,13 @@ class AdaptiveCoarseSpace:
 
         Collective.
 
-        Modes of a fibre that nothing holds have no energy, and are left out; others may depend on each other.  What is
-        added makes the sum definite, and S_0 greater: of a coarse displacement of the scaled energy mu the share
-        eps / (mu + eps) of its forces is left, eps being what is added.
+        Modes of a free fibre have no energy, and are left out; other modes may be linearly dependent.  The multiple
+        eps I makes the sum definite, and S_0 larger: of the forces of a coarse displacement with the scaled energy mu,
+        the fraction eps / (mu + eps) is left.
 
         Raises:
-            LinAlgError: rounding leaves the matrix indefinite by more than all of COARSE_REGULARISATIONS.
-            CaseError: the library that the options name cannot factor the matrix, or not on that many ranks.
+            LinAlgError: rounding leaves the matrix indefinite with each of COARSE_REGULARISATIONS.
+            CaseError: the library in the options cannot factor the matrix on this number of ranks.
         """
         self.factorizations += 1
         if not self.coarse_dimension:
@@ -137,7 +136,7 @@ class AdaptiveCoarseSpace:
             largest = self.comm.allreduce(energy.max(initial=0.0), MPI.MAX)
             # An energy is the square of a displacement.
             self._free_energy = ZERO_TOLERANCE * np.where(energy > ZERO_TOLERANCE**2 * largest, energy, largest)
-        # What a free motion has of energy is rounding, which would be scaled up to more than what is added.
+        # The energy of a free motion is rounding, which the scale would increase beyond the added multiple.
         is_held = energy > self._free_energy
         root = np.sqrt(np.where(is_held, energy, 0.0))
         self._weights = np.divide(1.0, root, out=np.zeros_like(root), where=is_held)
@@ -152,7 +151,7 @@ class AdaptiveCoarseSpace:
                     raise
 
     def balanced(self, x: Float) -> Float:
-        """S_0 x, forces by displacements x (boundary dofs,) or (boundary dofs, k).  Collective."""
+        """Compute the forces S_0 x of displacements x (boundary dofs,) or (boundary dofs, k).  Collective."""
         forces = self._operators.apply_with_springs(x)
         if not self.coarse_dimension:
             return forces
@@ -165,14 +164,14 @@ class AdaptiveCoarseSpace:
         return forces
 
     def solve(self, work: Float) -> Float:
-        """c with Z_0^T S Z_0 c = the sum over ranks of work, (u,) or (u, k) both.  Collective."""
+        """Solve Z_0^T S Z_0 c = work, summed over ranks, for c; both are (u,) or (u, k).  Collective."""
         with self._solve_event:
             return distributed_arrays.scale_rows(
                 self._weights, self.solver.solve(distributed_arrays.scale_rows(self._weights, work))
             )
 
     def _parts(self) -> zip[tuple[Int, Float, slice]]:
-        """Return places of the modes that reach each subdomain, S Z_0, and where it is among the boundary dofs."""
+        """Pair the mode positions of each subdomain with S Z_0 and with the slice of its boundary dofs."""
         return zip(self._columns, self._forces, self._operators.slices, strict=True)
 
     def destroy(self) -> None:
@@ -181,9 +180,9 @@ class AdaptiveCoarseSpace:
 
 
 class Balanced(Preconditioner):
-    """z = B_D S_0 B_D^T r with S_0 of `coarse`, the rest as in `scaled`.
+    """The preconditioner z = B_D S_0 B_D^T r, with S_0 of `coarse` and B_D of `scaled`.
 
-    S_0 B_D^T B R = S_0 R = 0 for rigid-body motions R: so G^T z = 0, and a part G a of r makes no z.
+    S_0 B_D^T B R = S_0 R = 0 for rigid-body motions R: so G^T z = 0, and a part G a of r does not change z.
 
     Attributes:
         scaled: the preconditioner without coarse space.
@@ -201,9 +200,9 @@ class Balanced(Preconditioner):
         self.coarse.activate(active)
 
     def apply(self, r: Float) -> Float:
-        """B_D S_0 B_D^T r.  Collective."""
+        """Compute B_D S_0 B_D^T r.  Collective."""
         return self.scaled.multipliers(self.coarse.balanced(self.scaled.displacement_with_jump(r)))
 
     def closing_forces(self, jump: Float) -> Float:
-        """B_D S B_D^T of the jump.  Collective."""
+        """Compute B_D S B_D^T times the jump.  Collective."""
         return self.scaled.apply(jump)

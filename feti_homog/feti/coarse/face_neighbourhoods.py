@@ -1,15 +1,15 @@
-"""Face neighbourhoods on long boundaries, and trace spaces, linear between some nodes.
+"""Face neighbourhoods on long boundaries, and trace spaces of piecewise linear displacements.
 
-For face displacements p the body energy is at least the energy in the face neighbourhood N, whatever else
-moves:
+For face displacements p, the body energy is at least the energy in the face neighbourhood N, for any other
+displacements:
 
     min { x^T S x : x = p on the face } >= p^T S_N p.
 
-So displacements that are soft in the body, x, are soft in some neighbourhood, on its face; there may be more of these.
-With all but the face held fixed, the neighbourhood is stiffer than the body:  S restricted to the face <= S_fixed.
+So each soft displacement x of the body is soft in a neighbourhood, on its face; the neighbourhood may have more soft
+displacements.  With all nodes off the face fixed, it is stiffer than the body:  S restricted to the face <= S_fixed.
 
-Refinement hardly changes the soft modes of a subdomain, so a fine boundary is searched for them on the coarsest trace
-space of enough dofs: P q for the values q at the vertices of the coarse mesh and at every k-th node along its edges.
+Refinement hardly changes the soft modes of a subdomain.  So the search uses the coarsest trace space with enough dofs:
+P q for the values q at the vertices of the coarse mesh and at every k-th node along its edges.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ from feti_homog.feti.linalg.dense_matrices import schur_complement
 from feti_homog.feti.operators.one_subdomain import ExplicitInterfaceOperator
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.mesh import ReferenceLattice, Submesh, periodic_topology, submeshes
-from feti_homog.typing import Bool, Float, Int
+from feti_homog.typing import Float, Int
 
 
 def trace_space(
@@ -32,7 +32,7 @@ def trace_space(
 ) -> csr_matrix:
     """Return the prolongation P (cn, cm) to n boundary `nodes`, with cm >= min(cn, `min_dofs`).
 
-    Nodes are sorted classes of the refined piece; edge ends missing from them have zero displacement.
+    Nodes are sorted classes of the refined piece; edge ends that are not boundary nodes have zero displacement.
     """
     vertices, inner, c = len(submesh.class_keys), lattice.intervals - 1, problem.components
     on_edge = nodes >= vertices
@@ -71,10 +71,10 @@ class FaceNeighbourhood:
     """A face neighbourhood in its body, as a subdomain, condensed to the n face dofs.
 
     Attributes:
-        at: (n,) positions of these dofs among the body's boundary dofs.
-        operator: its dense boundary operators.
-        R: (n, k) its kernel on the face.
-        P: (n, m) its trace space.
+        at: (n,) positions of the face dofs among the boundary dofs of the body.
+        operator: dense boundary operators of the neighbourhood.
+        R: (n, k) kernel on the face.
+        P: (n, m) trace space.
         S_fixed: (n, n) stiffness of the face if other faces and all nodes outside the neighbourhood are fixed.
     """
 
@@ -88,7 +88,7 @@ class FaceNeighbourhood:
 def face_neighbourhoods(
     body: Subdomain, dofs: Int, face: Int, thresholds: Thresholds = DEFAULTS
 ) -> list[FaceNeighbourhood]:
-    """Return the face neighbourhoods: connected parts of the triangles near it with enough face nodes.
+    """Build the neighbourhoods of a face: connected parts of the triangles near it with several face nodes.
 
     Args:
         dofs: (n,) boundary dofs of the body, sorted.
@@ -108,30 +108,23 @@ def face_neighbourhoods(
     triangles = np.flatnonzero(is_near)
     edges = body.submesh.edge_class[body.submesh.triangle_edges[triangles]]
     label = periodic_topology.components(len(triangles), *periodic_topology.edge_pairs(edges))
-    neighbourhoods = (
-        _neighbourhood(body, dofs, triangles[label == k], on_face, on_others, thresholds.min_trace_dofs)
-        for k in range(label.max() + 1)
-    )
-    return [neighbourhood for neighbourhood in neighbourhoods if neighbourhood is not None]
-
-
-def _neighbourhood(
-    body: Subdomain, dofs: Int, triangles: Int, on_face: Bool, on_others: Bool, min_trace_dofs: int
-) -> FaceNeighbourhood | None:
-    """Return the neighbourhood in coarse triangles if it has enough face nodes."""
-    outside = np.zeros_like(on_face)
-    outside[body.mesh.node_class[np.delete(body.mesh.nodes, triangles, axis=0)]] = True
-    piece = submeshes.part(body.submesh, triangles)
-    subdomain = Subdomain.build(piece, body.mesh.lattice, body.L, body.problem, is_thin=body.is_thin, mixed=body.mixed)
-    of_body = np.empty(subdomain.mesh.n_classes, np.int64)
-    of_body[subdomain.mesh.node_class[subdomain.mesh.nodes]] = body.mesh.node_class[body.mesh.nodes[triangles]]
-    nodes = np.flatnonzero(on_face[of_body])
-    if len(nodes) < 2:  # a single node has no soft mode: it can only translate
-        return None
-    all_of = body.problem.dofs
-    face, at = all_of(nodes), np.searchsorted(dofs, all_of(of_body[nodes]))
-    movable = all_of(np.flatnonzero(on_face[of_body] | ~(outside | on_others)[of_body]))
-    K = subdomain.take_stiffness()
-    S_fixed = schur_complement(K[movable][:, movable].tocsr(), np.searchsorted(movable, face))
-    P = trace_space(subdomain.submesh, subdomain.mesh.lattice, subdomain.problem, nodes, min_trace_dofs)
-    return FaceNeighbourhood(at, ExplicitInterfaceOperator(subdomain, K, face), subdomain.R[face], P, S_fixed)
+    neighbourhoods, lattice, all_of = [], body.mesh.lattice, body.problem.dofs
+    for k in range(label.max() + 1):
+        members = triangles[label == k]
+        outside = np.zeros_like(on_face)
+        outside[np.delete(classes, members, axis=0)] = True
+        piece = submeshes.part(body.submesh, members)
+        subdomain = Subdomain.build(piece, lattice, body.L, body.problem, is_thin=body.is_thin, mixed=body.mixed)
+        of_body = np.empty(subdomain.mesh.n_classes, np.int64)
+        of_body[subdomain.mesh.node_class[subdomain.mesh.nodes]] = classes[members]
+        nodes = np.flatnonzero(on_face[of_body])
+        if len(nodes) < 2:  # a single node has no soft mode: it can only translate
+            continue
+        face, at = all_of(nodes), np.searchsorted(dofs, all_of(of_body[nodes]))
+        movable = all_of(np.flatnonzero(on_face[of_body] | ~(outside | on_others)[of_body]))
+        K = subdomain.take_stiffness()
+        S_fixed = schur_complement(K[movable][:, movable].tocsr(), np.searchsorted(movable, face))
+        P = trace_space(piece, lattice, body.problem, nodes, thresholds.min_trace_dofs)
+        operator = ExplicitInterfaceOperator(subdomain, K, face)
+        neighbourhoods.append(FaceNeighbourhood(at, operator, subdomain.R[face], P, S_fixed))
+    return neighbourhoods

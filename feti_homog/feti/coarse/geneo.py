@@ -1,12 +1,12 @@
-"""Local eigenproblems of all subdomains: modes that slow the preconditioned dual operator down.
+"""Local eigenproblems of all subdomains, whose soft modes slow down the convergence, and averages of these modes.
 
 With the averaged soft modes in equilibrium, the largest eigenvalue of the preconditioned dual operator is at most
-1 + N / tau whatever the geometry and the materials, N being the largest number of subdomains that share nodes with one,
-itself included (GenEO: Spillane & Rixen, IJNME 95, 2013).  Measured, it is about 1 / tau.
+1 + N / tau for any geometry and any materials.  N is the largest number of subdomains around one subdomain, itself
+included (GenEO: Spillane & Rixen, IJNME 95, 2013).  Measured values are about 1 / tau.
 
 Subdomain modes are averaged over node copies: Z_0 = (I - B_D^T B) V, the coarse displacements.
-B Z_0 = 0, for B B_D^T = I, so they are displacements of the cell whose active rows are glued.  A subdomain mode
-reaches the subdomains that share nodes with it, and no further.
+B Z_0 = 0, for B B_D^T = I, so Z_0 are displacements of the cell with glued active rows.  A subdomain mode reaches only
+the subdomains that share nodes with its subdomain.
 """
 
 from collections.abc import Iterator, Sequence
@@ -24,30 +24,30 @@ from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.system.parallel import distributed_arrays, mpi_errors
 from feti_homog.typing import Float, Float32, Int
 
-# Jumps B V that the modes of a subdomain, itself or a neighbour, open on subdomain rows: positions (r,) among the rows
-# of the subdomain, numbers (c,) of coarse modes, and values (r, c).
+# Jumps B V that the modes of a subdomain or of a neighbour open on the rows of the subdomain: row positions (r,),
+# numbers (c,) of coarse modes, and values (r, c).
 Jumps = tuple[Int, Int, Float]
 
 
 class AveragedModes:
-    """Z_0 on this rank's subdomains, for any active rows: its parts stay for changes of these rows.
+    """The averaged modes Z_0 on local subdomains, from parts that hold for any active rows.
 
     Attributes:
-        total: coarse modes of all subdomains, n.
-        columns: for each subdomain the numbers (m,) of modes that reach it, ascending.
-        reaching: (u,) the numbers of all that reach this rank's subdomains, ascending.
-        is_own: (u,) whether each belongs to a local subdomain.
+        total: number n of coarse modes of all subdomains.
+        columns: numbers (m,) of the modes that reach each subdomain, ascending.
+        reaching: (u,) numbers of the modes that reach any local subdomain, ascending.
+        is_own: (u,) whether the mode belongs to a local subdomain.
     """
 
     def __init__(
         self, comm: MPI.Intracomm, blocks: Sequence[SubdomainBlocks], neighbours: Neighbours, V: Sequence[Float]
     ) -> None:
-        """`V` are of each subdomain its kernel, then its soft modes, on its boundary dofs.  Collective."""
+        """Exchange the jumps of `V`: kernel and soft modes of each subdomain on its boundary.  Collective."""
         self._blocks, self._V, self._sizes = blocks, V, [len(rows) for rows in neighbours.rows]
         counts = np.zeros(len(neighbours.rank), np.int64)
         counts[neighbours.index] = [v.shape[1] for v in V]
         comm.Allreduce(MPI.IN_PLACE, counts)
-        ends = np.cumsum(counts)  # of each subdomain in the cell its last coarse mode + 1
+        ends = np.cumsum(counts)  # last coarse mode of each subdomain in the cell, + 1
         self._jumps: list[list[Jumps]] = [[] for _ in blocks]
 
         def messages() -> Iterator[tuple[int, int, tuple[Int, Float]]]:
@@ -55,7 +55,7 @@ class AveragedModes:
                 Z, s = block.B @ v, neighbours.index[i]
                 first = ends[s] - v.shape[1]
                 for t, common in neighbours.common[i].items():
-                    # All of its own, though a mode may open nothing.
+                    # A subdomain has all its modes, even if a mode opens no jump.
                     some = np.arange(v.shape[1]) if t == s else np.flatnonzero(Z[common].any(axis=0))
                     yield i, t, (first + some, Z[np.ix_(common, some)])
 
@@ -71,12 +71,12 @@ class AveragedModes:
         self.is_own = np.isin(self.reaching, np.concatenate([none, *numbers]))
 
     def of_subdomain(self, i: int, BW: csr_matrix) -> Float:
-        """(boundary dofs, m) Z_0 on subdomain i, less its own kernel, which has no energy there.
+        """Compute Z_0 on subdomain i, (boundary dofs, m), less the kernel of i, which has no energy there.
 
-        Without the kernel, the rest of a rigid-body motion in a stiff subdomain has all its digits.
+        Without the kernel, the rest of a rigid-body motion in a stiff subdomain has all digits.
 
         Args:
-            BW: (rows, boundary dofs) its scaled constraints W^-1 B D^-1 of the active rows.
+            BW: (rows, boundary dofs) scaled constraints W^-1 B D^-1 of the subdomain, on the active rows.
         """
         columns, kernel = self.columns[i], self._blocks[i].R.shape[1]
         jump = np.zeros((self._sizes[i], len(columns)))
@@ -89,7 +89,7 @@ class AveragedModes:
         return Z
 
     def translations(self, comm: MPI.Intracomm) -> Float:
-        """(u, c) amplitudes for translations of the whole cell, which have little energy.  Collective."""
+        """Compute amplitudes (u, c) of whole-cell translations, which have little energy.  Collective."""
         subdomains = [block.subdomain for block in self._blocks]
         c = subdomains[0].problem.components if subdomains else 0
         amplitudes = np.zeros((self.total, comm.allreduce(c, MPI.MAX)))
@@ -101,7 +101,7 @@ class AveragedModes:
 def subdomain_blocks(
     operators: InterfaceOperators, scaling: StiffnessScaled, rows: Sequence[Int]
 ) -> list[SubdomainBlocks]:
-    """Return the blocks of this rank's subdomains; `rows` belong to their nodes.  Collective."""
+    """Cut the blocks of local subdomains out of B and W^-1 B D^-1, on the `rows` of their nodes.  Collective."""
     B, BW = operators.B.tocsc(), scaled_constraints(scaling)
     blocks = []
     for i, (subdomain, operator) in enumerate(zip(operators.subdomains, operators.with_springs, strict=True)):
@@ -113,7 +113,7 @@ def subdomain_blocks(
 
 
 def scaled_constraints(scaling: StiffnessScaled) -> csc_matrix:
-    """(local rows, boundary dofs) W^-1 B D^-1 on the active rows of the scaling, else 0.  Collective."""
+    """Compute W^-1 B D^-1 (local rows, boundary dofs), 0 on inactive rows.  Collective."""
     jump_operator = scaling.jump_operator
     owned = jump_operator.owned[1] - jump_operator.owned[0]
     inverse = scaling.W_inverse.tocoo()
@@ -129,14 +129,14 @@ def scaled_constraints(scaling: StiffnessScaled) -> csc_matrix:
 def kernels_and_soft_modes(
     blocks: Sequence[SubdomainBlocks], neighbours: Neighbours, threshold: float, thresholds: Thresholds = DEFAULTS
 ) -> list[Float]:
-    """V: for each subdomain of this rank (n, k + m) its kernel and its m modes below the threshold.  Collective.
+    """Compute V (n, k + m) of each local subdomain: kernel and m modes below the threshold.  Collective.
 
     Raises:
-        MeshError: the neighbourhood of a face, on any rank, is no subdomain.
+        MeshError: a face neighbourhood on some rank is not a valid subdomain.
     """
     parts = list(zip(blocks, neighbours.common, strict=True))
     problems = mpi_errors.agree(neighbours.comm, lambda: [eigenproblem(*part, thresholds) for part in parts])
-    # Of the neighbours' shares in M^-1 the rows that both have.
+    # Shares of the neighbours in M^-1, on common rows.
     received: list[list[tuple[int, Float32]]] = [[] for _ in blocks]
 
     def messages() -> Iterator[tuple[int, int, Float32]]:
@@ -153,7 +153,7 @@ def kernels_and_soft_modes(
 
 
 def local_columns(matrix: csc_matrix, span: slice, rows: Int) -> csr_matrix:
-    """Return the columns `span` on the sorted `rows`, which hold all their entries."""
+    """Cut out the columns `span` on sorted `rows` that contain all entries of these columns."""
     indptr = matrix.indptr[span.start : span.stop + 1]
     part = slice(indptr[0], indptr[-1])
     at = np.searchsorted(rows, matrix.indices[part])

@@ -4,10 +4,10 @@ For a subdomain s with Schur complement S_s and constraints B_s, the displacemen
 
     S_s p = theta N_s p,  N_s = B_s^T M^-1 B_s,  theta < tau
 
-are soft in s but stiff in the eyes of the preconditioner.  On a large boundary this dense eigenproblem is too large.
-But where each node is shared with one other body only, the weights of M^-1 hardly change along the boundary, its own
-share is no more than S_s, and the neighbour's share makes p stiff: so each face has an eigenproblem of its own, with
-the Schur complement of the face's neighbourhood for S_s.  The eigenproblems are projected to trace spaces.
+are soft in s but stiff in the preconditioner.  On a large boundary, this dense eigenproblem is too large.  But if each
+node belongs to one other body only, the weights of M^-1 hardly change along the boundary, the share of s in M^-1 is at
+most S_s, and the share of the neighbour makes p stiff.  Then each face has its own eigenproblem, with the Schur
+complement of the face neighbourhood in place of S_s.  The eigenproblems are projected to trace spaces.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,20 +22,21 @@ from feti_homog.feti.coarse.face_neighbourhoods import face_neighbourhoods, trac
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.linalg.dense_matrices import cholesky
 from feti_homog.feti.operators.with_springs import BoundaryOperator, DenseOperator, is_dense
-from feti_homog.feti.thresholds import DEFAULTS, Thresholds
+from feti_homog.feti.thresholds import Thresholds
 from feti_homog.typing import Float, Float32, Int
 
-# Eigenvalues of a matrix in single precision, relative to its largest, that are rounding.
+# Relative size of eigenvalues that are rounding, for a matrix in single precision.
 SINGLE_PRECISION_NULL = 10 * np.finfo(np.float32).eps
 
 
 @dataclass(frozen=True)
 class SubdomainBlocks:
-    """One subdomain on the rows of its nodes.
+    """The matrices of one subdomain on the rows at its nodes.
 
     Attributes:
-        subdomain, dofs: itself, and its (n,) boundary dofs.
-        operator: its boundary operators.
+        subdomain: the subdomain.
+        dofs: (n,) boundary degrees of freedom.
+        operator: boundary operators.
         B: (rows, n) constraints.
         BW: (rows, n) scaled constraints W^-1 B D^-1.
         facewise: whether each face has an eigenproblem of its own.
@@ -55,35 +56,31 @@ class SubdomainBlocks:
 
 
 class SubdomainEigenproblem:
-    """One eigenproblem on the whole boundary."""
+    """The eigenproblem of a subdomain on its whole boundary."""
 
     def __init__(
-        self,
-        block: SubdomainBlocks,
-        operator: DenseOperator,
-        common: Mapping[int, Int],
-        min_trace_dofs: int = DEFAULTS.min_trace_dofs,
+        self, block: SubdomainBlocks, operator: DenseOperator, common: Mapping[int, Int], min_trace_dofs: int
     ) -> None:
-        """Store the rows of `common` that the subdomain shares with each subdomain, itself included."""
+        """Project S to the trace space; `common` are the rows in common with each subdomain, itself included."""
         self.block, self.common, self._operator = block, common, operator
         subdomain, S = block.subdomain, operator.S
         nodes = np.unique(subdomain.problem.nodes(block.dofs))
         self._P = trace_space(subdomain.submesh, subdomain.mesh.lattice, subdomain.problem, nodes, min_trace_dofs)
         self._regular_S = congruent(self._P, S) + operator.regularisation(self._P)
-        # (rows, rows) its share W^-1 B D^-1 S D^-1 B^T W^-1 of M^-1; this precision separates soft from stiff.
+        # Share W^-1 B D^-1 S D^-1 B^T W^-1 of M^-1 (rows, rows); single precision separates soft from stiff modes.
         BW = block.BW.astype(np.float32)
         self._share = BW @ (BW @ S.astype(np.float32)).T
 
     def preconditioner_shares(self) -> Iterator[tuple[int, Float32]]:
-        """Its share of M^-1 on the rows in common with each other subdomain."""
+        """Yield the share in M^-1 on the rows in common with each other subdomain."""
         for s, rows in self.common.items():
             if s != self.block.subdomain.submesh.index:
                 yield s, self._share[np.ix_(rows, rows)]
 
     def modes(self, shares: Sequence[tuple[int, Float32]], threshold: float) -> Float:
-        """(n, m) soft modes besides the kernel, for the shares of other subdomains in M^-1."""
+        """Compute soft modes (n, m) without the kernel, from the shares of other subdomains in M^-1."""
         M = self._share.copy()
-        # In the order of subdomains, so that rounding does not depend on the ranks.
+        # Subdomain order, so that rounding does not depend on the ranks.
         for s, share in sorted(shares, key=itemgetter(0)):
             M[np.ix_(self.common[s], self.common[s])] += share
         N = jump_energy(self.block.B, self._P, self.block.R, M)
@@ -92,9 +89,9 @@ class SubdomainEigenproblem:
 
 
 class FaceEigenproblems:
-    """One eigenproblem on each face; see `SubdomainEigenproblem`."""
+    """The eigenproblems of a subdomain on each face; methods as of `SubdomainEigenproblem`."""
 
-    def __init__(self, block: SubdomainBlocks, common: Mapping[int, Int], thresholds: Thresholds = DEFAULTS) -> None:
+    def __init__(self, block: SubdomainBlocks, common: Mapping[int, Int], thresholds: Thresholds) -> None:
         self.block, self.common = block, common
         self._factor, self._decayed = thresholds.face_factor, thresholds.decayed
         problem = block.subdomain.problem
@@ -106,7 +103,7 @@ class FaceEigenproblems:
         }
 
     def preconditioner_shares(self) -> Iterator[tuple[int, Float32]]:
-        """No less than its share of M^-1 on the rows in common with each other subdomain."""
+        """Yield upper bounds of the share in M^-1 on the rows in common with each other subdomain."""
         for s, neighbourhoods in self._neighbourhoods.items():
             share = np.zeros((len(self.common[s]),) * 2)
             for part in neighbourhoods:
@@ -115,9 +112,9 @@ class FaceEigenproblems:
             yield s, share.astype(np.float32)
 
     def modes(self, shares: Sequence[tuple[int, Float32]], threshold: float) -> Float:
-        """(n, m) soft face modes, for other subdomains' shares in M^-1.
+        """Compute soft face modes (n, m), from the shares of other subdomains in M^-1.
 
-        The rest of the boundary follows as it does in the whole body, until the mode has decayed.
+        Each mode continues on the rest of the boundary as in the whole body, until it has decayed.
         """
         forces = [np.zeros((len(self.block.dofs), 0))]
         for s, share in shares:
@@ -135,12 +132,12 @@ class FaceEigenproblems:
 
 
 def eigenproblem(
-    block: SubdomainBlocks, common: Mapping[int, Int], thresholds: Thresholds = DEFAULTS
+    block: SubdomainBlocks, common: Mapping[int, Int], thresholds: Thresholds
 ) -> SubdomainEigenproblem | FaceEigenproblems:
-    """Return the eigenproblem of a subdomain, or one for each face.
+    """Set up the eigenproblem of a subdomain, or one eigenproblem for each face.
 
     Raises:
-        TypeError: one on the whole boundary is wanted, but its operators are not dense.
+        TypeError: the problem is on the whole boundary, but the operators are not dense.
     """
     if block.facewise:
         return FaceEigenproblems(block, common, thresholds)
@@ -150,9 +147,10 @@ def eigenproblem(
 
 
 def jump_forces(B: csr_matrix, p: Float, R: Float, M: Float32) -> Float:
-    """(n, m) N p with N = B^T M B, as precise as M, for p (n, m), less forces that work on the kernel R (n, k).
+    """Compute N p (n, m), N = B^T M B, for p (n, m), less forces that do work on the kernel R (n, k).
 
-    S+ N p is a step of inverse iteration: it bends an eigenvector that was sought among traces as the body does.
+    S+ N p is a step of inverse iteration, which bends an eigenvector of the trace space as the body bends.  The result
+    is as precise as M.
     """
     NR, Np = (np.asarray(B.T @ (M @ (B @ x).astype(np.float32)).astype(float)) for x in (R, p))
     return np.asfortranarray(
@@ -161,29 +159,29 @@ def jump_forces(B: csr_matrix, p: Float, R: Float, M: Float32) -> Float:
 
 
 def congruent(T: csr_matrix | Float, A: Float | Float32) -> Float:
-    """T^T A T for symmetric A."""
+    """Compute T^T A T for symmetric A."""
     return np.asarray(T.T @ (T.T @ A).T)
 
 
 def jump_energy(B: csr_matrix, P: csr_matrix, R: Float, M: Float32) -> Float:
-    """(m + k, m + k) T^T M T for jumps T = B [P R] of trace space and kernel, for symmetric M and as precise."""
+    """Compute T^T M T (m + k, m + k) for symmetric M and the jumps T = B [P R] of trace space and kernel."""
     TP, TR = (B @ P).astype(np.float32), (B @ R).astype(np.float32)
     MR = M @ TR
     return np.block([[congruent(TP, M), TP.T @ MR], [(TP.T @ MR).T, TR.T @ MR]]).astype(float)
 
 
 def soft_modes(S: Float, N: Float, threshold: float) -> Float:
-    """(m, j) eigenvectors q of P^T S P q = theta P^T N P q with theta < threshold, besides the kernel of S.
+    """Compute eigenvectors q (m, j) of P^T S P q = theta P^T N P q with theta < threshold, without the kernel of S.
 
     Args:
-        S: (m, m) P^T S P, made definite on the kernel of S.
+        S: (m, m) P^T S P, regularised on the kernel of S.
         N: (m + k, m + k) [P R]^T N [P R], with the kernel R (n, k) of S.
     """
     m = len(S)
     NR, RNR = N[:m, m:], N[m:, m:]
-    # Without the kernel's part, N has eigenvectors N-orthogonal to the kernel, where the definite matrix is S.
+    # Without the kernel part, eigenvectors of N are N-orthogonal to the kernel, and there the regularised matrix is S.
     rest = N[:m, :m] - NR @ np.linalg.pinv(RNR, rcond=SINGLE_PRECISION_NULL, hermitian=True) @ NR.T
-    # A Cholesky factorization shows at a tenth of the cost whether there are any.
+    # A Cholesky factorization detects soft modes at a tenth of the cost of an eigenproblem.
     try:
         cholesky(S - threshold * rest)
     except np.linalg.LinAlgError:

@@ -21,19 +21,19 @@ class NaturalCoarseSpace:
     """The condition G^T lam = 0 on the active multipliers, for which all subdomains are in equilibrium.
 
     The load of a macroscopic strain does no work on rigid-body motions, so e = R^T f vanishes.  G has a row for each
-    multiplier and a column for each kernel mode; every rank holds its own rows, and its share in a factor of G^T G.
+    multiplier and a column for each kernel mode.  Every rank has its owned rows, and its part in a factor of G^T G.
 
     Attributes:
-        kernel_dimension: kernel modes of all subdomains, m.
-        owned_modes: the modes of this rank's subdomains among the m.
-        R: (boundary dofs, own modes) kernels on the boundaries.
+        kernel_dimension: number m of kernel modes of all subdomains.
+        owned_modes: slice of the modes of local subdomains among all modes.
+        R: (boundary dofs, owned modes) kernels on the boundaries.
         G: (owned rows, m).
-        body: (m,) the body of each mode.
-        pinned_body: the body with the pinned class, -1 if there is none.
+        body: (m,) body of each mode.
+        pinned_body: body with the pinned class, -1 if no class is pinned.
         unconstrained_modes: (m, z) orthonormal amplitudes of the motions that no active row resists, sparse.
-        unknowns: (u,) modes in this rank's rows of G or in its unconstrained modes, and this rank's own modes.
-        factorizations: of G^T G so far.
-        solver: of G^T G.
+        unknowns: (u,) modes in the owned rows of G or in local unconstrained modes, and owned modes.
+        factorizations: number of factorizations of G^T G.
+        solver: solver for G^T G.
     """
 
     def __init__(self, operators: InterfaceOperators) -> None:
@@ -58,23 +58,23 @@ class NaturalCoarseSpace:
         self.G = assemble_owned_rows(comm, operators.B @ self.R, jump_operator.rows, columns, (owned, modes))
         self.factorizations, self._active = 0, np.ones(owned)
         self._diagonal = distributed_arrays.allreduce_sum(comm, np.asarray(self.G.power(2).sum(axis=0)).ravel())
-        self.unconstrained_modes = self._no_motions = csc_matrix((self.kernel_dimension, 0))
+        self.unconstrained_modes = csc_matrix((self.kernel_dimension, 0))
         self._reaching = np.union1d(self.G.indices, columns).astype(np.int64)
         self.solver = DistributedSolver(comm, self.kernel_dimension, "feti_natural_")
         self.factor()
 
     def activate(self, active: Float) -> None:
-        """Set the active rows, where `active` (owned rows,) is 1; the other rows carry no multiplier.  Collective.
+        """Set the active rows, where `active` (owned rows,) is 1; other rows have no multiplier.  Collective.
 
-        The next projection factors G^T G.  Motions Z that no active row resists, as of a free fibre, get a stiffness s:
-        G^T G + s Z Z^T.
+        The next projection factors G^T G.  Motions Z that no active row resists, for example of a free fibre, get a
+        stiffness s: G^T G + s Z Z^T.
         """
         self._active, self._is_factored = active, False
-        self.unconstrained_modes = self._null_space(self._gram.entries(active))
+        self.unconstrained_modes = self.free_motions(active)
 
     @property
     def G_active(self) -> csr_matrix:
-        """G with 0 in inactive rows."""
+        """The matrix G with 0 in inactive rows."""
         return (diags(self._active) @ self.G).tocsr()
 
     def factor(self) -> None:
@@ -82,7 +82,7 @@ class NaturalCoarseSpace:
         self._is_factored = True
         if not self.kernel_dimension:
             return
-        # Of the unconstrained modes the ones whose first subdomain is this rank's, as rows.
+        # Rows of Z: unconstrained modes whose first subdomain is on this rank.
         modes, first = self.unconstrained_modes, self.unconstrained_modes.indices[self.unconstrained_modes.indptr[:-1]]
         Z = modes[:, (first >= self.owned_modes.start) & (first < self.owned_modes.stop)].T.tocsr()
         self.unknowns = np.union1d(self._reaching, Z.indices).astype(np.int64)
@@ -95,32 +95,31 @@ class NaturalCoarseSpace:
 
     @cached_property
     def _gram(self) -> GramMatrix:
-        """Products of G, set up when rows first leave: 36 numbers a row.  Collective."""
+        """Products of G, set up when a row becomes inactive for the first time: 36 numbers a row.  Collective."""
         return GramMatrix(self.comm, self.G)
 
     @cached_property
-    def _groups(self) -> list[tuple[Int, Int]]:
+    def _groups(self) -> list[tuple[Int, Int, Float, Float, Float]]:
         """Groups of coupled modes (groups, size), and the positions of their blocks in the entries of G^T G.
 
-        The pieces of the pinned body are glued to the pinned class and cannot move.  The other modes that are coupled
-        share an eigenproblem, which is about as large as the kernel of a fibre.
+        Then blocks, eigenvalues and eigenvectors of the last call of `free_motions`.  The pieces of the pinned body are
+        glued to the pinned class and cannot move.  Other modes that G^T G couples have a common eigenproblem, which is
+        about as large as the kernel of a fibre.
         """
-        movable = np.flatnonzero(self.body != self.pinned_body)
-        return [(members, self._gram.places(members)) for members in self._gram.groups(movable)]
+        groups = []
+        for members in self._gram.groups(np.flatnonzero(self.body != self.pinned_body)):
+            places = self._gram.places(members)
+            nothing = np.full(places.shape, np.nan)
+            groups.append((members, places, nothing, nothing[..., 0].copy(), nothing.copy()))
+        return groups
 
-    @cached_property
-    def _eigenpairs(self) -> list[tuple[Float, Float, Float]]:
-        """Blocks of the groups at the last call, their eigenvalues and their eigenvectors."""
-        shapes = [places.shape for _, places in self._groups]
-        return [(np.full(shape, np.nan), np.empty(shape[:2]), np.empty(shape)) for shape in shapes]
-
-    def _null_space(self, entries: Float) -> csc_matrix:
-        """Compute the orthonormal null space (m, z) of G^T G with these entries."""
-        padded, columns, none = np.append(entries, 0.0), 0, np.zeros(0, np.int64)
+    def free_motions(self, active: Float) -> csc_matrix:
+        """Compute the `unconstrained_modes` (m, z) for these active rows: the null space of G^T G.  Collective."""
+        padded, columns, none = np.append(self._gram.entries(active), 0.0), 0, np.zeros(0, np.int64)
         rows, numbers, values = [none], [none], [np.zeros(0)]
-        for (members, places), (blocks, eigenvalues, vectors) in zip(self._groups, self._eigenpairs, strict=True):
+        for members, places, blocks, eigenvalues, vectors in self._groups:
             now = padded[places]
-            # A break changes one group or two.
+            # A broken bond changes one or two groups.
             if len(other := np.flatnonzero((now != blocks).any(axis=(1, 2)))):
                 eigenvalues[other], vectors[other] = np.linalg.eigh(now[other])
                 blocks[other] = now[other]
@@ -132,8 +131,6 @@ class NaturalCoarseSpace:
             numbers.append(np.repeat(columns + np.arange(len(which)), members.shape[1]))
             values.append(vectors[which, :, mode].ravel())
             columns += len(which)
-        if not columns:
-            return self._no_motions
         entry = np.concatenate(values), (np.concatenate(rows), np.concatenate(numbers))
         Z = csc_matrix(entry, shape=(self.kernel_dimension, columns))
         Z.eliminate_zeros()
@@ -141,7 +138,7 @@ class NaturalCoarseSpace:
         return Z
 
     def amplitudes(self, x: Float) -> Float:
-        """Compute (G^T G)^-1 G^T x on every rank, for the owned rows x (rows,) or (rows, k).  Collective."""
+        """Compute (G^T G)^-1 G^T x on every rank, for owned rows x (rows,) or (rows, k).  Collective."""
         if not self._is_factored:
             self.factor()
         place = np.searchsorted(self.unknowns, np.arange(self.kernel_dimension)[self.owned_modes])
@@ -150,17 +147,13 @@ class NaturalCoarseSpace:
         return distributed_arrays.allreduce_sum(self.comm, amplitudes)
 
     def project(self, x: Float) -> Float:
-        """Project the owned rows x, which are 0 on inactive rows: P x works on no rigid-body motion.  Collective."""
+        """Project owned rows x, 0 on inactive rows: P x does no work on rigid-body motions.  Collective."""
         if not self.kernel_dimension:
             return x.copy()
         if not self._is_factored:
             self.factor()
         projected: Float = x - self._G @ self.solver.solve(self._GT @ x)
         return projected
-
-    def free_motions(self, active: Float) -> csc_matrix:
-        """Compute the `unconstrained_modes` (m, z) for other active rows.  Collective."""
-        return self._null_space(self._gram.entries(active))
 
     def rigid_body_motion(self, amplitudes: Float) -> Float:
         """Compute the motion R alpha of the boundary dofs for alpha (m,) or (m, k)."""
@@ -176,7 +169,7 @@ class GramMatrix:
     """Entries of G^T A G in the pattern of G^T G, for active rows A = diag(a), as sums of stored products."""
 
     def __init__(self, comm: MPI.Intracomm, G: csr_matrix) -> None:
-        """`G` (owned rows, m).  Collective."""
+        """Compute the products of G (owned rows, m).  Collective."""
         self._comm, self._m = comm, G.shape[1]
         count = np.diff(G.indptr)
         # Pairs of entries of one row.
@@ -187,7 +180,7 @@ class GramMatrix:
         diagonal = np.arange(self._m) * (self._m + 1)
         self._keys = np.unique(np.concatenate([diagonal, *comm.allgather(np.unique(key))]))
         entry = np.searchsorted(self._keys, key)
-        # Of each row its products, and the entries that they are parts of.
+        # First product and product count of each row; the entry that each product adds to, and its value.
         self._first, self._count = np.cumsum(count**2) - count**2, count**2
         self._entry, self._product = entry, G.data[a] * G.data[b]
         self._active, self._own = np.zeros(G.shape[0]), np.zeros(len(self._keys))
@@ -196,7 +189,7 @@ class GramMatrix:
     def entries(self, active: Float) -> Float:
         """Compute the entries of G^T A G, row by row, for owned rows where `active` is 1.  Collective.
 
-        Products of rows that changed since the last call are added or subtracted.
+        The method adds or subtracts only the products of rows that changed since the last call.
         """
         changed = np.flatnonzero(active != self._active)
         count = self._count[changed]
@@ -207,7 +200,7 @@ class GramMatrix:
         return distributed_arrays.allreduce_sum(self._comm, self._own)
 
     def groups(self, some: Int) -> list[Int]:
-        """Group the mode numbers `some` that G^T G couples: an array (groups, size) for each group size."""
+        """Group the modes in `some` that G^T G couples: one array (groups, size) for each group size."""
         place = np.full(self._m, -1)
         place[some] = np.arange(len(some))
         i, j = place[self._rows], place[self._columns]
@@ -218,9 +211,9 @@ class GramMatrix:
         return [some[order[starts[sizes == size][:, None] + np.arange(size)]] for size in np.unique(sizes)]
 
     def places(self, members: Int) -> Int:
-        """Return the entry numbers (g, s, s) that couple the members (g, s) of each group.
+        """Return entry numbers (g, s, s) for pairs of the members (g, s) of each group.
 
-        A pair without an entry gets the number of entries.
+        A pair without an entry gets the total number of entries.
         """
         key = members[:, :, None] * self._m + members[:, None, :]
         at = np.minimum(np.searchsorted(self._keys, key), len(self._keys) - 1)

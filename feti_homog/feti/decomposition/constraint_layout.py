@@ -1,4 +1,4 @@
-"""Rows and columns of the gluing constraints B on one rank, and their interface nodes."""
+"""Rows and columns of the gluing constraints B on one rank, and the interface nodes whose bonds can break."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from feti_homog.typing import Bool, Float, Int
 
 
 class Meshed(Protocol):
-    """A subdomain, or a part of one: its coarse share and its refined mesh."""
+    """A subdomain or a part of a subdomain: its coarse mesh and its refined mesh."""
 
     @property
     def submesh(self) -> Submesh: ...
@@ -28,16 +28,15 @@ class InterfaceNodes:
     """The breakable nodes of which a rank owns the multipliers, i = 0..k-1.
 
     Attributes:
-        row: (k,) local row of the bond; of displacements in the plane that along the normal, and the tangential one
-            follows.
+        row: (k,) first local row of the bond.  In the plane this is the normal row, and the tangential row follows.
         points: (k, 2) position on the fibre.
-        normal: (k, 2) from the inner to the outer body; the tangent is (-n_y, n_x).
+        normal: (k, 2) unit normal from the inner to the outer body; the tangent is (-n_y, n_x).
         length: (k,) tributary interface length: traction = nodal force / length.
         fibre: (k,) constituent.
-        pair: (k,) interface of the case.
-        bodies: (k, 2) the body around the fibre, and the fibre's own.
-        precracked: (k,) whether the mesh has it debonded from the start.
-        fibre_node: (k,) the fibre's copy among the fine nodes of this rank.
+        pair: (k,) interface number of the case.
+        bodies: (k, 2) outer body and fibre body.
+        precracked: (k,) whether the node is debonded in the mesh.
+        fibre_node: (k,) number of the fibre's node copy among the fine nodes of this rank.
     """
 
     row: Int
@@ -52,16 +51,16 @@ class InterfaceNodes:
 
 
 class ConstraintLayout:
-    """Rows and columns of B on one rank, entity by entity.
+    """The layout of B on one rank: rows and columns of each shared entity.
 
     Attributes:
         components: c, rows of a vector constraint.
-        count: (n,) rows of each shared entity.
-        first: (n,) the first of them among the local rows.
-        rows: (local rows,) their global numbers.
-        dofs: (subdomains + 1,) where each subdomain begins among the local dofs.
-        base: for each sharer, its first fine node on the entity, as this rank numbers them; -1 if the sharer is on
-            another rank.
+        count: (n,) number of rows of each shared entity.
+        first: (n,) first local row of each shared entity.
+        rows: (local rows,) global row numbers.
+        dofs: (subdomains + 1,) first local degree of freedom of each subdomain, and the number of all.
+        owned: first global row of this rank and the one after its last.
+        base: for each sharer, the local number of its first fine node on the entity; -1 for a sharer on another rank.
     """
 
     def __init__(
@@ -69,6 +68,11 @@ class ConstraintLayout:
     ) -> None:
         self.shared, self.subdomains, self.lattice = shared, subdomains, lattice
         self.components = components
+        begin, end = shared.owned
+        self.owned = components * begin, components * end
+        # Whether this rank owns the rows of each entity, and the first of them, counted from this rank's first row.
+        self._is_owned = (shared.first >= begin) & (shared.first < end)
+        self._owned_row = components * (shared.first - begin)
         copies = shared.copies
         self.count = components * shared.nodes * (copies - 1)
         self.first = np.cumsum(self.count) - self.count
@@ -85,26 +89,10 @@ class ConstraintLayout:
             edge = refinement.edge_node(len(submesh.class_keys), place, np.ones_like(key), lattice)
             self.base[mine] = offset + np.where(is_edge, edge, np.searchsorted(submesh.class_keys, key))
 
-    @property
-    def owned(self) -> tuple[int, int]:
-        """First global row of this rank and the one after its last."""
-        return self.components * self.shared.owned[0], self.components * self.shared.owned[1]
-
-    @property
-    def _owned(self) -> Bool:
-        """(n,) whether this rank owns the rows of each entity."""
-        first, last = self.shared.owned
-        return (self.shared.first >= first) & (self.shared.first < last)
-
-    @property
-    def _owned_row(self) -> Int:
-        """(n,) first row of each entity, counted from this rank's first."""
-        return self.components * (self.shared.first - self.shared.owned[0])
-
     def matrix(self) -> csr_matrix:
-        """B (local rows, local dofs)."""
+        """Assemble B (local rows, local dofs)."""
         shared, entries = self.shared, []
-        # Entities grouped by how many copies each body has and whether they can break.
+        # One group of entities for each number of copies in the bodies, with and without bonds that can break.
         for k in np.unique(shared.copies):
             some = np.flatnonzero(shared.copies == k)
             body = shared.body[shared.pointer[some][:, None] + np.arange(k)]
@@ -118,10 +106,10 @@ class ConstraintLayout:
         return coo_matrix((values, (rows.astype(np.int64), columns.astype(np.int64))), shape=shape).tocsr()
 
     def _entries(self, entities: Int, sizes: Int, breakable: bool) -> tuple[Int, Int, Float]:
-        """Rows, columns and values of B on some entities whose bodies have `sizes` copies each."""
+        """Compute rows, columns and values of B on entities whose bodies have `sizes` copies each."""
         shared, c = self.shared, self.components
-        # (k - 1, k) orthonormal contrasts between the copies in each of two bodies, and between their means; bodies of
-        # another number never part, and count as one.
+        # (k - 1, k) orthonormal contrasts between the copies in each of two bodies, and between the body means.  One
+        # body, or more than two bodies, cannot part and count as one body.
         contrasts = helmert(int(sizes.sum()))
         if len(sizes) == 2:
             contrasts = np.vstack([block_diag(*map(helmert, sizes)), np.repeat([1.0, -1.0] / sizes, sizes)])
@@ -147,33 +135,33 @@ class ConstraintLayout:
         return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
 
     def _places(self, entity: Int, p: Int) -> Float:
-        """(i,) where fine node p of the entities is, in [0, 1] along edges."""
+        """Compute positions (i,) of fine nodes p, in [0, 1] along edges; 0 at vertices."""
         return np.where(self.shared.is_edge[entity], (p + 1) / self.lattice.intervals, 0.0)
 
     def _normals(self, entity: Int, p: Int) -> Float:
-        """(i, 2) unit normals at fine node p of the entities."""
+        """Compute unit normals (i, 2) at fine nodes p of the entities."""
         shared = self.shared
         normal = along(shared.normal[entity], shared.turn[entity], self._places(entity, p))
         return np.asarray(normal / np.hypot(*normal.T)[:, None])
 
     def node_rows(self) -> tuple[Int, Int]:
-        """First owned row and row count for each fine node whose rows are owned."""
+        """Return the first owned row and the row count of each fine node that this rank owns."""
         shared = self.shared
-        mine = np.flatnonzero(self._owned)
+        mine = np.flatnonzero(self._is_owned)
         size = self.components * (shared.copies[mine] - 1)
         entity, p = expand(np.arange(len(mine)), shared.nodes[mine])
         return self._owned_row[mine][entity] + p * size[entity], size[entity]
 
     def interface_nodes(self) -> InterfaceNodes:
-        """Return the breakable nodes whose rows are owned."""
+        """Collect the breakable nodes whose rows this rank owns."""
         shared = self.shared
-        breakable = np.flatnonzero(self._owned & (shared.fibre >= 0))
+        breakable = np.flatnonzero(self._is_owned & (shared.fibre >= 0))
         entity, p = expand(breakable, shared.nodes[breakable])
         k = shared.copies[entity]
         positions = np.zeros((self.dofs[-1] // self.components, 2))
         for offset, mesh in zip(self.dofs // self.components, (s.mesh for s in self.subdomains), strict=False):
             positions[offset + mesh.node_class] = mesh.points
-        # Sharers are sorted inwards, so the last one is the fibre's, and it is this rank's, which owns the rows.
+        # Sharers are sorted inwards: the last sharer belongs to the fibre, and to this rank, which owns the rows.
         copy = self.base[shared.pointer[entity + 1] - 1] + p
         # int N ds along the curve, summed over the sides of a node; half a side for linear elements.
         normal, turn, place = shared.normal[entity], shared.turn[entity], self._places(entity, p)
@@ -196,13 +184,13 @@ class ConstraintLayout:
         )
 
     def facing(self) -> tuple[Int, Int]:
-        """(local rows, 2) copy counts in the outer and the inner body, and (local rows,) the inner body.
+        """Count the copies in the outer and the inner body (local rows, 2); return the inner body (local rows,), too.
 
-        Rows that are not between two bodies have 0 and -1.
+        Rows that do not connect two bodies have the counts 0 and the body -1.
         """
         shared = self.shared
         entity = np.repeat(np.arange(len(shared.key)), shared.copies)
-        # Sharers are sorted inwards: the first is the outer body's.
+        # Sharers are sorted inwards: the first sharer belongs to the outer body.
         outer, inner = shared.body[shared.pointer[:-1]], shared.body[shared.pointer[1:] - 1]
         of_outer, of_inner = (
             np.bincount(entity[shared.body == body[entity]], minlength=len(outer)) for body in (outer, inner)
@@ -217,9 +205,9 @@ class ConstraintLayout:
         return copies, inside
 
     def outer_copies(self) -> tuple[Int, Int]:
-        """Return the breakable nodes of which this rank has the outer body's first copy.
+        """Find the breakable nodes whose first copy in the outer body is on this rank.
 
-        The local row of each bond, and the number of its copy among the local fine nodes.
+        Return the first local row of each bond, and the local number of the copy.
         """
         shared = self.shared
         first = self.base[shared.pointer[:-1]]
@@ -229,7 +217,7 @@ class ConstraintLayout:
 
 
 def expand(entities: Int, nodes: Int) -> tuple[Int, Int]:
-    """Entity and position of every fine node."""
+    """Return the entity and the position on that entity of every fine node."""
     ends = np.cumsum(nodes)
     p = np.arange(ends[-1] if len(ends) else 0) - np.repeat(ends - nodes, nodes)
     return np.repeat(entities, nodes), p

@@ -1,4 +1,4 @@
-"""Subdomains that meet in constraints, and messages between them; interface nodes that lie beside each other."""
+"""Subdomains that share constraints, messages between these subdomains, and adjacent interface nodes."""
 
 from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
@@ -17,15 +17,15 @@ SIDES = {3: ((0, 1), (1, 2), (2, 0)), 6: ((0, 3), (3, 1), (1, 4), (4, 2), (2, 5)
 
 
 class Neighbours:
-    """Pairs: a local subdomain t and any subdomain s that shares nodes with it, itself included.
+    """The subdomains that share nodes with each local subdomain, which is its own neighbour, too.
 
     Attributes:
         index: global numbers of the local subdomains.
-        local: their positions in `index`, by global number.
+        local: position in `index` by global subdomain number.
         rank: rank of every subdomain in the cell, by global number.
-        rows: rows[i] local rows, ascending, of the nodes in local subdomain i.
-        common: common[i][s] positions in rows[i] of the rows of the nodes that it shares with subdomain s, in the
-            same order on both sides.
+        rows: rows[i] are the local rows at nodes of local subdomain i, ascending.
+        common: common[i][s] are the positions in rows[i] of rows at nodes that local subdomain i shares with
+            subdomain s, in the same order on both sides.
     """
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, subdomains: Sequence[Subdomain]) -> None:
@@ -35,7 +35,7 @@ class Neighbours:
         self.local = {s: i for i, s in enumerate(self.index)}
         self.rank = {s: r for r, indices in enumerate(comm.allgather(self.index)) for s in indices}
         shared, parts = jump_operator.shared, [np.zeros((3, 0), np.int64)]
-        # Pairs (t, s) of subdomains that share an entity, t one of this rank's: t, s, entity in ascending order.
+        # Triples t, s, entity in ascending order, where local subdomain t and subdomain s share the entity.
         for k in np.unique(shared.copies):
             entity = np.flatnonzero(shared.copies == k)
             among, shape = shared.sharer[shared.pointer[entity][:, None] + np.arange(k)], (len(entity), k, k)
@@ -58,11 +58,11 @@ class Neighbours:
     def exchange(
         self, messages: Iterable[tuple[int, int, Message]], deliver: Callable[[int, int, Message], None]
     ) -> None:
-        """Deliver messages between subdomains; within a rank as they come.  Collective.
+        """Deliver messages between subdomains, at once within a rank.  Collective.
 
         Args:
-            messages: (i, s, message) from this rank's subdomain i to the subdomain of global number s.
-            deliver: called on the rank of s with its position there, the global number of i, and the message.
+            messages: (i, s, message) from local subdomain i to the subdomain with global number s.
+            deliver: called on the receiving rank with the position of s, the global number of i, and the message.
         """
         outgoing: list[list[tuple[int, int, Message]]] = [[] for _ in range(self.comm.size)]
         for i, s, message in messages:
@@ -77,12 +77,12 @@ class Neighbours:
 
 
 class InterfaceNeighbours:
-    """All interface nodes in row order, and their neighbours.
+    """All interface nodes in row order, and the adjacency of these nodes.
 
     Attributes:
-        rows: (n,) global rows of their bonds, the first of each.
-        first: number of this rank's first node.
-        adjacency: (n, n) 1 between neighbours.
+        rows: (n,) first global row of each bond.
+        first: number of the first node on this rank.
+        adjacency: (n, n) matrix with 1 between neighbours.
     """
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, subdomains: Sequence[Subdomain]) -> None:
@@ -95,20 +95,31 @@ class InterfaceNeighbours:
         self.first = int(np.searchsorted(self.rows, rows[0])) if len(rows) else 0
         bodies, n = np.concatenate(comm.allgather(jump_operator.nodes.bodies)), len(self.rows)
         number = self.node_numbers(jump_operator)
+        # Outer sides of the subdomains of each body between interface nodes a < b, as codes a n + b.
+        none = np.zeros(0, np.int64)
+        codes, first = ([none], [none]), 0
+        for s in subdomains:
+            nodes = number[first + s.mesh.node_class[s.mesh.triangles]]
+            first += s.mesh.n_classes
+            ends = nodes[:, SIDES[nodes.shape[1]]].reshape(-1, 2)
+            ends = ends[(ends >= 0).all(axis=1)]
+            for body, of_body in zip(bodies.T, codes, strict=True):
+                low, high = np.sort(ends[(body[ends] == s.submesh.body).all(axis=1)], axis=1).T
+                of_body.append(_once(low * n + high))
         # Both bodies have the side of an interface once: twice is within a body that is cut, and a void has none.
-        outer, inner = (np.concatenate(comm.allgather(_sides(subdomains, number, body, n))) for body in bodies.T)
-        a, b = np.divmod(np.intersect1d(_once(outer), _once(inner)), n)
+        outer, inner = (_once(np.concatenate(comm.allgather(np.concatenate(of_body)))) for of_body in codes)
+        a, b = np.divmod(np.intersect1d(outer, inner), n)
         entries = np.ones(2 * len(a)), (np.concatenate([a, b]), np.concatenate([b, a]))
         self.adjacency: csr_matrix = coo_matrix(entries, shape=(n, n)).tocsr()
         self._components = jump_operator.components
-        # (n, most neighbours + 1) each node, its neighbours, and itself again where there are fewer.
+        # (n, most neighbours + 1) each node and its neighbours, padded with the node.
         count = np.diff(self.adjacency.indptr)
         self._reached = np.repeat(np.arange(n)[:, None], count.max(initial=0) + 1, axis=1)
         within = np.arange(self.adjacency.nnz) - np.repeat(self.adjacency.indptr[:-1], count)
         self._reached[np.repeat(np.arange(n), count), within] = self.adjacency.indices
 
     def rows_near(self, rows: Int, choose: Callable[[Int], Int], enough: int) -> Int:
-        """Return global rows and near ones along the interfaces that `choose` returns, until they are enough."""
+        """Return global rows and the rows near them that `choose` keeps, until there are `enough` rows."""
         bonds = np.unique(np.searchsorted(self.rows, rows, side="right") - 1)
         while True:
             reached_rows = (self.rows[bonds][:, None] + np.arange(self._components)).ravel()
@@ -119,7 +130,7 @@ class InterfaceNeighbours:
             bonds = reached
 
     def node_numbers(self, jump_operator: JumpOperator) -> Int:
-        """(local fine nodes,) number of the interface node that each copies, or -1."""
+        """Return the interface node number of each local fine node (local fine nodes,), or -1."""
         number = np.full(jump_operator.B.shape[1] // jump_operator.components, -1)
         normal = np.searchsorted(jump_operator.rows, self.rows)
         normal = np.minimum(normal, max(len(jump_operator.rows) - 1, 0))
@@ -129,23 +140,7 @@ class InterfaceNeighbours:
         return number
 
 
-def _sides(subdomains: Sequence[Subdomain], number: Int, body: Int, n: int) -> Int:
-    """(e,) codes a n + b, a < b, for outer sides of these subdomains between interface nodes a and b.
-
-    `body` (n,) is the one of each node whose subdomains count, `number` as of `node_numbers`.
-    """
-    codes, first = [np.zeros(0, np.int64)], 0
-    for s in subdomains:
-        nodes = number[first + s.mesh.node_class[s.mesh.triangles]]
-        first += s.mesh.n_classes
-        ends = nodes[:, SIDES[nodes.shape[1]]].reshape(-1, 2)
-        ends = ends[(ends >= 0).all(axis=1)]
-        low, high = np.sort(ends[(body[ends] == s.submesh.body).all(axis=1)], axis=1).T
-        codes.append(_once(low * n + high))
-    return np.concatenate(codes)
-
-
 def _once(values: Int) -> Int:
-    """Return the values that are there once."""
+    """Return the values that occur exactly once."""
     different, count = np.unique(values, return_counts=True)
     return np.asarray(different[count == 1])

@@ -50,7 +50,7 @@ GLUE = InterfaceSprings(())
 
 
 class JumpOperator:
-    """B on this rank's subdomains and the multiplier layout.
+    """The jump operator B on the local subdomains, and the layout of the multipliers.
 
     Attributes:
         comm: of all ranks.

@@ -1,4 +1,4 @@
-"""Bodies cut into subdomains, and subdomains assigned to ranks."""
+"""Partition: bodies are cut into subdomains, and the subdomains are assigned to ranks."""
 
 import heapq
 from dataclasses import dataclass
@@ -15,16 +15,16 @@ from feti_homog.typing import Int
 
 @dataclass(frozen=True)
 class Partition:
-    """Subdomain of each coarse triangle, (m,), and rank of each subdomain, (s,)."""
+    """The subdomain (m,) of each coarse triangle, and the rank (s,) of each subdomain."""
 
     subdomain: Int
     rank: Int
 
 
 def decompose(torus: Torus, parts: Int, pieces: Int, n_ranks: int, length_classes: int = LENGTH_CLASSES) -> Partition:
-    """Cut the bodies of a whole cell into pieces, and assign these to ranks.
+    """Cut the bodies of a whole cell into pieces, and assign the pieces to ranks.
 
-    See `cut_into_pieces` and `assign_ranks`.
+    The arguments are documented at `cut_into_pieces` and `assign_ranks`.
     """
     tail, head, edge = torus.sides
     subdomain = cut_into_pieces(torus, parts, pieces, torus.edge_lengths[edge].max(), length_classes)
@@ -34,10 +34,10 @@ def decompose(torus: Torus, parts: Int, pieces: Int, n_ranks: int, length_classe
 
 
 def halves(torus: Torus) -> Partition | None:
-    """Cut a whole cell into two strips, one for each of two ranks; None if these are not connected.
+    """Cut a whole cell into two connected strips for two ranks; return None if a strip is not connected.
 
-    The strips along x or y hold about half of the triangles, and fewest edges separate them.  On the torus
-    METIS' halves have boundaries up to half as long again.
+    Each strip, along x or y, has about half of the triangles, and the cut crosses as few edges as possible.  On the
+    torus, the boundaries between two METIS parts are up to 50 % longer.
     """
     tail, head, _ = torus.sides
     centres = torus.mesh.points[torus.mesh.triangles].mean(axis=1) / torus.mesh.period % 1.0
@@ -47,7 +47,7 @@ def halves(torus: Torus) -> Partition | None:
         place[np.argsort(x, kind="stable")] = np.arange(m)
         low, high = np.sort([place[tail], place[head]], axis=0)
         low, high = np.where(high - low > m / 2, (high, low + m), (low, high))
-        # Sides that cross each place in the cyclic order, and both ends of each strip.
+        # Number of sides that cross each position of the cyclic order, then that number at both ends of each strip.
         crossed = np.bincount(low + 1, minlength=2 * m) - np.bincount(high + 1, minlength=2 * m)
         crossed = np.cumsum(crossed).reshape(2, m).sum(axis=0)
         ends = m // 2 + np.unique((STRIP_SLACK * m * np.linspace(-1.0, 1.0, STRIP_WIDTHS)).astype(np.int64))
@@ -59,21 +59,23 @@ def halves(torus: Torus) -> Partition | None:
     connected = periodic_topology.components(len(piece), tail[together], head[together])
     sizes = np.bincount(connected)
     main = [np.argmax(np.where(np.bincount(connected, piece) == sizes * k, sizes, 0)) for k in range(2)]
-    piece ^= ~np.isin(connected, main)  # islands go to the half around them
+    piece ^= ~np.isin(connected, main)  # a strip takes its islands
     together = piece[tail] == piece[head]
     is_whole = periodic_topology.components(len(piece), tail[together], head[together]).max() == 1
     return Partition(piece, np.arange(2)) if is_whole else None
 
 
 def cut_into_pieces(torus: Torus, parts: Int, pieces: Int, longest: float, length_classes: int = LENGTH_CLASSES) -> Int:
-    """(m,) subdomain of each triangle, connected through edges: pieces that METIS leaves in several parts are split.
+    """Compute the subdomain (m,) of each triangle.
+
+    Subdomains are connected through edges: a METIS part that is not connected becomes several subdomains.
 
     Args:
         parts: (m,) body of each triangle: `torus.constituent`, or `torus.plane_parts()`.
-        pieces: (b,) wanted pieces of each body; METIS cuts a body that has more than one, by short cuts: so
-            they rather cross narrow gaps than run along them, which converges better.
-        longest: edge of the whole cell.
-        length_classes: number of edge lengths that METIS distinguishes; with 1 all count alike.
+        pieces: (b,) number of pieces of each body.  METIS makes short cuts, which cross narrow gaps and do not
+            follow them: the iteration converges faster.
+        longest: longest edge length in the cell.
+        length_classes: number of edge lengths that METIS distinguishes; with 1 all edges have equal weight.
     """
     tail, head, edge = torus.sides
     inside = parts[tail] == parts[head]
@@ -91,12 +93,12 @@ def cut_into_pieces(torus: Torus, parts: Int, pieces: Int, longest: float, lengt
     key = parts * (piece.max(initial=0) + 1) + piece
     together = key[tail] == key[head]
     connected = periodic_topology.components(len(parts), tail[together], head[together])
-    # Numbered body by body, so that neighbours in number are neighbours in place.
+    # Numbers ascend body by body, so that consecutive subdomains are close to each other.
     return periodic_topology.renumber(connected, np.lexsort((connected, piece, parts)))
 
 
 def pieces_for_count(load: Int, count: int) -> Int:
-    """(b,) pieces of each body: `count` in all (never fewer than one a body), the largest pieces halved first."""
+    """Divide bodies into `count` pieces (b,), at least one each: the body with the largest pieces gets the next."""
     pieces = np.ones(len(load), np.int64)
     heap = [(-float(size), body) for body, size in enumerate(load)]
     heapq.heapify(heap)
@@ -110,18 +112,18 @@ def pieces_for_count(load: Int, count: int) -> Int:
 
 
 def pieces_for_size(load: Int, dofs_per_load: float, max_dofs: int) -> Int:
-    """(b,) pieces of each body such that none has many more than `max_dofs` dofs."""
+    """Compute piece counts (b,) for which pieces have about `max_dofs` degrees of freedom at most."""
     return np.minimum(np.ceil(load * dofs_per_load / max_dofs).astype(np.int64), load)
 
 
 def _graph(n: int, left: Int, right: Int, weight: Int) -> csr_matrix:
-    """(n, n) symmetric: summed weights of pairs (left, right)."""
+    """Sum the weights of pairs (left, right) into a symmetric matrix (n, n)."""
     both = (np.r_[left, right], np.r_[right, left])
     return coo_matrix((np.r_[weight, weight], both), shape=(n, n)).tocsr()
 
 
 def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
-    """Part of each vertex; parts of about equal `load`, or number of vertices, with edges of small weight between."""
+    """Compute the part of each vertex by METIS: about equal loads, or vertex counts, and a small edge cut."""
     options = pymetis.Options(contig=int(load is None), seed=0)
     _, part = pymetis.part_graph(
         count, pymetis.CSRAdjacency(graph.indptr, graph.indices), eweights=graph.data, vweights=load, options=options
@@ -130,10 +132,10 @@ def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
 
 
 def assign_ranks(load: Int, left: Int, right: Int, n_ranks: int) -> Int:
-    """(s,) rank of each subdomain with `load` triangles (s,).
+    """Assign each subdomain with `load` triangles (s,) to a rank: (s,).
 
-    Neighbours (left, right), in a row for each edge that they share, are on one rank as far as the loads stay even;
-    some ranks get none if there are more ranks than subdomains.
+    Neighbours (left, right), listed once per shared edge, get the same rank as far as the loads stay balanced.  With
+    more ranks than subdomains, some ranks stay empty.
     """
     by_load = dividing.balanced(load, n_ranks)
     if n_ranks == 1 or len(load) <= n_ranks:

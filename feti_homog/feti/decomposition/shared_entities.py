@@ -1,8 +1,8 @@
 """Coarse vertices and edges shared by subdomains: constraints, and the normals and lengths of interfaces.
 
 An entity is a vertex class or a torus edge that belongs to several subdomains.  Each fine node on an entity of k
-subdomains needs k - 1 vector constraints.  It belongs to the rank of its last sharer, which numbers these and sends the
-others.
+subdomains needs k - 1 vector constraints.  The rank of the last sharer owns the entity: it numbers the constraints and
+sends the numbers to the ranks of the other sharers.
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ SHARES = {1: np.full((2, 6), 0.5), 2: np.stack([POINTS**2 - POINTS, 2 - 2 * POIN
 
 
 def along(ends: Float, turn: Float, place: Float) -> Float:
-    """Return y = dx / ds or normals (k, 2) at `place` s (k,) in [0, 1], from their values at `ends` (k, 2, 2).
+    """Interpolate y = dx / ds or normals (k, 2) at `place` s (k,) in [0, 1] between `ends` (k, 2, 2).
 
     On an arc of an ellipse whose parameter turns by `turn` (k,), y'' = -turn^2 y; on straight edges `turn` is 0.
     """
@@ -36,7 +36,7 @@ def along(ends: Float, turn: Float, place: Float) -> Float:
 
 
 def side_lengths(ends: Float, turn: Float, low: Float, order: int, side: float) -> Float:
-    """Return tributary lengths (k, order + 1) from s = `low` (k,) to `low` + `side`; arguments as in `along`."""
+    """Integrate the tributary lengths (k, order + 1) from s = `low` (k,) to `low` + `side`, for `along`'s arguments."""
     places = low[:, None] + side * (1 + POINTS) / 2
     speeds = [np.hypot(*along(ends, turn, place).T) for place in places.T]
     return np.asarray(np.stack(speeds, axis=1) * WEIGHTS @ SHARES[order].T * (side / 2))
@@ -45,7 +45,7 @@ def side_lengths(ends: Float, turn: Float, low: Float, order: int, side: float) 
 def breakable_pairs(meshes: SubmeshesOfRank, table: submeshes.SubdomainTable, pairs: Int, sharers: Sharers) -> Int:
     """Return the case interface (n,) between the two bodies of each shared entity.
 
-    -1 where bonds never break, a third body meets them, or they meet along no line.
+    The value is -1 where bonds never break, where a third body touches, or where the bodies meet in a point.
     """
     body, copies = table.body[sharers.sharer], sharers.copies
     outer, inner = body[sharers.pointer[:-1]], body[sharers.pointer[1:] - 1]
@@ -65,13 +65,13 @@ def interface_geometry(
     sharers: Sharers,
     lattice: ReferenceLattice,
 ) -> tuple[Float, Float, Bool]:
-    """Return normal, turn and precracked as in `SharedEntities`, of entities that this rank owns.  Collective.
+    """Compute normal, turn and precracked of `SharedEntities` for entities of this rank.  Collective.
 
-    0 of other entities and where no bond may break; `pairs` and `lattice` as in `share_entities`.
+    The results are 0 for other entities and where bonds never break; `pairs` and `lattice` as in `share_entities`.
     """
     n, owner = len(sharers.key), table.rank[sharers.innermost]
     can_part = (owner == comm.rank) & (breakable_pairs(meshes, table, pairs, sharers) >= 0)
-    # The last sharer of an edge between two bodies is on the side of the fibre.
+    # The last sharer of an edge between two bodies is a piece of the fibre.
     edges = np.flatnonzero(sharers.is_edge & can_part)
     mesh = meshes.whole
     edge, subdomain_of = np.searchsorted(mesh.edge_keys, sharers.key[edges]), np.full(len(mesh.edge_keys), -1)
@@ -101,9 +101,9 @@ def interface_geometry(
 
 
 def _check(meshes: SubmeshesOfRank, sharers: Sharers, normals: Float, sums: Float) -> None:
-    """Raise MeshError where a normal is not finite or zero, or its sides are folded onto each other.
+    """Raise MeshError if a normal is zero or not finite, or if sides are folded onto each other.
 
-    The directions of folded sides cancel; `normals` (n, 2, 2) and `sums` (n, 4) as in `interface_geometry`.
+    The normals of folded sides cancel; `normals` (n, 2, 2) and `sums` (n, 4) as in `interface_geometry`.
     """
     length = np.linalg.norm(normals, axis=2)
     folded = ~sharers.is_edge & ~(np.hypot(*sums[:, :2].T) > ZERO_TOLERANCE * sums[:, 2])
@@ -117,10 +117,10 @@ def _check(meshes: SubmeshesOfRank, sharers: Sharers, normals: Float, sums: Floa
 
 
 def _sums_at_vertices(comm: MPI.Intracomm, sharers: Sharers, owner: Int, ends: Int, edge: Int, parts: Float) -> Float:
-    """(n, k) the sums over all ranks for each entity that this rank owns.  Collective.
+    """Sum edge contributions at vertices over all ranks: (n, k) for entities of this rank.  Collective.
 
-    They are of `parts` (p, 2, k) of these edges (p,) for the classes at their `ends` (p, 2), each of which is an entity
-    or the pinned class.
+    Edges (p,) contribute `parts` (p, 2, k) to the vertex classes at their `ends` (p, 2).  Each class is an entity or
+    the pinned class.
     """
     order, code = np.argsort(sharers.code), entity_code(ends, False)
     ordered = sharers.code[order]
@@ -129,16 +129,16 @@ def _sums_at_vertices(comm: MPI.Intracomm, sharers: Sharers, owner: Int, ends: I
     to = owner[order[np.searchsorted(ordered, code[is_entity])]]
     code, at, parts = distributed_arrays.exchange(comm, to, code[is_entity], at[is_entity], parts[is_entity])
     sums = np.zeros((len(order), parts.shape[1]))
-    # Rounding depends on the order, which is that of the edges on any number of ranks.
+    # Edge order on any number of ranks, for rounding depends on the order.
     sequence = np.lexsort(at.T)
     np.add.at(sums, order[np.searchsorted(ordered, code[sequence])], parts[sequence])
     return sums
 
 
 def edge_normals(mesh: Submesh, triangle: Int, k: Int) -> tuple[Float, Float]:
-    """Return normals (n, 2, 2) out of triangles (n,) where their edges k (n,) start and end.
+    """Compute outward normals (n, 2, 2) at both ends of edge k (n,) of each triangle, and turns (n,).
 
-    As in `SharedEntities`, and the turns (n,) of these.
+    Lengths of normals, and turns, as in `SharedEntities`.
     """
     a, b = (mesh.points[mesh.triangles[triangle, (k + step) % 3]] for step in (0, 1))
     plane = mesh.triangle_edges[triangle, k]
@@ -158,19 +158,18 @@ def edge_normals(mesh: Submesh, triangle: Int, k: Int) -> tuple[Float, Float]:
 
 @dataclass(frozen=True)
 class SharedEntities(Sharers):
-    """The n entities that one rank's subdomains take part in, in the order of their constraints.
+    """The n shared entities of the local subdomains, in the order of their constraints.
 
     Attributes:
         nodes: (n,) fine nodes on the entity: 1, or the inner lattice nodes of an edge.
-        first: (n,) number of its first vector constraint.
+        first: (n,) number of the first vector constraint.
         body: constituent of each sharer.
-        fibre: (n,) the body that may debond here from the one around it, the inner one; or -1 where nothing can break.
-        pair: (n,) the interface of the case that these two bodies have, -1 where nothing can break.
-        normal: (n, 2, 2) normals from the inner to the outer body at the start and the end of the edge, as long as dx /
-            ds, s in [0, 1] the place along it; at a vertex, where sides of elements meet, as long as its parts of these
-            together.
-        turn: (n,) of the edge, as in `Submesh`; 0 at vertices.
-        precracked: (n,) whether the mesh has the edge, or all edges that meet in the vertex, debonded.
+        fibre: (n,) the inner body, which may debond from the body around it; -1 where no bond can break.
+        pair: (n,) the case interface between these two bodies; -1 where no bond can break.
+        normal: (n, 2, 2) normals from the inner to the outer body at both ends of the edge, with the length of dx / ds
+            for the position s in [0, 1]; at a vertex, with the tributary length of the vertex.
+        turn: (n,) turn of the edge, as in `Submesh`; 0 at vertices.
+        precracked: (n,) whether the edge, or every edge at the vertex, is debonded in the mesh.
         owned: (2,) first vector constraint of this rank and the one after its last.
         constraints: number of vector constraints on all ranks.
     """
@@ -194,11 +193,11 @@ def share_entities(
     pairs: Int,
     lattice: ReferenceLattice,
 ) -> SharedEntities:
-    """Return the shared entities of this rank; constraints are numbered rank by rank. Collective.
+    """Find the shared entities of this rank, and number the constraints rank by rank.  Collective.
 
     Args:
-        pairs: (phases, phases) the interface of the case between two phases, -1 where they never part.
-        lattice: of the coarse triangles.
+        pairs: (phases, phases) the case interface between two phases, -1 where bonds never break.
+        lattice: reference lattice of the coarse triangles.
     """
     sharers = find_sharers(comm, meshes, table)
     geometry: tuple[Array, ...] = interface_geometry(comm, meshes, table, pairs, sharers, lattice)
@@ -210,7 +209,7 @@ def share_entities(
     constraints = np.where(owner == comm.rank, nodes * (sharers.copies - 1), 0)
     begin, own_constraints = comm.exscan(int(constraints.sum())) or 0, int(constraints.sum())
     numbers = begin + np.cumsum(constraints) - constraints
-    # Owners of entities send numbers and geometry to the other sharers.
+    # The owner of an entity sends its number and geometry to the other sharers.
     rank, entity = table.rank[sharers.sharer], np.repeat(np.arange(len(owner)), sharers.copies)
     mine = (owner == comm.rank)[entity]
     to = np.unique(entity[mine] * comm.size + rank[mine])

@@ -1,7 +1,7 @@
-"""Who shares which coarse vertices and edges, found by all ranks.
+"""Search for the subdomains that share coarse vertices and edges, by all ranks together.
 
-Each key has a home rank, key modulo ranks.  Every rank sends the homes which of its subdomains have a key that others
-may have, too; the home puts the subdomains in order, and sends them to the ranks that have one.
+Each key has a home rank, key modulo ranks.  Every rank tells the homes which of its subdomains have a key that other
+subdomains may have, too.  The home sorts the subdomains of a key, and sends them to all ranks that have one.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from feti_homog.typing import Bool, Int
 
 @dataclass(frozen=True)
 class Sharers:
-    """n entities that several subdomains share, some of them this rank's: vertices, then edges, each by key.
+    """The n entities that local subdomains share with other subdomains: vertices, then edges, sorted by key.
 
     Attributes:
-        key: (n,) class or torus edge.
-        is_edge: (n,) bool.
+        key: (n,) vertex class or torus edge.
+        is_edge: (n,) whether the entity is an edge.
         pointer, sharer: the subdomains that share entity i are sharer[pointer[i]:pointer[i + 1]], sorted by body, from
             the outermost to the innermost.
     """
@@ -34,35 +34,35 @@ class Sharers:
 
     @property
     def copies(self) -> Int:
-        """(n,) number of subdomains that share each."""
+        """(n,) number of subdomains that share each entity."""
         return np.diff(self.pointer)
 
     @property
     def innermost(self) -> Int:
-        """(n,) the last sharer of each."""
+        """(n,) the last sharer of each entity."""
         return np.asarray(self.sharer[self.pointer[1:] - 1])
 
     @property
     def code(self) -> Int:
-        """(n,) one number for each, in no order."""
+        """(n,) one unique number for each entity, not sorted."""
         return entity_code(self.key, self.is_edge)
 
     def chosen(self, which: Int) -> Sharers:
-        """Return the entities of these numbers (k,), in that order."""
+        """Return the entities with the numbers `which` (k,), in that order."""
         copies = self.copies[which]
         sharer = self.sharer[dividing.ranges(self.pointer[which], copies)]
         return Sharers(self.key[which], self.is_edge[which], np.r_[0, np.cumsum(copies)], sharer)
 
 
 def entity_code(key: Int, is_edge: Bool | bool) -> Int:
-    """(n,) one number for each class or torus edge of these keys (n,)."""
+    """Encode vertex classes or torus edges with the keys (n,) as unique numbers (n,)."""
     return np.asarray(2 * key + is_edge)
 
 
 def find_sharers(comm: MPI.Intracomm, meshes: SubmeshesOfRank, table: submeshes.SubdomainTable) -> Sharers:
-    """Return the vertex classes, but for the pinned one, and the torus edges that subdomains share. Collective.
+    """Find the vertex classes and torus edges that local subdomains share.  Collective.
 
-    Several subdomains share each, one on this rank at least.
+    The pinned class is left out.
     """
     mesh = meshes.whole
     corner, side = mesh.vertex_class[mesh.triangles], mesh.edge_class[mesh.triangle_edges]
@@ -71,7 +71,7 @@ def find_sharers(comm: MPI.Intracomm, meshes: SubmeshesOfRank, table: submeshes.
     at_border[mesh.vertex_class[mesh.edges[one_sided[mesh.edge_class]]]] = True
     if mesh.pinned >= 0:
         corner = np.where(corner == mesh.pinned, -1, corner)
-    # Codes of entities that other ranks may have, and local subdomains that have them; each pair once.
+    # Unique pairs of an entity that other ranks may have, as a code, and a local subdomain.
     kinds = [
         (entity_code(keys[local], is_edge), meshes.index[member])
         for is_edge, keys, (local, member) in (
@@ -87,7 +87,7 @@ def find_sharers(comm: MPI.Intracomm, meshes: SubmeshesOfRank, table: submeshes.
     shared = copies[entity] > 1
     code, subdomain = code[shared], subdomain[shared]
     code, first, copies = np.unique(code, return_index=True, return_counts=True)
-    # Each rank that has one of the sharers receives all.
+    # Each rank with a sharer of an entity receives all sharers of this entity.
     entity = np.repeat(np.arange(len(code)), copies)
     pairs = np.unique(entity * comm.size + table.rank[subdomain])
     entity, to = pairs // comm.size, pairs % comm.size
@@ -99,9 +99,9 @@ def find_sharers(comm: MPI.Intracomm, meshes: SubmeshesOfRank, table: submeshes.
 
 
 def _several(keys: Int, member: Int, at_border: Bool) -> tuple[Int, Int]:
-    """Return the keys of triangles (t, 3), negative ones left out.
+    """Return pairs of key and member for keys (t, 3) that several members have or that lie at the border.
 
-    That several members (t,) have or that are at the border of all, and these members.
+    `member` (t,) is the member of each triangle.  Negative keys are left out.
     """
     n = int(member.max(initial=0)) + 1
     low, high = np.full(len(at_border) + 1, n), np.full(len(at_border) + 1, -1)

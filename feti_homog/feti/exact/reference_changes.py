@@ -1,10 +1,10 @@
-"""The present response from the response of the reference cell, by followed columns of the rows C that changed.
+"""The present response from the response of the reference cell, by followed columns of the changed rows C.
 
-With W = s of rows that left (1) or came (-1), and dC of rows whose springs gained compliance, the transforms of
-`followed_response` give Gamma_:C B = Gamma'_:C W with the present response Gamma'.  So all other columns, and
-answers U, follow from the columns and answers of the reference cell by one product:
+Let W be s on rows that left (1) or came (-1), and dC on rows whose springs gained compliance.  The transforms of
+`followed_response` give Gamma_:C B = Gamma'_:C W with the present response Gamma'.  So one product turns the other
+columns, and answers U, of the reference cell into present columns and answers:
 
-    U' = U - Gamma'_:C W U_C,  U 0 before on rows that left or came.
+    U' = U - Gamma'_:C W U_C,  after U is set to 0 on rows that left or came.
 """
 
 import numpy as np
@@ -17,18 +17,18 @@ from feti_homog.typing import Float, Int
 
 
 class ReferenceChanges:
-    """The rows C of a reference cell that have changed, all of which have followed columns.
+    """The changed rows C of a reference cell, which all have followed columns.
 
     Attributes:
-        rows: (c,) C, global numbers.
+        rows: (c,) global numbers of C.
     """
 
     def __init__(
         self, comm: MPI.Intracomm, first: int, cell: ReferenceCell, followed: FollowedResponse, rows: Int, kinds: Float
     ) -> None:
-        """C are these global `rows` (c,); `kinds` (c, 2) are s, 0 of rows that hold here and there, and dC.
+        """Store C, the global `rows` (c,), and `kinds` (c, 2): s and dC of each row.
 
-        This rank's rows begin at `first`.
+        s is 0 for rows that are active in both cells.  The first owned row is `first`.
         """
         self._comm, self._first, self._cell, self._followed, self.rows = comm, first, cell, followed, rows
         self._turned, self._more = kinds.T[:, :, None]
@@ -38,32 +38,32 @@ class ReferenceChanges:
         self._own = places[self._mine]
 
     def present(self, columns: Float) -> Float:
-        """(owned rows, k) U' of U (owned rows, k).  Collective."""
+        """Compute U' (owned rows, k) from U (owned rows, k).  Collective."""
         response = columns.copy()
         response[self._own[self._turned[self._mine, 0] != 0.0]] = 0.0
         response -= self._followed.product(self.rows, self._weights * self._gathered(columns))
         return response
 
     def refined(self, columns: Float) -> Float:
-        """`present` without the rounding of followed columns, by one iterative refinement.  Collective.
+        """Compute `present` without rounding of followed columns, by one iterative refinement.  Collective.
 
-        c = B U_C obeys (Gamma_CC + D) c = U_C with the reference cell's own Gamma.
+        c = B U_C solves (Gamma_CC + D) c = U_C with Gamma of the reference cell.
         """
         response = self.present(columns)
         values = self._gathered(response)
         c = self._weights * values
         residual = columns - self._cell.respond(self._spread(c))
-        # D c of rows that hold in both cells, that came, and that left.
+        # D c on rows that are active in both cells, that came, and that left.
         stretched = np.where(self._turned == 0.0, values, np.where(self._turned < 0.0, -self._more * c, 0.0))
         rest = self._spread(self._gathered(residual) - stretched)
         residual[self._own] = response[self._own]
         return residual + self.present(rest)
 
     def error(self, rows: Int, columns: Float, stiffness: Float) -> float:
-        """Return how far new columns (owned rows, k) of global rows (k,), none of C, are off the followed columns of C.
+        """Compute the asymmetry of new columns (owned rows, k) and followed columns of C.  Collective.
 
-        Gamma' is symmetric.  Relative to the largest entry, each by its units: `stiffness` (all rows,) on active rows.
-        Collective.
+        Gamma' is symmetric.  The new columns belong to global rows (k,), none of C.  The error is relative to the
+        largest entry, after `stiffness` (all rows,) of active rows has removed the units.
         """
         entries, followed = self._gathered(columns), self._followed.entries(rows, self.rows).T
         holds = (
@@ -79,7 +79,7 @@ class ReferenceChanges:
         return distributed_arrays.gather_rows(self._comm, x, self._first, self.rows)
 
     def _spread(self, values: Float) -> Float:
-        """(owned rows, k) these (c, k) on C, 0 elsewhere."""
+        """Scatter values (c, k) on C to owned rows (owned rows, k); other rows are 0."""
         x = np.zeros((len(self._cell.active), values.shape[1]))
         x[self._own] = values[self._mine]
         return x

@@ -1,6 +1,6 @@
-"""Springs at the few nodes where both bodies are cut, which belong to the boundary of no single subdomain.
+"""Springs at the few nodes where both bodies are cut, which no single subdomain can include.
 
-With the compliances C of the rows X the preconditioner H, M^-1 or H_0, becomes
+With the compliances C of the rows X, the preconditioner H, which is M^-1 or H_0, becomes
 
     H - H X (C^-1 + X^T H X)^-1 X^T H,
 
@@ -8,7 +8,7 @@ which is (H^-1 + X C X^T)^-1 where H is definite, as H_0 is on G^T lam = 0.  On 
 
     C^-1 (C^-1 + X^T H X)^-1 X^T H,
 
-of which, however soft the springs, nothing cancels.
+in which no digits cancel, however soft the springs are.
 """
 
 from collections.abc import Callable
@@ -27,10 +27,10 @@ class SpringUpdate:
     """The update for the rows where `compliance` (owned rows,) is not 0."""
 
     def __init__(self, comm: MPI.Intracomm, first: int, compliance: Float, inverse: Callable[[Float], Float]) -> None:
-        """`inverse` is r -> H r for r (owned rows, k); `first` is this rank's first row.  Collective.
+        """Factor the update; `inverse` is r -> H r for r (owned rows, k), `first` the first owned row.  Collective.
 
         Raises:
-            ConvergenceError: the springs are so soft beside the bodies that rounding of H hides them.
+            ConvergenceError: the springs are softer than the rounding of H.
         """
         self.comm, self.first = comm, first
         places = np.flatnonzero(compliance)
@@ -47,7 +47,7 @@ class SpringUpdate:
         self._own, self._mine, self._stiffness = places, mine, stiffness[mine]
 
     def apply(self, z: Float) -> Float:
-        """Return the updated H times r, for z = H r (owned rows,) or (owned rows, k). Collective."""
+        """Update z = H r (owned rows,) or (owned rows, k) for the springs.  Collective."""
         if not len(self.rows):
             return z
         stretch = cho_solve(self._factor, distributed_arrays.gather_rows(self.comm, z, self.first, self.rows))
@@ -57,7 +57,7 @@ class SpringUpdate:
 
 
 def _factored(block: Float) -> tuple[Float, bool]:
-    """Return the factor of C^-1 + X^T H X. Raises ConvergenceError if it is not definite."""
+    """Factor C^-1 + X^T H X; raise ConvergenceError if it is not definite."""
     try:
         factor: tuple[Float, bool] = cho_factor(block)
     except LinAlgError as error:
@@ -69,17 +69,17 @@ def _factored(block: Float) -> tuple[Float, bool]:
 
 
 class SpringUpdated(Preconditioner):
-    """A preconditioner with the update for the springs of all active rows, which may soften."""
+    """A preconditioner that is updated for the springs of active rows, which may soften."""
 
     def __init__(self, comm: MPI.Intracomm, inner: Preconditioner, first: int, compliance: Float) -> None:
-        """Arguments as of `SpringUpdate`; `inner` is H, for all rows active.  Collective."""
+        """Update `inner`, which is H with all rows active; other arguments as of `SpringUpdate`.  Collective."""
         self._comm, self._inner, self._first = comm, inner, first
         self._left_out = self._compliance = compliance
         self.is_exact = inner.is_exact
         self._update = SpringUpdate(comm, first, compliance, inner.apply)
 
     def soften(self, more: Float) -> None:
-        """Let springs have `more` compliance (owned rows,) than at first, from the next `activate` on."""
+        """Give springs `more` compliance (owned rows,) than at first, from the next `activate` on."""
         self._compliance = self._left_out + more
 
     def activate(self, active: Float) -> None:
@@ -88,9 +88,9 @@ class SpringUpdated(Preconditioner):
         self._update = SpringUpdate(self._comm, self._first, active * self._compliance, self._inner.apply)
 
     def apply(self, r: Float) -> Float:
-        """Return the updated H times r. Collective."""
+        """Compute the updated H times r.  Collective."""
         return self._update.apply(self._inner.apply(r))
 
     def closing_forces(self, jump: Float) -> Float:
-        """Return the forces of `inner`, updated.  Collective."""
+        """Update the closing forces of `inner`.  Collective."""
         return self._update.apply(self._inner.closing_forces(jump))

@@ -19,19 +19,19 @@ from feti_homog.typing import Float, Int
 if TYPE_CHECKING:
     from feti_homog.feti.linalg.partial_cholesky import PartialFactor
 
-# MUMPS' status of a workspace that is too small, and per cent more than its estimate that it then gets.
+# MUMPS' errors for a workspace that is too small, and the percentages by which the estimate then grows.
 TOO_SMALL, MORE_WORKSPACE = (-8, -9), (None, 100, 1000)
 
 
 def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) -> Float:
     """Compute the Schur complement (n, n) on `rows`, in Fortran order; the rest of the matrix must be SPD.
 
-    CHOLMOD eliminates the rest in the `order` (dofs,) if there is one; the diagonal on `rows` must be positive then.
-    Without an order, or with options under `feti_schur_`, MUMPS eliminates it.
+    With an `order` (dofs,), CHOLMOD eliminates the rest in that order, and the diagonal on `rows` must be positive.
+    Without an order, or with options under `feti_schur_`, MUMPS eliminates the rest.
 
     Raises:
         LinAlgError: the rest of the matrix is not positive definite, or has entries that are not finite.
-        MemoryError: the library cannot factor it, for want of memory as a rule.
+        MemoryError: the library cannot factor the matrix, usually for lack of memory.
     """
     if len(rows) == matrix.shape[0]:
         return np.asarray(matrix.toarray(order="F"))
@@ -39,7 +39,7 @@ def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) ->
         return _by_cholmod(matrix, rows, np.zeros((matrix.shape[0], 0)), order, keep_factor=False).S
     scale = power_of_two(matrix.diagonal())
     matrix.sort_indices()
-    # In place and back, which changes no digit: a copy would be as large as the matrix.
+    # Scale in place and back, which changes no digit: a copy would be as large as the matrix.
     matrix.data *= scale
     try:
         schur = _by_mumps(matrix, rows)
@@ -51,12 +51,12 @@ def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) ->
 
 @dataclass(frozen=True)
 class ShiftedFactor:
-    """Cholesky factor of K + D, for a matrix K (dofs, dofs) that may be singular itself.
+    """Cholesky factor of K + D, for a matrix K (dofs, dofs) that may be singular.
 
     Attributes:
         factor: L with L L^T = K + D.
-        rows: (n,) rows to which K is condensed.
-        D: (n,) > 0, added to the diagonal of K on `rows`.
+        rows: (n,) rows of the condensed matrix.
+        D: (n,) positive terms on the diagonal of K at `rows`.
     """
 
     factor: PartialFactor
@@ -80,7 +80,7 @@ class CondensedMatrix:
         S: (n, n) Schur complement, in Fortran order.
         q: (n, v) Q_b - K_bi K_ii^-1 Q_i.
         C: (v, v) -Q_i^T K_ii^-1 Q_i.
-        factor: of K + D if it is kept and CHOLMOD condensed K: MUMPS leaves none.
+        factor: factor of K + D; None if it is not kept, or if MUMPS condensed K.
     """
 
     S: Float
@@ -92,7 +92,7 @@ class CondensedMatrix:
 def condensed_with_loads(
     matrix: csr_matrix, rows: Int, loads: Float, order: Int | None = None, keep_factor: bool = False
 ) -> CondensedMatrix:
-    """Condense a matrix and its loads Q (dofs, v) to `rows` by one elimination; errors as of `schur_complement`."""
+    """Condense a matrix and loads Q (dofs, v) to `rows` by one elimination; raise as `schur_complement`."""
     if order is not None and _can_be_ordered():
         return _by_cholmod(matrix, rows, loads, order, keep_factor)
     v, n = loads.shape[1], len(rows)
@@ -104,14 +104,14 @@ def condensed_with_loads(
 
 
 def _can_be_ordered() -> bool:
-    """Return whether CHOLMOD can eliminate in a given order, and no option asks for anything of MUMPS."""
+    """Return whether CHOLMOD can eliminate in a chosen order, and no option configures MUMPS."""
     from feti_homog.feti.linalg import partial_cholesky  # only large subdomains need it
 
     return partial_cholesky.is_available() and not options_database.choices("feti_schur_")
 
 
 def _by_cholmod(matrix: csr_matrix, rows: Int, loads: Float, order: Int, keep_factor: bool) -> CondensedMatrix:
-    """Return the result of `condensed_with_loads` from K + D = L L^T.
+    """Condense a matrix and loads by the factorization K + D = L L^T.
 
     D > 0 on `rows` makes K + D definite even if K is singular. With y = L^-1 Q and the block L_bb of L on `rows`,
     S = L_bb L_bb^T - D and q = L_bb y_b.
@@ -168,9 +168,9 @@ def _by_mumps(matrix: csr_matrix, rows: Int) -> Float:
 
 
 def cholesky(A: Float, lower: bool = True, clean: bool = True) -> Float:
-    """Return the triangle L with L L^T = A (n, n), or the upper one L^T.
+    """Compute the Cholesky factor L of A = L L^T (n, n), or the upper triangle L^T.
 
-    In the memory of A if that is in Fortran order.
+    The factor overwrites A if A is in Fortran order.
 
     Args:
         clean: set the other triangle to 0.
@@ -189,10 +189,10 @@ def cholesky(A: Float, lower: bool = True, clean: bool = True) -> Float:
 
 
 class DenseSolver:
-    """Solver X = A^-1 B for one SPD matrix A (n, n); a matrix in Fortran order is overwritten by its factor."""
+    """Solver X = A^-1 B for one SPD matrix A (n, n).  The factor overwrites A in Fortran order."""
 
     def __init__(self, A: Float) -> None:
-        """Factorize.
+        """Factor A.
 
         Raises:
             LinAlgError: as `cholesky`.
@@ -211,7 +211,7 @@ class DenseSolver:
 
 
 def check_lapack(routine: str, info: int) -> None:
-    """Read the info that a routine of LAPACK returns.
+    """Check the `info` that a LAPACK routine returned.
 
     Raises:
         LinAlgError: the matrix is not positive definite, or singular.
@@ -224,9 +224,9 @@ def check_lapack(routine: str, info: int) -> None:
 
 
 def invert_upper(A: Float) -> None:
-    """Invert an SPD matrix A (n, n), in Fortran order, in its upper triangle and diagonal.
+    """Replace the upper triangle and diagonal of an SPD matrix A (n, n) by those of its inverse.
 
-    The strict lower triangle stays.
+    A is in Fortran order.  The strict lower triangle stays.
 
     Raises:
         LinAlgError: A is not positive definite.
@@ -237,7 +237,7 @@ def invert_upper(A: Float) -> None:
 
 
 def _invert_triangle(U: Float) -> None:
-    """U <- U^-1 for the upper triangle of U, by halves: OpenBLAS inverts large ones column by column."""
+    """Invert the upper triangle U in place, by halves: OpenBLAS inverts large triangles column by column."""
     n = len(U)
     if n <= BLOCK_ROWS:
         U[:], info = dtrtri(U, lower=0)
@@ -252,7 +252,7 @@ def _invert_triangle(U: Float) -> None:
 def full_from_lower(A: Float, block: int = BLOCK_ROWS) -> Float:
     """Return the symmetric matrix, in C order, with the lower triangle of A (n, n).
 
-    By blocks that fit the cache.
+    The copy proceeds by blocks that fit the cache.
     """
     full, lower = A.copy(order="F"), np.tri(block, dtype=bool)
     for j in range(0, len(A), block):
@@ -264,10 +264,10 @@ def full_from_lower(A: Float, block: int = BLOCK_ROWS) -> Float:
 
 
 def product_with_some(columns: Float, at: Int, x: Float) -> Float:
-    """Compute columns[:, at] x for columns (n, m) and x (c,) or (c, k), with copies of a few columns."""
+    """Compute columns[:, at] x for columns (n, m) and x (c,) or (c, k); copy only a few columns at a time."""
     k = x.size // max(len(x), 1)
     if len(at) * (k + COPIED_COLUMNS) > columns.shape[1] * k:
-        # A product with all columns is cheaper than a copy of some.
+        # The product with all columns is cheaper than a copy of the columns `at`.
         padded = np.zeros((columns.shape[1], *x.shape[1:]))
         padded[at] = x
         return np.asarray(columns @ padded)

@@ -1,4 +1,4 @@
-"""Direct and iterative solves with sparse matrices of all ranks, through PETSc's KSP and PC."""
+"""Direct and iterative solvers for sparse matrices that are sums over ranks, through PETSc's KSP and PC."""
 
 import numpy as np
 from mpi4py import MPI
@@ -13,14 +13,14 @@ from feti_homog.typing import Float, Int
 
 
 class DistributedSolver:
-    """X = A^-1 B for a definite matrix A (n, n) that is a sum over ranks and changes from time to time.
+    """Solver X = A^-1 B for a definite matrix A (n, n), a sum over ranks that may be replaced.
 
-    Every rank factors a small matrix whole, by CHOLMOD; all ranks factor a large one together, by MUMPS. Options under
-    the prefix choose others; `ksp_type` and `pc_type` mean all ranks together.
+    Every rank factors a whole small matrix, by CHOLMOD; all ranks together factor a large matrix, by MUMPS.  Options
+    under the prefix choose other solvers; with `ksp_type` or `pc_type` all ranks solve together.
     """
 
     def __init__(self, comm: MPI.Intracomm, total: int, prefix: str, most_whole: int = REPLICATED_UNKNOWNS) -> None:
-        """Choose the solver for n = `total`; up to `most_whole` every rank factors the whole matrix."""
+        """Choose the solver for n = `total`: up to n = `most_whole`, every rank factors the whole matrix."""
         self.comm, self.total, self._prefix = comm, total, prefix
         self._ksp: PETSc.KSP | None = None
         options = PETSc.Options(prefix)
@@ -28,16 +28,16 @@ class DistributedSolver:
         self.is_distributed = comm.size > 1 and together
 
     def factor(self, unknowns: Int, part: csr_matrix, near_kernel: Float | None = None) -> None:
-        """Assemble and factor A; the last factor is freed.  Collective.
+        """Assemble and factor A, and free the last factor.  Collective.
 
         Args:
-            unknowns: (u,) numbers of local unknowns, ascending; several ranks may have one.
+            unknowns: (u,) numbers of the local unknowns, ascending; ranks may have unknowns in common.
             part: (u, u) this rank's part of the sum.
-            near_kernel: (u, c) vectors of little energy, for multigrid.
+            near_kernel: (u, c) vectors with little energy, for multigrid.
 
         Raises:
-            LinAlgError: A is not positive definite; on all ranks if it is so on one, for rounding may differ where
-                processors do.
+            LinAlgError: A is not positive definite on some rank, for rounding may differ between processors; all
+                ranks raise the error.
             MemoryError, CaseError: as `factored`.
         """
         self.destroy()
@@ -52,7 +52,7 @@ class DistributedSolver:
             matrix.scale(self._scale)
             library = PETSc.Mat.SolverType.MUMPS if self.is_distributed else PETSc.Mat.SolverType.CHOLMOD
             if near_kernel is not None:
-                # A basis (n, m), without zeros, that ranks with the same unknown agree on.
+                # A basis (n, m), without zero columns and equal on all ranks.
                 mean = self._sum(near_kernel) / np.maximum(self._sum(np.ones((len(near_kernel), 1))), 1.0)
                 near_kernel = np.linalg.qr(mean[:, mean.any(axis=0)])[0]
             # Before a factor that may fail on one rank alone.
@@ -66,9 +66,9 @@ class DistributedSolver:
             raise np.linalg.LinAlgError(f"a coarse matrix is singular: {error or 'on another rank'}") from error
 
     def solve(self, B: Float) -> Float:
-        """Compute A^-1 times right-hand sides summed over ranks, on the local unknowns.  Collective.
+        """Solve for right-hand sides summed over ranks; return the local unknowns.  Collective.
 
-        Each rank passes its part B (u,) or (u, k).
+        Each rank passes its part B (u,) or (u, k) of the right-hand sides.
         """
         assert self._ksp is not None, "nothing is factored"
         right = self._sum(B if B.ndim == 2 else B[:, None])[slice(*self._b.getOwnershipRange())]
@@ -79,14 +79,14 @@ class DistributedSolver:
         return np.asarray(X[self._unknowns]).reshape(B.shape)
 
     def _sum(self, B: Float) -> Float:
-        """Sum B (u, k) over ranks: (n, k)."""
+        """Sum right-hand sides B (u, k) over ranks: (n, k)."""
         part = np.zeros((self.total, B.shape[1]))
         part[self._unknowns] = B
         return distributed_arrays.allreduce_sum(self.comm, part)
 
     @property
     def iterations(self) -> int:
-        """Iterations of the last solve for one column, if the options ask for an iterative method; else 1."""
+        """Iterations of the last solve for one column by an iterative method; 1 for a direct method."""
         assert self._ksp is not None, "nothing is factored"
         return 1 if is_direct(self._ksp) else int(self._ksp.getIterationNumber())
 

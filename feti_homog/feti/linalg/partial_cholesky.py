@@ -1,7 +1,7 @@
-"""Partial Cholesky factorizations by the CHOLMOD that PETSc is linked with; PETSc's own interface to it offers none.
+"""Partial Cholesky factorizations by PETSc's CHOLMOD library; the interface of PETSc has no partial factorization.
 
-MUMPS orders the eliminated rows without regard to rows that stay, and takes longer where many stay.  CHOLMOD's own
-functions take a given order of all rows.  The structures below are from its manual, equal in KNOWN_VERSIONS.
+MUMPS orders the eliminated rows without regard to the rows that stay, and is slower if many rows stay.  CHOLMOD
+accepts an order of all rows.  The structures below follow its manual, and are equal in KNOWN_VERSIONS.
 """
 
 import ctypes
@@ -62,7 +62,7 @@ class _Factor(ctypes.Structure):
 
 @cache
 def is_available() -> bool:
-    """Return whether PETSc is linked with a CHOLMOD whose structures are known."""
+    """Return whether PETSc is linked with a known version of CHOLMOD."""
     version = (c_int * 3)()
     try:
         _library().cholmod_version(version)
@@ -72,26 +72,26 @@ def is_available() -> bool:
 
 
 class PartialFactor:
-    """L L^T = A (n, n) with `rows` (m,) eliminated last, the others in the `order` (n,) of all.
+    """Factor L of A = L L^T (n, n), where `rows` (m,) come last and other rows follow `order` (n,).
 
-    The factor is freed with this object.
+    The destructor of this object frees the factor.
     """
 
     def __init__(self, A: csr_matrix, rows: Int, order: Int) -> None:
-        """Factor.
+        """Factor A.
 
         Raises:
             LinAlgError: A is not positive definite.
-            MemoryError: CHOLMOD could not factor, for want of memory as a rule.
+            MemoryError: CHOLMOD could not factor, usually for lack of memory.
         """
         n, is_last = A.shape[0], np.zeros(A.shape[0], bool)
         is_last[rows] = True
         A.sort_indices()
-        # CHOLMOD reads these arrays as they lie in memory.
+        # CHOLMOD reads these arrays directly.
         p, i = (indices.astype(np.int32, copy=False) for indices in (A.indptr, A.indices))
         x = np.asarray(A.data, np.float64)
         matrix = _Sparse(n, n, A.nnz, _address(p), _address(i), None, _address(x), None, LOWER, 0, REAL, 0, 1, 1)
-        # The rows in the order that is asked for; CHOLMOD eliminates row `_order[k]` as its `_place[k]`-th.
+        # The requested order of rows; CHOLMOD eliminates row `_order[k]` at step `_place[k]`.
         self._order, self._m = np.r_[order[~is_last[order]], rows], len(rows)
         self._common, library = ctypes.create_string_buffer(COMMON_BYTES), _library()
         library.cholmod_start(self._common)
@@ -104,7 +104,7 @@ class PartialFactor:
             raise np.linalg.LinAlgError(f"not positive definite (cholmod: pivot {self._factor.contents.minor})")
 
     def last_block(self) -> Float:
-        """(m, m) block of L on `rows`, in reverse, so that it is an upper triangle.
+        """Return the block (m, m) of L on `rows` in reverse order: an upper triangle.
 
         Entry (m - 1 - i, m - 1 - j) belongs to L on rows i and j of `rows`.  Entries below the diagonal are arbitrary.
         """
@@ -127,7 +127,7 @@ class PartialFactor:
         return U
 
     def forward(self, B: Float) -> Float:
-        """(n, k) L^-1 B for B (n, k): first the other rows in the `order` given, then `rows`."""
+        """Compute L^-1 B (n, k) for B (n, k): first the eliminated rows in `order`, then `rows`."""
         if not B.shape[1]:
             return B
         permuted = np.empty(B.shape, order="F")
@@ -135,14 +135,14 @@ class PartialFactor:
         return self._solve(FORWARD, permuted)[self._place]
 
     def solve(self, B: Float) -> Float:
-        """A^-1 B for B (n,) or (n, k)."""
+        """Compute A^-1 B for B (n,) or (n, k)."""
         return self._solve(WHOLE, np.asfortranarray(B.reshape(len(B), -1), np.float64)).reshape(B.shape)
 
     def _solve(self, system: int, B: Float) -> Float:
-        """(n, k) solution of one of CHOLMOD's systems, for B (n, k) in Fortran order.
+        """Solve one of CHOLMOD's systems for B (n, k) in Fortran order: (n, k).
 
         Raises:
-            MemoryError: CHOLMOD could not solve, for want of memory as a rule.
+            MemoryError: CHOLMOD could not solve, usually for lack of memory.
         """
         right = _Dense(len(B), B.shape[1], B.size, len(B), _address(B), None, REAL, 0)
         solved = _library().cholmod_solve(system, self._factor, byref(right), self._common)
@@ -155,9 +155,9 @@ class PartialFactor:
 
 
 def _analyse(matrix: _Sparse, order: Int, factor: Any, common: Any) -> Int:
-    """Lay out a factor in a postordering of the elimination tree, with the fill of `order` (n,).
+    """Analyse the matrix in a postordering of the elimination tree, with the fill of `order` (n,).
 
-    Return the place (n,) of each row of `order` in it.
+    Return the elimination step (n,) of each row of `order`.
     """
     n, library = len(order), _library()
     parent, post, count, *work = np.empty((5, n), np.int32)
@@ -183,7 +183,7 @@ def _analyse(matrix: _Sparse, order: Int, factor: Any, common: Any) -> Int:
 
 
 def _free(factor: Any, common: Any) -> None:
-    """Free a factor, and then CHOLMOD's workspace."""
+    """Free a factor and CHOLMOD's workspace."""
     _library().cholmod_free_factor(byref(factor), common)
     _library().cholmod_finish(common)
 
@@ -199,7 +199,7 @@ def _array(pointer: int, size: int, kind: Any) -> Array:
 
 @cache
 def _library() -> ctypes.CDLL:
-    """Return CHOLMOD as petsc4py's extension module finds it."""
+    """Load the CHOLMOD library that petsc4py's extension module is linked with."""
     library = ctypes.CDLL(PETSc.__file__)
     library.cholmod_allocate_factor.restype = POINTER(_Factor)
     library.cholmod_ptranspose.restype = POINTER(_Sparse)

@@ -1,7 +1,7 @@
-"""Direct solves through PETSc's KSP and PC: of one rank, and the scales and statuses that all ranks share.
+"""Direct solvers of one rank through PETSc's KSP and PC, and the scaling and status checks of all direct solvers.
 
-Libraries have thresholds without a unit: where MUMPS leaves a Schur complement, it replaces pivots below about 1e-16.
-So each matrix is factored with its largest diagonal entry between 1 and 2.  A power of two changes no digit.
+Libraries have absolute thresholds: for a Schur complement, MUMPS replaces pivots below about 1e-16.  So each matrix is
+scaled to a largest diagonal entry between 1 and 2.  The scale is a power of two, which changes no digit.
 """
 
 import math
@@ -25,19 +25,19 @@ Options = Mapping[str, bool | int | str]
 SINGULAR = -10
 # PETSc's error code for a factorization that the chosen library does not have (PETSC_ERR_MISSING_FACTOR).
 MISSING_FACTOR = 92
-# How PETSc's words for it end.
+# End of PETSc's message if CHOLMOD is out of memory.
 CHOLMOD_OUT_OF_MEMORY = "failed with status -2"
-# With these CHOLMOD makes L L^T of small matrices too, which those that are indefinite do not have: D of its own
-# L D L^T may have any sign.
+# With these options CHOLMOD computes L L^T for small matrices too, and fails if the matrix is indefinite: D of the
+# default L D L^T may have any sign.
 DEFINITE: Options = {"mat_cholmod_final_asis": False, "mat_cholmod_final_ll": True}
-# The order of rows is that of elimination, and CHOLMOD tries no other.
+# Rows are eliminated in their order, and CHOLMOD tries no other order.
 ORDERED: Options = {"pc_factor_mat_ordering_type": "natural", "mat_cholmod_nmethods": 1}
 
 
 def power_of_two(diagonal: Float, comm: MPI.Intracomm | None = None) -> float:
-    """Return the factor that brings the largest entry of a diagonal to between 1 and 2; 1 where none is positive.
+    """Return the power of two that scales the largest diagonal entry to between 1 and 2.
 
-    With a communicator the diagonal is spread over its ranks.  Collective then.
+    The factor is 1 if no entry is positive.  With a communicator, the diagonal is distributed; collective then.
 
     Raises:
         LinAlgError: an entry is not finite; on all ranks.
@@ -51,11 +51,11 @@ def power_of_two(diagonal: Float, comm: MPI.Intracomm | None = None) -> float:
 
 
 def check_factor(pc: PETSc.PC) -> None:
-    """Check the status that the library of a factored `pc` returned beside the factor.
+    """Check the status of a factorization in the library of `pc`.
 
     Raises:
         LinAlgError: the matrix of a Cholesky factorization is not positive definite, or pivots are too small for MUMPS.
-        MemoryError: MUMPS could not factor, for want of memory as a rule.
+        MemoryError: MUMPS could not factor, usually for lack of memory.
     """
     library, is_cholesky = pc.getFactorSolverType(), pc.getType() == PETSc.PC.Type.CHOLESKY
     negative = 0
@@ -79,16 +79,16 @@ def check_factor(pc: PETSc.PC) -> None:
 
 
 def mumps_error(factor: PETSc.Mat) -> tuple[int, int]:
-    """MUMPS' INFOG(1) and INFOG(2) if the first is an error, which PETSc may keep to itself; else zeros."""
+    """Return MUMPS' INFOG(1) and INFOG(2) after an error, which PETSc may not report; else zeros."""
     first, second = (int(factor.getMumpsInfog(k)) for k in (1, 2))
     return (first, second) if first < 0 else (0, 0)
 
 
 class DirectSolver:
-    """X = A^-1 B for one symmetric definite matrix A (n, n) of one rank and any number of right-hand sides."""
+    """Solver X = A^-1 B for one symmetric definite matrix A (n, n) on one rank."""
 
     def __init__(self, matrix: csr_matrix, prefix: str, is_ordered: bool = False) -> None:
-        """Factorize.  Options under `prefix` (default: cholesky by CHOLMOD).  Arguments as of `factored`.
+        """Factor A; options under `prefix` (default: cholesky by CHOLMOD).  Arguments as of `factored`.
 
         Raises:
             LinAlgError, MemoryError, CaseError: as `factored`.
@@ -99,7 +99,7 @@ class DirectSolver:
         self._x, self._b = self._ksp.getOperators()[0].createVecs()
         pc, A = self._ksp.getPC(), self._ksp.getOperators()[0]
         is_cholesky = pc.getType() == PETSc.PC.Type.CHOLESKY
-        # A factor of CHOLMOD's needs its matrix no more: an empty one of its size takes its place.
+        # A CHOLMOD factor does not need its matrix any more: an empty matrix of equal size replaces it.
         if is_cholesky and pc.getFactorSolverType() == PETSc.Mat.SolverType.CHOLMOD and is_direct(self._ksp):
             empty = PETSc.Mat().createAIJ(A.getSizes(), nnz=0, comm=A.comm)
             empty.assemble()
@@ -109,26 +109,26 @@ class DirectSolver:
         self._destroy = weakref.finalize(self, _destroy, self._ksp, self._x, self._b)
 
     def solve(self, B: Float) -> Float:
-        """A^-1 B for B (n,) or (n, k)."""
+        """Compute A^-1 B for B (n,) or (n, k)."""
         X = solve_columns(self._ksp, self._x, self._b, B if B.ndim == 2 else B[:, None])
         X *= self._scale
         return X.reshape(B.shape)
 
     def destroy(self) -> None:
-        """Free the factor now; otherwise it is freed with this object."""
+        """Free the factor now; otherwise the destructor of this object frees it."""
         self._destroy()
 
 
 def is_direct(ksp: PETSc.KSP) -> bool:
-    """Return whether a solver applies a factor once, and does not iterate."""
+    """Return whether the solver applies a factor once and does not iterate."""
     return bool(ksp.getType() == PETSc.KSP.Type.PREONLY)
 
 
 def solve_columns(ksp: PETSc.KSP, x: PETSc.Vec, b: PETSc.Vec, B: Float) -> Float:
-    """Return the rows (own rows, k) of A^-1 B on this rank, Fortran order, for its rows B (own rows, k).
+    """Compute the owned rows (owned rows, k) of A^-1 B, in Fortran order, for owned rows B (owned rows, k).
 
-    `x` and `b` are work vectors.  Iterative methods solve the columns one after the other.  Collective where the matrix
-    is.
+    `x` and `b` are work vectors.  Iterative methods solve one column after the other.  Collective on the ranks of the
+    matrix.
     """
     X = np.empty(B.shape, order="F")
     if B.shape[1] > 1 and is_direct(ksp):
@@ -148,19 +148,19 @@ def solve_columns(ksp: PETSc.KSP, x: PETSc.Vec, b: PETSc.Vec, B: Float) -> Float
 def factored(
     A: PETSc.Mat, prefix: str, library: str, near_kernel: Float | None = None, is_ordered: bool = False
 ) -> PETSc.KSP:
-    """Return a KSP with the Cholesky factorization of a symmetric definite matrix by this library.
+    """Factor a symmetric definite matrix by Cholesky in a `library`; return the KSP.
 
-    Options under `prefix` may choose others. Rows that are ordered are eliminated one after the other. Collective where
-    the matrix is.
+    Options under `prefix` may choose another method.  If the matrix `is_ordered`, rows are eliminated one after the
+    other.  Collective on the ranks of the matrix.
 
-    Rows and columns should have similar size: MUMPS does not scale here, for its own scaling loses all digits of coarse
-    problems with contrasts of 1e6.  Multigrid learns of the `near_kernel` (n, k), orthonormal vectors of little energy,
+    Rows and columns should have similar size: MUMPS does not scale here, for its scaling loses all digits of coarse
+    problems with contrasts of 1e6.  Multigrid uses the `near_kernel` (n, k): orthonormal vectors with little energy,
     equal on all ranks.
 
     Raises:
-        LinAlgError: the matrix is not positive definite, or too near to one that is singular.
-        MemoryError: MUMPS could not factor, or CHOLMOD had no memory left.
-        CaseError: the library that the options name has no such factorization.
+        LinAlgError: the matrix is not positive definite, or nearly singular.
+        MemoryError: MUMPS could not factor, or CHOLMOD is out of memory.
+        CaseError: the library in the options has no such factorization.
     """
     if near_kernel is not None and near_kernel.shape[1]:
         vectors = [A.createVecLeft() for _ in near_kernel.T]
@@ -168,7 +168,7 @@ def factored(
             vector.setArray(values[slice(*vector.getOwnershipRange())])
         space = PETSc.NullSpace().create(vectors=vectors, comm=A.comm)
         A.setNearNullSpace(space)
-        # The matrix keeps them, and frees them with itself.
+        # The matrix holds references, which its destructor frees.
         for petsc_object in (space, *vectors):
             petsc_object.destroy()
     A.setOption(PETSc.Mat.Option.SPD, True)
@@ -191,7 +191,7 @@ def factored(
 
 @contextmanager
 def _unless_given(options: Options, prefix: str) -> Iterator[None]:
-    """Set options while the block lasts, unless the user has set them."""
+    """Set options within the block, unless the user has set them."""
     database = PETSc.Options(prefix)
     added = {name: value for name, value in options.items() if not database.hasName(name)}
     for name, value in added.items():
@@ -204,7 +204,7 @@ def _unless_given(options: Options, prefix: str) -> Iterator[None]:
 
 
 def _direct_ksp(A: PETSc.Mat, prefix: str, library: str) -> PETSc.KSP:
-    """Return a KSP that applies a Cholesky factorization by `library` once; options under `prefix` may change both."""
+    """Create a KSP that applies a Cholesky factor of `library` once; options under `prefix` may change both."""
     ksp = PETSc.KSP().create(A.comm)
     ksp.setOptionsPrefix(prefix)
     ksp.setOperators(A)
@@ -229,13 +229,13 @@ def _direct_ksp(A: PETSc.Mat, prefix: str, library: str) -> PETSc.KSP:
 
 
 def _destroy(ksp: PETSc.KSP, *vectors: PETSc.Vec) -> None:
-    """Free a factor at once: objects that Python merely drops stay until PETSc's garbage collection."""
+    """Free a factor at once: objects that Python only drops wait for PETSc's garbage collection."""
     for petsc_object in (ksp.getOperators()[0], ksp, *vectors):
         petsc_object.destroy()
 
 
 def sequential(matrix: csr_matrix) -> PETSc.Mat:
-    """Return the matrix as PETSc's, on this rank alone; both share their arrays."""
+    """Wrap a matrix as a PETSc matrix on this rank, with the arrays in common."""
     matrix.sort_indices()
     csr = matrix.indptr, matrix.indices, matrix.data
     return PETSc.Mat().createAIJWithArrays(matrix.shape, csr, comm=PETSc.COMM_SELF)

@@ -1,4 +1,4 @@
-"""Sparse matrices: sums of dense blocks, symmetric scaling, and sums over ranks whose rows belong to one rank each."""
+"""Sparse matrices: sums of dense blocks, symmetric scaling, and sums over ranks."""
 
 import numpy as np
 from mpi4py import MPI
@@ -11,21 +11,21 @@ from feti_homog.typing import Bool, Float, Int, Int32
 
 
 class DenseBlockSum:
-    """The sparse sum of dense blocks that are added one after the other.
+    """A sparse sum of dense blocks.
 
-    Blocks wait in a buffer, which is added to the sum when it has more than `max_buffered_entries` entries and more
-    than the sum itself.  So memory is at most about twice the sum, which is copied only when it has doubled.
+    Blocks wait in a buffer until the buffer has more than `max_buffered_entries` entries and more entries than the sum.
+    So the memory is at most about twice the sum, and each copy of the sum doubles its entries.
     """
 
     def __init__(self, shape: tuple[int, int], max_buffered_entries: int = MAX_BUFFERED_ENTRIES) -> None:
         self._sum = csr_matrix(shape)
         self._max_buffered_entries = max_buffered_entries
-        # Of each block: rows, how many entries each has, their columns and values.
+        # Rows of each block, entry counts of the rows, columns and values.
         self._buffer: list[tuple[Int, Int, Int32, Float]] = []
         self._buffered_entries = 0
 
     def add(self, rows: Int, columns: Int, values: Float) -> None:
-        """Add the block `values` (rows, columns)."""
+        """Add a dense block of `values` (rows, columns)."""
         counts, wide = np.full(len(rows), len(columns)), np.tile(columns.astype(np.int32), len(rows))
         self._buffer.append((rows, counts, wide, values.ravel()))
         self._buffered_entries += values.size
@@ -33,12 +33,12 @@ class DenseBlockSum:
             self._flush()
 
     def matrix(self) -> csr_matrix:
-        """Return the sum of all blocks so far."""
+        """Return the sum of all blocks."""
         self._flush()
         return self._sum
 
     def _flush(self) -> None:
-        """Add the buffer to the sum."""
+        """Add the buffered blocks to the sum."""
         if not self._buffer:
             return
         rows, counts, columns, values = (np.concatenate(part) for part in zip(*self._buffer, strict=True))
@@ -47,24 +47,24 @@ class DenseBlockSum:
         # A product sums faster than a conversion from coordinates, which sorts.
         stacked = csr_matrix((values, columns, np.r_[0, np.cumsum(counts)]), shape=(len(rows), n))
         place = csr_matrix((np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=(m, len(rows)))
-        # Sums copy both, an empty one too.
+        # A sum copies both terms, even if one is empty.
         self._sum = self._sum + place @ stacked if self._sum.nnz else csr_matrix(place @ stacked)
 
 
 def scaled(A: csr_matrix, weights: Float) -> csr_matrix:
-    """diag(weights) A diag(weights) for weights (n,), in the pattern of A (n, n).
+    """Compute diag(weights) A diag(weights) for weights (n,), in the pattern of A (n, n).
 
-    Products with diagonal matrices would look for that pattern anew.
+    Products with diagonal matrices would compute the pattern again.
     """
     data = A.data * weights[A.indices] * np.repeat(weights, np.diff(A.indptr))
-    # Indices of its own: sorting one matrix must not shuffle the other.
+    # Copies of the indices: a sort of one matrix must not shuffle the other.
     return csr_matrix((data, A.indices.copy(), A.indptr.copy()), shape=A.shape)
 
 
 def assemble_owned_rows(
     comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, owned: tuple[int, int]
 ) -> csr_matrix:
-    """Return the owned rows of `local` summed over ranks.  Collective.
+    """Sum local matrices over ranks, and return the owned rows.  Collective.
 
     Args:
         local: (r, c) this rank's contribution.
@@ -82,7 +82,7 @@ def assemble_owned_rows(
 
 
 def gathered_sum(comm: MPI.Intracomm, part: csr_matrix, unknowns: Int, total: int) -> csr_matrix:
-    """Return the sum (n, n) over ranks of `part` (u, u) in the `unknowns` (u,), on every rank.  Collective."""
+    """Sum `part` (u, u) on the `unknowns` (u,) over ranks into (n, n), on every rank.  Collective."""
     entries = part.tocoo()
     triples = unknowns[entries.row], unknowns[entries.col], entries.data
     rows, columns, values = (np.concatenate(parts) for parts in zip(*comm.allgather(triples), strict=True))
@@ -94,12 +94,12 @@ def add_shared_rows(comm: MPI.Intracomm, local: csr_matrix, rows: Int, is_shared
 
     Args:
         local: (r, n) this rank's contribution; the n columns are common to all ranks.
-        rows: (r,) global numbers of its rows.
-        is_shared_row: (r,) whether other ranks have the row too; only these travel.
+        rows: (r,) global row numbers.
+        is_shared_row: (r,) whether other ranks have the row, too; only shared rows are sent.
         owned: number of rows that this rank owns.
 
     Returns:
-        (r, n) these rows of the sum over ranks.
+        (r, n) local rows of the sum over ranks.
     """
     if comm.size == 1:
         return local
@@ -107,7 +107,7 @@ def add_shared_rows(comm: MPI.Intracomm, local: csr_matrix, rows: Int, is_shared
     used, indices = np.unique(shared.indices, return_inverse=True)
     narrow = csr_matrix((shared.data, indices, shared.indptr), shape=(shared.shape[0], len(used)))
     A = _assemble(comm, narrow, rows[is_shared_row], used, (owned, _even_share(comm, n)))
-    # In descending order: PETSc 3.18 mixes up the columns if every rank asks for all rows in ascending order.
+    # Descending order: PETSc 3.18 mixes up the columns if every rank requests all rows in ascending order.
     asked_rows = PETSc.IS().createGeneral(rows[is_shared_row][::-1].astype(PETSc.IntType), comm=PETSc.COMM_SELF)
     all_columns = PETSc.IS().createStride(n, 0, 1, comm=PETSc.COMM_SELF)
     sums = A.createSubMatrices(asked_rows, all_columns)[0]
@@ -121,9 +121,9 @@ def add_shared_rows(comm: MPI.Intracomm, local: csr_matrix, rows: Int, is_shared
 
 
 def assemble_distributed(comm: MPI.Intracomm, part: csr_matrix, numbers: Int, total: int) -> PETSc.Mat:
-    """(n, n) the sum over ranks of parts (k, k), as a matrix whose rows the ranks share evenly.  Collective.
+    """Sum parts (k, k) over ranks into a matrix (n, n) with evenly distributed rows.  Collective.
 
-    Rows and columns of the parts have these numbers (k,).
+    Rows and columns of the parts have the `numbers` (k,).
     """
     share = _even_share(comm, total)
     return _assemble(comm, part, numbers, numbers, (share, share))
@@ -144,12 +144,12 @@ def allreduce_sparse(comm: MPI.Intracomm, part: csr_matrix) -> csr_matrix:
 
 
 def _even_share(comm: MPI.Intracomm, n: int) -> int:
-    """Return how many of n rows this rank gets if all ranks get about as many."""
+    """Return the row count of this rank in an even distribution of n rows."""
     return n // comm.size + (comm.rank < n % comm.size)
 
 
 def _assemble(comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, owned: tuple[int, int]) -> PETSc.Mat:
-    """Return the sum of the contributions as PETSc's distributed sparse matrix; arguments as `assemble_owned_rows`."""
+    """Sum local matrices into a distributed PETSc matrix; arguments as of `assemble_owned_rows`."""
     maps = [PETSc.LGMap().create(i.astype(PETSc.IntType), comm=comm) for i in (rows, columns)]
     sizes = tuple((n, comm.allreduce(n)) for n in owned)
     A = PETSc.Mat().createIS(sizes, lgmapr=maps[0], lgmapc=maps[1], comm=comm)

@@ -91,16 +91,21 @@ class InterfaceOperators:
         self.local_dofs = np.concatenate([np.zeros(0, np.int64), *numbers])
         self.B = jump_operator.B[:, self.local_dofs].tocsr()
         self.BT = self.B.T.tocsr()
-        can_condense = bool(PETSc.Sys.hasExternalPackage("mumps"))
         first_row, last_row = jump_operator.owned
         at = int(np.searchsorted(jump_operator.rows, first_row))
         owned = slice(at, at + last_row - first_row)
         self.springs = np.zeros(last_row - first_row) if compliance is None else compliance[owned]
         self.compliance = np.where((jump_operator.copies[owned] > 1).all(axis=1), self.springs, 0.0)
         self.of_inner = self._inner_dofs(jump_operator)
-        roots = self._compliance_roots(jump_operator.copies, compliance)
+        roots = [
+            None
+            if compliance is None
+            else compliance_root(self.B[:, span], compliance, jump_operator.copies, self.of_inner[span])
+            for span in self.slices
+        ]
         springs = [not s.is_outer and root is not None for s, root in zip(subdomains, roots, strict=True)]
         sizes = _sizes(jump_operator.shared, subdomains, self.dofs, springs)
+        can_condense = bool(PETSc.Sys.hasExternalPackage("mumps"))
         chosen = choose(sizes, kind, applications, soft_modes, can_condense, thresholds)
         self.facewise = [choice.facewise for choice in chosen]
         self.operators: list[InterfaceOperator] = []
@@ -117,13 +122,6 @@ class InterfaceOperators:
                 diagonal = 1.0 / (1.0 / diagonal + np.asarray(root.multiply(root).sum(axis=1)).ravel())
             diagonals.append(diagonal)
         self.body_diagonal, self.diagonal = np.concatenate(bodies), np.concatenate(diagonals)
-
-    def _compliance_roots(self, copies: Int, compliance: Float | None) -> list[csr_matrix | None]:
-        """Compute the root of the spring compliance for each subdomain; None without springs."""
-        if compliance is None:
-            return [None for _ in self.subdomains]
-        roots = [compliance_root(self.B[:, span], compliance, copies, self.of_inner[span]) for span in self.slices]
-        return [root if root.shape[1] else None for root in roots]
 
     @cached_property
     def slices(self) -> list[slice]:
@@ -144,29 +142,26 @@ class InterfaceOperators:
         """Compute S x for x (n,) or (n, k)."""
         return self._each([o.apply_schur for o in self.operators], x)
 
-    def apply_with_springs(self, x: Float) -> Float:
-        """Compute S~ x, the stiffness with springs, for x (n,) or (n, k)."""
-        return self._each([o.apply_schur for o in self.with_springs], x)
+    def apply_with_springs(self, x: Float, which: Sequence[bool] | None = None) -> Float:
+        """Compute S~ x, the stiffness with springs, for x (n,) or (n, k).
 
-    def apply_some_with_springs(self, which: Sequence[bool], x: Float) -> Float:
-        """Compute S~ x for x (n,) or (n, k) on the subdomains in `which`, 0 on the others."""
-        x = np.asfortranarray(x)
-        y = np.zeros(x.shape, order="F")
-        for operator, span, is_wanted in zip(self.with_springs, self.slices, which, strict=True):
-            if is_wanted and x[span].any():
-                operator.apply_schur(x[span], y[span])
-        return y
+        With `which`, the result is 0 on subdomains for which this is false or x is 0.
+        """
+        some = None if which is None else [k for k, span in enumerate(self.slices) if which[k] and x[span].any()]
+        return self._each([o.apply_schur for o in self.with_springs], x, some)
 
     def apply_flexibility(self, x: Float) -> Float:
         """Compute the boundary part of K+ x for x (n,) or (n, k)."""
         return self._each([o.apply_flexibility for o in self.operators], x)
 
-    def _each(self, applied: Sequence[Callable[[Float, Float], Float]], x: Float) -> Float:
-        """Apply the operator of each subdomain to its part of x (n,) or (n, k)."""
+    def _each(
+        self, applied: Sequence[Callable[[Float, Float], Float]], x: Float, some: Sequence[int] | None = None
+    ) -> Float:
+        """Apply the operators of `some` subdomains, or of all, to their parts of x (n,) or (n, k)."""
         x = np.asfortranarray(x)
-        y = np.empty(x.shape, order="F")
-        for apply, span in zip(applied, self.slices, strict=True):
-            apply(x[span], y[span])
+        y = np.zeros(x.shape, order="F")
+        for k in range(len(applied)) if some is None else some:
+            applied[k](x[self.slices[k]], y[self.slices[k]])
         return y
 
     @cached_property

@@ -1,8 +1,8 @@
 """Boundary operators of a subdomain, its Schur complement S and flexibility S+: dense matrices, or sparse factors.
 
-Dense ones are symmetric and share one square array, so that a product reads n^2 / 2 numbers.  S comes from one partial
-factorization.  The dual problem needs only the boundary, so the factor is kept only for displacements inside.  Sparse
-factors serve where dense matrices would be too large.
+The dense matrices are symmetric and stored in one square array, so that a product reads n^2 / 2 numbers.  One partial
+factorization gives S.  The dual problem needs only the boundary, so that the factor is kept only for displacements
+inside.  Sparse factors replace dense matrices that would be too large.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ class ExplicitInterfaceOperator:
     With the fixing nodes on the boundary, the inverse of S + rho Rf Rf^T is the boundary part of K+.
 
     Attributes:
-        condensed: the unit loads on the boundary.
-        factor: of the whole subdomain, from which `extend` has displacements inside; None if it was not kept.
+        condensed: unit loads on the boundary.
+        factor: factor of the whole subdomain, with which `extend` computes displacements inside; None if not kept.
     """
 
     is_dense = True
@@ -37,7 +37,7 @@ class ExplicitInterfaceOperator:
     def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int, keep_factor: bool = False) -> None:
         """Condense K (cn, cn) to `dofs` (n,), which are sorted local numbers.  Options under `feti_schur_`.
 
-        `keep_factor` of a subdomain with loads inside, if CHOLMOD condenses it.
+        `keep_factor` has an effect on subdomains with loads inside that CHOLMOD condenses.
 
         Raises:
             LinAlgError: the Schur complement is not positive definite on the complement of the kernel.
@@ -53,14 +53,14 @@ class ExplicitInterfaceOperator:
             both = schur_complement(K, dofs, order)
         self.condensed = CondensedLoads(q, C, C)
         self._schur_diagonal = both.diagonal().copy()
-        # S stays below the diagonal; the inverse of the regularised S comes above it.
+        # S stays below the diagonal; the inverse of the regularised S goes above the diagonal.
         both[np.ix_(self._fixed, self._fixed)] += np.triu(self._term)
         try:
             invert_upper(both)
         except np.linalg.LinAlgError as error:
             raise np.linalg.LinAlgError(f"the regularised Schur complement of a subdomain: {error}") from error
         self._flexibility_diagonal = both.diagonal().copy()
-        # Each diagonal has less than the norm of its matrix.
+        # Diagonal entries are lower bounds of matrix norms.
         conditioning = self._schur_diagonal.max(initial=0.0) * self._flexibility_diagonal.max(initial=0.0)
         is_thin = subdomain.is_thin and bool(conditioning > thresholds.ILL_CONDITIONED)
         self._refines = is_thin or subdomain.compressible_share < thresholds.INCOMPRESSIBLE_SHARE
@@ -68,13 +68,13 @@ class ExplicitInterfaceOperator:
         self._both = both
 
     def apply_schur(self, x: Float, out: Float | None = None) -> Float:
-        """S x for x (n,) or (n, k), into `out` if it is given; else in Fortran order."""
+        """Compute S x for x (n,) or (n, k), into `out` or in Fortran order."""
         return self._product(x, out, self._schur_diagonal, lower=1)
 
     def apply_flexibility(self, x: Float, out: Float | None = None) -> Float:
-        """S+ x for x (n,) or (n, k), into `out` if it is given; else in Fortran order.
+        """Compute S+ x for x (n,) or (n, k), into `out` or in Fortran order.
 
-        Of a body whose inverse is ill-conditioned, thin or nearly incompressible, with one step of iterative
+        The inverse of a thin or nearly incompressible body is ill-conditioned: it gets one step of iterative
         refinement.
         """
         y = self._product(x, out, self._flexibility_diagonal, lower=0)
@@ -85,9 +85,9 @@ class ExplicitInterfaceOperator:
         return y
 
     def _product(self, x: Float, out: Float | None, diagonal: Float, lower: int) -> Float:
-        """Multiply the symmetric matrix in one triangle of the array, and a diagonal, with x.
+        """Multiply x by the symmetric matrix with a triangle of the array and a diagonal.
 
-        Fastest in Fortran order.
+        Fortran order is fastest.
         """
         A = self._both
         if out is None:
@@ -102,7 +102,7 @@ class ExplicitInterfaceOperator:
         return out
 
     def extend(self, x: Float, loads: Float | None) -> Float:
-        """(dofs, k) displacements under loads (v, k), if any, and x (n, k) on the boundary, by the kept factor."""
+        """Extend boundary displacements x (n, k) to (dofs, k) under loads (v, k), if any, by the kept factor."""
         assert self.factor is not None
         forces, reactions = np.zeros((self._subdomain.n_dofs, *x.shape[1:])), self.apply_schur(x)
         if loads is not None:
@@ -134,15 +134,15 @@ class ExplicitInterfaceOperator:
 class CondensedLoads:
     """The v unit loads condensed to the n boundary dofs of subdomains.
 
-    Loads vanish inside pieces of one material but for nodes at voids.  With K_ii u_i = -Q_i E - K_ib u_b the stress
-    integral is C E + q^T u_b and the forces on the boundary are S u_b + q E, of
+    Inside pieces of one material, loads vanish except at voids.  With K_ii u_i = -Q_i E - K_ib u_b, the stress
+    integral is C E + q^T u_b and the forces on the boundary are S u_b + q E, where
 
         q = Q_b - K_bi K_ii^-1 Q_i,  C = |Omega| L - Q_i^T K_ii^-1 Q_i.
 
     Attributes:
         boundary: (n, v) q.
-        stiffness: (v, v) C, or the sum.
-        energy: (v, v) twice the energy where u_b = 0: C. Of a subdomain without a boundary it is computed as
+        stiffness: (v, v) C, or its sum over subdomains.
+        energy: (v, v) twice the energy at u_b = 0, which is C.  A subdomain without a boundary has
             |Omega| L + 2 Q_i^T u_i + u_i^T K_ii u_i, which is C only if u_i is exact.
     """
 
@@ -160,7 +160,7 @@ class ImplicitInterfaceOperator:
         """Factor K + rho Rf Rf^T; `dofs` (n,) are sorted local numbers.  Options under `feti_sub_`."""
         self.n, self.dofs, self._subdomain = len(dofs), dofs, subdomain
         if not len(dofs) and not subdomain.R.shape[1]:
-            # Pinned and without a boundary: it is solved for the unit loads, for no other forces will act on it.
+            # A pinned subdomain without a boundary has no other forces than the unit loads: solve for these now.
             s, u = subdomain, np.empty(subdomain.Q.shape)
             self.interior = Interior(K, dofs, s.elimination_order())
             self.interior.answers = self.interior.solve(-s.Q[self.interior.dofs])
@@ -175,12 +175,12 @@ class ImplicitInterfaceOperator:
 
     @cached_property
     def interior(self) -> Interior:
-        """The interior, factored when first asked for; for that K is assembled again."""
+        """The interior, factored at the first access, after K is assembled again."""
         return Interior(self._subdomain.take_stiffness(), self.dofs, self._subdomain.elimination_order())
 
     @cached_property
     def condensed(self) -> CondensedLoads:
-        """The loads, which need the interior where they act inside."""
+        """The condensed loads; loads inside need the interior."""
         s, q, C = self._subdomain, self._subdomain.Q[self.dofs], self._subdomain.area * self._subdomain.L
         if s.loads_inside:
             inside = s.Q[self.interior.dofs]
@@ -189,11 +189,11 @@ class ImplicitInterfaceOperator:
         return CondensedLoads(q, C, C)
 
     def apply_schur(self, x: Float, out: Float | None = None) -> Float:
-        """S x = K_bb x - K_bi K_ii^-1 K_ib x for x (n,) or (n, k), into `out` if it is given."""
+        """Compute S x = K_bb x - K_bi K_ii^-1 K_ib x for x (n,) or (n, k), into `out` if any."""
         return _by_columns(self.interior.reactions, x, out)
 
     def apply_flexibility(self, x: Float, out: Float | None = None) -> Float:
-        """Return the boundary part of K+ x for x (n,) or (n, k), into `out` if it is given."""
+        """Compute the boundary part of K+ x for x (n,) or (n, k), into `out` if any."""
 
         def solve(x: Float) -> Float:
             load = np.zeros((self._subdomain.n_dofs, *x.shape[1:]), order="F")
@@ -204,11 +204,11 @@ class ImplicitInterfaceOperator:
 
 
 class Interior:
-    """The factored interior of one subdomain: the dofs that no constraint acts on.
+    """The factored interior of one subdomain: the dofs without constraints.
 
     Attributes:
-        dofs: their local numbers, in the order of elimination if there is one, else sorted.
-        answers: (inner dofs, v) displacements under the unit loads, None where they are not kept.
+        dofs: local numbers of the inner dofs, in elimination order if there is one, else sorted.
+        answers: (inner dofs, v) displacements under the unit loads; None if not kept.
     """
 
     answers: Float | None = None
@@ -239,24 +239,24 @@ class Interior:
         return self._Kib.T.tocsr()
 
     def extend(self, x: Float, load: Float | None = None) -> Float:
-        """-K_ii^-1 (K_ib x + q): the interior in equilibrium with boundary displacements x (n,) or (n, k).
+        """Compute -K_ii^-1 (K_ib x + q), in equilibrium with boundary displacements x (n,) or (n, k).
 
-        The `load` q (inner dofs,) or (inner dofs, k) acts on it if there is one.
+        The `load` q (inner dofs,) or (inner dofs, k) acts on the interior, if any.
         """
         forces = self._Kib @ x
         return self.solve(-forces if load is None else -forces - load)
 
     def solve(self, forces: Float) -> Float:
-        """K_ii^-1 f for forces (inner dofs,) or (inner dofs, k) while the boundary is held."""
+        """Compute K_ii^-1 f for forces (inner dofs,) or (inner dofs, k) with a fixed boundary."""
         return self._solver.solve(forces) if len(self.dofs) else np.zeros(forces.shape)
 
     def reactions(self, x: Float) -> Float:
-        """S x, the forces that go with boundary displacements x (n,) or (n, k)."""
+        """Compute the forces S x of boundary displacements x (n,) or (n, k)."""
         return np.asarray(self._Kbb @ x + self.coupling @ self.extend(x))
 
 
 def _by_columns(apply: Callable[[Float], Float], x: Float, out: Float | None) -> Float:
-    """`apply` to at most COLUMNS_AT_ONCE columns of x (n, k) at a time, or to x (n,)."""
+    """Apply a function to x (n,), or to at most COLUMNS_AT_ONCE columns of x (n, k) at a time."""
     if out is None:
         out = np.empty_like(x)
     if not len(x):
