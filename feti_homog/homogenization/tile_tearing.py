@@ -67,20 +67,20 @@ def place_nodes(
     return mpi_errors.on_root_only(comm, with_nodes, unmeshed)
 
 
-def begin_mesh(case: Case, policy: tiling.TilePolicy) -> gmsh_mesher.UnmeshedCell | gmsh_mesher.NodedCell | CoarseMesh:
+def begin_mesh(case: Case, policy: tiling.TilePolicy) -> gmsh_mesher.UnmeshedCell | CoarseMesh:
     """Return a user's mesh, or the cell that rank 0 makes alone.
 
     Raises:
         CaseError: a phase has no material, or a material no phase.
         MeshError: the cell cannot be meshed, or its mesh file is faulty.
     """
-    cell: gmsh_mesher.UnmeshedCell | gmsh_mesher.NodedCell | CoarseMesh
+    cell: gmsh_mesher.UnmeshedCell | CoarseMesh
     if case.cell.has_own_mesh:
         from feti_homog.mesh.readers import msh_reader  # with the readers of all formats
 
         cell = msh_reader.read_cell(case.cell)
     else:
-        listed = arrange.listed_arrangement(case.cell)
+        listed = None if case.cell.table is None else arrange.arrange(case.cell)
         estimate = element_estimate.ElementEstimate.of(case.cell, listed)
         section = replace(case.cell, tip_size=arc_selection.size(case, estimate))
         cell = gmsh_mesher.begin(section, listed, arc_selection.marks(case, estimate.fibres), policy)

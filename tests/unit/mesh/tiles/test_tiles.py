@@ -5,13 +5,15 @@ from dataclasses import replace
 import gmsh
 import numpy as np
 import pytest
+from support import generated_meshes
+from support.generated_meshes import generate
 from support.tiled_cells import CELLS, SMALL, mesh_of, noded
 from unit.mesh.fill.test_gmsh_mesher import least_angle
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas
-from feti_homog.mesh.fill.gmsh_mesher import begin, generate
+from feti_homog.mesh.fill.gmsh_mesher import begin
 from feti_homog.mesh.outline.bridges import CLEAR, LEAST_ANGLE
 from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE
 from feti_homog.mesh.outline.outline import images
@@ -151,7 +153,7 @@ def test_small_cells_and_other_shapes_are_not_tiled():
     arrangement = arrange(CELLS["dense"])
     assert is_tiled(arrangement, TilePolicy(least_discs=36)) and not is_tiled(arrangement, TilePolicy(least_discs=37))
     assert not is_tiled(replace(arrangement, outlines=elliptic(arrangement.outlines)), SMALL)
-    assert len(begin(CELLS["dense"], None, policy=TilePolicy(least_discs=37)).with_nodes().parts) == 1
+    assert len(generated_meshes.noded(begin(CELLS["dense"], None, {}, TilePolicy(least_discs=37))).parts) == 1
 
 
 def test_a_tile_that_gmsh_leaves_unfilled_is_reported(monkeypatch):
