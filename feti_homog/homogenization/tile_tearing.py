@@ -5,10 +5,10 @@ tiles, and no rank has all tiles.  Matrix pieces lie within tiles, and a fibre l
 the case and the number of ranks, not on the rank that filled a tile.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain
 from operator import itemgetter
-from typing import TypeVar
 
 import numpy as np
 from mpi4py import MPI
@@ -19,15 +19,13 @@ from feti_homog.feti.decomposition import partition
 from feti_homog.homogenization import arc_selection, cell_remarks
 from feti_homog.homogenization.domain_partition import RankShare, distribute, summary_of
 from feti_homog.homogenization.partition_policy import PartitionPolicy, can_be_cut_across, wanted_pieces
-from feti_homog.mesh import CoarseMesh, ReferenceLattice, Torus, arrange, coarse_mesh, periodic_topology, submeshes
+from feti_homog.mesh import CoarseMesh, ReferenceLattice, Torus, arrange, periodic_topology, submeshes
 from feti_homog.mesh.fill import gmsh_mesher
 from feti_homog.mesh.outline import lines
 from feti_homog.mesh.sizes import element_estimate, graded_size
 from feti_homog.mesh.tiles import tile_filling, tiling
 from feti_homog.system.parallel import distributed_arrays, dividing, mpi_errors
 from feti_homog.typing import Float, Int
-
-T = TypeVar("T")
 
 
 def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy) -> RankShare:
@@ -94,10 +92,8 @@ def fill_tiles(cell: gmsh_mesher.NodedCell | CoarseMesh | None, comm: MPI.Intrac
     Raises:
         MeshError: on every rank, if one cannot fill a tile.
     """
-    tiles = [] if cell is None or isinstance(cell, CoarseMesh) else [tile for _, tile in cell.parts]
-    gathered = distributed_arrays.gather(
-        comm, mpi_errors.agree(comm, fill_own, deal_tiles(tiles, [len(tile.points) for tile in tiles], comm))
-    )
+    tiles = cell.parts if isinstance(cell, gmsh_mesher.NodedCell) else ()
+    gathered = distributed_arrays.gather(comm, mpi_errors.agree(comm, fill_own, deal_tiles(tiles, comm)))
     fillings = [filling for _, filling in sorted(chain.from_iterable(gathered), key=itemgetter(0))]
 
     def joined(cell: gmsh_mesher.NodedCell | CoarseMesh) -> CoarseMesh:
@@ -106,13 +102,11 @@ def fill_tiles(cell: gmsh_mesher.NodedCell | CoarseMesh | None, comm: MPI.Intrac
     return mpi_errors.on_root_only(comm, joined, cell)
 
 
-def deal_tiles(tiles: list[T], loads: list[int], comm: MPI.Intracomm) -> list[tuple[int, T]]:
-    """Deal tiles from rank 0 to all ranks.  Collective.
-
-    The tiles have sizes `loads`; returns the numbers and tiles that this rank fills.
-    """
-    parts: list[list[tuple[int, T]]] = [[] for _ in range(comm.size)]
-    for k, rank in enumerate(dividing.balanced(np.array(loads, np.int64), comm.size).tolist()):
+def deal_tiles(tiles: Sequence[tile_filling.Tile], comm: MPI.Intracomm) -> list[tuple[int, tile_filling.Tile]]:
+    """Deal tiles from rank 0 to all ranks; return the numbers and tiles that this rank fills.  Collective."""
+    parts: list[list[tuple[int, tile_filling.Tile]]] = [[] for _ in range(comm.size)]
+    loads = np.array([len(tile.points) for tile in tiles], np.int64)
+    for k, rank in enumerate(dividing.balanced(loads, comm.size).tolist()):
         parts[rank].append((k, tiles[k]))
     return distributed_arrays.scatter(comm, parts)
 
@@ -185,9 +179,8 @@ def tear_by_tiles(
 
 def _filled(noded: gmsh_mesher.NodedCell | None, regions: tiling.Regions, comm: MPI.Intracomm) -> tuple[Torus, Int]:
     """Return the torus that the tiles of this rank fill, and the tile (m,) of each triangle.  Collective."""
-    tiles = mpi_errors.on_root_only(comm, tiles_to_fill, noded) or []
-    dealt = deal_tiles(tiles, [len(tile.nodes) for tile in tiles], comm)
-    fillings = mpi_errors.agree(comm, fill_own, [(k, tile.tile) for k, tile in dealt])
+    dealt = deal_tiles(() if noded is None else noded.parts, comm)
+    fillings = mpi_errors.agree(comm, fill_own, dealt)
     inner = dict(chain.from_iterable(comm.allgather([(k, len(filling.inner)) for k, filling in fillings])))
     ends = regions.nodes + np.cumsum([0, *(inner[k] for k in range(len(inner)))])
     pairs = zip(dealt, fillings, strict=True)
@@ -254,10 +247,3 @@ def tiled_cell(case: Case, noded: gmsh_mesher.NodedCell) -> tuple[Int, Int, Int]
     count = np.diff(curves.first)[arcs] - 1
     edges = np.bincount(sides[:, shared].ravel(), np.tile(count[shared], 2), n).astype(np.int64)
     return cell_remarks.pairs_of(case, regions.phases), nesting, edges
-
-
-def tiles_to_fill(noded: gmsh_mesher.NodedCell) -> list[tiling.NumberedTile]:
-    """Return a noded cell's numbered tiles."""
-    lines, arrangement = noded.lines, noded.arrangement
-    stands_for = coarse_mesh.representatives(lines.points, arrangement.width, arrangement.height).astype(np.int64)
-    return [tiling.NumberedTile(nodes, stands_for[nodes], tile) for nodes, tile in noded.parts]

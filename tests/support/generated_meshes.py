@@ -28,4 +28,4 @@ def noded(cell: UnmeshedCell) -> NodedCell:
 
 def filled(cell: NodedCell) -> CoarseMesh:
     """Fill all tiles."""
-    return cell.mesh([fill(tile) for _, tile in cell.parts])
+    return cell.mesh([fill(tile) for tile in cell.parts])

@@ -21,7 +21,7 @@ from feti_homog.mesh.tiles.tile_filling import Filling, Tile, arc_edges
 from feti_homog.mesh.tiles.tiling import Regions, TilePolicy, Tiling, cut, is_tiled, tiling
 from feti_homog.microstructure import Arrangement, arrangements, phase_names
 from feti_homog.microstructure.shapes import Conics
-from feti_homog.typing import Int, Int32
+from feti_homog.typing import Int32
 
 
 def begin(
@@ -123,8 +123,10 @@ class UnmeshedCell:
             MeshError: the lines would have too many.
         """
         lines = self.bare.outline(stations)
-        cell = Tile(lines.points, lines.curves, self.sizes.largest, self.sizes.are_graded(self.arrangement))
-        return NodedCell(self.arrangement, lines, tuple(cut(lines, cell, self.tiles)), self.scale)
+        arrangement, sizes, nodes = self.arrangement, self.sizes, np.arange(len(lines.points))
+        classes = representatives(lines.points, arrangement.width, arrangement.height).astype(np.int64)
+        cell = Tile(lines.points, nodes, classes, lines.curves, sizes.largest, sizes.are_graded(arrangement))
+        return NodedCell(arrangement, lines, tuple(cut(lines, cell, self.tiles)), self.scale)
 
 
 @dataclass(frozen=True)
@@ -134,13 +136,13 @@ class NodedCell:
     Attributes:
         arrangement: the fibres.
         lines: the outline.
-        parts: tiles to fill, each with its node numbers (n,) in the outline.
+        parts: tiles to fill.
         scale: lengths in the mesh / lengths in the arrangement.
     """
 
     arrangement: Arrangement
     lines: Outline
-    parts: tuple[tuple[Int, Tile], ...]
+    parts: tuple[Tile, ...]
     scale: float
 
     def mesh(self, fillings: Sequence[Filling]) -> CoarseMesh:
@@ -148,9 +150,9 @@ class NodedCell:
         arrangement, lines, scale = self.arrangement, self.lines, self.scale
         # Nodes of the outline come first, and then of one tile after the other.
         count, parts = len(lines.points), []
-        for (nodes, _), filling in zip(self.parts, fillings, strict=True):
+        for tile, filling in zip(self.parts, fillings, strict=True):
             inner = np.arange(count, count + len(filling.inner))
-            parts.append(np.concatenate([nodes, inner]).astype(np.int32)[filling.triangles])
+            parts.append(np.concatenate([tile.nodes, inner]).astype(np.int32)[filling.triangles])
             count += len(filling.inner)
         points = np.concatenate([lines.points, *(filling.inner for filling in fillings)])
         triangles, circle = np.concatenate(parts), np.concatenate([filling.circle for filling in fillings])

@@ -169,7 +169,8 @@ def test_the_last_bits_of_the_outline_do_not_change_the_mesh(name, seed):
     sizes = MeshSizes(*[case.mesh_size] * 3)
     bare = BareOutline.of(arrange(case), sizes, {})
     lines = bare.outline(bare.lines.stations(bare.field))
-    tile = Tile(lines.points, lines.curves, sizes.largest, False)
+    nodes = np.arange(len(lines.points))
+    tile = Tile(lines.points, nodes, nodes, lines.curves, sizes.largest, False)
     ends = lines.points + chance.choice([-1.0, 1.0], lines.points.shape)
     here, elsewhere = fill(tile), fill(replace(tile, points=np.nextafter(lines.points, ends)))
     for name in ("inner", "triangles", "circle"):

@@ -132,18 +132,18 @@ def test_fibres_in_a_row_are_one_tile():
 def test_what_is_in_a_tile_is_of_it_alone():
     found = noded("dense")
     edges = np.zeros(len(found.lines.points), int)
-    for nodes, tile in found.parts:
-        assert np.array_equal(tile.points, found.lines.points[nodes])
+    for tile in found.parts:
+        assert np.array_equal(tile.points, found.lines.points[tile.nodes])
         bounds = (tile.curves.inside != OUTSIDE).astype(int) + (tile.curves.outside != OUTSIDE)
         assert bounds.min() == 1
-        edges[nodes] += 1
+        edges[tile.nodes] += 1
     # Within a tile, on a border of two, and where a bridge begins on a fibre that is in a third.
     assert edges.min() == 1 and edges.max() in (2, 3)
 
 
 def test_order_of_filling_does_not_matter():
     found = noded("dense")
-    backwards = [tile_filling.fill(tile) for _, tile in reversed(found.parts)][::-1]
+    backwards = [tile_filling.fill(tile) for tile in reversed(found.parts)][::-1]
     mesh = found.mesh(backwards)
     assert np.array_equal(mesh.points, mesh_of("dense").points)
     assert np.array_equal(mesh.triangles, mesh_of("dense").triangles)
@@ -157,7 +157,7 @@ def test_small_cells_and_other_shapes_are_not_tiled():
 
 
 def test_a_tile_that_gmsh_leaves_unfilled_is_reported(monkeypatch):
-    _, tile = noded("dense").parts[0]
+    tile = noded("dense").parts[0]
     add = tile_filling._add_surfaces
 
     def without_last(gmsh, own):
@@ -175,4 +175,4 @@ def test_a_tile_that_gmsh_fails_on_is_reported(monkeypatch):
 
     monkeypatch.setattr(gmsh.model.mesh, "generate", broken)
     with pytest.raises(MeshError, match=r"gmsh cannot fill the part .*: no mesh of dimension 2; expected another"):
-        tile_filling.fill(noded("dense").parts[0][1])
+        tile_filling.fill(noded("dense").parts[0])
