@@ -8,8 +8,8 @@ from itertools import product
 
 import numpy as np
 
-from feti_homog.mesh.outline.bridges import TURN
 from feti_homog.mesh.outline.lines import Lines
+from feti_homog.mesh.outline.outline import TURN
 from feti_homog.mesh.sizes import graded_size
 from feti_homog.mesh.sizes.graded_size import MAX_GROWTH, Source
 from feti_homog.microstructure import Arrangement, arrangements

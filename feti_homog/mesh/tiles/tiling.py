@@ -13,11 +13,18 @@ import numpy as np
 from scipy.spatial import QhullError
 
 from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, edges
-from feti_homog.mesh.outline.bridges import CLEAR, Bridges, bridges, centre_lines
 from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE
-from feti_homog.mesh.outline.outline import Outline, crossings, curve_at, images, on_side
+from feti_homog.mesh.outline.outline import Bridges, Outline, crossings, curve_at, images, on_side
 from feti_homog.mesh.periodic_topology import Torus, plane_edges_of
-from feti_homog.mesh.tiles.matrix_faces import MatrixTiles, beside, grid_cell, matrix_tiles
+from feti_homog.mesh.tiles.matrix_faces import (
+    CLEAR,
+    MatrixTiles,
+    beside,
+    bridges,
+    centre_lines,
+    grid_cell,
+    matrix_tiles,
+)
 from feti_homog.mesh.tiles.tile_filling import Filling, Tile, arc_edges
 from feti_homog.microstructure import Arrangement
 from feti_homog.microstructure.shapes import Discs, Ellipses

@@ -14,11 +14,11 @@ from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.fill.gmsh_mesher import begin
-from feti_homog.mesh.outline.bridges import CLEAR, LEAST_ANGLE
 from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE
 from feti_homog.mesh.outline.outline import images
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.tiles import tile_filling
+from feti_homog.mesh.tiles.matrix_faces import CLEAR, LEAST_ANGLE
 from feti_homog.mesh.tiles.tiling import TilePolicy, is_tiled, tiling
 from feti_homog.microstructure.arrangements import Arrangement
 from feti_homog.microstructure.shapes.shapes import elliptic
