@@ -100,7 +100,7 @@ def size_field(
         *_beside_sides(ellipses, size, largest),
         (crossings, np.minimum(sharp, largest), np.full(len(crossings), MAX_GROWTH)),
         (np.stack([nearest, np.zeros(2)]), np.full(2, to_corner), np.full(2, MAX_GROWTH)),
-        graded_size.at_vertices(vertices, size, largest),
+        graded_size.at_vertices(vertices, size),
     ]
     lines = None
     if sizes.are_graded(arrangement):
