@@ -30,9 +30,10 @@ from feti_homog.feti.coarse.natural import NaturalCoarseSpace  # noqa: E402
 from feti_homog.feti.decomposition.jump_operator import JumpOperator  # noqa: E402
 from feti_homog.homogenization.domain_partition import summary_of  # noqa: E402
 from feti_homog.homogenization.partition_policy import DEFAULT_POLICY  # noqa: E402
-from feti_homog.homogenization.tile_tearing import begin_mesh, tiled_cell, tiles_to_fill  # noqa: E402
+from feti_homog.homogenization.tile_tearing import begin_mesh, tiled_cell  # noqa: E402
 from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
 from feti_homog.mesh.fill.gmsh_mesher import UnmeshedCell  # noqa: E402
+from feti_homog.mesh.tiles.tile_filling import fill  # noqa: E402
 from feti_homog.mesh.tiles.tiling import TilePolicy  # noqa: E402
 from feti_homog.system.parallel.mpi_errors import on_root, run_main  # noqa: E402
 from feti_homog.system.petsc.options_database import case_options  # noqa: E402
@@ -164,9 +165,8 @@ def seconds_alone(case: Case, policy: TilePolicy) -> float:
     placed = time.perf_counter()
     noded = unmeshed.with_nodes(stations)
     if len(noded.parts) == 1:
-        noded.filled()
+        noded.mesh([fill(tile) for tile in noded.parts])
     tiled_cell(case, noded)
-    tiles_to_fill(noded)
     summary_of(case, noded, 0, 0)
     return begun - start + time.perf_counter() - placed
 

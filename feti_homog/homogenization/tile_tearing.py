@@ -5,10 +5,10 @@ tiles, and no rank has all tiles.  A piece of the matrix, or a fibre, lies in on
 and the number of ranks, not on the rank that filled a tile.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain
 from operator import itemgetter
-from typing import TypeVar
 
 import numpy as np
 from mpi4py import MPI
@@ -19,15 +19,13 @@ from feti_homog.feti.decomposition import partition
 from feti_homog.homogenization import arc_selection, cell_remarks
 from feti_homog.homogenization.domain_partition import RankShare, distribute, summary_of
 from feti_homog.homogenization.partition_policy import PartitionPolicy, can_be_cut_across, wanted_pieces
-from feti_homog.mesh import CoarseMesh, ReferenceLattice, Torus, arrange, coarse_mesh, periodic_topology, submeshes
+from feti_homog.mesh import CoarseMesh, ReferenceLattice, Torus, arrange, periodic_topology, submeshes
 from feti_homog.mesh.fill import gmsh_mesher
 from feti_homog.mesh.outline import lines
 from feti_homog.mesh.sizes import element_estimate, graded_size
 from feti_homog.mesh.tiles import tile_filling, tiling
 from feti_homog.system.parallel import distributed_arrays, dividing, mpi_errors
 from feti_homog.typing import Float, Int
-
-T = TypeVar("T")
 
 
 def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy) -> RankShare:
@@ -65,20 +63,20 @@ def place_nodes(
     return mpi_errors.on_root_only(comm, with_nodes, unmeshed)
 
 
-def begin_mesh(case: Case, policy: tiling.TilePolicy) -> gmsh_mesher.UnmeshedCell | gmsh_mesher.NodedCell | CoarseMesh:
-    """Return a user's mesh, or the cell that rank 0 begins.
+def begin_mesh(case: Case, policy: tiling.TilePolicy) -> gmsh_mesher.UnmeshedCell | CoarseMesh:
+    """Return a user's mesh, or the cell that rank 0 makes alone.
 
     Raises:
         CaseError: a phase has no material, or a material no phase.
         MeshError: the cell cannot be meshed, or its mesh file is faulty.
     """
-    cell: gmsh_mesher.UnmeshedCell | gmsh_mesher.NodedCell | CoarseMesh
+    cell: gmsh_mesher.UnmeshedCell | CoarseMesh
     if case.cell.has_own_mesh:
         from feti_homog.mesh.readers import msh_reader  # with the readers of all formats
 
         cell = msh_reader.read_cell(case.cell)
     else:
-        listed = arrange.listed_arrangement(case.cell)
+        listed = None if case.cell.table is None else arrange.arrange(case.cell)
         estimate = element_estimate.ElementEstimate.of(case.cell, listed)
         section = replace(case.cell, tip_size=arc_selection.size(case, estimate))
         cell = gmsh_mesher.begin(section, listed, arc_selection.marks(case, estimate.fibres), policy)
@@ -92,10 +90,8 @@ def fill_tiles(cell: gmsh_mesher.NodedCell | CoarseMesh | None, comm: MPI.Intrac
     Raises:
         MeshError: on every rank, if a rank cannot fill a tile.
     """
-    tiles = [] if cell is None or isinstance(cell, CoarseMesh) else [tile for _, tile in cell.parts]
-    gathered = distributed_arrays.gather(
-        comm, mpi_errors.agree(comm, fill_own, deal_tiles(tiles, [len(tile.points) for tile in tiles], comm))
-    )
+    tiles = cell.parts if isinstance(cell, gmsh_mesher.NodedCell) else ()
+    gathered = distributed_arrays.gather(comm, mpi_errors.agree(comm, fill_own, deal_tiles(tiles, comm)))
     fillings = [filling for _, filling in sorted(chain.from_iterable(gathered), key=itemgetter(0))]
 
     def joined(cell: gmsh_mesher.NodedCell | CoarseMesh) -> CoarseMesh:
@@ -104,10 +100,11 @@ def fill_tiles(cell: gmsh_mesher.NodedCell | CoarseMesh | None, comm: MPI.Intrac
     return mpi_errors.on_root_only(comm, joined, cell)
 
 
-def deal_tiles(tiles: list[T], loads: list[int], comm: MPI.Intracomm) -> list[tuple[int, T]]:
-    """Deal numbered tiles from rank 0 to all ranks, balanced by `loads`.  Collective."""
-    parts: list[list[tuple[int, T]]] = [[] for _ in range(comm.size)]
-    for k, rank in enumerate(dividing.balanced(np.array(loads, np.int64), comm.size).tolist()):
+def deal_tiles(tiles: Sequence[tile_filling.Tile], comm: MPI.Intracomm) -> list[tuple[int, tile_filling.Tile]]:
+    """Deal tiles from rank 0 to all ranks; return the numbers and tiles that this rank fills.  Collective."""
+    parts: list[list[tuple[int, tile_filling.Tile]]] = [[] for _ in range(comm.size)]
+    loads = np.array([len(tile.points) for tile in tiles], np.int64)
+    for k, rank in enumerate(dividing.balanced(loads, comm.size).tolist()):
         parts[rank].append((k, tiles[k]))
     return distributed_arrays.scatter(comm, parts)
 
@@ -179,10 +176,9 @@ def tear_by_tiles(
 
 
 def _filled(noded: gmsh_mesher.NodedCell | None, regions: tiling.Regions, comm: MPI.Intracomm) -> tuple[Torus, Int]:
-    """Fill the tiles of this rank; return their torus and the tile (m,) of each triangle.  Collective."""
-    tiles = mpi_errors.on_root_only(comm, tiles_to_fill, noded) or []
-    dealt = deal_tiles(tiles, [len(tile.nodes) for tile in tiles], comm)
-    fillings = mpi_errors.agree(comm, fill_own, [(k, tile.tile) for k, tile in dealt])
+    """Return the torus that the tiles of this rank fill, and the tile (m,) of each triangle.  Collective."""
+    dealt = deal_tiles(() if noded is None else noded.parts, comm)
+    fillings = mpi_errors.agree(comm, fill_own, dealt)
     inner = dict(chain.from_iterable(comm.allgather([(k, len(filling.inner)) for k, filling in fillings])))
     ends = regions.nodes + np.cumsum([0, *(inner[k] for k in range(len(inner)))])
     pairs = zip(dealt, fillings, strict=True)
@@ -247,10 +243,3 @@ def tiled_cell(case: Case, noded: gmsh_mesher.NodedCell) -> tuple[Int, Int, Int]
     count = np.diff(curves.first)[arcs] - 1
     edges = np.bincount(sides[:, shared].ravel(), np.tile(count[shared], 2), n).astype(np.int64)
     return cell_remarks.pairs_of(case, regions.phases), nesting, edges
-
-
-def tiles_to_fill(noded: gmsh_mesher.NodedCell) -> list[tiling.NumberedTile]:
-    """List the tiles of a cell with numbered nodes."""
-    lines, arrangement = noded.lines, noded.arrangement
-    stands_for = coarse_mesh.representatives(lines.points, arrangement.width, arrangement.height).astype(np.int64)
-    return [tiling.NumberedTile(nodes, stands_for[nodes], tile) for nodes, tile in noded.parts]

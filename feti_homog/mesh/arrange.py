@@ -44,14 +44,6 @@ def arrange(cell: cell_section.Cell) -> Arrangement:
     )
 
 
-def listed_arrangement(cell: cell_section.Cell) -> Arrangement | None:
-    """Arrange the fibres of a table; return None for other cells, which may be large.
-
-    Raises as `arrange`.
-    """
-    return None if cell.table is None else arrange(cell)
-
-
 def random_arrangement(
     cell: cell_section.Cell, max_steps: int | None = None, max_attempts: int | None = None
 ) -> Arrangement:

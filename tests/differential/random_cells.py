@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from support.generated_meshes import generate
 from support.void_cells import write_part
 
 from differential.random_phases import Document
 from feti_homog.case.cell_section import Cell
-from feti_homog.mesh.fill.gmsh_mesher import generate
 
 GEOMETRIES = {"square": 0.2, "hexagonal": 0.15, "random": 0.25, "table": 0.3, "mesh": 0.1}
 MOST_FIBRES = 3

@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, solve
+from support.generated_meshes import generate
 from support.void_cells import write_part
 
 from feti_homog import run
 from feti_homog.case import cases
 from feti_homog.mesh.arrange import arrange
-from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.verify.certificate import verify
 
 pytestmark = pytest.mark.parallel

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from support.generated_meshes import generate
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_size
 from feti_homog.feti.decomposition.shared_entities import share_entities
-from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.submeshes import SubdomainTable, cut_for_ranks, pinned_class

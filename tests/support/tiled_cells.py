@@ -4,6 +4,7 @@ from functools import cache
 
 from feti_homog.mesh.fill.gmsh_mesher import begin
 from feti_homog.mesh.tiles.tiling import TilePolicy
+from support import generated_meshes
 from support.circular_cells import cell
 
 VOIDS = {"voids": 0.05, "void_radius": 0.7}
@@ -23,11 +24,11 @@ SMALL = TilePolicy(least_discs=4, discs=4)
 
 @cache
 def noded(name):
-    found = begin(CELLS[name], None, policy=SMALL).with_nodes()
+    found = generated_meshes.noded(begin(CELLS[name], None, {}, SMALL))
     assert len(found.parts) >= 4
     return found
 
 
 @cache
 def mesh_of(name):
-    return noded(name).filled()
+    return generated_meshes.filled(noded(name))

@@ -7,8 +7,8 @@ import numpy as np
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.mesh.coarse_mesh import CoarseMesh
-from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.typing import Bool
+from support.generated_meshes import generate
 
 
 def write_voids(path: Path, voids: Sequence[int] | None = None, **cell) -> None:

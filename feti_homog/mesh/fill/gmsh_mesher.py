@@ -5,41 +5,30 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from types import MappingProxyType
 
 import numpy as np
 
 from feti_homog.case import cell_section, cell_sizes
 from feti_homog.errors import MeshError
-from feti_homog.mesh.arrange import arrange, listed_arrangement
+from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import CoarseMesh, representatives
 from feti_homog.mesh.outline.bare_outline import BareOutline
 from feti_homog.mesh.outline.lines import LineStations
 from feti_homog.mesh.outline.outline import Outline
 from feti_homog.mesh.sizes import element_estimate
 from feti_homog.mesh.sizes.graded_size import MeshSizes
-from feti_homog.mesh.tiles.tile_filling import Filling, Tile, arc_edges, fill
-from feti_homog.mesh.tiles.tiling import DEFAULT_TILES, Regions, TilePolicy, Tiling, cut, is_tiled, tiling
+from feti_homog.mesh.tiles.tile_filling import Filling, Tile, arc_edges
+from feti_homog.mesh.tiles.tiling import Regions, TilePolicy, Tiling, cut, is_tiled, tiling
 from feti_homog.microstructure import Arrangement, arrangements, phase_names
 from feti_homog.microstructure.shapes import Conics
-from feti_homog.typing import Int, Int32
-
-NO_MARKS: Mapping[int, Sequence[float]] = MappingProxyType({})
-
-
-def generate(
-    cell: cell_section.Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS, policy: TilePolicy = DEFAULT_TILES
-) -> CoarseMesh:
-    """Mesh a generated cell on this rank."""
-    begun = begin(cell, listed_arrangement(cell), marks, policy)
-    return begun if isinstance(begun, CoarseMesh) else begun.with_nodes().filled()
+from feti_homog.typing import Int32
 
 
 def begin(
     cell: cell_section.Cell,
     listed: Arrangement | None,
-    marks: Mapping[int, Sequence[float]] = NO_MARKS,
-    policy: TilePolicy = DEFAULT_TILES,
+    marks: Mapping[int, Sequence[float]],
+    policy: TilePolicy,
 ) -> UnmeshedCell | CoarseMesh:
     """Begin the periodic coarse mesh for a square, hexagonal or random cell, or a table.
 
@@ -49,7 +38,7 @@ def begin(
     is scaled, so that cells of one shape have one mesh at all sizes.
 
     Args:
-        listed: a table's arrangement, see `listed_arrangement`.
+        listed: a table's arrangement; None for other cells, which may be large.
         marks: maps a curve (`BareOutline.of`) to angles in degrees, measured at its centre, where the mesh gets nodes:
             debond tips. A mark moves to another mark, or to a crossing of the circle with the cell's boundary, that is
             within MERGED.
@@ -75,10 +64,10 @@ def begin(
         from feti_homog.mesh.fill.shape_mesher import mesh_outlines  # with a reader of meshes
 
         return mesh_outlines(arrangement, sizes, scale)
-    unmeshed = UnmeshedCell.of(arrangement, sizes, marks, scale, policy)
-    field = unmeshed.bare.field
-    element_estimate.refuse_many(field, field.least, arrangement.size, limit)
-    return unmeshed
+    tiles = tiling(arrangement, sizes.largest, marks, policy)
+    bare = BareOutline.of(arrangement, sizes, marks, None if tiles is None else tiles.bridges)
+    element_estimate.refuse_many(bare.field, bare.field.least, arrangement.size, limit)
+    return UnmeshedCell(arrangement, bare, sizes, tiles, scale)
 
 
 def arrangement_scale(cell: cell_section.Cell, arrangement: Arrangement) -> float:
@@ -122,34 +111,22 @@ class UnmeshedCell:
     tiles: Tiling | None
     scale: float
 
-    @classmethod
-    def of(
-        cls,
-        arrangement: Arrangement,
-        sizes: MeshSizes,
-        marks: Mapping[int, Sequence[float]] = NO_MARKS,
-        scale: float = 1.0,
-        policy: TilePolicy = DEFAULT_TILES,
-    ) -> UnmeshedCell:
-        """Make the bare lines of a cell, and its tiles; see `begin`."""
-        tiles = tiling(arrangement, sizes.largest, marks, policy)
-        bare = BareOutline.of(arrangement, sizes, marks, None if tiles is None else tiles.bridges)
-        return cls(arrangement, bare, sizes, tiles, scale)
-
     @property
     def phases(self) -> tuple[str, ...]:
         """The phase names, the matrix first."""
         return self.arrangement.phases
 
-    def with_nodes(self, stations: LineStations | None = None) -> NodedCell:
-        """Put nodes on the lines of the cell, by default all placed on this rank.
+    def with_nodes(self, stations: LineStations) -> NodedCell:
+        """Put nodes on the lines of the cell.
 
         Raises:
             MeshError: the lines would have too many.
         """
-        lines = self.bare.outline(stations or self.bare.lines.stations(self.bare.field))
-        cell = Tile(lines.points, lines.curves, self.sizes.largest, self.sizes.are_graded(self.arrangement))
-        return NodedCell(self.arrangement, lines, tuple(cut(lines, cell, self.tiles)), self.scale)
+        lines = self.bare.outline(stations)
+        arrangement, sizes, nodes = self.arrangement, self.sizes, np.arange(len(lines.points))
+        classes = representatives(lines.points, arrangement.width, arrangement.height).astype(np.int64)
+        cell = Tile(lines.points, nodes, classes, lines.curves, sizes.largest, sizes.are_graded(arrangement))
+        return NodedCell(arrangement, lines, tuple(cut(lines, cell, self.tiles)), self.scale)
 
 
 @dataclass(frozen=True)
@@ -159,37 +136,28 @@ class NodedCell:
     Attributes:
         arrangement: the fibres.
         lines: the outline.
-        parts: tiles to fill, each with its node numbers (n,) in the outline.
+        parts: tiles to fill.
         scale: lengths in the mesh / lengths in the arrangement.
     """
 
     arrangement: Arrangement
     lines: Outline
-    parts: tuple[tuple[Int, Tile], ...]
+    parts: tuple[Tile, ...]
     scale: float
-
-    @property
-    def phases(self) -> tuple[str, ...]:
-        """The phase names, the matrix first."""
-        return self.arrangement.phases
-
-    def filled(self) -> CoarseMesh:
-        """Fill all tiles on this rank, and return the mesh."""
-        return self.mesh([fill(tile) for _, tile in self.parts])
 
     def mesh(self, fillings: Sequence[Filling]) -> CoarseMesh:
         """Join the filled tiles, in the order of `parts`, to a mesh."""
         arrangement, lines, scale = self.arrangement, self.lines, self.scale
         # Nodes of the outline come first, and then of one tile after the other.
         count, parts = len(lines.points), []
-        for (nodes, _), filling in zip(self.parts, fillings, strict=True):
+        for tile, filling in zip(self.parts, fillings, strict=True):
             inner = np.arange(count, count + len(filling.inner))
-            parts.append(np.concatenate([nodes, inner]).astype(np.int32)[filling.triangles])
+            parts.append(np.concatenate([tile.nodes, inner]).astype(np.int32)[filling.triangles])
             count += len(filling.inner)
         points = np.concatenate([lines.points, *(filling.inner for filling in fillings)])
         triangles, circle = np.concatenate(parts), np.concatenate([filling.circle for filling in fillings])
         phase, precedence = self._within
-        solid = phase[circle] < len(self.phases)
+        solid = phase[circle] < len(arrangement.phases)
         triangles, circle = triangles[solid], circle[solid]
         # Nodes within voids are left out.
         used = np.zeros(len(points), bool)
@@ -231,7 +199,7 @@ class NodedCell:
     def regions(self) -> Regions:
         """The cell's regions; the matrix around discs, which do not touch, is one region."""
         phase, precedence = self._within
-        solid = phase < len(self.phases)
+        solid = phase < len(self.arrangement.phases)
         _, first, constituent = np.unique(precedence[solid], return_index=True, return_inverse=True)
         of_circle = np.full(len(phase), -1)
         of_circle[solid] = constituent
@@ -239,7 +207,7 @@ class NodedCell:
             width=self.scale * self.arrangement.width,
             height=self.scale * self.arrangement.height,
             scale=self.scale,
-            phases=self.phases,
+            phases=self.arrangement.phases,
             ellipses=self.lines.ellipses.scaled(self.scale),
             constituent=of_circle,
             phase=phase[solid][first].astype(np.int64),

@@ -8,8 +8,8 @@ from itertools import product
 
 import numpy as np
 
-from feti_homog.mesh.outline.bridges import TURN
 from feti_homog.mesh.outline.lines import Lines
+from feti_homog.mesh.outline.outline import TURN
 from feti_homog.mesh.sizes import graded_size
 from feti_homog.mesh.sizes.graded_size import MAX_GROWTH, Source
 from feti_homog.microstructure import Arrangement, arrangements
@@ -100,7 +100,7 @@ def size_field(
         *_beside_sides(ellipses, size, largest),
         (crossings, np.minimum(sharp, largest), np.full(len(crossings), MAX_GROWTH)),
         (np.stack([nearest, np.zeros(2)]), np.full(2, to_corner), np.full(2, MAX_GROWTH)),
-        graded_size.at_vertices(vertices, size, largest),
+        graded_size.at_vertices(vertices, size),
     ]
     lines = None
     if sizes.are_graded(arrangement):

@@ -82,11 +82,6 @@ class Lines:
         """Return the points (n, 2) at these fractions (n,) of lines (n,)."""
         raise NotImplementedError
 
-    def caps(self, line: Int, share: Float) -> Float:
-        """Return the longest edge (n,) at these fractions (n,) of lines (n,)."""
-        low, high = self.cap[line].T
-        return np.asarray(low + share * (high - low))
-
     def __len__(self) -> int:
         return len(self.lengths)
 
@@ -210,9 +205,14 @@ def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges:
         MeshError: there would be more than `limit`.
     """
     lengths = lines.lengths
+
+    def size_at(line: Int, share: Float) -> Float:
+        low, high = lines.cap[line].T
+        return np.minimum(field(lines.points(line, share)), low + share * (high - low))
+
     line, samples = np.repeat(np.arange(len(lengths)), least_samples), np.linspace(0, 1, least_samples)
     samples = np.tile(samples, len(lengths))
-    sizes = np.minimum(field(lines.points(line, samples)), lines.caps(line, samples))
+    sizes = size_at(line, samples)
     while field.graded is not None:
         way = np.diff(samples) * lengths[line[:-1]]
         wide = (np.diff(line) == 0) & (way > 1 / SAMPLES_OF_AN_EDGE * np.minimum(sizes[:-1], sizes[1:]))
@@ -220,8 +220,8 @@ def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges:
             break
         at = np.flatnonzero(wide) + 1
         middle, of = (samples[at - 1] + samples[at]) / 2, line[at]
-        more = np.minimum(field(lines.points(of, middle)), lines.caps(of, middle))
-        line, samples, sizes = (np.insert(*x) for x in ((line, at, of), (samples, at, middle), (sizes, at, more)))
+        inserted = (line, at, of), (samples, at, middle), (sizes, at, size_at(of, middle))
+        line, samples, sizes = (np.insert(*values) for values in inserted)
     density, begin = lengths[line] / sizes, np.searchsorted(line, np.arange(len(lengths) + 1))
     # int ds / h from the beginning of each line, by the trapezoidal rule.
     measure, counts, last = np.zeros(len(samples)), np.diff(begin), begin[1:] - 1
@@ -258,16 +258,16 @@ class SizedLines:
     """Lines whose nodes do not depend on other lines, so that ranks may share them."""
 
     arcs: Lines
-    bridges: Segments
+    bridges: Lines
     sampling: Sampling
 
     def parts(self, count: int) -> list[SizedLines]:
         """Divide the lines, in order, into `count` parts of equal numbers."""
-        arcs, bridges = (pairwise(dividing.even(len(lines), count)) for lines in (self.arcs, self.bridges))
-        return [
-            SizedLines(self.arcs.chosen(slice(*arcs_part)), self.bridges.chosen(slice(*bridges_part)), self.sampling)
-            for arcs_part, bridges_part in zip(arcs, bridges, strict=True)
-        ]
+        arcs, bridges = (
+            [lines.chosen(slice(*ends)) for ends in pairwise(dividing.even(len(lines), count))]
+            for lines in (self.arcs, self.bridges)
+        )
+        return [SizedLines(*lines, self.sampling) for lines in zip(arcs, bridges, strict=True)]
 
     def stations(self, field: SizeField) -> LineStations:
         """Place the nodes on these lines.

@@ -7,16 +7,32 @@ from itertools import product
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.mesh.outline.bridges import TURN, OnCircles
 from feti_homog.mesh.outline.lines import MATRIX, Curves
 from feti_homog.microstructure import Arrangement
 from feti_homog.microstructure.shapes import Conics, Discs, Ellipses
 from feti_homog.typing import Bool, Float, Int
 
+TURN = 2 * np.pi
 # Relative distance below which two positions are one.
 SAME_PLACE = 1e-9
 # A mark nearer than this many radians to another vertex of its circle is that vertex.
 MERGED = np.radians(0.05)
+
+# Circle (v,) and angle (v,) in radians of points on circles.
+OnCircles = tuple[Int, Float]
+
+
+@dataclass(frozen=True)
+class Bridges:
+    """Lines (b,) between discs `ends` (b, 2), the second in the direction `angle` (b,)."""
+
+    ends: Int
+    angle: Float
+
+    @property
+    def on_circles(self) -> OnCircles:
+        """The points at which bridges begin, then the points at which they end."""
+        return self.ends.T.ravel(), np.concatenate([self.angle, self.angle + np.pi]) % TURN
 
 
 @dataclass(frozen=True)

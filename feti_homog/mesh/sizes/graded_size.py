@@ -45,12 +45,12 @@ def circle_size(arrangement: Arrangement, largest: float) -> Float:
     """
     shells, disc = arrangement.shells
     caps = np.minimum(largest, 2 * np.pi * shells.radii / MIN_EDGES_AROUND)
-    return np.where(arrangement.coated[disc], np.minimum(caps, coating_size(arrangement)[disc]), caps)
+    return np.minimum(caps, coating_size(arrangement)[disc])
 
 
 def coating_size(arrangement: Arrangement) -> Float:
-    """Return sqrt(t a) (N,) for coatings of thickness t on discs of radius a."""
-    return np.asarray(np.sqrt(arrangement.coating * arrangement.radii))
+    """Return sqrt(t a) (N,) for coatings of thickness t on discs of radius a, infinite for bare discs."""
+    return np.where(arrangement.coated, np.sqrt(arrangement.coating * arrangement.radii), np.inf)
 
 
 def _between_fibres(circles: Float, size: Float, caps: Float, largest: float) -> Iterator[Source]:
@@ -95,14 +95,13 @@ def _at_sides(circles: Float, size: Float, caps: Float, largest: float) -> Itera
             yield crossing, length[sharp], np.full(len(crossing), MAX_GROWTH)
 
 
-def at_vertices(vertices: Float, size: Float, largest: float) -> Source:
+def at_vertices(vertices: Float, size: Float) -> Source:
     """Return the vertices, once on the torus, as sources by the distance to the next."""
     places = wrap(vertices, size)
     tree = cKDTree(places, boxsize=size)
     same = tree.query_pairs(1e-9 * size.max(), output_type="ndarray")
     places = np.delete(places, same[:, 1], axis=0)
-    if len(places) == 1:
-        return places, np.array([largest]), np.array([MAX_GROWTH])
+    # A single vertex is infinitely far from the next.
     distance, _ = cKDTree(places, boxsize=size).query(places, k=2)
     return places, distance[:, 1], np.full(len(places), MAX_GROWTH)
 
@@ -141,7 +140,7 @@ class MeshSizes:
 
     def on_circles(self, arrangement: Arrangement) -> Float:
         """Return the sizes (N,) on the circles of each disc."""
-        sizes = np.where(arrangement.coated, np.minimum(self.interface, coating_size(arrangement)), self.interface)
+        sizes = np.minimum(self.interface, coating_size(arrangement))
         around = 2 * np.pi * arrangement.radii / MIN_EDGES_AROUND
         return np.where(around < FINE_CIRCLE * self.largest, np.minimum(sizes, around), sizes)
 
@@ -163,15 +162,15 @@ class SizeField:
         size: Float,
         largest: float,
         graded: FromLines | None = None,
-        chunk: int = CHUNK,
         nearest: int = NEAREST,
+        chunk: int = CHUNK,
     ) -> None:
         """Prepare sources on the torus with periods `size` (2,).
 
         The `nearest` sources count at a position; a query has `chunk` positions.
         """
         self.largest, self.graded = largest, graded
-        self._size, self._bound, self._chunk, self._nearest = size, largest / MAX_GROWTH, chunk, nearest
+        self._size, self._bound, self._nearest, self._chunk = size, largest / MAX_GROWTH, nearest, chunk
         places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
         # Where the tree finds no more sources, it returns their number: an infinite length.
         self._lengths, self._growths = np.append(lengths, np.inf), np.append(growths, MAX_GROWTH)
@@ -214,7 +213,7 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
         *_between_fibres(circles[first], size, caps[first], largest),
         *_at_sides(circles, size, caps, largest),
         (corners, np.tile(length[close], 2), np.full(len(corners), MAX_GROWTH)),
-        at_vertices(vertices, size, largest),
+        at_vertices(vertices, size),
     ]
     if not sizes.are_graded(arrangement):
         return SizeField(sources, size, largest)

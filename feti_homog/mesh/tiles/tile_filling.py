@@ -34,12 +34,15 @@ class Tile:
 
     Attributes:
         points: (n, 2) nodes on the lines.
+        nodes, classes: (n,) their numbers in the cell, and representatives of their periodic classes.
         curves: through the nodes; beyond a curve that bounds the tile is OUTSIDE.
         largest: element size.
         is_graded: whether elements grow from the sizes on lines, which else are interpolated.
     """
 
     points: Float
+    nodes: Int
+    classes: Int
     curves: Curves
     largest: float
     is_graded: bool

@@ -13,11 +13,18 @@ import numpy as np
 from scipy.spatial import QhullError
 
 from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, edges
-from feti_homog.mesh.outline.bridges import CLEAR, Bridges, bridges, centre_lines
 from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE
-from feti_homog.mesh.outline.outline import Outline, crossings, curve_at, images, on_side
+from feti_homog.mesh.outline.outline import Bridges, Outline, crossings, curve_at, images, on_side
 from feti_homog.mesh.periodic_topology import Torus, plane_edges_of
-from feti_homog.mesh.tiles.matrix_faces import MatrixTiles, beside, grid_cell, matrix_tiles
+from feti_homog.mesh.tiles.matrix_faces import (
+    CLEAR,
+    MatrixTiles,
+    beside,
+    bridges,
+    centre_lines,
+    grid_cell,
+    matrix_tiles,
+)
 from feti_homog.mesh.tiles.tile_filling import Filling, Tile, arc_edges
 from feti_homog.microstructure import Arrangement
 from feti_homog.microstructure.shapes import Discs, Ellipses
@@ -121,13 +128,13 @@ def _side_pieces(discs: Discs, outer: Int, size: Float) -> tuple[Int, Float]:
     return np.concatenate(nodes), np.concatenate(ends)
 
 
-def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[tuple[Int, Tile]]:
-    """Cut a cell with the outline `lines` into tiles with their node numbers (n,).
+def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[Tile]:
+    """Cut a cell with the outline `lines` into tiles.
 
     Without a tiling the cell is one tile.
     """
     if tiles is None:
-        return [(np.arange(len(cell.points)), cell)]
+        return [cell]
     # The tiles to the left and right of each curve, OUTSIDE beyond the sides.
     curves, matrix = cell.curves, tiles.matrix
     left, right = tiles.within[curves.inside], tiles.within[curves.outside]
@@ -155,7 +162,7 @@ def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[tuple[Int, Til
         inside = np.where(left[some] == name, mine.inside, OUTSIDE)
         outside = np.where(right[some] == name, mine.outside, OUTSIDE)
         bounded = replace(mine, node=node, inside=inside, outside=outside)
-        parts.append((nodes, replace(cell, points=cell.points[nodes], curves=bounded)))
+        parts.append(replace(cell, points=cell.points[nodes], nodes=nodes, classes=cell.classes[nodes], curves=bounded))
     return parts
 
 
@@ -183,26 +190,17 @@ class Regions:
 
 
 @dataclass(frozen=True)
-class NumberedTile:
-    """A tile with node numbers (n,), and with representatives (n,) of periodic classes."""
-
-    nodes: Int
-    classes: Int
-    tile: Tile
-
-
-@dataclass(frozen=True)
 class FilledTile:
     """A tile with its triangles.
 
     Attributes:
         number: among all tiles.
-        lines, filling: numbered nodes on its lines; triangles and nodes within.
+        tile, filling: nodes on its lines; triangles and nodes within.
         first: number of its first node off the lines.
     """
 
     number: int
-    lines: NumberedTile
+    tile: Tile
     filling: Filling
     first: int
 
@@ -217,9 +215,9 @@ def tile_torus(regions: Regions, tiles: Sequence[FilledTile], all_nodes: int) ->
 
     `all_nodes` counts the nodes in the cell.
     """
-    numbers = [np.concatenate([filled.lines.nodes, filled.inner]) for filled in tiles]
-    classes = [np.concatenate([filled.lines.classes, filled.inner]) for filled in tiles]
-    points = [np.concatenate([filled.lines.tile.points, filled.filling.inner]) for filled in tiles]
+    numbers = [np.concatenate([filled.tile.nodes, filled.inner]) for filled in tiles]
+    classes = [np.concatenate([filled.tile.classes, filled.inner]) for filled in tiles]
+    points = [np.concatenate([filled.tile.points, filled.filling.inner]) for filled in tiles]
     constituent = _all([regions.constituent[filled.filling.circle] for filled in tiles])
     solid = constituent >= 0
     triangles = _all([n[filled.filling.triangles] for n, filled in zip(numbers, tiles, strict=True)], 3)[solid]
@@ -256,9 +254,9 @@ def tile_torus(regions: Regions, tiles: Sequence[FilledTile], all_nodes: int) ->
 
 def _arcs(tiles: Sequence[FilledTile], number: Int, triangles: Int32) -> tuple[Int32, Int]:
     """Find the edges (a, 2) of triangles on circles, and their circles; node k is number[k]."""
-    arcs = [arc_edges(filled.lines.tile.curves) for filled in tiles]
+    arcs = [arc_edges(filled.tile.curves) for filled in tiles]
     circle = _all([circles for _, circles in arcs])
-    ends = _all([filled.lines.nodes[pairs] for filled, (pairs, _) in zip(tiles, arcs, strict=True)], 2)
+    ends = _all([filled.tile.nodes[pairs] for filled, (pairs, _) in zip(tiles, arcs, strict=True)], 2)
     n = max(len(number), 1)
     pairs = np.searchsorted(number, ends).clip(max=n - 1).astype(np.int32)
     # A tile has arcs of its voids, too; an arc between two tiles is in both.

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from reference import monolithic
+from support.generated_meshes import generate
 from support.subdomains import cut
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.fem.assembly import assemble, element_strain
-from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.mesh_fibres import unwrap
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice, refine

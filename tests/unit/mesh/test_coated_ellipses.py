@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from support.generated_meshes import generate
 from support.subdomains import cut
 from unit.mesh.test_table_ellipses import ROWS, cell_of, table
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas, double_arcs
-from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice, refine

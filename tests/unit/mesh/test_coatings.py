@@ -2,16 +2,15 @@
 
 import numpy as np
 import pytest
+from support.generated_meshes import generate, mesh_of_discs
 from support.subdomains import cut
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas, double_arcs
-from feti_homog.mesh.fill.gmsh_mesher import UnmeshedCell, generate
 from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice, refine
-from feti_homog.mesh.sizes.graded_size import MeshSizes
 from feti_homog.microstructure.arrangements import Arrangement
 
 CELLS = {
@@ -62,7 +61,7 @@ def test_sides_may_cut_coatings_anywhere():
     """Through the coating alone, the fibre, the corner of the cell: what is cut is one body on the torus."""
     for at in ([0.27, 0.4], [0.2, 0.05], [0.1, 0.1], [0.0, 0.0], [0.26, 0.5]):
         discs = Arrangement.of_discs(1.0, 1.0, np.array([at]), np.array([0.25]), ("fibre",), coating=np.array([0.05]))
-        torus = Torus.of(UnmeshedCell.of(discs, MeshSizes(0.1, 0.1, 0.1)).with_nodes().filled())
+        torus = Torus.of(mesh_of_discs(discs))
         share = np.bincount(torus.mesh.phase, areas(torus.mesh.points, torus.mesh.triangles))
         assert torus.constituent_phase.tolist() == [0, 1, 2]
         assert share.sum() == pytest.approx(1.0) and share[1:] == pytest.approx([0.196, 0.0864], rel=0.05)
@@ -71,7 +70,7 @@ def test_sides_may_cut_coatings_anywhere():
 def test_bare_and_coated_fibres_go_together():
     centres, radii = np.array([[0.25, 0.3], [0.75, 0.7]]), np.array([0.1, 0.2])
     discs = Arrangement.of_discs(1.0, 1.0, centres, radii, ("glass", "carbon"), coating=np.array([0.0, 0.02]))
-    mesh = UnmeshedCell.of(discs, MeshSizes(0.1, 0.1, 0.1)).with_nodes().filled()
+    mesh = mesh_of_discs(discs)
     assert mesh.phases == ("matrix", "glass", "carbon", "coating")
     assert Torus.of(mesh).constituent_phase.tolist() == [0, 1, 2, 3]
 

@@ -4,16 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.generated_meshes import generate, mesh_of_discs
 from unit.mesh.faulty_meshes import ALL_SIDES, FIBRE, MATRIX, RIGHT_SIDE, grid, node
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange
-from feti_homog.mesh.fill.gmsh_mesher import UnmeshedCell, generate
 from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers.msh_reader import read
-from feti_homog.mesh.sizes.graded_size import MeshSizes
 
 
 def circles_of(mesh):
@@ -52,7 +51,7 @@ def test_fibres_of_many_phases_are_numbered_as_arranged():
     cell = Cell(geometry="random", fibre_fraction=0.5, fibres=7, mesh_size=0.1)
     names = ("b", "a", "a", "c", "b", "a", "c")
     arrangement = replace(arrange(cell), phase=names)
-    torus, circles = circles_of(UnmeshedCell.of(arrangement, MeshSizes(0.1, 0.1, 0.1)).with_nodes().filled())
+    torus, circles = circles_of(mesh_of_discs(arrangement))
     offset = circles[1:, :2] - arrangement.centres
     assert np.abs(offset - np.round(offset)).max() < 1e-12
     assert torus.mesh.phases == ("matrix", "b", "a", "c")

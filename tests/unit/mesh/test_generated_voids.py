@@ -7,6 +7,7 @@ import tomli_w
 from mpi4py import MPI
 from pattern_statistics import smallest_gap
 from support.circular_cells import cell as circular
+from support.generated_meshes import generate
 from support.void_cells import write_voids
 
 from feti_homog import run
@@ -15,7 +16,6 @@ from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas, void_edges, voids
-from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 
 MATRIX = {"young": 3.0, "poisson": 0.35}

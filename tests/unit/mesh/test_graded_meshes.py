@@ -10,11 +10,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.circular_cells import cell
+from support.generated_meshes import generate
 from unit.mesh.fill.test_gmsh_mesher import least_angle
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange
-from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.sizes import element_estimate
 from feti_homog.mesh.sizes.graded_size import MAX_GROWTH, MIN_EDGES_AROUND
 

@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tomli_w
+from support.generated_meshes import generate
 
 from feti_homog.case import cases
 from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError
 from feti_homog.mesh.coarse_mesh import areas, voids
-from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.generated_meshes import generate
 from unit.microstructure.test_arrangement import smallest_gap
 
 from feti_homog.case.cell_section import Cell
@@ -9,7 +10,7 @@ from feti_homog.case.cell_sizes import fibre_counts
 from feti_homog.commands.listed_fibres import table
 from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange
-from feti_homog.mesh.fill.gmsh_mesher import arrangement_scale, generate
+from feti_homog.mesh.fill.gmsh_mesher import arrangement_scale
 from feti_homog.mesh.sizes.element_estimate import ElementEstimate
 
 MIX = {"glass": 0.3, "carbon": 0.25}

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import tomli_w
 from mpi4py import MPI
+from support.generated_meshes import generate
 from unit.mesh.fill.test_gmsh_mesher import least_angle
 
 from feti_homog import run
@@ -15,7 +16,6 @@ from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas, voids
-from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.fill.shape_mesher import mesh_outlines
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.sizes.graded_size import MeshSizes

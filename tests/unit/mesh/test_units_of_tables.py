@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from support.generated_meshes import generate
 
 from feti_homog.case import cases
-from feti_homog.mesh.fill.gmsh_mesher import generate
 
 LENGTHS = ("x", "y", "radius", "a", "b")
 COLUMNS = (*LENGTHS, "angle", "sides", "corner")

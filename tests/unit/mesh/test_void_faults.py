@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from support.generated_meshes import generate
 from support.void_cells import write_part, write_voids
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.errors import MeshError
 from feti_homog.mesh.coarse_mesh import voids
-from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.readers.msh_reader import read
 
 

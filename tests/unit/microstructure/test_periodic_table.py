@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.generated_meshes import generate
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.errors import MOST_FAULTS, MeshError
 from feti_homog.mesh.arrange import arrange
-from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.microstructure.fibre_table import table_of

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from support.generated_meshes import generate
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.feti.decomposition.partition import decompose, halves, pieces_for_count, pieces_for_size
-from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.periodic_topology import Torus, components, edge_pairs
 from feti_homog.mesh.submeshes import SubdomainTable, cut_for_ranks, pinned_class
 

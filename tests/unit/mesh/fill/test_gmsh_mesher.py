@@ -7,10 +7,10 @@ from functools import cache
 import numpy as np
 import pytest
 from support.circular_cells import cell
+from support.generated_meshes import generate
 
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas, flip_double_arcs
-from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.outline.bare_outline import BareOutline
 from feti_homog.mesh.sizes.graded_size import MeshSizes
 from feti_homog.mesh.tiles.tile_filling import Tile, fill
@@ -169,7 +169,8 @@ def test_the_last_bits_of_the_outline_do_not_change_the_mesh(name, seed):
     sizes = MeshSizes(*[case.mesh_size] * 3)
     bare = BareOutline.of(arrange(case), sizes, {})
     lines = bare.outline(bare.lines.stations(bare.field))
-    tile = Tile(lines.points, lines.curves, sizes.largest, False)
+    nodes = np.arange(len(lines.points))
+    tile = Tile(lines.points, nodes, nodes, lines.curves, sizes.largest, False)
     ends = lines.points + chance.choice([-1.0, 1.0], lines.points.shape)
     here, elsewhere = fill(tile), fill(replace(tile, points=np.nextafter(lines.points, ends)))
     for name in ("inner", "triangles", "circle"):

@@ -13,7 +13,7 @@ from feti_homog.mesh.outline.lines import Stations
 
 
 def bare_of(name):
-    return begin(CELLS[name], None, policy=SMALL).bare
+    return begin(CELLS[name], None, {}, SMALL).bare
 
 
 @pytest.mark.parametrize("count", [3, 400])

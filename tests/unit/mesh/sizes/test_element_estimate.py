@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from scipy.special import ellipe
+from support.generated_meshes import generate
 from unit.mesh.test_table_ellipses import cell_of, table
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange
-from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.sizes.element_estimate import ElementEstimate, refuse_many
 from feti_homog.mesh.sizes.graded_size import MeshSizes, size_field
 from feti_homog.microstructure.shapes.ellipses import Ellipses

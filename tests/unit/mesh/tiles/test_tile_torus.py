@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from support.tiled_cells import mesh_of, noded
 
-from feti_homog.homogenization.tile_tearing import tiles_to_fill
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.submeshes import SubdomainTable, cut_for_ranks, joined
 from feti_homog.mesh.tiles.tile_filling import fill
@@ -18,9 +17,9 @@ named = pytest.mark.parametrize("name", ["dense", "dilute", "coated, voids", "wi
 @cache
 def filled(name):
     """Return the filled tiles, and how many nodes they have."""
-    lines, first, tiles = tiles_to_fill(noded(name)), noded(name).regions.nodes, []
+    lines, first, tiles = noded(name).parts, noded(name).regions.nodes, []
     for number, own in enumerate(lines):
-        tiles.append(FilledTile(number, own, fill(own.tile), first))
+        tiles.append(FilledTile(number, own, fill(own), first))
         first += len(tiles[-1].filling.inner)
     return tiles, first
 

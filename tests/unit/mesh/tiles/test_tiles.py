@@ -5,18 +5,20 @@ from dataclasses import replace
 import gmsh
 import numpy as np
 import pytest
+from support import generated_meshes
+from support.generated_meshes import generate
 from support.tiled_cells import CELLS, SMALL, mesh_of, noded
 from unit.mesh.fill.test_gmsh_mesher import least_angle
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas
-from feti_homog.mesh.fill.gmsh_mesher import begin, generate
-from feti_homog.mesh.outline.bridges import CLEAR, LEAST_ANGLE
+from feti_homog.mesh.fill.gmsh_mesher import begin
 from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE
 from feti_homog.mesh.outline.outline import images
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.tiles import tile_filling
+from feti_homog.mesh.tiles.matrix_faces import CLEAR, LEAST_ANGLE
 from feti_homog.mesh.tiles.tiling import TilePolicy, is_tiled, tiling
 from feti_homog.microstructure.arrangements import Arrangement
 from feti_homog.microstructure.shapes.shapes import elliptic
@@ -130,18 +132,18 @@ def test_fibres_in_a_row_are_one_tile():
 def test_what_is_in_a_tile_is_of_it_alone():
     found = noded("dense")
     edges = np.zeros(len(found.lines.points), int)
-    for nodes, tile in found.parts:
-        assert np.array_equal(tile.points, found.lines.points[nodes])
+    for tile in found.parts:
+        assert np.array_equal(tile.points, found.lines.points[tile.nodes])
         bounds = (tile.curves.inside != OUTSIDE).astype(int) + (tile.curves.outside != OUTSIDE)
         assert bounds.min() == 1
-        edges[nodes] += 1
+        edges[tile.nodes] += 1
     # Within a tile, on a border of two, and where a bridge begins on a fibre that is in a third.
     assert edges.min() == 1 and edges.max() in (2, 3)
 
 
 def test_order_of_filling_does_not_matter():
     found = noded("dense")
-    backwards = [tile_filling.fill(tile) for _, tile in reversed(found.parts)][::-1]
+    backwards = [tile_filling.fill(tile) for tile in reversed(found.parts)][::-1]
     mesh = found.mesh(backwards)
     assert np.array_equal(mesh.points, mesh_of("dense").points)
     assert np.array_equal(mesh.triangles, mesh_of("dense").triangles)
@@ -151,11 +153,11 @@ def test_small_cells_and_other_shapes_are_not_tiled():
     arrangement = arrange(CELLS["dense"])
     assert is_tiled(arrangement, TilePolicy(least_discs=36)) and not is_tiled(arrangement, TilePolicy(least_discs=37))
     assert not is_tiled(replace(arrangement, outlines=elliptic(arrangement.outlines)), SMALL)
-    assert len(begin(CELLS["dense"], None, policy=TilePolicy(least_discs=37)).with_nodes().parts) == 1
+    assert len(generated_meshes.noded(begin(CELLS["dense"], None, {}, TilePolicy(least_discs=37))).parts) == 1
 
 
 def test_a_tile_that_gmsh_leaves_unfilled_is_reported(monkeypatch):
-    _, tile = noded("dense").parts[0]
+    tile = noded("dense").parts[0]
     add = tile_filling._add_surfaces
 
     def without_last(gmsh, own):
@@ -173,4 +175,4 @@ def test_a_tile_that_gmsh_fails_on_is_reported(monkeypatch):
 
     monkeypatch.setattr(gmsh.model.mesh, "generate", broken)
     with pytest.raises(MeshError, match=r"gmsh cannot fill the part .*: no mesh of dimension 2; expected another"):
-        tile_filling.fill(noded("dense").parts[0][1])
+        tile_filling.fill(noded("dense").parts[0])
