@@ -43,8 +43,8 @@ class Responses:
     def __init__(self):
         self.taken = []
 
-    def record(self, plane, axial, *_):
-        self.taken.append(plane)
+    def record(self, responses, *_):
+        self.taken.append(responses[0])
 
 
 def solve(case, comm, thresholds=DEFAULTS, policy=DEFAULT_POLICY):

@@ -106,8 +106,12 @@ class FrictionlessLeg(Leg):
 
         `end` has the solutions at the end of the leg with fixed contact states.
         """
-        before, share = self._state, self._share
-        breaks, begins, certain = self._predict(end)
+        cell, before, share = self.cell, self._state, self._share
+        # Fractions of the leg at which a bond breaks, contact begins to change, and surely has; or inf.
+        breaks = first_break(cell, self.law, before.bonds, cell.traction(before.solutions), cell.traction(end))
+        begins, certain = (1.0, 1.0) if self._false_alarm else first_change(cell.plane, before, end[0])
+        begins, certain = (np.inf, np.inf) if begins == 1.0 else (begins, certain)
+        breaks, begins, certain = (share + (1.0 - share) * way for way in (breaks, begins, certain))
         target = min(breaks, begins, 1.0)
         is_here = target - share <= SAME_SHARE and (target == begins or (target == breaks and self._is_due()))
         reached = is_here or self._approach(target, end)
@@ -121,48 +125,38 @@ class FrictionlessLeg(Leg):
                 yield from self._turned()
         yield from self._break_overloaded()
 
-    def _predict(self, end: Sequence[DualSolution]) -> tuple[float, float, float]:
-        """Return the fractions of the leg at which a bond breaks, contact begins to change, and surely has; or inf."""
-        cell, state, rest = self.cell, self._state, 1.0 - self._share
-        breaks = first_break(cell, self.law, state.bonds, cell.traction(state.solutions), cell.traction(end))
-        begins, certain = (1.0, 1.0) if self._false_alarm else first_change(cell.plane, state, end[0])
-        if begins == 1.0:
-            begins = certain = np.inf
-        return self._share + rest * breaks, self._share + rest * begins, self._share + rest * certain
-
     def _is_due(self) -> bool:
         """Return whether the most utilised bonds are at their strength."""
         return self._used()[1] > 1.0 - UTILISATION_TIE
 
     def _approach(self, target: float, end: Sequence[DualSolution]) -> bool:
         """Advance to the target if the response is straight, else halve the way; return whether it is reached."""
-        start, begin, reached = self._share, self._state, True
+        cell, start, begin, reached = self.cell, self._share, self._state, True
         nearest = min(start + SAME_SHARE, 1.0)
         target = max(target, nearest)
         if target >= self._bends_before:
             target, reached = max((start + self._bends_before) / 2, nearest), False
+        before, after = self._mean, cell.macroscopic(end)
+        ends = np.stack([self._response(before), self._response(after)])
+        largest = max(
+            np.abs(ends).max(), np.abs(cell.least_bonded_stress(np.stack([before.strain, after.strain]))).max()
+        )
+        off_line = max(cell.plane.scales.sign_noise, OFF_LINE_ROUNDING) * largest
         while True:
             way = (target - start) / (1.0 - start)
             lam = tuple((1.0 - way) * a + way * b.lam for a, b in zip(begin.multipliers, end, strict=True))
             state = self._solve(target, begin.bonds, lam)
-            if target <= nearest or not state.converged or self._continues(end, way, state):
+            if target <= nearest or not state.converged:
+                break
+            # The response is straight if no bond is overloaded and the state is on the line to `end`.
+            used = most_utilised(cell, self.law, state)[1]
+            error = (1.0 - way) * ends[0] + way * ends[1] - self._response(cell.macroscopic(state.solutions))
+            if used <= 1.0 + UTILISATION_TIE and np.abs(error).max() <= off_line:
                 break
             self._bends_before, reached = target, False
             target = max((start + target) / 2, nearest)
         self._stand(target, state)
         return reached
-
-    def _continues(self, end: Sequence[DualSolution], way: float, state: Equilibrium) -> bool:
-        """Return whether a state overloads no bond and has its response on the line to `end`.  Collective."""
-        cell = self.cell
-        _, used, _ = most_utilised(cell, self.law, state)
-        before, after = self._mean, cell.macroscopic(end)
-        ends = np.stack([self._response(before), self._response(after)])
-        error = np.abs((1.0 - way) * ends[0] + way * ends[1] - self._response(cell.macroscopic(state.solutions))).max()
-        strains = np.stack([before.strain, after.strain])
-        largest = max(np.abs(ends).max(), np.abs(cell.least_bonded_stress(strains)).max())
-        tolerance = max(cell.plane.scales.sign_noise, OFF_LINE_ROUNDING)
-        return bool(used <= 1.0 + UTILISATION_TIE and error <= tolerance * largest)
 
     def _response(self, state: Macroscopic) -> Float:
         """(n,) components that the load does not prescribe: stresses, and strains times a stiffness."""

@@ -52,7 +52,20 @@ def plot(directory: Path) -> list[Path]:
     document = result_json.read(directory) if (directory / result_json.NAME).exists() else {}
     with mpl.rc_context(plot_helpers.STYLE):
         try:
-            paths = _pictures(directory, document) if _output(document).get("fields", True) else []
+            if not _output(document).get("fields", True):
+                return response_curves.plot(directory, document)
+            with h5py.File(directory / field_file.NAME, "r") as file:
+                cell, report = drawn_cell.DrawnCell.of(file), reported(document)
+                entries = {"cell": cell_picture.figure(cell), "partition": cell_picture.partition(cell)}
+                entries |= {"mesh_error": error} if (error := cell_picture.mesh_error(cell)) is not None else {}
+                paths = [plot_helpers.save(figure, directory / f"{name}.png") for name, figure in entries.items()]
+                if report.is_curve:
+                    paths += deformed_panels.plot(directory, file, document)
+                for number in [] if report.is_curve else sorted(file.get("state", ()), key=int):
+                    state = file[f"state/{number}"]
+                    name = report.picture or _name(number, state.attrs)
+                    paths.append(plot_helpers.save(_drawn_state(cell, state, document), directory / f"{name}.png"))
+                paths += traction_plots.plot(directory, cell, document)
             return paths + response_curves.plot(directory, document)
         except OSError as error:
             raise FetiHomogError(f"cannot draw {directory / field_file.NAME}: {error.strerror or error}") from error
@@ -62,23 +75,6 @@ def _output(document: Document) -> Document:
     """Return the section [output] of the case, empty without a result.json."""
     entries: Document = document.get("case", {}).get("output", {})
     return entries
-
-
-def _pictures(directory: Path, document: Document) -> list[Path]:
-    """Return the pictures of result.h5."""
-    with h5py.File(directory / field_file.NAME, "r") as file:
-        cell = drawn_cell.DrawnCell.of(file)
-        entries = {"cell": cell_picture.figure(cell), "partition": cell_picture.partition(cell)}
-        entries |= {"mesh_error": error} if (error := cell_picture.mesh_error(cell)) is not None else {}
-        paths = [plot_helpers.save(figure, directory / f"{name}.png") for name, figure in entries.items()]
-        if reported(document).is_curve:
-            paths += deformed_panels.plot(directory, file, document)
-        else:
-            for number in sorted(file.get("state", ()), key=int):
-                state = file[f"state/{number}"]
-                name = reported(document).picture or _name(number, state.attrs)
-                paths.append(plot_helpers.save(_drawn_state(cell, state, document), directory / f"{name}.png"))
-        return paths + traction_plots.plot(directory, cell, document)
 
 
 def _name(number: str, attributes: Any) -> str:

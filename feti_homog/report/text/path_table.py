@@ -1,7 +1,6 @@
 """The table of a path: peak, energies, and rows of some points."""
 
 from textwrap import wrap
-from typing import Any
 
 import numpy as np
 
@@ -16,8 +15,21 @@ ROWS = 15  # of the table
 
 
 def path_table(document: Document, limit: int = ROWS) -> Table:
-    """Return totals of the path above at most `limit` rows of points."""
-    points, numbers, varying = document["path"], landmarks.chosen(document, limit), _path_columns(document)
+    """Return totals of the path above at most `limit` rows of points.
+
+    Columns: leading strain, stresses that waypoints name or that act, temperature, strains under prescribed stresses.
+    """
+    points, numbers = document["path"], landmarks.chosen(document, limit)
+    strain, stress = (columns_without_noise([point[name] for point in points]) for name in ("strain", "stress"))
+    strains, stresses = voigt.voigt_names(strain.shape[1])
+    leading = path_curves.leading_component(document)
+    visible = {*path_curves.named_components(document), *path_curves.components_above(path_curves.FAINT, stress)}
+    varying = {strains[leading]: strain[:, leading]} | {stresses[k]: stress[:, k] for k in sorted(visible)}
+    if any(point.get("temperature") for point in points):
+        varying[load_sections.TEMPERATURE] = np.array([point["temperature"] for point in points])
+    prescribed = {name for target in path_curves.targets(document) for name in target}
+    acting = path_curves.components_above(path_curves.FAINT, strain)
+    varying |= {strains[k]: strain[:, k] for k in acting if stresses[k] in prescribed}
     first = dict(list(varying.items())[:5])
     rest = [name for name in varying if name not in first]
     broke = sum(point["broke"] for point in points)
@@ -32,24 +44,6 @@ def path_table(document: Document, limit: int = ROWS) -> Table:
     totals = [*_peak_lines(document, landmarks.peak_of(document)), *_path_energies(document, label)]
     totals += [f"Also in path.csv: {', '.join(rest)}"] if rest else []
     return Table(f"Path{label}: {len(points)} points{some}; {broke} bonds broke", columns, rows, totals)
-
-
-def _path_columns(document: Document) -> dict[str, Any]:
-    """Return the columns that vary along a path, (n,) each.
-
-    Leading strain, stresses that waypoints name or that act, temperature, and strains under prescribed stresses.
-    """
-    points = document["path"]
-    strain, stress = (columns_without_noise([point[name] for point in points]) for name in ("strain", "stress"))
-    strains, stresses = voigt.voigt_names(strain.shape[1])
-    leading = path_curves.leading_component(document)
-    visible = {*path_curves.named_components(document), *path_curves.components_above(path_curves.FAINT, stress)}
-    curves = {strains[leading]: strain[:, leading]} | {stresses[k]: stress[:, k] for k in sorted(visible)}
-    if any(point.get("temperature") for point in points):
-        curves[load_sections.TEMPERATURE] = np.array([point["temperature"] for point in points])
-    prescribed = {name for target in path_curves.targets(document) for name in target}
-    more = path_curves.components_above(path_curves.FAINT, strain)
-    return curves | {strains[k]: strain[:, k] for k in more if stresses[k] in prescribed}
 
 
 def _peak_lines(document: Document, peak: Document) -> list[str]:
