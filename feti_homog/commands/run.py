@@ -42,7 +42,7 @@ def _run(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.case import sections, toml_files
-    from feti_homog.studies import first_case, fit_file, uncertainty
+    from feti_homog.studies import case_runs, fit_file, uncertainty
 
     document = mpi_errors.on_root(comm, toml_files.read_document, arguments.case)  # once: it may be a pipe
     if document.keys() & {*sections.FIT_SECTIONS}:
@@ -50,7 +50,7 @@ def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
     elif mpi_errors.on_root(comm, uncertainty.is_study, document):
         text = mpi_errors.on_root(comm, uncertainty.parse, document, arguments.case.parent).describe(comm)
     else:
-        text = first_case.of_document(document, arguments.case.parent, comm)
+        text = case_runs.describe(document, arguments.case.parent, comm)
     mpi_errors.on_root_only(comm, standard_streams.print_product, text)
 
 

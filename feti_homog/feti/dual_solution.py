@@ -98,10 +98,8 @@ class ActiveJumps:
         # Free bodies lie where faces part least, however they are cut.
         if (Z := self._natural.unconstrained_modes).shape[1]:
             M = self._natural.G @ Z
-            squares, sums = (
-                allreduce_sparse(self._comm, (M.T @ M).tocsr()),
-                distributed_arrays.allreduce_sum(self._comm, M.T @ jump),
-            )
+            squares = allreduce_sparse(self._comm, (M.T @ M).tocsr())
+            sums = distributed_arrays.allreduce_sum(self._comm, M.T @ jump)
             least = Z @ splu(squares.tocsc()).solve(sums)
             alpha, jump = alpha - least, jump - self._natural.G @ least
         residual = self.norms(self._active.restrict(jump)) / np.where(scale > 0, scale, 1.0)

@@ -1,7 +1,8 @@
-"""Running a sweep: all cases by rank groups, or one case in a job array."""
+"""Check a sweep and describe its first case; run all cases by rank groups, or one case in a job array."""
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,14 +11,14 @@ from enum import Enum, auto
 from pathlib import Path
 from typing import Any
 
-from feti_homog.analysis import runner
-from feti_homog.case import Case
+from feti_homog.analysis import description, runner
+from feti_homog.case import Case, cases, sections
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError
 from feti_homog.studies import case_folders
 from feti_homog.studies.case_folders import LOCK_FILE, Status
-from feti_homog.studies.first_case import check_options
-from feti_homog.studies.sweep_cases import Sweep, SweepCase
+from feti_homog.studies.sweep_cases import Sweep, SweepCase, case_names, expand
 from feti_homog.system.parallel import mpi_errors
+from feti_homog.system.petsc import options_database
 from feti_homog.system.runtime import file_locks, standard_streams
 from feti_homog.typing import Intracomm
 
@@ -218,3 +219,40 @@ class CaseRunner:
     def _print(self, line: str) -> None:
         if self.comm.rank == 0 and not self.quiet:
             standard_streams.say(line)
+
+
+def describe(document: dict[str, Any], folder: Path, comm: Intracomm) -> str:
+    """Describe a case, or a sweep with its first case; empty except on rank 0.  Collective.
+
+    Raises:
+        CaseError, MeshError: the document is faulty, or the cell of its first case.
+    """
+    if sections.SWEEP not in document:
+        return description.describe(mpi_errors.on_root(comm, cases.parse, document, folder), comm)
+    sweep = mpi_errors.on_root(comm, expand, document, folder)
+    points = len({entry.point for entry in sweep.entries})
+    heading = f"sweep      {len(sweep.cases)} cases, {points} points, all of them valid; the first:"
+    return describe_first(sweep, heading, comm)
+
+
+def describe_first(sweep: Sweep, heading: str, comm: Intracomm) -> str:
+    """Return a heading and the description of the first case.  Collective.  Raises as `describe`."""
+    check_options(sweep)
+    text = description.describe(sweep.cases[0], comm)
+    return f"{heading}\n{text}" if comm.rank == 0 else ""
+
+
+def check_options(sweep: Sweep) -> None:
+    """Raise CaseError with all faulty PETSc options, each with its cases."""
+    numbers_by_options = dict[str, list[int]]()
+    for entry, case in zip(sweep.entries, sweep.cases, strict=True):
+        numbers_by_options.setdefault(json.dumps(case.petsc, sort_keys=True), []).append(entry.number)
+    faults = []
+    for options, numbers in numbers_by_options.items():
+        try:
+            with options_database.case_options(json.loads(options)):
+                pass
+        except CaseError as error:
+            faults += [f"{case_names(numbers)}: {fault}" for fault in error.faults]
+    if faults:
+        raise CaseError(*faults)

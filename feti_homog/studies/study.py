@@ -17,7 +17,7 @@ from typing import Any, ClassVar
 from feti_homog.case import toml_files
 from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.results import atomic, output_folder, result_json
-from feti_homog.studies import case_folders, case_runs, first_case
+from feti_homog.studies import case_folders, case_runs
 from feti_homog.studies.sweep_cases import Sweep
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.runtime import input_files, standard_streams
@@ -101,7 +101,7 @@ class Study(ABC):
             CaseError, MeshError: the cell of the first case is faulty.
         """
         heading = mpi_errors.on_root(comm, self.heading)
-        return first_case.first_of(mpi_errors.on_root(comm, self.first_cases), heading, comm)
+        return case_runs.describe_first(mpi_errors.on_root(comm, self.first_cases), heading, comm)
 
     def run(self, directory: Path, comm: Intracomm, ranks_per_case: int, retry: bool, quiet: bool) -> dict[str, Any]:
         """Run the study, or resume it, and return its document on every rank.  Collective.

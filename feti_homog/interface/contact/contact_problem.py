@@ -140,7 +140,6 @@ class ContactProblem:
         Raises:
             NotCarriedError: nothing carries the stresses of the load.
         """
-
         self.prepare(bonds)
         return mixed_load.solve(self.scales, load, start)
 

@@ -108,10 +108,8 @@ class FaceSystem:
 
     def linear(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, bool]:
         """Return the scaled x (m,) with these statuses, and whether x is a solution; see `StatusSystem.solve`."""
-        rows, (x, values) = (
-            status_system.free_rows(status, self.friction, load.by_stress),
-            self.prescribed(status, load, start),
-        )
+        rows = status_system.free_rows(status, self.friction, load.by_stress)
+        x, values = self.prescribed(status, load, start)
         followed = self._turned(*rows)
         if followed is not None:
             solution = followed.solve(x, values, self.terms)

@@ -222,10 +222,8 @@ class SlidingCell:
         parts = zip(self._held_rows, self._parts(x), strict=True)
         force[self._held] = np.hstack([problem.some_multipliers(rows, *answer) for rows, (problem, answer) in parts])
         damaged, slip = self._damaged[self._face_nodes], self._jumps_of(x)[1::2][self._position]
-        node, C = (
-            self._face_nodes[damaged],
-            self.solver.intact_compliance[self.interface.nodes.row[self._face_nodes[damaged]] + 1],
-        )
+        node = self._face_nodes[damaged]
+        C = self.solver.intact_compliance[self.interface.nodes.row[node] + 1]
         force[node, 1] = (C * force[node, 1] + slip[damaged]) / (C + self._more[node])
         return np.asarray(force / self.interface.nodes.length[:, None])
 

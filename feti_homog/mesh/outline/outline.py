@@ -168,10 +168,8 @@ def tip_vertices(arrangement: Arrangement, marks: Mapping[int, Sequence[float]],
     pairs = [(name, mark) for name, angles in marks.items() if name in names for mark in angles]
     name, mark = np.array([k for k, _ in pairs], np.int64), np.array([mark for _, mark in pairs])
     fibre = np.where(name < 0, ~name, name)
-    curves, size = (
-        arrangement.outlines[fibre].grown(np.where(name < 0, 0.0, arrangement.coating[fibre])),
-        arrangement.size,
-    )
+    curves = arrangement.outlines[fibre].grown(np.where(name < 0, 0.0, arrangement.coating[fibre]))
+    size = arrangement.size
     assert isinstance(curves, Conics)
     places = curves.points(curves.parameter_at(np.radians(mark)))
     return np.asarray(vertices[cKDTree(vertices % size, boxsize=size).query(places % size)[1]])

@@ -1,7 +1,7 @@
 """Read the triangles and the lines of an Abaqus input file (.inp)."""
 
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -13,7 +13,6 @@ from feti_homog.mesh.readers.abaqus_keywords import REFUSED, KeywordBlock, block
 from feti_homog.mesh.readers.raw_mesh import Block, RawMesh, assembled
 from feti_homog.schema import wording
 from feti_homog.system.runtime import input_files
-from feti_homog.typing import Int
 
 # Types of elements, and the numbers of nodes that they may have: lines; quadrilaterals, which are cut in two;
 # triangles, among them rigid ones.
@@ -181,18 +180,15 @@ class _Content:
             parts.append(Block(np.array([*triangles]), np.array([*triangles.values()]), group))
         groups, aliases = zip(*place, strict=True)
         numbers, points = np.fromiter(self.nodes, np.int64), np.array(list(self.nodes.values()))
-        curves = self._curves(labels)
-        return assembled(numbers, points, parts, groups, curves, ("element set", "element set"), aliases)
-
-    def _curves(self, labels: Mapping[int, tuple[str, ...]]) -> dict[str, Int]:
-        """Return the end nodes (d, 2) of the lines in each set without triangles."""
+        # Sets of lines without triangles are curves.
         with_triangles = {name for tag in self.triangles for name in labels.get(tag, ())}
         ends: dict[str, list[list[int]]] = {}
         for tag, nodes in self.lines.items():
             for name in labels.get(tag, ()):
                 if name not in with_triangles:
                     ends.setdefault(name, []).append([nodes[0], nodes[-1]])
-        return {name: np.array(pairs, np.int64) for name, pairs in ends.items()}
+        curves = {name: np.array(pairs, np.int64) for name, pairs in ends.items()}
+        return assembled(numbers, points, parts, groups, curves, ("element set", "element set"), aliases)
 
 
 def _names_of(sets: Iterable[tuple[str, set[int]]]) -> dict[int, tuple[str, ...]]:

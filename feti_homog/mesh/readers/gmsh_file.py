@@ -120,7 +120,15 @@ def raw_mesh(content: MshContent) -> RawMesh:
     """Convert content into triangles and curves; MeshError if it has other elements."""
     if faults := _faults(content):
         raise MeshError(*faults)
-    elements, curves = content.elements, _curves(content)
+    elements, none = content.elements, np.zeros((0, 2), np.int64)
+    lines = [elements[kind] for kind in LINES if kind in elements]
+    named = {name for (dimension, _), name in content.names.items() if dimension == 1}
+    curves = dict.fromkeys(named & {DEBONDED}, none)
+    members = {(group, number) for (d, number), some in content.groups.items() if d == 1 for group in some}
+    for group, number in sorted(members):
+        name = content.name(1, group)
+        ends = [nodes[entity == number, :2] for _, nodes, entity in lines]
+        curves[name] = np.concatenate([curves.get(name, none), *ends])
     if not len(curves.get(DEBONDED, (0,))):
         raise MeshError(f'no lines in the physical curve "{DEBONDED}"')
     blocks, groups = list[Block](), list[tuple[int, ...]]()
@@ -236,16 +244,3 @@ def _faults(content: MshContent) -> list[str]:
     if not kinds and not faults:
         faults.append("no triangles in it: mesh the surfaces and put them in physical surfaces before saving")
     return faults
-
-
-def _curves(content: MshContent) -> dict[str, Int]:
-    """Return the end nodes (d, 2) of the lines in each physical curve; DEBONDED may be empty."""
-    none, lines = np.zeros((0, 2), np.int64), [content.elements[kind] for kind in LINES if kind in content.elements]
-    named = {name for (dimension, _), name in content.names.items() if dimension == 1}
-    curves = dict.fromkeys(named & {DEBONDED}, none)
-    entities = {(group, number) for (d, number), groups in content.groups.items() if d == 1 for group in groups}
-    for group, number in sorted(entities):
-        name = content.name(1, group)
-        ends = [nodes[entity == number, :2] for _, nodes, entity in lines]
-        curves[name] = np.concatenate([curves.get(name, none), *ends])
-    return curves

@@ -90,17 +90,13 @@ def mesh_of(grid: Grid) -> RawMesh:
     aliases = [(f"number {k}",) for k in values.tolist()]
     phases = [({0: "matrix", 1: "fibre"}.get(k, f"fibre:{k}"),) for k in values.tolist()]
     names, containers = (phases if has_phases else aliases), (f"value of {name}", "cells")
+    lines = np.flatnonzero(np.isin(grid.types, [*LINES]))
+    marks = np.ravel(data.get(DEBONDED, np.zeros(len(grid.types))))[lines]
+    number, ends = np.where(marks != 0, -1, 0 if has_phases else groups[lines]), grid.nodes_of(lines, 2)
+    titles = {k: "line" if has_phases else f"number {k}" for k in np.unique(number).tolist()} | {-1: DEBONDED}
+    curves = {titles[k]: ends[number == k] for k in np.unique(number).tolist()}
     tags = grid.first + np.arange(len(grid.points))
-    return assembled(tags, grid.points, blocks, names, _curves(grid, groups, has_phases), containers, aliases)
-
-
-def _curves(grid: Grid, groups: Int, has_phases: bool) -> dict[str, Int]:
-    """Return the end nodes (d, 2) of the lines in each curve."""
-    cells = np.flatnonzero(np.isin(grid.types, [*LINES]))
-    marks = np.ravel(grid.data.get(DEBONDED, np.zeros(len(grid.types))))[cells]
-    number, ends = np.where(marks != 0, -1, 0 if has_phases else groups[cells]), grid.nodes_of(cells, 2)
-    names = {k: "line" if has_phases else f"number {k}" for k in np.unique(number).tolist()} | {-1: DEBONDED}
-    return {names[k]: ends[number == k] for k in np.unique(number).tolist()}
+    return assembled(tags, grid.points, blocks, names, curves, containers, aliases)
 
 
 def _misfits(grid: Grid) -> list[str]:

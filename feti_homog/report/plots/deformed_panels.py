@@ -116,10 +116,8 @@ def draw_state(
             if most is not None:
                 cell = replace(cell, colours=(Normalize(-most, most), "RdBu_r", "both"))
             cell.bar(axes, cell.draw(axes, number, cell.moved(number)))
-            caption, softens = (
-                cell.caption,
-                bool((drawn_cell.states_of_nodes(file[f"state/{number}"]) == drawn_cell.DAMAGED).any()),
-            )
+            caption, states = cell.caption, drawn_cell.states_of_nodes(file[f"state/{number}"])
+            softens = bool((states == drawn_cell.DAMAGED).any())
     except (OSError, KeyError) as error:
         raise FetiHomogError(f"cannot draw state {number} of {path}: {error}") from error
     axes.autoscale_view()
@@ -164,10 +162,8 @@ def shown_scale(file: Any, document: Document) -> float:
     for number in reported(document).states(document, MAX_FRAMES, len(file["state"])):
         state = file[f"state/{number}"]
         u = decimation.drawn_displacement(state, drawn)
-        displacement, largest = (
-            max(displacement, plot_helpers.largest_length(u)),
-            min(largest, decimation.largest_scale(u, drawn)),
-        )
+        displacement = max(displacement, plot_helpers.largest_length(u))
+        largest = min(largest, decimation.largest_scale(u, drawn))
         opening = max(opening, float(state["jump"][:, 0].max(initial=0.0)))
     size = float(min(file.attrs["width"], file.attrs["height"]))
     scale = plot_helpers.magnification(displacement, size, opening, largest)

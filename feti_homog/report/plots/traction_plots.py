@@ -113,10 +113,8 @@ def _curves(axes: Axes, state: Any, quantity: str, place: Coordinate, last: bool
     values, at, turn = values[place.nodes], place.values, place.ends[1] - place.ends[0]
     # Nodes are all around if the gap between last and first is less than twice the others.
     if place.ends == DEGREES and len(at) > 1 and at[0] + turn - at[-1] < 2.0 * np.diff(at).max():
-        at, values = (
-            np.concatenate([at[-1:] - turn, at, at[:1] + turn]),
-            np.concatenate([values[-1:], values, values[:1]]),
-        )
+        at = np.concatenate([at[-1:] - turn, at, at[:1] + turn])
+        values = np.concatenate([values[-1:], values, values[:1]])
     for label, column, ink in zip(NAMES[quantity], values.T, INK, strict=False):
         width, style = (1.5, "-") if last else (0.9, "--")
         axes.plot(at, column, style, color=ink, linewidth=width, label=label if last else None)
