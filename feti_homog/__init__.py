@@ -16,8 +16,6 @@ From a program of one's own, under `mpirun` or not:
 - `CaseError`, `MeshError`, `ConvergenceError`, all of them `FetiHomogError`: raised on all ranks, `faults` in words.
 """
 
-from __future__ import annotations
-
 import importlib
 import os
 from typing import TYPE_CHECKING, Any

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -209,7 +208,7 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
         "output": _read_section(document, "output", reader),
         "petsc": sections.read_petsc(document.get("petsc", {}), faults),
     }
-    faults += chain.from_iterable(of_rules)
+    faults += [fault for rule in of_rules for fault in rule]
     # Sections that do not belong to the analysis have no further checks.
     faults += relation_faults(contents | {FIELDS.get(name, name): None for name in foreign}, document, selected[PLANE])
     return contents, faults

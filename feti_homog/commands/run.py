@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -67,9 +66,8 @@ def _keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.case import reference
 
     section = arguments.section
-    tables = mpi_errors.on_root_only(
-        comm, reference.tables if section is None else partial(reference.tables_of, section)
-    )
+    chosen = reference.tables if section is None else lambda: reference.tables_of(section)
+    tables = mpi_errors.on_root_only(comm, chosen)
     mpi_errors.on_root_only(comm, standard_streams.print_product, reference.as_text(tables or []))
 
 

@@ -165,3 +165,6 @@ STIFF_FIBRES = 1e3
 # averaged modes may depend on each other.  In the lists of `scripts/robustness`, with contrasts to 1e6, the first was
 # enough.
 COARSE_REGULARISATIONS = (1e-12, 1e-10, 1e-8)
+# Energy of an averaged mode with all rows active, relative to the largest, that is rounding of displacements: the
+# square of their 1e-14.  Modes of two kinds have energies in different units, so it leaves room for any unit of stress.
+ROUNDED_MODE_ENERGY = 1e-28

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
@@ -118,7 +117,7 @@ def faults(case: Case, nodes: EstimatedNodes, moved: Sequence[debonded_arcs.Move
     for pair, interface in enumerate(case.interfaces):
         fibres, directions = nodes.fibre[nodes.pair == pair], nodes.direction[nodes.pair == pair]
         label = interface_section.interface_label(pair, len(case.interfaces))
-        for (place, arc), opening in product(enumerate(interface.debonded), openings):
+        for (place, arc), opening in ((arc, opening) for arc in enumerate(interface.debonded) for opening in openings):
             angle, line = opening if arc.angle is None else arc.angle, f"[{label}] debonded[{place}]"
             inside = debonded_arcs.debonded([arc], opening, fibres, directions, moved[pair])
             for fibre in [None] if isinstance(arc.fibre, str) else arc.fibre:

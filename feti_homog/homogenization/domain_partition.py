@@ -8,8 +8,6 @@ from feti_homog.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition import partition
 from feti_homog.homogenization import arc_selection, cell_remarks, partition_policy
-from feti_homog.homogenization.arc_selection import EstimatedNodes
-from feti_homog.homogenization.cell_remarks import longest, mesh_remarks, subdomain_remarks, table_remarks
 from feti_homog.interface import debonded_arcs
 from feti_homog.mesh import CoarseMesh, ReferenceLattice, SubmeshesOfRank, Torus, coarse_mesh, mesh_fibres, submeshes
 from feti_homog.mesh.fill import gmsh_mesher
@@ -140,7 +138,7 @@ def distribute(
     faults += arc_selection.fibre_faults(case, centres[is_fibre])
     moved = (debonded_arcs.NOT_MOVED,) * len(case.interfaces)
     if case.arcs and not faults:
-        nodes = EstimatedNodes.of(torus, lattice, pairs, numbers, centres)
+        nodes = arc_selection.EstimatedNodes.of(torus, lattice, pairs, numbers, centres)
         moved = nodes.moved_tips(case, int(is_fibre.sum()))
         faults = arc_selection.faults(case, nodes, moved)
     if faults:
@@ -155,7 +153,7 @@ def distribute(
         pieces = partition_policy.wanted_pieces(case, np.bincount(parts), shared_edges, lattice, n_ranks, policy)
         cut = partition.decompose(torus, parts, pieces, n_ranks)
     table = submeshes.SubdomainTable.of(torus, cut.subdomain, cut.rank, across)
-    notes = subdomain_remarks(case, bodies, len(cut.rank), triangles)
+    notes = cell_remarks.subdomain_remarks(case, bodies, len(cut.rank), triangles)
     summary = CellSummary(
         width=mesh.width,
         height=mesh.height,
@@ -163,7 +161,7 @@ def distribute(
         bodies=bodies,
         subdomains=len(cut.rank),
         coarse_triangles=triangles,
-        interface_edge=longest(mesh.points[coarse_mesh.interface_edges(mesh)]),
+        interface_edge=cell_remarks.longest(mesh.points[coarse_mesh.interface_edges(mesh)]),
         numbers=numbers,
         is_fibre=is_fibre,
         constituent_phase=torus.constituent_phase,
@@ -174,7 +172,7 @@ def distribute(
         snapped=mesh.snapped,
         voids=coarse_mesh.voids(mesh) if torus.at_void.any() else 0,
         match_distance=match_distance(case, mesh.width, mesh.height, centres[is_fibre], circles[is_fibre, 2]),
-        remarks=(*table_remarks(case), *mesh_remarks(case, torus, pairs), *notes),
+        remarks=(*cell_remarks.table_remarks(case), *cell_remarks.mesh_remarks(case, torus, pairs), *notes),
         across=across,
         interface_nodes=_interface_nodes(torus, pairs, lattice) if across else None,
     )
@@ -200,7 +198,7 @@ def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triang
         bodies=len(regions.phase),
         subdomains=subdomains,
         coarse_triangles=triangles,
-        interface_edge=longest(noded.scale * lines.points[tile_filling.arc_edges(lines.curves)[0]]),
+        interface_edge=cell_remarks.longest(noded.scale * lines.points[tile_filling.arc_edges(lines.curves)[0]]),
         numbers=np.append(0, disc + 1),
         is_fibre=np.append(False, is_fibre),
         constituent_phase=regions.phase,
@@ -213,8 +211,8 @@ def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triang
         match_distance=match_distance(case, regions.width, regions.height, centres[is_fibre], radii[is_fibre]),
         remarks=(
             *arrangement.remarks,
-            *table_remarks(case),
-            *subdomain_remarks(case, len(regions.phase), subdomains, triangles),
+            *cell_remarks.table_remarks(case),
+            *cell_remarks.subdomain_remarks(case, len(regions.phase), subdomains, triangles),
         ),
     )
 

@@ -6,8 +6,6 @@ The memory is linear in the degrees of freedom, because bodies are cut into equa
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
-from math import ceil
 
 import numpy as np
 
@@ -115,7 +113,7 @@ def can_be_cut_across(case: Case) -> bool:
         return False
     ratios = (laws.isotropic_ratio(material) or 0.0 for material in case.materials.values())
     # Contrast: the largest ratio of the largest entries of two phases' stiffnesses, in any problem.
-    pairs = product(phase_laws.problems(case), case.materials)
+    pairs = [(problem, phase) for problem in phase_laws.problems(case) for phase in case.materials]
     sizes = np.array([np.abs(phase_laws.law(case, phase, problem)[:4, :4]).max() for problem, phase in pairs])
     sizes = sizes.reshape(-1, len(case.materials))
     return max(ratios) <= MOST_POISSON and float((sizes.max(axis=1) / sizes.min(axis=1)).max()) <= MOST_CONTRAST
@@ -196,7 +194,7 @@ def recommended_ranks(dofs: int, bodies: int) -> int:
     The number is at most the number of bodies, because more ranks would cut bodies, which costs iterations.  In cells
     that are cut across materials, coarse triangles stand for bodies.
     """
-    return max(1, min(bodies, ceil(dofs / DOFS_OF_A_RANK)))
+    return max(1, min(bodies, -(-dofs // DOFS_OF_A_RANK)))
 
 
 def in_words(size: float) -> str:

@@ -8,7 +8,6 @@ and the number of ranks, not on the rank that filled a tile.
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain
-from operator import itemgetter
 
 import numpy as np
 from mpi4py import MPI
@@ -92,7 +91,7 @@ def fill_tiles(cell: gmsh_mesher.NodedCell | CoarseMesh | None, comm: MPI.Intrac
     """
     tiles = cell.parts if isinstance(cell, gmsh_mesher.NodedCell) else ()
     gathered = distributed_arrays.gather(comm, mpi_errors.agree(comm, fill_own, deal_tiles(tiles, comm)))
-    fillings = [filling for _, filling in sorted(chain.from_iterable(gathered), key=itemgetter(0))]
+    fillings = [filling for _, filling in sorted(chain.from_iterable(gathered), key=lambda part: part[0])]
 
     def joined(cell: gmsh_mesher.NodedCell | CoarseMesh) -> CoarseMesh:
         return cell if isinstance(cell, CoarseMesh) else cell.mesh(fillings)

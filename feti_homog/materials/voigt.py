@@ -3,13 +3,11 @@
 [11, 22, 12] in plane strain and plane stress, [11, 22, 33, 23, 13, 12] in space and generalized plane strain.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from feti_homog.typing import Float
+from feti_homog.typing import Document, Float
 
 STRESSES, STRAINS = ("S11", "S22", "S12"), ("E11", "E22", "gamma12")
 SPATIAL_STRESSES = ("S11", "S22", "S33", "S23", "S13", "S12")
@@ -66,7 +64,7 @@ GENERALIZED = PlaneState(
 PLANE_STATES = {state.name: state for state in (PLANE_STRAIN, PLANE_STRESS, GENERALIZED)}
 
 
-def plane_state_of(document: Mapping[str, Any]) -> PlaneState:
+def plane_state_of(document: Document) -> PlaneState:
     """Return the plane state of a document of result.json."""
     return PLANE_STATES[document["case"]["analysis"]["plane"]]
 

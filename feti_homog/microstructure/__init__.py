@@ -4,8 +4,6 @@ Imports `microstructure.shapes`, `schema` and `system`.  Main entries: `arrangem
 `periodic_table.table_arrangement`, `random_fibres`.
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:

@@ -14,7 +14,6 @@ import numpy as np
 
 from feti_homog.materials import voigt
 from feti_homog.results import path_curves
-from feti_homog.results.path_curves import SAME_LOAD, Document, Point
 from feti_homog.typing import Float
 
 # A drop is a fall of the stress, or a jump of the strain, by more than this fraction of the largest value; the saw
@@ -43,7 +42,7 @@ def turning_points(values: Float, threshold: float) -> list[int]:
     return [*entries, high if rises else low] if entries else []
 
 
-def peak_of(document: Document) -> dict[str, Any]:
+def peak_of(document: path_curves.Document) -> dict[str, Any]:
     """Return the fields of `result_records.Peak` for a non-empty path.
 
     The peak is the largest stress up to the deepest fall in which bonds break, or on the whole path without such a
@@ -65,32 +64,32 @@ def peak_of(document: Document) -> dict[str, Any]:
         }
     if valley is not None:
         entries |= {"stress_left": remaining, "event_left": valley}
-    elif points[-1]["load_factor"] < 1.0 - SAME_LOAD:
+    elif points[-1]["load_factor"] < 1.0 - path_curves.SAME_LOAD:
         entries["so_far"] = True
     entries["dissipated"] = points[event].get("dissipated", 0.0)
     return {"strain_name": names[0], "stress_name": names[1], **entries}
 
 
-def stresses_of(document: Document, peak: Document) -> list[float]:
+def stresses_of(document: path_curves.Document, peak: path_curves.Document) -> list[float]:
     """Return the stress at each point, in the component of the peak."""
     component = voigt.voigt_names(len(document["path"][0]["stress"]))[1].index(peak["stress_name"])
     return [float(point["stress"][component]) for point in document["path"]]
 
 
-def fall_of(document: Document, peak: Document) -> float:
+def fall_of(document: path_curves.Document, peak: path_curves.Document) -> float:
     """Return the stress fall, to the valley or the end, / the largest stress."""
     remaining = (stresses_of(document, peak)[-1], peak.get("stress_left", peak["stress"]))
     return max(1.0 - stress / peak["stress"] for stress in remaining) if peak["stress"] else 0.0
 
 
-def name_of(document: Document, peak: Document) -> str:
+def name_of(document: path_curves.Document, peak: path_curves.Document) -> str:
     """Return PEAK if the stress falls afterwards, SO_FAR for an unfinished path, else LARGEST."""
     if "so_far" in peak:
         return SO_FAR
     return LARGEST if fall_of(document, peak) < LEAST_FALL else PEAK
 
 
-def _deepest_fall(document: Document, stress: Float) -> tuple[int, float, int | None]:
+def _deepest_fall(document: path_curves.Document, stress: Float) -> tuple[int, float, int | None]:
     """Return peak number, valley stress and valley number of the deepest fall.
 
     The peak is the largest stress (n,) up to the deepest fall in which bonds break.  Without a fall, the peak is the
@@ -114,7 +113,7 @@ def _deepest_fall(document: Document, stress: Float) -> tuple[int, float, int | 
     return int(number[size[: top + 1].argmax()]), float(stress[valley]), int(number[valley])
 
 
-def marks(document: Document) -> dict[int, str]:
+def marks(document: path_curves.Document) -> dict[int, str]:
     """Return the titles of all landmarks, by rising point number."""
     peak = peak_of(document)
     largest = name_of(document, peak)
@@ -131,7 +130,7 @@ Drop = tuple[float, int, int]
 """Stress fall, or strain jump scaled to a stress, and the point numbers before and after."""
 
 
-def kept(points: Sequence[Point], states: int | str, legs: int, marked: Collection[int] = ()) -> list[int]:
+def kept(points: Sequence[path_curves.Point], states: int | str, legs: int, marked: Collection[int] = ()) -> list[int]:
     """Return the rising numbers of the points to keep.
 
     Args:
@@ -160,7 +159,7 @@ def kept(points: Sequence[Point], states: int | str, legs: int, marked: Collecti
     return sorted({a + (b - a) * k // parts for _, parts, a, b in gaps for k in range(parts)} | ends)
 
 
-def drops(points: Sequence[Point], legs: int) -> list[Drop]:
+def drops(points: Sequence[path_curves.Point], legs: int) -> list[Drop]:
     """Return the stress drops, and the strain jumps at constant load.
 
     A drop leads from a peak to the next valley.  On the first leg of an event path, a drop also leads from each load at
@@ -176,7 +175,7 @@ def drops(points: Sequence[Point], legs: int) -> list[Drop]:
     ]
     per_strain = largest / (float(length.max()) or 1.0)
     load = np.array([point["load_factor"] for point in points])
-    of_first_leg = int((load * legs <= 1.0 + SAME_LOAD).sum()) if legs else 0
+    of_first_leg = int((load * legs <= 1.0 + path_curves.SAME_LOAD).sum()) if legs else 0
     # Branches are rays through zero: stress and strain after a drop are scaled to the load before the drop.
     rising, scaled, later = load[:of_first_leg], per_strain * strain, list[Drop]()
     for a, b in pairwise(np.flatnonzero(rising >= np.maximum.accumulate(rising)).tolist()):
@@ -184,7 +183,7 @@ def drops(points: Sequence[Point], legs: int) -> list[Drop]:
         jump = _norm((scaled[b] * scale - scaled[a])[None], 0.5)[0]
         later += [(max(float(size[a] - size[b] * scale), float(jump)), a, b)] * (b > a + 1)
     # On later legs the strain jumps across all points at one load, between which bonds break.
-    starts = of_first_leg + np.flatnonzero(np.abs(np.diff(load[of_first_leg:], prepend=-1.0)) > SAME_LOAD)
+    starts = of_first_leg + np.flatnonzero(np.abs(np.diff(load[of_first_leg:], prepend=-1.0)) > path_curves.SAME_LOAD)
     for a, b in pairwise([*starts.tolist(), len(load)]):
         jump = float(_norm((scaled[b - 1] - scaled[a])[None], 0.5)[0])
         later.append((jump, a, min(b, len(load) - 1)))
@@ -198,7 +197,7 @@ def _norm(values: Float, shear: float) -> Float:
     return np.asarray(np.sqrt(square[:, :tensions].sum(axis=1) + shear * square[:, tensions:].sum(axis=1)))
 
 
-def chosen(document: Document, rows: int, among: Sequence[int] | None = None) -> list[int]:
+def chosen(document: path_curves.Document, rows: int, among: Sequence[int] | None = None) -> list[int]:
     """Choose at most `rows` points of a path, or of its points `among` (rising).
 
     The choice has the first and last point, then landmarks, deepest drop and leg ends, each group if it fits, and
@@ -221,12 +220,12 @@ def chosen(document: Document, rows: int, among: Sequence[int] | None = None) ->
     return [int(numbers[place]) for place in sorted(evenly | fixed)]
 
 
-def kept_points(document: Document) -> list[int]:
+def kept_points(document: path_curves.Document) -> list[int]:
     """Return the points with kept fields, in state order; all points if no fields are kept."""
     return list(document.get("states") or range(len(document["path"])))
 
 
-def landmark_states(document: Document, rows: int, count: int) -> list[int]:
+def landmark_states(document: path_curves.Document, rows: int, count: int) -> list[int]:
     """Return the states at landmarks, among the first `count` states.
 
     With fewer than three such states, return at most `rows` states from `chosen_states`.
@@ -236,7 +235,7 @@ def landmark_states(document: Document, rows: int, count: int) -> list[int]:
     return entries if len(entries) >= 3 else chosen_states(document, rows, count)
 
 
-def chosen_states(document: Document, rows: int, count: int) -> list[int]:
+def chosen_states(document: path_curves.Document, rows: int, count: int) -> list[int]:
     """Choose at most `rows` states among the first `count`, as `chosen` does for points."""
     among = kept_points(document)[:count]
     return [among.index(number) for number in chosen(document, rows, among)]

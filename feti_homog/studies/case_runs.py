@@ -15,7 +15,6 @@ from feti_homog.analysis import description, runner
 from feti_homog.case import Case, cases, sections
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError
 from feti_homog.studies import case_folders
-from feti_homog.studies.case_folders import LOCK_FILE, Status
 from feti_homog.studies.sweep_cases import Sweep, SweepCase, case_names, expand
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.petsc import options_database
@@ -70,7 +69,7 @@ def run_all(sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int,
     states = mpi_errors.on_root(comm, lambda: [case_folders.case_state(directory, entry) for entry in sweep.entries])
     failed = [(entry, state) for entry, state in zip(sweep.entries, states, strict=True) if state.status.is_failure]
     if comm.rank == 0 and not quiet:
-        done = sum(state.status is Status.DONE for state in states)
+        done = sum(state.status is case_folders.Status.DONE for state in states)
         standard_streams.say(f"{done} of {len(states)} cases done in {directory}")
     if failed:
         if comm.rank == 0:
@@ -127,7 +126,7 @@ def _run_free_cases(runner: CaseRunner, sweep: Sweep) -> FetiHomogError | None:
 @contextmanager
 def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) -> Iterator[None]:
     """Provide the folder made and held: by one sweep, or by any number of single cases. Collective."""
-    lock = file_locks.Lock(directory / LOCK_FILE, shared)
+    lock = file_locks.Lock(directory / case_folders.LOCK_FILE, shared)
 
     def prepare() -> None:
         case_folders.prepare_folder(directory, sweep)
@@ -170,11 +169,11 @@ class CaseRunner:
         Returns the outcome, and the other process that has the case, if any.  Raises FetiHomogError if the folder
         cannot be written.
         """
-        lock = file_locks.Lock(self.directory / entry.folder / LOCK_FILE, timeout=timeout)
+        lock = file_locks.Lock(self.directory / entry.folder / case_folders.LOCK_FILE, timeout=timeout)
         try:
             outcome, holder = mpi_errors.on_root(self.comm, self._claim, lock, entry, case)
             if outcome is Outcome.COMPUTED:
-                start, status = time.perf_counter(), str(Status.DONE)
+                start, status = time.perf_counter(), str(case_folders.Status.DONE)
                 try:
                     folder, resume = self.directory / entry.folder, case.section.is_followed
                     runner.run(case, folder, self.comm, quiet=True, resume=resume)
@@ -186,7 +185,7 @@ class CaseRunner:
                 except FetiHomogError:  # a file could not be written: the case is to be computed again
                     if mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
                         mpi_errors.on_root_only(
-                            self.comm, case_folders.set_aside, self.directory, entry, Status.DAMAGED
+                            self.comm, case_folders.set_aside, self.directory, entry, case_folders.Status.DAMAGED
                         )
                     raise
                 seconds, inputs = time.perf_counter() - start, entry.describe(case.output.stress_unit)
@@ -206,12 +205,12 @@ class CaseRunner:
         except OSError as error:
             raise FetiHomogError(f"cannot make {folder}: {error.strerror}") from error
         state = case_folders.stored_state(self.directory, entry)
-        if state.status is Status.DONE or (state.status.is_failure and not self.retry):
+        if state.status is case_folders.Status.DONE or (state.status.is_failure and not self.retry):
             lock.release()
             return Outcome.FAILED_BEFORE if state.status.is_failure else Outcome.FINISHED_BEFORE, ""
-        if state.status is Status.DAMAGED:
+        if state.status is case_folders.Status.DAMAGED:
             self._print(f"{entry.folder}: {state.reason}; set aside, the case is computed again")
-        if state.status is not Status.WAITING:
+        if state.status is not case_folders.Status.WAITING:
             case_folders.reset(self.directory, entry, state.status)
         case_folders.write_case_file(self.directory, entry, case)
         return Outcome.COMPUTED, ""

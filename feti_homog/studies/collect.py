@@ -5,7 +5,6 @@ import math
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,6 @@ import numpy as np
 from feti_homog.report.text import point_tables, tables
 from feti_homog.results import atomic
 from feti_homog.studies import case_folders
-from feti_homog.studies.case_folders import CaseState, Status, SweepIndex
 from feti_homog.studies.outputs import numbers, outputs
 from feti_homog.studies.sweep_table import SweepTable
 
@@ -51,7 +49,7 @@ def collect(directory: Path, pictures: bool) -> list[str]:
     failed = [
         (entry, state)
         for entry, state in zip(index.entries, states, strict=True)
-        if state.status.is_failure or state.status is Status.DAMAGED
+        if state.status.is_failure or state.status is case_folders.Status.DAMAGED
     ]
     failures = case_folders.failure_lines(failed, index.stress_unit)
     return [f"{len(table.status)} cases: {counts}", *failures, *map(str, paths)]
@@ -89,13 +87,13 @@ def write(directory: Path, table: SweepTable) -> list[Path]:
             for name, text in zip(("cases", "statistics"), texts, strict=True)]  # fmt: skip
 
 
-def _index_and_states(directory: Path) -> tuple[SweepIndex, list[CaseState]]:
+def _index_and_states(directory: Path) -> tuple[case_folders.SweepIndex, list[case_folders.CaseState]]:
     index = case_folders.read_index(directory)
     return index, [case_folders.case_state(directory, entry) for entry in index.entries]
 
 
-def _table(index: SweepIndex, states: Sequence[CaseState]) -> SweepTable:
-    documents = [state.document if state.status is Status.DONE else None for state in states]
+def _table(index: case_folders.SweepIndex, states: Sequence[case_folders.CaseState]) -> SweepTable:
+    documents = [state.document if state.status is case_folders.Status.DONE else None for state in states]
     place = {name: [getattr(entry, name) for entry in index.entries] for name in ("folder", "point", "realisation")}
     inputs = [entry.inputs for entry in index.entries]
     in_names = numbers(row.get("analysis.plane") for row in inputs)
@@ -114,4 +112,5 @@ def _table(index: SweepIndex, states: Sequence[CaseState]) -> SweepTable:
 
 def _columns(rows: Sequence[Mapping[str, Any]], missing: Any) -> dict[str, list[Any]]:
     """Return the values of each name in all rows."""
-    return {name: [row.get(name, missing) for row in rows] for name in dict.fromkeys(chain.from_iterable(rows))}
+    names = dict.fromkeys(name for row in rows for name in row)
+    return {name: [row.get(name, missing) for row in rows] for name in names}

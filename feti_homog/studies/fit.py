@@ -19,7 +19,6 @@ from feti_homog.report.text import study_tables
 from feti_homog.results import atomic
 from feti_homog.studies import estimation, fit_result
 from feti_homog.studies.axes import Assignment
-from feti_homog.studies.estimation import ParameterEstimates
 from feti_homog.studies.predictions import Datum, exact_derivatives, predicted
 from feti_homog.studies.study import SILENT, Evaluator, Study
 from feti_homog.studies.sweep_cases import Sweep, cases_at
@@ -96,7 +95,7 @@ class Fit(Study):
         if evaluator.comm.rank == 0 and not evaluator.quiet and (line := self.axes()):
             standard_streams.say(f"remark: {line}")
 
-        def write(estimates: ParameterEstimates) -> dict[str, Any]:
+        def write(estimates: estimation.ParameterEstimates) -> dict[str, Any]:
             from feti_homog.studies import pictures  # only a rank that draws loads Matplotlib
 
             document = {"name": self.name, **fit_result.content(self.unknowns, self.data, estimates)}
@@ -149,7 +148,7 @@ class Evaluations:
     evaluator: Evaluator
     answers: dict[Point, list[Answer]] = field(default_factory=dict)
 
-    def estimate(self) -> ParameterEstimates | None:
+    def estimate(self) -> estimation.ParameterEstimates | None:
         """Return the estimates on rank 0.  Collective: the other ranks serve its questions."""
         comm = self.evaluator.comm
         if comm.rank:

@@ -1,9 +1,8 @@
 """Measured values, and the values of a result.json in their place, with derivatives where they are exact."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from feti_homog.materials import engineering_constants, laws, voigt
 from feti_homog.report.text import point_tables
 from feti_homog.results import path_curves
 from feti_homog.studies.outputs import outputs
-from feti_homog.typing import Float
+from feti_homog.typing import Document, Float
 
 TOUGHNESS = "toughness"
 OF_PATHS = ("onset", "peak", "end")
@@ -123,7 +122,7 @@ def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], nam
     return np.array(derivatives)
 
 
-def _exponent(document: path_curves.Document, section: Mapping[str, Any], key: str) -> float | None:
+def _exponent(document: path_curves.Document, section: Document, key: str) -> float | None:
     """Return the degree to which loads at breaks are homogeneous in a key of the only interface.
 
     All loads up to the onset must grow alike; a temperature that comes before them does not.  The degree is 1/2 in the

@@ -16,7 +16,6 @@ from feti_homog.verify.constitutive_law import laws, mixed_phases
 from feti_homog.verify.elements import Elements, add_at_nodes
 from feti_homog.verify.findings import ROUNDING
 from feti_homog.verify.reading import ResultFiles, State, gradient
-from feti_homog.verify.torus import TornNodes, TornSides
 
 # Share of the terms that adds to the scale of their sum: 1e-15 of the terms are rounding.
 ROUNDED_TERMS = 1e-5
@@ -80,8 +79,8 @@ class DiscreteCell:
     stiffnesses: Float
     expansions: Float
     elements: Elements
-    sides: TornSides
-    nodes: TornNodes
+    sides: torus.TornSides
+    nodes: torus.TornNodes
     constituent: Int
     inner: Bool
     faces: Faces

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from feti_homog import CaseError
+from feti_homog.report.text import study_tables
 from feti_homog.studies import uncertainty
 from feti_homog.system.parallel.mpi_errors import on_root
 
@@ -78,10 +79,10 @@ def test_random_cells_have_the_scatter_of_inputs_and_that_between_them(comm, sha
         assert each["std"] == pytest.approx(np.hypot(inputs, between)) and sum(each["shares"]) == pytest.approx(1.0)
         errors = np.abs(np.diff([own["derivatives"][k] for own in cells], axis=0))[0, young] / 2
         assert each["derivative_errors"] == pytest.approx(errors, abs=1e-9) and each["mesh_error"] > 0
-    text = uncertainty.text(found)
+    text = study_tables.scatter_text(found)
     assert "+- cells" in text and "Standard error" not in text
     found["results"][0]["derivative_errors"] = [0.51 * abs(each) for each in found["results"][0]["derivatives"]]
-    assert "half of the slope by material.fibre.young: C11" in uncertainty.text(found)
+    assert "half of the slope by material.fibre.young: C11" in study_tables.scatter_text(found)
     ours = uncertainty.parse(case | {"uncertainty": {"material.fibre.poisson": 0.01}}, Path())
     with pytest.raises(CaseError, match="holds another study of scatter"):
         ours.run(shared_path / "out", comm, comm.size, False, True)

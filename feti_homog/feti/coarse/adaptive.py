@@ -25,7 +25,7 @@ from feti_homog.feti.linalg.distributed_solver import DistributedSolver
 from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, scaled
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.preconditioners import Dirichlet, Preconditioner, StiffnessScaled, never_softens
-from feti_homog.feti.thresholds import COARSE_REGULARISATIONS, DEFAULTS, ZERO_TOLERANCE, Thresholds
+from feti_homog.feti.thresholds import COARSE_REGULARISATIONS, DEFAULTS, ROUNDED_MODE_ENERGY, ZERO_TOLERANCE, Thresholds
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.system.runtime import process_memory
 from feti_homog.typing import Float, Int
@@ -134,8 +134,7 @@ class AdaptiveCoarseSpace:
         energy = distributed_arrays.allreduce_sum(self.comm, energies)[self._modes.reaching]
         if self._free_energy is None:
             largest = self.comm.allreduce(energy.max(initial=0.0), MPI.MAX)
-            # An energy is the square of a displacement.
-            self._free_energy = ZERO_TOLERANCE * np.where(energy > ZERO_TOLERANCE**2 * largest, energy, largest)
+            self._free_energy = ZERO_TOLERANCE * np.where(energy > ROUNDED_MODE_ENERGY * largest, energy, largest)
         # The energy of a free motion is rounding, which the scale would increase beyond the added multiple.
         is_held = energy > self._free_energy
         root = np.sqrt(np.where(is_held, energy, 0.0))

@@ -12,7 +12,6 @@ complement of the face neighbourhood in place of S_s.  The eigenproblems are pro
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from operator import itemgetter
 
 import numpy as np
 from scipy.linalg import eigh
@@ -81,7 +80,7 @@ class SubdomainEigenproblem:
         """Compute soft modes (n, m) without the kernel, from the shares of other subdomains in M^-1."""
         M = self._share.copy()
         # Subdomain order, so that rounding does not depend on the ranks.
-        for s, share in sorted(shares, key=itemgetter(0)):
+        for s, share in sorted(shares, key=lambda part: part[0]):
             M[np.ix_(self.common[s], self.common[s])] += share
         N = jump_energy(self.block.B, self._P, self.block.R, M)
         modes = np.asarray(self._P @ soft_modes(self._regular_S, N, threshold))

@@ -10,13 +10,12 @@ from scipy.spatial import cKDTree
 
 from feti_homog.mesh.outline import lines, outline
 from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE, Curves, Lines, LineStations, Segments, SizedLines
-from feti_homog.mesh.outline.outline import Bridges, OnCircles, Outline
 from feti_homog.mesh.sizes.graded_size import MeshSizes, SizeField, circle_size, size_field
 from feti_homog.microstructure import Arrangement
 from feti_homog.microstructure.shapes import Conics, Discs, Ellipses
 from feti_homog.typing import Bool, Float, Int
 
-NO_BRIDGES = Bridges(np.zeros((0, 2), np.int64), np.zeros(0))
+NO_BRIDGES = outline.Bridges(np.zeros((0, 2), np.int64), np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,7 @@ class BareOutline:
         arrangement: Arrangement,
         sizes: MeshSizes,
         marks: Mapping[int, Sequence[float]],
-        bridges: Bridges | None = None,
+        bridges: outline.Bridges | None = None,
     ) -> BareOutline:
         """Divide the outlines and cell sides into lines, for edges of at most `sizes`.
 
@@ -89,7 +88,7 @@ class BareOutline:
             straight = Segments(*np.zeros((3, 0, 2)))
         return cls(size, curves, disc, around, vertices, circle, SizedLines(arcs, straight, sampling), field)
 
-    def outline(self, stations: LineStations) -> Outline:
+    def outline(self, stations: LineStations) -> outline.Outline:
         """Return the outline with these nodes; opposite sides have the same nodes.
 
         Raises:
@@ -114,7 +113,7 @@ class BareOutline:
         number[is_end] = cKDTree(self.vertices).query(points[is_end])[1]
         ellipses = Ellipses(self.curves.centres, self.curves.frames)
         nodes = np.concatenate([self.vertices, points[~is_end]])
-        return Outline(nodes, replace(curves, node=number[place]), ellipses, self.disc, self.around)
+        return outline.Outline(nodes, replace(curves, node=number[place]), ellipses, self.disc, self.around)
 
     def _sides(self, axis: int) -> Iterator[tuple[Float, Curves]]:
         """Yield the nodes (n, 2), the same on both sides along `axis`, and their curves."""
@@ -144,7 +143,7 @@ class BareOutline:
 
 
 def _arcs(
-    curves: Conics, border: Float, vertices: OnCircles, size: Float
+    curves: Conics, border: Float, vertices: outline.OnCircles, size: Float
 ) -> tuple[tuple[Int, Float, Float], Float, Bool]:
     """Divide curves into arcs; return these, their first points (a, 2), and which are not in `border` (b, 2)."""
     arcs = outline.arcs_within(curves, vertices, size)
@@ -155,7 +154,7 @@ def _arcs(
     return arcs, ends, away
 
 
-def _segments(curves: Discs, bridges: Bridges, caps: Float, field: SizeField) -> Segments:
+def _segments(curves: Discs, bridges: outline.Bridges, caps: Float, field: SizeField) -> Segments:
     """Return the bridges as segments; edges on circles are at most `caps` (k,).
 
     Where elements are not graded, edges are at most as long as the sizes at both ends, interpolated, as in gmsh across

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
 from feti_homog.mesh.outline.lines import Lines
 from feti_homog.mesh.outline.outline import TURN
 from feti_homog.mesh.sizes import graded_size
-from feti_homog.mesh.sizes.graded_size import MAX_GROWTH, Source
 from feti_homog.microstructure import Arrangement, arrangements
 from feti_homog.microstructure.shapes import Ellipses, convex_sums, directions, gaps
 from feti_homog.typing import Float, Int
@@ -95,11 +93,11 @@ def size_field(
     nearest = offset[np.argmin(np.linalg.norm(offset, axis=1))]
     to_corner = min(graded_size.PASSAGE_EDGE * float(np.linalg.norm(nearest)), largest)
     sources = [
-        (points, caps, np.full(len(points), MAX_GROWTH)),
+        (points, caps, np.full(len(points), graded_size.MAX_GROWTH)),
         _between(ellipses[np.sort(np.unique(disc, return_index=True)[1])], size, largest),
         *_beside_sides(ellipses, size, largest),
-        (crossings, np.minimum(sharp, largest), np.full(len(crossings), MAX_GROWTH)),
-        (np.stack([nearest, np.zeros(2)]), np.full(2, to_corner), np.full(2, MAX_GROWTH)),
+        (crossings, np.minimum(sharp, largest), np.full(len(crossings), graded_size.MAX_GROWTH)),
+        (np.stack([nearest, np.zeros(2)]), np.full(2, to_corner), np.full(2, graded_size.MAX_GROWTH)),
         graded_size.at_vertices(vertices, size),
     ]
     lines = None
@@ -108,7 +106,7 @@ def size_field(
     return graded_size.SizeField(sources, size, largest, lines)
 
 
-def _between(ellipses: Ellipses, size: Float, largest: float) -> Source:
+def _between(ellipses: Ellipses, size: Float, largest: float) -> graded_size.Source:
     """Return the facing points of near fibres as sources of sizes."""
     first, second, vector = arrangements.neighbours(ellipses.centres, size, 2 * ellipses.longest.max() + largest)
     one = ellipses[first]
@@ -122,9 +120,9 @@ def _between(ellipses: Ellipses, size: Float, largest: float) -> Source:
     return places, np.tile(length[narrow], 2), np.tile(growth[narrow], 2)
 
 
-def _beside_sides(ellipses: Ellipses, size: Float, largest: float) -> Iterator[Source]:
+def _beside_sides(ellipses: Ellipses, size: Float, largest: float) -> Iterator[graded_size.Source]:
     """Yield as sources where ellipses come near a side: extreme points and their feet."""
-    for axis, sign in product((0, 1), (-1.0, 1.0)):
+    for axis, sign in ((0, -1.0), (0, 1.0), (1, -1.0), (1, 1.0)):
         normal = np.zeros((len(ellipses), 2))
         normal[:, axis] = sign
         extreme = ellipses.facing(normal)

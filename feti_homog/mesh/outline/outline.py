@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -65,7 +64,7 @@ def images(arrangement: Arrangement) -> tuple[Conics, Int, Int]:
     Periodic images are listed separately, fibre by fibre and image by image, each from without.
     """
     size, outlines, outer = arrangement.size, arrangement.outlines, arrangement.outer
-    steps = np.array(list(product((-1, 0, 1), repeat=2)))
+    steps = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)])
     fibre = np.repeat(arrangement.order, len(steps))
     centres = outlines.centres[fibre] + np.tile(steps, (len(outlines), 1)) * size
     outside = np.abs(centres - np.clip(centres, 0, size))

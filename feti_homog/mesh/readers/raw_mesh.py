@@ -1,7 +1,5 @@
 """Assemble the triangles of a file, with three or six nodes, as one mesh; quadrilaterals are cut in two."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 

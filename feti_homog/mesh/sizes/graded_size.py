@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -76,7 +75,7 @@ def passage_growth(width: Float, curvature: Float) -> Float:
 def _at_sides(circles: Float, size: Float, caps: Float, largest: float) -> Iterator[Source]:
     """Yield as sources where circles come near a side: extreme points, feet, crossings."""
     centres, radii = circles[:, :2] % size, circles[:, 2]
-    for axis, sign in product((0, 1), (-1.0, 1.0)):
+    for axis, sign in ((0, -1.0), (0, 1.0), (1, -1.0), (1, 1.0)):
         distance = centres[:, axis] if sign < 0 else size[axis] - centres[:, axis]
         extreme, foot = centres.copy(), centres.copy()
         extreme[:, axis] += sign * radii

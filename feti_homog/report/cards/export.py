@@ -18,9 +18,8 @@ components 11, 22, 33, 23, 13, 12 of a tensor, so half of the engineering shears
 
 import csv
 import io
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -28,7 +27,7 @@ from feti_homog.errors import CaseError
 from feti_homog.materials import engineering_constants
 from feti_homog.report.cards import effective_material
 from feti_homog.results import result_json
-from feti_homog.typing import Float
+from feti_homog.typing import Document, Float
 
 FIELD, FIELDS = 20, 8  # characters of a number and numbers of a line, of Abaqus
 TENSOR_SHEARS = np.array([1.0, 1.0, 1.0, 0.5, 0.5, 0.5])
@@ -212,7 +211,7 @@ FORMATS: dict[str, Callable[[effective_material.EffectiveMaterial], str]] = {
     "moose": moose,
     "csv": csv_table,
 }
-SYMMETRIES: dict[str, Callable[[Mapping[str, Any]], effective_material.EffectiveMaterial]] = {
+SYMMETRIES: dict[str, Callable[[Document], effective_material.EffectiveMaterial]] = {
     "orthotropic": effective_material.in_axes_of_the_cell,
     "transversely isotropic": effective_material.nearest_transversely_isotropic,
 }

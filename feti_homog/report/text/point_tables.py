@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import cos, radians, sin
-from operator import itemgetter
 from textwrap import wrap
 from typing import Any
 
@@ -116,7 +115,7 @@ def envelope_table(document: Document, limit: int = ENVELOPE_ROWS) -> Table:
     if not broken:
         return Table(title, [], [], above)
     for extreme, choose in (("least", min), ("largest", max)):
-        point = choose(broken, key=itemgetter("factor"))
+        point = choose(broken, key=lambda point: point["factor"])
         above.append(f"  {extreme:<9}{point['factor']:.7g} at {point['angle']:g} degrees")
     names = [name for name in ONSET if name in broken[0]]
     used = "traction / strength" if "normal" in names else "psi of its traction"
