@@ -75,7 +75,9 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
 
 
 def _events_in_checkpoint(context: AnalysisContext, law: BondLaw) -> int:
-    """Count the valid checkpoint events; drop them unless the run resumes.  Collective.
+    """Count the checkpoint events from which the run goes on, and drop all others.  Collective.
+
+    A run that does not resume drops all; otherwise the events before the first invalid one count.
 
     Raises:
         CaseError: the checkpoint cannot be used.

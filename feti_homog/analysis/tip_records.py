@@ -87,7 +87,7 @@ def tips(context: AnalysisContext, law: BondLaw, point: path_points.Point) -> Ti
 
 
 def _sections(cell: unit_cell.TornCell, pair: Float | Int) -> tuple[int, ...] | None:
-    """Return [[interface]] section numbers, from 1; None if there is one."""
+    """Return the [[interface]] section numbers, from 1, of `pair`; None if the case has at most one section."""
     return tuple((pair + 1).astype(int).tolist()) if len(cell.case.interfaces) > 1 else None
 
 

@@ -113,9 +113,11 @@ def _chunks(numbers: Int, size: int) -> list[Int]:
 def _affine(
     macro: MacroElement, mesh: FineMesh, part: Int, tensor: Float, mixed: Float | None
 ) -> tuple[Float, Float, float]:
-    """Compute couples (t, p, c^2), loads (t, q, 2) and area of affine coarse triangles, on the unit triangle.
+    """Integrate affine coarse triangles on the unit triangle; `mixed` is the stiffness of mixed elements.
 
-    With a stiffness `mixed`, the elements are mixed.
+    Returns:
+        Stiffness blocks (t, p, c^2) of the p coupled pairs of nodes, integrals (t, q, 2) of the shape function
+        gradients, and the total area.
     """
     g, w = gradients(mesh.points[mesh.nodes[part, :3]])
     # The last two of the three linear functions are the reference coordinates: inverse_rk = dr_r / dx_k.

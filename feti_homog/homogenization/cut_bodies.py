@@ -135,7 +135,11 @@ def border_lines(s: Submesh, mesh: FineMesh, classes: Int32) -> tuple[Int, Int, 
 def fits_across_cuts(
     shared: SharedVertices, bodies: Sequence[stress_recovery.RecoveredStress]
 ) -> dict[int, tuple[Int, Float]]:
-    """Return, by mesh, the vertex classes (n,) and fits (n, p, m k) that cuts change.  Collective."""
+    """Fit recovered stresses at vertices on or next to cuts, over all pieces.  Collective.
+
+    Returns:
+        For each mesh index, the vertex classes (n,) and their fits (n, p, m k).
+    """
     pieces = zip(shared.meshes, shared.classes, shared.sides, shared.is_first, strict=True)
     strips = [_Strip.of(bodies[mesh], classes, sides, first) for mesh, classes, sides, first in pieces]
     patches = _over_pieces(shared, strips, [strip.stress.patch_sums() for strip in strips])

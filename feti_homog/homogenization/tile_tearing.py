@@ -220,7 +220,11 @@ def _assigned(load: Int, neighbours: list[tuple[Int, Int, Int, Int]], n_ranks: i
 
 
 def tiled_cell(case: Case, noded: gmsh_mesher.NodedCell) -> tuple[Int, Int, Int]:
-    """Return facts about a tiled cell: `cell_remarks.pairs_of`, `Torus.nesting`, shared coarse edges (constituents,).
+    """Return the interface numbers, nesting and edge counts of a tiled cell.
+
+    Returns:
+        Interface numbers (phases, phases) as from `cell_remarks.pairs_of`; ranks (constituents,) as `Torus.nesting`;
+        and the number (constituents,) of coarse edges that each constituent shares with others.
 
     Raises:
         CaseError: an interface is between phases that do not touch.

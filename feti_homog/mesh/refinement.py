@@ -78,7 +78,7 @@ class ReferenceLattice:
         return (self.intervals // self.order).bit_length() - 1
 
     def coarser(self, fewer: int = 1) -> ReferenceLattice:
-        """Return the lattice with `fewer` halvings less."""
+        """Return the lattice that is halved `fewer` times less often."""
         return ReferenceLattice.of(self.halvings - fewer, self.order)
 
     def within(self, finer: ReferenceLattice) -> Int:

@@ -62,7 +62,7 @@ def fibre_part(cell: unit_cell.TornCell) -> FibrePart:
 
 
 def interface_part(cell: unit_cell.TornCell) -> InterfacePart:
-    """Return the interface nodes with multipliers of this rank. Collective."""
+    """Return the interface nodes whose multipliers this rank owns.  Collective."""
     jumps, nodes = cell.jumps, cell.jumps.nodes
     first = cell.comm.exscan(sum(len(s.mesh.points) for s in cell.parts)) or 0
     numbers = first + cell.class_nodes

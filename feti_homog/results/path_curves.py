@@ -35,7 +35,7 @@ def named_components(document: Document) -> list[int]:
 
 
 def _given(document: Document) -> list[load_sections.Strain | load_sections.MixedLoad]:
-    """Return the loads of a case, without the components that they leave out."""
+    """Return the loads as the case in `document` gives them, with no component filled in."""
     section = document["case"].get("path") or document["case"]["load"]
     as_written = section.get("waypoints") or [section[name] for name in ("strain", "to") if name in section]
     return [load_sections.MixedLoad(**load) if isinstance(load, Mapping) else tuple(load) for load in as_written]

@@ -56,7 +56,7 @@ def collect(directory: Path, pictures: bool) -> list[str]:
 
 
 def write(directory: Path, table: SweepTable) -> list[Path]:
-    """Write cases.csv and statistics.csv, each in one step; returns their paths.  On one rank.
+    """Write cases.csv and statistics.csv atomically, and return their paths.  On one rank.
 
     Raises:
         FetiHomogError: a file cannot be written.

@@ -56,7 +56,10 @@ class Faces:
         return np.stack([np.bincount(self.row[on_face], column, k) for column in values[on_face].T], axis=1)
 
     def means(self, values: Float, of_fibre: bool) -> Float:
-        """(k, c) means of values (b, c) over the subdomains on one face; NaN without any."""
+        """Average values (b, c) over the subdomains on one face.
+
+        Returns the means (k, c) at the interface nodes, NaN where the face has no subdomain.
+        """
         share = 1.0 / self.copies[:, None]
         with np.errstate(invalid="ignore"):
             return self.sums(values * share, of_fibre) / self.sums(np.ones_like(values) * share, of_fibre)

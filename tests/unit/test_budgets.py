@@ -16,24 +16,24 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 # Lines, of the modules beside the packages under ".".
 LINES = {
     ".": 467,
-    "analysis": 2996,
+    "analysis": 2998,
     "case": 2815,
     "commands": 542,
-    "fem": 1148,
-    "feti": 6391,
-    "homogenization": 3208,
-    "interface": 4004,
+    "fem": 1150,
+    "feti": 6395,
+    "homogenization": 3215,
+    "interface": 4005,
     "materials": 1429,
-    "mesh": 5820,
-    "microstructure": 2102,
-    "report": 3417,
+    "mesh": 5825,
+    "microstructure": 2103,
+    "report": 3419,
     "results": 2379,
     "schema": 432,
-    "studies": 2926,
+    "studies": 2925,
     "system": 1803,
-    "verify": 3220,
+    "verify": 3223,
 }
-FILES, TOTAL = 290, 45100
+FILES, TOTAL = 290, 45125
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 10.2, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

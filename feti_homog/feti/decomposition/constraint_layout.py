@@ -25,15 +25,15 @@ class Meshed(Protocol):
 
 @dataclass(frozen=True)
 class InterfaceNodes:
-    """The breakable nodes of which a rank owns the multipliers, i = 0..k-1.
+    """The k breakable nodes whose multipliers a rank owns.
 
     Attributes:
-        row: (k,) first local row of the bond.  In the plane this is the normal row, and the tangential row follows.
+        row: (k,) first local row of the bond: in the plane the normal row, before the tangential row.
         points: (k, 2) position on the fibre.
         normal: (k, 2) unit normal from the inner to the outer body; the tangent is (-n_y, n_x).
         length: (k,) tributary interface length: traction = nodal force / length.
-        fibre: (k,) constituent.
-        pair: (k,) interface number of the case.
+        fibre: (k,) constituent number of the fibre.
+        pair: (k,) number of the interface in the case.
         bodies: (k, 2) outer body and fibre body.
         precracked: (k,) whether the node is debonded in the mesh.
         fibre_node: (k,) number of the fibre's node copy among the fine nodes of this rank.

@@ -101,9 +101,13 @@ def interface_geometry(
 
 
 def _check(meshes: SubmeshesOfRank, sharers: Sharers, normals: Float, sums: Float) -> None:
-    """Raise MeshError if a normal is zero or not finite, or if sides are folded onto each other.
+    """Raise MeshError if an interface entity has no usable normal.
 
-    The normals of folded sides cancel; `normals` (n, 2, 2) and `sums` (n, 4) as in `interface_geometry`.
+    A normal is unusable if it is zero or not finite, or if the interface folds back onto itself at a vertex.
+
+    Args:
+        normals: (n, 2, 2) normals at both ends of each entity.
+        sums: (n, 4) sums over the edges at a vertex: normal times length (2), length, number of bonded edges.
     """
     length = np.linalg.norm(normals, axis=2)
     folded = ~sharers.is_edge & ~(np.hypot(*sums[:, :2].T) > ZERO_TOLERANCE * sums[:, 2])

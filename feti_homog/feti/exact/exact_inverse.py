@@ -75,7 +75,7 @@ class ExactInverse(Preconditioner):
         self._restart()
 
     def soften(self, more: Float) -> None:
-        """Let springs have `more` compliance (owned rows,) than at first, from the next `activate` on."""
+        """Add `more` compliance (owned rows,) to the initial one, from the next `activate` on."""
         self._next = more
 
     def activate(self, active: Float) -> None:

@@ -95,10 +95,11 @@ class StatusSystem:
         return int(np.prod(np.sign(lu.diagonal()))) * (-1 if swaps % 2 else 1)
 
     def solve(self, x: Float, rhs: Float) -> tuple[Float, bool]:
-        """Solve for x (m,) with the right-hand side (m,), and return whether x is a solution.
+        """Solve for x (m,), and return whether x is a solution.
 
-        The start x has the prescribed entries, and free motions keep their amplitude in it.  If forces drive a free
-        motion, no solution exists: then springs of the stiffness HELD bear these forces.
+        The argument x is the start: it holds the prescribed entries, and free motions keep their amplitude in the
+        start.  If the right-hand side `rhs` (m,) drives a free motion there is no solution: springs of stiffness HELD
+        bear the forces.
         """
         start, x = x, x.copy()
         if self._factor is None:

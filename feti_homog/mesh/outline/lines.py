@@ -65,10 +65,10 @@ class Curves:
 
 
 class Lines:
-    """c lines, whose attributes are arrays (c, ...).
+    """Base class of c lines; each attribute is an array (c, ...).
 
     Attributes:
-        cap: (c, 2) longest edge at both ends, linear between them.
+        cap: (c, 2) longest allowed edge at the two ends of each line; it varies linearly between them.
     """
 
     cap: Float

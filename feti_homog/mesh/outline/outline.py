@@ -159,9 +159,10 @@ def arcs_within(curves: Conics, vertices: OnCircles, size: Float) -> tuple[Int, 
 
 
 def tip_vertices(arrangement: Arrangement, marks: Mapping[int, Sequence[float]], vertices: Float) -> Float:
-    """Return the vertices (t, 2) that marks in degrees have become; missing curves have none.
+    """Find the vertices (t, 2) at the marked angles on fibre curves.
 
-    Mark k is on the outer curve of fibre k, ~k on the curve within its coating.
+    `marks` has angles in degrees by curve: k is the outer curve of fibre k, ~k the curve within its coating.  Marks on
+    curves that do not exist are left out.
     """
     names = {*range(len(arrangement.radii)), *(~np.flatnonzero(arrangement.coated)).tolist()}
     pairs = [(name, mark) for name, angles in marks.items() if name in names for mark in angles]

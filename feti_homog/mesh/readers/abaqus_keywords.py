@@ -70,10 +70,12 @@ class KeywordBlock:
 
     @classmethod
     def begun(cls, number: int, line: str) -> KeywordBlock:
-        """Begin the block of a keyword line: *ELEMENT, TYPE=CPE3 has the parameter TYPE.
+        """Begin a block with the keyword and parameters of its line.
+
+        For example, *ELEMENT, TYPE=CPE3 has the keyword ELEMENT and the parameter TYPE.
 
         Raises:
-            MeshError: the keyword is unknown, or a parameter that is not read may matter.
+            MeshError: the keyword is unknown, or the reader ignores a parameter that may matter.
         """
         word, *rest = (part.strip() for part in line[1:].split(","))
         try:

@@ -66,12 +66,13 @@ class Grid:
 def mesh_of(grid: Grid) -> RawMesh:
     """Convert a grid into triangles and lines.
 
-    Its cell data `phase` are 0 in the matrix, 1 in phase fibre, k in fibre:k; in their place groups come from one of
-    NUMBERS, or from the only cell data of whole numbers. Cell data `debonded`, if there are any, are 1 on lines
-    that are debonded from the start; other lines are curves by their numbers, or `line` beside phases.
+    The cell data `phase` are 0 in the matrix, 1 in phase fibre, k in fibre:k.  Without them, triangles are grouped by
+    the first of NUMBERS in the grid, otherwise by its only cell data of whole numbers.  The optional cell data
+    `debonded` are 1 on lines that are debonded from the start.  All other lines form one curve for each number or,
+    beside phases, a single curve `line`.
 
     Raises:
-        MeshError: it has other cells or no phases, or is damaged.
+        MeshError: the grid has other cells or no phases, or is damaged.
     """
     if faults := _misfits(grid):
         raise MeshError(*faults)

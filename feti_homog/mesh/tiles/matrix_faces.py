@@ -84,11 +84,12 @@ def centre_lines(circles: Float, which: Int) -> CentreLines:
 
 
 def bridges(lines: CentreLines, size: Float, margin: float, largest: float, vertices: OnCircles) -> Bridges:
-    """Choose bridges among the centre lines, clear of third discs and cell sides.
+    """Choose bridges among the centre lines, clear of other discs and sides.
 
-    Bridges on one disc are LEAST_ANGLE from each other and from its `vertices`; of two that are too near, the shorter
-    one stays. Their ends are `margin` away from the sides, and their middles by a `largest` edge or their length: good
-    triangles beside a side need room.
+    On one disc, bridges are at least LEAST_ANGLE apart and as far from its `vertices`; of two bridges that are too
+    close the shorter one stays.  Good triangles near a cell side need room: the ends of a bridge are more than `margin`
+    from the sides, and its middle is farther from them than `largest` or than the length of the bridge, whichever is
+    less.
     """
     middle = lines.facing.mean(axis=1)
     away, ends_away = (np.minimum(points, size - points) for points in (middle, lines.facing))
@@ -162,12 +163,12 @@ class HalfLines:
 
 @dataclass(frozen=True)
 class MatrixTiles:
-    """Tiles in the matrix next to discs.
+    """The tiles, cells of a grid, of the matrix faces beside discs.
 
     Attributes:
         lines: half-lines that divide the matrix: side pieces, then bridges.
-        tile: (h,) on the left of each.
-        alone: (n,) tile around a disc without such lines; NOWHERE where there are some.
+        tile: (h,) tile on the left of each half-line.
+        alone: (n,) tile around each disc without half-lines; NOWHERE for all other discs.
     """
 
     lines: HalfLines

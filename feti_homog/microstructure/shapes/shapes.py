@@ -50,9 +50,10 @@ def outlines_of(rows: Columns) -> Outlines:
 
 
 def with_parts(outlines: Outlines, parts: Sequence[tuple[Bool, Outlines]]) -> Outlines:
-    """Replace the outlines in the rows (N,) of each part.
+    """Replace the outlines in the rows that each part selects.
 
-    Returns discs or ellipses where these suffice, else sums.
+    A part has a mask (N,) of rows and their outlines.  Returns `Discs` or `Ellipses` where these suffice, otherwise
+    `ConvexSums`.
     """
     parts = [(mask, part) for mask, part in parts if mask.any()]
     if not parts:

@@ -114,9 +114,11 @@ def _count(number: int, one: str, many: str) -> str:
 
 
 def write_fibre_numbers(axes: Axes, cell: drawn_cell.DrawnCell, inches: float, factors: Array | None = None) -> None:
-    """Write each fibre's number on it; on every part of a round fibre cut by the cell sides.
+    """Write each fibre's number on it, and on every part of a round fibre that the cell sides cut.
 
-    `inches` is a length unit in the picture; below the numbers stand `factors` (f,), if there are any.
+    Args:
+        inches: inches in the picture per unit of length.
+        factors: (f,) values to write below the numbers, if any.
     """
     fibres, drawn = cell.file["fibre"], cell.drawn
     if len(fibres["number"]) > 2000:  # none could be read

@@ -159,7 +159,7 @@ class LoadLabels:
 
     @classmethod
     def of(cls, document: Document) -> LoadLabels:
-        """Read leading component and load from a result.json."""
+        """Make the load labels from the document of a result.json."""
         analysis = reported(document)
         if analysis.is_followed:
             largest = np.abs([point["stress"] for point in document[analysis.name]]).max()

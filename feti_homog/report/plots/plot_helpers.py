@@ -203,7 +203,7 @@ def nodal_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
 
 
 def bond_limits(case: Document) -> list[str]:
-    """Describe each interface law in a line; several laws with their phases."""
+    """Describe each interface law in one line; with its phases if there are several laws."""
     bonds, output = path_curves.interface_sections({"case": case}) or [{}], case.get("output", {})
     stress, length = output.get("stress_unit", ""), output.get("length_unit", "")
     units = stress, f"{stress} {length}" if stress and length else ""
