@@ -192,7 +192,7 @@ def measure(cell: Cell, space: str, comm: MPI.Intracomm, thresholds: Thresholds 
     start = time.perf_counter()
     case = cell.case(space)
     with case_options(case.petsc):
-        torn = tear(case, comm, Progress(comm, quiet=True), thresholds=thresholds)
+        torn = tear(case, comm, Progress(comm, quiet=True), thresholds)
         solver = torn.solver
         solutions = solver.solve_many(np.eye(3), np.zeros((solver.rows, 3)))
     boundary = comm.allreduce(max((len(d) for d in solver.interface_operators.dofs), default=0), MPI.MAX)

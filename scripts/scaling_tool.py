@@ -227,7 +227,7 @@ def _coarse(
     right, motions = (np.ones((n, LOADS)) for n in (coarse.part().shape[0], len(natural.unknowns)))
     right[1::2] = -1.0
     solve = fastest(lambda: coarse.solve(right))
-    natural_solve = fastest(lambda: natural.solve(natural.solve(motions)))
+    natural_solve = fastest(lambda: natural.solver.solve(natural.solver.solve(motions)))
     inner = coarse.solver.iterations
     part = coarse.part()
     process_memory.forget_peak()

@@ -114,8 +114,8 @@ class PrimalTest:
         self._jump_stall, self._force_stall = Stall(STALL_ITERATIONS), Stall(FORCE_STALL_ITERATIONS)
 
     def is_met(self, rtol: float, jump: float, forces: float) -> bool:
-        """Return whether norms of the jump and of the forces are both below rtol."""
-        return jump <= rtol * self.jump_scale and forces <= rtol * self.force_scale
+        """Return whether norms of the jump and of the forces are both below rtol, or the jump is zero."""
+        return jump == 0.0 or (jump <= rtol * self.jump_scale and forces <= rtol * self.force_scale)
 
     def __call__(self, ksp: PETSc.KSP, iteration: int, residual: float) -> PETSc.KSP.ConvergedReason:
         """Test for convergence; `residual` is the norm |P H r|.  Collective."""

@@ -75,7 +75,7 @@ class SpringUpdated(Preconditioner):
         """Update `inner`, which is H with all rows active; other arguments as of `SpringUpdate`.  Collective."""
         self._comm, self._inner, self._first = comm, inner, first
         self._left_out = self._compliance = compliance
-        self.is_exact = inner.is_exact
+        self.is_exact, self.norm = inner.is_exact, inner.norm  # softer springs make |H| smaller
         self._update = SpringUpdate(comm, first, compliance, inner.apply)
 
     def soften(self, more: Float) -> None:

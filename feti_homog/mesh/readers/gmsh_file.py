@@ -123,7 +123,7 @@ def raw_mesh(content: MshContent) -> RawMesh:
     elements, none = content.elements, np.zeros((0, 2), np.int64)
     lines = [elements[kind] for kind in LINES if kind in elements]
     named = {name for (dimension, _), name in content.names.items() if dimension == 1}
-    curves = dict.fromkeys(named & {DEBONDED}, none)
+    curves = dict.fromkeys(named & {DEBONDED}, none)  # refused below if it has no lines
     members = {(group, number) for (d, number), some in content.groups.items() if d == 1 for group in some}
     for group, number in sorted(members):
         name = content.name(1, group)
@@ -232,8 +232,8 @@ def _faults(content: MshContent) -> list[str]:
         twice = np.unique(ordered[1:][ordered[1:] == ordered[:-1]])
         if len(twice):
             faults.append(f"{name} {first_of(map(str, twice), len(twice))}: the number is there twice")
-    kinds = sorted({*content.elements} - {POINT, *LINES})
-    for kind in (kind for kind in kinds if kind not in TRIANGLES and not faults):
+    kinds = {*content.elements} - {POINT, *LINES}
+    for kind in [] if faults else sorted(kinds - {*TRIANGLES}):
         numbers, nodes, _ = content.elements[kind]
         centre = content.points[np.isin(content.tags, nodes[0])].mean(axis=0)
         faults.append(

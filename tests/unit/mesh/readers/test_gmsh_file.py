@@ -1,5 +1,6 @@
 """The reader of .msh files: every form that gmsh writes, names, faults."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -238,6 +239,18 @@ def test_faults_of_the_format_are_named(name, tmp_path):
     with pytest.raises(MeshError) as caught:
         read(tmp_path / "a.msh")
     assert caught.value.faults[0].startswith("a.msh: ") and message in caught.value.faults[0]
+
+
+def test_every_kind_of_unusable_elements_is_named(tmp_path):
+    mesh = grid()
+    nodes = list(mesh.nodes)[:5]
+    solids = {901: (4, 1, 1, tuple(nodes[:4])), 902: (7, 1, 1, tuple(nodes))}
+    replace(mesh, elements=mesh.elements | solids).write(tmp_path / "a.msh")
+    with pytest.raises(MeshError) as caught:
+        gmsh_file.load(tmp_path / "a.msh")
+    tetrahedra, pyramids = caught.value.faults
+    assert tetrahedra.startswith("element 901 at ") and "Tetrahedron" in tetrahedra
+    assert pyramids.startswith("element 902 at ") and "Pyramid" in pyramids
 
 
 def test_sections_without_nodes_and_elements_are_passed_over(tmp_path):
