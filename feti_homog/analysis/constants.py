@@ -207,10 +207,10 @@ def _note_bounds(
 def state_error(
     context: AnalysisContext, responses: Sequence[averaging.Response]
 ) -> tuple[dict[str, float], list[averaging.Response]]:
-    """Estimate the relative energy error of one state, `mesh_error`.  Collective.
+    """Estimate the mesh error of the energy of one state.  Collective.
 
-    Also returns the responses, with the error of each element where a later step uses it.  There is no error if the
-    case has `mesh_error = false`.
+    Returns `mesh_error`, the error over the energy, by its name (nothing if the case has `mesh_error = false`), and the
+    responses, with the error of each element where a later step uses it.
     """
     if not context.case.output.mesh_error:
         return {}, list(responses)
@@ -244,7 +244,7 @@ def energy_error(stiffness: Float, errors: list[mesh_estimate.EnergyErrors]) -> 
 
 
 def _secants(errors: Sequence[mesh_estimate.EnergyErrors], name: str) -> dict[str, Float]:
-    """Return errors of one kind, from PARTS, in `effective_stiffness` and `thermal_stress`."""
+    """Return one part of the errors, `name` of PARTS, in `effective_stiffness` and `thermal_stress`."""
     if not errors:
         return {}
     entries = phase_laws.secants(*(getattr(error, name) for error in errors))

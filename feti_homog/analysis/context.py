@@ -1,4 +1,4 @@
-"""The state of one analysis run: the cell under its loads, checks, recorded states, points and progress."""
+"""Everything that one run of an analysis uses: the cell under its loads, checks, recorders and progress."""
 
 from __future__ import annotations
 

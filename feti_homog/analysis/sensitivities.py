@@ -1,4 +1,4 @@
-"""Derivatives of a stiffness and its constants, and of one state, by the constants of the case."""
+"""Derivatives by the constants of the case, of a stiffness with its constants or of one state."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

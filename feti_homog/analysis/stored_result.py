@@ -25,9 +25,9 @@ def read(directory: Path) -> dict[str, Any]:
 
 
 def check_to_draw(directory: Path) -> None:
-    """Check that `directory` has the files of one run for a picture.  Call on one rank.
+    """Check that the files in `directory` can be drawn: they belong to one run.  Call on one rank.
 
-    result.h5 must be there; result.json may be missing.
+    The file result.h5 is required, result.json is optional.
 
     Raises:
         CaseError: result.h5 is missing, or a file is damaged, or from another program or run.

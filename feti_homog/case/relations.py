@@ -17,7 +17,7 @@ from feti_homog.schema import TableReader, keys, wording
 # Relative tolerance between a softening branch and the keys that repeat its numbers.
 SAME = 1e-6
 COMMON = tuple(name for name, entry in keys.keys_of(InterfaceSection).items() if not entry.by_pair)
-"""Keys that must have the same value in all [[interface]] sections."""
+"""Keys with one value for all interfaces: every [[interface]] section must repeat it."""
 
 
 def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], plane: str | None) -> list[str]:

@@ -166,7 +166,7 @@ class Krylov:
         active: ActiveRows,
         columns: int,
     ) -> None:
-        """Set up; `vector` is a multiplier vector with the layout of one load case.  Collective."""
+        """Create the KSP for `columns` load cases, each with the layout of `vector`.  Collective."""
         self._columns = columns
         owned_rows, all_rows = vector.getSizes()
         sizes = (owned_rows * columns, all_rows * columns)

@@ -14,9 +14,8 @@ from feti_homog.report.text import point_tables, tables
 from feti_homog.results import atomic
 from feti_homog.studies import case_folders
 from feti_homog.studies.outputs import numbers, outputs
-from feti_homog.studies.sweep_table import SweepTable
+from feti_homog.studies.sweep_table import PARTS, SweepTable
 
-PARTS = ("count", "mean", "std", "ci95")
 COUNTS = ("refine", "elements", "nodes", "ranks", "subdomains", "dofs", "multipliers", "iterations", "memory")
 CASE = ("folder", "point", "realisation", "status", "reason")
 

@@ -15,6 +15,7 @@ from feti_homog.results import path_curves
 from feti_homog.typing import Document, Float
 
 CONFIDENCE = 0.95
+PARTS = ("count", "mean", "std", "ci95")
 CURVE_POINTS = 401  # strains at which curves are averaged
 
 
@@ -53,11 +54,10 @@ class SweepTable:
     @cached_property
     def statistics(self) -> dict[str, Statistics]:
         """By output, over the realisations of each point."""
-        parts = ("count", "mean", "std", "ci95")
         statistics = {}
         for name, values in self.outputs.items():
             samples = [Statistics.of(values[self.rows(point)]) for point in self.points]
-            statistics[name] = Statistics(*(np.array([getattr(each, part) for each in samples]) for part in parts))
+            statistics[name] = Statistics(*(np.array([getattr(each, part) for each in samples]) for part in PARTS))
         return statistics
 
     @property

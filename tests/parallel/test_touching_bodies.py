@@ -186,6 +186,7 @@ def test_influence_columns_are_the_inverse_where_three_bodies_meet(comm: Any, sh
     F, N = dense.F + np.diag(gathered(cell, cell.solver.operator.compliance)), null_space(dense.G.T)
     expected = N @ np.linalg.solve(N.T @ F @ N, N.T)
     assert relative_error(matrix(cell, cell.solver.preconditioner.apply), expected) < 1e-10
+    assert np.linalg.norm(expected, 2) <= cell.solver.preconditioner.norm
 
 
 @pytest.mark.parametrize("apart", [0.0, 1e-12])

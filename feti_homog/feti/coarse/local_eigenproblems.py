@@ -30,7 +30,7 @@ SINGLE_PRECISION_NULL = 10 * np.finfo(np.float32).eps
 
 @dataclass(frozen=True)
 class SubdomainBlocks:
-    """The matrices of one subdomain on the rows at its nodes.
+    """Matrices of one subdomain, on the constraint rows that act on it.
 
     Attributes:
         subdomain: the subdomain.

@@ -170,7 +170,7 @@ class _Exchange:
 
 
 class NodeBlocks:
-    """A matrix that couples only multipliers at the same fine node, as small dense blocks.
+    """A block-diagonal matrix with one dense block for the multipliers at each fine node.
 
     Attributes:
         rows: number of rows that this rank owns.

@@ -16,10 +16,10 @@ from feti_homog.typing import Float, Int
 
 @dataclass(eq=False)
 class Subdomain:
-    """A piece of one body, or of several bonded bodies: n node classes, c displacements each, kernel dimension k.
+    """One subdomain: a piece of a body or of several bonded bodies.
 
-    K is by far the largest part.  The matrix that `build` assembles stays until the first call of `take_stiffness`,
-    whose caller then owns it; later calls assemble K anew.
+    It has n node classes with c displacements each, and a kernel of dimension k.  K is by far the largest part:
+    `build` assembles it, the first `take_stiffness` hands it over to its caller, and later calls assemble it anew.
 
     Attributes:
         submesh: the coarse share.
@@ -166,10 +166,10 @@ class Subdomain:
 
     @property
     def compressible_share(self) -> float:
-        """Fraction of the diagonal of K that scales jumps: of a phase with the same mu and lambda <= 2 mu.
+        """Fraction to which the diagonal of K is reduced where it scales jumps.
 
-        1 for several materials, none of which is nearly incompressible.
-        A boundary that keeps the volume is as stiff as mu, but single nodes of mixed elements are as lambda.
+        A boundary that keeps the volume is as stiff as mu, but single nodes of mixed elements are as stiff as lambda:
+        here lambda is at most 2 mu.  The fraction is 1 for several materials, of which none is nearly incompressible.
         """
         if not self.is_mixed or self.material is not None:
             return 1.0
@@ -244,7 +244,7 @@ def label(submesh: Submesh) -> str:
 
 
 def _pinned(K: csr_matrix, problem: Problem, pinned: int) -> csr_matrix:
-    """Replace rows and columns of the node `pinned` in K by those of a multiple of I; none for -1."""
+    """Pin a node: set its rows and columns in K to those of a multiple of I.  -1 pins no node."""
     if pinned < 0:
         return K
     dofs, largest = problem.dofs(np.array([pinned])), K.diagonal().max()

@@ -60,7 +60,7 @@ class ExactInverse(Preconditioner):
         self._first, end = jump_operator.owned
         self._rows = end - self._first
         self.stiffness = np.concatenate(comm.allgather(stiffness_of_rows(operators)))
-        # K <= n diag(K) for the n displacements of an element.
+        # K <= n diag(K) for the n displacements of an element; tests measure the bound where bodies meet.
         displacements = max((s.mesh.triangles.shape[1] * s.problem.components for s in operators.subdomains), default=0)
         self.norm = max(comm.allgather(displacements)) * self.stiffness.max(initial=0.0)
         self._one_sided = one_sided_jumps(operators)
@@ -211,7 +211,7 @@ class ExactInverse(Preconditioner):
         return self.reference.respond(distributed_arrays.scale_rows(self.reference.active, g)) + at_rest
 
     def multipliers(self, d: Float, E: Float) -> Float:
-        """Compute H d E for d (owned rows, v), the same at every call, and E (v, k).  Collective."""
+        """Compute H d E for E (v, k); d (owned rows, v) must be the same in every call.  Collective."""
         return distributed_arrays.scale_rows(self._active, self.renew_answer(d) @ E)
 
     def answer(self, d: Float, E: Float, free: int = 0) -> tuple[Float, Float] | None:

@@ -224,9 +224,9 @@ def check_lapack(routine: str, info: int) -> None:
 
 
 def invert_upper(A: Float) -> None:
-    """Replace the upper triangle and diagonal of an SPD matrix A (n, n) by those of its inverse.
+    """Invert an SPD matrix A (n, n) in place, in its upper triangle.
 
-    A is in Fortran order.  The strict lower triangle stays.
+    A is in Fortran order.  The entries below the diagonal stay as they are.
 
     Raises:
         LinAlgError: A is not positive definite.

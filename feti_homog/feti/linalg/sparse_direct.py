@@ -1,4 +1,4 @@
-"""Direct solvers of one rank through PETSc's KSP and PC, and the scaling and status checks of all direct solvers.
+"""Factor and solve sparse matrices on one rank by PETSc; scale and check the factors of all direct solvers.
 
 Libraries have absolute thresholds: for a Schur complement, MUMPS replaces pivots below about 1e-16.  So each matrix is
 scaled to a largest diagonal entry between 1 and 2.  The scale is a power of two, which changes no digit.

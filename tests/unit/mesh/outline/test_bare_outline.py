@@ -10,6 +10,8 @@ from support.tiled_cells import CELLS, SMALL
 from feti_homog.errors import MeshError
 from feti_homog.mesh.fill.gmsh_mesher import begin
 from feti_homog.mesh.outline.lines import Stations
+from feti_homog.mesh.outline.outline import vertex_angles
+from feti_homog.microstructure.shapes import Discs, Ellipses
 
 
 def bare_of(name):
@@ -54,3 +56,15 @@ def test_too_many_nodes_of_all_parts_are_refused():
         replace(lines, sampling=few).joined(parts)
     with pytest.raises(MeshError, match=f"nodes; expected at most {most}"):
         Stations.joined([arcs for arcs, _ in parts], most)
+
+
+@pytest.mark.parametrize("kind", ["disc", "ellipse"])
+def test_marks_at_one_place_are_one_vertex(kind):
+    centre = np.array([[0.5, 0.5]])
+    disc = Discs(centre, np.array([0.3]))
+    curves = disc if kind == "disc" else Ellipses.of(centre, np.array([0.3]), np.array([0.2]), np.array([30.0]))
+    no_crossing = np.zeros(0, np.int64), np.zeros((0, 2))
+    number, parameter = vertex_angles(curves, np.zeros(1, np.int64), no_crossing, {0: [20.0, 20.04, 20.1]})
+    assert number.tolist() == [0, 0]
+    offset = curves[number].points(parameter) - centre
+    assert np.degrees(np.arctan2(offset[:, 1], offset[:, 0])) == pytest.approx([20.0, 20.1])
