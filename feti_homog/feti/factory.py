@@ -14,7 +14,7 @@ from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.operators.preconditioners import Dirichlet, Identity, Lumped, Preconditioner
+from feti_homog.feti.operators.preconditioners import Dirichlet, Identity, Lumped, Preconditioner, SpringUpdated
 from feti_homog.feti.solver_plan import BONDED, ProblemSizes, SolverOptions, choose
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.system.parallel import mpi_errors
@@ -144,8 +144,6 @@ def build(
     left_out = operators.compliance if plan.preconditioner == "dirichlet" else np.zeros(len(compliance))
     followed = plan.preconditioner == "influence" or not soften
     if not followed or comm.allreduce(bool(left_out.any()), MPI.LOR):
-        from feti_homog.feti.exact.spring_update import SpringUpdated  # of softening springs alone
-
         preconditioner = SpringUpdated(comm, preconditioner, jump_operator.owned[0], left_out)
     inverse = cast("ExactInverse", preconditioner) if plan.preconditioner == "influence" else None
     return SolverParts(operators, preconditioner, natural, adaptive, inverse)

@@ -24,7 +24,7 @@ from feti_homog.feti.decomposition.interface_neighbours import Neighbours
 from feti_homog.feti.linalg.distributed_solver import DistributedSolver
 from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, scaled
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.operators.preconditioners import Dirichlet, Preconditioner, StiffnessScaled, never_softens
+from feti_homog.feti.operators.preconditioners import Dirichlet, Preconditioner, StiffnessScaled
 from feti_homog.feti.thresholds import COARSE_REGULARISATIONS, DEFAULTS, ROUNDED_MODE_ENERGY, ZERO_TOLERANCE, Thresholds
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.system.runtime import process_memory
@@ -187,8 +187,6 @@ class Balanced(Preconditioner):
         scaled: the preconditioner without coarse space.
         coarse: the coarse space.
     """
-
-    soften = never_softens
 
     def __init__(self, scaled: Dirichlet, coarse: AdaptiveCoarseSpace) -> None:
         self.scaled, self.coarse = scaled, coarse

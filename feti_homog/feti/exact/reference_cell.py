@@ -14,12 +14,11 @@ from mpi4py import MPI
 from scipy.sparse import csr_matrix, diags, hstack
 
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.exact.spring_update import SpringUpdate
 from feti_homog.feti.linalg.dense_matrices import DenseSolver
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, allreduce_sparse
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.operators.preconditioners import Preconditioner, never_softens
+from feti_homog.feti.operators.preconditioners import Preconditioner, SpringUpdate
 from feti_homog.feti.operators.with_springs import is_dense
 from feti_homog.feti.thresholds import COLUMNS_AT_ONCE, DEFAULTS, STIFF_FIBRES
 from feti_homog.system.parallel import distributed_arrays
@@ -278,7 +277,7 @@ class BondedInverse(Preconditioner):
     Unlike `ExactInverse` it follows no rows: another set of active rows is factored anew.
     """
 
-    soften, is_exact = never_softens, True
+    is_exact = True
 
     def __init__(self, operators: InterfaceOperators) -> None:
         """Factor the cell with all bonds; all boundary operators must be dense.  Collective."""
