@@ -51,8 +51,8 @@ class Thresholds:
 DEFAULTS = Thresholds()
 
 # Relative size below which a number is zero but for rounding: |K R| beside |K| (a rotation that is wrong by 1 % gives
-# 1e-7), eigenvalues of G^T G, pivots of H, and energies of modes that no active row resists (one resisting row out of
-# n gives about 1 / n).  Rounding leaves about 1e-15.
+# 1e-7), eigenvalues of G^T G, pivots of H, energies of modes that no active row resists (one resisting row out of n
+# gives about 1 / n), and residuals of iterative methods in place of a factorization.  Rounding leaves about 1e-15.
 ZERO_TOLERANCE = 1e-10
 # Columns that are solved, copied or computed together.  Fewer take more time, and the right-hand sides take 8 bytes a
 # degree of freedom and column (`scripts/benchmark_path --to-the-end`).
@@ -60,8 +60,6 @@ COLUMNS_AT_ONCE = 64
 
 # linalg
 
-# Relative tolerance of an iterative method that an option chooses in place of a factorization.
-ITERATIVE_RTOL = 1e-10
 # MUMPS gets this much more workspace than its estimate, in per cent: its own 20 were too little for a matrix of 13 084
 # rows on two ranks.
 MUMPS_EXTRA_WORKSPACE_PERCENT = 100

@@ -21,8 +21,7 @@ from scipy.sparse import csr_matrix, diags
 
 from feti_homog.feti.coarse import geneo
 from feti_homog.feti.decomposition.interface_neighbours import Neighbours
-from feti_homog.feti.linalg.distributed_solver import DistributedSolver
-from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, scaled
+from feti_homog.feti.linalg.sparse_matrices import DistributedSolver, scaled, sum_of_blocks
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.preconditioners import Dirichlet, Preconditioner, StiffnessScaled
 from feti_homog.feti.thresholds import COARSE_REGULARISATIONS, DEFAULTS, ROUNDED_MODE_ENERGY, ZERO_TOLERANCE, Thresholds
@@ -108,10 +107,8 @@ class AdaptiveCoarseSpace:
 
     def part(self) -> csr_matrix:
         """Sum this rank's part (u, u) of Z_0^T S Z_0."""
-        total = DenseBlockSum((len(self._modes.reaching),) * 2)
-        for columns, energy in zip(self._columns, self._energies, strict=True):
-            total.add(columns, columns, energy)
-        return total.matrix()
+        blocks = zip(self._columns, self._columns, self._energies, strict=True)
+        return sum_of_blocks((len(self._modes.reaching),) * 2, blocks)
 
     def factor(self, part: csr_matrix) -> None:
         """Factor Z_0^T S Z_0, the sum of all parts, scaled to a unit diagonal, plus a small multiple of I.

@@ -8,8 +8,7 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import block_diag, csc_matrix, csr_matrix, diags
 
-from feti_homog.feti.linalg.distributed_solver import DistributedSolver
-from feti_homog.feti.linalg.sparse_matrices import assemble_owned_rows
+from feti_homog.feti.linalg.sparse_matrices import DistributedSolver, assemble_owned_rows
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.thresholds import ZERO_TOLERANCE
 from feti_homog.mesh import periodic_topology
