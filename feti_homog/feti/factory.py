@@ -130,7 +130,17 @@ def build(
     how = operator, applications, soft, thresholds, springs, recovers and one_each
     with PETSc.Log.Event("FETISubdomains"):
         operators = mpi_errors.agree(comm, InterfaceOperators, jump_operator, subdomains, *how)
-    plan = choose(_sizes(operators, applications, are_cut, one_each), options, thresholds)
+    dense = [operator.is_dense for operator in operators.operators]
+    sizes = ProblemSizes(
+        applications=applications,
+        bodies_are_cut=are_cut,
+        all_dense=comm.allreduce(all(dense), MPI.LAND),
+        all_searchable=comm.allreduce(all(np.logical_or(dense, operators.facewise)), MPI.LAND),
+        shared_dofs=jump_operator.shared_dofs,
+        has_thin=comm.allreduce(any(s.is_thin for s in subdomains), MPI.LOR),
+        one_each=one_each,
+    )
+    plan = choose(sizes, options, thresholds)
     preconditioner = construct(plan.preconditioner, operators)
     with PETSc.Log.Event("FETINatural"):
         natural = NaturalCoarseSpace(operators)
@@ -147,17 +157,3 @@ def build(
         preconditioner = SpringUpdated(comm, preconditioner, jump_operator.owned[0], left_out)
     inverse = cast("ExactInverse", preconditioner) if plan.preconditioner == "influence" else None
     return SolverParts(operators, preconditioner, natural, adaptive, inverse)
-
-
-def _sizes(operators: InterfaceOperators, applications: int, are_cut: bool, one_each: bool) -> ProblemSizes:
-    """Collect the sizes that the choice depends on.  Collective."""
-    comm, dense = operators.comm, [o.is_dense for o in operators.operators]
-    return ProblemSizes(
-        applications=applications,
-        bodies_are_cut=are_cut,
-        all_dense=comm.allreduce(all(dense), MPI.LAND),
-        all_searchable=comm.allreduce(all(np.logical_or(dense, operators.facewise)), MPI.LAND),
-        shared_dofs=operators.jump_operator.shared_dofs,
-        has_thin=comm.allreduce(any(s.is_thin for s in operators.subdomains), MPI.LOR),
-        one_each=one_each,
-    )
