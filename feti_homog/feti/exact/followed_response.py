@@ -188,7 +188,7 @@ class FollowedResponse:
         which, B = inverse
         if len(which):
             self._make_room(len(which))
-            s, difference, places = sign[which], columns[:, which], rows[which] - self._first
+            s, difference, places = sign[which], np.take(columns, which, axis=1), rows[which] - self._first
             mine = np.flatnonzero((places >= 0) & (places < len(columns)))
             places = places[mine]
             turned = difference @ (B * s)
