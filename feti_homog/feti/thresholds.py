@@ -105,13 +105,12 @@ DENSE_INVERSE_COST = 1 / 700
 SCALED_LAME = 2.0
 # Columns up to which dense products one after the other are faster than all at once (`scripts/measure_kernels.py`).
 DENSE_COLUMNS_ONE_BY_ONE = 6
-# Product of the largest diagonal entries of S and of its regularised inverse above which a thin body refines products
-# with the inverse: up to 3e3 for discs and pieces around them, 1.5e4 for rings a twentieth of their radius thick, 4e6
-# for a hundredth.  Forces balance to 4e-12 there, and to 5e-8 without refinement.
+# Ratio of the largest to the least stiffness of a body above which products with its inverse are refined.  Of a thin
+# body, the product of the largest diagonal entries of S and of its regularised inverse: up to 3e3 for discs and pieces
+# around them, 1.5e4 for rings a twentieth of their radius thick, 4e6 for a hundredth.  Forces balance to 4e-12 there,
+# and to 5e-8 without refinement.  Of any body 1 / `Subdomain.compressible_share`, so that nu is above 0.49999: beside
+# fibres of a thousandth of its modulus a matrix of nu = 0.4999999 balances energies to 3e-9, and to 2e-4 without.
 ILL_CONDITIONED = 1e4
-# `Subdomain.compressible_share` below which products are refined too: nu above 0.49999. Beside fibres of a thousandth
-# of its modulus a matrix of nu = 0.4999999 balances energies to 3e-9, and to 2e-4 without refinement.
-INCOMPRESSIBLE_SHARE = 1e-4
 
 # solver, krylov
 
