@@ -128,7 +128,7 @@ FORCE_STALL_ITERATIONS = 50
 MAX_RESTARTS = 2
 # A jump on the active rows is rounding if it is below the first number times the jump of the torn cell.  A larger one
 # is rounding up to this multiple of the estimate by `dual_solution.jump_rounding`: with phases 1000 times apart
-# rounding was up to 20 times the estimate.
+# rounding was up to 20 times the estimate.  So are averaged modes up to this multiple of the machine precision.
 ZERO_JUMP, ROUNDING_MARGIN = 1e-13, 100.0
 
 # exact, confirmation
@@ -162,6 +162,3 @@ STIFF_FIBRES = 1e3
 # averaged modes may depend on each other.  In the lists of `scripts/robustness`, with contrasts to 1e6, the first was
 # enough.
 COARSE_REGULARISATIONS = (1e-12, 1e-10, 1e-8)
-# Energy of an averaged mode with all rows active, relative to the largest, that is rounding of displacements: the
-# square of their 1e-14.  Modes of two kinds have energies in different units, so it leaves room for any unit of stress.
-ROUNDED_MODE_ENERGY = 1e-28

@@ -24,7 +24,7 @@ from feti_homog.feti.decomposition.interface_neighbours import Neighbours
 from feti_homog.feti.linalg.sparse_matrices import DistributedSolver, scaled, sum_of_blocks
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.preconditioners import Dirichlet, Preconditioner, StiffnessScaled
-from feti_homog.feti.thresholds import COARSE_REGULARISATIONS, DEFAULTS, ROUNDED_MODE_ENERGY, ZERO_TOLERANCE, Thresholds
+from feti_homog.feti.thresholds import COARSE_REGULARISATIONS, DEFAULTS, ROUNDING_MARGIN, ZERO_TOLERANCE, Thresholds
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.system.runtime import process_memory
 from feti_homog.typing import Float, Int
@@ -131,7 +131,9 @@ class AdaptiveCoarseSpace:
         energy = distributed_arrays.allreduce_sum(self.comm, energies)[self._modes.reaching]
         if self._free_energy is None:
             largest = self.comm.allreduce(energy.max(initial=0.0), MPI.MAX)
-            self._free_energy = ZERO_TOLERANCE * np.where(energy > ROUNDED_MODE_ENERGY * largest, energy, largest)
+            # Energies of displacements that are rounding are rounding squared.
+            rounded = (ROUNDING_MARGIN * np.finfo(float).eps) ** 2 * largest
+            self._free_energy = ZERO_TOLERANCE * np.where(energy > rounded, energy, largest)
         # The energy of a free motion is rounding, which the scale would increase beyond the added multiple.
         is_held = energy > self._free_energy
         root = np.sqrt(np.where(is_held, energy, 0.0))
