@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 from petsc4py import PETSc
+from scipy.sparse import csr_matrix
 
 from feti_homog.errors import MeshError
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
@@ -87,7 +88,7 @@ class InterfaceOperators:
         nodes = (s.problem.nodes(np.flatnonzero(mine)) for s, mine in zip(subdomains, constrained, strict=True))
         self.dofs = [s.problem.dofs(np.unique(some)) for s, some in zip(subdomains, nodes, strict=True)]
         self.offsets = np.cumsum([0, *(len(d) for d in self.dofs)])
-        numbers = [o + d for o, d in zip(first, self.dofs, strict=False)]
+        numbers = (of + dofs for of, dofs in zip(first[:-1], self.dofs, strict=True))
         self.local_dofs = np.concatenate([np.zeros(0, np.int64), *numbers])
         self.B = jump_operator.B[:, self.local_dofs].tocsr()
         self.BT = self.B.T.tocsr()
@@ -96,19 +97,17 @@ class InterfaceOperators:
         owned = slice(at, at + last_row - first_row)
         self.springs = np.zeros(last_row - first_row) if compliance is None else compliance[owned]
         self.compliance = np.where((jump_operator.copies[owned] > 1).all(axis=1), self.springs, 0.0)
-        roots = [
-            None
-            if compliance is None
-            else compliance_root(self.B[:, span], compliance, jump_operator.copies, self.of_inner[span])
-            for span in self.slices
-        ]
+        roots: list[csr_matrix | None] = [None] * len(subdomains)
+        if compliance is not None:
+            parts = ((self.B[:, span], compliance, jump_operator.copies, self.of_inner[span]) for span in self.slices)
+            roots = [compliance_root(*part) for part in parts]
         pieces = jump_operator.shared.pieces
         sizes = [
             SubdomainSize(s.n_dofs, len(dofs), s.submesh.index not in pieces, not s.is_outer and root is not None)
             for s, dofs, root in zip(subdomains, self.dofs, roots, strict=True)
         ]
-        can_condense = bool(PETSc.Sys.hasExternalPackage("mumps"))
-        chosen = choose(sizes, kind, applications, soft_modes, can_condense, thresholds)
+        has_mumps = PETSc.Sys.hasExternalPackage("mumps")
+        chosen = choose(sizes, kind, applications, soft_modes, has_mumps, thresholds)
         self.facewise = [choice.facewise for choice in chosen]
         self.operators: list[InterfaceOperator] = []
         self.with_springs: list[BoundaryOperator] = []
