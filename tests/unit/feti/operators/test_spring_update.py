@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from feti_homog.errors import ConvergenceError
-from feti_homog.feti.exact.spring_update import SpringUpdate
+from feti_homog.feti.operators.preconditioners import SpringUpdate
 
 
 @pytest.mark.parametrize("softness", [1e-12, 1.0, 1e6, 1e15, 1e25])
