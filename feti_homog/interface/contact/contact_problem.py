@@ -126,7 +126,7 @@ class ContactProblem:
 
     @cached_property
     def scales(self) -> LoadScales:
-        """Scales of load effects; its methods are collective, and so is the first use of its properties."""
+        """Scales of load effects, computed at the first read, which is collective."""
         return LoadScales(self.solver, self.size)
 
     @cached_property

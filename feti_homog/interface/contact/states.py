@@ -7,6 +7,7 @@ friction, independent of the search that found the state.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import IntEnum
 
 import numpy as np
 from mpi4py import MPI
@@ -19,7 +20,16 @@ from feti_homog.typing import Bool, Float
 
 Status = NDArray[np.int8]
 
-BONDED, CLOSED, OPEN = 0, 1, 2
+
+class Contact(IntEnum):
+    """Contact state of an interface node: bonded, or debonded with faces that touch or are apart."""
+
+    BONDED = 0
+    CLOSED = 1
+    OPEN = 2
+
+
+BONDED, CLOSED, OPEN = Contact
 
 
 @dataclass(frozen=True)

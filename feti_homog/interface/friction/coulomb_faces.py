@@ -25,14 +25,14 @@ from feti_homog.errors import NotCarriedError
 from feti_homog.interface.contact.contact_problem import BLOCK_PIVOTS
 from feti_homog.interface.contact.states import Status
 from feti_homog.interface.friction.face_system import FaceSystem, Prescribed
-from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK
+from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK, FaceStatus
 from feti_homog.typing import Bool, Float
 
-# Pivots, and pivots per node, after which other searches take over; a continuation step takes at most SOLVES pivots.
-SOLVES, SOLVES_PER_NODE = 50, 4
+# Pivots, besides one for each status of each node, after which other searches take over; pivots of a continuation step.
+SOLVES = 50
 # Largest number of status sets to try, and of equal continuation steps of mu.
 MOST_TRIED = 256.0
-STATUSES = np.array([STICK, FORWARD, OPEN_FACE, BACKWARD], np.int8)
+STATUSES = np.array(list(FaceStatus), np.int8)
 Found = tuple[Status, Float] | None
 
 SEARCHED = "friction: no admissible statuses of the faces were found"
@@ -82,7 +82,7 @@ class StatusSearch:
         After some block pivots without progress, one random node changes at a time: a fixed order may end in a cycle.
         """
         fewest, pivots, random = self.faces.nodes + 1, 0, np.random.default_rng(0)
-        for _ in range(solves or SOLVES + SOLVES_PER_NODE * self.faces.nodes):
+        for _ in range(solves or SOLVES + self.allowed.size):
             x, balanced = self.faces.linear(status, self.load, self.start)
             better = self._improved(status, x)
             wrong = np.flatnonzero(better != status)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -56,6 +55,7 @@ class FaceSystem:
         size = np.sqrt(np.concatenate([nodes, np.maximum(diagonal[2 * n :], 0.0)]))
         self.size = np.where(size > 0.0, size, 1.0)
         self.S = stiffness / np.outer(self.size, self.size)
+        self._absolute: Float32 = np.abs(self.S).astype(np.float32)
         self._followed: status_system.FollowedStatuses | None = None
         self._last: tuple[bytes, status_system.StatusSystem] | None = None
         self._factored = 0
@@ -84,13 +84,8 @@ class FaceSystem:
         elif before._followed.grow(self.S, old, other, units):
             self._followed = before._followed
 
-    @cached_property
-    def _absolute(self) -> Float32:
-        """The absolute values |S_ij| (m, m), in single precision."""
-        return np.asarray(np.abs(self.S), np.float32)
-
     def terms(self, x: Float) -> Float:
-        """Return sum_j |S_ij x_j| (m,), the scale of the rounding in S x."""
+        """Return sum_j |S_ij x_j| (m,), the scale of the rounding in S x, from sums in single precision."""
         largest = float(np.abs(x).max(initial=0.0)) or 1.0
         return np.asarray(largest * (self._absolute @ np.abs(x / largest).astype(np.float32)), float)
 

@@ -18,6 +18,8 @@ from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BondState
 from feti_homog.typing import Bool, Float, Int
 
+# Bonds whose utilisations differ relatively by less break together: in a symmetric cell the solver errs by less.
+UTILISATION_TIE = 1e-6
 # Number of halvings of a unit interval, or of steps of Newton's method, that exhausts double precision.
 MOST_STEPS = 60
 

@@ -22,7 +22,7 @@ from feti_homog.errors import ConvergenceError
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, BondState
-from feti_homog.interface.laws.bond_law import KeyValues, SpringLaw
+from feti_homog.interface.laws.bond_law import UTILISATION_TIE, KeyValues, SpringLaw
 from feti_homog.typing import Bool, Float, Int
 
 if TYPE_CHECKING:
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
 # Blocks of H are rounding below this fraction of the stiffness beside the bond.
 RIGID = 1e-9
-# Largest rounding of H for a comparison of energies: bonds whose utilisations differ by less break together.
-MOST_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -158,10 +156,10 @@ class ReleasedEnergy(SpringEnergy):
     def _activate(influence: exact_inverse.ExactInverse, interface: ContactProblem, bonds: BondState) -> None:
         """Update the inverse dual operator to a bond state.  Collective; raises as `in_state`."""
         interface.prepare(bonds)
-        if not influence.rounding <= MOST_ROUNDING:
+        if not influence.rounding <= UTILISATION_TIE:
             raise ConvergenceError(
                 f'[interface] growth = "released": rounding hides {influence.rounding:.1e} of what breaks release, '
-                f"expected at most {MOST_ROUNDING:g}: springs are too soft beside bodies that are cut or coated, or "
+                f"expected at most {UTILISATION_TIE:g}: springs are too soft beside bodies that are cut or coated, or "
                 'phases too far apart; growth = "springs" bears more'
             )
 
