@@ -146,8 +146,7 @@ class CoulombLeg(Leg):
         self._go_straight(status, after, 0.0, faces.heat(status, x, after) / self.cell.area)
         self._share = 1.0 if breaks > 1.0 and change >= rest else share + way
         if breaks <= 1.0:
-            yield from self._break()
-            yield from self._break_overloaded()
+            yield from self._break_overloaded(is_due=True)
         elif self._share < 1.0 and (self._first or self._share - self._reported >= LEAST_SHARE):
             self._first = False
             yield self._point(0, 0, self._path_state())
@@ -161,28 +160,29 @@ class CoulombLeg(Leg):
         Raises:
             NotCarriedError: the cell carries nothing beyond the last step.
         """
-        sliding, x = self.sliding, self._x
-        self._share, self.limit = mpi_errors.on_root(self.cell.comm, self._carried, share)
-        status, after = self._on_root(sliding.faces.step, self._status, self._given(self._share, x), x)
-        heat = sliding.faces.heat_behind(status, x, after) / self.cell.area
+        sliding, x, faces = self.sliding, self._x, self.sliding.faces
+
+        def carried() -> tuple[float, NotCarriedError | None]:
+            """Return the fraction that the cell carries, and the error that limits it or None."""
+            low, high = self._share, share
+            try:
+                faces.step(self._status, self._given(share, x), x)
+            except StuckError:
+                return share, None
+            except NotCarriedError as error:
+                limit = error
+            else:
+                return share, None
+            while high - low > SAME_SHARE * share:
+                middle = (low + high) / 2
+                carries = faces.carries(self._status, self._given(middle, x), x)
+                low, high = (middle, high) if carries else (low, middle)
+            if low - self._share <= 10 * SAME_SHARE * share:
+                raise limit
+            return low, limit
+
+        self._share, self.limit = mpi_errors.on_root(self.cell.comm, carried)
+        status, after = self._on_root(faces.step, self._status, self._given(self._share, x), x)
+        heat = faces.heat_behind(status, x, after) / self.cell.area
         way = Energies(sliding.stored(after) - sliding.stored(x) + heat, 0.0, 0.0, heat)
         self._stand(status, after, sliding.macroscopic(after), way)
-
-    def _carried(self, share: float) -> tuple[float, NotCarriedError | None]:
-        """Return the largest fraction up to `share` that the cell carries, and the error that limits it or None."""
-        low, high, faces = self._share, share, self.sliding.faces
-        try:
-            faces.step(self._status, self._given(share, self._x), self._x)
-        except StuckError:
-            return share, None
-        except NotCarriedError as error:
-            limit = error
-        else:
-            return share, None
-        while high - low > SAME_SHARE * share:
-            middle = (low + high) / 2
-            carries = faces.carries(self._status, self._given(middle, self._x), self._x)
-            low, high = (middle, high) if carries else (low, middle)
-        if low - self._share <= 10 * SAME_SHARE * share:
-            raise limit
-        return low, limit

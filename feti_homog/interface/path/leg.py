@@ -10,7 +10,7 @@ from dataclasses import replace
 from feti_homog.errors import NotCarriedError
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, Equilibrium
-from feti_homog.interface.laws.bond_law import BondLaw
+from feti_homog.interface.laws.bond_law import UTILISATION_TIE, BondLaw
 from feti_homog.interface.loads import Load, Macroscopic
 from feti_homog.interface.path import path_points
 from feti_homog.typing import Bool, Float
@@ -100,17 +100,15 @@ class Leg(ABC):
 
     def _is_overloaded(self) -> bool:
         """Return whether a break or a change of contact has overloaded bonds.  Collective."""
-        return self._used()[1] > 1.0 + path_points.UTILISATION_TIE and self.state.converged
+        return self._used()[1] > 1.0 + UTILISATION_TIE and self.state.converged
 
-    def _break_overloaded(self) -> Iterator[path_points.Point]:
-        while self._is_overloaded():
-            yield from self._break()
-
-    def _break(self) -> Iterator[path_points.Point]:
-        """Break the worst bonds at s, and find the state after the break.  Collective."""
-        broke, softened, broken = self._release(self._used()[2])
-        yield self._point(broke, softened, broken)
-        self._settle(broken)
+    def _break_overloaded(self, is_due: bool = False) -> Iterator[path_points.Point]:
+        """Break the worst bonds at s while they are overloaded, and first if a break is due.  Collective."""
+        while is_due or self._is_overloaded():
+            broke, softened, broken = self._release(self._used()[2])
+            yield self._point(broke, softened, broken)
+            self._settle(broken)
+            is_due = False
 
     def _release(self, which: Bool) -> tuple[int, int, path_points.PathState]:
         """Break the bonds `which` (k,): numbers that part and that soften, and the path state.  Collective."""

@@ -21,8 +21,7 @@ from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.floating_bodies import FloatingBodies, shares_to_zero
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium
-from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.interface.path.path_points import UTILISATION_TIE
+from feti_homog.interface.laws.bond_law import UTILISATION_TIE, BondLaw
 from feti_homog.typing import Bool, Float, Int
 
 # Parts of a straight way at whose ends a utilisation without convexity is evaluated.

@@ -10,12 +10,9 @@ from mpi4py import MPI
 
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces, held_traction
 from feti_homog.interface.contact.states import BONDED, BondState, Equilibrium
-from feti_homog.interface.laws.bond_law import BondLaw
+from feti_homog.interface.laws.bond_law import UTILISATION_TIE, BondLaw
 from feti_homog.interface.loads import Macroscopic, Multipliers
 from feti_homog.typing import Bool, Float
-
-# Bonds whose utilisations differ relatively by less break together: in a symmetric cell the solver errs by less.
-UTILISATION_TIE = 1e-6
 
 
 @dataclass(frozen=True)
