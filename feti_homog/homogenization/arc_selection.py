@@ -121,14 +121,17 @@ def faults(case: Case, nodes: EstimatedNodes, moved: Sequence[debonded_arcs.Move
             angle, line = opening if arc.angle is None else arc.angle, f"[{label}] debonded[{place}]"
             inside = debonded_arcs.debonded([arc], opening, fibres, directions, moved[pair])
             for fibre in [None] if isinstance(arc.fibre, str) else arc.fibre:
-                if angle and not (inside if fibre is None else inside[fibres == fibre]).any():
-                    lines.append(line + _fault(angle, fibre, fibres, interface.between))
+                if not angle or (inside if fibre is None else inside[fibres == fibre]).any():
+                    continue
+                if fibre is not None and fibre not in fibres:
+                    which = (
+                        "that can debond" if interface.between is None else f"between {' and '.join(interface.between)}"
+                    )
+                    lines.append(f"{line}.fibre: fibre {fibre} has no interface {which}")
+                    continue
+                whose = "any fibre" if fibre is None else f"fibre {fibre}"
+                words = (
+                    f"no node of {whose} is within the arc of {angle} degrees; make it wider, or the elements smaller"
+                )
+                lines.append(f"{line}: {words}")
     return list(dict.fromkeys(lines))
-
-
-def _fault(angle: float, fibre: int | None, fibres: Int, between: Sequence[str] | None) -> str:
-    if fibre is not None and fibre not in fibres:
-        which = "that can debond" if between is None else f"between {' and '.join(between)}"
-        return f".fibre: fibre {fibre} has no interface {which}"
-    whose = "any fibre" if fibre is None else f"fibre {fibre}"
-    return f": no node of {whose} is within the arc of {angle} degrees; make it wider, or the elements smaller"

@@ -12,14 +12,13 @@ from feti_homog.mesh import Torus, submeshes
 from feti_homog.schema import wording
 from feti_homog.typing import AnyInt, Float, Int
 
-SAME_FRACTION = 0.01  # of a matched table and its cell, relative
+# Relative difference between fibre fractions, stiffness ratios or teeth that deserves no remark.
+SAME_RATIO = 0.01
 # Largest element on an interface / length of the process zone. With 0.54 of it the stresses of the square cell of
 # tests/parallel/test_energy.py are within 1.4 % of those with elements a quarter as long, with 1.1 of it within 4.3 %.
 RESOLVED = 0.5
 # The same of cohesive laws, whose tractions fall along it.
 RESOLVED_SOFTENING = 1 / 3
-# Relative difference of stiffness ratios, or of teeth, that is none.
-SAME_RATIO = 1e-3
 
 
 def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
@@ -106,7 +105,7 @@ def table_remarks(case: Case) -> tuple[str, ...]:
         f"[cell] fibre_fraction = {cell.fibre_fraction:g}: {cell.match.name} has {fraction:.4g}; neighbours are as far "
         "away as there, in diameters"
     )
-    return (remark,) if abs(cell.fibre_fraction / fraction - 1.0) > SAME_FRACTION else ()
+    return (remark,) if abs(cell.fibre_fraction / fraction - 1.0) > SAME_RATIO else ()
 
 
 def longest(ends: Float) -> float:

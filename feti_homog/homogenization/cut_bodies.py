@@ -37,18 +37,38 @@ class SharedVertices:
     def __init__(self, comm: MPI.Intracomm, meshes: Sequence[tuple[Sequence[Submesh], FineMesh]]) -> None:
         """Find the common vertices and edges of several pieces.  Collective."""
         self._comm = comm
-        borders = [_border(pieces, mesh) for pieces, mesh in meshes]
+        # On the piece borders: vertices (n, 3) by body, entity and position, their classes (n,), coarse edges (e, 3) by
+        # body, entity and position, and the vertex classes (e, m) along these edges.
+        borders = []
+        for pieces, mesh in meshes:
+            first, parts = 0, list[tuple[Int, Int, Int, Int]]()
+            for s in pieces:
+                triangle, k, line = border_lines(s, mesh, mesh.node_class[mesh.nodes[first : first + len(s.triangles)]])
+                first, line = first + len(s.triangles), line[:, :: mesh.lattice.order]
+                ends = s.vertex_class[s.triangles[triangle[:, None], np.stack([k, (k + 1) % 3], axis=1)]]
+                back = s.backwards[triangle, k]
+                ends[back] = ends[back, ::-1]
+                place = np.arange(line.shape[1])
+                place[-1] = 0
+                entity = sharers.entity_code(s.edge_keys[s.edge_class[s.triangle_edges[triangle, k]]], True)
+                body = s.constituent[triangle]
+                key = np.tile(entity[:, None], len(place))
+                key[:, [0, -1]] = sharers.entity_code(s.class_keys[ends], False)
+                rows = np.stack(np.broadcast_arrays(body[:, None], key, place), axis=2).reshape(-1, 3)
+                classes, once = np.unique(line, return_index=True)
+                parts.append((rows[once], classes, np.column_stack([body, entity, np.zeros_like(entity)]), line))
+            borders.append([np.concatenate(table) for table in zip(*parts, strict=True)])
         vertex_copies, edge_copies = (self._copies([border[k] for border in borders]) for k in (0, 2))
         self._rows = NO_ROWS
         self.meshes, self.classes, self.sides, self.is_first = list[int](), list[Int](), list[Int](), list[Bool]()
-        for mesh, (rows, classes, _, line) in enumerate(borders):
-            shared, on_cut = vertex_copies[mesh][:, 0] > 1, edge_copies[mesh][:, 0] > 1
+        for number, (rows, classes, _, line) in enumerate(borders):
+            shared, on_cut = vertex_copies[number][:, 0] > 1, edge_copies[number][:, 0] > 1
             if shared.any():
                 self._rows = np.concatenate([self._rows, rows[shared]])
-                self.meshes.append(mesh)
+                self.meshes.append(number)
                 self.classes.append(classes[shared])
                 self.sides.append(np.stack([line[on_cut, :-1], line[on_cut, 1:]], axis=2).reshape(-1, 2))
-                self.is_first.append(np.repeat(edge_copies[mesh][on_cut, 1] == 1, line.shape[1] - 1))
+                self.is_first.append(np.repeat(edge_copies[number][on_cut, 1] == 1, line.shape[1] - 1))
 
     def sum(self, parts: Sequence[Float]) -> list[Float]:
         """Sum values (n, k) at each mesh's shared vertices over all pieces.  Collective."""
@@ -89,33 +109,6 @@ class SharedVertices:
 def _split(values: Array, parts: Sequence[Array]) -> list[Array]:
     """Split the rows of values into arrays with the lengths of the parts."""
     return [values[a:b] for a, b in pairwise(np.cumsum([0, *map(len, parts)]).tolist())]
-
-
-def _border(pieces: Sequence[Submesh], mesh: FineMesh) -> tuple[Int, Int, Int, Int]:
-    """Return the vertices and coarse edges on the piece borders of a joined mesh.
-
-    The result has the vertices (n, 3) by body, entity and position, the vertex classes (n,), the coarse edges (e, 3) by
-    body, entity and position, and the vertex classes (e, m) along these edges.
-    """
-    first, borders = 0, []
-    for s in pieces:
-        triangle, k, line = border_lines(s, mesh, mesh.node_class[mesh.nodes[first : first + len(s.triangles)]])
-        first, line = first + len(s.triangles), line[:, :: mesh.lattice.order]
-        ends = s.vertex_class[s.triangles[triangle[:, None], np.stack([k, (k + 1) % 3], axis=1)]]
-        back = s.backwards[triangle, k]
-        ends[back] = ends[back, ::-1]
-        place = np.arange(line.shape[1])
-        place[-1] = 0
-        key = np.tile(
-            sharers.entity_code(s.edge_keys[s.edge_class[s.triangle_edges[triangle, k]]], True)[:, None], len(place)
-        )
-        edges = np.column_stack([s.constituent[triangle], key[:, 0], np.zeros(len(key), np.int64)])
-        key[:, [0, -1]] = sharers.entity_code(s.class_keys[ends], False)
-        rows = np.stack(np.broadcast_arrays(s.constituent[triangle][:, None], key, place), axis=2).reshape(-1, 3)
-        classes, once = np.unique(line, return_index=True)
-        borders.append((rows[once], classes, edges, line))
-    vertices, classes, edges, lines = (np.concatenate(rows) for rows in zip(*borders, strict=True))
-    return vertices, classes, edges, lines
 
 
 def border_lines(s: Submesh, mesh: FineMesh, classes: Int32) -> tuple[Int, Int, Int]:

@@ -29,7 +29,6 @@ from feti_homog.materials import voigt
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Array, Float, Int
 
-DIRECTION_DIGITS = 9
 # Length at which the modes are separated / radius of the fibre; this length is one element at least.
 MODE_LENGTH = 1e-3
 QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
@@ -38,7 +37,6 @@ QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 REACH, REACH_OF_A_PERIOD, CORE = 0.8, 0.32, 0.5
 # Relative distance from a circle beyond which a node of both bodies is on another boundary, or on another image.
 OFF_CIRCLE = 1e-4
-VOID = -1
 
 
 class CrackExtension:
@@ -128,12 +126,12 @@ class EnergyReleaseRates:
         self.points, self.bodies = self._gathered(nodes.points), self._gathered(nodes.bodies)
         self.pair = self._gathered(nodes.pair)
         # Rounded, lest rounding decide their order.
-        direction = np.round(self._gathered(cell.directions), DIRECTION_DIGITS)
+        direction = np.round(self._gathered(cell.directions), debonded_arcs.DIRECTION_DIGITS)
         self.direction, self.length = np.where(direction <= -180.0, 180.0, direction), self._gathered(nodes.length)
         # (interfaces, 2) normal and tangential stiffnesses of the bonds, infinite where they are rigid.
         self._stiffness = np.array(phase_laws.springs(cell.case).stiffness or ((np.inf, np.inf),))
         self._tree = cKDTree(in_cell(self.points, self._period), boxsize=self._period)
-        # (k, 2) body boundary nodes on all ranks, and (k,) their bodies, VOID at voids. Each body has its own nodes
+        # (k, 2) body boundary nodes on all ranks, and (k,) their bodies, -1 at voids. Each body has its own nodes
         # where two bodies meet; cuts between a body's pieces are no boundaries.
         borders = [np.bincount(s.submesh.edge_class[s.submesh.triangle_edges].ravel()) == 1 for s in cell.subdomains]
         rows, points, body = [np.zeros((0, 2), np.int64)], [np.zeros((0, 2))], [np.zeros(0, np.int64)]
@@ -144,7 +142,7 @@ class EnergyReleaseRates:
         cuts = edges[pieces > 1]
         for s, border in zip(cell.subdomains, borders, strict=True):
             cut = np.isin(s.submesh.edge_keys, cuts[cuts[:, 1] == s.submesh.body, 0])
-            for edge, name in ((border & ~cut & ~s.submesh.at_void, s.submesh.body), (s.submesh.at_void, VOID)):
+            for edge, name in ((border & ~cut & ~s.submesh.at_void, s.submesh.body), (s.submesh.at_void, -1)):
                 points.append(s.mesh.points[np.unique(assembly.nodes_along(s.submesh, s.mesh, edge))])
                 body.append(np.full(len(points[-1]), name))
         self._boundaries = self._gathered(np.concatenate(points)), self._gathered(np.concatenate(body))

@@ -13,7 +13,7 @@ from feti_homog.case import Case, bond_laws
 from feti_homog.fem import AXIAL, Problem
 from feti_homog.feti import thresholds
 from feti_homog.feti.decomposition import partition
-from feti_homog.homogenization import phase_laws
+from feti_homog.homogenization import phase_laws, uniform_parts
 from feti_homog.materials import laws
 from feti_homog.mesh import ReferenceLattice
 from feti_homog.mesh.tiles import tiling
@@ -21,8 +21,6 @@ from feti_homog.microstructure import phase_names
 from feti_homog.system.petsc import option_table, options_database
 from feti_homog.typing import Int
 
-# Poisson's ratio up to which single nodes of mixed elements are hardly stiffer than mu makes them (`SCALED_LAME`).
-MOST_POISSON = 0.45
 # Ratio of stiffnesses up to which subdomains may have several phases: above, rounding in their dense matrices costs
 # accuracy (4e-7 at 1e6, 2e-10 at 9e3) and then convergence.
 MOST_CONTRAST = 1e3
@@ -35,10 +33,9 @@ BASE_BYTES, DOF_BYTES, COLUMN_BYTES = 1.8e8, 1.5e3, 2.0e4
 FACTOR_BYTES = 2.9e2
 # Bytes more of a path to complete debonding with influence columns: for each multiplier of a rank, and for each pair of
 # one and a column, of which a cell that is factored anew has `INFLUENCE_COLUMNS`. Of five paths of 1 to 50 fibres, 120
-# to 4 110 multipliers, on one rank, estimates are 0.93 to 1.17 times the measured memory.
+# to 4 110 multipliers, on one rank, estimates are 0.93 to 1.17 times the measured memory.  The six dense matrices of
+# debonded faces with friction (`interface.friction`) take as much for each pair of jumps.
 PATH_BYTES, PAIR_BYTES = 7e4, 50
-# Bytes for each pair of jumps of debonded faces with friction: six dense matrices (`interface.friction`).
-FACE_PAIR_BYTES = 48
 # Degrees of freedom of a rank; with fewer, its waiting for others takes more than it saves.
 DOFS_OF_A_RANK = 50_000
 # Typical numbers, by which operators are chosen; iterations with coatings are without influence columns.
@@ -116,7 +113,9 @@ def can_be_cut_across(case: Case) -> bool:
     pairs = [(problem, phase) for problem in phase_laws.problems(case) for phase in case.materials]
     sizes = np.array([np.abs(phase_laws.law(case, phase, problem)[:4, :4]).max() for problem, phase in pairs])
     sizes = sizes.reshape(-1, len(case.materials))
-    return max(ratios) <= MOST_POISSON and float((sizes.max(axis=1) / sizes.min(axis=1)).max()) <= MOST_CONTRAST
+    # Up to LOCKING single nodes of mixed elements are hardly stiffer than mu makes them (`SCALED_LAME`).
+    is_compressible = max(ratios) <= uniform_parts.LOCKING / (2.0 + 2.0 * uniform_parts.LOCKING)
+    return is_compressible and float((sizes.max(axis=1) / sizes.min(axis=1)).max()) <= MOST_CONTRAST
 
 
 def wanted_pieces(
@@ -184,7 +183,7 @@ def memory(nodes: Sequence[int], subdomains: Sequence[int], components: Sequence
 def memory_to_the_end(case: Case, few: float, multipliers: int, columns: int, ranks: int) -> float:
     """Estimate the bytes of the largest rank when all bonds have broken; `few` before the first break."""
     stored = columns if columns <= thresholds.NEVER_REFACTORED_ROWS else thresholds.INFLUENCE_COLUMNS
-    faces = FACE_PAIR_BYTES * multipliers**2 if case.has_friction else 0
+    faces = PAIR_BYTES * multipliers**2 if case.has_friction else 0
     return few + columns / ranks * (PATH_BYTES + stored * PAIR_BYTES) + faces
 
 

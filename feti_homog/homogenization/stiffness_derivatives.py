@@ -68,12 +68,21 @@ def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response
             rows = nodes.row[nodes.pair == section] + component
             work[section, component] = lam[rows].T @ (group[0].state.solution.compliance[rows, None] * lam[rows])
         springs.append(distributed_arrays.allreduce_sum(cell.comm, work))
-    for name, value, places in _spring_constants(case):
-        energies = tuple(
-            sum((work[place] for place in of_problem), np.zeros(work.shape[2:])) / (value * area)
-            for work, of_problem in zip(springs, places, strict=False)
-        )
-        changes.append(Derivative(name, value, energies))
+    for number, bond in enumerate(case.interfaces):
+        label = f"interface.{number + 1}" if len(case.interfaces) > 1 else "interface"
+        # The problems and components of the springs that have a stiffness.
+        places = {"normal_stiffness": [(0, 0)], "tangential_stiffness": [(0, 1)], "axial_stiffness": [(1, 0)]}
+        if bond.axial_stiffness is None:
+            places["tangential_stiffness"].append((1, 0))
+        for key, pairs_of_key in places.items():
+            value = getattr(bond, key)
+            if value is not None and np.isfinite(value):
+                energies = tuple(
+                    sum((work[number, i] for p, i in pairs_of_key if p == problem), np.zeros(work.shape[2:]))
+                    / (value * area)
+                    for problem, work in enumerate(springs)
+                )
+                changes.append(Derivative(f"{label}.{key}", value, energies))
     for f in _fractions(case):
         changes.append(Derivative("cell.fibre_fraction", f, tuple(growth / (2 * f * area) for _, growth in integrals)))
     return changes
@@ -187,24 +196,6 @@ def _gram(fields: Float, weights: Float) -> Float:
     """(n, n) int f f^T for fields (e, q, n)."""
     flat = fields.reshape(weights.size, -1)
     return np.asarray(flat.T @ (weights.reshape(-1, 1) * flat))
-
-
-def _spring_constants(case: Case) -> Iterator[tuple[str, float, tuple[list[tuple[int, int]], list[tuple[int, int]]]]]:
-    """Yield names and values of finite spring stiffnesses, with their sections and components by problem."""
-    several = len(case.interfaces) > 1
-    for number, bond in enumerate(case.interfaces):
-        section = f"interface.{number + 1}" if several else "interface"
-        along = [(number, 0)]
-        around = along if bond.axial_stiffness is None else []
-        places = {
-            "normal_stiffness": ([(number, 0)], []),
-            "tangential_stiffness": ([(number, 1)], around),
-            "axial_stiffness": ([], along),
-        }
-        for name, by_problem in places.items():
-            value = getattr(bond, name)
-            if value is not None and np.isfinite(value):
-                yield f"{section}.{name}", value, by_problem
 
 
 def _fractions(case: Case) -> Iterator[float]:

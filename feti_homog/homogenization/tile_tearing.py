@@ -147,7 +147,13 @@ def tear_by_tiles(
     """
     phase_pairs, nesting, edges = mpi_errors.on_root(comm, tiled_cell, case, noded)
     regions: tiling.Regions = comm.bcast(None if noded is None else noded.regions)
-    torus, tile = _filled(noded, regions, comm)
+    dealt = deal_tiles(() if noded is None else noded.parts, comm)
+    fillings = mpi_errors.agree(comm, fill_own, dealt)
+    inner = dict(chain.from_iterable(comm.allgather([(k, len(filling.inner)) for k, filling in fillings])))
+    ends = regions.nodes + np.cumsum([0, *(inner[k] for k in range(len(inner)))])
+    pairs = zip(dealt, fillings, strict=True)
+    filled = [tiling.FilledTile(k, tile, filling, int(ends[k])) for (k, tile), (_, filling) in pairs]
+    torus, tile = mpi_errors.agree(comm, tiling.tile_torus, regions, filled, int(ends[-1]))
     load = np.bincount(torus.constituent, minlength=len(regions.phase))
     comm.Allreduce(MPI.IN_PLACE, load)
     pieces = wanted_pieces(case, load, edges, lattice, comm.size, policy)
@@ -172,17 +178,6 @@ def tear_by_tiles(
     shares = mpi_errors.agree(comm, lambda: list(submeshes.cut_for_ranks(torus, subdomain, table, comm.size, pinned)))
     summary = mpi_errors.on_root(comm, summary_of, case, noded, len(body), int(load.sum()))
     return RankShare(summary, table, phase_pairs, submeshes.joined(distributed_arrays.alltoall(comm, shares)))
-
-
-def _filled(noded: gmsh_mesher.NodedCell | None, regions: tiling.Regions, comm: MPI.Intracomm) -> tuple[Torus, Int]:
-    """Return the torus that the tiles of this rank fill, and the tile (m,) of each triangle.  Collective."""
-    dealt = deal_tiles(() if noded is None else noded.parts, comm)
-    fillings = mpi_errors.agree(comm, fill_own, dealt)
-    inner = dict(chain.from_iterable(comm.allgather([(k, len(filling.inner)) for k, filling in fillings])))
-    ends = regions.nodes + np.cumsum([0, *(inner[k] for k in range(len(inner)))])
-    pairs = zip(dealt, fillings, strict=True)
-    filled = [tiling.FilledTile(k, tile, filling, int(ends[k])) for (k, tile), (_, filling) in pairs]
-    return mpi_errors.agree(comm, tiling.tile_torus, regions, filled, int(ends[-1]))
 
 
 def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) -> Int:

@@ -31,7 +31,8 @@ from feti_homog.typing import Float, Int
 ELEMENTS_AT_ONCE = 1 << 13
 # Halvings from which on the mesh that is refined twice less serves, but across materials and where a phase locks.
 REFINED_OFTEN = 3
-# Largest lambda / mu on that mesh, of a Poisson's ratio of 0.4: beyond, errors of coarse elements are no guide.
+# Largest lambda / mu on that mesh, and in subdomains across materials, for a Poisson's ratio of 0.4: beyond, errors of
+# coarse elements are no guide.
 LOCKING = 4.0
 # Position of a displacement that is not on a boundary: the last position, where the displacement is zero.
 NONE = -1

@@ -249,27 +249,26 @@ def assemble_subdomains(
         line.append(f"{summary.coarse_triangles} triangles, {summary.bodies} bodies, {summary.subdomains} subdomains")
     for remark in summary.remarks:
         progress.say(f"remark: {remark}")
+
+    def assembled() -> list[Subdomain]:
+        problem, subdomains = phase_laws.problems(case)[0], list[Subdomain]()
+        for s in share.submeshes.cut():
+            phase_of = summary.constituent_phase[s.constituent]
+            material = None if s.phase else np.unique(phase_of, return_inverse=True)[1]
+            mixed = tuple(phase_laws.is_mixed(case, name) for name in _phases(summary, s))
+            flags = {"is_thin": s.phase == phase_names.COATING, "is_outer": s.phase == phase_names.MATRIX}
+            laws = _laws(case, summary, s, problem)
+            subdomains.append(Subdomain.build(s, lattice, laws, problem, material, mixed, **flags))
+        return subdomains
+
     with progress.stage("assemble") as line:
-        subdomains = mpi_errors.agree(comm, _assemble, case, share, lattice)
+        subdomains = mpi_errors.agree(comm, assembled)
         dofs = comm.allreduce(sum(s.n_dofs for s in subdomains))
         meshed = comm.allreduce(sum(s.area for s in subdomains))
         if summary.voids:
             line.append(f"{summary.voids} voids, porosity {1 - meshed / summary.area:.6g},")
         line.append(f"{dofs} degrees of freedom, refine = {case.cell.refine}, order = {case.cell.order}")
     return share, shared, lattice, subdomains
-
-
-def _assemble(case: Case, share: RankShare, lattice: ReferenceLattice) -> list[Subdomain]:
-    """Refine and assemble this rank's subdomains."""
-    summary, problem, subdomains = share.summary, phase_laws.problems(case)[0], list[Subdomain]()
-    for s in share.submeshes.cut():
-        phase_of = summary.constituent_phase[s.constituent]
-        material = None if s.phase else np.unique(phase_of, return_inverse=True)[1]
-        mixed = tuple(phase_laws.is_mixed(case, name) for name in _phases(summary, s))
-        flags = {"is_thin": s.phase == phase_names.COATING, "is_outer": s.phase == phase_names.MATRIX}
-        laws = _laws(case, summary, s, problem)
-        subdomains.append(Subdomain.build(s, lattice, laws, problem, material, mixed, **flags))
-    return subdomains
 
 
 def _laws(case: Case, summary: CellSummary, submesh: Submesh, problem: Problem) -> Float:

@@ -19,6 +19,8 @@ from feti_homog.typing import Bool, Float, Int
 
 # A node this close to a tip, in degrees, is the tip: coordinates in files and on circles are rounded.
 TIP_TOLERANCE_DEGREES = 1e-6
+# Decimals by which directions are sorted and compared, in degrees: rounding must not change their order.
+DIRECTION_DIGITS = 9
 # Fibre number and direction of a tip, as `tips` has it -> direction in the mesh.
 MovedTips = Mapping[tuple[int, float], float]
 NOT_MOVED: MovedTips = MappingProxyType({})
@@ -155,7 +157,7 @@ def debonded(
 
 def _end(arc: interface_section.Arc, half: float) -> float:
     """Return the direction in [0, 360) of an arc's tip, `half` away from its centre."""
-    return round(arc.centre + half, 9) % 360.0
+    return round(arc.centre + half, DIRECTION_DIGITS) % 360.0
 
 
 def faults(arcs: Sequence[interface_section.Arc], centres: Float, label: str = "interface") -> list[str]:
