@@ -14,14 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from feti_homog.materials.laws import COUPLINGS
+from feti_homog.materials.laws import COUPLINGS, ISOTROPY
 from feti_homog.materials.material_forms import PER_TEMPERATURE
 from feti_homog.materials.voigt import EXPANSIONS, THERMAL_STRESSES
 from feti_homog.system.runtime import described, records
 from feti_homog.typing import Array, Float
 
 DIRECTIONS = 720  # across the fibres
-TRANSVERSELY_ISOTROPIC = 1e-9  # relative distance to the nearest transversely isotropic stiffness, from rounding
 
 # Turns the components of a stiffness, (3, 3) or (6, 6), into components of the same Frobenius norm as the tensor.
 _MANDEL = {n: np.sqrt(np.outer(scale, scale)) for n, scale in ((3, [1, 1, 2]), (6, [1, 1, 1, 2, 2, 2]))}
@@ -222,7 +221,7 @@ def transversely_isotropic_stiffness(constants: TransverseIsotropy) -> Float:
 
 def is_transversely_isotropic(constants: TransverseIsotropy) -> bool:
     """Return whether the stiffness with these constants is transversely isotropic, up to rounding."""
-    return constants.deviation < TRANSVERSELY_ISOTROPIC
+    return constants.deviation < ISOTROPY
 
 
 def transverse_moduli(stiffness: ArrayLike) -> TransverseModuli:

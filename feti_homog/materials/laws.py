@@ -29,7 +29,7 @@ NEEDED: dict[
 }
 """Optional constants that each plane state requires."""
 OF_DATA_SHEETS = "axis 3 is along the fibres: with constants of a data sheet give E_axial, E_transverse, nu_axial, ..."
-# Relative tolerance for isotropic constants of a material.
+# Relative rounding in the constants and the stiffness of an isotropic, or transversely isotropic, material.
 ISOTROPY = 1e-9
 # Beyond the first, rounding of displacements makes stresses as large as those of the soft phase are allowed to be off;
 # beyond the second, it leaves nothing of them.
