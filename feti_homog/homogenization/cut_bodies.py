@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from mpi4py import MPI
@@ -79,20 +78,25 @@ class SharedVertices:
             return np.asarray(totals[number])
 
         width = self._comm.allreduce(max((part.shape[1] for part in parts), default=0), MPI.MAX)
-        return _split(self._at_home(self._rows, np.concatenate([np.zeros((0, width)), *parts]), sums), self.classes)
+        return self._at_home(self._rows, np.concatenate([np.zeros((0, width)), *parts]), self.classes, sums)
 
-    def _copies(self, rows: Sequence[Int]) -> list[Int]:
+    def _copies(self, parts: Sequence[Int]) -> list[Int]:
         """Return the copy count of each row (n, 3) in the meshes, and 1 at the first copy, else 0.  Collective."""
 
         def copies(number: Int, _: Int) -> Int:
             _, first, count = np.unique(number, return_index=True, return_counts=True)
             return np.stack([count[number], first[number] == np.arange(len(number))], axis=1)
 
-        all_rows = np.concatenate([NO_ROWS, *rows])
-        return _split(self._at_home(all_rows, all_rows, copies), rows)
+        rows = np.concatenate([NO_ROWS, *parts])
+        return self._at_home(rows, rows, parts, copies)
 
-    def _at_home(self, rows: Int, values: Array, combine: Callable[[Int, Array], Array]) -> Array:
-        """Call `combine` on the home ranks with the numbers of rows (n, 3) and with values (n, k).  Collective."""
+    def _at_home(
+        self, rows: Int, values: Array, parts: Sequence[Array], combine: Callable[[Int, Array], Array]
+    ) -> list[Array]:
+        """Call `combine` on the home ranks with the numbers of rows (n, 3) and with values (n, k).  Collective.
+
+        Return the combined rows in arrays with the lengths of `parts`.
+        """
         comm, home = self._comm, rows[:, 1:].sum(axis=1) // 2 % self._comm.size
         rows, values, source, place = distributed_arrays.exchange(
             comm, home, rows, values, np.full(len(rows), comm.rank), np.arange(len(rows))
@@ -103,12 +107,7 @@ class SharedVertices:
         number = np.empty(len(order), np.int64)
         number[order] = np.cumsum(is_new) - 1
         place, combined = distributed_arrays.exchange(comm, source, place, combine(number, values))
-        return np.asarray(combined[np.argsort(place)])
-
-
-def _split(values: Array, parts: Sequence[Array]) -> list[Array]:
-    """Split the rows of values into arrays with the lengths of the parts."""
-    return [values[a:b] for a, b in pairwise(np.cumsum([0, *map(len, parts)]).tolist())]
+        return np.split(combined[np.argsort(place)], np.cumsum([len(part) for part in parts])[:-1]) if parts else []
 
 
 def border_lines(s: Submesh, mesh: FineMesh, classes: Int32) -> tuple[Int, Int, Int]:

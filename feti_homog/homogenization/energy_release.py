@@ -115,6 +115,7 @@ class EnergyReleaseRates:
         interface: contact problem of the responses.
         points, bodies, pair, direction, length: (n, 2) and (n,) at all ranks' interface nodes: positions, outer and
             inner constituents, interface sections, degrees about the centre of the inner constituent, lengths.
+        fibre, radius: (n,) fibre numbers, also within coatings, and circle radii, NaN without a circle.
     """
 
     def __init__(self, cell: TornCell, interface: contact_problem.ContactProblem) -> None:
@@ -124,7 +125,8 @@ class EnergyReleaseRates:
         self._chains = debonded_arcs.InterfaceChains(cell.neighbours.adjacency)
         self._extensions = [CrackExtension(s, self._period) for s in cell.subdomains]
         self.points, self.bodies = self._gathered(nodes.points), self._gathered(nodes.bodies)
-        self.pair = self._gathered(nodes.pair)
+        self.pair, inner = self._gathered(nodes.pair), self.bodies[:, 1]
+        self.fibre, self.radius = cell.summary.fibre_number(inner), cell.summary.radii[inner]
         # Rounded, lest rounding decide their order.
         direction = np.round(self._gathered(cell.directions), debonded_arcs.DIRECTION_DIGITS)
         self.direction, self.length = np.where(direction <= -180.0, 180.0, direction), self._gathered(nodes.length)
@@ -152,8 +154,8 @@ class EnergyReleaseRates:
         solution, status = response.state.solution, self._gathered(response.state.status)
         tips = self._chains.tips(status)
         # Tips on circles, in the order of fibres, interfaces and directions.
-        order = np.lexsort((self.direction[tips.node], self.pair[tips.node], self._numbers(tips)))
-        tips = tips.chosen(order[np.isfinite(self._radius(tips)[order])])
+        order = np.lexsort((self.direction[tips.node], self.pair[tips.node], self.fibre[tips.node]))
+        tips = tips.chosen(order[np.isfinite(self.radius[tips.node[order]])])
         jump = self._gathered(self.interface.jump(solution))
         force = self._gathered(self.interface.traction(solution)) * self.length[:, None]
         jump[np.abs(jump) < self.interface.scales.gap_noise(solution.strain)] = 0.0
@@ -169,20 +171,12 @@ class EnergyReleaseRates:
         fraction = np.divide(closing[rigid], work, out=np.zeros_like(closing[rigid]), where=work > 0)
         modes[rigid] = fraction * np.maximum(0.0, self._released(tips.chosen(rigid), response))[:, None]
         return EnergyRelease(
-            fibre=self._numbers(tips),
+            fibre=self.fibre[tips.node],
             pair=self.pair[tips.node],
             direction=self.direction[tips.node],
             modes=response.scale**2 * modes,
             length=length,
         )
-
-    def _numbers(self, tips: debonded_arcs.CrackTips) -> Int:
-        """Return the fibre numbers (t,) of tips, also for fibres within coatings."""
-        return self.cell.summary.fibre_number(self.bodies[tips.node, 1])
-
-    def _radius(self, tips: debonded_arcs.CrackTips) -> Float:
-        """Return the circle radii (t,) at tips; NaN without a circle."""
-        return np.asarray(self.cell.summary.radii[self.bodies[tips.node, 1]])
 
     def _released(self, tips: debonded_arcs.CrackTips, response: Response) -> Float:
         """Return G (t,) from a virtual crack extension at each tip.  Collective."""
@@ -211,14 +205,14 @@ class EnergyReleaseRates:
             first = last
         turn = self.direction[tips.node] - self.direction[tips.behind]
         outward = np.sign((turn + 180.0) % 360.0 - 180.0)
-        return np.asarray(-outward * distributed_arrays.allreduce_sum(self.cell.comm, change) / self._radius(tips))
+        return np.asarray(-outward * distributed_arrays.allreduce_sum(self.cell.comm, change) / self.radius[tips.node])
 
     def _closing(self, tips: debonded_arcs.CrackTips, status: Status, force: Float, jump: Float) -> tuple[Float, Float]:
         """Return `closing_work` (t, 2) in opening and in shear, and the closed lengths (t,).
 
         A length is MODE_LENGTH times the radius, or the length of the element behind the tip if that is larger.
         """
-        smallest, order = MODE_LENGTH * self._radius(tips), self.cell.case.cell.order
+        smallest, order = MODE_LENGTH * self.radius[tips.node], self.cell.case.cell.order
         work, length = np.zeros((len(smallest), 2)), np.zeros(len(smallest))
         # Nodes of a chain within these lengths at most, and one element more.
         counts = self._tree.query_ball_point(

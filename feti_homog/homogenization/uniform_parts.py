@@ -156,34 +156,6 @@ class NestedInterior:
     interior: one_subdomain.Interior
     loads: Float | None
 
-    @classmethod
-    def of(
-        cls,
-        places: Sequence[int],
-        boundary: interface_operators.InterfaceOperators,
-        lattice: ReferenceLattice,
-        nested: Int,
-    ) -> NestedInterior:
-        """Refine, assemble and factor; `nested` numbers lattice nodes among finer ones."""
-        members = [boundary.subdomains[place] for place in places]
-        first, meshes, numbers = members[0], [refinement.refine(s.submesh, lattice) for s in members], list[Int]()
-        for k, s, mesh in zip(places, members, meshes, strict=True):
-            inside = NONE - 1
-            of_fine = np.full(s.n_dofs, inside)
-            of_fine[boundary.dofs[k]] = boundary.offsets[k] + np.arange(len(boundary.dofs[k]))
-            if s.submesh.pinned >= 0:
-                of_fine[s.problem.dofs(np.array([s.submesh.pinned]))] = NONE
-            fine = np.empty(mesh.n_classes, np.int64)
-            fine[mesh.node_class[mesh.nodes]] = s.mesh.node_class[s.mesh.nodes[:, nested]]
-            numbers.append(of_fine[s.problem.dofs(fine)])
-        place = np.concatenate(numbers)
-        fixed = np.flatnonzero(place != inside)
-        mesh = refinement.joined(meshes)
-        body = assembly.assemble(mesh, first.L, first.problem, first.is_mixed)
-        interior = one_subdomain.Interior(body.K, fixed)
-        loads = body.Q[interior.dofs] if any(s.submesh.at_void.any() for s in members) else None
-        return cls(members, mesh, fixed, place[fixed], interior, loads)
-
     def displacement(self, u: Float, loads: Float) -> Float:
         """Return u* (classes, c, k) from u (boundary dofs, k) on all boundaries under the loads (v, k)."""
         problem = self.members[0].problem
@@ -204,10 +176,26 @@ def locks(subdomains: Sequence[Subdomain | UniformPart], comm: MPI.Intracomm) ->
 def nested_interiors(
     boundary: interface_operators.InterfaceOperators, lattice: ReferenceLattice, coarser: ReferenceLattice
 ) -> Iterator[NestedInterior]:
-    """Yield this rank's subdomain interiors on the coarser lattice, in groups."""
-    nested = coarser.within(lattice)
+    """Refine, assemble and factor this rank's subdomain interiors on the coarser lattice, group by group."""
+    nested, inside = coarser.within(lattice), NONE - 1
     for group in groups(boundary.subdomains, coarser):
-        yield NestedInterior.of(group, boundary, coarser, nested)
+        members = [boundary.subdomains[k] for k in group]
+        first, meshes, numbers = members[0], [refinement.refine(s.submesh, coarser) for s in members], list[Int]()
+        for k, s, mesh in zip(group, members, meshes, strict=True):
+            of_fine = np.full(s.n_dofs, inside)
+            of_fine[boundary.dofs[k]] = boundary.offsets[k] + np.arange(len(boundary.dofs[k]))
+            if s.submesh.pinned >= 0:
+                of_fine[s.problem.dofs(np.array([s.submesh.pinned]))] = NONE
+            fine = np.empty(mesh.n_classes, np.int64)
+            fine[mesh.node_class[mesh.nodes]] = s.mesh.node_class[s.mesh.nodes[:, nested]]
+            numbers.append(of_fine[s.problem.dofs(fine)])
+        place = np.concatenate(numbers)
+        fixed = np.flatnonzero(place != inside)
+        mesh = refinement.joined(meshes)
+        body = assembly.assemble(mesh, first.L, first.problem, first.is_mixed)
+        interior = one_subdomain.Interior(body.K, fixed)
+        loads = body.Q[interior.dofs] if any(s.submesh.at_void.any() for s in members) else None
+        yield NestedInterior(members, mesh, fixed, place[fixed], interior, loads)
 
 
 def groups(subdomains: Sequence[Subdomain | UniformPart], lattice: ReferenceLattice) -> Iterator[list[int]]:
