@@ -14,16 +14,7 @@ from feti_homog.errors import ConvergenceError
 from feti_homog.feti.decomposition import jump_operator
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface import Load
-from feti_homog.interface.contact import (
-    BONDED,
-    CLOSED,
-    OPEN,
-    BondState,
-    Equilibrium,
-    Status,
-    contact_problem,
-    coupled_interfaces,
-)
+from feti_homog.interface.contact import BondState, Contact, ContactProblem, Equilibrium, Status, coupled_interfaces
 from feti_homog.materials import voigt
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Bool, Float
@@ -91,7 +82,7 @@ class Homogenization:
     def __init__(self, cell: TornCell, contact: bool) -> None:
         self.cell, size = cell, np.array([cell.summary.width, cell.summary.height])
         self.law = cell.bond_law
-        self.interface = contact_problem.ContactProblem(cell.solver, contact, size, self.law.softening)
+        self.interface = ContactProblem(cell.solver, contact, size, self.law.softening)
 
     @property
     def intact(self) -> BondState:
@@ -182,7 +173,7 @@ class Homogenization:
     def damage(self, bonds: BondState) -> Float:
         """(k,) bond damage, 0 intact to 1 broken."""
         damage = self.law.damage(bonds)
-        return (bonds.status != BONDED).astype(float) if damage is None else damage
+        return (bonds.status != Contact.BONDED).astype(float) if damage is None else damage
 
     def _rubbing(self, state: Equilibrium) -> float:
         """Return the work on faces with friction per area, which is not stored.  Collective."""
@@ -206,7 +197,7 @@ class Homogenization:
         """Count interface nodes in each state.  Collective."""
         if self.cell.summary.across:  # without multipliers there nothing can part
             return {"bonded": self.cell.summary.interface_nodes or 0, "open": 0, "closed": 0}
-        numbers = np.array([(status == kind).sum() for kind in (BONDED, OPEN, CLOSED)])
+        numbers = np.array([(status == kind).sum() for kind in (Contact.BONDED, Contact.OPEN, Contact.CLOSED)])
         sums = self.cell.comm.allreduce(numbers)
         return dict(zip(("bonded", "open", "closed"), sums.tolist(), strict=True))
 
@@ -267,7 +258,7 @@ class FibreInterfaces:
 
     def loose(self, status: Status) -> list[int]:
         """Return fibre numbers, from 1, without a bond that holds.  Collective."""
-        is_loose = (self.length(status == BONDED) == 0.0) & (self._length > 0.0)
+        is_loose = (self.length(status == Contact.BONDED) == 0.0) & (self._length > 0.0)
         return [int(number) for number in np.flatnonzero(is_loose) + 1]
 
     def angle(self, length: Float) -> Float:
@@ -282,7 +273,7 @@ class FibreInterfaces:
         """Return the debonded fraction (i,) of the length of each [[interface]] section.  Collective."""
         length, debonded = (
             np.bincount(self._nodes.pair, values, self._pairs).astype(float)
-            for values in (self._nodes.length, self._nodes.length * (status != BONDED))
+            for values in (self._nodes.length, self._nodes.length * (status != Contact.BONDED))
         )
         length = distributed_arrays.allreduce_sum(self._comm, length)
         return np.asarray(distributed_arrays.allreduce_sum(self._comm, debonded) / np.where(length > 0, length, 1.0))

@@ -24,7 +24,7 @@ from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.domain_partition import in_cell
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface import debonded_arcs
-from feti_homog.interface.contact import BONDED, Status, contact_problem
+from feti_homog.interface.contact import BONDED, ContactProblem, Status
 from feti_homog.materials import voigt
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Array, Float, Int
@@ -118,7 +118,7 @@ class EnergyReleaseRates:
         fibre, radius: (n,) fibre numbers, also within coatings, and circle radii, NaN without a circle.
     """
 
-    def __init__(self, cell: TornCell, interface: contact_problem.ContactProblem) -> None:
+    def __init__(self, cell: TornCell, interface: ContactProblem) -> None:
         """Gather the interface nodes, and find the boundaries that limit a crack extension.  Collective."""
         nodes = interface.nodes
         self.cell, self.interface, self._period = cell, interface, cell.summary.period

@@ -16,15 +16,7 @@ from scipy.sparse import csr_matrix
 from feti_homog.fem import Problem, assembly
 from feti_homog.feti.decomposition import JumpOperator, SharedEntities, Subdomain, jump_operator, shared_entities
 from feti_homog.feti.operators import interface_operators, one_subdomain
-from feti_homog.mesh import (
-    FineMesh,
-    ReferenceLattice,
-    Submesh,
-    SubmeshesOfRank,
-    periodic_topology,
-    refinement,
-    submeshes,
-)
+from feti_homog.mesh import FineMesh, ReferenceLattice, Submesh, periodic_topology, refinement, submeshes
 from feti_homog.typing import Float, Int
 
 # Number of elements in a group of subdomains: small enough for the processor's cache, large enough for NumPy.
@@ -103,7 +95,7 @@ def share_parts(
     body = np.array([p.submesh.body for p in parts])
     member = np.repeat(np.arange(len(parts)), [len(p.mesh.nodes) for p in parts])
     index, phase = np.array([p.submesh.index for p in parts]), tuple(p.submesh.phase for p in parts)
-    joined = SubmeshesOfRank(submeshes.joined_meshes([p.submesh for p in parts]), member, index, body, phase)
+    joined = submeshes.SubmeshesOfRank(submeshes.joined_meshes([p.submesh for p in parts]), member, index, body, phase)
     bodies = comm.allgather(body)
     rank = np.repeat(np.arange(comm.size), [len(bodies_of_rank) for bodies_of_rank in bodies])
     table = submeshes.SubdomainTable(np.concatenate(bodies), rank, table.nesting, table.phase)

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from feti_homog.case import interface_section
-from feti_homog.interface.contact.states import BONDED, Status
+from feti_homog.interface.contact import BONDED, Status
 from feti_homog.schema import wording
 from feti_homog.typing import Bool, Float, Int
 

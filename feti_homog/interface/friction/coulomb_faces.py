@@ -22,8 +22,8 @@ from itertools import product
 import numpy as np
 
 from feti_homog.errors import NotCarriedError
+from feti_homog.interface.contact import Status
 from feti_homog.interface.contact.contact_problem import BLOCK_PIVOTS
-from feti_homog.interface.contact.states import Status
 from feti_homog.interface.friction.face_system import FaceSystem, Prescribed
 from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK, FaceStatus
 from feti_homog.typing import Bool, Float

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.interface.contact.states import Status
+from feti_homog.interface.contact import Status
 from feti_homog.interface.friction import status_system
 from feti_homog.typing import Bool, Float, Float32, Int
 

@@ -18,9 +18,17 @@ from scipy.linalg import block_diag, lu_factor, lu_solve
 
 from feti_homog.errors import CaseError
 from feti_homog.feti import DualSolution, solver_plan
-from feti_homog.interface.contact.contact_problem import ContactProblem
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status, coulomb_errors
+from feti_homog.interface.contact import (
+    BONDED,
+    CLOSED,
+    OPEN,
+    BondState,
+    ContactProblem,
+    CoupledInterfaces,
+    Equilibrium,
+    Status,
+)
+from feti_homog.interface.contact.states import coulomb_errors
 from feti_homog.interface.friction.coulomb_faces import CoulombFaces
 from feti_homog.interface.friction.status_system import HELD, INVERSE_ITERATIONS, OPEN_FACE, STICK, UNRESISTED
 from feti_homog.interface.loads import Load, Macroscopic

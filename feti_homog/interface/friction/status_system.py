@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
-from feti_homog.interface.contact.states import Status
+from feti_homog.interface.contact import Status
 from feti_homog.typing import Bool, Float, Int
 
 

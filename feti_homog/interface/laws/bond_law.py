@@ -14,8 +14,7 @@ from typing import Any, ClassVar, Protocol, Self
 import numpy as np
 
 from feti_homog.case import bond_laws
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import BondState
+from feti_homog.interface.contact import BondState, CoupledInterfaces
 from feti_homog.typing import Bool, Float, Int
 
 # Bonds whose utilisations differ relatively by less break together: in a symmetric cell the solver errs by less.

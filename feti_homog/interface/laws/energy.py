@@ -19,9 +19,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 
 from feti_homog.errors import ConvergenceError
-from feti_homog.interface.contact.contact_problem import ContactProblem
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import BONDED, BondState
+from feti_homog.interface.contact import BONDED, BondState, ContactProblem, CoupledInterfaces
 from feti_homog.interface.laws.bond_law import UTILISATION_TIE, KeyValues, SpringLaw
 from feti_homog.typing import Bool, Float, Int
 

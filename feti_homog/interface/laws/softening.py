@@ -23,8 +23,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from feti_homog.errors import CaseError
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import BondState
+from feti_homog.interface.contact import BondState, CoupledInterfaces
 from feti_homog.interface.laws.bond_law import MOST_STEPS, KeyValues, SpringLaw
 from feti_homog.interface.laws.strength import QuadraticStrength
 from feti_homog.typing import Bool, Float, Int

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.errors import NotCarriedError
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import Equilibrium, Status
+from feti_homog.interface.contact import CoupledInterfaces, Equilibrium, Status
 from feti_homog.interface.friction.coulomb_faces import StuckError
 from feti_homog.interface.friction.face_system import Prescribed
 from feti_homog.interface.friction.sliding_cell import SlidingCell

@@ -8,8 +8,7 @@ from mpi4py import MPI
 
 from feti_homog.errors import NotCarriedError
 from feti_homog.feti import DualSolution
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import BondState, Equilibrium
+from feti_homog.interface.contact import BondState, CoupledInterfaces, Equilibrium
 from feti_homog.interface.laws.bond_law import UTILISATION_TIE, BondLaw
 from feti_homog.interface.loads import Load, Macroscopic, Multipliers
 from feti_homog.interface.path.leg import SAME_SHARE, Leg

@@ -8,8 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from feti_homog.errors import NotCarriedError
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import BONDED, Equilibrium
+from feti_homog.interface.contact import BONDED, CoupledInterfaces, Equilibrium
 from feti_homog.interface.laws.bond_law import UTILISATION_TIE, BondLaw
 from feti_homog.interface.loads import Load, Macroscopic
 from feti_homog.interface.path import path_points

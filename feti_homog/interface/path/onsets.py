@@ -17,10 +17,8 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.feti import DualSolution
-from feti_homog.interface.contact.contact_problem import ContactProblem
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
+from feti_homog.interface.contact import BONDED, CLOSED, OPEN, BondState, ContactProblem, CoupledInterfaces, Equilibrium
 from feti_homog.interface.contact.floating_bodies import FloatingBodies, shares_to_zero
-from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium
 from feti_homog.interface.laws.bond_law import UTILISATION_TIE, BondLaw
 from feti_homog.typing import Bool, Float, Int
 

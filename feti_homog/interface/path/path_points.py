@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces, held_traction
-from feti_homog.interface.contact.states import BONDED, BondState, Equilibrium
+from feti_homog.interface.contact import BONDED, BondState, CoupledInterfaces, Equilibrium
+from feti_homog.interface.contact.coupled_interfaces import held_traction
 from feti_homog.interface.laws.bond_law import UTILISATION_TIE, BondLaw
 from feti_homog.interface.loads import Macroscopic, Multipliers
 from feti_homog.typing import Bool, Float
