@@ -45,12 +45,13 @@ class FaceSystem:
         friction: (n,) mu.
         S: (m, m) scaled stiffness, with 1 as the largest diagonal entry of each node.
         size: (m,) units: the stiffness is S_ij size_i size_j.
+        nodes, loads: the number n of nodes, and the indices of the loads in x.
     """
 
     def __init__(self, stiffness: Float, friction: Float) -> None:
         """Scale the stiffness (m, m) of n normal and n tangential jumps and v loads: m = 2n + v."""
         n, diagonal = len(friction), stiffness.diagonal()
-        self.friction = friction
+        self.friction, self.nodes, self.loads = friction, n, slice(2 * n, len(stiffness))
         nodes = np.repeat(diagonal[: 2 * n].reshape(n, 2).max(axis=1, initial=0.0), 2)
         size = np.sqrt(np.concatenate([nodes, np.maximum(diagonal[2 * n :], 0.0)]))
         self.size = np.where(size > 0.0, size, 1.0)
@@ -60,16 +61,6 @@ class FaceSystem:
         self._last: tuple[bytes, status_system.StatusSystem] | None = None
         self._factored = 0
         self._products: deque[tuple[Float, Float]] = deque(maxlen=PRODUCTS)
-
-    @property
-    def nodes(self) -> int:
-        """The number n of nodes."""
-        return len(self.friction)
-
-    @property
-    def loads(self) -> slice:
-        """The indices of the loads in x."""
-        return slice(2 * self.nodes, len(self.S))
 
     def forces(self, x: Float) -> tuple[Float, Float]:
         """Return the scaled normal and tangential forces (n,)."""
