@@ -24,7 +24,7 @@ LAYERS = 3
 
 
 class SharedVertices:
-    """The shared vertices in this rank's meshes, each of which joins some pieces.
+    """The shared vertices of body pieces in this rank's meshes, each mesh with some pieces.
 
     Attributes:
         meshes: indices of this rank's meshes with shared vertices.
@@ -81,7 +81,7 @@ class SharedVertices:
         return self._at_home(self._rows, np.concatenate([np.zeros((0, width)), *parts]), self.classes, sums)
 
     def _copies(self, parts: Sequence[Int]) -> list[Int]:
-        """Return the copy count of each row (n, 3) in the meshes, and 1 at the first copy, else 0.  Collective."""
+        """Count the copies of each row (n, 3) in all meshes; the second column is 1 at the first copy.  Collective."""
 
         def copies(number: Int, _: Int) -> Int:
             _, first, count = np.unique(number, return_index=True, return_counts=True)
@@ -111,7 +111,7 @@ class SharedVertices:
 
 
 def border_lines(s: Submesh, mesh: FineMesh, classes: Int32) -> tuple[Int, Int, Int]:
-    """Return the triangles (e,) at a piece border, their border edges (e,), and classes (e, M + 1) along the edges.
+    """Return the triangles (e,) at a piece border, their border edges (e,), and the edge classes (e, M + 1).
 
     `classes` (t, q) are the lattice node classes of all triangles.
     """
@@ -153,7 +153,7 @@ def fits_across_cuts(
 
 @dataclass(frozen=True)
 class _Strip:
-    """The elements about one mesh's shared vertices, with vertex numbers from 0.
+    """The elements about the shared vertices of a mesh, with vertex numbers from 0.
 
     Attributes:
         stress: recovered stress on these elements.
@@ -173,7 +173,7 @@ class _Strip:
 
     @classmethod
     def of(cls, body: stress_recovery.RecoveredStress, classes: Int, cut: Int, is_first: Bool) -> _Strip:
-        """Find the elements; of the sides `cut` (c, 2) on cuts, this piece counts the first copies."""
+        """Find the elements; this piece counts a side of `cut` (c, 2) only where its copy `is_first`."""
         is_vertex, at = np.zeros(len(body.u), bool), body.node_class[body.triangles[:, :3]]
         is_vertex[classes] = True
         for _ in range(LAYERS):
@@ -191,7 +191,7 @@ class _Strip:
         return cls(stress, is_vertex, stress.numbers[classes], sides[once], vector[once], np.unique(sides[single]))
 
     def neighbours(self, at_boundary: Bool) -> local_fits.PatchNeighbours:
-        """Return vertex pairs with the first on the body boundary; `at_boundary` (n,) tells it of shared vertices."""
+        """Return vertex pairs with the first on the body boundary, where shared vertices are `at_boundary` (n,)."""
         is_bound = np.zeros(int(self.is_vertex.sum()), bool)
         is_bound[self.bounds] = True
         is_bound[self.shared] = at_boundary
@@ -201,7 +201,7 @@ class _Strip:
 
 
 def _code(a: Int, b: Int, size: int) -> Int:
-    """Return one number for each vertex pair, among `size` vertices."""
+    """Return a number for each pair of vertices, among `size` vertices."""
     return np.asarray(np.minimum(a, b) * size + np.maximum(a, b))
 
 

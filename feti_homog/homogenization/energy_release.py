@@ -29,7 +29,7 @@ from feti_homog.materials import voigt
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Array, Float, Int
 
-# Length at which the modes are separated / radius of the fibre; this length is one element at least.
+# Length at which the modes are separated / radius of the fibre; at least one element counts.
 MODE_LENGTH = 1e-3
 QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 # Radius around a tip beyond which no node turns / distance to boundaries; largest such radius / a period of the cell;
@@ -40,7 +40,7 @@ OFF_CIRCLE = 1e-4
 
 
 class CrackExtension:
-    """The elements of a subdomain around a tip, and the energy change of a crack extension in these elements."""
+    """A virtual crack extension in the elements of a subdomain around a tip."""
 
     def __init__(self, subdomain: Subdomain, period: Float) -> None:
         """Prepare the search for elements around points; `period` (2,) is the period of the cell."""
@@ -127,7 +127,7 @@ class EnergyReleaseRates:
         self.points, self.bodies = self._gathered(nodes.points), self._gathered(nodes.bodies)
         self.pair, inner = self._gathered(nodes.pair), self.bodies[:, 1]
         self.fibre, self.radius = cell.summary.fibre_number(inner), cell.summary.radii[inner]
-        # Rounded, lest rounding decide their order.
+        # Rounding errors must not decide the order of directions.
         direction = np.round(self._gathered(cell.directions), debonded_arcs.DIRECTION_DIGITS)
         self.direction, self.length = np.where(direction <= -180.0, 180.0, direction), self._gathered(nodes.length)
         # (interfaces, 2) normal and tangential stiffnesses of the bonds, infinite where they are rigid.

@@ -146,7 +146,7 @@ def _has_corners(cell: TornCell) -> bool:
 def _recovered(
     cell: TornCell, responses: Sequence[Response], keep: bool, lattice: ReferenceLattice
 ) -> Iterator[tuple[stress_recovery.RecoveredStress, arc_error.ArcSides]]:
-    """Yield recovered stresses and arcs by subdomain group, refined by the lattice.  Collective before the first.
+    """Yield recovered stresses and arcs by subdomain group, on a lattice.  Collective before the first.
 
     A coarser lattice has its own equilibrium, but across materials the mesh displacements at its nodes, whose error is
     hardly less.
@@ -211,7 +211,7 @@ class Group(NamedTuple):
 def boundary_tractions(
     cell: TornCell, responses: Sequence[Response], groups: Sequence[Group], shared: SharedVertices | None, nested: bool
 ) -> dict[int, local_fits.KnownTractions]:
-    """Return, by group, the tractions where two sides on arcs meet, and zero tractions at voids.  Collective.
+    """Return, by group, the tractions between sides on arcs, and zero tractions at voids.  Collective.
 
     A traction is the force divided by the node length if the mesh is `nested`, and otherwise divided by the side
     length, so that uniform stresses give exact tractions.

@@ -1,4 +1,4 @@
-"""Energy errors of springs at nodes, which add to the element and arc errors."""
+"""Estimate the energy errors of nodal springs, which add to the element and arc errors."""
 
 from collections.abc import Sequence
 
@@ -19,7 +19,7 @@ POINTS, WEIGHTS = roots_legendre(6)
 
 
 class SpringSides:
-    """The element sides along springs and the interface nodes of all ranks, which are the same in all states."""
+    """The element sides along springs, and the interface nodes of all ranks, for all states."""
 
     def __init__(
         self,

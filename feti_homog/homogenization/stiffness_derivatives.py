@@ -89,7 +89,7 @@ def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response
 
 
 def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str, Float], Float]:
-    """Integrals (v, k, v, k) int e_i (x) e_j by material; changes by growth.  Collective.
+    """Integrate e_i (x) e_j (v, k, v, k) by material, and the change by growth.  Collective.
 
     There are k unit loads.  Changes (k, k) are energy derivatives by ln R of all fibres, 0 unless the case has such
     fibres.
@@ -153,7 +153,7 @@ class _Fields:
         return cls(g[:, :, :a], w, slopes, strain + loads, rest)
 
     def products(self) -> Float:
-        """(mk + 1, mk + 1) int f f^T for f = [strains, 1]."""
+        """Return int f f^T (mk + 1, mk + 1) for f = [strains, 1]."""
         *points, _, k = self.strain.shape
         gram = _gram(np.concatenate([self.strain.reshape(*points, -1), np.ones((*points, 1))], axis=2), self.weights)
         if self.rest is not None:  # 11 and 22 products have -d lambda r^2 from isotropic dA
@@ -163,7 +163,7 @@ class _Fields:
         return gram
 
     def change(self, problem: Problem, A: Float, V: Float, more: Float) -> Float:
-        """(k, k) derivative of int e_i A e_j where nodes move by s V.
+        """Differentiate int e_i A e_j (k, k) by s, while nodes move by s V.
 
         At fixed displacements, V (e, a, 2): int (de_i + div V e_i / 2) A e_j and its transpose, d grad u = -grad V grad
         u; `more` (v - m, k) other loads.
@@ -185,7 +185,7 @@ class _Fields:
 
 
 def _strains(slopes: Float, problem: Problem) -> Float:
-    """(e, q, m, k) strains from slopes (e, q, 2, c, k)."""
+    """Return the strains (e, q, m, k) of slopes (e, q, 2, c, k)."""
     strain = np.zeros((*slopes.shape[:2], problem.strains, slopes.shape[4]))
     for (i, d), number in np.ndenumerate(problem.voigt):
         strain[:, :, number] += slopes[:, :, d, i]
@@ -193,7 +193,7 @@ def _strains(slopes: Float, problem: Problem) -> Float:
 
 
 def _gram(fields: Float, weights: Float) -> Float:
-    """(n, n) int f f^T for fields (e, q, n)."""
+    """Return int f f^T (n, n) for fields (e, q, n)."""
     flat = fields.reshape(weights.size, -1)
     return np.asarray(flat.T @ (weights.reshape(-1, 1) * flat))
 

@@ -21,7 +21,7 @@ from feti_homog.typing import Float, Int
 
 # Number of elements in a group of subdomains: small enough for the processor's cache, large enough for NumPy.
 ELEMENTS_AT_ONCE = 1 << 13
-# Halvings from which on the mesh that is refined twice less serves, but across materials and where a phase locks.
+# Halvings from which a mesh refined twice less gives the error, but across materials and where a phase locks.
 REFINED_OFTEN = 3
 # Largest lambda / mu on that mesh, and in subdomains across materials, for a Poisson's ratio of 0.4: beyond, errors of
 # coarse elements are no guide.
@@ -130,7 +130,7 @@ class ForcesBetweenParts:
 
 @dataclass(frozen=True)
 class NestedInterior:
-    """The factored interior of some subdomains with one phase on a coarser mesh, with c displacements per node.
+    """The factored interior of one-phase subdomains on a coarser mesh, with c displacements per node.
 
     Attributes:
         members: subdomains.

@@ -31,7 +31,7 @@ def estimates(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimates
 
 
 def rule_of_mixtures(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Phases in parallel along the fibres, in series across them; any number of phases.
+    """Put phases in parallel along the fibres and in series across them; any number of phases.
 
         E_A = sum c E_A,  nu_A = sum c nu_A,  1/E_T = sum c/E_T,  1/G_A = sum c/G_A,  1/G_T = sum c/G_T,
         alpha_A = sum c E_A alpha_A / E_A*,  alpha_T = sum c (alpha_T + nu_A alpha_A) - nu_A* alpha_A*,
@@ -138,26 +138,26 @@ def _in_parallel(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> dict[s
 
 
 def cylinders_in_matrix(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> TransverseIsotropy:
-    """`aligned_cylinders` with the matrix around, and for a fibre on springs the bonded one that does the same."""
+    """Estimate by `aligned_cylinders` with the matrix around, and `equivalent_fibre` for fibres on springs."""
     fractions = [c for c, _ in _phases(matrix, fibres)]
     phases = [matrix, *(phase_bounds.equivalent_fibre(family, matrix) for family in fibres)]
     return phase_bounds.aligned_cylinders(fractions, phases, (matrix.K_transverse, matrix.G_transverse, matrix.G_axial))
 
 
 def mori_tanaka(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Every fibre is alone in the matrix, under the matrix's mean field; any kinds of round fibres, on springs too.
+    """Put every fibre alone in the matrix, under the mean field of the matrix, by `cylinders_in_matrix`.
 
-    `cylinders_in_matrix`.  Mori and Tanaka 1973, Benveniste 1987; transversely isotropic phases Chen, Dvorak and
-    Benveniste 1992; springs Benveniste 1985.
+    For any kinds of round fibres, on springs too.  Mori and Tanaka 1973, Benveniste 1987; transversely isotropic phases
+    Chen, Dvorak and Benveniste 1992; springs Benveniste 1985.
     """
     return Estimate.of(cylinders_in_matrix(matrix, fibres))
 
 
 def composite_cylinders(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Cylinders of fibre and matrix, alike but for their size, that fill space; one kind of fibres, on springs too.
+    """Fill space with cylinders of fibre and matrix, alike but for their size; one kind of fibres, on springs too.
 
-    Exact for this arrangement: k, E_A, nu_A, G_A and the expansions, as of `cylinders_in_matrix`.  Of
-    shear across the fibres there are bounds only.  Hashin and Rosen 1964; anisotropic fibres Hashin 1979; expansions
+    k, E_A, nu_A, G_A and the expansions by `cylinders_in_matrix` are exact for this arrangement; for shear across the
+    fibres there are only bounds.  Hashin and Rosen 1964; anisotropic fibres Hashin 1979; expansions
     Rosen and Hashin 1970; springs, of fibres of equal radius, Hashin 1990.
     """
     if len(fibres) != 1:

@@ -132,7 +132,7 @@ def is_isotropic(stiffness: ArrayLike) -> bool:
 
 
 def hashin_shtrikman(fractions: ArrayLike, stiffnesses: Sequence[ArrayLike]) -> Bounds:
-    """Bounds on an isotropic composite of isotropic phases, (n,) and (n, 3, 3), in the plane.
+    """Bound the moduli of an isotropic composite of isotropic phases, (n,) and (n, 3, 3), in the plane.
 
     k* = (sum c_i/(k_i + mu0))^-1 - mu0, mu* = (sum c_i/(mu_i + h0))^-1 - h0, h0 = k0 mu0/(k0 + 2 mu0), with
     k0, mu0 the least moduli of the phases for the lower bound and the greatest for the upper (Hashin 1965,
@@ -210,7 +210,7 @@ def expansions(phase: TransverseIsotropy) -> Pair | None:
 
 
 def equivalent_fibre(family: Fibres, matrix: TransverseIsotropy) -> TransverseIsotropy:
-    """Return the bonded fibre that replaces one on springs in a matrix whose field is uniform far away.
+    """Return the bonded fibre that replaces a fibre on springs, under a uniform far field.
 
     E_axial, nu_axial and the expansions stay;
 
@@ -240,7 +240,7 @@ def equivalent_fibre(family: Fibres, matrix: TransverseIsotropy) -> TransverseIs
 
 
 def fibre_bounds(fractions: Sequence[float], phases: Sequence[TransverseIsotropy]) -> FibreBounds:
-    """Bounds on bonded, transversely isotropic phases: cylinders along x3 with any section.
+    """Bound the constants of bonded, transversely isotropic cylinders along x3, with any section.
 
     `aligned_cylinders` with the least moduli of the phases around, and with the greatest.  Bounds on nu_A are the
     values of Hill's relation at the bounds on k, so for two phases only.  All but the bounds on G_T hold for square

@@ -22,7 +22,7 @@ from feti_homog.typing import Float
 
 
 class CoupledInterfaces:
-    """Interfaces of a cell, which its plane and axial problems share.
+    """The interfaces of a cell, shared by its plane and axial problems.
 
     Strains and stresses (n,) have the plane components first, then the axial components.
 
@@ -116,7 +116,7 @@ def energy_beside_springs(interface: ContactProblem, state: Equilibrium) -> floa
 
 
 def held_traction(cell: CoupledInterfaces, state: Equilibrium) -> Float:
-    """Return the traction (k, c) at this rank's nodes; in damaged bonds s / C, of the intact fraction."""
+    """Return the traction (k, c) at this rank's nodes; the shear of a damaged bond is s / C, in its intact fraction."""
     traction, r = cell.traction(state.solutions), slipped(cell.plane, state)[cell.nodes.row + 1]
     nodes = np.flatnonzero(r)
     C = state.solution.compliance[cell.nodes.row[nodes] + 1]

@@ -18,7 +18,7 @@ NEGLIGIBLE = 1e-6
 
 
 class LoadScales:
-    """Scales of the loads (v,) of one problem: its m strains, then other actions such as a temperature.
+    """The scales of the loads (v,) of a problem: m strains, then actions such as a temperature.
 
     Attributes:
         mean_stiffness: (v, v) mean stiffness <L>, Voigt's bound for strains.
@@ -26,7 +26,7 @@ class LoadScales:
         largest_stiffness: largest entry of Reuss' bound.
         roots: (v,) square roots of the diagonal of `least_bonded_stiffness`, inf for loads without a stress; strains
             times these roots, and stresses over them, are comparable.
-        longest: (k,) largest tributary length around each bond's inner body.
+        longest: (k,) largest tributary length on the interface of each node.
     """
 
     def __init__(self, solver: FetiSolver, size: Float) -> None:
@@ -60,7 +60,7 @@ class LoadScales:
         self.longest = self.over_interface(nodes.length)
 
     def over_interface(self, values: Float) -> Float:
-        """Return the largest of the values (k,) around each bond's inner body, at least 0.  Collective."""
+        """Return the largest of the values (k,) on the interface of each node, at least 0.  Collective."""
         inner, largest = self.solver.jump_operator.nodes.bodies[:, 1], np.zeros(self._bodies)
         np.maximum.at(largest, inner, values)
         self.solver.comm.Allreduce(MPI.IN_PLACE, largest, MPI.MAX)
@@ -104,7 +104,7 @@ class LoadScales:
         return np.asarray(self.sign_noise * np.maximum(self.over_interface(forces), caused))
 
     def asked(self, load: Load) -> Float:
-        """Return the sizes (v,) of prescribed strains, plus strains of the bonded cell by stresses."""
+        """Return the sizes (v,) of the strains that a load prescribes, or its stresses cause in the bonded cell."""
         k = self.solver.problem.stresses
         strain = np.abs(np.where(load.by_stress, 0.0, load.values))
         stress = np.abs(np.where(load.by_stress, load.values, 0.0))[:k]
@@ -112,15 +112,15 @@ class LoadScales:
         return np.asarray(strain)
 
     def acting(self, strain: Float, asked: Float) -> Float:
-        """Return the strain sizes (v,) of a state, at most ABSURD times `asked`, as error scales."""
+        """Limit the strain sizes (v,) of a state to ABSURD times `asked`, for use as error scales."""
         limit = ABSURD * self.imposed_strain(asked).max()
         is_strain = np.arange(len(strain)) < self.solver.problem.strains
         return np.where(is_strain, np.minimum(np.abs(strain), limit), np.abs(strain))
 
     def excess(self, strain: Float, asked: Float) -> float:
-        """Return the ratio of the largest strain of a state (v,) to the largest one of `asked` (v,)."""
+        """Return the largest strain of a state (v,), relative to the largest strain of `asked` (v,)."""
         return float(self.imposed_strain(strain).max() / (self.imposed_strain(asked).max() or np.inf))
 
     def imposed_strain(self, loads: Float) -> Float:
-        """Return the strain sizes, (m,) or (m, n), under loads (v,) or (v, n) in the bonded cell."""
+        """Return the strain sizes, (m,) or (m, n), that loads (v,) or (v, n) cause in the bonded cell."""
         return np.asarray(self._strains @ np.abs(loads))

@@ -68,7 +68,7 @@ class FaceSystem:
         return f[::2], f[1::2]
 
     def follow(self, before: FaceSystem, old: Int, other: Int) -> None:
-        """Take over the response of faces whose entries have the indices `old` (m',); see `FollowedStatuses.grow`."""
+        """Take over the response of the faces `before`; arguments as in `FollowedStatuses.grow`."""
         units = before.size / self.size[old]
         if before._followed is None:
             self._factored = before._factored
@@ -81,7 +81,7 @@ class FaceSystem:
         return np.asarray(largest * (self._absolute @ np.abs(x / largest).astype(np.float32)), float)
 
     def product(self, x: Float) -> Float:
-        """Return S x (m,) for an array that nothing changes later; the last products are stored."""
+        """Return S x (m,), and store it; the caller must not change x later."""
         for array, y in self._products:
             if array is x:
                 return y
@@ -93,7 +93,7 @@ class FaceSystem:
         return y
 
     def linear(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, bool]:
-        """Return the scaled x (m,) with these statuses, and whether x is a solution; see `StatusSystem.solve`."""
+        """Solve for the scaled x (m,) with these statuses; return x and whether it is a solution."""
         rows = status_system.free_rows(status, self.friction, load.by_stress)
         x, values = self.prescribed(status, load, start)
         followed = self._turned(*rows)
@@ -145,7 +145,7 @@ class FaceSystem:
         )
 
     def prescribed(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, Float]:
-        """Return x (m,) with its prescribed entries, and S x (m,) in the rows of the loads."""
+        """Return x (m,) with its prescribed entries, and the right-hand side S x (m,) in the load rows."""
         last, loads, x, rows = 2 * self.nodes, self.loads, start.copy(), np.zeros(len(start))
         x[:last:2] = np.where(status == status_system.OPEN_FACE, x[:last:2], 0.0)
         x[1:last:2] = np.where(status == status_system.STICK, load.slip, x[1:last:2])

@@ -63,7 +63,7 @@ class CondensedProblem:
         self._some: tuple[Int, Float] | None = None
 
     def take(self, rows: Int, springs: Float) -> tuple[Float, Float, Float]:
-        """Return H_DD (n, n) plus springs (n,), b (n, v) and L (v, v) for rows D.  Collective."""
+        """Condense the problem to rows D: return H_DD (n, n) plus springs, b (n, v) and L (v, v).  Collective."""
         self.rows, self._some = rows, None
         self._columns, K = self._inverse.columns(rows)
         K[np.diag_indices(len(K))] += springs
@@ -84,7 +84,7 @@ class CondensedProblem:
         return np.asarray(self._response @ strain - self._columns @ jump)
 
     def some_multipliers(self, rows: Int, jump: Float, strain: Float) -> Float:
-        """Return lam (k, c) in owned rows (k, c); the columns of H are stored for the last array of rows."""
+        """Return lam (k, c) in owned rows (k, c); the last rows keep their columns of H."""
         if self._some is None or self._some[0] is not rows:
             self._some = rows, self._columns[rows.ravel()]
         return self._response[rows] @ strain - (self._some[1] @ jump).reshape(rows.shape)
@@ -108,9 +108,9 @@ class CondensedProblem:
 
 
 class AxialFaces:
-    """The axial problem in the matrix S of `coulomb_faces`, with its jumps g = K^-1 b E eliminated.
+    """The axial problem in the matrix S of `coulomb_faces`, with its jumps eliminated: g = K^-1 b E.
 
-    HELD times its diagonal entry holds a row without springs; the stiffest spring would dominate the largest entry.
+    HELD times its diagonal entry holds each row without springs: the largest entry may belong to a stiff spring.
 
     Attributes:
         problem: condensed axial problem.
@@ -225,7 +225,7 @@ class SlidingCell:
         return np.asarray((x / self.faces.size)[: self.faces.loads.start])
 
     def traction(self, x: Float) -> Float:
-        """Return the traction (k, 2), or (k, 3) with the axial one, in the intact fraction of each bond."""
+        """Return the traction in the intact fraction of each bond, (k, 2), or (k, 3) with the axial traction."""
         force = np.zeros((len(self.friction), sum(rows.shape[1] for rows in self._held_rows)))
         parts = zip(self._held_rows, self._parts(x), strict=True)
         force[self._held] = np.hstack([problem.some_multipliers(rows, *answer) for rows, (problem, answer) in parts])

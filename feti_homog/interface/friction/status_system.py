@@ -57,7 +57,7 @@ def free_rows(status: Status, friction: Float, by_stress: Bool) -> tuple[Bool, F
 
 
 def residual(y: Float, rhs: Float, free: Bool, slope: Float) -> Float:
-    """Return the residual (m,) of y = S x (m,) in the free rows, 0 in prescribed rows."""
+    """Return the residual (m,) for y = S x (m,) in free rows, 0 in prescribed rows."""
     sliding = np.flatnonzero(slope)
     missing = rhs - y
     missing[sliding] -= slope[sliding] * y[sliding - 1]
@@ -65,14 +65,14 @@ def residual(y: Float, rhs: Float, free: Bool, slope: Float) -> Float:
 
 
 def largest_share(residuals: Float, terms: Float, slope: Float) -> float:
-    """Return the largest of residuals (m,), relative to the terms (m,) of its row."""
+    """Return the largest residual (m,), relative to the terms (m,) of its row."""
     size, sliding = terms.copy(), np.flatnonzero(slope)
     size[sliding] += np.abs(slope[sliding]) * terms[sliding - 1]
     return float((np.abs(residuals) / np.where(size > 0.0, size, 1.0)).max(initial=0.0))
 
 
 class StatusSystem:
-    """The factored system S x = 0 in the free rows, with prescribed x in all other rows.
+    """The factored system of the free rows, S x = rhs, with x prescribed in all other rows.
 
     Sliding nodes have the row S_t + s mu S_n: their traction is s mu times the pressure.
 
@@ -85,9 +85,9 @@ class StatusSystem:
         """Factor the rows from `free_rows` in S (m, m), as in `CoulombFaces`."""
         self.free = free
         sliding = np.flatnonzero(slope)
-        place = np.cumsum(self.free) - 1
+        position = np.cumsum(self.free) - 1
         self._rows = S[self.free]
-        self._rows[place[sliding]] += slope[sliding, None] * S[sliding - 1]
+        self._rows[position[sliding]] += slope[sliding, None] * S[sliding - 1]
         A = self._rows[:, self.free]
         A[np.diag_indices(len(A))] += HELD
         self._factor = lu_factor(A, overwrite_a=True, check_finite=False) if len(A) else None
@@ -216,9 +216,9 @@ class FollowedStatuses:
         return np.asarray((self._R[0, :size, :size][:, some] @ permuted[some] - change)[self._index])
 
     def solve(self, x: Float, rhs: Float, terms: Callable[[Float], Float]) -> tuple[Float, Float] | None:
-        """Return x and S x (m,) with the right-hand side (m,), from a start with the prescribed entries.
+        """Solve for x; return x and S x (m,), from a start with the prescribed entries.
 
-        None if R has lost too many digits, relative to the terms sum_j |S_ij x_j| of each row.
+        Return None if R has lost too many digits, relative to the terms sum_j |S_ij x_j| of each row.
         """
         prescribed = np.where(self.free, rhs, x)
         if np.count_nonzero(prescribed) <= FEW:
@@ -234,7 +234,7 @@ class FollowedStatuses:
         return (x, y) if error <= NOISE else None
 
     def grow(self, S: Float, old: Int, other: Int, units: Float) -> bool:
-        """Add prescribed entries, so that the present entries have the indices `old` (m,) in S (m', m').
+        """Add prescribed entries; the present entries get the indices `old` (m,) in S (m', m').
 
         The present entries change to the units `units` (m,), and S changes between the entries with the indices
         `other`.  Return False if a pivot is too small; then R is worthless.

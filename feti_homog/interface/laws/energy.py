@@ -103,7 +103,7 @@ class TipEnergies:
 
 @dataclass(frozen=True, kw_only=True)
 class ReleasedEnergy(SpringEnergy):
-    """A bond of tributary length l at a tip breaks when the break releases G_c l.
+    """A bond at a tip breaks when its break releases G_c l, with its tributary length l.
 
     All other bonds break when the spring energy reaches G_c.
 
@@ -196,7 +196,7 @@ class SpringsAndTips(SpringEnergy):
 
 
 def released_energy(H: Float, lam: Float, stiffness: Float, contact: bool) -> Float:
-    """Return the energy (m,) that each break releases, with blocks H (m, 2, 2) and forces lam (m, 2).
+    """Return the released energy (m,) of each break, for blocks H (m, 2, 2) and forces (m, 2).
 
     `stiffness` (m, 2) bounds H: where H is rounding relative to this bound, as at the last bond of a fibre, no force
     can act.  With `contact` the faces that would overlap keep the normal force.

@@ -79,7 +79,7 @@ class CoulombLeg(Leg):
         return status, x
 
     def _given(self, share: float, x: Float) -> Prescribed:
-        """Prescribe the load at a fraction of the leg, and the slips of scaled x."""
+        """Prescribe the load at a fraction of the leg, and the slips in scaled x."""
         load = self._load_at(share)
         return Prescribed(load.by_stress, self.sliding.given(load), x[1 : 2 * len(self.sliding.rows) : 2])
 
@@ -90,7 +90,7 @@ class CoulombLeg(Leg):
         self._status, self._x, self._mean, self._state = status, x, mean, None
 
     def _settle(self, begin: PathState) -> None:
-        """Find the state at s with the bonds of `begin`, after its break if any.  Collective.
+        """Find the state at s with the bonds of `begin`, after a break if `begin` has one.  Collective.
 
         In a break faces lose the product of jumps and mean forces; slips turn a part into heat by the final forces, and
         the break has released the rest.
@@ -154,7 +154,7 @@ class CoulombLeg(Leg):
             raise StuckError(CYCLE)
 
     def _go_to(self, share: float) -> None:
-        """Advance to a fraction of the leg in one step, or to the largest that the cell carries.  Collective.
+        """Advance in one step to a fraction of the leg, or as far as the cell carries the load.  Collective.
 
         Raises:
             NotCarriedError: the cell carries nothing beyond the last step.
@@ -162,7 +162,7 @@ class CoulombLeg(Leg):
         sliding, x, faces = self.sliding, self._x, self.sliding.faces
 
         def carried() -> tuple[float, NotCarriedError | None]:
-            """Return the fraction that the cell carries, and the error that limits it or None."""
+            """Return the fraction of the leg that the cell carries, and the error that limits this fraction or None."""
             low, high = self._share, share
             try:
                 faces.step(self._status, self._given(share, x), x)

@@ -73,7 +73,7 @@ class FrictionlessLeg(Leg):
         return self.cell.equilibrium(self._load_at(share), bonds, lam)
 
     def _stand(self, share: float, state: Equilibrium) -> None:
-        """Set the state to the equilibrium at a fraction of the leg, and add the energies of the way."""
+        """Set the state to the equilibrium at a fraction of the leg, and add the energies of the way to it."""
         if share >= self._bends_before:
             self._bends_before = np.inf
         self._share, self._state, self._bonds = share, state, state.bonds
@@ -82,7 +82,7 @@ class FrictionlessLeg(Leg):
         self._from = self._path_state()
 
     def _advance(self) -> Iterator[Point]:
-        """Advance to the next event, or as far as the response is straight, and past it.  Collective.
+        """Advance past the next event, or as far as the response is straight.  Collective.
 
         Raises:
             NotCarriedError: neither open nor touching faces carry the load's stresses.
@@ -130,7 +130,7 @@ class FrictionlessLeg(Leg):
         return self._used()[1] > 1.0 - UTILISATION_TIE
 
     def _approach(self, target: float, end: Sequence[DualSolution]) -> bool:
-        """Advance to the target if the response is straight, else halve the way; return whether it is reached."""
+        """Advance to the target, or as far as the response is straight; return whether the target is reached."""
         cell, start, begin, reached = self.cell, self._share, self._state, True
         nearest = min(start + SAME_SHARE, 1.0)
         target = max(target, nearest)
@@ -159,7 +159,7 @@ class FrictionlessLeg(Leg):
         return reached
 
     def _response(self, state: Macroscopic) -> Float:
-        """(n,) components that the load does not prescribe: stresses, and strains times a stiffness."""
+        """Return the components (n,) that the load does not prescribe: stresses, and strains times a stiffness."""
         return np.where(self.end.by_stress, self.cell.plane.scales.largest_stiffness * state.strain, state.stress)
 
     def _turn(self, position: float) -> Point:

@@ -19,7 +19,7 @@ SAME_SHARE = 1e-9
 
 
 class Leg(ABC):
-    """Leg `leg` between two loads of equal kinds, at its rising share s.
+    """Leg number `leg`, between two loads of the same kinds, at its rising fraction s.
 
     Bonds break at constant load: a point, then the state after the break at the same s.
 
@@ -49,7 +49,7 @@ class Leg(ABC):
 
     @abstractmethod
     def _settle(self, begin: path_points.PathState) -> None:
-        """Find the state at s with the bonds of `begin`, after its break if any.  Collective."""
+        """Find the state at s with the bonds of `begin`, after a break if `begin` has one.  Collective."""
 
     @abstractmethod
     def _advance(self) -> Iterator[path_points.Point]:
@@ -110,11 +110,11 @@ class Leg(ABC):
             is_due = False
 
     def _release(self, which: Bool) -> tuple[int, int, path_points.PathState]:
-        """Break the bonds `which` (k,): numbers that part and that soften, and the path state.  Collective."""
+        """Break the bonds `which` (k,): return how many part and how many soften, and the path state.  Collective."""
         return path_points.break_bonds(self.cell, self.law, which, self.state, self._path_state())
 
     def _point(self, broke: int, softened: int, after: path_points.PathState) -> path_points.Point:
-        """Return the point at s, with the numbers of bonds that part and that soften.  Collective."""
+        """Return the point at s, at which `broke` bonds part and `softened` bonds soften.  Collective."""
         energies, self._energies, self._reported = self._energies, path_points.NO_ENERGIES, self._share
         load_factor = (self.leg + self._share) / len(self.waypoints)
         return path_points.Point(load_factor, 1.0, self.state, broke, softened, energies, self._used()[0], after)
