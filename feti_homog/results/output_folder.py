@@ -15,7 +15,7 @@ from typing import TextIO
 
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.materials import voigt
-from feti_homog.results import atomic, checkpoints, field_file, result_json
+from feti_homog.results import atomic, field_file, result_json
 from feti_homog.results.field_layout import PROGRAM
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.runtime import file_locks, input_files
@@ -79,7 +79,10 @@ def refuse_files_of_others(directory: Path) -> None:
             kind = "a folder there" if path.is_dir() else "" if path.exists() else "a link there that leads nowhere"
             if kind:
                 raise CaseError(f"--out {directory}: {path.name} is {kind}, and a run writes a file of that name")
-        checkpoints.refuse_others(directory)
+        if any(path.name.startswith("checkpoint") for path in directory.iterdir()):
+            from feti_homog.results import checkpoints  # paths alone have checkpoints
+
+            checkpoints.refuse_others(directory)
         signs = [path for path in paths if path.name in SIGNS]
         # Without any sign of a run, all files that are not empty are foreign.
         others = [path for path in signs or paths if path.stat().st_size and not (signs and _is_own(path))]
