@@ -19,10 +19,9 @@ from feti_homog.interface.friction import coulomb_faces, sliding_cell
 from feti_homog.interface.laws import BondLaw
 from feti_homog.interface.path import coulomb_leg, frictionless_leg, path_following, path_points
 from feti_homog.materials import voigt
-from feti_homog.results import checkpoints, landmarks
+from feti_homog.results import checkpoints, landmarks, path_curves
 
 NAMED_FIBRES = 8  # in a remark
-LEAST_STRESS = 1e-9  # in a fault, relative to the largest
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
@@ -137,8 +136,8 @@ def _points(
         if count == 0:
             raise _with_advice(error, "", path) from error
         stress = np.asarray(context.loads.means(responses)["stress"])
-        named = zip(voigt.voigt_names(len(stress))[1], stress, strict=True)
-        large = [f", {name} {value:.6g}" for name, value in named if abs(value) > LEAST_STRESS * np.abs(stress).max()]
+        names, acting = voigt.voigt_names(len(stress))[1], path_curves.components_above(path_curves.ZERO, stress[None])
+        large = [f", {names[component]} {stress[component]:.6g}" for component in acting]
         place = f" beyond the last point{''.join(large)}"
         context.checks.faults.append(str(_with_advice(error, place, path)))
 

@@ -67,7 +67,6 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
     with _torn(case, comm, progress) as cell:
         states = StateRecorder(cell, None, keep_fields, progress.say)
         context = AnalysisContext.of(cell, progress, states)
-        _warn(context)
         result = _result(context, _analyse(context), states.fields())
     _print_summary(result, progress)
     if result.faults:
@@ -82,12 +81,6 @@ def _begun(case: Case, comm: MPI.Intracomm, quiet: bool) -> progress_bar.Progres
         for line in lines:
             progress.say(f"{label}: {line}")
     return progress
-
-
-def _warn(context: AnalysisContext) -> None:
-    """Print the warnings about probably unintended settings."""
-    for warning in context.warnings():
-        context.progress.say(f"warning: {warning}")
 
 
 @contextmanager
@@ -124,7 +117,6 @@ def _run_and_write(
         states = StateRecorder(cell, file, keep_fields, progress.say)
         context = AnalysisContext.of(cell, progress, states)
         context = replace(context, directory=directory, resume=resume, log=log.write, events=output_folder.LOG)
-        _warn(context)
         analysis = _analyse(context)
         seal = states.seal()
         if states.error is not None and not keep_fields:
@@ -169,7 +161,9 @@ def _write(result: Result, directory: Path, cell: unit_cell.TornCell) -> None:
 
 
 def _analyse(context: AnalysisContext) -> dict[str, Any]:
-    """Run the analysis of the case and return its `Result` entries.  Collective."""
+    """Warn about settings, run the analysis of the case, and return its `Result` entries.  Collective."""
+    for warning in context.warnings():
+        context.progress.say(f"warning: {warning}")
     with context.progress.stage("solve") as line:
         module = import_module(f"feti_homog.analysis.{context.case.analysis.type}")
         analysis: dict[str, Any] = module.run(context)
