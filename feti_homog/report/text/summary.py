@@ -61,12 +61,27 @@ def summary(document: Document) -> str:
     Raises:
         KeyError: a key of these is missing.
     """
-    size = document["memory"]
+    size, solver = document["memory"], document["solver"]
+    names = {"ranks": "rank", "subdomains": "subdomain", "dofs": "dof"}
+    dual = [_number(solver["multipliers"], "multiplier"), f"kernel {solver['kernel_dim']}"]
+    settings = _cell(document) + _field("Solver", [_number(solver[key], name) for key, name in names.items()])
+    settings += _field("Dual", [*dual, f"coarse problem {solver['coarse_dim']}"])
+    if (count := solver.get("factorizations")) is not None:  # of the axial problem too
+        coarse = f"coarse problem {_number(solver.get('coarse_factorizations', 0), 'time')}"
+        settings += _field("Factorized", [f"{count} {'matrix' if count == 1 else 'matrices'} of subdomains", coarse])
+    counts = solver["iterations"]
+    if not any(counts):
+        settings += _field("Iterations", [f"none in {_number(len(counts), 'state')}"])
+    elif len(counts) <= 12:
+        settings += _field("Iterations", map(str, counts))
+    else:
+        a_state = f"{min(counts)} to {max(counts)} a state"
+        settings += _field("Iterations", [a_state, f"{sum(counts)} for {len(counts)} states"])
     memory = f"{size / 2**20:.0f} MiB" if size < 2**30 else f"{size / 2**30:.2f} GiB"
     remarks = [(label, str(text)) for label in REMARKS for text in document.get(f"{label.lower()}s", ())]
     blocks = [
         _heading(document),
-        [*_cell(document), *_solver(document["solver"])],
+        settings,
         *(table.lines for table in answers(document)),
         checks(document).lines,
         [
@@ -166,24 +181,6 @@ def _cell(document: Document) -> list[str]:
     return lines + _field("Mesh", mesh)
 
 
-def _solver(solver: Document) -> list[str]:
-    names = {"ranks": "rank", "subdomains": "subdomain", "dofs": "dof"}
-    lines = _field("Solver", [_number(solver[key], name) for key, name in names.items()])
-    dual = [_number(solver["multipliers"], "multiplier"), f"kernel {solver['kernel_dim']}"]
-    lines += _field("Dual", [*dual, f"coarse problem {solver['coarse_dim']}"])
-    if (count := solver.get("factorizations")) is not None:  # of the axial problem too
-        coarse = f"coarse problem {_number(solver.get('coarse_factorizations', 0), 'time')}"
-        lines += _field("Factorized", [f"{count} {'matrix' if count == 1 else 'matrices'} of subdomains", coarse])
-    counts = solver["iterations"]
-    if not any(counts):
-        iterations = [f"none in {_number(len(counts), 'state')}"]
-    elif len(counts) <= 12:
-        iterations = [str(count) for count in counts]
-    else:
-        iterations = [f"{min(counts)} to {max(counts)} a state", f"{sum(counts)} for {len(counts)} states"]
-    return lines + _field("Iterations", iterations)
-
-
 def checks(document: Document) -> Table:
     """Return the largest relative error of each law; laws of contact need an interface."""
     limit, has_interface = document.get("check_tolerance"), bool(document["case"].get("interface"))
@@ -201,7 +198,7 @@ def checks(document: Document) -> Table:
     return Table(title, columns, rows, abreast=1)
 
 
-def _field(label: str, phrases: Sequence[str]) -> list[str]:
+def _field(label: str, phrases: Iterable[str]) -> list[str]:
     """Return a label and its words, joined by commas and wrapped to WIDTH columns."""
     text = ", ".join(phrases).replace(", (", " (")
     return wrap(
