@@ -41,11 +41,6 @@ class CellLoads:
         self.interfaces = coupled_interfaces.CoupledInterfaces(*(problem.interface for problem in self.problems))
         self.names = tuple(name for problem in self.problems for name in problem.loads)
 
-    @property
-    def plane(self) -> averaging.Homogenization:
-        """The plane problem."""
-        return self.problems[0]
-
     def load(self, target: Mapping[str, float]) -> Load:
         """Return the load of a waypoint, a mapping of strains and stresses."""
         stress = dict(zip(voigt.SPATIAL_STRAINS, voigt.SPATIAL_STRESSES, strict=True)) | {"temperature": "temperature"}
@@ -139,7 +134,7 @@ class AnalysisContext:
     @property
     def plane(self) -> averaging.Homogenization:
         """The plane problem."""
-        return self.loads.plane
+        return self.loads.problems[0]
 
     @property
     def cell(self) -> unit_cell.TornCell:
@@ -183,19 +178,15 @@ class AnalysisContext:
 
     @cached_property
     def checkpoint(self) -> checkpoints.EventsInMemory:
-        """The store of path events, in the folder or in memory.  Collective when first read.
-
-        There is no limit to multipliers if all fields are kept, and with friction, where one load has many equilibria.
-        """
+        """The store of path events, in the folder or in memory.  Collective when first read."""
         from feti_homog.results import checkpoints  # paths alone have events
 
-        case, comm, jumps = self.case, self.cell.comm, self.cell.solver.jump_operator
-        room = None if case.has_friction or case.output.states == "all" else checkpoints.WHOLE_BYTES
+        comm, jumps, room = self.cell.comm, self.cell.solver.jump_operator, checkpoints.room_of(self.case)
         if self.directory is None:  # without fields and tips a path reads no event again
             reads_again = self.states.has_place or self.plane.law.has_toughness
             return checkpoints.EventsInMemory(comm, room if reads_again else 0)
         pieces = f"{self.cell.summary.subdomains} subdomains on {comm.size} ranks, {jumps.global_rows} multipliers"
-        digest = mpi_errors.on_root(comm, case.digest, False)  # events are the same for any [output]
+        digest = mpi_errors.on_root(comm, self.case.digest, False)  # events are the same for any [output]
         return checkpoints.Checkpoint(self.directory, comm, f"case {digest}, {pieces}", room)
 
     @cached_property

@@ -23,6 +23,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from feti_homog.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.results import atomic
 from feti_homog.system.parallel import mpi_errors
@@ -39,6 +40,14 @@ WHOLE_BYTES = 64 * 2**20
 FOUND_AGAIN = re.compile(r"(lam|jump|used|alpha)(_axial)?(_ends)?")
 
 Arrays = dict[str, NDArray[Any]]
+
+
+def room_of(case: Case) -> int | None:
+    """Return the bytes of events up to which checkpoints have multipliers.
+
+    There is no limit, None, if all fields are kept, and with friction, where one load has many equilibria.
+    """
+    return None if case.has_friction or case.output.states == "all" else WHOLE_BYTES
 
 
 class EventsInMemory:
