@@ -167,7 +167,7 @@ def panels(file: Any, document: Document, scale: float) -> Figure:
     places = [cell.moved(number) for number in numbers]
     size = np.subtract(*_corners(places)[::-1])
     rows, columns = _grid(len(numbers), size[0] / size[1])
-    height = _inches(size, WIDTH / columns)[1] + 0.6  # with a title
+    height = _inches(size, (WIDTH - 0.5) / columns)[1] + 0.55  # beside a colour bar, with a title
     figure = Figure(figsize=(WIDTH, rows * height + 0.7), layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     shapes = [cell.draw(axes, number, moved) for axes, number, moved in zip(grid, numbers, places, strict=False)]
