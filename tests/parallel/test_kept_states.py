@@ -12,7 +12,6 @@ from mpi4py import MPI
 from support.ranks import PIECES, parallel_assert
 
 from feti_homog import Case, run
-from feti_homog.analysis import runner
 from feti_homog.errors import ConvergenceError
 from feti_homog.materials.voigt import STRAINS, STRESSES
 from feti_homog.results import checkpoints, field_file
@@ -171,7 +170,7 @@ def test_an_interrupted_path_keeps_the_same_states(comm, shared_path, whole, kin
 def test_states_without_multipliers_are_solved_again(comm, shared_path, whole, kind, room):
     """There is room for the multipliers of no event, or of the first ones; the path is ended and goes on, too."""
     known, expected = len(document(whole(kind))["path"]) * 2 // 3, whole(kind)
-    with mock.patch.object(runner, "room_of", return_value=room):
+    with mock.patch.object(checkpoints, "room_of", return_value=room):
         with pytest.raises(ConvergenceError, match="max_events"):
             run(case(kind, 5, max_events=known), comm, out=shared_path, resume=False)
         found = on_root(comm, multipliers_of, shared_path / "checkpoint/events")

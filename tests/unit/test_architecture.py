@@ -162,6 +162,7 @@ def test_a_stiffness_run_loads_no_other_analysis(tmp_path):
     others |= {"interface.path", "report.plots", "report.page", "homogenization.energy_release"}
     others |= {"interface.contact.floating_bodies", "interface.friction"}
     others |= {"materials.estimates", "verify", "studies"}
+    others |= {"report.text.path_table", "report.text.point_tables", "results.checkpoints", "results.landmarks"}
     others |= {"mesh.readers", "mesh.fill.shape_mesher", "mesh.outline.elliptic_outline"}
     others |= {"microstructure.random_fibres", "microstructure.fibre_table", "microstructure.shapes.shapes"}
     others |= {"feti.coarse.adaptive", "feti.exact.exact_inverse"}
