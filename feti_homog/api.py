@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feti_homog.case import Case
-from feti_homog.errors import EXIT_DONE, CaseError, LibraryError
+from feti_homog.errors import CaseError, ExitCode, LibraryError
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.petsc import libraries, option_table, option_values
 from feti_homog.system.runtime import environment, standard_streams
@@ -88,8 +88,7 @@ def run_sweep(
         sweep = mpi_errors.on_root(comm, sweep_cases.expand, cases, Path())
     else:
         sweep = mpi_errors.on_root(comm, sweep_cases.load, cases)
-    group = comm.size if ranks_per_case is None else ranks_per_case
-    case_runs.run_all(sweep, folder(out), comm, group, retry, quiet)
+    case_runs.run_all(sweep, folder(out), comm, ranks_per_case, retry, quiet)
     return mpi_errors.on_root(comm, collect.read, Path(out))
 
 
@@ -131,7 +130,7 @@ def run_fit(
         study = mpi_errors.on_root(comm, fit_file.load, Path(fit))
     else:
         study = mpi_errors.on_root(comm, fit_file.parse, fit, Path())
-    return study.run(folder(out), comm, comm.size if ranks_per_case is None else ranks_per_case, retry, quiet)
+    return study.run(folder(out), comm, ranks_per_case, retry, quiet)
 
 
 def launch(
@@ -147,7 +146,7 @@ def launch(
 
     def command(words: Sequence[str], comm: Intracomm) -> int:
         main(parsed(parser, words, comm), comm)
-        return EXIT_DONE
+        return ExitCode.DONE
 
     return start(command, argv)
 

@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import re
+from enum import IntEnum
 from typing import Any
 
-EXIT_DONE, EXIT_DEFECT, EXIT_INPUT, EXIT_UNCONVERGED = 0, 1, 2, 3
 # Characters of a fault and number of faults: a file may have any number of them, with words of any length.
 LONGEST_LINE, KEPT_END, MOST_FAULTS = 1000, 200, 30
+
+
+class ExitCode(IntEnum):
+    """Exit codes of the program."""
+
+    DONE = 0
+    DEFECT = 1
+    INPUT = 2
+    UNCONVERGED = 3
 
 
 def escaped(text: str, allowed: str = "") -> str:
@@ -21,7 +30,7 @@ class FetiHomogError(Exception):
     Lines are cut to LONGEST_LINE characters, before their last KEPT_END; beyond MOST_FAULTS the others are counted.
     """
 
-    exit_code = EXIT_DEFECT
+    exit_code = ExitCode.DEFECT
 
     def __init__(self, *faults: str) -> None:
         more = len(faults) - MOST_FAULTS
@@ -40,19 +49,19 @@ class FetiHomogError(Exception):
 class CaseError(FetiHomogError):
     """The case file or the command line is faulty; each fault names section and key."""
 
-    exit_code = EXIT_INPUT
+    exit_code = ExitCode.INPUT
 
 
 class MeshError(FetiHomogError):
     """The cell cannot be meshed, or a user's mesh is faulty; each fault names nodes or elements."""
 
-    exit_code = EXIT_INPUT
+    exit_code = ExitCode.INPUT
 
 
 class ConvergenceError(FetiHomogError):
     """A solve did not converge or a check failed; the computed part is written and marked."""
 
-    exit_code = EXIT_UNCONVERGED
+    exit_code = ExitCode.UNCONVERGED
 
 
 class NotCarriedError(ConvergenceError):
@@ -66,4 +75,4 @@ class NoMemoryError(FetiHomogError):
 class LibraryError(FetiHomogError):
     """A library that pip does not bring is missing or does not fit; each fault gives the remedy."""
 
-    exit_code = EXIT_INPUT
+    exit_code = ExitCode.INPUT

@@ -85,8 +85,14 @@ PAIRS = KeyRow(sections.CORRELATION, PAIR_WORDS, "", "", "", "Correlation of pai
 AXIS = KeyRow("SECTION.KEY", sections.AXIS_EXPECTED, "", "", "", sections.AXIS_MEANING)
 
 
-def tables() -> list[TableReference]:
-    """Return all tables of the case file, in the order of `ORDER`."""
+def tables(section: str | None = None) -> list[TableReference]:
+    """Return all tables of the case file, or of one section, in the order of `ORDER`.
+
+    Raises:
+        CaseError: no section has this name.
+    """
+    if section is not None and section not in ORDER:
+        raise CaseError(f"{section}: unknown section; expected one of {', '.join(ORDER)}")
     ranges = _rows(sections.SWEEP, sections.RANGE_KEYS)
     references = [
         TableReference("name", "before the first section", "the case as a whole.", (NAME,)),
@@ -103,15 +109,8 @@ def tables() -> list[TableReference]:
             sections.SWEEP, f"a range in [{sections.SWEEP}]", "Values of a key that lie between two ends.", ranges
         ),
     ]
-    return sorted(references, key=lambda table: ORDER.index(table.section))
-
-
-def tables_of(section: str) -> list[TableReference]:
-    """Return the tables of a section. Raises CaseError if no section has this name."""
-    result = [table for table in tables() if table.section == section]
-    if not result:
-        raise CaseError(f"{section}: unknown section; expected one of {', '.join(ORDER)}")
-    return result
+    chosen = [table for table in references if section in (None, table.section)]
+    return sorted(chosen, key=lambda table: ORDER.index(table.section))
 
 
 def _table(table: sections.SectionTable, *rows: KeyRow) -> TableReference:
