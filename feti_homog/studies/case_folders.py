@@ -100,7 +100,15 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
     try:
         with file_locks.Lock(directory / INDEX_LOCK_FILE, timeout=INDEX_LOCK_TIMEOUT_S):
             stored = _stored_entries(directory)
-            if reason := _difference(stored, sweep.entries):
+            reason = f"it has {len(stored)} cases, this file {len(sweep.entries)}"
+            for old, new in zip(stored, sweep.entries, strict=False):
+                if old != new:
+                    reason = f"its {old.folder} ({old.describe('')}) differs from this file ({new.describe('')})"
+                    if old.inputs == new.inputs:
+                        in_words = "keys that do not vary, or in the content of a mesh"
+                        reason = f"its {old.folder} differs from this file in {in_words}"
+                    break
+            if stored != sweep.entries[: len(stored)]:
                 raise CaseError(f"--out {directory} holds another sweep: {reason}; choose another folder")
             if not stored:
                 refuse_files_of_others(directory, SWEEP_ENTRIES, "sweep")
@@ -121,16 +129,6 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
 
 def _stored_entries(directory: Path) -> tuple[SweepCase, ...]:
     return read_index(directory).entries if (directory / INDEX_FILE).exists() else ()
-
-
-def _difference(stored: Sequence[SweepCase], entries: Sequence[SweepCase]) -> str:
-    """Return how cases differ from the stored ones, with which they should begin; empty if they do."""
-    for old, new in zip(stored, entries, strict=False):
-        if old != new and old.inputs == new.inputs:
-            return f"its {old.folder} differs from this file in keys that do not vary, or in the content of a mesh"
-        if old != new:
-            return f"its {old.folder} ({old.describe('')}) differs from this file ({new.describe('')})"
-    return f"it has {len(stored)} cases, this file {len(entries)}" if len(stored) > len(entries) else ""
 
 
 def csv_text(rows: Iterable[Iterable[Any]]) -> str:
