@@ -1,21 +1,21 @@
 """Measured values, and the values of a result.json in their place, with derivatives where they are exact."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.case import Case, bond_laws
+from feti_homog.case import Case, bond_laws, load_sections, sections
 from feti_homog.errors import CaseError
 from feti_homog.materials import engineering_constants, laws, voigt
 from feti_homog.report.text import point_tables
 from feti_homog.results import path_curves
+from feti_homog.schema import wording
 from feti_homog.studies.outputs import outputs
 from feti_homog.typing import Document, Float
 
 TOUGHNESS = "toughness"
-OF_PATHS = ("onset", "peak", "end")
 
 
 @dataclass(frozen=True)
@@ -37,18 +37,58 @@ class Datum:
     strain_name: str = ""
 
 
-def available(case: Case) -> list[str]:
-    """Return the value names in a result; none for analyses that no fit takes."""
-    spatial = voigt.PLANE_STATES[case.analysis.plane].is_spatial
-    size = 6 if spatial else 3
-    if case.analysis.type == "stiffness":
-        is_heated = spatial and all(laws.expansion(material) is not None for material in case.materials.values())
-        return [*engineering_constants.constants(np.eye(size), np.zeros(6) if is_heated else None)]
-    if case.analysis.type == "path":
-        strains, stresses = voigt.voigt_names(size)
-        places = [f"{place}_{name}" for place in OF_PATHS for name in (*stresses, *strains)]
-        return ["onset_load_factor", *places, "dissipated", "work"]
-    return []
+def data_faults(case: Case, data: Sequence[Datum], place: str) -> Iterator[str]:
+    """Yield the reasons why a result of the case lacks values for the data, each behind the place of the data."""
+    state, kind = voigt.PLANE_STATES[case.analysis.plane], case.analysis.type
+    strains, stresses = voigt.voigt_names(6 if state.is_spatial else 3)
+    if kind == "stiffness":
+        is_heated = state.is_spatial and None not in map(laws.expansion, case.materials.values())
+        names = [*engineering_constants.constants(np.eye(len(strains)), np.zeros(6) if is_heated else None)]
+    elif kind == "path":
+        names = [f"{mark}_{name}" for mark in ("onset", "peak", "end") for name in (*stresses, *strains)]
+        names = ["onset_load_factor", *names, "dissipated", "work"]
+    else:
+        yield f'[analysis] type = "{kind}": a fit takes "stiffness" and "path"'
+        return
+    if points := [datum for datum in data if datum.strain is not None]:
+        yield from (f"{place}{sections.CURVE}: {fault}" for fault in _curve_faults(case, points))
+    for name in dict.fromkeys(datum.name for datum in data if datum.strain is None):
+        if name in engineering_constants.FORMER:
+            yield f"{place}{wording.toml_key(name)}: its name is {engineering_constants.FORMER[name]}"
+        elif name not in names:
+            hint = wording.suggestion(name, names, {})
+            yield f"{place}{wording.toml_key(name)}: the analysis does not give it; {hint}"
+
+
+def _curve_faults(case: Case, points: Sequence[Datum]) -> Iterator[str]:
+    """Yield faults of a measured curve beside its test's analysis.
+
+    The strain that rises along a leg is the largest, or that of the only loaded component: a strain or a stress.
+    """
+    state = voigt.PLANE_STATES[case.analysis.plane]
+    names = {name for datum in points for name in (datum.strain_name, datum.name)}
+    unknown = sorted(names.difference(*state.components))
+    for name in unknown:
+        yield f'plane = "{case.analysis.plane}" has no {name}'
+    if case.analysis.type != "path" or len(case.targets) != 1:
+        yield "expected an analysis of type path, of one leg"
+        return
+    target = case.targets[0]
+    loads = [(strain, name, target[name]) for strain, stress in state.components for name in (strain, stress)
+             if target.get(name)]  # fmt: skip
+    is_strain = bool(loads) and all(name == strain for strain, name, _ in loads)
+    if unknown or not (is_strain or len(loads) == 1):
+        return
+    rising, _, end = max(loads, key=lambda load: abs(load[2]))
+    if not is_strain and target.get(load_sections.TEMPERATURE):
+        end = 0.0  # the temperature beside the stress decides the sign
+    values = [datum.strain or 0.0 for datum in points]
+    if rising != points[0].strain_name:
+        yield f"expected the strain that rises along the path, {rising}"
+    elif any(value * end < 0 for value in values):
+        yield f"expected strains of the sign of the path, which ends at {end:g}"
+    elif is_strain and (largest := max(map(abs, values))) > abs(end) * (1 + path_curves.SAME_LOAD):
+        yield f"a strain of {largest:g} is beyond the end of the path at {abs(end):g}"
 
 
 def responses(document: path_curves.Document) -> dict[str, float]:
