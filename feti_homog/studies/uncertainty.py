@@ -11,7 +11,7 @@ DIR/uncertainty.json
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -160,7 +160,14 @@ def parse(values: Mapping[str, Any], folder: Path) -> ScatterStudy:
         output["sensitivities"] = True
     means = {name: number_at(document, _path(name)) or 0.0 for name in uncertainty.std}
     study = ScatterStudy(document, folder, uncertainty, means, settings.realisations)
-    if faults := [*_faults_of_ends(study)]:
+    for name, std in uncertainty.std.items():  # cases one standard deviation from the means
+        if not output.get("sensitivities") or name.partition(".")[0] not in SECTIONS:
+            try:
+                study.differing([name])
+            except CaseError as error:
+                place = f"[{sections.UNCERTAINTY}] {name} = {means[name]:g} +- {std:g}"
+                faults += [f"{place}: {fault}" for fault in error.faults]
+    if faults:
         raise CaseError(*faults)
     return study
 
@@ -169,19 +176,6 @@ def is_study(values: Mapping[str, Any]) -> bool:
     """Return whether a document has uncertain numbers."""
     document = toml_files.to_document(values)
     return sections.UNCERTAINTY in document or bool(read_uncertainty(document, []).std)
-
-
-def _faults_of_ends(study: ScatterStudy) -> Iterator[str]:
-    """Yield faults of cases one standard deviation from the means."""
-    is_exact = bool(study.document["output"].get("sensitivities"))
-    for name, std in study.uncertainty.std.items():
-        if is_exact and name.partition(".")[0] in SECTIONS:
-            continue
-        try:
-            study.differing([name])
-        except CaseError as error:
-            place = f"[{sections.UNCERTAINTY}] {name} = {study.means[name]:g} +- {std:g}"
-            yield from (f"{place}: {fault}" for fault in error.faults)
 
 
 def _path(name: str) -> toml_files.TomlPath:
