@@ -13,7 +13,7 @@ from feti_homog.report.text import point_tables
 from feti_homog.results import path_curves
 from feti_homog.schema import wording
 from feti_homog.studies.outputs import outputs
-from feti_homog.typing import Document, Float
+from feti_homog.typing import Float
 
 TOUGHNESS = "toughness"
 
@@ -131,10 +131,11 @@ def predicted(document: path_curves.Document, data: Sequence[Datum]) -> Float:
 def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], name: str) -> Float | None:
     """(m,) derivatives of the values by an unknown; None where the result does not give them.
 
-    Constants have none by strengths, and by expansions in a plane.
+    Constants have none by strengths, and by expansions in a plane.  Loads at breaks are homogeneous in a key of the
+    only interface: of degree 1 in the only strength, of degree 1/2 in the toughness of springs that do not soften.  All loads up to the onset must grow alike; a temperature that comes before them does not.
     """
-    sections = path_curves.interface_sections(document)
-    name = name.replace("interface.1.", "interface.") if len(sections) == 1 else name
+    interfaces = path_curves.interface_sections(document)
+    name = name.replace("interface.1.", "interface.") if len(interfaces) == 1 else name
     if (sensitivities := document.get("sensitivities")) is not None:
         if name in sensitivities["parameters"]:
             values = np.array(sensitivities["derivatives"])[:, sensitivities["parameters"].index(name)]
@@ -143,12 +144,19 @@ def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], nam
         section, idle = name.partition(".")[0], ("strength", "toughness")
         is_idle = ".expansion" in name if section == "material" else section == "interface" and name.endswith(idle)
         return np.zeros(len(data)) if is_idle else None
-    key = name.removeprefix("interface.")
-    exponent = _exponent(document, sections[0], key) if name != key and len(sections) == 1 else None
-    if exponent is None:
+    key, case = name.removeprefix("interface."), document["case"]
+    is_alike = case["analysis"]["type"] == "path" and path_curves.is_proportional(document)
+    is_alike |= case["analysis"]["type"] == "envelope" and case["envelope"].get("temperature") is None
+    if name == key or len(interfaces) != 1 or not is_alike:
+        return None
+    law = bond_laws.LAWS[interfaces[0].get("criterion", bond_laws.DEFAULT)]
+    strengths = [name for name in law.limits if math.isfinite(float(interfaces[0].get(name) or "inf"))]
+    is_toughness = key == TOUGHNESS and key in law.keys and not law.softens
+    if not is_toughness and strengths != [key]:
         return None
     # S(E; s R) = s S(E / s; R), unless a value depends on the end of the load.
-    relative, numbers, derivatives = exponent / float(sections[0][key]), _values(document), list[float]()
+    relative = (0.5 if is_toughness else 1.0) / float(interfaces[0][key])
+    numbers, derivatives = _values(document), list[float]()
     for datum in data:
         if datum.strain is not None:
             value, slope = _on_curve(document, datum)
@@ -160,23 +168,6 @@ def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], nam
             return None
         derivatives.append(numbers[datum.name] * relative)
     return np.array(derivatives)
-
-
-def _exponent(document: path_curves.Document, section: Document, key: str) -> float | None:
-    """Return the degree to which loads at breaks are homogeneous in a key of the only interface.
-
-    All loads up to the onset must grow alike; a temperature that comes before them does not.  The degree is 1/2 in the
-    toughness of springs that it does not change, and 1 in the only strength; None in other keys.
-    """
-    case = document["case"]
-    is_envelope = case["analysis"]["type"] == "envelope" and case["envelope"].get("temperature") is None
-    if not is_envelope and not (case["analysis"]["type"] == "path" and path_curves.is_proportional(document)):
-        return None
-    law = bond_laws.LAWS[section.get("criterion", bond_laws.DEFAULT)]
-    if key == TOUGHNESS and key in law.keys and not law.softens:
-        return 0.5
-    strengths = [name for name in law.limits if math.isfinite(float(section.get(name) or "inf"))]
-    return 1.0 if strengths == [key] else None
 
 
 def _on_curve(document: path_curves.Document, datum: Datum) -> tuple[float, float]:
