@@ -132,10 +132,11 @@ def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], nam
     """(m,) derivatives of the values by an unknown; None where the result does not give them.
 
     Constants have none by strengths, and by expansions in a plane.  Loads at breaks are homogeneous in a key of the
-    only interface: of degree 1 in the only strength, of degree 1/2 in the toughness of springs that do not soften.  All loads up to the onset must grow alike; a temperature that comes before them does not.
+    only interface: of degree 1 in the only strength, of degree 1/2 in the toughness of springs that do not soften.  All
+    loads up to the onset must grow alike; a temperature that comes before them does not.
     """
-    interfaces = path_curves.interface_sections(document)
-    name = name.replace("interface.1.", "interface.") if len(interfaces) == 1 else name
+    tables = path_curves.interface_sections(document)
+    name = name.replace("interface.1.", "interface.") if len(tables) == 1 else name
     if (sensitivities := document.get("sensitivities")) is not None:
         if name in sensitivities["parameters"]:
             values = np.array(sensitivities["derivatives"])[:, sensitivities["parameters"].index(name)]
@@ -147,15 +148,15 @@ def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], nam
     key, case = name.removeprefix("interface."), document["case"]
     is_alike = case["analysis"]["type"] == "path" and path_curves.is_proportional(document)
     is_alike |= case["analysis"]["type"] == "envelope" and case["envelope"].get("temperature") is None
-    if name == key or len(interfaces) != 1 or not is_alike:
+    if name == key or len(tables) != 1 or not is_alike:
         return None
-    law = bond_laws.LAWS[interfaces[0].get("criterion", bond_laws.DEFAULT)]
-    strengths = [name for name in law.limits if math.isfinite(float(interfaces[0].get(name) or "inf"))]
+    law = bond_laws.LAWS[tables[0].get("criterion", bond_laws.DEFAULT)]
+    strengths = [name for name in law.limits if math.isfinite(float(tables[0].get(name) or "inf"))]
     is_toughness = key == TOUGHNESS and key in law.keys and not law.softens
     if not is_toughness and strengths != [key]:
         return None
     # S(E; s R) = s S(E / s; R), unless a value depends on the end of the load.
-    relative = (0.5 if is_toughness else 1.0) / float(interfaces[0][key])
+    relative = (0.5 if is_toughness else 1.0) / float(tables[0][key])
     numbers, derivatives = _values(document), list[float]()
     for datum in data:
         if datum.strain is not None:
