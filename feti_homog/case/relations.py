@@ -1,7 +1,7 @@
 """Read the [interface] sections, and check relations between section values: faults, and remarks on loads."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -100,32 +100,24 @@ def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[I
             interfaces.append(replace(named, **_of_branch(named)))
     if len(interfaces) < len(tables):
         return None
-    reader.faults += _faults_between(interfaces, tables)
-    for label, interface, table in zip(labels, interfaces, tables, strict=True):
-        reader.faults += [f"[{label}] {line}" for line in _faults_within(interface, table)]
-    return tuple(interfaces)
-
-
-def _faults_between(interfaces: Sequence[InterfaceSection], tables: Sequence[Mapping[str, Any]]) -> list[str]:
-    """List missing pairs, repeated pairs, and keys in which the interface sections must agree."""
-    faults: list[str] = []
     first: dict[frozenset[str], int] = {}
-    for number, interface in enumerate(interfaces[: None if len(interfaces) > 1 else 0]):
-        label = interface_label(number, len(interfaces))
+    for number, (label, interface) in enumerate(zip(labels, interfaces, strict=True) if len(tables) > 1 else ()):
         if interface.between is None:
-            faults.append(f"[{label}] between: missing; of several [[interface]] each needs {PAIR.expected}")
+            reader.faults.append(f"[{label}] between: missing; of several [[interface]] each needs {PAIR.expected}")
             continue
         other = first.setdefault(frozenset(interface.between), number)
         if other != number:
             pair = wording.toml_value(interface.between)
-            faults.append(f"[{label}] between = {pair}: expected another pair than [interface {other + 1}] has")
+            reader.faults.append(f"[{label}] between = {pair}: expected another pair than [interface {other + 1}] has")
         for name in COMMON:
             value, common = getattr(interface, name), getattr(interfaces[0], name)
             if value != common:
                 expected = f"expected {_written(common)}, as of [interface 1]"
                 word = "law" if name == "criterion" and name not in tables[number] else name
-                faults.append(f"[{label}] {word} = {_written(value)}: {expected}: all interfaces agree in it")
-    return faults
+                reader.faults.append(f"[{label}] {word} = {_written(value)}: {expected}: all interfaces agree in it")
+    for label, interface, table in zip(labels, interfaces, tables, strict=True):
+        reader.faults += [f"[{label}] {line}" for line in _faults_within(interface, table)]
+    return tuple(interfaces)
 
 
 def _written(value: Any) -> str:
