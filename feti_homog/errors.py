@@ -1,10 +1,8 @@
 """Errors that a user can cause or must hear of, and the exit codes."""
 
-from __future__ import annotations
-
 import re
 from enum import IntEnum
-from typing import Any
+from typing import Any, Self
 
 # Characters of a fault and number of faults: a file may have any number of them, with words of any length.
 LONGEST_LINE, KEPT_END, MOST_FAULTS = 1000, 200, 30
@@ -42,7 +40,7 @@ class FetiHomogError(Exception):
         self.faults = tuple(f"{n[:end]}...{n[-KEPT_END:]}" if len(n) > LONGEST_LINE else n for n in lines)
         super().__init__("\n".join(self.faults))
 
-    def __reduce__(self) -> tuple[type[FetiHomogError], tuple[Any, ...]]:
+    def __reduce__(self) -> tuple[type[Self], tuple[Any, ...]]:
         return type(self), self.faults
 
 

@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from itertools import permutations
 from math import ceil, fsum, inf, log, pi, sqrt
-from typing import Any
 
 import numpy as np
 
@@ -68,7 +67,7 @@ MOST_REFINED = 8
 
 def sized(
     cell: Cell,
-    table: Mapping[str, Any],
+    table: Mapping[str, object],
     materials: Mapping[str, material_forms.Material],
     plane: str,
     free_faces: bool,

@@ -4,7 +4,6 @@ import inspect
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from feti_homog.case import sections
 from feti_homog.errors import CaseError
@@ -18,7 +17,7 @@ ORDER = (
 """Sections in the order of the reference."""
 
 WIDTH = 100  # characters of a printed line
-INDENT: dict[str, Any] = {"initial_indent": "      ", "subsequent_indent": "      ", "break_on_hyphens": False}
+INDENTED = textwrap.TextWrapper(WIDTH, initial_indent=6 * " ", subsequent_indent=6 * " ", break_on_hyphens=False)
 
 MATERIAL_MEANING = (
     "One section for each phase: [material.matrix], [material.fibre] and, for phases of a mesh or a table, sections of "
@@ -149,6 +148,6 @@ def as_text(references: Sequence[TableReference]) -> str:
             presence, only = ("required", " if") if row.default == "required" else (default, "; only if")
             when = f"{only} {row.applies}" if row.applies else ""
             words = (f"{row.accepts}{unit}; {presence}{when}", row.meaning)
-            lines += [f"\n  {row.key}", *(textwrap.fill(line, WIDTH, **INDENT) for line in words)]
+            lines += [f"\n  {row.key}", *map(INDENTED.fill, words)]
         blocks.append("\n".join(lines))
     return "\n\n".join(blocks)

@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
-from operator import ne
 from typing import Any
 
 from feti_homog.case import section_values as kinds
@@ -180,9 +179,10 @@ def _files() -> Iterator[Rule]:
     yield Rule((*CELL, "file"), lambda name: not str(name).endswith(kinds.TABLE_SUFFIXES), line, (MESH,))
     line = f"expected the name of a .csv file for {TABLE.in_words('cell')}"
     yield Rule((*CELL, "file"), lambda name: not str(name).endswith(kinds.MESH_SUFFIXES), line, (TABLE,))
-    for wrong, right, geometry in (("overlaps", "snap", MESH), ("snap", "overlaps", TABLE)):
-        line = f'expected "none" or "{right}" for {geometry.in_words("cell")}'
-        yield Rule((*CELL, "repair"), partial(ne, wrong), line, (geometry,))
+    line = f'expected "none" or "snap" for {MESH.in_words("cell")}'
+    yield Rule((*CELL, "repair"), lambda value: value != "overlaps", line, (MESH,))
+    line = f'expected "none" or "overlaps" for {TABLE.in_words("cell")}'
+    yield Rule((*CELL, "repair"), lambda value: value != "snap", line, (TABLE,))
     for name in ("width", "height"):
         line = "missing; fibre_list has no line such as # width = 120, height = 80"
         yield needed(CELL, name, line, TABLE, beside="fibre_list")

@@ -2,6 +2,7 @@
 
 import argparse
 
+from feti_homog.case import cases, sections, toml_files
 from feti_homog.errors import CaseError
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.petsc import option_table
@@ -12,7 +13,6 @@ from feti_homog.typing import Intracomm
 def run(arguments: argparse.Namespace, comm: Intracomm) -> None:
     """Run a case.  Collective."""
     from feti_homog.analysis import runner
-    from feti_homog.case import cases
     from feti_homog.results import output_folder
 
     case = mpi_errors.on_root(comm, cases.load, arguments.case)
@@ -24,7 +24,6 @@ def run(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 def check(arguments: argparse.Namespace, comm: Intracomm) -> None:
     """Describe the run of a case, or the first case of a study.  Collective."""
-    from feti_homog.case import sections, toml_files
     from feti_homog.studies import case_runs, fit_file, uncertainty
 
     document = mpi_errors.on_root(comm, toml_files.read_document, arguments.case)  # once: it may be a pipe

@@ -4,7 +4,7 @@ import argparse
 
 from feti_homog.errors import CaseError
 from feti_homog.results import output_folder
-from feti_homog.studies import case_runs, sweep_cases
+from feti_homog.studies import case_runs, fit_file, sweep_cases
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.runtime import standard_streams
 from feti_homog.typing import Intracomm
@@ -36,8 +36,6 @@ def collect(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 def fit(arguments: argparse.Namespace, comm: Intracomm) -> None:
     """Fit the unknowns of a file to measured values.  Collective."""
-    from feti_homog.studies import fit_file
-
     study = mpi_errors.on_root(comm, fit_file.load, arguments.case)
     study.run(arguments.out, comm, arguments.ranks_per_case, arguments.retry, arguments.quiet)
 

@@ -1,12 +1,10 @@
 """Points of a sweep: axis values combined to a grid, row by row, or sampled."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import prod
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,7 +26,7 @@ class Axis:
     log: bool = False
 
     @classmethod
-    def of(cls, path: toml_files.TomlPath, value: Any) -> Axis:
+    def of(cls, path: toml_files.TomlPath, value: Any) -> Self:
         """Return the axis of a valid list or range."""
         if isinstance(value, list):
             return cls(path, tuple(value))

@@ -1,7 +1,5 @@
 """Check a sweep and describe its first case; run all cases by rank groups, or one case in a job array."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Iterator

@@ -1,11 +1,9 @@
 """The table of a sweep: inputs, outputs and results of all cases, and statistics over realisations."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from scipy.stats import t as student
@@ -17,6 +15,29 @@ from feti_homog.typing import Document, Float
 
 PARTS = ("count", "mean", "std", "ci95")
 CURVE_POINTS = 401  # strains at which curves are averaged
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Statistics over finished realisations, (points, ...).
+
+    `ci95` is the mean's half 95 % confidence interval by Student's t; it and `std` are NaN for fewer than two.
+    """
+
+    count: Float
+    mean: Float
+    std: Float
+    ci95: Float
+
+    @classmethod
+    def of(cls, samples: Float) -> Self:
+        """Return statistics over the first axis of samples (n, ...), without NaN."""
+        is_known = np.isfinite(samples)
+        count = is_known.sum(axis=0)
+        several = np.where(count > 1, count, np.nan)
+        mean = np.where(is_known, samples, 0.0).sum(axis=0) / np.where(count > 0, count, np.nan)
+        std = np.sqrt(np.where(is_known, (samples - mean) ** 2, 0.0).sum(axis=0) / (several - 1))
+        return cls(count.astype(float), mean, std, student.ppf((1 + CONFIDENCE) / 2, several - 1) * std / several**0.5)
 
 
 @dataclass(frozen=True)
@@ -105,29 +126,6 @@ class SweepTable:
         stresses = range(paths[0].shape[1] - 1)
         curves = np.array([[np.interp(strain, p[:, -1], p[:, k]) for k in stresses] for p in paths])
         return strain, curves.swapaxes(1, 2)
-
-
-@dataclass(frozen=True)
-class Statistics:
-    """Statistics over finished realisations, (points, ...).
-
-    `ci95` is the mean's half 95 % confidence interval by Student's t; it and `std` are NaN for fewer than two.
-    """
-
-    count: Float
-    mean: Float
-    std: Float
-    ci95: Float
-
-    @classmethod
-    def of(cls, samples: Float) -> Statistics:
-        """Return statistics over the first axis of samples (n, ...), without NaN."""
-        is_known = np.isfinite(samples)
-        count = is_known.sum(axis=0)
-        several = np.where(count > 1, count, np.nan)
-        mean = np.where(is_known, samples, 0.0).sum(axis=0) / np.where(count > 0, count, np.nan)
-        std = np.sqrt(np.where(is_known, (samples - mean) ** 2, 0.0).sum(axis=0) / (several - 1))
-        return cls(count.astype(float), mean, std, student.ppf((1 + CONFIDENCE) / 2, several - 1) * std / several**0.5)
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,11 @@ DIR/differences               the cases with each number without derivatives les
 DIR/uncertainty.json
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -30,8 +28,7 @@ from feti_homog.studies.uncertain_numbers import SECTIONS, Uncertainty, number_a
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.typing import Float
 
-if TYPE_CHECKING:
-    Documents = Sequence[Mapping[str, Any]]
+Documents = Sequence[Mapping[str, Any]]
 
 
 @dataclass(frozen=True)
