@@ -1,4 +1,4 @@
-"""Errors that a user can cause or must hear of, and the exit codes."""
+"""Errors that are printed for the user, and the exit codes."""
 
 import re
 from enum import IntEnum
@@ -18,7 +18,7 @@ class ExitCode(IntEnum):
 
 
 def escaped(text: str, allowed: str = "") -> str:
-    """Escape characters that are not printable, but for `allowed`: a terminal would obey a file's."""
+    """Escape all characters but printable and `allowed` ones: a terminal would obey control characters of a file."""
     return re.sub(r"[^ -~]", lambda c: c[0] if c[0].isprintable() or c[0] in allowed else ascii(c[0])[1:-1], text)
 
 
@@ -67,7 +67,7 @@ class NotCarriedError(ConvergenceError):
 
 
 class NoMemoryError(FetiHomogError):
-    """A rank has no memory left, of which all ranks know."""
+    """A rank has no memory left, and all ranks know it."""
 
 
 class LibraryError(FetiHomogError):

@@ -60,10 +60,12 @@ class Rule:
         for step in self.path[1:]:
             if step == ITEMS:
                 lists = [match for match in matches if isinstance(match[2], list)]
-                matches = [(label, f"{place}[{k}]", item) for label, place, of in lists for k, item in enumerate(of)]
+                matches = [
+                    (name, f"{place}[{k}]", item) for name, place, items in lists for k, item in enumerate(items)
+                ]
             else:
                 tables = [match for match in matches if isinstance(match[2], dict) and step in match[2]]
-                matches = [(label, f"{place}.{step}" if place else step, of[step]) for label, place, of in tables]
+                matches = [(name, f"{place}.{step}" if place else step, table[step]) for name, place, table in tables]
         for section, place, value in matches:
             if value is None or (self.holds is not None and self.holds(value)):
                 continue

@@ -151,7 +151,7 @@ def _add_studies(commands: argparse._SubParsersAction[Parser]) -> None:
 def _command(
     commands: argparse._SubParsersAction[Parser], action: str, summary: str, description: str | None = None
 ) -> Parser:
-    """Return the new parser for a command with the name of its function, `action`."""
+    """Add the command of the function `action`, "module.name", and return its parser."""
     parser = commands.add_parser(action.partition(".")[2], help=summary, description=description)
     parser.set_defaults(action=action)
     return parser

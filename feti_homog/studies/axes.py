@@ -18,7 +18,7 @@ Assignment = dict[toml_files.TomlPath, Any]
 
 @dataclass(frozen=True)
 class Axis:
-    """A key that varies: its values or, if it is sampled, the ends that they lie between."""
+    """A key that varies, with its values or, if it is sampled, both ends of its range."""
 
     path: toml_files.TomlPath
     values: tuple[Any, ...] = ()
@@ -103,12 +103,12 @@ def _samples(axes: Sequence[Axis], settings: sections.SweepSection) -> list[Assi
 
 
 def _is_foreign(path: toml_files.TomlPath) -> bool:
-    """Return whether no key of that section can vary."""
+    """Return whether a path begins with no section whose keys can vary."""
     return path[0] not in sections.TOP_LEVEL or path[0] in ("name", sections.SWEEP)
 
 
 def _is_range(path: toml_files.TomlPath, value: Any) -> bool:
-    """Return whether the value of a key is meant as a range; a section, which may have a key "to", is none."""
+    """Return whether a value is meant as a range; a section may have a key "to", but is no range."""
     return len(path) > 1 and isinstance(value, dict) and bool(value.keys() & {"from", "to"})
 
 

@@ -73,7 +73,7 @@ class SweepIndex:
 
 
 def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str) -> None:
-    """Check that nothing stands under names of a study in a folder without its document.  On one rank.
+    """Refuse a folder without a study whose files have the names of a study.  On one rank.
 
     Raises:
         CaseError: a file that is not empty, or such a folder.
@@ -85,7 +85,7 @@ def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str)
 
 
 def prepare_folder(directory: Path, sweep: Sweep) -> None:
-    """Make the folder of a sweep, or check that it is, perhaps with fewer cases.  On one rank.
+    """Make the folder of a sweep, or check a folder that has its cases, or the first of them.  On one rank.
 
     Raises:
         CaseError: the folder has another sweep, or foreign files under a sweep's names.
@@ -164,14 +164,14 @@ def _replaced(value: Any, old: Any, new: Any) -> Any:
 
 
 def case_state(directory: Path, entry: SweepCase) -> CaseState:
-    """Return case progress; RUNNING while another process holds the case's lock.  On one rank."""
+    """Return the progress of a case; RUNNING while a process holds its lock.  On one rank."""
     state = stored_state(directory, entry)
     is_open = state.status in (Status.WAITING, Status.FAILED)
     return CaseState(Status.RUNNING) if is_open and file_locks.holder(directory / entry.folder / LOCK_FILE) else state
 
 
 def stored_state(directory: Path, entry: SweepCase) -> CaseState:
-    """Return case progress by files alone, as the lock's holder needs it.  On one rank."""
+    """Return the progress of a case by its files alone, for the holder of its lock.  On one rank."""
     folder = directory / entry.folder
     path = folder / result_json.NAME
     try:

@@ -78,7 +78,7 @@ def run_all(
 
 
 def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: bool, quiet: bool) -> None:
-    """Run the case of that number (from 1) on all ranks; others may be run at the same time.  Collective.
+    """Run one case, by its number from 1, on all ranks.  Collective; other jobs may run other cases at the same time.
 
     Raises:
         CaseError: as `run_all`, or there is no such case, or another process has it.
@@ -103,7 +103,7 @@ def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: 
 
 @contextmanager
 def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) -> Iterator[None]:
-    """Provide the folder made and held: by one sweep, or by any number of single cases. Collective."""
+    """Make the folder of a sweep and hold its lock, which single cases share.  Collective."""
     lock = file_locks.Lock(directory / case_folders.LOCK_FILE, shared)
 
     def prepare() -> None:
@@ -132,7 +132,7 @@ class Outcome(Enum):
 
 @dataclass(frozen=True)
 class CaseRunner:
-    """Runs one sweep's cases on the ranks in `comm`; `retry` takes up failed ones, `quiet` prints nothing."""
+    """Runs the cases of a sweep on the ranks of `comm`; `retry` repeats failed cases, `quiet` prints nothing."""
 
     comm: Intracomm
     directory: Path
@@ -141,9 +141,9 @@ class CaseRunner:
     quiet: bool
 
     def run_free(self) -> FetiHomogError | None:
-        """Run free cases until there are none; returns the error that stopped the group.  Collective in the group.
+        """Run cases until no other is free; returns the error that stopped the group.  Collective in the group.
 
-        The group passes over cases of others at once; in a last round it waits for each as `Lock` does.
+        Cases that other groups hold are passed over at once; a last round waits for their locks, as `Lock` does.
         """
         timeouts = [0.0, file_locks.LOCK_TIMEOUT_S]
         try:
@@ -159,10 +159,10 @@ class CaseRunner:
         return None
 
     def run(self, entry: SweepCase, timeout: float = file_locks.LOCK_TIMEOUT_S) -> tuple[Outcome, str]:
-        """Run a case unless it is finished, failed before, or another has it for `timeout` seconds.  Collective.
+        """Run a case unless it is finished, has failed, or is held by another process.  Collective.
 
-        Returns the outcome, and the other process that has the case, if any.  Raises FetiHomogError if the folder
-        cannot be written.
+        Waits `timeout` seconds for the lock.  Returns the outcome, and the other process that holds the case, if any.
+        Raises FetiHomogError if the folder cannot be written.
         """
         case, folder = self.sweep.cases[entry.number - 1], self.directory / entry.folder
         lock = file_locks.Lock(folder / case_folders.LOCK_FILE, timeout=timeout)

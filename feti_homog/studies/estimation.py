@@ -14,7 +14,7 @@ from scipy.stats import chi2, norm
 from feti_homog.typing import Array, Float
 
 CONFIDENCE = 0.95
-# Of the largest singular value: below are directions that no datum sees; of a direction: smaller entries are rounding.
+# No datum sees directions with smaller singular values / the largest; smaller entries of a direction are rounding.
 RANK_TOLERANCE, ENTRY = 1e-6, 1e-2
 STEP, MOST_EVALUATIONS = 1e-8, 60
 Model = Callable[[Float], Float]

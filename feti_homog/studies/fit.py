@@ -83,7 +83,7 @@ class Fit(Study):
         return [datum for datum in self.data if datum.test == test]
 
     def rows_of(self, test: int) -> slice:
-        """Return the place of a test's data among all."""
+        """Return the slice of a test's data in all data."""
         first = next(k for k, datum in enumerate(self.data) if datum.test == test)
         return slice(first, first + len(self.data_of(test)))
 
@@ -128,7 +128,7 @@ def _rounded(x: Sequence[float] | Float) -> Point:
 
 @dataclass(frozen=True)
 class Answer:
-    """A test's result.json, and its values (m,) in place of the test's data."""
+    """The result.json of a test, and its values (m,) for the data of the test."""
 
     document: Mapping[str, Any]
     values: Float

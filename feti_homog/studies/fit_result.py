@@ -16,7 +16,7 @@ HEAD = ("test", "name", "strain", "value", "std", "computed", "residual")
 def content(
     unknowns: Mapping[str, sections.Unknown], data: Sequence[Datum], estimates: ParameterEstimates
 ) -> dict[str, Any]:
-    """Return the content of fit.json behind its name; numbers that are not finite are None."""
+    """Return the content of fit.json after its name; numbers that are not finite are None."""
     faults = [] if estimates.converged else [f"no minimum after {estimates.evaluations} evaluations"]
     faults += names_of(estimates.undetermined, [*unknowns])
     faults += [

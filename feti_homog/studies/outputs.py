@@ -16,7 +16,7 @@ Column = result_json.DescribedColumn
 
 
 def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
-    """Numbers i and j in a sweep's names Cij, for its plane states.
+    """Return the numbers i and j of names Cij in a sweep with these plane states.
 
     Where some cases are in space, Cij is the same entry in all.
     """

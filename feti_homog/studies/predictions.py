@@ -38,7 +38,7 @@ class Datum:
 
 
 def data_faults(case: Case, data: Sequence[Datum], place: str) -> Iterator[str]:
-    """Yield the reasons why a result of the case lacks values for the data, each behind the place of the data."""
+    """Yield the reasons why results of a case lack values for the data; `place` precedes each reason."""
     state, kind = voigt.PLANE_STATES[case.analysis.plane], case.analysis.type
     strains, stresses = voigt.voigt_names(6 if state.is_spatial else 3)
     if kind == "stiffness":

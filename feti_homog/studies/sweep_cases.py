@@ -1,4 +1,4 @@
-"""A sweep file expanded: its numbered cases, all of them checked."""
+"""Expand a sweep file to numbered cases, and check all of them."""
 
 import copy
 import json
@@ -72,7 +72,7 @@ def load(path: str | Path) -> Sweep:
 def expand(values: Mapping[str, Any], folder: Path) -> Sweep:
     """Return the sweep of nested dictionaries with a table "sweep"; its files are relative to `folder`.
 
-    All points come once before any comes in its next realisation, so that more realisations add cases at the end.
+    A realisation of all points precedes the next one, so that more realisations add cases at the end.
     Raises CaseError as `load` does.
     """
     document = toml_files.to_document(values)

@@ -74,7 +74,7 @@ class SweepTable:
 
     @cached_property
     def statistics(self) -> dict[str, Statistics]:
-        """By output, over the realisations of each point."""
+        """The statistics of each output over the realisations of each point."""
         statistics = {}
         for name, values in self.outputs.items():
             samples = [Statistics.of(values[self.rows(point)]) for point in self.points]

@@ -133,7 +133,7 @@ def _in_lists(path: toml_files.TomlPath) -> toml_files.TomlPath:
 
 
 def number_at(document: Mapping[str, Any], path: toml_files.TomlPath) -> float | None:
-    """Return the number at a place of the case; None for other values, and in a section that stands several times."""
+    """Return the number at a path; None for other values, and in a section of which the case has several."""
     result = _at(document, _in_lists(path))
     return float(result) if types.is_number(result) else None
 
@@ -141,7 +141,7 @@ def number_at(document: Mapping[str, Any], path: toml_files.TomlPath) -> float |
 def with_number(
     document: Mapping[str, Any], path: toml_files.TomlPath, value: float
 ) -> tuple[toml_files.TomlPath, Any]:
-    """Return a number's key and another value for it; for one in a list the list's key and value."""
+    """Return the key of a number with a new value; of a number in a list, the key of the list and the new list."""
     full = _in_lists(path)
     for k in range(1, len(full)):
         result = _at(document, full[:k])

@@ -43,7 +43,7 @@ class ScatterStudy(Study):
     realisations: int | None
 
     def cases(self, points: Sequence[Assignment], **output: bool) -> Sweep:
-        """Return the cases at some values, every realisation of each. Raises CaseError with their faults."""
+        """Return all realisations of the cases at some points. Raises CaseError with their faults."""
         document = {**self.document, "output": self.document["output"] | output}
         return cases_at(document, points, self.folder, self.realisations, section=sections.UNCERTAINTY)
 
@@ -51,7 +51,7 @@ class ScatterStudy(Study):
         return self.cases([{}])
 
     def differing(self, names: Sequence[str]) -> Sweep:
-        """Return the cases with each of these numbers less and more by its standard deviation."""
+        """Return two cases for each number: one standard deviation below and above its mean."""
         ends = [(name, self.means[name] + sign * self.uncertainty.std[name]) for name in names for sign in (-1, 1)]
         points = [dict([with_number(self.document, _path(name), end)]) for name, end in ends]
         return self.cases(points, mesh_error=False)
@@ -83,7 +83,7 @@ class ScatterStudy(Study):
         return study_tables.scatter_text(document)
 
     def _content(self, means: Documents, inexact: Sequence[str], ends: Documents) -> dict[str, Any]:
-        """Return the content of uncertainty.json behind its digest."""
+        """Return the content of uncertainty.json after its digest."""
         data, uncertainty, count = _data([*means, *ends]), self.uncertainty, len(means)
         values, mesh_errors = _values(means, data), [constant_tables.mesh_errors(document) for document in means]
         sides = _values(ends, data).reshape(count, len(inexact), 2, len(data))
