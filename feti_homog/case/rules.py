@@ -58,14 +58,12 @@ class Rule:
         label = " ".join(self.path[:1])
         matches = [(f"{label} {k}" if len(sections) > 1 else label, "", each) for k, each in enumerate(sections, 1)]
         for step in self.path[1:]:
-            if step == ITEMS:
-                lists = [match for match in matches if isinstance(match[2], list)]
-                matches = [
-                    (name, f"{place}[{k}]", item) for name, place, items in lists for k, item in enumerate(items)
-                ]
-            else:
-                tables = [match for match in matches if isinstance(match[2], dict) and step in match[2]]
-                matches = [(name, f"{place}.{step}" if place else step, table[step]) for name, place, table in tables]
+            parents, matches = matches, []
+            for name, place, parent in parents:
+                if step == ITEMS and isinstance(parent, list):
+                    matches += [(name, f"{place}[{k}]", item) for k, item in enumerate(parent)]
+                elif isinstance(parent, dict) and step in parent:
+                    matches.append((name, f"{place}.{step}" if place else step, parent[step]))
         for section, place, value in matches:
             if value is None or (self.holds is not None and self.holds(value)):
                 continue
