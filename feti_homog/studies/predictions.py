@@ -42,7 +42,7 @@ def data_faults(case: Case, data: Sequence[Datum], place: str) -> Iterator[str]:
     state, kind = voigt.PLANE_STATES[case.analysis.plane], case.analysis.type
     strains, stresses = voigt.voigt_names(6 if state.is_spatial else 3)
     if kind == "stiffness":
-        is_heated = state.is_spatial and None not in map(laws.expansion, case.materials.values())
+        is_heated = state.is_spatial and all(laws.expansion(each) is not None for each in case.materials.values())
         names = [*engineering_constants.constants(np.eye(len(strains)), np.zeros(6) if is_heated else None)]
     elif kind == "path":
         names = [f"{mark}_{name}" for mark in ("onset", "peak", "end") for name in (*stresses, *strains)]
