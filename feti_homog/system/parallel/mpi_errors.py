@@ -9,7 +9,7 @@ from array import array
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
-from feti_homog.errors import EXIT_DEFECT, FetiHomogError, NoMemoryError
+from feti_homog.errors import ExitCode, FetiHomogError, NoMemoryError
 from feti_homog.system.runtime.standard_streams import complain
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ def end_job(comm: Comm, error: BaseException) -> NoReturn:
     if isinstance(ending, FetiHomogError):
         code, lines = ending.exit_code, _lines(ending)
     else:
-        code = EXIT_DEFECT
+        code = ExitCode.DEFECT
         lines = f"rank {comm.rank} of {comm.size}:\n{''.join(traceback.format_exception(error))}"
     complain(lines)
     sys.stdout.flush()

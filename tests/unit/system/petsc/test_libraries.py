@@ -8,7 +8,7 @@ import pytest
 from petsc4py import PETSc
 from support.jobs import PATIENCE
 
-from feti_homog.errors import EXIT_DONE, EXIT_INPUT
+from feti_homog.errors import ExitCode
 from feti_homog.system.petsc.libraries import DEBIAN_MODULES, petsc4py_advice
 from feti_homog.system.petsc.options_database import case_options
 
@@ -29,7 +29,7 @@ def faults(folder, **modules: str) -> list[str]:
         text=True,
         timeout=PATIENCE,
     )
-    assert job.returncode == EXIT_INPUT and job.stdout == ""
+    assert job.returncode == ExitCode.INPUT and job.stdout == ""
     return job.stderr.splitlines()
 
 
@@ -71,7 +71,7 @@ def test_the_advice_names_debians_newest_folder_with_petsc4py(tmp_path):
 def test_petsc_lists_options_that_nobody_read_only_if_asked(asked):
     words = ["options", "-feti_pc_type", "lumped", *(["-options_left"] if asked else [])]
     job = subprocess.run([sys.executable, "-m", "feti_homog", *words], capture_output=True, text=True, timeout=PATIENCE)
-    assert job.returncode == EXIT_DONE
+    assert job.returncode == ExitCode.DONE
     assert ("name:-feti_pc_type" in job.stdout) == asked
 
 
