@@ -9,12 +9,12 @@ import numpy as np
 
 from feti_homog.errors import CaseError
 from feti_homog.system.runtime import input_files
-from feti_homog.verify.check_constants import check_constants
-from feti_homog.verify.check_loads import StateNumbers, States, check_loads
+from feti_homog.verify.check_constants import check_constants, check_reciprocity, check_status
+from feti_homog.verify.check_loads import StateNumbers, States, check_loads, check_tables, rows_of
 from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh, check_mesh_error, check_rates
 from feti_homog.verify.check_path import check_envelope, check_path
 from feti_homog.verify.check_sensitivities import check_sensitivities
-from feti_homog.verify.check_state import check_state
+from feti_homog.verify.check_state import check_bonds, check_gluing, check_state
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Finding, Findings, checks, unchecked
 from feti_homog.verify.path_energies import check_step_heat
@@ -100,6 +100,8 @@ def laws_of_fields(findings: Findings, cell: DiscreteCell) -> list[StateNumbers]
         terms = np.abs(state.displacement) + np.abs(state.fluctuation)
         fields = cell.elements.fields(state.displacement, terms, state.along, state.temperature * cell.expansions)
         check_state(findings, cell, state, fields)
+        check_gluing(findings, cell, state, fields)
+        check_bonds(findings, cell, state)
         check_mesh_error(findings, cell, state)
         if before is not None and "path" in files.document:
             check_step_heat(findings, cell, before, state)
@@ -110,8 +112,9 @@ def laws_of_fields(findings: Findings, cell: DiscreteCell) -> list[StateNumbers]
 
 def laws_of_numbers(findings: Findings, cell: DiscreteCell, states: States) -> None:
     """Check the numbers of result.json against the states."""
-    document = cell.files.document
-    check_loads(findings, cell, states)
+    document, rows = cell.files.document, rows_of(cell)
+    check_loads(findings, cell, states, rows)
+    check_tables(findings, cell, states, rows)
     check_arcs(findings, cell, states)
     if "path" in document:
         check_path(findings, cell, states)
@@ -120,5 +123,8 @@ def laws_of_numbers(findings: Findings, cell: DiscreteCell, states: States) -> N
             check_rates(findings, cell, table.get("tips"), f"point {number}")
     if "envelope" in document:
         check_envelope(findings, cell, states)
-    check_constants(findings, cell, states)
+    check_status(findings, cell)
+    check_reciprocity(findings, cell, states)
+    if "effective_stiffness" in document:
+        check_constants(findings, cell)
     check_sensitivities(findings, cell)

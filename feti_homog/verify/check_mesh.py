@@ -6,14 +6,14 @@ Element shares of the mesh error are compared with averages at nodes (Zienkiewic
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.special import roots_legendre
+from scipy.special import gammaln, roots_legendre
 
 from feti_homog.typing import Bool, Float
 from feti_homog.verify.check_loads import NAMES, States
 from feti_homog.verify.discrete_cell import BONDED, DiscreteCell
 from feti_homog.verify.elements import PLACES, add_at_nodes, quadrature_points
 from feti_homog.verify.findings import ROUNDING, Findings, Section
-from feti_homog.verify.reading import State
+from feti_homog.verify.reading import COATING, State
 from feti_homog.verify.torus import from_centre
 
 # The mesher moves the tips of arcs by so many degrees at most; nodes nearer to a tip are on neither side.
@@ -35,8 +35,12 @@ MIDDLES = np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])
 
 
 def check_mesh(findings: Findings, cell: DiscreteCell) -> None:
-    """Check that elements with positive areas fill the cell except voids, and torn sides have one partner or a void."""
-    elements, sides, porosity = cell.elements, cell.sides, cell.files.document["cell"].get("porosity", 0.0)
+    """Check that elements with positive areas fill the cell except voids, and torn sides have one partner or a void.
+
+    Sizes, counts and area fractions in result.json are those of the mesh.
+    """
+    elements, sides, section, phases = cell.elements, cell.sides, cell.files.document["cell"], cell.files.phases
+    mesh, (width, height), porosity = cell.files.mesh, cell.files.size, section.get("porosity", 0.0)
     findings.record("mesh", np.where(elements.least_jacobian > 0, 0.0, np.inf), "element {}".format)
     findings.compare("mesh", elements.area.sum(), (1 - porosity) * cell.area, cell.area, "the sum of all areas")
     normals = sides.normal[sides.at_void]
@@ -46,11 +50,34 @@ def check_mesh(findings: Findings, cell: DiscreteCell) -> None:
     sums = np.hypot(*(sides.normal + sides.normal[sides.partner]).T) / np.hypot(*sides.normal.T)
     mismatch = np.where(sides.at_void, 0.0, np.where(sides.partner < 0, np.inf, sums))  # inf: several partners
     findings.record("mesh", mismatch, lambda i: f"a side of element {sides.element[i]}")
+    counts = {"width": width, "height": height, "area": cell.area}
+    counts |= {"elements": len(mesh.triangles), "nodes": len(mesh.points)}
+    for name, value in counts.items():
+        findings.compare("cell", section[name], value, value, f"cell.{name}")
+    fibres = [number for number, name in enumerate(phases) if name not in ("matrix", COATING)]
+    shares = {"fibre_fraction": cell.fractions[fibres].sum(), "porosity": cell.porosity}
+    for name, value in shares.items():
+        findings.compare("cell", section.get(name, 0.0), value, 1.0, f"cell.{name}")
+    for name, value in zip(phases, cell.fractions, strict=True):
+        findings.compare("cell", section["fractions"][name], value, 1.0, f"cell.fractions.{name}")
+    order = 1 + mesh.triangles.shape[1] // 6
+    findings.compare("cell", cell.files.case["cell"].get("order", order), order, 1.0, "case.cell.order")
 
 
 def check_interface(findings: Findings, cell: DiscreteCell) -> None:
-    """Check that interface nodes stand where two bodies may part, and their sections and shapes."""
+    """Check that interface nodes stand where two bodies may part, and their sections, shapes and strengths."""
     rows, faces, at = cell.files.interface, cell.faces, "interface node {}".format
+    nodes, k = cell.files.document["solver"]["interface_nodes"], len(rows.points)
+    findings.compare("cell", nodes, k, 1.0, "solver.interface_nodes")
+    # Strengths scatter by Weibull's distribution with mean 1; a table may have others.
+    strength, scatter = cell.files.fibres.strength, next(iter(cell.files.interfaces), {}).get("scatter")
+    if cell.files.case["cell"]["geometry"] != "table":
+        expected = np.ones_like(strength)
+        if scatter is not None:
+            stream = np.random.default_rng(np.random.SeedSequence(scatter["seed"], spawn_key=(1,)))
+            m = scatter["shape"]
+            expected = np.exp(np.log(-np.log(1.0 - stream.random(len(strength)))) / m - gammaln(1.0 + 1.0 / m))
+        findings.compare("tables", strength, expected, expected, "/fibre/strength at fibre {}".format)
     findings.record("interface", faces.distance / cell.files.size.max(), at)
     count = np.bincount(faces.place[faces.place >= 0], minlength=cell.nodes.places)
     wrong = np.flatnonzero(count != (faces.pair >= 0))
