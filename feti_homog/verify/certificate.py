@@ -12,12 +12,12 @@ from feti_homog.system.runtime import input_files
 from feti_homog.verify.check_constants import check_constants, check_reciprocity, check_status
 from feti_homog.verify.check_loads import StateNumbers, States, check_loads, check_tables, rows_of
 from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh, check_mesh_error, check_rates
-from feti_homog.verify.check_path import check_envelope, check_path
+from feti_homog.verify.check_path import check_breaks, check_envelope, check_strength
 from feti_homog.verify.check_sensitivities import check_sensitivities
 from feti_homog.verify.check_state import check_bonds, check_gluing, check_state
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Finding, Findings, checks, unchecked
-from feti_homog.verify.path_energies import check_step_heat
+from feti_homog.verify.path_energies import check_heat, check_losses, check_step_heat, check_stored
 from feti_homog.verify.reading import COATING, altered, opened
 
 # Raised by numbers of unexpected kind or shape.
@@ -117,7 +117,11 @@ def laws_of_numbers(findings: Findings, cell: DiscreteCell, states: States) -> N
     check_tables(findings, cell, states, rows)
     check_arcs(findings, cell, states)
     if "path" in document:
-        check_path(findings, cell, states)
+        points = document["path"]
+        if all(0 <= state.point < len(points) for state in states):  # others break the law of the load
+            for check in (check_breaks, check_strength, check_stored):
+                check(findings, cell, states)
+            (check_heat if "friction_heat" in points[0] else check_losses)(findings, cell, states)
     else:
         for number, table in enumerate([document, *cell.files.points], start=-1):
             check_rates(findings, cell, table.get("tips"), f"point {number}")

@@ -5,8 +5,9 @@ import numpy as np
 from feti_homog.typing import Float
 from feti_homog.verify.check_loads import States
 from feti_homog.verify.constitutive_law import VOIGT, turned
-from feti_homog.verify.discrete_cell import BONDED, DiscreteCell
+from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import KKT, Findings, relative, solver_limit
+from feti_homog.verify.reading import Status
 
 RTOL = 1e-8  # of the dual problems, by default
 DIRECTIONS = 720  # across the fibres, in half a turn
@@ -40,7 +41,7 @@ def check_reciprocity(findings: Findings, cell: DiscreteCell, states: States) ->
     document = cell.files.document
     for number, table in enumerate([document, *document.get("angle", ())], start=-1):
         of_table = [state for state in states if number < 0 or state.point == number]
-        if cell.files.contact and any((state.status != BONDED).any() for state in of_table):
+        if cell.files.contact and any((state.status != Status.BONDED).any() for state in of_table):
             continue
         place = f"angle[{number}]." if number >= 0 else ""
         for name in {"effective_stiffness", "stiffness"} & table.keys():

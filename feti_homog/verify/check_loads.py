@@ -16,17 +16,16 @@ import numpy as np
 
 from feti_homog.typing import Bool, Document, Float
 from feti_homog.verify.bonds import cohesive_traction, energy_of_springs, law_at
-from feti_homog.verify.discrete_cell import BONDED, CLOSED, OPEN, DiscreteCell
+from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.elements import ElementFields
-from feti_homog.verify.findings import Findings
-from feti_homog.verify.reading import State
+from feti_homog.verify.findings import ROUNDING, Findings
+from feti_homog.verify.reading import State, Status
 
 NAMES = {
     3: (("E11", "E22", "gamma12"), ("S11", "S22", "S12")),
     6: (("E11", "E22", "E33", "gamma23", "gamma13", "gamma12"), ("S11", "S22", "S33", "S23", "S13", "S12")),
 }
-TEMPERATURE, COUNTS = "temperature", {"bonded": BONDED, "closed": CLOSED, "open": OPEN}
-SAME_SHARE = 1e-12  # rounding of shares of a leg
+TEMPERATURE, COUNTS = "temperature", {status.name.lower(): status for status in Status}
 OF_ARCS = "debonded_length", "damaged_length", "debonded_shares"  # of an angle, in all unit loads
 UNIT_LOADS = {3: [0, 1, 2], 6: [0, 1, 5, 2, 6, 4, 3]}  # components in the order of the states; 6 is the temperature
 FIELDS = ("displacement", "fluctuation", "stress", "mesh_error", "stress_33")  # of a state on its mesh
@@ -73,7 +72,7 @@ def at_points(case: Document, points: Sequence[Document]) -> Iterator[Prescribed
     start, last = np.zeros(len(ends[0].values)), None
     for point in points:
         along = float(point["load_factor"]) * len(ends)
-        while leg < len(ends) - 1 and (ended or along > leg + 1 + SAME_SHARE):
+        while leg < len(ends) - 1 and (ended or along > leg + 1 + ROUNDING):
             before, end, leg, ended = ends[leg], ends[leg + 1], leg + 1, False
             start = before.values
             if last is not None:
@@ -82,7 +81,7 @@ def at_points(case: Document, points: Sequence[Document]) -> Iterator[Prescribed
         share = along - leg
         yield Prescribed((1 - share) * start + share * ends[leg].values, ends[leg].by_stress)
         # After the last break at a waypoint comes a point without breaks.
-        ended, last = abs(share - 1) <= SAME_SHARE and not (by_events and damaged_at(point)), point
+        ended, last = abs(share - 1) <= ROUNDING and not (by_events and damaged_at(point)), point
 
 
 def damaged_at(point: Document) -> int:
@@ -115,7 +114,7 @@ class StateNumbers(State):
         law = law_at(cell.files, damage=state.damage)
         released = cell.tips(state.status) & law.grows_by_release
         traction = cohesive_traction(cell.files, state)
-        used = np.where(released, np.nan, np.where(state.status == BONDED, law.utilisation(traction), 0.0))
+        used = np.where(released, np.nan, np.where(state.status == Status.BONDED, law.utilisation(traction), 0.0))
         in_springs = energy_of_springs(cell.files, state) / cell.area
         weights, phase = cell.elements.area / cell.area, cell.files.mesh.phase
         heat = -float(weights @ (cell.expansions[phase] * state.stress).sum(axis=1))
@@ -189,7 +188,7 @@ def check_tables(findings: Findings, cell: DiscreteCell, states: States, rows: R
     stress = max((float(np.abs(state.mean_stress).max()) for state in states), default=0.0) or 1.0
     energy = max([state.stored for state, *_ in pairs], default=0.0) + cell.rounded_energy
     for state, _, entries in pairs:
-        debonded, damaged = state.status != BONDED, (state.damage > 0.0) & (state.damage < 1.0)
+        debonded, damaged = state.status != Status.BONDED, (state.damage > 0.0) & (state.damage < 1.0)
         numbers: dict[str, tuple[Any, float]] = {
             "strain": (state.strain, cell.largest_strain or 1.0),
             "stress": (state.mean_stress, stress),

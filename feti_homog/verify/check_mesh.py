@@ -10,10 +10,10 @@ from scipy.special import gammaln, roots_legendre
 
 from feti_homog.typing import Bool, Float
 from feti_homog.verify.check_loads import NAMES, States
-from feti_homog.verify.discrete_cell import BONDED, DiscreteCell
+from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.elements import PLACES, add_at_nodes, quadrature_points
 from feti_homog.verify.findings import ROUNDING, Findings, Section
-from feti_homog.verify.reading import COATING, State
+from feti_homog.verify.reading import COATING, State, Status
 from feti_homog.verify.torus import from_centre
 
 # The mesher moves the tips of arcs by so many degrees at most; nodes nearer to a tip are on neither side.
@@ -168,18 +168,16 @@ def check_arcs(findings: Findings, cell: DiscreteCell, states: States) -> None:
         # A wrong number of a point breaks the law of the tables.
         opening = points[min(max(state.point, 0), len(points) - 1)]["angle"] if points else None
         inside, outside = _sides(cell, opening)
-        bonded = state.status == BONDED
+        bonded = state.status == Status.BONDED
         findings.record("arcs", np.count_nonzero(inside & bonded), f"{state.name}, bonded within arcs")
         # The first state of a path by events is the one at which the first bonds break.
         intact = "path" not in document or (state.point == 0 and case["path"]["method"] == "events")
         if intact and not from_mesh:
             findings.record("arcs", np.count_nonzero(outside & ~bonded), f"{state.name}, debonded outside of arcs")
-
-
-def check_first_step(findings: Findings, cell: DiscreteCell, first: Section) -> None:
-    """Check that all nodes outside of the case's arcs, and no others, have bonds before the first increment."""
-    if cell.files.case["cell"]["geometry"] != "mesh" or "interface" not in cell.files.case:
-        (inside, outside), count = _sides(cell, None), first["bonded"] + first["broke"]
+    if "path" in document and case["path"]["method"] != "events" and not from_mesh:
+        # Before the first increment all nodes outside of the case's arcs, and no others, have bonds.
+        (inside, outside), first = _sides(cell, None), document["path"][0]
+        count = first["bonded"] + first["broke"]
         excess = max(np.count_nonzero(outside) - count, count - np.count_nonzero(~inside), 0)
         findings.record("arcs", excess, "path[0].broke")
 

@@ -4,69 +4,44 @@ Fields may be kept at some points only; the others in result.json obey the same 
 """
 
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 
 import numpy as np
 
 from feti_homog.typing import Bool, Float
 from feti_homog.verify.bonds import law_at
-from feti_homog.verify.check_loads import NAMES, SAME_SHARE, TEMPERATURE, StateNumbers, States, damaged_at
-from feti_homog.verify.check_mesh import AT_NODE, check_first_step
-from feti_homog.verify.discrete_cell import BONDED, DIRECTION_DIGITS, DiscreteCell
-from feti_homog.verify.findings import STRENGTH, Findings, Points, Section, relative, solver_limit
-from feti_homog.verify.path_energies import check_path_energies
+from feti_homog.verify.check_loads import NAMES, TEMPERATURE, StateNumbers, States, damaged_at
+from feti_homog.verify.check_mesh import AT_NODE
+from feti_homog.verify.discrete_cell import DIRECTION_DIGITS, DiscreteCell
+from feti_homog.verify.findings import ROUNDING, STRENGTH, Findings, Points, Section, relative, solver_limit
+from feti_homog.verify.reading import Status
 
 # Utilisations by tractions below 10 rtol of the stress are none to the program; twice as many are here.
 NOISE_PER_RTOL = 20.0
 
 
-def check_path(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check the points of a path in result.json, and its states."""
-    points = cell.files.document["path"]
-    if any(not 0 <= state.point < len(points) for state in states):  # which breaks the law of the load
-        return
-    by_events, law = cell.files.case["path"]["method"] == "events", law_at(cell.files)
-    if not by_events:
-        check_first_step(findings, cell, points[0])
-    for number, (point, after) in enumerate(pairwise(points)):
-        broke = (point if by_events else after)["broke"]
-        findings.compare("breaks", point["bonded"] - after["bonded"], broke, 1.0, f"path[{number + 1}].bonded")
-    if by_events and points[-1]["load_factor"] == 1.0:
-        findings.record("breaks", points[-1]["broke"], f"path[{len(points) - 1}], bonds that broke at the end")
-    # Signs are sure where a force or a gap is 20 rtol beyond zero.  While contact changes at one load, all else moves
-    # by 115 rtol then, the median of 276 changes, and by 2100 rtol at most.
-    tolerance = max(STRENGTH, 10.0 * solver_limit(float(cell.files.document["solver"].hint("rtol"))))
-    if law.has_tips:
-        states = [_check_tips(findings, cell, state, points[state.point]["tips"]) for state in states]
-    # Events break the worst bonds. No bond exceeds its strength unless a jump at this load overloads it and it breaks.
-    for number, state in enumerate(states):
-        used, where = np.nan_to_num(state.used), f"{state.name}, interface node {{}}".format
-        overloaded = by_events & overloaded_by_jump(state, points, tolerance)
-        findings.record("strength", np.where(overloaded, 0.0, np.maximum(used - 1.0, 0.0)), where)
-        largest, after = used.max(initial=1.0), states[min(number + 1, len(states) - 1)]
-        if by_events and (broke := damaged_at(points[state.point])):
-            # The next point has the bonds that break; here so many are as near to their strength as the worst.
-            worst = np.sort(np.where(np.isnan(state.used), np.inf, state.used))[-broke:]
-            findings.record("strength", np.maximum(1.0 - worst / largest, 0.0), f"{state.name}, bonds that break")
-        if by_events and after.point == state.point + 1:
-            broken = (after.damage > state.damage) & ~np.isnan(state.used)
-            findings.record("strength", np.where(broken, 1.0 - state.used / largest, 0.0), where)
-    _check_steps(findings, cell, states, points, by_events)
-    check_path_energies(findings, cell, states, points)
-
-
-def _check_steps(findings: Findings, cell: DiscreteCell, states: States, points: Points, by_events: bool) -> None:
-    """Check the breaks between consecutive states, which never heal, and the growth of the fracture energy.
+def check_breaks(findings: Findings, cell: DiscreteCell, states: States) -> None:
+    """Check that bonds break as the points of a path report, never heal, and absorb the fracture energy.
 
     This energy grows with the broken length by G_c in the mode of the state before, if the files have that state, else
     by the range over all modes.
     """
+    points, by_events = cell.files.document["path"], cell.files.case["path"]["method"] == "events"
+    for number, (point, after) in enumerate(pairwise(points), start=1):
+        broke = (point if by_events else after)["broke"]
+        findings.compare("breaks", point["bonded"] - after["bonded"], broke, 1.0, f"path[{number}].bonded")
+    if by_events and points[-1]["load_factor"] == 1.0:
+        findings.record("breaks", points[-1]["broke"], f"path[{len(points) - 1}], bonds that broke at the end")
     has_toughness, scale = law_at(cell.files).has_toughness, float(np.finfo(float).tiny)
     if has_toughness:
         scale = max(points[-1]["fracture_energy"], scale)
         findings.record("energy", points[0]["fracture_energy"] * by_events / scale, "path[0].fracture_energy")
     for state, after in pairwise(states):
-        bonded, still, damaged = state.status == BONDED, after.status == BONDED, after.damage > state.damage
+        bonded, still, damaged = (
+            state.status == Status.BONDED,
+            after.status == Status.BONDED,
+            after.damage > state.damage,
+        )
         between = points[state.point : after.point] if by_events else points[state.point + 1 : after.point + 1]
         softened, limit = np.count_nonzero(still & damaged), sum(point.get("softened", 0) for point in between)
         off = abs(softened - limit) if len(between) == 1 else max(softened - limit, 0)
@@ -86,6 +61,33 @@ def _check_steps(findings: Findings, cell: DiscreteCell, states: States, points:
             findings.record("energy", off, f"{after.name}, fracture_energy")
 
 
+def check_strength(findings: Findings, cell: DiscreteCell, states: States) -> None:
+    """Check that no bond exceeds its strength, and events break the worst bonds.
+
+    A jump at this load may overload bonds that break.
+    """
+    points, law = cell.files.document["path"], law_at(cell.files)
+    # Signs are sure where a force or a gap is 20 rtol beyond zero.  While contact changes at one load, all else moves
+    # by 115 rtol then, the median of 276 changes, and by 2100 rtol at most.
+    tolerance = max(STRENGTH, 10.0 * solver_limit(float(cell.files.document["solver"].hint("rtol"))))
+    if law.has_tips:
+        states = [_check_tips(findings, cell, state, points[state.point]["tips"]) for state in states]
+    by_events = cell.files.case["path"]["method"] == "events"
+    for state, after in zip_longest(states, states[1:]):
+        used, where = np.nan_to_num(state.used), f"{state.name}, interface node {{}}".format
+        overloaded = by_events & overloaded_by_jump(state, points, tolerance)
+        findings.record("strength", np.where(overloaded, 0.0, np.maximum(used - 1.0, 0.0)), where)
+        if not by_events:
+            continue
+        largest, broke = used.max(initial=1.0), damaged_at(points[state.point])
+        # The next point has the bonds that break; here so many are as near to their strength as the worst.
+        worst = np.sort(np.where(np.isnan(state.used), np.inf, state.used))[::-1][:broke]
+        findings.record("strength", np.maximum(1.0 - worst / largest, 0.0), f"{state.name}, bonds that break")
+        if after is not None and after.point == state.point + 1:
+            broken = (after.damage > state.damage) & ~np.isnan(state.used)
+            findings.record("strength", np.where(broken, 1.0 - state.used / largest, 0.0), where)
+
+
 def overloaded_by_jump(state: StateNumbers, points: Points, tolerance: float) -> Bool:
     """(k,) bonds that may exceed their strength where some break.
 
@@ -95,7 +97,7 @@ def overloaded_by_jump(state: StateNumbers, points: Points, tolerance: float) ->
     if state.point == 0 or damaged_at(points[state.point]) == 0:
         return np.zeros(len(state.released), bool)
     before, now = points[state.point - 1 : state.point + 1]
-    if damaged_at(before) > 0 and abs(before["load_factor"] - now["load_factor"]) <= SAME_SHARE:
+    if damaged_at(before) > 0 and abs(before["load_factor"] - now["load_factor"]) <= ROUNDING:
         return np.ones(len(state.released), bool)
     same = damaged_at(before) == 0 and before["closed"] != now["closed"]
     for name in ("strain", "stress", TEMPERATURE):
@@ -141,7 +143,7 @@ def check_envelope(findings: Findings, cell: DiscreteCell, states: States) -> No
     document, keys, law = cell.files.document, cell.files.case["envelope"], law_at(cell.files)
     points, n, status = document["envelope"], keys["directions"], states[0].status
     released = cell.tips(status) & law.grows_by_release
-    may_break = (status == BONDED) & ~released
+    may_break = (status == Status.BONDED) & ~released
     unit_loads = np.array([[*state.strain, state.temperature] for state in states]).T
     unit_tractions = np.stack([state.traction for state in states])
     findings.compare("load", len(points), n, 1.0, "envelope, which lacks directions or has too many")

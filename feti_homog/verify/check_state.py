@@ -5,10 +5,10 @@ import numpy as np
 from feti_homog.typing import Float
 from feti_homog.verify.bonds import friction_at, law_at, rubbing_force
 from feti_homog.verify.constitutive_law import out_of_plane
-from feti_homog.verify.discrete_cell import BONDED, CLOSED, OPEN, ROUNDED_TERMS, DiscreteCell
+from feti_homog.verify.discrete_cell import ROUNDED_TERMS, DiscreteCell
 from feti_homog.verify.elements import PLACES, ElementFields
 from feti_homog.verify.findings import Findings, relative
-from feti_homog.verify.reading import State
+from feti_homog.verify.reading import State, Status
 
 
 def check_state(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
@@ -90,7 +90,7 @@ def check_bonds(findings: Findings, cell: DiscreteCell, state: State) -> None:
     On debonded faces gap >= 0, traction <= 0, gap traction = 0, and only friction acts along them.
     """
     files, at = cell.files, f"{state.name}, interface node {{}}".format
-    values, bonded = state.fluctuation[cell.nodes.node], state.status == BONDED
+    values, bonded = state.fluctuation[cell.nodes.node], state.status == Status.BONDED
     parted = cell.faces.means(values, of_fibre=False) - cell.faces.means(values, of_fibre=True)
     largest = cell.largest_displacement(state)
     findings.compare("jump", cell.in_axes(state.jump), parted, largest, at)
@@ -99,7 +99,7 @@ def check_bonds(findings: Findings, cell: DiscreteCell, state: State) -> None:
     slack = state.jump - law_at(files, damage=state.damage).jumps(state.traction)
     rubs = (friction_at(files, on_damage=True) > 0.0) & bonded & (state.damage > 0.0)
     gap = slack[:, 0].copy()
-    slack[rubs, 1] = slack[~bonded, 1:] = slack[state.status == OPEN] = 0.0
+    slack[rubs, 1] = slack[~bonded, 1:] = slack[state.status == Status.OPEN] = 0.0
     findings.record("bond", relative(slack, largest), at)
     if not len(bonded):
         return
@@ -108,10 +108,10 @@ def check_bonds(findings: Findings, cell: DiscreteCell, state: State) -> None:
     pull, force = max(float(np.abs(state.traction).max()), least), np.abs(normal) * files.interface.length
     laws = []
     if not bonded.all():
-        friction, closed = friction_at(files) * pressure, state.status == CLOSED
+        friction, closed = friction_at(files) * pressure, state.status == Status.CLOSED
         push = max(float(force.max()), least * float(files.interface.length.max()))
         excess = np.where(bonded, 0.0, np.maximum(shear - friction, 0.0))
-        laws.append(("free faces", excess + np.where(state.status == OPEN, np.abs(normal), 0.0), pull))
+        laws.append(("free faces", excess + np.where(state.status == Status.OPEN, np.abs(normal), 0.0), pull))
         if friction.any():
             slides = (state.sliding != 0) & closed
             laws.append(("sliding", np.where(slides, state.sliding * state.traction[:, 1] - friction, 0.0), pull))

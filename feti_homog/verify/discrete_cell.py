@@ -15,11 +15,10 @@ from feti_homog.verify.bonds import friction_at, pairs_of
 from feti_homog.verify.constitutive_law import laws, mixed_phases
 from feti_homog.verify.elements import Elements, add_at_nodes
 from feti_homog.verify.findings import ROUNDING
-from feti_homog.verify.reading import ResultFiles, State, gradient
+from feti_homog.verify.reading import ResultFiles, State, Status, gradient
 
 # Share of the terms that adds to the scale of their sum: 1e-15 of the terms are rounding.
 ROUNDED_TERMS = 1e-5
-BONDED, CLOSED, OPEN = 0, 1, 2
 DIRECTION_DIGITS = 9  # to which directions of tips differ
 
 
@@ -152,7 +151,7 @@ class DiscreteCell:
 
     def tips(self, status: AnyInt) -> Bool:
         """(k,) bonds next to a broken one."""
-        rows, broken, near_break = self.inner_rows, status != BONDED, np.zeros(len(status), bool)
+        rows, broken, near_break = self.inner_rows, status != Status.BONDED, np.zeros(len(status), bool)
         pairs = (rows[:, [0, 2, 2, 1]] if rows.shape[1] == 3 else rows).reshape(-1, 2)
         pairs = pairs[(pairs >= 0).all(axis=1)].T
         for node, neighbour in (pairs, pairs[::-1]):

@@ -6,6 +6,7 @@ import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from enum import IntEnum
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -66,6 +67,12 @@ class Fibres:
     strength: Float
 
 
+class Status(IntEnum):
+    """Status of an interface node in result.h5."""
+
+    BONDED, CLOSED, OPEN = range(3)
+
+
 @dataclass(frozen=True)
 class State:
     """The group /state/K.
@@ -79,7 +86,7 @@ class State:
         displacement, fluctuation: (n, c) u and u - E x.
         stress, stress_33: (m, v) and (m,) element means.
         traction, jump: (k, c) normal, tangential and axial.
-        status: (k,) 0 bonded, 1 closed, 2 open.
+        status: (k,) numbers of `Status`.
         damage: (k,) from 0, intact, to 1, broken.
         sliding: (k,) slip direction -1 or 1 of sliding nodes, else 0.
         mesh_error: (m,) element shares of the estimated energy error, NaN without an estimate.
