@@ -10,14 +10,14 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from feti_homog.errors import EXIT_DEFECT, FetiHomogError, NoMemoryError
-from feti_homog.system.runtime.standard_streams import complain
+from feti_homog.system.runtime.standard_streams import SILENT_SECONDS, complain
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Comm, Request
 
 T = TypeVar("T")
-# Seconds that a rank with an error waits for the others to come with theirs, before it ends the job.
-ARRIVAL_TIMEOUT_S = 5.0
+# A rank with an error waits so long for the others to come with theirs, before it ends the job.
+ARRIVAL_TIMEOUT_S = SILENT_SECONDS
 
 
 class RemoteError(RuntimeError):
