@@ -65,12 +65,11 @@ def _agreed(comm: Comm, result: T | None, error: Exception | None) -> T:
 def agree_after(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
     """Return function(...) of all ranks, a library's collective call.
 
-    If any raises a FetiHomogError, every rank does.
-
-    Any other exception is raised by its rank alone, without a word to the others, which may be waiting for it within
-    `function`: it must end the job, as does a FetiHomogError for which the others do not come in time.  Collective.
+    If any raises a FetiHomogError, every rank does.  Any other exception is raised by its rank alone, without a word
+    to the others, which may be waiting for it within `function`: it must end the job, as does a FetiHomogError for
+    which the others do not come in time.  Collective.
     """
-    result, error = None, None
+    result = error = None
     try:
         result = function(*args, **kwargs)
     except FetiHomogError as met:

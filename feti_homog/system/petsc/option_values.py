@@ -195,9 +195,7 @@ def named_values(words: Sequence[str]) -> dict[str, str]:
 def petsc_words(options: Mapping[str, str]) -> list[str]:
     """Return the words of options by name without dash, for PETSc's start.
 
-    Its own flags are there or not, true or false.
-
-    False flags of the solver stay, for a case may have them true.
+    Its own flags are there or not, true or false.  False flags of the solver stay, for a case may have them true.
     """
     settled = {name: flag_value(text) if is_own_flag(name) else text for name, text in options.items()}
     pairs = [(f"-{name}", text) for name, text in settled.items() if text is not None]

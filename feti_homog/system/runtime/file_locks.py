@@ -88,13 +88,12 @@ class Lock:
                 with contextlib.suppress(OSError):  # it holds on a full disk too, without the name of its holder
                     os.truncate(self._file, 0)
                     os.pwrite(self._file, this_process().encode(), 0)
-        except OSError as error:
+        except (OSError, LockHeld) as error:
             self._close()
+            if isinstance(error, LockHeld):
+                raise
             failure = LocksUnsupported if error.errno in UNSUPPORTED else FetiHomogError
             raise failure(f"cannot lock {self.path}: {error.strerror}") from error
-        except LockHeld:
-            self._close()
-            raise
 
     def _close(self) -> None:
         if self._file >= 0:
