@@ -124,7 +124,8 @@ def laws_of_numbers(findings: Findings, cell: DiscreteCell, states: States) -> N
             (check_heat if "friction_heat" in points[0] else check_losses)(findings, cell, states)
     else:
         for number, table in enumerate([document, *cell.files.points], start=-1):
-            check_rates(findings, cell, table.get("tips"), f"point {number}")
+            if (tips := table.get("tips")) is not None:
+                check_rates(findings, cell, tips, f"point {number}")
     if "envelope" in document:
         check_envelope(findings, cell, states)
     check_status(findings, cell)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.typing import Bool, Document, Float
-from feti_homog.verify.bonds import cohesive_traction, energy_of_springs, law_at
+from feti_homog.verify.bonds import cohesive_traction, law_at, rubbing_force
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.elements import ElementFields
 from feti_homog.verify.findings import ROUNDING, Findings
@@ -115,7 +115,11 @@ class StateNumbers(State):
         released = cell.tips(state.status) & law.grows_by_release
         traction = cohesive_traction(cell.files, state)
         used = np.where(released, np.nan, np.where(state.status == Status.BONDED, law.utilisation(traction), 0.0))
-        in_springs = energy_of_springs(cell.files, state) / cell.area
+        # In rubbing bonds the springs store (1 - d) K s^2 / 2 + d f^2 / (2 K).
+        intact = law_at(cell.files, damage=np.zeros(len(traction))).jumps(np.ones_like(traction))[:, 1]
+        twice = (traction * law.jumps(traction)).sum(axis=1)
+        twice += state.damage * intact * rubbing_force(cell.files, state) ** 2
+        in_springs = float(twice @ cell.files.interface.length) / (2 * cell.area)
         weights, phase = cell.elements.area / cell.area, cell.files.mesh.phase
         heat = -float(weights @ (cell.expansions[phase] * state.stress).sum(axis=1))
         thermal = np.einsum("pij,pj->pi", cell.stiffnesses, cell.expansions)[phase]

@@ -26,9 +26,7 @@ LENGTH_ERROR, NORMAL_ERROR = np.pi / 2 - 1, np.sqrt(2.0)
 WITHOUT_BUBBLE = 1.7
 # Share of the elements' errors to which arcs may cancel them.
 LEAST_SHARE = 0.05
-# Tips and first bonds are at nodes, to the rounding of directions, in radii or degrees; lengths for modes are at least
-# this share of the radius.
-AT_NODE, MODE_LENGTH = 1e-6, 1e-3
+MODE_LENGTH = 1e-3  # least length for modes / radius
 LOADS = [sign + name for sign in ("", "-") for name in (*NAMES[3][0], "strain")]  # of release rates
 # Middles of sides, a quadrature rule for squares of linear functions.
 MIDDLES = np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])
@@ -196,10 +194,8 @@ def _sides(cell: DiscreteCell, opening: float | None) -> tuple[Bool, Bool]:
     return inside, outside
 
 
-def check_rates(findings: Findings, cell: DiscreteCell, tips: Section | None, where: str) -> None:
+def check_rates(findings: Findings, cell: DiscreteCell, tips: Section, where: str) -> None:
     """Check that release rates agree with each other, and tips and their lengths for modes with the mesh."""
-    if tips is None:
-        return
     rows, at = cell.files.interface, f"{where}, tip {{}}".format
     table = {name: np.array(tips[name]) for name in ("G", "G_I", "G_II", "psi", "length", "angle", "fibre", "load")}
     G, first, second, psi, length, angle, number, load = table.values()
@@ -214,8 +210,8 @@ def check_rates(findings: Findings, cell: DiscreteCell, tips: Section | None, wh
         radius = float(np.median(radii[on_curve])) if on_curve.any() else np.nan
         chords = 2 * radius * np.abs(np.sin(np.radians(cell.bond_directions[on_curve] - angle[t]) / 2))
         off = np.abs(np.append(chords, MODE_LENGTH * radius) - length[t]).min() / length[t]
-        off += chords.min(initial=np.inf) > AT_NODE * radius
-        findings.record("rates", max(off - AT_NODE, 0.0), at(t))
+        off += chords.min(initial=np.inf) > ROUNDING * radius
+        findings.record("rates", max(off - ROUNDING, 0.0), at(t))
 
 
 def check_mesh_error(findings: Findings, cell: DiscreteCell, state: State) -> None:

@@ -11,13 +11,18 @@ import numpy as np
 from feti_homog.typing import Bool, Float
 from feti_homog.verify.bonds import law_at
 from feti_homog.verify.check_loads import NAMES, TEMPERATURE, StateNumbers, States, damaged_at
-from feti_homog.verify.check_mesh import AT_NODE
-from feti_homog.verify.discrete_cell import DIRECTION_DIGITS, DiscreteCell
-from feti_homog.verify.findings import ROUNDING, STRENGTH, Findings, Points, Section, relative, solver_limit
+from feti_homog.verify.discrete_cell import DiscreteCell
+from feti_homog.verify.findings import (
+    CONTACT_PER_RTOL,
+    ROUNDING,
+    STRENGTH,
+    Findings,
+    Points,
+    Section,
+    relative,
+    solver_limit,
+)
 from feti_homog.verify.reading import Status
-
-# Utilisations by tractions below 10 rtol of the stress are none to the program; twice as many are here.
-NOISE_PER_RTOL = 20.0
 
 
 def check_breaks(findings: Findings, cell: DiscreteCell, states: States) -> None:
@@ -113,7 +118,7 @@ def _check_tips(findings: Findings, cell: DiscreteCell, state: StateNumbers, tip
     """
     # By fibre, section and direction.
     node, rows = np.flatnonzero(cell.tips(state.status)), cell.files.interface
-    turned = np.round(cell.bond_directions[node], DIRECTION_DIGITS)
+    turned = np.round(cell.bond_directions[node] / ROUNDING)
     node = node[np.lexsort((turned, rows.pair[node], rows.fibre[node]))]
     law, where, used = law_at(cell.files, node), f"{state.name}, tip {{}}".format, state.used.copy()
     psi, first, second = law.mode(state.traction[node]), np.array(tips["G_I"]), np.array(tips["G_II"])
@@ -171,7 +176,7 @@ def check_envelope(findings: Findings, cell: DiscreteCell, states: States) -> No
             findings.compare("load", stress, stiffness @ strain + thermal, terms.max(), f"{at}.stress")
             _check_onset(findings, cell, point, traction, used, released, at)
         else:
-            noise = NOISE_PER_RTOL * float(document["solver"].hint("rtol")) * np.abs(stiffness @ strain).max()
+            noise = CONTACT_PER_RTOL * float(document["solver"].hint("rtol")) * np.abs(stiffness @ strain).max()
             over = used > law.onset(np.full_like(traction, noise))
             findings.require("onset", not over.any(), f"{at}, where some load breaks a bond")
 
@@ -185,7 +190,7 @@ def _check_onset(
     """
     rows, largest, away = cell.files.interface, float(used.max(initial=0.0)), cell.bond_directions - point["bond_angle"]
     on_curve = (rows.fibre == point["fibre"]) & (rows.pair == point.get("interface", 1) - 1)
-    nodes = np.flatnonzero(on_curve & (np.abs((away + 180.0) % 360.0 - 180.0) < AT_NODE))
+    nodes = np.flatnonzero(on_curve & (np.abs((away + 180.0) % 360.0 - 180.0) < ROUNDING))
     findings.require("tables", bool(len(nodes)), f"{at}, where no bond is")
     if not len(nodes):
         return

@@ -1,7 +1,7 @@
 """Sensitivity law: field energies change as in the file where constants of the case change."""
 
 import copy
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -19,7 +19,6 @@ from feti_homog.verify.reading import State, Status, gradient
 from feti_homog.verify.torus import from_centre
 
 TINY = float(np.finfo(float).tiny)
-WEIGHTS = (1.0, -0.7, 0.5, 0.9, -0.8)
 SPRINGS = ("normal_stiffness", "tangential_stiffness", "axial_stiffness")
 Case = dict[str, Any]
 
@@ -33,14 +32,28 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
         return
     data = document["sensitivities"]
     names = data["parameters"]
-    missing = sorted({*_parameters(cell)}.difference(names))
+    # All constants of phases and springs that the answer depends on: names end in .k for one of several numbers, in
+    # .Cij for an entry of a stiffness.
+    material, sections, needed = cell.files.case["material"], cell.files.interfaces, set[str]()
+    for phase in {*cell.files.phases} & material.keys():
+        for key, value in material[phase].items():
+            if "thermal_stress" in document or not key.startswith("expansion"):
+                numbers = np.array(value, float)
+                ends = [f".{k + 1}" for k in range(len(numbers))] if numbers.ndim else [""]
+                if numbers.ndim > 1:
+                    ends = [f".C{i + 1}{j + 1}" for i, j in np.argwhere(np.triu(numbers))]
+                needed |= {f"material.{phase}.{key}{end}" for end in ends}
+    for number, section in enumerate(sections, start=1):
+        name = f"interface.{number}" if len(sections) > 1 else "interface"
+        needed |= {f"{name}.{key}" for key in SPRINGS if np.isfinite(float(section.get(key) or np.inf))}
+    missing = sorted(needed.difference(names))
     findings.record("tables", [np.inf] * len(missing), lambda k: f"sensitivities, {missing[k]}")
     places = (_place(dict(cell.files.case), name) for name in names)
     values = np.array([np.array(table[key], float)[index] for table, key, index in places])
     # Changes over which the laws are nearly linear.
     ratios = np.array([name.endswith(".poisson") for name in names]) & (values < 0.5)
     sizes = np.where(ratios, 0.5 - values, np.where(values == 0.0, 1.0, np.abs(values)))
-    direction = sizes * np.resize(WEIGHTS, len(values))
+    direction = sizes * np.cos(np.arange(len(values)))  # of both signs, none zero
     states = list(cell.files.states())
     if "load" not in document and data.get("at_fixed_status"):
         states = states[: len(states) // 2]  # the second half is under minus the unit loads
@@ -55,25 +68,6 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
         energies.append(_energies(cell, states, case))
     check = _check_load if "load" in document else _check_stiffness
     check(findings, cell, states, (energies[0] - energies[1]) / (2 * STEP), direction)
-
-
-def _parameters(cell: DiscreteCell) -> Iterator[str]:
-    """Yield the names of all constants of phases and springs that the answer depends on.
-
-    Names end in .k for one of several numbers, in .Cij for an entry of a stiffness.
-    """
-    material, sections = cell.files.case["material"], cell.files.interfaces
-    for phase in {*cell.files.phases} & material.keys():
-        for key, value in material[phase].items():
-            if "thermal_stress" in cell.files.document or not key.startswith("expansion"):
-                numbers = np.array(value, float)
-                places = [f".{k + 1}" for k in range(len(numbers))] if numbers.ndim else [""]
-                if numbers.ndim > 1:
-                    places = [f".C{i + 1}{j + 1}" for i, j in np.argwhere(np.triu(numbers))]
-                yield from (f"material.{phase}.{key}{place}" for place in places)
-    for number, section in enumerate(sections, start=1):
-        name = f"interface.{number}" if len(sections) > 1 else "interface"
-        yield from (f"{name}.{key}" for key in SPRINGS if np.isfinite(float(section.get(key) or np.inf)))
 
 
 def _check_stiffness(

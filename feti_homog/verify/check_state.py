@@ -106,24 +106,25 @@ def check_bonds(findings: Findings, cell: DiscreteCell, state: State) -> None:
     normal, shear = state.traction[:, 0], np.abs(state.traction[:, 1:]).max(axis=1)
     pressure, (_, least, imposed) = np.maximum(-normal, 0.0), cell.scales_of(state)
     pull, force = max(float(np.abs(state.traction).max()), least), np.abs(normal) * files.interface.length
-    laws = []
+
+    def record(law: str, violation: Float, scale: float) -> None:
+        findings.record(law, relative(violation, scale), at)
+
     if not bonded.all():
         friction, closed = friction_at(files) * pressure, state.status == Status.CLOSED
         push = max(float(force.max()), least * float(files.interface.length.max()))
         excess = np.where(bonded, 0.0, np.maximum(shear - friction, 0.0))
-        laws.append(("free faces", excess + np.where(state.status == Status.OPEN, np.abs(normal), 0.0), pull))
+        record("free faces", excess + np.where(state.status == Status.OPEN, np.abs(normal), 0.0), pull)
         if friction.any():
             slides = (state.sliding != 0) & closed
-            laws.append(("sliding", np.where(slides, state.sliding * state.traction[:, 1] - friction, 0.0), pull))
-            laws.append(("sliding", np.where(closed | rubs, 0.0, np.abs(state.sliding)), 1.0))
+            record("sliding", np.where(slides, state.sliding * state.traction[:, 1] - friction, 0.0), pull)
+            record("sliding", np.where(closed | rubs, 0.0, np.abs(state.sliding)), 1.0)
         if files.contact:
-            laws.append(("penetration", np.where(bonded, 0.0, np.maximum(-gap, 0.0)), imposed))
-            laws.append(("tension", np.where(closed, np.maximum(normal, 0.0), 0.0), pull))
-            laws.append(("complementarity", np.where(bonded, 0.0, force * gap), push * imposed))
+            record("penetration", np.where(bonded, 0.0, np.maximum(-gap, 0.0)), imposed)
+            record("tension", np.where(closed, np.maximum(normal, 0.0), 0.0), pull)
+            record("complementarity", np.where(bonded, 0.0, force * gap), push * imposed)
     if rubs.any():
         rubbing, limit = rubbing_force(files, state), friction_at(files, on_damage=True) * pressure
         sticks = np.maximum(np.abs(rubbing) - limit, 0.0)
         off = np.where(state.sliding != 0, state.sliding * rubbing - limit, sticks)
-        laws.append(("sliding", np.where(rubs, off, 0.0), pull))
-    for law, violation, scale in laws:
-        findings.record(law, relative(violation, scale), at)
+        record("sliding", np.where(rubs, off, 0.0), pull)

@@ -17,8 +17,6 @@ from feti_homog.typing import Bool, Float, Int
 from feti_homog.verify.reading import Mesh
 
 ELEMENTS_AT_ONCE = 1 << 15
-MOST_KEPT = 50_000_000  # numbers of gradients that stay from state to state: 400 MB
-SIDES = ((0, 1), (1, 2), (2, 0))
 # (c, 2) place of du_i/dx_d in the strains, by the number of strains.
 PLACES = {3: np.array([[0, 2], [2, 1]]), 6: np.array([[0, 5], [5, 1], [4, 3]])}
 # r_a = N_a + half of the functions of the two sides at vertex a.
@@ -132,14 +130,6 @@ class Elements:
 
     def _parts(self) -> Iterator[tuple[slice, Float, Float]]:
         """Yield elements in portions, with gradients (e, q, a, 2) and weights (e, q) at their quadrature points."""
-        return iter(self._kept) if self._kept else self._computed()
-
-    @cached_property
-    def _kept(self) -> list[tuple[slice, Float, Float]]:
-        points, nodes = _rule(self._mesh.triangles.shape[1])[0].shape[:2]
-        return list(self._computed()) if len(self._mesh.triangles) * points * nodes * 2 <= MOST_KEPT else []
-
-    def _computed(self) -> Iterator[tuple[slice, Float, Float]]:
         slopes, shares = _rule(self._mesh.triangles.shape[1])
         # r_0 = 1 - r_1 - r_2, so the columns of the Jacobian are dx/dr_1 - dx/dr_0 and dx/dr_2 - dx/dr_0.
         free = slopes[:, :, 1:] - slopes[:, :, :1]
@@ -165,10 +155,9 @@ def _rule(nodes: int) -> tuple[Float, Float]:
     root = np.sqrt(213125 - 53320 * np.sqrt(10.0))
     weights, r = [(620 + sign * root) / 3720 for sign in (1, 1, 1, -1, -1, -1)], quadrature_points()
     slopes = np.zeros((6, 6, 3))
-    for a in range(3):
+    for a, b in ((0, 1), (1, 2), (2, 0)):
         slopes[:, a, a] = 4 * r[:, a] - 1
-    for side, (a, b) in enumerate(SIDES):
-        slopes[:, 3 + side, a], slopes[:, 3 + side, b] = 4 * r[:, b], 4 * r[:, a]
+        slopes[:, 3 + a, a], slopes[:, 3 + a, b] = 4 * r[:, b], 4 * r[:, a]
     return slopes, np.array(weights)
 
 

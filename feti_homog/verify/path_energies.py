@@ -34,13 +34,9 @@ from feti_homog.verify.check_loads import (
     damaged_at,
     targets,
 )  # fmt: skip
-from feti_homog.verify.discrete_cell import DiscreteCell
+from feti_homog.verify.discrete_cell import ROUNDED_TERMS, DiscreteCell
 from feti_homog.verify.findings import ROUNDING, Findings
 from feti_homog.verify.reading import State, Status
-
-# Shares below which energies are rounding: a step's in the path energies so far, an increment's heat in the stored
-# energy.
-LEAST_STEP, LEAST_HEAT = 1e-6, 1e-4
 
 
 @dataclass(frozen=True)
@@ -127,7 +123,7 @@ def check_heat(findings: Findings, cell: DiscreteCell, states: States) -> None:
     # Sums along the path have the rounding of their largest terms; its share in an increment is far less.
     scale = np.maximum.accumulate(np.abs(terms).max(axis=1)) + np.finfo(float).tiny
     steps = np.diff(terms, axis=0, prepend=0.0)
-    of_step = np.abs(steps).max(axis=1) + LEAST_STEP * scale
+    of_step = np.abs(steps).max(axis=1) + ROUNDED_TERMS * scale
     findings.record("heat", np.abs(terms @ [1.0, -1.0, -1.0, -1.0]) / scale, "path[{}].work".format)
     findings.record("heat", np.maximum(-steps[:, 3], 0.0) / of_step, "path[{}].friction_heat".format)
     breaks = np.array([damaged_at(point) for point in points])
@@ -153,7 +149,7 @@ def check_step_heat(findings: Findings, cell: DiscreteCell, before: State, state
     force = np.where(rubs, state.traction[:, 1], 0.0) * files.interface.length / cell.area
     heat = points[at]["friction_heat"] - points[before.point]["friction_heat"]
     scale = np.abs(force) @ (np.abs(slips[0]) + np.abs(slips[1]))
-    scale += LEAST_HEAT * max(abs(points[number]["stored"]) for number in (before.point, at))
+    scale += ROUNDED_TERMS * max(abs(points[number]["stored"]) for number in (before.point, at))
     findings.compare("heat", force @ (slips[1] - slips[0]), heat, scale or 1e-300, f"path[{at}].friction_heat")
 
 

@@ -166,33 +166,33 @@ class ResultFiles:
 
     def states(self) -> Iterator[State]:
         """Yield the states in order, one in memory at a time."""
+        n, m, k = len(self.mesh.points), len(self.mesh.triangles), len(self.interface.points)
+        shapes = {"displacement": (n, 2), "stress": (m, 3), "stress_33": (m,), "traction": (k, 2), "jump": (k, 2)}
         for number in sorted(map(int, self.file.get("state", ()))):
             with _reading(Path(self.file.filename)):
-                state = self._state(f"state/{number}", 6 if self.is_spatial else 3)
+                group = f"state/{number}"
+                attributes, table = self.file[group].attrs, partial(_table, self.file, group)
+                status = table("status", (k,))
+                # Older results have no damage, nothing that slides and no estimated errors.
+                older = {"damage": np.where(status != Status.BONDED, 1.0, 0.0), "sliding": np.zeros(k, int)}
+                older["mesh_error"] = np.full(m, np.nan)
+                arrays = {name: table(name, value.shape, value) for name, value in older.items()}
+                arrays |= {name: table(name, shape) for name, shape in shapes.items()}
+                if self.is_spatial:
+                    for name, rows in (("displacement", n), ("traction", k), ("jump", k)):
+                        arrays[name] = np.column_stack([arrays[name], table(f"axial_{name}", (rows,))])
+                    plane, axial = arrays["stress"], table("axial_stress", (m, 2))
+                    arrays["stress"] = np.column_stack([plane[:, :2], arrays["stress_33"], axial, plane[:, 2]])
+                strain, mean = (np.array(attributes[name], float) for name in ("strain", "stress"))
+                v = arrays["stress"].shape[1]
+                _expect(
+                    strain.shape == mean.shape == (v,), f"/{group} has a strain or a stress of another size than {v}"
+                )
+                name, temperature = f"state {number} ({attributes['label']})", float(attributes.get("temperature", 0.0))
+                factor, point = float(attributes["load_factor"]), int(attributes["point"])
+                arrays["fluctuation"] = arrays["displacement"] - self.mesh.points @ gradient(strain).T
+                state = State(name, strain, mean, factor, point, status=status, temperature=temperature, **arrays)
             yield state
-
-    def _state(self, group: str, v: int) -> State:
-        """Read the state of a group, whose strain and stress have v components."""
-        attributes, table = self.file[group].attrs, partial(_table, self.file, group)
-        n, m, k = len(self.mesh.points), len(self.mesh.triangles), len(self.interface.points)
-        status = table("status", (k,))
-        # Older results have no damage, nothing that slides and no estimated errors.
-        older = {"damage": (status != 0).astype(float), "sliding": np.zeros(k, int), "mesh_error": np.full(m, np.nan)}
-        arrays = {name: table(name, value.shape, value) for name, value in older.items()}
-        shapes = {"displacement": (n, 2), "stress": (m, 3), "stress_33": (m,), "traction": (k, 2), "jump": (k, 2)}
-        arrays |= {name: table(name, shape) for name, shape in shapes.items()}
-        if v == 6:
-            for name, rows in (("displacement", n), ("traction", k), ("jump", k)):
-                arrays[name] = np.column_stack([arrays[name], table(f"axial_{name}", (rows,))])
-            plane, axial = arrays["stress"], table("axial_stress", (m, 2))
-            arrays["stress"] = np.column_stack([plane[:, :2], arrays["stress_33"], axial, plane[:, 2]])
-        strain, mean = (np.array(attributes[name], float) for name in ("strain", "stress"))
-        _expect(strain.shape == mean.shape == (v,), f"/{group} has a strain or a stress of another size than {v}")
-        name = f"{group.replace('/', ' ')} ({attributes['label']})"
-        factor, point = float(attributes["load_factor"]), int(attributes["point"])
-        arrays["fluctuation"] = arrays["displacement"] - self.mesh.points @ gradient(strain).T
-        temperature = float(attributes.get("temperature", 0.0))
-        return State(name, strain, mean, factor, point, status=status, temperature=temperature, **arrays)
 
 
 def altered(directory: Path) -> tuple[str, ...]:
