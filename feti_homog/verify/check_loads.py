@@ -4,13 +4,11 @@ A case prescribes the strain or the stress of every component; in generalized pl
 strain component.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -109,7 +107,7 @@ class StateNumbers(State):
     expanding: float
 
     @classmethod
-    def of(cls, cell: DiscreteCell, state: State, fields: ElementFields) -> StateNumbers:
+    def of(cls, cell: DiscreteCell, state: State, fields: ElementFields) -> Self:
         """Return the numbers of a state."""
         law = law_at(cell.files, damage=state.damage)
         released = cell.tips(state.status) & law.grows_by_release

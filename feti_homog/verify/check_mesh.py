@@ -227,13 +227,9 @@ def check_mesh_error(findings: Findings, cell: DiscreteCell, state: State) -> No
         ratio = (LEAST_SHARE * total + ROUNDING) / (error + ROUNDING)
         findings.record("mesh error", ratio - 1, f"{state.name}, the error of its energy")
     energy = float(state.strain @ state.mean_stress) * cell.area
-    if cell.files.case["analysis"]["type"] == "stiffness" and energy > 0 and not np.isnan(state.mesh_error).all():
-        ratio = (total + ROUNDING) / (_averaged(cell, state) / energy + ROUNDING)
-        findings.record("mesh error", max(ratio, 1 / ratio) - 1, state.name)
-
-
-def _averaged(cell: DiscreteCell, state: State) -> float:
-    """int d : S : d, with d the stresses interpolated from averages at nodes less the elements' stresses."""
+    if cell.files.case["analysis"]["type"] != "stiffness" or not energy > 0 or np.isnan(state.mesh_error).all():
+        return
+    # int d : S : d, with d the stresses interpolated from averages at nodes less the elements' stresses.
     mesh, v, elements = cell.files.mesh, cell.stiffnesses.shape[1], cell.elements
     n, is_linear = mesh.triangles.shape[1], mesh.triangles.shape[1] == 3
     r = MIDDLES if is_linear else quadrature_points()  # (q, 3) barycentric coordinates
@@ -253,7 +249,7 @@ def _averaged(cell: DiscreteCell, state: State) -> float:
         weights += np.bincount(nodes.ravel(), np.repeat(area, n), len(weights))
         add_at_nodes(sums, nodes, stress * area[:, None, None])
     averages = sums / np.where(weights > 0.0, weights, 1.0)[:, None]
-    components, total = np.unique(PLACES[v]), 0.0  # on which displacements work; bubbles are in the plane
+    components, averaged = np.unique(PLACES[v]), 0.0  # on which displacements work; bubbles are in the plane
     has_bubble = elements.mixed[:, None] & np.isin(components, PLACES[v][:2])
     factor = np.where(has_bubble | is_linear, 1.0, np.sqrt(WITHOUT_BUBBLE))
     flexibility = np.linalg.inv(cell.stiffnesses[:, components[:, None], components])
@@ -262,5 +258,6 @@ def _averaged(cell: DiscreteCell, state: State) -> float:
     for part, w, stress in stresses():
         phase = mesh.phase[part]
         off = (functions @ averages[mesh.triangles[part]] - stress)[..., components] * factor[phase, None]
-        total += float(np.einsum("eq,eqi,eij,eqj->", w, off, flexibility[phase], off, optimize=True))
-    return total
+        averaged += float(np.einsum("eq,eqi,eij,eqj->", w, off, flexibility[phase], off, optimize=True))
+    ratio = (total + ROUNDING) / (averaged / energy + ROUNDING)
+    findings.record("mesh error", max(ratio, 1 / ratio) - 1, state.name)

@@ -8,7 +8,7 @@ from itertools import pairwise, zip_longest
 
 import numpy as np
 
-from feti_homog.typing import Bool, Float
+from feti_homog.typing import Bool
 from feti_homog.verify.bonds import law_at
 from feti_homog.verify.check_loads import NAMES, TEMPERATURE, StateNumbers, States, damaged_at
 from feti_homog.verify.discrete_cell import DiscreteCell
@@ -144,9 +144,12 @@ def _check_tips(findings: Findings, cell: DiscreteCell, state: StateNumbers, tip
 
 
 def check_envelope(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check the points of `envelope` in result.json, by the states of the unit loads."""
+    """Check the points of `envelope` in result.json, by the states of the unit loads.
+
+    Utilisations are 0 at debonded nodes and at tips that break by energy release.
+    """
     document, keys, law = cell.files.document, cell.files.case["envelope"], law_at(cell.files)
-    points, n, status = document["envelope"], keys["directions"], states[0].status
+    rows, points, n, status = cell.files.interface, document["envelope"], keys["directions"], states[0].status
     released = cell.tips(status) & law.grows_by_release
     may_break = (status == Status.BONDED) & ~released
     unit_loads = np.array([[*state.strain, state.temperature] for state in states]).T
@@ -167,39 +170,29 @@ def check_envelope(findings: Findings, cell: DiscreteCell, states: States) -> No
         shares, *_ = np.linalg.lstsq(unit_loads, np.array([*strain, temperature * has_factor]), rcond=None)
         traction = np.tensordot(shares, unit_tractions, axes=1)
         used = np.where(may_break, law.onset(traction), 0.0)
-        if has_factor:
-            stress, factor = np.array(point["stress"]), float(point["factor"])
-            value = strain if of_strains else stress
-            scale = max(factor, float(np.abs(value).max()))
-            findings.compare("load", value, factor * unit, scale, f"{at}, {' and '.join(keys['plane'])}")
-            terms = np.abs(stiffness) @ np.abs(strain) + np.abs(thermal)
-            findings.compare("load", stress, stiffness @ strain + thermal, terms.max(), f"{at}.stress")
-            _check_onset(findings, cell, point, traction, used, released, at)
-        else:
+        if not has_factor:
             noise = CONTACT_PER_RTOL * float(document["solver"].hint("rtol")) * np.abs(stiffness @ strain).max()
             over = used > law.onset(np.full_like(traction, noise))
             findings.require("onset", not over.any(), f"{at}, where some load breaks a bond")
-
-
-def _check_onset(
-    findings: Findings, cell: DiscreteCell, point: Section, traction: Float, used: Float, released: Bool, at: str
-) -> None:
-    """Check that no bond exceeds its strength, and the bond in the file is at its strength and breaks as written.
-
-    Utilisations `used` (k,) are 0 at debonded nodes and at tips that break by energy release, `released` (k,).
-    """
-    rows, largest, away = cell.files.interface, float(used.max(initial=0.0)), cell.bond_directions - point["bond_angle"]
-    on_curve = (rows.fibre == point["fibre"]) & (rows.pair == point.get("interface", 1) - 1)
-    nodes = np.flatnonzero(on_curve & (np.abs((away + 180.0) % 360.0 - 180.0) < ROUNDING))
-    findings.require("tables", bool(len(nodes)), f"{at}, where no bond is")
-    if not len(nodes):
-        return
-    is_tip, node = bool(released[nodes].any()), int(nodes[np.argmax(used[nodes])])
-    if point["factor"] == 0.0:
-        findings.record("onset", max(1.0 - largest, 0.0) if not is_tip else 0.0, f"{at}, of the temperature alone")
-    else:
-        findings.record("onset", max(largest - 1.0, 0.0) if is_tip else abs(largest - 1.0), at)
-    if not is_tip:
-        findings.record("strength", (largest - used[node]) / largest, f"{at}, fibre and bond_angle")
-    for name, value in law_at(cell.files, np.array([node])).breaks(traction[node : node + 1]).items():
-        findings.record("onset", relative(point[name] - value, 90.0 if name == "psi" else 1.0), f"{at}.{name}")
+            continue
+        stress, factor = np.array(point["stress"]), float(point["factor"])
+        value, terms = strain if of_strains else stress, np.abs(stiffness) @ np.abs(strain) + np.abs(thermal)
+        scale = max(factor, float(np.abs(value).max()))
+        findings.compare("load", value, factor * unit, scale, f"{at}, {' and '.join(keys['plane'])}")
+        findings.compare("load", stress, stiffness @ strain + thermal, terms.max(), f"{at}.stress")
+        # No bond exceeds its strength, and the bond in the file is at its strength and breaks as written.
+        largest, away = float(used.max(initial=0.0)), cell.bond_directions - point["bond_angle"]
+        on_curve = (rows.fibre == point["fibre"]) & (rows.pair == point.get("interface", 1) - 1)
+        nodes = np.flatnonzero(on_curve & (np.abs((away + 180.0) % 360.0 - 180.0) < ROUNDING))
+        findings.require("tables", bool(len(nodes)), f"{at}, where no bond is")
+        if not len(nodes):
+            continue
+        is_tip, node, off = bool(released[nodes].any()), int(nodes[np.argmax(used[nodes])]), largest - 1.0
+        if factor == 0.0:
+            findings.record("onset", 0.0 if is_tip else max(-off, 0.0), f"{at}, of the temperature alone")
+        else:
+            findings.record("onset", max(off, 0.0) if is_tip else abs(off), at)
+        if not is_tip:
+            findings.record("strength", (largest - used[node]) / largest, f"{at}, fibre and bond_angle")
+        for name, expected in law_at(cell.files, np.array([node])).breaks(traction[node : node + 1]).items():
+            findings.record("onset", relative(point[name] - expected, 90.0 if name == "psi" else 1.0), f"{at}.{name}")

@@ -1,10 +1,8 @@
 """The cell in a result: its elements, torn nodes, interface faces, and scales for its states."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -89,7 +87,7 @@ class DiscreteCell:
     largest_strain: float
 
     @classmethod
-    def of(cls, files: ResultFiles) -> DiscreteCell:
+    def of(cls, files: ResultFiles) -> Self:
         """Return the cell of a result. Raises CaseError if a phase has no material."""
         mesh = files.mesh
         stiffnesses, free = laws(files.case, files.phases)

@@ -17,9 +17,8 @@ cascade, and where a later leg is on a ray.  There the loss obeys an equation; e
 Between event points without breaks the response is straight, so the work is (Sigma + Sigma').(E' - E) / 2.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -54,7 +53,7 @@ class PointNumbers:
     terms: float = 0.0
 
     @classmethod
-    def of(cls, cell: DiscreteCell, number: int, load: Prescribed, state: StateNumbers | None) -> PointNumbers:
+    def of(cls, cell: DiscreteCell, number: int, load: Prescribed, state: StateNumbers | None) -> Self:
         """Return the numbers of a point, with the fields' energy, or without a state by Hill E.Sigma / 2.
 
         The conjugate to a temperature follows from the stored energy.
