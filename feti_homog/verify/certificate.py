@@ -17,7 +17,7 @@ from feti_homog.verify.check_sensitivities import check_sensitivities
 from feti_homog.verify.check_state import check_bonds, check_gluing, check_state
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Finding, Findings, checks, unchecked
-from feti_homog.verify.path_energies import check_heat, check_losses, check_step_heat, check_stored
+from feti_homog.verify.path_energies import check_heat, check_losses, check_stored
 from feti_homog.verify.reading import COATING, altered, opened
 
 # Raised by numbers of unexpected kind or shape.
@@ -93,7 +93,7 @@ def laws_of_fields(findings: Findings, cell: DiscreteCell) -> list[StateNumbers]
     files = cell.files
     check_mesh(findings, cell)
     check_interface(findings, cell)
-    states, before = list[StateNumbers](), None
+    states = list[StateNumbers]()
     for state in files.states():
         arrays = (state.displacement, state.fluctuation, state.stress, state.traction, state.jump, state.strain)
         findings.record("numbers", [np.count_nonzero(~np.isfinite(array)) for array in arrays], state.name)
@@ -103,18 +103,15 @@ def laws_of_fields(findings: Findings, cell: DiscreteCell) -> list[StateNumbers]
         check_gluing(findings, cell, state, fields)
         check_bonds(findings, cell, state)
         check_mesh_error(findings, cell, state)
-        if before is not None and "path" in files.document:
-            check_step_heat(findings, cell, before, state)
-        before = state
         states.append(StateNumbers.of(cell, state, fields))
     return states
 
 
 def laws_of_numbers(findings: Findings, cell: DiscreteCell, states: States) -> None:
     """Check the numbers of result.json against the states."""
-    document, rows = cell.files.document, rows_of(cell)
-    check_loads(findings, cell, states, rows)
-    check_tables(findings, cell, states, rows)
+    document = cell.files.document
+    pairs = check_loads(findings, cell, states, rows_of(cell))
+    check_tables(findings, cell, states, pairs)
     check_arcs(findings, cell, states)
     if "path" in document:
         points = document["path"]

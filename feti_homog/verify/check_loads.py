@@ -130,10 +130,11 @@ class StateNumbers(State):
 
 States = Sequence[StateNumbers]
 Rows = Sequence[tuple[Prescribed, Document]]
+Pairs = Sequence[tuple[StateNumbers, tuple[Prescribed, Document]]]
 
 
-def check_loads(findings: Findings, cell: DiscreteCell, states: States, rows: Rows) -> None:
-    """Check loads of points and states against the case.
+def check_loads(findings: Findings, cell: DiscreteCell, states: States, rows: Rows) -> Pairs:
+    """Check loads of points and states against the case, and return the states with their rows.
 
     A path keeps as many states as the case asks for, at points that result.json lists, the first and the last among
     them; other analyses keep all.
@@ -153,13 +154,16 @@ def check_loads(findings: Findings, cell: DiscreteCell, states: States, rows: Ro
             _check_prescribed(findings, load, entries, scales, f"path[{number}]")
         key = cell.files.case["output"]["states"]
         count = min(key, count) if isinstance(key, int) else count if key == "all" else len(numbers)
+        pairs = [(state, rows[state.point]) for state in states if 0 <= state.point < len(rows)]
     else:
+        pairs = list(zip(states, rows, strict=False))
         points = np.arange(len(numbers)) // (count // len(document.get("angle", [None])))
         findings.compare("tables", numbers, points, 1.0, lambda k: f"{states[k].name}, point")
     findings.compare("load", len(states), count, 1.0, f"{len(states)} states, {count} asked for")
-    for state, load, _ in with_rows(cell, states, rows):
+    for state, (load, _) in pairs:
         own = {"strain": state.strain, "stress": state.mean_stress, TEMPERATURE: state.temperature}
         _check_prescribed(findings, load, own, scales, state.name)
+    return pairs
 
 
 def _check_prescribed(
@@ -175,7 +179,7 @@ def _check_prescribed(
     findings.record("load", abs(off) / max(abs(temperature), 1.0), f"{place}, temperature")
 
 
-def check_tables(findings: Findings, cell: DiscreteCell, states: States, rows: Rows) -> None:
+def check_tables(findings: Findings, cell: DiscreteCell, states: States, pairs: Pairs) -> None:
     """Check the points or columns of result.json against the states."""
     files, nodes, sections = cell.files, cell.files.interface, len(cell.files.interfaces)
     same = json.loads(str(files.file.attrs["case"])) == files.case
@@ -186,10 +190,9 @@ def check_tables(findings: Findings, cell: DiscreteCell, states: States, rows: R
 
     longest = float(lengths(np.ones(len(nodes.length), bool)).max(initial=0.0)) or 1.0
     of_section = nodes.length[:, None] * (nodes.pair[:, None] == np.arange(sections))
-    pairs = with_rows(cell, states, rows)
     stress = max((float(np.abs(state.mean_stress).max()) for state in states), default=0.0) or 1.0
-    energy = max([state.stored for state, *_ in pairs], default=0.0) + cell.rounded_energy
-    for state, _, entries in pairs:
+    energy = max([state.stored for state, _ in pairs], default=0.0) + cell.rounded_energy
+    for state, (_, entries) in pairs:
         debonded, damaged = state.status != Status.BONDED, (state.damage > 0.0) & (state.damage < 1.0)
         numbers: dict[str, tuple[Any, float]] = {
             "strain": (state.strain, cell.largest_strain or 1.0),
@@ -240,10 +243,3 @@ def rows_of(cell: DiscreteCell) -> Rows:
             entries = {"stress": sign * columns[:, k]} | {name: table[name] for name in names if name in table}
             rows.append((Prescribed(sign * np.eye(n)[k], np.zeros(n, bool)), entries))
     return rows
-
-
-def with_rows(cell: DiscreteCell, states: States, rows: Rows) -> list[tuple[StateNumbers, Prescribed, Document]]:
-    """Pair states with the rows of their points on a path, or in order without a path."""
-    if "path" in cell.files.document:
-        return [(state, *rows[state.point]) for state in states if 0 <= state.point < len(rows)]
-    return [(state, *row) for state, row in zip(states, rows, strict=False)]

@@ -18,6 +18,7 @@ Between event points without breaks the response is straight, so the work is (Si
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Self
 
 import numpy as np
@@ -35,7 +36,7 @@ from feti_homog.verify.check_loads import (
 )  # fmt: skip
 from feti_homog.verify.discrete_cell import ROUNDED_TERMS, DiscreteCell
 from feti_homog.verify.findings import ROUNDING, Findings
-from feti_homog.verify.reading import State, Status
+from feti_homog.verify.reading import Status
 
 
 @dataclass(frozen=True)
@@ -129,9 +130,11 @@ def check_heat(findings: Findings, cell: DiscreteCell, states: States) -> None:
     breaks = np.r_[0, breaks[:-1]] if by_events else breaks
     lost = np.where(breaks > 0, 0.0, np.abs(steps[:, 2]))
     findings.record("heat", lost / of_step, "path[{}].dissipated".format)
+    for before, state in pairwise(states):
+        check_step_heat(findings, cell, before, state)
 
 
-def check_step_heat(findings: Findings, cell: DiscreteCell, before: State, state: State) -> None:
+def check_step_heat(findings: Findings, cell: DiscreteCell, before: StateNumbers, state: StateNumbers) -> None:
     """Check that an increment without breaks makes the heat from its slips under the tractions at its end.
 
     It is relative to the tractions times the slips since the beginning, whose difference it is.  The work of increments
@@ -139,7 +142,7 @@ def check_step_heat(findings: Findings, cell: DiscreteCell, before: State, state
     """
     files, at = cell.files, state.point
     points = files.document["path"]
-    if at != before.point + 1 or "friction_heat" not in points[at] or damaged_at(points[at]):
+    if at != before.point + 1 or damaged_at(points[at]):
         return
     if files.case["path"]["method"] == "events" or friction_at(files, on_damage=True).any():
         return

@@ -207,9 +207,8 @@ def altered(directory: Path) -> tuple[str, ...]:
     unchanged = {JSON: document.get("checksum") == f"{zlib.crc32(text.encode('utf-8', 'surrogatepass')):08x}"}
     with _reading(path), input_files.opened(path) as stream:  # the CRC-32 of its blocks' CRC-32s
         size, seal = os.fstat(stream.fileno()).st_size, document.get("result_h5")
-        has_size = isinstance(seal, dict) and seal.get("bytes") == size
-        blocks = iter(partial(stream.read, CHECKSUM_BLOCK), b"") if has_size else ()
-        checksum = zlib.crc32(np.array([zlib.crc32(block) for block in blocks], "<u4").tobytes())
+        blocks = [zlib.crc32(block) for block in iter(partial(stream.read, CHECKSUM_BLOCK), b"")]
+        checksum = zlib.crc32(np.array(blocks, "<u4").tobytes())
     unchanged[FIELDS] = seal == {"bytes": size, "checksum": f"{checksum:08x}"}
     return tuple(name for name, is_unchanged in unchanged.items() if not is_unchanged)
 
