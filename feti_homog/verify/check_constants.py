@@ -86,9 +86,9 @@ def check_constants(findings: Findings, cell: DiscreteCell) -> None:
             strains, place = -np.linalg.solve(C, heat), "thermal_expansion"
             findings.compare("compliance", document[place], strains, np.abs(strains).max(), place)
     for section in SECTIONS & document.keys():
-        constants = {} if document.get(section) is None else constants_of(C, heat)
-        for name, value in (document.get(section) or {}).items():
-            expected, place = constants.get(name), f"{section}.{name}"
+        constants = {} if document[section] is None else constants_of(C, heat)
+        for name in document[section] or ():
+            value, expected, place = document[section][name], constants.get(name), f"{section}.{name}"
             if value is None or expected is None:
                 findings.require("moduli", value is expected, place)
             else:

@@ -134,8 +134,7 @@ def _check_tips(findings: Findings, cell: DiscreteCell, state: StateNumbers, tip
         findings.compare("tables", tips["psi"], np.degrees(psi), 90.0, where)
         findings.compare("tables", first * np.sin(psi) ** 2, second * np.cos(psi) ** 2, first + second, where)
         if law.grows_by_release:
-            for name in ("G_I", "G_II"):
-                tips.leaves_open(name)
+            tips.leaves_open("G_I", "G_II")
         else:
             energies = law.energies(state.traction[node])
             total = energies.sum(axis=1)[:, None]

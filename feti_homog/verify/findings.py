@@ -11,7 +11,7 @@ checks, min(1000 rtol, 1e-4).  `rtol` is written in the result, so 1e-4 is the m
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -225,17 +225,13 @@ class Section(dict[str, Any]):
         """Return an entry, which counts as read."""
         return self[key] if key in self else default  # noqa: SIM401, which would be this again
 
-    def items(self) -> Iterator[tuple[str, Any]]:  # type: ignore[override]
-        """Yield all entries, which count as read."""
-        return ((key, self[key]) for key in self)
-
     def hint(self, key: str, default: Any = None) -> Any:
         """Return an entry that a law uses without checking it."""
         return super().get(key, default)
 
-    def leaves_open(self, key: str) -> None:
-        """Count an entry as unread for good: laws use its value but do not determine it."""
-        self.unread[self._prefix + key] = True
+    def leaves_open(self, *keys: str) -> None:
+        """Count entries as unread for good: laws use their values but do not determine them."""
+        self.unread |= dict.fromkeys((self._prefix + key for key in keys), True)
 
 
 Points = Sequence[Section]

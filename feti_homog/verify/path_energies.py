@@ -25,15 +25,7 @@ import numpy as np
 
 from feti_homog.typing import Float
 from feti_homog.verify.bonds import friction_at, law_at
-from feti_homog.verify.check_loads import (
-    TEMPERATURE,
-    Prescribed,
-    StateNumbers,
-    States,
-    at_points,
-    damaged_at,
-    targets,
-)  # fmt: skip
+from feti_homog.verify.check_loads import TEMPERATURE, Prescribed, StateNumbers, States, at_points, damaged_at, targets
 from feti_homog.verify.discrete_cell import ROUNDED_TERMS, DiscreteCell
 from feti_homog.verify.findings import ROUNDING, Findings
 from feti_homog.verify.reading import Status
@@ -188,10 +180,9 @@ def _work(one: Float, other: Float) -> float:
 def check_losses(findings: Findings, cell: DiscreteCell, states: States) -> None:
     """Check the work, and the loss in breaks by (P).
 
-    The loss is the old bonds' potential less the new bonds', at the load of the break.
-
-    At events, bonds that break at a point lose the energy up to the next. In an increment, bonds break at its end;
-    bonded phases at the strain of the new bonds store no less than the old bonds would.
+    The loss is the old bonds' potential less the new bonds', at the load of the break.  At events, bonds that break at
+    a point lose the energy up to the next.  In an increment, bonds break at its end; bonded phases at the strain of the
+    new bonds store no less than the old bonds would.
     """
     points, by_events = cell.files.document["path"], cell.files.case["path"]["method"] == "events"
     of_point, loads = {state.point: state for state in states}, at_points(cell.files.case, points)
