@@ -82,7 +82,7 @@ def _verified(directory: Path) -> Certificate:
         raise CaseError(f"{directory}: its files do not belong together or are incomplete: {fault}") from error
 
 
-def checks_of(cell: DiscreteCell) -> tuple[Finding, ...]:
+def checks_of(cell: DiscreteCell) -> list[Finding]:
     """List the laws of a result with their limits."""
     case, rtol = cell.files.case, float(cell.files.document["solver"].hint("rtol"))
     return checks(rtol, case["cell"]["geometry"] == "mesh", COATING in case["material"], cell.elements.contrasts)

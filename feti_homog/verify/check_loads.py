@@ -151,7 +151,7 @@ def check_loads(findings: Findings, cell: DiscreteCell, states: States, rows: Ro
         in_order = [*numbers[:1], *numbers[-1:]] == [0, count - 1] and numbers == sorted({*numbers})
         findings.require("load", in_order, "states, which are not from the first point to the last")
         for number, (load, entries) in enumerate(rows):
-            _check_prescribed(findings, load, entries, scales, f"path[{number}]")
+            _check_load(findings, load, entries, scales, f"path[{number}]")
         key = cell.files.case["output"]["states"]
         count = min(key, count) if isinstance(key, int) else count if key == "all" else len(numbers)
         pairs = [(state, rows[state.point]) for state in states if 0 <= state.point < len(rows)]
@@ -162,13 +162,11 @@ def check_loads(findings: Findings, cell: DiscreteCell, states: States, rows: Ro
     findings.compare("load", len(states), count, 1.0, f"{len(states)} states, {count} asked for")
     for state, (load, _) in pairs:
         own = {"strain": state.strain, "stress": state.mean_stress, TEMPERATURE: state.temperature}
-        _check_prescribed(findings, load, own, scales, state.name)
+        _check_load(findings, load, own, scales, state.name)
     return pairs
 
 
-def _check_prescribed(
-    findings: Findings, load: Prescribed, numbers: Document, scales: tuple[float, float], place: str
-) -> None:
+def _check_load(findings: Findings, load: Prescribed, numbers: Document, scales: Sequence[float], place: str) -> None:
     """Check the strains, stresses and temperature that a load prescribes."""
     strain, stress, v = np.array(numbers["strain"]), np.array(numbers["stress"]), len(numbers["strain"])
     values, by_stress = load.values[:v], load.by_stress[:v]

@@ -12,16 +12,7 @@ from feti_homog.typing import Bool
 from feti_homog.verify.bonds import law_at
 from feti_homog.verify.check_loads import NAMES, TEMPERATURE, StateNumbers, States, damaged_at
 from feti_homog.verify.discrete_cell import DiscreteCell
-from feti_homog.verify.findings import (
-    CONTACT_PER_RTOL,
-    ROUNDING,
-    STRENGTH,
-    Findings,
-    Points,
-    Section,
-    relative,
-    solver_limit,
-)
+from feti_homog.verify.findings import CONTACT_PER_RTOL, ROUNDING, STRENGTH, Findings, Points, Section, solver_limit
 from feti_homog.verify.reading import Status
 
 
@@ -42,11 +33,8 @@ def check_breaks(findings: Findings, cell: DiscreteCell, states: States) -> None
         scale = max(points[-1]["fracture_energy"], scale)
         findings.record("energy", points[0]["fracture_energy"] * by_events / scale, "path[0].fracture_energy")
     for state, after in pairwise(states):
-        bonded, still, damaged = (
-            state.status == Status.BONDED,
-            after.status == Status.BONDED,
-            after.damage > state.damage,
-        )
+        bonded, still = (each.status == Status.BONDED for each in (state, after))
+        damaged = after.damage > state.damage
         between = points[state.point : after.point] if by_events else points[state.point + 1 : after.point + 1]
         softened, limit = np.count_nonzero(still & damaged), sum(point.get("softened", 0) for point in between)
         off = abs(softened - limit) if len(between) == 1 else max(softened - limit, 0)
@@ -194,4 +182,4 @@ def check_envelope(findings: Findings, cell: DiscreteCell, states: States) -> No
         if not is_tip:
             findings.record("strength", (largest - used[node]) / largest, f"{at}, fibre and bond_angle")
         for name, expected in law_at(cell.files, np.array([node])).breaks(traction[node : node + 1]).items():
-            findings.record("onset", relative(point[name] - expected, 90.0 if name == "psi" else 1.0), f"{at}.{name}")
+            findings.compare("onset", point[name], expected, 90.0 if name == "psi" else 1.0, f"{at}.{name}")

@@ -66,13 +66,11 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
             numbers[index] = numbers[index[::-1]] = value
             table[key] = numbers.tolist()
         energies.append(_energies(cell, states, case))
-    check = _check_load if "load" in document else _check_stiffness
+    check = _check_load if "load" in document else _check_moduli
     check(findings, cell, states, (energies[0] - energies[1]) / (2 * STEP), direction)
 
 
-def _check_stiffness(
-    findings: Findings, cell: DiscreteCell, states: list[State], slope: Float, direction: Float
-) -> None:
+def _check_moduli(findings: Findings, cell: DiscreteCell, states: list[State], slope: Float, direction: Float) -> None:
     """Check the constants of a stiffness and their derivatives.
 
     Energies of contact states are stationary, too: the diagonal of the secants. Other derivatives need fields under

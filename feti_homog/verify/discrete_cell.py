@@ -105,12 +105,9 @@ class DiscreteCell:
         is_fibre = np.asarray((pair[nodes.place] >= 0) & (node_depth == innermost[nodes.place]))
         # The place nearest to each interface node.
         points, size = files.interface.points, files.size
-        place, distance = np.full(len(points), -1), np.full(len(points), np.inf)
-        if len(points) and len(nodes.node):
-            tree = cKDTree(torus.wrapped(mesh.points[nodes.node], size), boxsize=size)
-            away, nearest = tree.query(torus.wrapped(points, size), distance_upper_bound=radius)
-            on_mesh = np.flatnonzero(np.isfinite(away))
-            place[on_mesh], distance[on_mesh] = nodes.place[nearest[on_mesh]], away[on_mesh]
+        tree = cKDTree(torus.wrapped(mesh.points[nodes.node], size), boxsize=size)
+        distance, nearest = tree.query(torus.wrapped(points, size), distance_upper_bound=radius)
+        place = np.append(nodes.place, -1)[nearest]
         row_of = np.full(nodes.places, -1)
         row_of[place[place >= 0]] = np.flatnonzero(place >= 0)
         labels = nodes.place * (int(nodes.subdomain.max(initial=0)) + 1) + nodes.subdomain

@@ -118,9 +118,7 @@ def solver_limit(rtol: float) -> float:
     return min(CHECK_PER_RTOL * rtol, LARGEST_CHECK)
 
 
-def checks(
-    rtol: float, users_mesh: bool, has_coatings: bool, mixed: tuple[float, float] = (0.0, 0.0)
-) -> tuple[Finding, ...]:
+def checks(rtol: float, users_mesh: bool, has_coatings: bool, mixed: tuple[float, float] = (0.0, 0.0)) -> list[Finding]:
     """List the laws with their limits, without violations, for dual problems solved to `rtol`.
 
     mixed: largest lambda / mu of mixed elements; largest mu of all / least mu of mixed elements.
@@ -172,7 +170,7 @@ def checks(
         ("sensitivities", "constants change with those of the case as in the file, relative", max(STEP, solver)),
         ("bounds", "bounds follow from fractions and materials, and the stiffness is between them", sums),
     )
-    return tuple(Finding(*row) for row in rows)
+    return [Finding(*row) for row in rows]
 
 
 # Why laws leave numbers alone, by a part of their names; the first that fits.

@@ -185,9 +185,8 @@ class ResultFiles:
                     arrays["stress"] = np.column_stack([plane[:, :2], arrays["stress_33"], axial, plane[:, 2]])
                 strain, mean = (np.array(attributes[name], float) for name in ("strain", "stress"))
                 v = arrays["stress"].shape[1]
-                _expect(
-                    strain.shape == mean.shape == (v,), f"/{group} has a strain or a stress of another size than {v}"
-                )
+                has_size = strain.shape == mean.shape == (v,)
+                _expect(has_size, f"/{group} has a strain or a stress of another size than {v}")
                 name, temperature = f"state {number} ({attributes['label']})", float(attributes.get("temperature", 0.0))
                 factor, point = float(attributes["load_factor"]), int(attributes["point"])
                 arrays["fluctuation"] = arrays["displacement"] - self.mesh.points @ gradient(strain).T
