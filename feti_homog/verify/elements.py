@@ -129,8 +129,17 @@ class Elements:
             yield part, gradients, weights, slope, local, answer
 
     def _parts(self) -> Iterator[tuple[slice, Float, Float]]:
-        """Yield elements in portions, with gradients (e, q, a, 2) and weights (e, q) at their quadrature points."""
-        slopes, shares = _rule(self._mesh.triangles.shape[1])
+        """Yield elements in portions, with gradients (e, q, a, 2) and weights (e, q) at their quadrature points.
+
+        The rule is exact for constants, or for degree 4: Dunavant's (1985), at `quadrature_points`.
+        """
+        shares, slopes = np.ones(1), np.eye(3)[None]  # weights, their sum 1; dN_a/dr_b (q, a, 3)
+        if self._mesh.triangles.shape[1] == 6:
+            root, r = np.sqrt(213125 - 53320 * np.sqrt(10.0)), quadrature_points()
+            shares, slopes = (620 + root * np.repeat([1.0, -1.0], 3)) / 3720, np.zeros((6, 6, 3))
+            for a, b in ((0, 1), (1, 2), (2, 0)):
+                slopes[:, a, a] = 4 * r[:, a] - 1
+                slopes[:, 3 + a, a], slopes[:, 3 + a, b] = 4 * r[:, b], 4 * r[:, a]
         # r_0 = 1 - r_1 - r_2, so the columns of the Jacobian are dx/dr_1 - dx/dr_0 and dx/dr_2 - dx/dr_0.
         free = slopes[:, :, 1:] - slopes[:, :, :1]
         for first in range(0, len(self._mesh.triangles), ELEMENTS_AT_ONCE):
@@ -142,23 +151,6 @@ class Elements:
             # Of an element without area nothing is finite, and every law fails.
             gradients = np.einsum("qas,eqsd->eqad", free, adjugate / determinant[..., None, None])
             yield part, gradients, determinant * shares / 2
-
-
-@cache
-def _rule(nodes: int) -> tuple[Float, Float]:
-    """dN_a/dr_b (q, a, 3) and weights (q,), their sum 1, of a rule exact for constants or for degree 4.
-
-    The six points are Dunavant's (1985), `quadrature_points`.
-    """
-    if nodes == 3:
-        return np.eye(3)[None], np.ones(1)
-    root = np.sqrt(213125 - 53320 * np.sqrt(10.0))
-    weights, r = [(620 + sign * root) / 3720 for sign in (1, 1, 1, -1, -1, -1)], quadrature_points()
-    slopes = np.zeros((6, 6, 3))
-    for a, b in ((0, 1), (1, 2), (2, 0)):
-        slopes[:, a, a] = 4 * r[:, a] - 1
-        slopes[:, 3 + a, a], slopes[:, 3 + a, b] = 4 * r[:, b], 4 * r[:, a]
-    return slopes, np.array(weights)
 
 
 @cache
