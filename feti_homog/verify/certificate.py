@@ -43,7 +43,7 @@ class Certificate:
 
     @property
     def text(self) -> str:
-        """A line for each law."""
+        """Return the certificate as text, with a line for each law."""
         broken = sum(not finding.holds for finding in self.findings)
         verdict = f"{broken} of {len(self.findings)} laws are broken" if broken else "every law holds"
         names = [f"  {', '.join(names)}: {reason}" for reason, names in self.unchecked.items()]
@@ -52,7 +52,7 @@ class Certificate:
 
     @property
     def document(self) -> dict[str, Any]:
-        """Certificate for programs."""
+        """Return the certificate as values of JSON."""
         laws = [dict(finding.document) for finding in self.findings]
         about = {"title": self.title, "status": self.status, "holds": self.holds}
         return about | {"laws": laws, "not_checked": self.unchecked}

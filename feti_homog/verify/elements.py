@@ -119,8 +119,6 @@ class Elements:
                 lame = np.stack([self._stiffnesses[phase[mixed], 0, 1], self._stiffnesses[phase[mixed], -1, -1]], 1)
                 elastic = local[mixed] - own_free[mixed, None]
                 inner, pressure = inner_fields(gradients[mixed], weights[mixed], elastic, lame)
-                if v == 6:
-                    inner = np.concatenate([inner, np.zeros((*inner.shape[:2], 1, 2))], axis=2)
                 bubble = _strains(inner, v, 0.0)
                 local[mixed] += bubble
                 excess[mixed] = pressure - lame[:, :1] * (elastic + bubble)[..., NORMAL[v]].sum(axis=2)
@@ -164,9 +162,9 @@ def quadrature_points() -> Float:
 
 
 def _strains(slope: Float, v: int, along: float) -> Float:
-    """(e, q, v) from du_i/dx_d (e, q, c, 2) and E33."""
+    """(e, q, v) from du_i/dx_d (e, q, c, 2), or of the plane (e, q, 2, 2), and E33."""
     local = np.zeros((*slope.shape[:2], v))
-    for (i, d), place in np.ndenumerate(PLACES[v]):
+    for (i, d), place in np.ndenumerate(PLACES[v][: slope.shape[2]]):
         local[..., place] += slope[..., i, d]
     if along:
         local[..., 2] = along

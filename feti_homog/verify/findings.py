@@ -65,7 +65,7 @@ class Finding:
 
     @property
     def document(self) -> Mapping[str, Any]:
-        """The finding for JSON; an infinite violation is null."""
+        """Return the finding as values of JSON; an infinite violation is null."""
         violation = self.violation if np.isfinite(self.violation) else None
         law = {"law": self.name, "words": self.description, "limit": self.limit}
         return law | {"violation": violation, "where": self.where, "holds": self.holds}

@@ -137,7 +137,7 @@ class ResultFiles:
 
     @property
     def case(self) -> Mapping[str, Any]:
-        """The resolved case."""
+        """Return the resolved case."""
         case: Mapping[str, Any] = self.document["case"]
         return case
 
@@ -153,13 +153,13 @@ class ResultFiles:
 
     @property
     def interfaces(self) -> Sequence[Mapping[str, Any]]:
-        """The sections [[interface]]; none if all bonds are perfect."""
+        """Return the sections [[interface]]; none if all bonds are perfect."""
         sections: Any = self.case.get("interface", [])
         return sections if isinstance(sections, list) else [sections]
 
     @property
     def points(self) -> Points:
-        """The points of a path or an angle, or the load."""
+        """Return the points of a path or an angle, or the load."""
         document = self.document
         points: Points = document.get("path") or document.get("angle") or []
         return points or ([document["load"]] if "load" in document else [])
@@ -195,7 +195,7 @@ class ResultFiles:
 
 
 def altered(directory: Path) -> tuple[str, ...]:
-    """Names of files changed since the run. Raises CaseError, one line, if one is unreadable."""
+    """Name the files that have changed since the run. Raises CaseError, one line, if one is unreadable."""
     document, path = _document(directory / JSON), directory / FIELDS
     if not path.is_file():
         has_fields = document["case"].get("output", {}).get("fields", False)
