@@ -3,8 +3,6 @@
 The system takes a lock back when its process ends, however that ends: none is left behind by a kill.
 """
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import fcntl
@@ -13,6 +11,7 @@ import re
 import socket
 import time
 from pathlib import Path
+from typing import Self
 
 from feti_homog.errors import FetiHomogError
 
@@ -69,7 +68,7 @@ class Lock:
         files.discard(self.path)
         self._close()
 
-    def __enter__(self) -> Lock:
+    def __enter__(self) -> Self:
         self.acquire()
         return self
 
