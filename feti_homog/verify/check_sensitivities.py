@@ -47,13 +47,14 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
         name = f"interface.{number}" if len(sections) > 1 else "interface"
         needed |= {f"{name}.{key}" for key in SPRINGS if np.isfinite(float(section.get(key) or np.inf))}
     missing = sorted(needed.difference(names))
-    findings.record("tables", [np.inf] * len(missing), lambda k: f"sensitivities, {missing[k]}")
+    findings.record("tables", [np.inf] * len(missing), lambda i: f"sensitivities, {missing[i]}")
     places = (_place(dict(cell.files.case), name) for name in names)
     values = np.array([np.array(table[key], float)[index] for table, key, index in places])
     # Changes over which the laws are nearly linear.
     ratios = np.array([name.endswith(".poisson") for name in names]) & (values < 0.5)
     sizes = np.where(ratios, 0.5 - values, np.where(values == 0.0, 1.0, np.abs(values)))
-    direction = sizes * np.cos(np.arange(len(values)))  # of both signs, none zero
+    k = np.arange(1, len(values) + 1)
+    direction = sizes * (-1.0) ** k * (1 + 1 / k)  # of both signs and different sizes, none small
     states = list(cell.files.states())
     if "load" not in document and data.get("at_fixed_status"):
         states = states[: len(states) // 2]  # the second half is under minus the unit loads
