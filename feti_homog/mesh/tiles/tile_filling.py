@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
+from math import isclose
 from types import ModuleType
 
 import numpy as np
@@ -15,14 +16,12 @@ from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE, Curves
 from feti_homog.mesh.sizes.graded_size import MAX_GROWTH
 from feti_homog.typing import Float, Int, Int32
 
-# gmsh's algorithms. The first makes the better triangles of one size, but leaves a disc with thousands of nodes on its
-# circle unfilled.
-FRONTAL_DELAUNAY, DELAUNAY = 6, 5
+# An algorithm of gmsh. The default makes the better triangles of one size, but leaves a disc with thousands of nodes on
+# its circle unfilled.
+DELAUNAY = 5
 # Decimals of the coordinates that gmsh is given. The last bits of the outline's differ from machine to machine, and
 # with them gmsh would make other triangles.
 DECIMALS = 12
-# Of the area of triangles against that of the part of the cell that they fill, relative.
-AREA_TOLERANCE = 1e-9
 
 # Corners (k, 2) of a closed line, and the tags of its gmsh lines, negative for lines run backwards.
 Loop = tuple[Float, list[int]]
@@ -73,7 +72,6 @@ def gmsh_session() -> Iterator[ModuleType]:
         for option, value in {
             "General.Terminal": 0,
             "General.NumThreads": 1,
-            "Mesh.Algorithm": FRONTAL_DELAUNAY,
             "Mesh.RandomSeed": 1,
             "Mesh.Renumber": 0,
         }.items():
@@ -123,7 +121,7 @@ def fill(tile: Tile) -> Filling:
     sign = (tile.curves.inside != OUTSIDE).astype(float) - (tile.curves.outside != OUTSIDE)
     a, b = tile.points[pairs[:, 0]], tile.points[pairs[:, 1]]
     within = float(sign[curve] @ (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2)
-    if abs(np.abs(area).sum() / within - 1) > AREA_TOLERANCE:
+    if not isclose(np.abs(area).sum(), within):
         raise _unfilled(tile, "triangles are missing")
     triangles[area < 0] = triangles[area < 0][:, ::-1]
     circle_of = np.repeat(circle, [len(nodes) // 3 for nodes in elements])
@@ -197,14 +195,13 @@ def _with_holes(loops: list[Loop]) -> list[list[list[int]]]:
     for hole in (k for k in range(len(loops)) if areas[k] < 0):
         polygon, tags = loops[hole]
         # Of one within the other the inner is meant, which is the smaller.
-        around = groups if len(groups) == 1 else (k for k in groups if _contains(loops[k][0], polygon[0]))
+        around = list(groups) if len(groups) == 1 else []
+        for k in groups.keys() - around:
+            # A polygon contains a point from which a ray crosses it an odd number of times.
+            a, b = loops[k][0] - polygon[0], np.roll(loops[k][0], -1, axis=0) - polygon[0]
+            crossing = (a[:, 1] > 0) != (b[:, 1] > 0)
+            rise = np.where(crossing, b[:, 1] - a[:, 1], 1.0)
+            if np.count_nonzero(crossing & (a[:, 0] - a[:, 1] * (b[:, 0] - a[:, 0]) / rise > 0)) % 2:
+                around.append(k)
         groups[min(around, key=areas.__getitem__)].append(tags)
     return list(groups.values())
-
-
-def _contains(polygon: Float, point: Float) -> bool:
-    """Return whether a polygon (k, 2) contains a point, by counting crossings."""
-    a, b = polygon - point, np.roll(polygon, -1, axis=0) - point
-    crossing = (a[:, 1] > 0) != (b[:, 1] > 0)
-    rise = np.where(crossing, b[:, 1] - a[:, 1], 1.0)
-    return bool(np.count_nonzero(crossing & (a[:, 0] - a[:, 1] * (b[:, 0] - a[:, 0]) / rise > 0)) % 2)
