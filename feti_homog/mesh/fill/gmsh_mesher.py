@@ -49,7 +49,16 @@ def begin(
     estimate = element_estimate.ElementEstimate.of(cell, listed)
     tiled = estimate.fibres >= policy.least_discs if listed is None else is_tiled(listed, policy)
     limit = element_estimate.MAX_TRIANGLES_OF_TILES if tiled else element_estimate.MAX_TRIANGLES
-    _refuse_extremes(estimate, sizes, sum(map(len, marks.values())), limit)
+    around = min(sizes.interface, estimate.interface_size)
+    at_tips = sum(map(len, marks.values())) * element_estimate.triangles_of_a_tip(max(1.0, around / sizes.tip))
+    if (count := estimate.triangles + at_tips) > limit:
+        keys = ("mesh_size", "interface_size", *(["tip_size"] if at_tips else []))
+        values = [f"{name} = {value:.3g}" for name in keys if (value := getattr(cell, name)) is not None]
+        values += [] if cell.fibres is None else [f"fibres = {cell.fibres}"]
+        raise MeshError(
+            f"[cell] {', '.join(values)}: about {count:.2g} elements before refine; expected at most {limit}; "
+            "refine splits them on the ranks"
+        )
     arrangement = arrange(cell) if listed is None else listed
     smallest = int(arrangement.radii.argmin())
     if arrangement.radii[smallest] < arrangements.SMALLEST_RADIUS * arrangement.width:
@@ -75,21 +84,6 @@ def arrangement_scale(cell: cell_section.Cell, arrangement: Arrangement) -> floa
         return float(cell.fibre_radius / arrangement.radii[: arrangement.fibres].mean())
     width = cell_sizes.mixed_width(cell) if cell.table is None else cell.table.width
     return width or 1.0
-
-
-def _refuse_extremes(estimate: element_estimate.ElementEstimate, sizes: MeshSizes, tips: int, limit: int) -> None:
-    """Raise MeshError for a cell that would take hours to mesh."""
-    cell, around = estimate.cell, min(sizes.interface, estimate.interface_size)
-    at_tips = tips * element_estimate.triangles_of_a_tip(max(1.0, around / sizes.tip))
-    count = estimate.triangles + at_tips
-    if count > limit:
-        keys = ("mesh_size", "interface_size", "tip_size") if at_tips else ("mesh_size", "interface_size")
-        asked = [f"{name} = {value:.3g}" for name in keys if (value := getattr(cell, name)) is not None]
-        asked += [] if cell.fibres is None else [f"fibres = {cell.fibres}"]
-        raise MeshError(
-            f"[cell] {', '.join(asked)}: about {count:.2g} elements before refine; expected at most {limit}; "
-            "refine splits them on the ranks"
-        )
 
 
 @dataclass(frozen=True)

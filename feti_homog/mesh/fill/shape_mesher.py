@@ -22,10 +22,8 @@ from feti_homog.microstructure import Arrangement, phase_names
 from feti_homog.microstructure.shapes import convex_sums
 from feti_homog.typing import Float
 
-# Distance from a line / size of the cell within which curves lie on it.
-ON_SIDE = 1e-6
-# Core / frame of a polygon below which it is a circle.
-ROUND = 1e-9
+# Distance from a side / size of the cell within which curves lie on it; core / frame of a polygon that is a circle.
+SAME_PLACE = 1e-6
 # Cells of the grid of sizes along a side.
 FEWEST_CELLS, MOST_CELLS = 32, 1000
 
@@ -53,7 +51,7 @@ def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> C
         for axis, width in enumerate(arrangement.size):
             sides = []
             for level in (0.0, width):
-                on = np.flatnonzero(np.abs(boxes[:, :, axis] - level).max(axis=1) < ON_SIDE)
+                on = np.flatnonzero(np.abs(boxes[:, :, axis] - level).max(axis=1) < SAME_PLACE)
                 sides.append([curves[k] for k in on[np.argsort(boxes[on, :, 1 - axis].mean(axis=1))]])
             moved = np.eye(4)
             moved[axis, 3] = width
@@ -124,37 +122,33 @@ def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
 
 def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int, shift: Float) -> int:
     """Add the surface of a moved ellipse, or of a polygon with a margin; return its tag."""
-    occ, (x, y) = gmsh.model.occ, (shapes.centres[number] + shift).tolist()
+    occ, centre = gmsh.model.occ, shapes.centres[number] + shift
     frame, core = shapes.frames[number], shapes.cores[number]
-    rounding, b = np.linalg.norm(frame, axis=0).tolist()
-    if np.abs(core).max() <= ROUND * max(rounding, b):
-        longer = 0 if rounding >= b else 1
-        surface = occ.addDisk(x, y, 0.0, max(rounding, b), min(rounding, b))
-        turn = float(np.arctan2(frame[1, longer], frame[0, longer]))
-        occ.rotate([(2, surface)], x, y, 0.0, 0.0, 0.0, 1.0, turn)
+    semi_axes = np.linalg.norm(frame, axis=0)
+    a, b = semi_axes.max(), semi_axes.min()
+    if np.abs(core).max() <= SAME_PLACE * a:
+        surface, (x, y) = occ.addDisk(*centre.tolist(), 0.0, a, b), frame[:, semi_axes.argmax()]
+        occ.rotate([(2, surface)], *centre.tolist(), 0.0, 0.0, 0.0, 1.0, np.arctan2(y, x))
         return int(surface)
 
     def point(place: Float) -> int:
         return int(occ.addPoint(*place.tolist(), 0.0))
 
-    # Corners run counter-clockwise.
-    corners = core[np.sort(np.unique(core.round(14), axis=0, return_index=True)[1])] + [x, y]
+    # Corners run counter-clockwise, and so do lines and, around a margin, arcs.
+    corners = core[np.sort(np.unique(core.round(14), axis=0, return_index=True)[1])] + centre
     following = np.roll(corners, -1, axis=0)
     along = (following - corners) / np.linalg.norm(following - corners, axis=1, keepdims=True)
-    if rounding == 0.0:
-        tags = [point(corner) for corner in corners]
-        lines = [occ.addLine(*ends) for ends in zip(tags, tags[1:] + tags[:1], strict=True)]
-        return int(occ.addPlaneSurface([occ.addCurveLoop(lines)]))
-    outward = np.column_stack([along[:, 1], -along[:, 0]]) * rounding
-    starts, stops = ([point(place) for place in ends + outward] for ends in (corners, following))
+    outward = np.column_stack([along[:, 1], -along[:, 0]]) * a
+    starts = [point(corner) for corner in corners + outward]
+    stops = [point(corner) for corner in following + outward] if a else starts[1:] + starts[:1]
     lines = []
     for k, corner in enumerate(following):
-        onward = starts[(k + 1) % len(starts)]
         lines.append(occ.addLine(starts[k], stops[k]))
-        # Half a turn, of two corners, has no sense of its own.
-        middle = [] if len(corners) > 2 else [point(corner + rounding * along[k])]
-        centre, places = point(corner), [stops[k], *middle, onward]
-        lines += [occ.addCircleArc(begin, centre, end) for begin, end in pairwise(places)]
+        if a:
+            # Half a turn, of two corners, has no sense of its own.
+            middle = [point(corner + a * along[k])] if len(corners) == 2 else []
+            around, places = point(corner), [stops[k], *middle, starts[(k + 1) % len(starts)]]
+            lines += [occ.addCircleArc(begin, around, end) for begin, end in pairwise(places)]
     return int(occ.addPlaneSurface([occ.addCurveLoop(lines)]))
 
 

@@ -79,7 +79,13 @@ class BareOutline:
             first = np.unique(arrangement.shells[1], return_index=True)[1]
             caps = circle_size(arrangement, sizes.interface)[first[disc] + (around != MATRIX)]
             arcs = lines.Arcs(curves.circles[circle], start, stop - start, np.stack([caps[circle]] * 2, axis=1))
-            straight = _segments(curves, bridges, caps, field)
+            begin, end = (curves[bridges.ends[:, k]].points(bridges.angle + k * np.pi) for k in (0, 1))
+            longest = np.full((len(begin), 2), field.largest)
+            if field.graded is None:
+                # Interpolated between both ends, as in gmsh across the matrix.
+                at_ends = np.stack([field(begin), field(end)], axis=1)
+                longest = np.minimum(at_ends, caps[bridges.ends])
+            straight = Segments(begin, end - begin, longest)
         else:
             from feti_homog.mesh.outline import elliptic_outline  # discs, the common case, do without
 
@@ -152,18 +158,3 @@ def _arcs(
     close = np.flatnonzero(~away)
     away[close] = cKDTree(border).query(ends[close])[0] > same
     return arcs, ends, away
-
-
-def _segments(curves: Discs, bridges: outline.Bridges, caps: Float, field: SizeField) -> Segments:
-    """Return the bridges as segments; edges on circles are at most `caps` (k,).
-
-    Where elements are not graded, edges are at most as long as the sizes at both ends, interpolated, as in gmsh across
-    the matrix.
-    """
-    begin, end = (curves[bridges.ends[:, k]].points(bridges.angle + k * np.pi) for k in (0, 1))
-    longest = np.full((len(begin), 2), field.largest)
-    if field.graded is None:
-        longest = np.stack(
-            [np.minimum(field(at), caps[bridges.ends[:, k]]) for k, at in enumerate((begin, end))], axis=1
-        )
-    return Segments(begin, end - begin, longest)

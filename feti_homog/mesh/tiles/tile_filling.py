@@ -187,21 +187,15 @@ def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int]]:
 
 def _with_holes(loops: list[Loop]) -> list[list[list[int]]]:
     """Group the tags of loops: an outer loop, then its holes, which run clockwise."""
-    areas = []
-    for polygon, _ in loops:
-        a, b = polygon - polygon[0], np.roll(polygon, -1, axis=0) - polygon[0]
-        areas.append(float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() / 2))
+    polygons, areas = [polygon @ [1, 1j] for polygon, _ in loops], []
+    for corners in polygons:
+        away = corners - corners[0]
+        areas.append(float((away.conj() * np.roll(away, -1)).imag.sum() / 2))
     groups = {k: [tags] for k, (_, tags) in enumerate(loops) if areas[k] >= 0}
     for hole in (k for k in range(len(loops)) if areas[k] < 0):
-        polygon, tags = loops[hole]
-        # Of one within the other the inner is meant, which is the smaller.
-        around = list(groups) if len(groups) == 1 else []
-        for k in groups.keys() - around:
-            # A polygon contains a point from which a ray crosses it an odd number of times.
-            a, b = loops[k][0] - polygon[0], np.roll(loops[k][0], -1, axis=0) - polygon[0]
-            crossing = (a[:, 1] > 0) != (b[:, 1] > 0)
-            rise = np.where(crossing, b[:, 1] - a[:, 1], 1.0)
-            if np.count_nonzero(crossing & (a[:, 0] - a[:, 1] * (b[:, 0] - a[:, 0]) / rise > 0)) % 2:
-                around.append(k)
-        groups[min(around, key=areas.__getitem__)].append(tags)
+        # A polygon turns once around a point within. Of one within the other the inner is meant, which is the smaller.
+        away = [polygons[k] - polygons[hole][0] for k in groups]
+        turns = [np.angle(np.roll(vectors, -1) / vectors).sum() for vectors in away]
+        around = (k for k, turn in zip(groups, turns, strict=True) if turn > np.pi)
+        groups[min(around, key=areas.__getitem__)].append(loops[hole][1])
     return list(groups.values())
