@@ -14,14 +14,12 @@ from feti_homog.errors import MeshError
 from feti_homog.mesh.coarse_mesh import areas, flip_double_arcs
 from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE, Curves
 from feti_homog.mesh.sizes.graded_size import MAX_GROWTH
+from feti_homog.microstructure import arrangements
 from feti_homog.typing import Float, Int, Int32
 
 # An algorithm of gmsh. The default makes the better triangles of one size, but leaves a disc with thousands of nodes on
 # its circle unfilled.
 DELAUNAY = 5
-# Decimals of the coordinates that gmsh is given. The last bits of the outline's differ from machine to machine, and
-# with them gmsh would make other triangles.
-DECIMALS = 12
 
 # Corners (k, 2) of a closed line, and the tags of its gmsh lines, negative for lines run backwards.
 Loop = tuple[Float, list[int]]
@@ -155,7 +153,7 @@ def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int]]:
     Each outline edge is a line with one element, and node n is point n + 1.
     """
     curves, geo = tile.curves, gmsh.model.geo
-    for tag, (x, y) in enumerate(tile.points.round(DECIMALS).tolist(), 1):
+    for tag, (x, y) in enumerate(tile.points.round(arrangements.GMSH_DECIMALS).tolist(), 1):
         geo.addPoint(x, y, 0.0, tag=tag)
     nodes = np.split(curves.node, curves.first[1:-1])
     lines = [np.array([geo.addLine(*ends) for ends in pairwise((curve + 1).tolist())]) for curve in nodes]
