@@ -28,7 +28,7 @@ from feti_homog.mesh.tiles.matrix_faces import (
 from feti_homog.mesh.tiles.tile_filling import Filling, Tile, arc_edges
 from feti_homog.microstructure import Arrangement
 from feti_homog.microstructure.shapes import Discs, Ellipses
-from feti_homog.typing import Array, Float, Int
+from feti_homog.typing import Array, Int
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,20 @@ def tiling(
     marked = [(k, np.radians(angle)) for k in outer.tolist() for angle in marks.get(int(disc[k]), ())]
     vertices = np.array([k for k, _ in marked], np.int64), np.array([angle for _, angle in marked])
     candidates = bridges(lines, size, CLEAR * arrangement.outer_radii.mean(), largest, vertices)
-    sides = _side_pieces(discs, outer, size)
+    # Side pieces in the matrix: the nodes, discs or corners, and the points at their ends.
+    nodes, ends = [], []
+    for axis, is_far in product((0, 1), (False, True)):
+        level, places = is_far * size[1 - axis], crossings(discs[outer], axis, size)
+        points, middles = (on_side(along, axis, level) for along in (places, (places[:-1] + places[1:]) / 2))
+        circle = curve_at(discs[outer], middles)
+        corner = len(discs) + (points[[0, -1]] > 0) @ [1, 2]
+        around = np.concatenate([corner[:1], outer[circle], corner[1:]])
+        piece = np.flatnonzero(circle == MATRIX)
+        # Counter-clockwise around the cell.
+        way = slice(None, None, 1 if is_far == (axis == 1) else -1)
+        nodes.append(around[piece[:, None] + [0, 2]][:, way])
+        ends.append(points[piece[:, None] + [0, 1]][:, way])
+    sides = np.concatenate(nodes), np.concatenate(ends)
     grid = np.maximum(1, np.round(size * np.sqrt(len(arrangement.radii) / policy.discs / size.prod()))).astype(int)
     matrix = matrix_tiles(circles, outer, sides, candidates, lines, size, grid)
     if matrix is None:
@@ -105,27 +118,6 @@ def tiling(
         matrix=matrix,
         within=grid_cell(np.mod(arrangement.centres, size), size, grid)[disc],
     )
-
-
-def _side_pieces(discs: Discs, outer: Int, size: Float) -> tuple[Int, Float]:
-    """Return the side pieces in the matrix, for `matrix_tiles`.
-
-    `outer` (n,) are the discs that bound the matrix.
-    """
-    nodes, ends = [], []
-    for axis, (level, low) in product((0, 1), ((0.0, True), (1.0, False))):
-        places = crossings(discs[outer], axis, size)
-        points = on_side(places, axis, level * size[1 - axis])
-        circle = curve_at(discs[outer], on_side((places[:-1] + places[1:]) / 2, axis, level * size[1 - axis]))
-        node = np.where(circle == MATRIX, MATRIX, outer[circle])
-        corner = len(discs) + (points[[0, -1]] > 0) @ [1, 2]
-        piece = np.flatnonzero(circle == MATRIX)
-        around = np.concatenate([corner[:1], node, corner[1:]])
-        both, where = np.stack([around[piece], around[piece + 2]], axis=1), points[piece[:, None] + [0, 1]]
-        forward = low == (axis == 0)
-        nodes.append(both if forward else both[:, ::-1])
-        ends.append(where if forward else where[:, ::-1])
-    return np.concatenate(nodes), np.concatenate(ends)
 
 
 def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[Tile]:
