@@ -4,7 +4,7 @@ Middle nodes on second-order edges define the curves, as in users' meshes.
 """
 
 from dataclasses import replace
-from itertools import pairwise, product
+from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import ModuleType
@@ -13,12 +13,13 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.mesh.coarse_mesh import CoarseMesh
+from feti_homog.mesh.outline.outline import images
 from feti_homog.mesh.readers.gmsh_file import MshContent, raw_mesh
 from feti_homog.mesh.readers.msh_reader import made
 from feti_homog.mesh.sizes.element_estimate import refuse_many
 from feti_homog.mesh.sizes.graded_size import MAX_GROWTH, MIN_EDGES_AROUND, PASSAGE_EDGE, MeshSizes, SizeField, wrap
 from feti_homog.mesh.tiles.tile_filling import gmsh_session
-from feti_homog.microstructure import Arrangement, phase_names
+from feti_homog.microstructure import Arrangement, arrangements, phase_names
 from feti_homog.microstructure.shapes import convex_sums
 from feti_homog.typing import Float
 
@@ -89,28 +90,18 @@ def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> C
 
 def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
     """Add the surfaces in the cell to groups by phase; return their precedence, 0 in the matrix."""
-    occ, size, outer, inner = gmsh.model.occ, arrangement.size, arrangement.outer, arrangement.outlines
-    assert isinstance(outer, convex_sums.ConvexSums) and isinstance(inner, convex_sums.ConvexSums)
-    rectangle = (2, occ.addRectangle(0.0, 0.0, 0.0, *size.tolist()))
-    steps = np.array(list(product((-1, 0, 1), repeat=2)))
-    image, shift = np.repeat(arrangement.order, len(steps)), np.tile(steps, (len(outer), 1)) * size
-    low, high = outer.centres - outer.extents[:, :, 0], outer.centres + outer.extents[:, :, 1]
-    inside = np.all((high[image] + shift > 0) & (low[image] + shift < size), axis=1)
-    # Images that reach into the cell, each from without.
-    added, disc, ring = [], list[int](), list[bool]()
-    for number, step in zip(image[inside].tolist(), shift[inside], strict=True):
-        for is_ring in (True, False) if arrangement.coated[number] else (False,):
-            added.append((2, _add_shape(gmsh, outer if is_ring else inner, number, step)))
-            disc.append(number)
-            ring.append(is_ring)
-    _, parts = occ.fragment([rectangle], added)
+    occ, (curves, disc, around) = gmsh.model.occ, images(arrangement)
+    assert isinstance(curves, convex_sums.ConvexSums)
+    rectangle = (2, occ.addRectangle(0.0, 0.0, 0.0, *arrangement.size.tolist()))
+    _, parts = occ.fragment([rectangle], [(2, _add_shape(gmsh, curves, number)) for number in range(len(curves))])
     occ.synchronize()
     number_of, phase = dict.fromkeys(parts[0], 0), dict.fromkeys(parts[0], phase_names.MATRIX)
-    numbers = arrangement.precedence(np.array(disc), np.array(ring))
+    ring = np.isin(np.arange(len(disc)), around)
+    numbers = arrangement.precedence(disc, ring)
     for pieces, entry, is_ring, precedence in zip(parts[1:], disc, ring, numbers, strict=True):
         within = set(pieces) & set(number_of)
         number_of |= dict.fromkeys(within, int(precedence))
-        phase |= dict.fromkeys(within, arrangement.within[is_ring][entry])
+        phase |= dict.fromkeys(within, arrangement.within[int(is_ring)][entry])
     outside = {piece for pieces in parts for piece in pieces} - set(number_of)
     voids = {piece for piece, name in phase.items() if name == phase_names.VOID}
     occ.remove(sorted(outside | voids), recursive=True)
@@ -120,9 +111,9 @@ def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
     return {tag: entry for (_, tag), entry in number_of.items()}
 
 
-def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int, shift: Float) -> int:
-    """Add the surface of a moved ellipse, or of a polygon with a margin; return its tag."""
-    occ, centre = gmsh.model.occ, shapes.centres[number] + shift
+def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int) -> int:
+    """Add the surface of an ellipse, or of a polygon with a margin; return its tag."""
+    occ, centre = gmsh.model.occ, shapes.centres[number]
     frame, core = shapes.frames[number], shapes.cores[number]
     semi_axes = np.linalg.norm(frame, axis=0)
     a, b = semi_axes.max(), semi_axes.min()
@@ -166,13 +157,12 @@ def _size_field(arrangement: Arrangement, sizes: MeshSizes) -> SizeField:
     thickness = np.where(arrangement.coated, arrangement.coating, np.inf)
     # The distance to the nearest point on another shape, or on an image.
     distance = np.full(len(places), np.inf)
-    steps = np.array(list(product((-1, 0, 1), repeat=2))) * size
     for label in np.unique(shape):
         mine, rest = places[shape == label], places[shape != label]
         if len(rest):
             distance[shape == label] = cKDTree(wrap(rest, size), boxsize=size).query(wrap(mine, size))[0]
-        images = np.concatenate([mine + step for step in steps if step.any()])
-        distance[shape == label] = np.minimum(distance[shape == label], cKDTree(images).query(mine)[0])
+        own_images = (mine + (arrangements.STEPS * size)[:, None]).reshape(-1, 2)
+        distance[shape == label] = np.minimum(distance[shape == label], cKDTree(own_images).query(mine)[0])
     length = np.minimum(sizes.interface, PASSAGE_EDGE * distance)
     length = np.minimum(length, np.minimum(2 * np.pi * rounds / MIN_EDGES_AROUND, COATING_EDGE * thickness)[shape])
     for axis in (0, 1):

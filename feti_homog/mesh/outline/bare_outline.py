@@ -56,6 +56,7 @@ class BareOutline:
         sampling, bridges = (lines.WHOLE, NO_BRIDGES) if bridges is None else (lines.IN_TILES, bridges)
         size = arrangement.size
         curves, disc, around = outline.images(arrangement)
+        assert isinstance(curves, Conics)
         sides = ((axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis]))
         border = np.concatenate(
             [outline.on_side(outline.crossings(curves, axis, size), axis, level) for axis, level in sides]
@@ -109,9 +110,7 @@ class BareOutline:
         ):
             curves = Curves(np.arange(len(placed.share)), placed.first, *regions)
             parts.append((kind.points(placed.line, placed.share), curves))
-        begin = np.cumsum([0, *(len(points) for points, _ in parts)])
-        place = np.concatenate([curves.node + first for (_, curves), first in zip(parts, begin, strict=False)])
-        points, curves = np.concatenate([points for points, _ in parts]), Curves.joined([curves for _, curves in parts])
+        points, curves = Curves.joined(parts)
         # Vertices, found by position, have the first numbers, and then the nodes between.
         is_end = np.zeros(len(points), bool)
         is_end[curves.first[:-1]] = is_end[curves.first[1:] - 1] = True
@@ -119,7 +118,7 @@ class BareOutline:
         number[is_end] = cKDTree(self.vertices).query(points[is_end])[1]
         ellipses = Ellipses(self.curves.centres, self.curves.frames)
         nodes = np.concatenate([self.vertices, points[~is_end]])
-        return outline.Outline(nodes, replace(curves, node=number[place]), ellipses, self.disc, self.around)
+        return outline.Outline(nodes, replace(curves, node=number[curves.node]), ellipses, self.disc, self.around)
 
     def _sides(self, axis: int) -> Iterator[tuple[Float, Curves]]:
         """Yield the nodes (n, 2), the same on both sides along `axis`, and their curves."""

@@ -54,14 +54,16 @@ class Curves:
         return Curves(node, first, self.circle[some], self.inside[some], self.outside[some])
 
     @classmethod
-    def joined(cls, parts: Sequence[Curves]) -> Curves:
-        """Concatenate curves, part after part."""
-        counts = np.concatenate([np.diff(part.first) for part in parts])
-        return cls(
-            np.concatenate([part.node for part in parts]),
+    def joined(cls, parts: Sequence[tuple[Float, Curves]]) -> tuple[Float, Curves]:
+        """Concatenate curves, part after part, with their points (n, 2), which each part numbers from 0."""
+        begin = np.cumsum([0, *(len(points) for points, _ in parts)])
+        counts = np.concatenate([np.diff(curves.first) for _, curves in parts])
+        curves = cls(
+            np.concatenate([curves.node + k for (_, curves), k in zip(parts, begin, strict=False)]),
             np.concatenate([[0], np.cumsum(counts)]),
-            *(np.concatenate([getattr(part, name) for part in parts]) for name in ("circle", "inside", "outside")),
+            *(np.concatenate([getattr(curves, x) for _, curves in parts]) for x in ("circle", "inside", "outside")),
         )
+        return np.concatenate([points for points, _ in parts]), curves
 
 
 class Lines:
@@ -195,8 +197,8 @@ def _refuse_many(edges: float, limit: int) -> None:
         )
 
 
-def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges: Int, limit: int) -> Stations:
-    """Place nodes equidistant in ds / h, with `least_edges` (c,) edges or more on each line.
+def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges: Int | int, limit: int) -> Stations:
+    """Place nodes equidistant in ds / h, with `least_edges`, () or (c,), edges or more on each line.
 
     The size h is sampled along each line by itself, at `least_samples` equidistant positions, and where it is graded,
     at SAMPLES_OF_AN_EDGE or more for each edge.
@@ -275,10 +277,10 @@ class SizedLines:
         Raises:
             MeshError: there would be more than the sampling allows.
         """
-        sampling, (arcs, bridges) = self.sampling, (np.ones(len(x), np.int64) for x in (self.arcs, self.bridges))
+        sampling = self.sampling
         return (
-            place_nodes(field, self.arcs, sampling.arc, arcs, sampling.most_nodes),
-            place_nodes(field, self.bridges, sampling.bridge, bridges, sampling.most_nodes),
+            place_nodes(field, self.arcs, sampling.arc, 1, sampling.most_nodes),
+            place_nodes(field, self.bridges, sampling.bridge, 1, sampling.most_nodes),
         )
 
     def joined(self, parts: Sequence[LineStations]) -> LineStations:
