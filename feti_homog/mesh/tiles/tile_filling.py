@@ -15,14 +15,15 @@ from feti_homog.mesh.coarse_mesh import areas, flip_double_arcs
 from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE, Curves
 from feti_homog.mesh.sizes.graded_size import MAX_GROWTH
 from feti_homog.microstructure import arrangements
-from feti_homog.typing import Float, Int, Int32
+from feti_homog.typing import Array, Float, Int, Int32
 
 # An algorithm of gmsh. The default makes the better triangles of one size, but leaves a disc with thousands of nodes on
 # its circle unfilled.
 DELAUNAY = 5
 
-# Corners (k, 2) of a closed line, and the tags of its gmsh lines, negative for lines run backwards.
-Loop = tuple[Float, list[int]]
+# Area within a closed line, negative if that runs clockwise, its corners x + i y (k,), and the tags of its gmsh lines,
+# negative for lines run backwards.
+Loop = tuple[float, Array, list[int]]
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ def fill(tile: Tile) -> Filling:
     """
     with gmsh_session() as gmsh:
         gmsh.option.setNumber("Mesh.MeshSizeMax", tile.largest)
-        surfaces, circle = _add_surfaces(gmsh, tile)
+        surfaces, circle, within = _add_surfaces(gmsh, tile)
         if tile.is_graded:
             # Elements have the nearest outline edge's size h, h + g d at the distance d from it. Otherwise gmsh would
             # interpolate between the lines: a disc would be as fine within as on its circle.
@@ -113,12 +114,6 @@ def fill(tile: Tile) -> Filling:
     points[: len(tile.points)] = tile.points
     triangles = np.searchsorted(tags[order], np.concatenate(elements)).astype(np.int32).reshape(-1, 3)
     area = areas(points, triangles)
-    # 1/2 of the integral of x dy - y dx along curves with the tile on their left, less along those with it on their
-    # right, is the area within.
-    pairs, curve = tile.curves.edges
-    sign = (tile.curves.inside != OUTSIDE).astype(float) - (tile.curves.outside != OUTSIDE)
-    a, b = tile.points[pairs[:, 0]], tile.points[pairs[:, 1]]
-    within = float(sign[curve] @ (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2)
     if not isclose(np.abs(area).sum(), within):
         raise _unfilled(tile, "triangles are missing")
     triangles[area < 0] = triangles[area < 0][:, ::-1]
@@ -147,8 +142,8 @@ def arc_edges(curves: Curves) -> tuple[Int32, Int32]:
     return pairs[circle != MATRIX].astype(np.int32), circle[circle != MATRIX].astype(np.int32)
 
 
-def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int]]:
-    """Add the surfaces of all regions; return their tags, and the circle around each or MATRIX.
+def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int], float]:
+    """Add the surfaces of all regions; return their tags, the circle around each or MATRIX, and their area.
 
     Each outline edge is a line with one element, and node n is point n + 1.
     """
@@ -171,29 +166,23 @@ def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int]]:
         while (region, node) in after:
             loop.append(after.pop((region, node)))
             node = int(loop[-1][0][-1])
-        polygon = tile.points[np.concatenate([curve[:-1] for curve, _ in loop])]
-        regions[region].append((polygon, np.concatenate([tags for _, tags in loop]).tolist()))
+        polygon = tile.points[np.concatenate([curve[:-1] for curve, _ in loop])] @ [1, 1j]
+        away = polygon - polygon[0]
+        area = float((away.conj() * np.roll(away, -1)).imag.sum() / 2)
+        regions[region].append((area, polygon, np.concatenate([tags for _, tags in loop]).tolist()))
     surfaces, circle = [], []
     # The matrix is last.
     for region in sorted(regions, key=lambda inside: inside == MATRIX):
-        for outer_and_holes in _with_holes(regions[region]):
-            surfaces.append(geo.addPlaneSurface([geo.addCurveLoop(tags) for tags in outer_and_holes]))
+        loops = regions[region]
+        outer_and_holes = {k: [line_tags] for k, (area, _, line_tags) in enumerate(loops) if area >= 0}
+        for polygon, line_tags in (loop[1:] for loop in loops if loop[0] < 0):
+            # A polygon turns once around a point within. Of one within the other the inner is meant, the smaller.
+            away = [loops[k][1] - polygon[0] for k in outer_and_holes]
+            turns = [np.angle(np.roll(vectors, -1) / vectors).sum() for vectors in away]
+            _, around = min((loops[k][0], k) for k, turn in zip(outer_and_holes, turns, strict=True) if turn > np.pi)
+            outer_and_holes[around].append(line_tags)
+        for group in outer_and_holes.values():
+            surfaces.append(geo.addPlaneSurface([geo.addCurveLoop(line_tags) for line_tags in group]))
             circle.append(region)
     geo.synchronize()
-    return surfaces, circle
-
-
-def _with_holes(loops: list[Loop]) -> list[list[list[int]]]:
-    """Group the tags of loops: an outer loop, then its holes, which run clockwise."""
-    polygons, areas = [polygon @ [1, 1j] for polygon, _ in loops], []
-    for corners in polygons:
-        away = corners - corners[0]
-        areas.append(float((away.conj() * np.roll(away, -1)).imag.sum() / 2))
-    groups = {k: [tags] for k, (_, tags) in enumerate(loops) if areas[k] >= 0}
-    for hole in (k for k in range(len(loops)) if areas[k] < 0):
-        # A polygon turns once around a point within. Of one within the other the inner is meant, which is the smaller.
-        away = [polygons[k] - polygons[hole][0] for k in groups]
-        turns = [np.angle(np.roll(vectors, -1) / vectors).sum() for vectors in away]
-        around = (k for k, turn in zip(groups, turns, strict=True) if turn > np.pi)
-        groups[min(around, key=areas.__getitem__)].append(loops[hole][1])
-    return list(groups.values())
+    return surfaces, circle, sum(area for loops in regions.values() for area, *_ in loops)
