@@ -64,7 +64,7 @@ def images(arrangement: Arrangement) -> tuple[Outlines, Int, Int]:
     Periodic images are listed separately, fibre by fibre and image by image, each from without.
     """
     size, outlines, outer = arrangement.size, arrangement.outlines, arrangement.outer
-    steps = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)])
+    steps = np.array(list(np.ndindex(3, 3))) - 1
     fibre = np.repeat(arrangement.order, len(steps))
     centres = outlines.centres[fibre] + np.tile(steps, (len(outlines), 1)) * size
     if isinstance(outer, Discs):

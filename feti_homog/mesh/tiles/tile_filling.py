@@ -1,6 +1,5 @@
 """The regions of an outline filled with triangles by gmsh."""
 
-from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -160,7 +159,7 @@ def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int], f
         directed.append((region, curve[::-1], -tags[::-1]))
     # At each vertex one curve of a region starts.
     after = {(region, int(curve[0])): (curve, tags) for region, curve, tags in directed if region != OUTSIDE}
-    regions: dict[int, list[Loop]] = defaultdict(list)
+    regions: dict[int, list[Loop]] = {}
     while after:
         loop, (region, node) = [], next(iter(after))
         while (region, node) in after:
@@ -169,7 +168,8 @@ def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int], f
         polygon = tile.points[np.concatenate([curve[:-1] for curve, _ in loop])] @ [1, 1j]
         away = polygon - polygon[0]
         area = float((away.conj() * np.roll(away, -1)).imag.sum() / 2)
-        regions[region].append((area, polygon, np.concatenate([tags for _, tags in loop]).tolist()))
+        tags = np.concatenate([tags for _, tags in loop])
+        regions.setdefault(region, []).append((area, polygon, tags.tolist()))
     surfaces, circle = [], []
     # The matrix is last.
     for region in sorted(regions, key=lambda inside: inside == MATRIX):

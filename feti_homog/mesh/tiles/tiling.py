@@ -7,7 +7,6 @@ after the other; a torus edge has the number that its two classes make.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 from scipy.spatial import QhullError
@@ -93,7 +92,7 @@ def tiling(
     candidates = bridges(lines, size, CLEAR * arrangement.outer_radii.mean(), largest, vertices)
     # Side pieces in the matrix: the nodes, discs or corners, and the points at their ends.
     nodes, ends = [], []
-    for axis, is_far in product((0, 1), (False, True)):
+    for axis, is_far in np.ndindex(2, 2):
         level, places = is_far * size[1 - axis], crossings(discs[outer], axis, size)
         points, middles = (on_side(along, axis, level) for along in (places, (places[:-1] + places[1:]) / 2))
         circle = curve_at(discs[outer], middles)
@@ -101,7 +100,7 @@ def tiling(
         around = np.concatenate([corner[:1], outer[circle], corner[1:]])
         piece = np.flatnonzero(circle == MATRIX)
         # Counter-clockwise around the cell.
-        way = slice(None, None, 1 if is_far == (axis == 1) else -1)
+        way = slice(None, None, 1 if is_far == axis else -1)
         nodes.append(around[piece[:, None] + [0, 2]][:, way])
         ends.append(points[piece[:, None] + [0, 1]][:, way])
     sides = np.concatenate(nodes), np.concatenate(ends)
