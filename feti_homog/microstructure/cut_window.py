@@ -53,7 +53,7 @@ def moves(outlines: Outlines, size: Float) -> Float:
         present = places[second] - places[first] + shift * size
         normal, least = parting(first, second, present)
         short = (normal * present).sum(axis=1) < (least + needed) * (1 - TOLERANCE)
-        # All pairs that ever were too near: fibres, periods between them, and least gaps.
+        # A row for each pair that was too near in any step: both fibres, periods between them, least gap.
         pairs = np.concatenate([pairs, np.column_stack([first, second, shift, needed])[short]])
         pairs = pairs[np.unique(pairs[:, :4], axis=0, return_index=True)[1]]
         last, moved = moved, _least_moves(outlines, pairs, moved, size) if len(pairs) else moved
@@ -65,7 +65,7 @@ def moves(outlines: Outlines, size: Float) -> Float:
 def _least_moves(outlines: Outlines, pairs: Float, moved: Float, size: Float) -> Float:
     """Return the d (N, 2) of least sum |d|^2 that keep all pairs (k, 5) apart.
 
-    They have n . (v + d_second - d_first) >= r, with the present directions n.
+    Each pair has n . (v + d_second - d_first) >= r, with the present direction n.
 
     By non-negative least squares: C. L. Lawson, R. J. Hanson, Solving Least Squares Problems, 1974, chapter 23.
     """

@@ -22,8 +22,8 @@ class EllipticArcs(Lines):
     """Arcs of ellipses.
 
     Attributes:
-        ellipses: of each arc.
-        angle, way: (a, k) parameters of places on each arc, and the lengths up to there.
+        ellipses: (a,) the ellipse of each arc.
+        angle, way: (a, k) parameters of positions on each arc, and the arc lengths up to these positions.
     """
 
     ellipses: Ellipses
@@ -71,7 +71,7 @@ def size_field(
     size, largest, inner = arrangement.size, sizes.largest, arrangement.outlines
     assert isinstance(inner, Ellipses)
     shells, disc = arrangement.shells
-    # In mesh order: that of rows does not matter.
+    # Ellipses in meshing order make the mesh independent of the row order.
     order = np.argsort(np.argsort(arrangement.order)[disc], kind="stable")
     ellipses, disc = Ellipses(shells.centres, shells.frames)[order], disc[order]
     angle = np.tile(np.linspace(0, 2 * np.pi, convex_sums.POINTS, endpoint=False), len(ellipses))

@@ -98,7 +98,7 @@ class Arcs(Lines):
 
     Attributes:
         circles: (a, 3) centre and radius.
-        start, span: (a,) angle in radians at which each begins, and how far it turns.
+        start, span: (a,) first angle of each arc, and the angle that the arc spans, in radians.
     """
 
     circles: Float
@@ -121,7 +121,7 @@ class Segments(Lines):
     """Straight lines.
 
     Attributes:
-        begin, way: (s, 2) where each begins, and where it goes from there.
+        begin, way: (s, 2) first ends, and vectors from these to the second ends.
     """
 
     begin: Float
@@ -153,7 +153,7 @@ class Sampling:
     most_nodes: int
 
 
-# Of a cell that one rank meshes in minutes, and of one that all ranks mesh: there an arc is a few edges long.
+# For cells that one rank meshes in minutes, and for cells that all ranks mesh, whose arcs are a few edges long.
 WHOLE, IN_TILES = Sampling(65, 513, 17, 120_000), Sampling(17, 129, 17, 3_000_000)
 
 
@@ -162,7 +162,7 @@ class Stations:
     """Nodes on c lines.
 
     Attributes:
-        share: (n,) part of the line's length, from 0 to 1.
+        share: (n,) fraction of the line's length, from 0 to 1.
         first: (c + 1,) line k has the nodes from first[k] up to first[k + 1].
         edges: int ds / h over all lines.
     """
@@ -257,7 +257,7 @@ LineStations = tuple[Stations, Stations]
 
 @dataclass(frozen=True)
 class SizedLines:
-    """Lines whose nodes do not depend on other lines, so that ranks may share them."""
+    """Arcs and bridges, whose nodes depend on no other line, so that each rank can place some of them."""
 
     arcs: Lines
     bridges: Lines
@@ -287,7 +287,7 @@ class SizedLines:
         """Join the nodes of all parts.
 
         Raises:
-            MeshError: they are more than the sampling allows.
+            MeshError: the sampling allows fewer nodes.
         """
         arcs, bridges = (Stations.joined(stations, self.sampling.most_nodes) for stations in zip(*parts, strict=True))
         return arcs, bridges

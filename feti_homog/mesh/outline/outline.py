@@ -42,8 +42,8 @@ class Outline:
         points: (n, 2) nodes on all lines, exactly in place.
         curves: through the nodes.
         ellipses: k circles and ellipses in the plane, disc by disc and image by image, each from without.
-        disc: (k,) whose image each circle is.
-        around: (k,) the circle around each; MATRIX if there is none.
+        disc: (k,) disc or ellipse of each image.
+        around: (k,) circle around each circle; MATRIX without one.
     """
 
     points: Float

@@ -21,7 +21,7 @@ from feti_homog.microstructure import arrangements
 from feti_homog.microstructure.shapes import on_circle
 from feti_homog.typing import Float, Int
 
-# Bridges stay away from third discs by this part of their radii, and their ends from sides by that of the mean radius.
+# Distance of bridges from third discs / their radius, and of bridge ends from cell sides / mean radius, at least.
 CLEAR = 0.3
 # Between two bridges on one disc, at least.
 LEAST_ANGLE = np.radians(25)

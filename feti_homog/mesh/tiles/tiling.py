@@ -186,9 +186,9 @@ class FilledTile:
     """A tile with its triangles.
 
     Attributes:
-        number: among all tiles.
-        tile, filling: nodes on its lines; triangles and nodes within.
-        first: number of its first node off the lines.
+        number: the tile's index among all tiles.
+        tile, filling: nodes on the lines; triangles and nodes within.
+        first: number of the first node off the lines.
     """
 
     number: int
