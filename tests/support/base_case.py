@@ -1,5 +1,7 @@
 """A right case file, and the same with some of its words exchanged."""
 
+import re
+
 BASE = """\
 [cell]
 geometry = "hexagonal"
@@ -64,3 +66,17 @@ def ended(text: str) -> str:
 
 def fraction(value: str) -> str:
     return cell("fibre_fraction = 0.4", f"fibre_fraction = {value}")
+
+
+def with_line(case: str, line: str) -> str:
+    """Put a line "[section] key = value" into a case, in place of the one that its key has."""
+    section, key, value = re.fullmatch(r"\[(.+?)\] (\w+) = (.*)", line).groups()
+    before, head, rest = case.partition(f"[{section}]\n")
+    lines, bracket, after = rest.partition("\n[")
+    others = [entry for entry in lines.splitlines() if not entry.startswith(f"{key} = ")]
+    return "\n".join([before + (head or f"[{section}]\n") + f"{key} = {value}", *others, ""]) + bracket + after
+
+
+def faults(case: str, lines: dict[str, str]) -> dict[str, str]:
+    """Return the case with each line, below the fault that names the line and ends with these words."""
+    return {f"{line}: {words}": with_line(case, line) for line, words in lines.items()}

@@ -6,7 +6,7 @@ from typing import Any
 
 from hypothesis import given, settings
 from unit.case.documents import changed_documents
-from unit.case.faulty_cases import FAULTY_CASES
+from unit.case.faulty_cases import FAULTY_CASES, NOT_TOML
 from unit.case.valid_cases import VALID_CASES
 
 from feti_homog.case.cases import parse
@@ -14,9 +14,8 @@ from feti_homog.case.rules import ITEMS, Rule, exclusive, needed
 from feti_homog.errors import CaseError
 from feti_homog.schema.keys import Selector
 
-NO_TOML = {"syntax", "syntax_unclosed", "key_twice", "section_twice", "number_too_long"}
 SOURCES = [tomllib.loads(text) for text in VALID_CASES.values()]
-SOURCES += [tomllib.loads(text) for name, (text, _) in FAULTY_CASES.items() if name not in NO_TOML]
+SOURCES += [tomllib.loads(text) for words, text in FAULTY_CASES.items() if words not in NOT_TOML]
 SOURCES += [{**each, "interface": [each["interface"]]} for each in SOURCES if "interface" in each]
 
 
