@@ -138,103 +138,54 @@ ELEMENTS_2 = "$Elements\n1\n1 2 2 1 1 1 2 3\n$EndElements\n"
 NODES_4 = "$Nodes\n1 3 1 3\n2 1 0 3\n1\n2\n3\n0 0 0\n1 0 0\n0 1 0\n$EndNodes\n"
 ELEMENTS_4 = "$Elements\n1 1 1 1\n2 1 2 1\n1 1 2 3\n$EndElements\n"
 FILE_2, FILE_4 = HEAD_2 + NODES_2 + ELEMENTS_2, HEAD_4 + NODES_4 + ELEMENTS_4
-FAULTS = {
-    "format 3": (FILE_2.replace("2.2", "3"), 'format "3" of gmsh: expected 2.2, 4.0 or 4.1'),
-    "format 1": ("$NOD\n0\n$ENDNOD\n", "format 1 of gmsh: save it in format 2.2 or 4.1"),
-    "short numbers": (
-        FILE_2.replace("0 8", "0 4", 1),
-        "$MeshFormat: expected 0 8 behind the version of text and 1 8 of binary",
-    ),
-    "byte order": (FILE_2.replace("0 8", "1 8", 1), "1 elements are announced, and 0 are there"),
-    "no format": (f"$Comments\n$EndComments\n{NODES_2}", "there is no $MeshFormat"),
-    "nodes twice": (HEAD_2 + NODES_2 + NODES_2, "$Nodes: it is there twice"),
-    "names": (f'{HEAD_2}$PhysicalNames\n2\n2 1 "a"\n$EndPhysicalNames\n', "$PhysicalNames: 1 names, and not as many"),
-    "two names": (
-        f'{HEAD_2}$PhysicalNames\n2\n2 1 "a"\n2 1 "b"\n$EndPhysicalNames\n',
-        "$PhysicalNames: one of the numbers has two names",
-    ),
-    "open names": (
-        f"{HEAD_2}$PhysicalNames\n0\n",
-        "$PhysicalNames: there is no $EndPhysicalNames: the file is damaged",
-    ),
-    "open comments": (f"{HEAD_2}$Comments\n", "$Comments: there is no $EndComments"),
-    "a word": (FILE_2.replace("2 1 0 0", "2 one 0 0"), "gmsh cannot read it: the file is damaged"),
-    "an underscore": (FILE_2.replace("2 1 0 0", "2 1_0 0 0"), "gmsh cannot read it: the file is damaged"),
-    "a fraction": (FILE_2.replace("1 2 2 1", "1 2.5 2 1"), "gmsh cannot read it: the file is damaged"),
-    "half a node": (
-        FILE_2.replace("2 1 0 0", "2.5 1 0 0"),
-        "the file is damaged: gmsh crashes on it",
-    ),
-    "twenty digits": (FILE_2.replace("2 1 0 0", f"{'9' * 20} 1 0 0"), "gmsh cannot read it: Wrong node index 2"),
-    "twenty digits of an element": (
-        FILE_2.replace("1 2 3\n$", f"1 2 {'9' * 20}\n$"),
-        "gmsh cannot read it: Wrong node index",
-    ),
-    "nan as a count": (FILE_2.replace("Nodes\n3", "Nodes\nnan"), "gmsh cannot read it: the file is damaged"),
-    "huge count": (
-        FILE_2.replace("Nodes\n3", "Nodes\n1000000000000"),
-        "gmsh cannot read it: Wrong node index",
-    ),
-    "negative count": (FILE_2.replace("Nodes\n3", "Nodes\n-1"), "gmsh cannot read it: Wrong node index"),
-    "numbers left": (FILE_2.replace("Nodes\n3", "Nodes\n2"), "the file is damaged: gmsh crashes on it"),
-    "elements left": (
-        FILE_2.replace("nts\n1\n", "nts\n0\n"),
-        "$Elements: 2 lines, and its counts announce 1, one for each element",
-    ),
-    "elements too many": (
-        FILE_2.replace("nts\n1\n", "nts\n1\n2 2 2 1 1 1 2 3\n"),
-        "$Elements: 3 lines, and its counts announce 2, one for each element",
-    ),
-    "elements missing": (
-        FILE_2.replace("nts\n1\n", "nts\n2\n"),
-        "$Elements: 2 lines, and its counts announce 3, one for each element",
-    ),
-    "element cut": (
-        FILE_2.replace("1 2 3\n$", "1 2\n$"),
-        "gmsh cannot read it: the file is damaged",
-    ),
-    "negative tags": (FILE_2.replace("1 2 2 1", "1 2 -2 1"), "not in any physical surface"),
-    "strange type": (
-        FILE_2.replace("1 2 2 1", "1 36 2 1"),
-        "gmsh cannot read it: the file is damaged",
-    ),
-    "node twice": (FILE_2.replace("2 1 0 0", "1 1 0 0"), "gmsh cannot read it: Skipping duplicate node 1"),
-    "strange type in 4": (
-        FILE_4.replace("2 1 2 1\n1 1", "2 1 36 1\n1 1"),
-        "gmsh cannot read it: Could not read elements",
-    ),
-    "wrong dimension": (
-        FILE_4.replace("2 1 2 1\n1 1", "1 1 2 1\n1 1"),
-        "gmsh cannot read it: Unknown entity 1 of dimension 1",
-    ),
-    "dimension 4": (FILE_4.replace("2 1 0 3", "4 1 0 3"), "gmsh cannot read it: Invalid dimension 4"),
-    "elements missing in 4": (FILE_4.replace("nts\n1 1", "nts\n1 2"), "$Elements: 3 lines, and its counts announce 4"),
-    "huge block": (
-        FILE_4.replace("2 1 0 3", "2 1 0 1000000000000"),
-        "gmsh cannot read it: the file is damaged",
-    ),
-    "huge number of blocks": (
-        FILE_4.replace("nts\n1 1", "nts\n1000000000000 1"),
-        "$Elements: 3 lines, and its counts announce 1000000000002",
-    ),
-    "huge number of entities": (
-        f"{HEAD_4}$Entities\n1000000000000 0 0 0\n$EndEntities\n",
-        "gmsh cannot read it: Could not read entities",
-    ),
-    "a section of another name": (
-        FILE_2.replace("$Elements", "$elements").replace("$EndElements", "$Endelements"),
-        'line 10: "$elements": expected a section of a mesh, such as $Nodes, or $Comments',
-    ),
-    "words between sections": (FILE_2.replace("$Elements", "more\n$Elements"), 'line 10: "more": expected a section'),
-    "elements behind the end": (FILE_2 + "2 2 2 1 1 1 2 3\n", 'line 14: "2 2 2 1 1 1 2 3": expected a section'),
-    "no group": (FILE_4, "element 1 at (0.333333333, 0.333333333): not in any physical surface"),
-    "no name": (FILE_2, 'no physical surface is named "matrix"; the file has 1. If 1 is the matrix, add'),
-}
+FAULTS = [
+    ('format "3" of gmsh: expected 2.2, 4.0 or 4.1', FILE_2.replace("2.2", "3")),
+    ("format 1 of gmsh: save it in format 2.2 or 4.1", "$NOD\n0\n$ENDNOD\n"),
+    ("$MeshFormat: expected 0 8 behind the version of text and 1 8 of binary", FILE_2.replace("0 8", "0 4", 1)),
+    ("1 elements are announced, and 0 are there", FILE_2.replace("0 8", "1 8", 1)),
+    ("there is no $MeshFormat", f"$Comments\n$EndComments\n{NODES_2}"),
+    ("$Nodes: it is there twice", HEAD_2 + NODES_2 + NODES_2),
+    ("$PhysicalNames: 1 names, and not as many", f'{HEAD_2}$PhysicalNames\n2\n2 1 "a"\n$EndPhysicalNames\n'),
+    ("$PhysicalNames: one of the numbers has two names",
+     f'{HEAD_2}$PhysicalNames\n2\n2 1 "a"\n2 1 "b"\n$EndPhysicalNames\n'),
+    ("$PhysicalNames: there is no $EndPhysicalNames: the file is damaged", f"{HEAD_2}$PhysicalNames\n0\n"),
+    ("$Comments: there is no $EndComments", f"{HEAD_2}$Comments\n"),
+    ("gmsh cannot read it: the file is damaged", FILE_2.replace("2 1 0 0", "2 one 0 0")),
+    ("gmsh cannot read it: the file is damaged", FILE_2.replace("2 1 0 0", "2 1_0 0 0")),
+    ("gmsh cannot read it: the file is damaged", FILE_2.replace("1 2 2 1", "1 2.5 2 1")),
+    ("the file is damaged: gmsh crashes on it", FILE_2.replace("2 1 0 0", "2.5 1 0 0")),
+    ("gmsh cannot read it: Wrong node index 2", FILE_2.replace("2 1 0 0", f"{'9' * 20} 1 0 0")),
+    ("gmsh cannot read it: Wrong node index", FILE_2.replace("1 2 3\n$", f"1 2 {'9' * 20}\n$")),
+    ("gmsh cannot read it: the file is damaged", FILE_2.replace("Nodes\n3", "Nodes\nnan")),
+    ("gmsh cannot read it: Wrong node index", FILE_2.replace("Nodes\n3", "Nodes\n1000000000000")),
+    ("gmsh cannot read it: Wrong node index", FILE_2.replace("Nodes\n3", "Nodes\n-1")),
+    ("the file is damaged: gmsh crashes on it", FILE_2.replace("Nodes\n3", "Nodes\n2")),
+    ("$Elements: 2 lines, and its counts announce 1, one for each element", FILE_2.replace("nts\n1\n", "nts\n0\n")),
+    ("$Elements: 3 lines, and its counts announce 2, one for each element",
+     FILE_2.replace("nts\n1\n", "nts\n1\n2 2 2 1 1 1 2 3\n")),
+    ("$Elements: 2 lines, and its counts announce 3, one for each element", FILE_2.replace("nts\n1\n", "nts\n2\n")),
+    ("gmsh cannot read it: the file is damaged", FILE_2.replace("1 2 3\n$", "1 2\n$")),
+    ("not in any physical surface", FILE_2.replace("1 2 2 1", "1 2 -2 1")),
+    ("gmsh cannot read it: the file is damaged", FILE_2.replace("1 2 2 1", "1 36 2 1")),
+    ("gmsh cannot read it: Skipping duplicate node 1", FILE_2.replace("2 1 0 0", "1 1 0 0")),
+    ("gmsh cannot read it: Could not read elements", FILE_4.replace("2 1 2 1\n1 1", "2 1 36 1\n1 1")),
+    ("gmsh cannot read it: Unknown entity 1 of dimension 1", FILE_4.replace("2 1 2 1\n1 1", "1 1 2 1\n1 1")),
+    ("gmsh cannot read it: Invalid dimension 4", FILE_4.replace("2 1 0 3", "4 1 0 3")),
+    ("$Elements: 3 lines, and its counts announce 4", FILE_4.replace("nts\n1 1", "nts\n1 2")),
+    ("gmsh cannot read it: the file is damaged", FILE_4.replace("2 1 0 3", "2 1 0 1000000000000")),
+    ("$Elements: 3 lines, and its counts announce 1000000000002", FILE_4.replace("nts\n1 1", "nts\n1000000000000 1")),
+    ("gmsh cannot read it: Could not read entities", f"{HEAD_4}$Entities\n1000000000000 0 0 0\n$EndEntities\n"),
+    ('line 10: "$elements": expected a section of a mesh, such as $Nodes, or $Comments',
+     FILE_2.replace("$Elements", "$elements").replace("$EndElements", "$Endelements")),
+    ('line 10: "more": expected a section', FILE_2.replace("$Elements", "more\n$Elements")),
+    ('line 14: "2 2 2 1 1 1 2 3": expected a section', FILE_2 + "2 2 2 1 1 1 2 3\n"),
+    ("element 1 at (0.333333333, 0.333333333): not in any physical surface", FILE_4),
+    ('no physical surface is named "matrix"; the file has 1. If 1 is the matrix, add', FILE_2),
+]  # fmt: skip
 
 
-@pytest.mark.parametrize("name", FAULTS)
-def test_faults_of_the_format_are_named(name, tmp_path):
-    content, message = FAULTS[name]
+@pytest.mark.parametrize(("message", "content"), FAULTS, ids=[words for words, _ in FAULTS])
+def test_faults_of_the_format_are_named(message, content, tmp_path):
     (tmp_path / "a.msh").write_text(content)
     with pytest.raises(MeshError) as caught:
         read(tmp_path / "a.msh")
