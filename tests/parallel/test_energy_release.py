@@ -250,21 +250,11 @@ INNER, OUTER = ["fibre", "coating"], ["coating", "matrix"]
 
 
 @pytest.mark.one_rank
-@pytest.mark.parametrize(
-    ("growing", "bond"),
-    [(OUTER, FREE), (INNER, TOUCHING)],
-    ids=["outer", "inner"],
-)
+@pytest.mark.parametrize(("growing", "bond"), [(OUTER, FREE), (INNER, TOUCHING)], ids=["outer", "inner"])
 def test_each_interface_of_a_coated_fibre_releases_what_the_energy_loses(comm, growing, bond):
     """While the arc on the other interface stays as long as it is."""
     radius, coating, strain = 0.25, 0.3, {"E11": 0.3, "E22": -0.5, "gamma12": 0.4}
-    cell = {
-        "fibre_fraction": np.pi * radius**2,
-        "coating": coating,
-        "mesh_size": 0.08,
-        "order": 2,
-        "refine": 1,
-    }
+    cell = {"fibre_fraction": np.pi * radius**2, "coating": coating, "mesh_size": 0.08, "order": 2, "refine": 1}
 
     def solved_with(opening):
         arcs = [{"fibre": 1, "centre": 20.0, "angle": opening if name == growing else 70.0} for name in (INNER, OUTER)]

@@ -158,10 +158,7 @@ def test_bonds_of_a_laminate_bear_the_macroscopic_stress(comm, strip, bonds, tem
         parallel_assert(comm, abs(share(bonds, stress[[0, 5, 4]]) - 1) < 1e-9, f"{point}")
 
 
-SPATIAL = (
-    ["E11", "E22", "E33", "gamma23", "gamma13", "gamma12"],
-    ["S11", "S22", "S33", "S23", "S13", "S12"],
-)
+SPATIAL = (["E11", "E22", "E33", "gamma23", "gamma13", "gamma12"], ["S11", "S22", "S33", "S23", "S13", "S12"])
 
 
 @pytest.mark.parametrize("stiffness", [None, np.inf, 40.0])

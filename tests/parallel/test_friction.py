@@ -65,11 +65,7 @@ def test_paths_are_those_of_a_slow_twin(comm, waypoints, springs):
 
 @pytest.mark.parametrize(
     ("plane", "law"),
-    [
-        ("strain", {}),
-        ("strain", SOFTENING),
-        ("generalized", SOFTENING | {"friction_on_damage": True}),
-    ],
+    [("strain", {}), ("strain", SOFTENING), ("generalized", SOFTENING | {"friction_on_damage": True})],
     ids=["strength", "softening", "generalized"],
 )
 def test_breaks_with_friction_obey_every_law_resumed_too(comm, shared_path, plane, law):

@@ -103,10 +103,7 @@ def test_fibres_debond_beside_voids_to_the_end(comm, shared_path):
 
 def test_an_accuracy_counts_free_faces_of_voids():
     """With them a cell of hardly any contrast needs more."""
-    document = {
-        "material": {"matrix": MATRIX, "fibre": MATRIX},
-        "analysis": {"type": "stiffness", "plane": "strain"},
-    }
+    document = {"material": {"matrix": MATRIX, "fibre": MATRIX}, "analysis": {"type": "stiffness", "plane": "strain"}}
     asked = {"geometry": "table", "width": 1.0, "height": 1.0, "accuracy": 1e-3}
     plain, void = (
         cases.parse(document | {"cell": {"fibre_list": rows} | asked}, Path()) for rows in (ROWS[1:3], ROWS[:3])

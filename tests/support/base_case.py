@@ -32,10 +32,7 @@ SPATIAL = (
 )
 OUT_OF_PLANE = "E3 = 5.0\nnu13 = 0.3\nnu23 = 0.3\n"
 
-MESH_CELL = (
-    'geometry = "hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.05',
-    'geometry = "mesh"\nfile = "cell.msh"',
-)
+MESH_CELL = ('geometry = "hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.05', 'geometry = "mesh"\nfile = "cell.msh"')
 
 TABLE_CELL = (
     MESH_CELL[0],

@@ -152,20 +152,13 @@ MIXED_PATHS: dict[str, dict[str, Any]] = {
         "interface": SPRINGS
         | {"criterion": "energy", "toughness": 0.001, "debonded": [{"fibre": "all", "centre": 140.0, "angle": 277.0}]},
         "path": {
-            "waypoints": [
-                {"S11": -1.22, "S22": 0.57, "S12": 0.84},
-                {"E11": -0.01, "E22": 0.035, "gamma12": 0.004},
-            ]
+            "waypoints": [{"S11": -1.22, "S22": 0.57, "S12": 0.84}, {"E11": -0.01, "E22": 0.035, "gamma12": 0.004}]
         },
     },
     "uneven steps": {  # no step meets the first waypoint, and contact changes within steps
         "cell": SQUARE,
         "interface": STRENGTHS,
-        "path": {
-            "waypoints": [{"E11": 0.1}, {"E11": -0.05}, {"S11": 2.0}],
-            "method": "increments",
-            "increments": 11,
-        },
+        "path": {"waypoints": [{"E11": 0.1}, {"E11": -0.05}, {"S11": 2.0}], "method": "increments", "increments": 11},
     },
     "cooled": IN_SPACE | {"interface": STRENGTHS, "path": {"waypoints": COOLED}},
     "cooled, thinned": IN_SPACE | {"interface": STRENGTHS, "path": {"waypoints": COOLED}, "states": 7},

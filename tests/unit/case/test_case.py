@@ -43,10 +43,7 @@ def test_keys_that_are_left_out_have_their_defaults(tmp_path):
         "voids": None, "void_radius": None,
         "mix": None, "radii": None,
     }  # fmt: skip
-    assert list(case.materials.items()) == [
-        ("matrix", Isotropic(88.0, 0.299)),
-        ("fibre", Isotropic(200.0, 0.222)),
-    ]
+    assert list(case.materials.items()) == [("matrix", Isotropic(88.0, 0.299)), ("fibre", Isotropic(200.0, 0.222))]
     assert (case.analysis.type, case.analysis.plane) == ("stiffness", "strain")
     assert (case.decomposition.subdomains, case.decomposition.max_dofs) == (None, None)
     assert (case.output.fields, case.output.pictures, case.output.stress) == (True, True, "auto")

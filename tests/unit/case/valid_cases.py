@@ -46,8 +46,7 @@ VALID_CASES = {
     "mesh of three phases": MESH + '[material."fibre:2"]\nstiffness = [[3, 1, 0], [1, 3, 0], [0, 0, 1]]\n',
     "orthotropic": fibre("E1 = 10.0\nE2 = 5.0\nE3 = 5.0\nnu12 = 0.3\nnu13 = 0.3\nnu23 = 0.2\nG12 = 2.0\nangle = 30\n"),
     "orthotropic in space": fibre(
-        ORTHOTROPIC + OUT_OF_PLANE + "G13 = 2.0\nG23 = 1.5\nangle = 30\nexpansion = [1e-6, 2e-6, 3e-6]\n",
-        "generalized",
+        ORTHOTROPIC + OUT_OF_PLANE + "G13 = 2.0\nG23 = 1.5\nangle = 30\nexpansion = [1e-6, 2e-6, 3e-6]\n", "generalized"
     ),
     "transversely isotropic": fibre(
         TRANSVERSE + AXIAL + "G_axial = 28.0\nexpansion_axial = -0.9e-6\nexpansion_transverse = 9e-6\n", "generalized"

@@ -176,8 +176,7 @@ def test_the_strain_that_leads_is_among_those_that_are_named() -> None:
 
 
 @pytest.mark.parametrize(
-    ("load", "word"),
-    [({"E11": 0.1, "S22": 0.0}, "strain"), ({"S11": 5.0}, "load"), ({"E11": 0.1, "S22": 5.0}, "load")],
+    ("load", "word"), [({"E11": 0.1, "S22": 0.0}, "strain"), ({"S11": 5.0}, "load"), ({"E11": 0.1, "S22": 5.0}, "load")]
 )
 def test_what_rises_is_the_strain_if_no_stress_is_given(load: dict[str, float], word: str) -> None:
     assert what_rises(mixed(load, [[1.0, 0, 0]], "strain")) == word

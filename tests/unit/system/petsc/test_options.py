@@ -50,10 +50,7 @@ def test_only_flags_of_petsc_itself_are_settled_when_it_starts():
 @pytest.mark.parametrize(
     ("names", "prints"),
     [
-        (
-            "ksp_view ksp_view_pre ksp_monitor_true_residual sub_ksp_converged_reason coarse_mat_view",
-            True,
-        ),
+        ("ksp_view ksp_view_pre ksp_monitor_true_residual sub_ksp_converged_reason coarse_mat_view", True),
         ("ksp_compute_singularvalues ksp_plot_eigenvalues schur_mat_mumps_icntl_4 sub_mat_cholmod_print view", True),
         ("ksp_type ksp_converged_maxits ksp_max_it pc_type coarse_pc_gamg_threshold schur_mat_mumps_icntl_14", False),
         ("schur_mat_mumps_icntl_7 ksp_error_if_not_converged ksp_converged_use_initial_residual_norm", False),
