@@ -65,15 +65,17 @@ def fraction(value: str) -> str:
     return cell("fibre_fraction = 0.4", f"fibre_fraction = {value}")
 
 
-def with_line(case: str, line: str) -> str:
-    """Put a line "[section] key = value" into a case, in place of the one that its key has."""
-    section, key, value = re.fullmatch(r"\[(.+?)\] (\w+) = (.*)", line).groups()
-    before, head, rest = case.partition(f"[{section}]\n")
-    lines, bracket, after = rest.partition("\n[")
-    others = [entry for entry in lines.splitlines() if not entry.startswith(f"{key} = ")]
-    return "\n".join([before + (head or f"[{section}]\n") + f"{key} = {value}", *others, ""]) + bracket + after
+def with_lines(case: str, *lines: str) -> str:
+    """Put lines "[section] key = value" into a case, each in place of the one that its key has."""
+    for line in lines:
+        section, key, value = re.fullmatch(r"\[(.+?)\] (\w+) = (.*)", line).groups()
+        before, head, rest = case.partition(f"[{section}]\n")
+        entries, bracket, after = rest.partition("\n[")
+        others = [entry for entry in entries.splitlines() if not entry.startswith(f"{key} = ")]
+        case = "\n".join([before + (head or f"[{section}]\n") + f"{key} = {value}", *others, ""]) + bracket + after
+    return case
 
 
 def faults(case: str, lines: dict[str, str]) -> dict[str, str]:
     """Return the case with each line, below the fault that names the line and ends with these words."""
-    return {f"{line}: {words}": with_line(case, line) for line, words in lines.items()}
+    return {f"{line}: {words}": with_lines(case, line) for line, words in lines.items()}

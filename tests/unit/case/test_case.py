@@ -82,31 +82,23 @@ def test_a_missing_number_of_a_softening_law_is_one_fault(tmp_path):
     ]
 
 
-def test_a_missing_file_is_reported(tmp_path):
+def test_files_that_cannot_be_read_are_reported(tmp_path):
     with pytest.raises(CaseError, match=r"none\.toml: cannot be read: No such file"):
         load(tmp_path / "none.toml")
-
-
-def test_a_folder_in_the_place_of_a_file_is_reported(tmp_path):
     with pytest.raises(CaseError, match="cannot be read: Is a directory"):
         load(tmp_path)
-
-
-def test_a_file_that_is_not_utf8_is_reported(tmp_path):
     path = tmp_path / "cell.toml"
     path.write_bytes(BASE.encode() + "# Zelle für Stoß\n".encode("latin-1"))
     with pytest.raises(CaseError, match=r"not UTF-8 text \(line 17\)"):
         load(path)
 
 
-def test_byte_order_mark_is_allowed(tmp_path):
+def test_byte_order_marks_and_integers_are_allowed(tmp_path):
     assert case_of(tmp_path, "\ufeff" + BASE) == case_of(tmp_path, BASE)
-
-
-def test_integers_are_numbers(tmp_path):
     material = case_of(tmp_path, BASE.replace("88.0", "88")).materials["matrix"]
     assert isinstance(material, Isotropic)
     assert isinstance(material.young, float)
+    case_of(tmp_path, changed(("0.299", "0.5"), ('"strain"', '"stress"')))
 
 
 @pytest.mark.parametrize("name", VALID_CASES)
@@ -118,7 +110,7 @@ def test_resolved_makes_the_same_case_again(tmp_path, name):
     assert pickle.loads(pickle.dumps(case)) == case
 
 
-def test_arcs_and_strengths_are_read(tmp_path):
+def test_sections_of_bonds_and_loads_are_read(tmp_path):
     case = case_of(tmp_path, debonded('{fibre = "all", centre = -30, angle = 60}, {fibre = 2, angle = 10.5}'))
     arcs = (Arc(fibre="all", centre=-30.0, angle=60.0), Arc(fibre=(2,), centre=0.0, angle=10.5))
     assert case.interface == InterfaceSection(debonded=arcs)
@@ -126,15 +118,9 @@ def test_arcs_and_strengths_are_read(tmp_path):
     assert (case.interface.normal_strength, case.interface.tangential_strength) == (None, None)
     strong = case_of(tmp_path, of_type("path", PATH, "[interface]", "normal_strength = inf", "tangential_strength = 2"))
     assert (strong.interface.normal_strength, strong.interface.tangential_strength) == (None, 2.0)
-
-
-def test_openings_are_read(tmp_path):
     case = case_of(tmp_path, of_type("angle", "[angle]", "values = [0, 30, 360.0]", BARE_ARC))
     assert case.angle == Angle(values=(0.0, 30.0, 360.0), strain=None)
     assert case.interface == InterfaceSection(debonded=(Arc(fibre=(1,), angle=None),))
-
-
-def test_targets_of_a_path_are_read(tmp_path):
     case = case_of(tmp_path, of_type("path", PATH))
     assert case.path == LoadPath(strain=(0.2, 0.0, 0.0))
     assert tuple(case.path.placed.values()) == ((0.2, 0.0, 0.0),)
@@ -210,10 +196,6 @@ def test_elements_of_nearly_incompressible_phases_are_quadratic(tmp_path, sizes)
         case_of(tmp_path, locking.replace("[cell]\n", "[cell]\norder = 1\n"))
     (warning,) = case_of(tmp_path, sized.replace("0.299", "0.499999999")).warnings()
     assert "so near to 0.5 that rounding may exceed the tolerance" in warning
-
-
-def test_incompressible_is_allowed_in_plane_stress(tmp_path):
-    case_of(tmp_path, changed(("0.299", "0.5"), ('"strain"', '"stress"')))
 
 
 def test_phases_of_any_name(tmp_path):

@@ -41,18 +41,12 @@ def test_faults_name_the_section_and_the_place_in_it():
     assert faults(Rule(("a", "x"), lambda value: value != 1, "no"), {"a": {"x": 1}}) == ["[a] x = 1: no"]
 
 
-def test_sections_of_one_name_are_numbered():
+def test_rules_number_sections_and_have_conditions():
     rule = needed(("a",), "x", "missing")
     assert faults(rule, {"a": [{"x": 1}, {}]}) == ["[a 2] x: missing"]
     assert faults(rule, {"a": [{}]}) == faults(rule, {"a": {}}) == ["[a] x: missing"]
     assert not faults(rule, {})
-
-
-def test_rules_have_conditions():
     rule = needed(("a",), "x", "missing", Selector("a", "kind").among("one", "two"))
     assert faults(rule, {"a": {}}, kind="one") and not faults(rule, {"a": {}}, kind="three")
     assert not faults(rule, {"a": {}})
-
-
-def test_what_is_no_table_is_faulty_elsewhere():
     assert not faults(exclusive(("a",), "x", "y"), {"a": 3}) and not faults(needed(("a",), "x", "missing"), {"a": 3})

@@ -72,12 +72,9 @@ def test_a_fault_leaves_the_old_file(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["result.json"]
 
 
-def test_a_folder_that_is_missing_is_made(tmp_path: Path) -> None:
+def test_missing_folders_are_made_or_reported(tmp_path: Path) -> None:
     result_json.write(tmp_path / "new" / "folder", {})
     assert (tmp_path / "new" / "folder" / "result.json").exists()
-
-
-def test_a_folder_that_cannot_be_made_is_reported(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(FetiHomogError, match=r"^cannot write .*file/folder/result\.json: Not a directory$"):
         result_json.write(tmp_path / "file" / "folder", {})

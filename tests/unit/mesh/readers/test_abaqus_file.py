@@ -33,12 +33,9 @@ def test_sets_of_element_lines_and_of_sections_are_phases_too(tmp_path):
     assert np.array_equal(read(path).phase, expected.phase)
 
 
-def test_debonded_lines_may_be_the_set_of_an_element_line(tmp_path):
+def test_lines_are_debonded_or_of_a_phase_by_their_set(tmp_path):
     path = write_inp(tmp_path / "one.inp", grid().with_curve(RIGHT_SIDE), sets=False)
     assert len(read(path).debonded_edges) == len(RIGHT_SIDE)
-
-
-def test_lines_in_a_set_of_a_phase_are_not_remarked(tmp_path):
     path = write_inp(tmp_path / "one.inp", grid().with_curve(RIGHT_SIDE, "matrix"))
     assert read(path).remarks == ()
 

@@ -41,12 +41,9 @@ def test_directions_without_an_onset_are_counted():
     assert lines[4].endswith(" (degrees), psi of its traction")
 
 
-def test_nothing_may_break():
+def test_strains_have_no_unit_and_nothing_may_break():
     lines = envelope_table(document(4, (), without=(0, 1, 2, 3))).lines
     assert len(lines) == 2
-
-
-def test_strains_have_no_unit():
     whole = document(4, ("psi",))
     whole["case"]["envelope"]["plane"] = ["E11", "gamma12"]
     assert envelope_table(whole).lines[0] == "Onset of debonding in the plane E11, gamma12: 4 directions"

@@ -8,8 +8,11 @@ CELL = {"E_axial": 41.7, "G_transverse": 3.7, "expansion_axial": None, "deviatio
 AXES = dict.fromkeys(("E1", "E2", "E3", "nu12", "nu13", "nu23", "G12", "G13", "G23"), 1.5)
 
 
-def test_without_constants_there_is_nothing():
+def test_the_range_over_directions_stands_above_the_table_if_there_is_one():
     assert constants({"case": {}}) == []
+    across = {"E_least": 9.81, "E_largest": 10.93, "G_least": 3.3, "G_largest": 3.82}
+    (table,) = constants({"case": {}, "transversely_isotropic": CELL, "transverse_moduli": across})
+    assert table.lines[1] == "  over all directions across: E from 9.81 to 10.93, G from 3.3 to 3.82"
 
 
 def test_a_row_for_each_source_and_a_column_for_each_constant_that_one_knows():
@@ -40,9 +43,3 @@ def test_a_row_for_each_source_and_a_column_for_each_constant_that_one_knows():
 def test_a_cell_without_estimates_is_reported_of_what_they_are(more, words):
     (table,) = constants({"case": {}, "transversely_isotropic": CELL, **more})
     assert table.lines[-1] == f"  closed-form estimates exist for {words} only"
-
-
-def test_the_range_over_directions_stands_above_the_table():
-    across = {"E_least": 9.81, "E_largest": 10.93, "G_least": 3.3, "G_largest": 3.82}
-    (table,) = constants({"case": {}, "transversely_isotropic": CELL, "transverse_moduli": across})
-    assert table.lines[1] == "  over all directions across: E from 9.81 to 10.93, G from 3.3 to 3.82"
