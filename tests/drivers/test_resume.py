@@ -10,36 +10,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support import events
+from support.base_case import with_lines
 from support.command_line import command_line
 from support.hooks import WAIT, Hook, HookedJob
 from support.small_path import SHEET_PATH
 
-COOLED = (
-    (
-        SHEET_PATH[: SHEET_PATH.index("[interface]")]
-        .replace('"square"', '"random"\nfibres = 2\nseed = 1\nmin_gap = 0.1')
-        .replace("mesh_size = 0.06", "mesh_size = 0.15")
-        .replace("young = 100.0\npoisson = 0.4", "young = 3.0\npoisson = 0.35\nexpansion = 6e-5")
-        .replace("young = 500.0", "young = 70.0\nexpansion = 5e-6")
-        .replace('"stress"', '"generalized"')
-    )
-    + """\
-[interface]
-normal_stiffness = 60.0
-tangential_stiffness = 25.0
-criterion = "energy"
-toughness = 4e-6
-
-[path]
-waypoints = [{temperature = -100.0}, {S22 = 0.04, S13 = 0.01}, {S22 = -0.01}]
-
-[output]
-fields = false
-pictures = false
-states = "all"
-[petsc]
-feti_pc_type = "influence"
-"""
+COOLED = with_lines(
+    SHEET_PATH[: SHEET_PATH.index("[interface]")],
+    *('[cell] geometry = "random"', "[cell] fibres = 2", "[cell] seed = 1", "[cell] min_gap = 0.1"),
+    *("[cell] mesh_size = 0.15", '[analysis] plane = "generalized"'),
+    *("[material.matrix] young = 3.0", "[material.matrix] poisson = 0.35", "[material.matrix] expansion = 6e-5"),
+    *("[material.fibre] young = 70.0", "[material.fibre] expansion = 5e-6"),
+    *("[interface] normal_stiffness = 60.0", "[interface] tangential_stiffness = 25.0"),
+    *('[interface] criterion = "energy"', "[interface] toughness = 4e-6"),
+    "[path] waypoints = [{temperature = -100.0}, {S22 = 0.04, S13 = 0.01}, {S22 = -0.01}]",
+    *("[output] fields = false", "[output] pictures = false", '[output] states = "all"'),
+    '[petsc] feti_pc_type = "influence"',
 )
 INCREMENTS = 'waypoints = [[0.1, 0.0, 0.0], [-0.05, 0.02, 0.0]]\nmethod = "increments"\nincrements = 24'
 LATER_LEGS = "waypoints = [[0.02, 0.0, 0.0], [-0.05, 0.02, 0.0], [0.1, 0.0, 0.0]]"
