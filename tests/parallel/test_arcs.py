@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 from support.cases import FIBRE, MATRIX
-from support.ranks import parallel_assert
+from support.ranks import parallel_assert, write_once
 from support.whole_meshes import coarse_mesh
 from unit.mesh.faulty_meshes import ALL_SIDES, RIGHT_SIDE, grid
 
@@ -131,9 +131,7 @@ def test_a_tip_beside_a_crossing_is_the_crossing(comm):
 def test_the_debonded_curve_of_a_mesh_is_debonded(comm, shared_path, order, refine, bodies):
     cell = {"geometry": "mesh", "file": "grid.msh", "order": order, "refine": refine, "bodies": bodies}
     for lines, vertices in ((RIGHT_SIDE, 1), (ALL_SIDES, 8)):
-        if comm.rank == 0:
-            grid().with_curve(lines).write(shared_path / "grid.msh")
-        comm.barrier()
+        write_once(comm, grid().with_curve(lines), shared_path / "grid.msh")
         torn_cell, nodes = torn(case_of(cell, [], shared_path, 3), comm)
         _, direction, state = nodes()
         inner = len(lines) * (torn_cell.lattice.intervals - 1)
@@ -144,9 +142,7 @@ def test_the_debonded_curve_of_a_mesh_is_debonded(comm, shared_path, order, refi
 
 
 def test_a_debonded_curve_and_arcs_add_up(comm, shared_path):
-    if comm.rank == 0:
-        grid().with_curve(RIGHT_SIDE).write(shared_path / "grid.msh")
-    comm.barrier()
+    write_once(comm, grid().with_curve(RIGHT_SIDE), shared_path / "grid.msh")
     cell = {"geometry": "mesh", "file": "grid.msh"}
     _, nodes = torn(case_of(cell, [{"fibre": 1, "centre": 180.0, "angle": 10.0}], shared_path), comm)
     _, direction, state = nodes()
@@ -156,9 +152,7 @@ def test_a_debonded_curve_and_arcs_add_up(comm, shared_path):
 
 
 def test_without_an_interface_section_all_is_bonded(comm, shared_path):
-    if comm.rank == 0:
-        grid().with_curve(RIGHT_SIDE).write(shared_path / "grid.msh")
-    comm.barrier()
+    write_once(comm, grid().with_curve(RIGHT_SIDE), shared_path / "grid.msh")
     case = case_of({"geometry": "mesh", "file": "grid.msh"}, [], shared_path)
     document = {name: section for name, section in case.resolved().items() if name != "interface"}
     _, nodes = torn(cases.parse(document, shared_path), comm)
@@ -191,9 +185,7 @@ def test_arcs_of_fibres_without_an_interface_between_the_pair_are_refused(comm):
 
 
 def test_arcs_of_a_fibre_without_centre_are_refused(comm, shared_path):
-    if comm.rank == 0:
-        grid(lambda x, y: abs(y - 0.5) < 0.25).write(shared_path / "grid.msh")
-    comm.barrier()
+    write_once(comm, grid(lambda x, y: abs(y - 0.5) < 0.25), shared_path / "grid.msh")
     cell = {"geometry": "mesh", "file": "grid.msh"}
     with pytest.raises(CaseError, match=r'^\[interface\] debonded\[0\].fibre = "all": fibre 1 has no centre, for it'):
         tear(case_of(cell, [ARC], shared_path), comm, Progress(comm, quiet=True))

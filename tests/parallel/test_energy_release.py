@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from reference.references import DEBONDED_FIBRE_BEM, DEBONDED_FIBRE_FEM, DEBONDED_FIBRE_TOTAL
 from support.cases import FIBRE, MATRIX, relative_error
-from support.ranks import parallel_assert
+from support.ranks import parallel_assert, write_once
 from support.void_cells import write_voids
 from unit.mesh.faulty_meshes import RIGHT_SIDE, grid
 
@@ -170,9 +170,7 @@ def test_stiffness_has_the_tips_of_all_its_loads(comm):
 
 def test_fibres_that_are_not_round_have_no_tips(comm, shared_path):
     """A square one, debonded on its right side."""
-    if comm.rank == 0:
-        grid().with_curve(RIGHT_SIDE).write(shared_path / "grid.msh")
-    comm.barrier()
+    write_once(comm, grid().with_curve(RIGHT_SIDE), shared_path / "grid.msh")
     document = {
         "cell": {"geometry": "mesh", "file": "grid.msh", "refine": 1},
         "material": {"matrix": MATRIX, "fibre": FIBRE},
