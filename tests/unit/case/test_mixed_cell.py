@@ -142,8 +142,3 @@ def test_each_phase_of_a_mix_has_its_material(phases, fault):
     with pytest.raises(CaseError) as caught:
         case_of(*phases, fibres=9, mix=MIX)
     assert any(fault in line for line in caught.value.faults), caught.value.faults
-
-
-@pytest.mark.parametrize("keys", [{"fibres": 9}, {"fibres": 9, "radii": RADII}, {"width": 90.0, "radii": RADII}])
-def test_a_mix_has_a_number_of_fibres_or_a_width(keys):
-    case_of(mix=MIX, **keys)

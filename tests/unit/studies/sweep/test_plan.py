@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.base_case import FIBRE, SPATIAL, TRANSVERSE
 from support.sweep_files import CASE, RANDOM
 
 from feti_homog.errors import CaseError
@@ -36,22 +35,6 @@ def test_values_arrive_in_the_cases():
     assert [case.name for case in sweep.cases] == ["s-0001", "s-0002"]
     assert [entry.folder for entry in sweep.entries] == ["case-0001", "case-0002"]
     assert len({entry.identity for entry in sweep.entries}) == 2
-
-
-def test_constants_in_space_are_varied_as_any_others():
-    across = CASE.replace("young = 200.0\npoisson = 0.222", f"{TRANSVERSE}nu_axial = 0.2")
-    sweep = expanded(
-        "material.fibre.E_axial = [100, 200]\nmaterial.matrix.expansion = {from = 1e-6, to = 3e-6, step = 1e-6}\n"
-        "analysis.plane = ['strain', 'generalized']\nmaterial.fibre.G_axial = [7.0]\n",
-        across,
-    )
-    fibres = {(case.analysis.plane, case.materials["fibre"].E_axial) for case in sweep.cases}
-    assert fibres == {(plane, E) for plane in ("strain", "generalized") for E in (100.0, 200.0)}
-    assert sorted({case.materials["matrix"].expansion for case in sweep.cases}) == pytest.approx([1e-6, 2e-6, 3e-6])
-    assert len({entry.identity for entry in sweep.entries}) == 12
-    general = CASE.replace(FIBRE, f"[material.fibre]\n{SPATIAL}")
-    by_axes = expanded("material.fibre.expansion = [1e-6, [1e-6, 2e-6, 3e-6]]", general)
-    assert [case.materials["fibre"].expansion for case in by_axes.cases] == [1e-6, (1e-6, 2e-6, 3e-6)]
 
 
 def test_loads_by_name_are_varied_as_any_keys():
