@@ -1,4 +1,4 @@
-"""Case files without faults, of all kinds, and tables [sweep]."""
+"""Case files without faults, of all kinds."""
 
 from support.base_case import (
     AXIAL,
@@ -111,19 +111,4 @@ VALID_CASES = {
     "increments": of_type("path", PATH, 'method = "increments"\nincrements = 50\nrelease = "worst"'),
     "strengths": debonded("{fibre = [1, 2], angle = 360}", "normal_strength = inf\ntangential_strength = 3"),
     "criterion": debonded(f'{ARC}, {{fibre = "all", angle = 0}}', 'normal_strength = 1\ncriterion = "quadratic"'),
-}
-
-WITHOUT_GEOMETRY = BASE.replace('geometry = "hexagonal"\n', "")
-
-VALID_SWEEPS = {
-    "nested and quoted": f"{BASE}[sweep]\ncell.fibre_fraction = [0.1, 0.2]\n'material.fibre.young' = [100, 200]\n",
-    "zip": f"{BASE}[sweep]\nmode = 'zip'\ncell.order = [1, 2]\ncell.refine = [0, 1]\n",
-    "step": f"{BASE}[sweep]\ncell.fibre_fraction = {{from = 0.1, to = 0.3, step = 0.1}}\n",
-    "count": f"{BASE}[sweep]\ncell.fibre_fraction = {{from = 0.01, to = 0.16, count = 3, scale = 'log'}}\n",
-    "loads": f"{BASE}[sweep]\npath.to.S11 = [1, 2]\npath.to.S22 = {{from = 1, to = 2, count = 2}}\n"
-    "'load.to.E11' = [1]\n'load.to' = {S22 = [1]}\n",
-    "samples": f"{BASE}[sweep]\nsamples = 3\nsampling = 'random'\nseed = 1\n"
-    "cell.fibre_fraction = {from = 0.1, to = 0.3}\n",
-    "tables": f"{WITHOUT_GEOMETRY}[sweep]\ncell = [{{geometry = 'square'}}, {{geometry = 'random', fibres = 3}}]\n"
-    "realisations = 2\n'cell.refine' = [0, 1]\n",
 }
