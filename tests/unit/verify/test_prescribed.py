@@ -1,11 +1,15 @@
-"""Verification reads the loads of a case that the program goes through."""
+"""Verification reads the loads that the program goes through, and measures stresses by what the case asks for."""
+
+from dataclasses import make_dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from support.verified_results import LOADS, MIXED_PATHS, document
 
 from feti_homog import Case
-from feti_homog.verify.check_loads import NAMES, at_points, targets
+from feti_homog.verify.check_loads import NAMES, Prescribed, _check_prescribed, _scales, at_points, targets
+from feti_homog.verify.findings import Findings, checks
 
 TWO_LEGS = {"path": {"waypoints": [{"E11": 0.4, "S22": 2.0}, {"S11": 3.0, "S22": 6.0}]}}
 
@@ -48,3 +52,21 @@ def test_steps_that_pass_a_waypoint_go_round_its_corner():
     loads = at_points({"analysis": {"plane": "strain"}, "path": path}, points)
     expected = [[0.2, 0.0, 0.0], [0.3, 0.1, 0.0], [0.3, 0.3, 0.0]]
     np.testing.assert_allclose([load.values for load in loads], expected, rtol=1e-14, atol=1e-16)
+
+
+State = make_dataclass("State", ["strain", "mean_stress", "temperature"])
+
+
+@pytest.mark.parametrize(("strain", "missed", "holds"), [(0.01, 0.0, True), (1e7, 0.0, True), (1e7, 5e-4, False)])
+def test_a_stress_that_is_missed_is_measured_by_the_load(strain, missed, holds):
+    load = Prescribed(np.array([-0.001, 0.0, 0.008]), np.array([False, True, True]))
+    state = State(np.array([-0.001, 0.0, strain]), np.array([-0.004, 0.0, 0.008 - missed]), 0.0)
+    cell = SimpleNamespace(
+        reuss=np.diag([4.0, 4.0, 1.0]), largest_strain=strain, loads=lambda strain, temperature: strain
+    )
+    findings = Findings(checks(1e-8, False, has_coatings=False))
+    scales = _scales(cell, [state], [load])
+    assert scales[2] == pytest.approx(0.008 - missed)
+    entries = {"strain": state.strain, "stress": state.mean_stress, "temperature": 0.0}
+    _check_prescribed(findings, load, entries, scales, "a state")
+    assert all(finding.holds for finding in findings.worst()) is holds
