@@ -49,17 +49,6 @@ def test_every_component_is_as_it_was_named_last(plane, data):
         assert list(found.items()) == expected
 
 
-def test_a_component_changes_its_kind_and_others_stay():
-    targets = path("[{S11 = 60}, {S11 = -20}, {E11 = 0.1, S12 = 2}, [0, 0, 0], {S22 = 3}]").targets
-    assert [list(each.items()) for each in targets] == [
-        [("S11", 60.0), ("S22", 0.0), ("S12", 0.0)],
-        [("S11", -20.0), ("S22", 0.0), ("S12", 0.0)],
-        [("E11", 0.1), ("S22", 0.0), ("S12", 2.0)],
-        [("E11", 0.0), ("E22", 0.0), ("gamma12", 0.0)],
-        [("E11", 0.0), ("S22", 3.0), ("gamma12", 0.0)],
-    ]
-
-
 def test_cooling_comes_first_and_stays():
     cooled, loaded = path("[{temperature = -100}, {gamma13 = 0.1}]", "generalized").targets
     assert list(cooled.items()) == [*((stress, 0.0) for _, stress in SPACE), ("temperature", -100.0)]
