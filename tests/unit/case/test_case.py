@@ -6,7 +6,7 @@ import pickle
 from pathlib import Path
 
 import pytest
-from support.base_case import BASE, FIBRE, changed, fibre
+from support.base_case import BASE, FIBRE, changed
 from unit.case.faulty_bonding import BARE_ARC, FAULTY_BONDINGS, FAULTY_COHESIVE_LAWS, PATH, SOFTENING, debonded, of_type
 from unit.case.faulty_cases import FAULTY_CASES, FAULTY_SIZES, FAULTY_TABLE_CELLS
 from unit.case.faulty_envelopes import FAULTY_ENVELOPES
@@ -17,7 +17,7 @@ from feti_homog.case.cases import check_phases, load, parse
 from feti_homog.case.interface_section import Arc, InterfaceSection
 from feti_homog.case.load_sections import Angle, LoadPath
 from feti_homog.errors import CaseError
-from feti_homog.materials.material_forms import General, Isotropic, Orthotropic
+from feti_homog.materials.material_forms import Isotropic
 
 FAULTY = FAULTY_CASES | FAULTY_BONDINGS | FAULTY_ENVELOPES | FAULTY_LOADS | FAULTY_SIZES | FAULTY_TABLE_CELLS
 FAULTY |= FAULTY_COHESIVE_LAWS
@@ -127,16 +127,6 @@ def test_sections_of_bonds_and_loads_are_read(tmp_path):
     assert (case.path.method, case.path.increments, case.path.max_events) == ("events", None, 100_000)
     there_and_back = case_of(tmp_path, of_type("path", "[path]\nwaypoints = [[1, 0, 0], [0, 0, 0]]"))
     assert tuple(there_and_back.path.placed.values()) == ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-
-
-def test_the_keys_of_a_material_choose_its_kind(tmp_path):
-    assert case_of(tmp_path, fibre("stiffness = [[3, 1, 0], [1, 3, 0], [0, 0, 1]]\n")).materials["fibre"] == General(
-        ((3.0, 1.0, 0.0), (1.0, 3.0, 0.0), (0.0, 0.0, 1.0))
-    )
-    constants = "E1 = 10.0\nE2 = 5.0\nnu12 = 0.3\nG12 = 2.0\n"
-    assert case_of(tmp_path, fibre(constants, "stress")).materials["fibre"] == Orthotropic(
-        E1=10.0, E2=5.0, nu12=0.3, G12=2.0
-    )
 
 
 def test_mesh_file_is_beside_the_case(tmp_path):

@@ -29,6 +29,7 @@ def in_space(case: str, bonds: str = "") -> str:
 
 VALID_CASES = {
     "base": BASE,
+    "accuracy": BASE.replace("mesh_size = 0.05", "accuracy = 1e-3"),
     "named, with options": "name = 'Zelle'\n"
     + BASE
     + "[decomposition]\nmax_dofs = 5000\n[petsc]\nfeti_ksp_rtol = 1e-8\nfeti_view = true\n",
