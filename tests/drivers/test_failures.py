@@ -55,28 +55,6 @@ def test_faulty_meshes_end_with_2_and_write_nothing(tmp_path, message, ranks):
     assert_refused(job, [message], tmp_path / "results")
 
 
-@pytest.mark.parametrize(
-    ("options", "messages"),
-    [
-        (["-feti_ksp_rtoll", "1e-3", "-feti_pc_typ", "none"], ["-feti_ksp_rtoll", "-feti_pc_typ"]),
-        (["-feti_foo"], ["-feti_foo: unknown option"]),
-        (
-            ["-feti_ksp_rtol", "2.0", "-feti_pc_type", "jacobi"],
-            ["-feti_ksp_rtol 2.0: expected a number above 0 and below 1", "-feti_pc_type jacobi: expected one of auto"],
-        ),
-    ],
-)
-def test_mistyped_options_end_with_2(tmp_path, options, messages):
-    job = command_line(2, "run", case_file(tmp_path), "--out", tmp_path / "results", "--quiet", *options)
-    assert_refused(job, messages, tmp_path / "results")
-
-
-def test_mistyped_options_of_the_case_end_with_2(tmp_path):
-    path = case_file(tmp_path, "[petsc]\nfeti_ksp_rtoll = 1e-3\n")
-    job = command_line(2, "run", path, "--out", tmp_path / "results", "--quiet")
-    assert_refused(job, ["feti_ksp_rtoll"], tmp_path / "results")
-
-
 @pytest.mark.parametrize("ranks", [0, 2])
 def test_a_file_in_the_place_of_the_folder_is_left_alone(tmp_path, ranks):
     out = tmp_path / "results"
