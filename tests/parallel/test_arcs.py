@@ -104,17 +104,6 @@ def test_several_arcs_debond_the_chosen_fibres_only(comm):
     parallel_assert(comm, not state[np.isin(number, [3, 5])].any())
 
 
-def test_every_opening_has_its_tips(comm):
-    openings = [0.0, 30.0, 75.0, 180.0, 359.0, 360.0]
-    case = case_of(CIRCULAR, [{"fibre": 2, "centre": 20.0}], angle={"values": openings})
-    cell, nodes = torn(case, comm)
-    for opening in openings[1:-1]:
-        check(comm, case, nodes, cell, {2: [(20.0, opening)]}, opening)
-    for opening in (0.0, 360.0):
-        number, _, state = nodes(opening)
-        parallel_assert(comm, bool(np.all(state == ((opening > 0) & (number == 2)))))
-
-
 def test_a_tip_beside_a_crossing_is_the_crossing(comm):
     """The side of the cell crosses the fibre at its corner at 90 degrees, which becomes the tip."""
     case = case_of(CIRCULAR, [{"fibre": 1, "centre": 60.0, "angle": 60.04}])
