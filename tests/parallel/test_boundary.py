@@ -151,25 +151,16 @@ def wanted(load, edges, interface=None, n_ranks=1, refine=0, policy=SMALL_PIECES
     return wanted_pieces(case, np.array(load), np.array(edges), lattice, n_ranks, policy).tolist()
 
 
-def test_large_bodies_are_cut():
+def test_pieces_follow_loads_ranks_and_boundaries():
     assert wanted([240, 260, 30, 1000], [90, 10, 10, 10]) == [1, 3, 1, 10]
     # Four elements a triangle.
     assert wanted([60, 65], [10, 10], refine=1) == [1, 3]
-
-
-def test_pieces_do_not_grow_with_their_body():
     assert wanted([5000], [10]) == [50]
     assert wanted([20_000, 30], [10, 10]) == [200, 1]
-
-
-def test_bodies_that_can_be_shared_evenly_are_whole_up_to_a_larger_size():
     load, edges = [600] * 100 + [1700], [10] * 101
     assert wanted(load, edges) == [1] * 100 + [17]
     assert wanted(load, edges, n_ranks=16) == [6] * 100 + [17]
     assert wanted([600] * 2, [400, 800]) == [6, 6]
-
-
-def test_bodies_that_debond_are_whole_unless_their_boundary_is_wide():
     bonds_break = sections.InterfaceSection()
     assert wanted([260, 3000, 260], [10, 39, 41], bonds_break) == [1, 1, 3]
     assert wanted([70, 70], [19, 21], bonds_break, refine=1) == [1, 3]

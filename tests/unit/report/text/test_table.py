@@ -9,10 +9,12 @@ from feti_homog.report.text.stiffness_tables import constants, moduli, stiffness
 from feti_homog.report.text.tables import Column, Table
 
 
-def test_html_has_the_decimals_of_text_and_small_errors():
+def test_html_has_the_decimals_of_text_small_errors_and_notes():
     columns = [Column(""), Column("stiffness", 12, ".3f"), Column("value"), Column("error", 12, ".1e")]
     table = Table("t", columns, [["S11", 12.34567, 12.34567891, 4.6e-13], ["S12", 1e-6, 1e-15, 0.0], ["n", 3]])
     assert table.cells == [["S11", "12.346", "12.34568", "4.6e-13"], ["S12", "0.000", "0", "0.0e+00"], ["n", "3"]]
+    html = Table("t", [Column("x")], [[1]], ["a < b"], ["c"]).html
+    assert "<caption>t<small>a &lt; b</small><small>c</small></caption>" in html
 
 
 def test_the_error_of_the_mesh_gives_the_digits_of_a_constant():
@@ -36,11 +38,6 @@ def test_rows_abreast_and_columns_in_blocks():
     table = Table("t", [Column("", -4), *map(Column, "xyz")], [["p", 1, 2, "-"], ["q", "-", "-", 3]], most_columns=2)
     assert [line.split() for line in table.lines] == [["t"], ["x", "y"], ["p", "1", "2"], ["z"], ["q", "3"]]
     assert table.cells == [["p", "1", "2", "-"], ["q", "-", "-", "3"]] and table.html.count("<tr>") == 3
-
-
-def test_notes_stand_in_the_caption():
-    html = Table("t", [Column("x")], [[1]], ["a < b"], ["c"]).html
-    assert "<caption>t<small>a &lt; b</small><small>c</small></caption>" in html
 
 
 def document(count: int, names: tuple[str, ...], without: tuple[int, ...] = (), **section: Any) -> dict[str, Any]:
