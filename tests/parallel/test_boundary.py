@@ -12,10 +12,9 @@ from support.cases import make_case, relative_error, solve
 from feti_homog.case import sections
 from feti_homog.errors import CaseError
 from feti_homog.feti.factory import construct
-from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.one_subdomain import ExplicitInterfaceOperator, ImplicitInterfaceOperator
 from feti_homog.feti.solver_plan import BONDED, PRECONDITIONERS
-from feti_homog.feti.thresholds import DEFAULTS, Thresholds
+from feti_homog.feti.thresholds import Thresholds
 from feti_homog.homogenization import unit_cell
 from feti_homog.homogenization.partition_policy import PartitionPolicy, wanted_pieces
 from feti_homog.mesh.refinement import ReferenceLattice
@@ -114,21 +113,6 @@ def test_implicit_and_explicit_operators_give_the_same(comm):
         found.append((L, matrix(cell, cell.solver.operator.apply)))
     for first, second in zip(*found, strict=True):
         assert relative_error(first, second) < 1e-9
-
-
-def test_operators_are_explicit_where_they_pay(comm):
-    cell = torn_cells.tear(comm, geometry="hexagonal", petsc={"feti_coarse_space": "natural"})
-
-    def kinds(applications, soft, thresholds=DEFAULTS):
-        boundary = InterfaceOperators(
-            cell.solver.jump_operator, cell.subdomains, "auto", applications, soft, thresholds
-        )
-        return set().union(*comm.allgather({type(o) for o in boundary.operators}))
-
-    assert kinds(0, False) == {ImplicitInterfaceOperator}
-    assert kinds(10**6, False) == {ExplicitInterfaceOperator}
-    assert kinds(0, True) == {ExplicitInterfaceOperator}
-    assert kinds(10**6, True, SMALL_DENSE) == {ImplicitInterfaceOperator}
 
 
 def test_adaptive_space_is_refused_where_boundaries_are_too_large(comm):
