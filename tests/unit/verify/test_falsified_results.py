@@ -253,10 +253,7 @@ def test_displacements_that_fit_their_stresses_break_equilibrium_alone(results, 
         file["state/0/displacement"][()] = displacement
         file["state/0/stress"][()] = cell.elements.fields(displacement, displacement, 0.0, cell.expansions).stress
 
-    assert broken(falsified(results("bonded"), tmp_path / "copy", edit)) - {"stress 33"} == {
-        "equilibrium",
-        "files",
-    }
+    assert broken(falsified(results("bonded"), tmp_path / "copy", edit)) - {"stress 33"} == {"equilibrium", "files"}
 
 
 def test_the_held_place_may_collect_the_rounding_of_all_others_and_no_more(results):
