@@ -38,9 +38,9 @@ def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     pairs = interface_edges(mesh)
     points, circles, arcs = mesh.points.copy(), list[Ellipses](), list[Int32]()
     for classes, places, chain, loop in _closed_loops(mesh, pairs, middles, MIN_CIRCLE_EDGES):
-        circle = fit_ellipse(chain, is_round=True)
-        moved = None if circle is None else _moved(mesh.points[classes], places, circle.circles[0], mesh.period)
-        if circle is None or moved is None:
+        circle = _fit_circle(places)
+        moved = _moved(mesh.points[classes], places, circle, mesh.period) if _holds(circle, chain) else None
+        if moved is None:
             continue
         points[classes] = moved
         circles += [circle.at(circle.centres - step) for step, _ in loop]
@@ -68,7 +68,7 @@ def with_ellipses(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     """Replace elliptic interfaces by ellipses, where they are no circles.
 
     A closed interface between two phases is an ellipse if all its nodes are within ROUNDNESS_TOLERANCE of one, and it
-    has at least MIN_ELLIPSE_EDGES edges, none on a side of the cell, none that spans more than one radian of its
+    has at least MIN_ELLIPSE_EDGES edges, none on a side of the cell, none that spans more than 60 degrees of its
     parameter or that the ellipse leaves by more than MOST_BENT of its length. Middle nodes, where there are any, cut
     edges in two. Others stay as they are. Edges are flipped where a triangle has two on one ellipse.
     """
@@ -76,8 +76,8 @@ def with_ellipses(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     pairs = pairs[~np.isin(edge_keys(pairs, nodes), edge_keys(mesh.arc_edges, nodes))]
     ellipses, arcs = list[Ellipses](), list[Int32]()
     for _, places, chain, loop in _closed_loops(mesh, pairs, middles, MIN_ELLIPSE_EDGES):
-        ellipse, onward = fit_ellipse(chain), np.roll(places, -1, axis=0)
-        if ellipse is None:
+        ellipse, onward = fit_ellipse(places), np.roll(places, -1, axis=0)
+        if ellipse is None or not _holds(ellipse, chain):
             continue
         # The ray to m, the middle of an edge, leaves the ellipse at m / |F^-1 m|.
         m = (places + onward) / 2 - ellipse.centres
@@ -170,39 +170,48 @@ def _closed_loops(
                 yield classes[order], places, chain, images
 
 
-def _moved(points: Float, places: Float, circle: Float, size: Float) -> Float | None:
+def _moved(points: Float, places: Float, circle: Ellipses, size: Float) -> Float | None:
     """Move points (k, 2) onto the circle, side nodes along their side; None if impossible."""
-    centres = circle[:2] - np.round((places - points) / size) * size
+    centres, radius = circle.centres - np.round((places - points) / size) * size, circle.frames[0, 0, 0]
     spokes = points - centres
-    moved: Float = centres + circle[2] * spokes / np.linalg.norm(spokes, axis=1)[:, None]
+    moved: Float = centres + radius * spokes / np.linalg.norm(spokes, axis=1)[:, None]
     on_side = (points == 0) | (points == size)
     if on_side.all(axis=1).any():
         return None
     for axis in (0, 1):
         fixed = np.flatnonzero(on_side[:, axis])
-        across = 1 - (spokes[fixed, axis] / circle[2]) ** 2
+        across = 1 - (spokes[fixed, axis] / radius) ** 2
         # Where the circle nearly touches the side, a node cannot get onto it along the side.
         if np.any(across < 1e-4):
             return None
         moved[fixed, axis] = points[fixed, axis]
-        half = np.sign(spokes[fixed, 1 - axis]) * circle[2] * np.sqrt(across)
+        half = np.sign(spokes[fixed, 1 - axis]) * radius * np.sqrt(across)
         moved[fixed, 1 - axis] = centres[fixed, 1 - axis] + half
     return moved
 
 
-def fit_ellipse(places: Float, is_round: bool = False) -> Ellipses | None:
-    """Fit an ellipse, or a circle, to a closed chain of positions (k, 2) in order.
+def _fit_circle(places: Float) -> Ellipses:
+    """Fit a circle |d|^2 = 2 c.d + r^2 - |c|^2, d from the mean of the positions (k, 2)."""
+    mean = places.mean(axis=0)
+    scale = np.abs(places - mean).max()
+    scaled = (places - mean) / scale
+    matrix = np.column_stack([2 * scaled, np.ones(len(places))])
+    (x, y, rest), *_ = np.linalg.lstsq(matrix, (scaled**2).sum(axis=1), rcond=None)
+    radius = np.sqrt(max(rest + x * x + y * y, 0.0))
+    return Ellipses.round(np.array([[*(mean + scale * np.array([x, y])), scale * radius]]))
 
-    None if they are on none or too far apart.
+
+def fit_ellipse(places: Float) -> Ellipses | None:
+    """Fit an ellipse to a closed chain of positions (k, 2) in order; None if `_holds` is false.
 
     The conic d.A.d + b.d = 1 that fits best, d from the mean of the places, is |F^-1 (d - c)| = 1.
     """
     mean = places.mean(axis=0)
     scale = np.abs(places - mean).max()
     x, y = ((places - mean) / scale).T
-    squares = [x * x + y * y] if is_round else [x * x, x * y, y * y]
-    (*coefficients, bx, by), *_ = np.linalg.lstsq(np.column_stack([*squares, x, y]), np.ones(len(x)), rcond=None)
-    xx, xy, yy = coefficients if not is_round else (coefficients[0], 0.0, coefficients[0])
+    (xx, xy, yy, bx, by), *_ = np.linalg.lstsq(
+        np.column_stack([x * x, x * y, y * y, x, y]), np.ones(len(x)), rcond=None
+    )
     A = np.array([[xx, xy / 2], [xy / 2, yy]])
     values, axes = np.linalg.eigh(A)
     if values[0] <= np.sqrt(np.finfo(float).eps) * values[1]:  # it may be a parabola but for rounding
@@ -210,9 +219,12 @@ def fit_ellipse(places: Float, is_round: bool = False) -> Ellipses | None:
     centre = -np.linalg.solve(A, [bx, by]) / 2
     level = 1 + centre @ A @ centre
     frame = axes * np.sqrt(level / values)
-    on_circle = np.linalg.solve(frame, np.stack([x, y]) - centre[:, None])
+    ellipse = Ellipses((mean + scale * centre)[None], scale * frame[None])
+    return ellipse if _holds(ellipse, places) else None
+
+
+def _holds(ellipse: Ellipses, chain: Float) -> bool:
+    """Return whether positions (k, 2) are on an ellipse F, with distances |F^-1 d| <= 1 from each to the next."""
+    on_circle = np.linalg.solve(ellipse.frames[0], (chain - ellipse.centres).T)
     chord = np.hypot(*(np.roll(on_circle, -1, axis=1) - on_circle))
-    away = np.abs(np.hypot(*on_circle) - 1)
-    if away.max() > ROUNDNESS_TOLERANCE or chord.max() > (1.0 if is_round else 2 * np.sin(0.5)):
-        return None
-    return Ellipses((mean + scale * centre)[None], scale * frame[None])
+    return bool(chord.max() <= 1 and np.all(np.abs(np.hypot(*on_circle) - 1) <= ROUNDNESS_TOLERANCE))
