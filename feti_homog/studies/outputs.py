@@ -12,6 +12,7 @@ from feti_homog.system.runtime import records
 from feti_homog.typing import Document
 
 PHASES_OF_ONE_FIBRE = 2
+MEASURES = ("principal", "von_mises", "hydrostatic", "utilisation")  # of the stresses in a phase
 Column = result_json.DescribedColumn
 
 
@@ -43,6 +44,7 @@ def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numb
     values |= _path(document) | _envelope(document)
     if (load := document.get("load")) is not None:
         values |= _at_point("load", load) | {f"load_{name}": load[name] for name in ("stored", *point_tables.STATES)}
+    values |= _phases(document)
     values |= {f"check_{name}": error for name, error in document["checks"].items()}
     values |= {f"seconds_{stage}": seconds for stage, seconds in document["timings"].items()}
     return {name: float(value) for name, value in (values | {"memory": document["memory"]}).items()}
@@ -102,6 +104,17 @@ def _path(document: Document) -> dict[str, float]:
     summit = landmarks.peak_of(document)
     values |= {f"peak_{summit[f'{kind}_name']}": summit[kind] for kind in ("stress", "strain")}
     return values | {f"end_{state}": points[-1][state] for state in point_tables.STATES}
+
+
+def _phases(document: Document) -> dict[str, float]:
+    """Return the largest stresses of the phases under each load; of angles and paths those of all states."""
+    values, is_curve = dict[str, float](), "angle" in document or "path" in document
+    for phase in document.get("phase_stresses", ()):
+        for measure in (name for name in MEASURES if name in phase):
+            named = dict(zip(phase["state"], phase[measure], strict=True))
+            columns = {"": max(named.values())} if is_curve else {f"{label}_": value for label, value in named.items()}
+            values |= {f"{place}{phase['phase']}_{measure}": value for place, value in columns.items()}
+    return values
 
 
 def _envelope(document: Document) -> dict[str, float]:
@@ -193,6 +206,8 @@ OUTPUT_COLUMNS = (
     Column("envelope_AXIS", "that of the axis", "load at onset along the first axis of an envelope"),
     Column("envelope_least_AXIS_AXIS", "that of the axes", "least load at onset of all directions"),
     Column("envelope_largest_AXIS_AXIS", "that of the axes", "largest, if every direction has one"),
+    Column("LOAD_PHASE_MEASURE", records.STRESS, "largest principal, von_mises or hydrostatic stress of a phase"),
+    Column("LOAD_PHASE_utilisation", "", "largest utilisation of its strength; of angles and paths without LOAD"),
     Column("check_LAW", "", "largest relative error of a law, as in result.json"),
     Column("seconds_STAGE", "s", "wall time of a stage, the largest over ranks"),
     Column("memory", "bytes", "peak resident memory, the largest over ranks"),

@@ -13,6 +13,7 @@ from feti_homog.verify.check_constants import check_constants
 from feti_homog.verify.check_loads import StateNumbers, States, check_loads
 from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh, check_mesh_error, check_rates
 from feti_homog.verify.check_path import check_envelope, check_path
+from feti_homog.verify.check_phases import check_phases
 from feti_homog.verify.check_sensitivities import check_sensitivities
 from feti_homog.verify.check_state import check_state
 from feti_homog.verify.discrete_cell import DiscreteCell
@@ -101,6 +102,7 @@ def laws_of_fields(findings: Findings, cell: DiscreteCell) -> list[StateNumbers]
         fields = cell.elements.fields(state.displacement, terms, state.along, state.temperature * cell.expansions)
         check_state(findings, cell, state, fields)
         check_mesh_error(findings, cell, state)
+        check_phases(findings, cell, state, len(states))
         if before is not None and "path" in files.document:
             check_step_heat(findings, cell, before, state)
         before = state

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.materials import voigt
-from feti_homog.report.text import point_tables
+from feti_homog.report.text import phase_tables, point_tables
 from feti_homog.report.text.constant_tables import sensitivities, table
 from feti_homog.report.text.path_table import ROWS, path_table
 from feti_homog.report.text.stiffness_tables import bounds, constants, moduli, stiffnesses, thermal
@@ -23,6 +23,7 @@ from feti_homog.typing import Document
 
 LABEL = 12  # columns of the labels at the left
 NAME = 28  # columns of the names of checks
+STATES = 4  # of a curve whose largest stresses are shown
 GLUE = "\N{NO-BREAK SPACE}"  # at which no line is broken
 REMARKS = ("Remark", "Warning", "Fault")
 
@@ -155,7 +156,10 @@ def notebook(document: Document) -> str:
 
 def answers(document: Document, most: int | None = None) -> list[Table]:
     """Return the tables of a result, with at most `most` rows of points."""
-    return reported(document).tables(document, most)
+    analysis = reported(document)
+    count = max((len(phase["state"]) for phase in document.get("phase_stresses", ())), default=0)
+    states = analysis.states(document, STATES, count) if analysis.is_curve else range(count)
+    return [*analysis.tables(document, most), *phase_tables.phase_tables(document, states)]
 
 
 def title_of(document: Document) -> str:
