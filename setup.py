@@ -18,7 +18,7 @@ setup(
     license="MIT",
     python_requires=">=3.11",
     packages=find_packages(include=["feti_homog", "feti_homog.*"]),
-    package_data={"feti_homog.report": ["page.css"]},
+    package_data={"feti_homog.report": ["page.css", "page.html"]},
     install_requires=[
         "numpy>=1.23",  # of the major version that petsc4py was built for: scripts/bootstrap takes that one
         "scipy>=1.10",

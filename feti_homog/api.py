@@ -1,4 +1,4 @@
-"""Computing from a program of one's own; PETSc starts when the first case is run."""
+"""Run cases, sweeps and fits from a Python program; PETSc starts with the first case."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feti_homog.case import Case
-from feti_homog.errors import EXIT_DONE, CaseError, LibraryError
+from feti_homog.errors import CaseError, ExitCode, LibraryError
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.petsc import libraries, option_table, option_values
 from feti_homog.system.runtime import environment, standard_streams
@@ -33,8 +33,8 @@ def run(
 ) -> result.Result:
     """Return the result of a case on every rank of `comm` (default: all ranks).
 
-    Collective over `comm`; ranks outside of it need not call it, nor wait.  If the program has not started PETSc,
-    this does, without options: the case's own are in its `petsc`.
+    Collective over `comm`; ranks outside of it need not call it, nor wait.  PETSc starts without options unless the
+    program has started it: options of the case are in its `petsc`.
 
     Args:
         out: a folder for the files that `feti-homog run` writes; without it none is written.
@@ -73,7 +73,7 @@ def run_sweep(
     Finished cases in `out` are kept, so that the same call goes on after an interruption.
 
     Args:
-        ranks_per_case: as many cases run at once as there are groups of so many ranks (default: one, on all).
+        ranks_per_case: ranks of a case (default: all); each group of so many ranks runs a case at once.
         retry: compute failed cases again.
         quiet: do not print a line for each case.
 
@@ -88,8 +88,7 @@ def run_sweep(
         sweep = mpi_errors.on_root(comm, sweep_cases.expand, cases, Path())
     else:
         sweep = mpi_errors.on_root(comm, sweep_cases.load, cases)
-    group = comm.size if ranks_per_case is None else ranks_per_case
-    case_runs.run_all(sweep, folder(out), comm, group, retry, quiet)
+    case_runs.run_all(sweep, folder(out), comm, ranks_per_case, retry, quiet)
     return mpi_errors.on_root(comm, collect.read, Path(out))
 
 
@@ -131,7 +130,7 @@ def run_fit(
         study = mpi_errors.on_root(comm, fit_file.load, Path(fit))
     else:
         study = mpi_errors.on_root(comm, fit_file.parse, fit, Path())
-    return study.run(folder(out), comm, comm.size if ranks_per_case is None else ranks_per_case, retry, quiet)
+    return study.run(folder(out), comm, ranks_per_case, retry, quiet)
 
 
 def launch(
@@ -147,7 +146,7 @@ def launch(
 
     def command(words: Sequence[str], comm: Intracomm) -> int:
         main(parsed(parser, words, comm), comm)
-        return EXIT_DONE
+        return ExitCode.DONE
 
     return start(command, argv)
 
@@ -187,7 +186,7 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
 def folder(name: str | Path) -> Path:
     """Return the folder, or file, of that name.
 
-    Raises CaseError for an empty one, by which Path means the current folder, and for one that no system takes.
+    Raises CaseError for an empty name, which Path takes for the current folder, and for null characters.
     """
     if name == "":
         raise CaseError('"" is no name of a folder; the current one is "."')
@@ -211,7 +210,7 @@ def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracom
 
 
 def _started(comm: Intracomm | None) -> Intracomm:
-    """Return the communicator, all ranks' by default, with PETSc started."""
+    """Start PETSc unless it runs; returns the communicator, by default that of all ranks."""
     environment.prefer_own_toolkits()
     libraries.require()
     from mpi4py import MPI

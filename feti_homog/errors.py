@@ -1,17 +1,24 @@
-"""Errors that a user can cause or must hear of, and the exit codes."""
-
-from __future__ import annotations
+"""Errors that are printed for the user, and the exit codes."""
 
 import re
-from typing import Any
+from enum import IntEnum
+from typing import Any, Self
 
-EXIT_DONE, EXIT_DEFECT, EXIT_INPUT, EXIT_UNCONVERGED = 0, 1, 2, 3
 # Characters of a fault and number of faults: a file may have any number of them, with words of any length.
 LONGEST_LINE, KEPT_END, MOST_FAULTS = 1000, 200, 30
 
 
+class ExitCode(IntEnum):
+    """Exit codes of the program."""
+
+    DONE = 0
+    DEFECT = 1
+    INPUT = 2
+    UNCONVERGED = 3
+
+
 def escaped(text: str, allowed: str = "") -> str:
-    """Escape characters that are not printable, but for `allowed`: a terminal would obey a file's."""
+    """Escape all characters but printable and `allowed` ones: a terminal would obey control characters of a file."""
     return re.sub(r"[^ -~]", lambda c: c[0] if c[0].isprintable() or c[0] in allowed else ascii(c[0])[1:-1], text)
 
 
@@ -21,7 +28,7 @@ class FetiHomogError(Exception):
     Lines are cut to LONGEST_LINE characters, before their last KEPT_END; beyond MOST_FAULTS the others are counted.
     """
 
-    exit_code = EXIT_DEFECT
+    exit_code = ExitCode.DEFECT
 
     def __init__(self, *faults: str) -> None:
         more = len(faults) - MOST_FAULTS
@@ -33,26 +40,26 @@ class FetiHomogError(Exception):
         self.faults = tuple(f"{n[:end]}...{n[-KEPT_END:]}" if len(n) > LONGEST_LINE else n for n in lines)
         super().__init__("\n".join(self.faults))
 
-    def __reduce__(self) -> tuple[type[FetiHomogError], tuple[Any, ...]]:
+    def __reduce__(self) -> tuple[type[Self], tuple[Any, ...]]:
         return type(self), self.faults
 
 
 class CaseError(FetiHomogError):
     """The case file or the command line is faulty; each fault names section and key."""
 
-    exit_code = EXIT_INPUT
+    exit_code = ExitCode.INPUT
 
 
 class MeshError(FetiHomogError):
     """The cell cannot be meshed, or a user's mesh is faulty; each fault names nodes or elements."""
 
-    exit_code = EXIT_INPUT
+    exit_code = ExitCode.INPUT
 
 
 class ConvergenceError(FetiHomogError):
     """A solve did not converge or a check failed; the computed part is written and marked."""
 
-    exit_code = EXIT_UNCONVERGED
+    exit_code = ExitCode.UNCONVERGED
 
 
 class NotCarriedError(ConvergenceError):
@@ -60,10 +67,10 @@ class NotCarriedError(ConvergenceError):
 
 
 class NoMemoryError(FetiHomogError):
-    """A rank has no memory left, of which all ranks know."""
+    """A rank has no memory left, and all ranks know it."""
 
 
 class LibraryError(FetiHomogError):
     """A library that pip does not bring is missing or does not fit; each fault gives the remedy."""
 
-    exit_code = EXIT_INPUT
+    exit_code = ExitCode.INPUT

@@ -92,11 +92,7 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
     comm = report_comm()
     failure = f"rank {comm.rank}:\n{report.longreprtext}" if report.failed else ""
     if not others_come(comm, PATIENCE if failure else float("inf")):
-        print(
-            f"{item.nodeid}: the other ranks do not end this test;\n{failure}",
-            file=sys.__stderr__,
-            flush=True,
-        )
+        print(f"{item.nodeid}: the other ranks do not end this test;\n{failure}", file=sys.__stderr__, flush=True)
         comm.Abort(1)
     failures = [text for text in comm.allgather(failure) if text]
     if failures:

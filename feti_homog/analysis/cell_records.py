@@ -1,13 +1,20 @@
 """Records of the cell, fibres, solver, checks and sensitivities in result.json."""
 
-from collections.abc import Mapping
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from feti_homog.materials import phase_bounds
+from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.system.runtime import described, records
 from feti_homog.typing import Float
+
+if TYPE_CHECKING:
+    from feti_homog.homogenization import unit_cell
 
 
 @dataclass(frozen=True)
@@ -57,6 +64,27 @@ class FibreInfo:
         "strength of its bonds / that of [interface]; absent where all fibres have the same", default=None
     )
 
+    @classmethod
+    def all_of(cls, cell: unit_cell.TornCell) -> tuple[FibreInfo, ...]:
+        """Return the records of the fibres, in the order of their numbers."""
+        summary, factors = cell.summary, cell.strength_factors
+        bodies, varies = summary.fibre_bodies, not (factors == 1.0).all()
+        ellipses = Ellipses(summary.centres, summary.frames)
+        is_ellipse = np.isnan(summary.radii) & ~np.isnan(ellipses.angles)
+        return tuple(
+            cls(
+                number=number,
+                phase=summary.phases[summary.constituent_phase[body]],
+                centre=None if np.isnan(summary.centres[body, 0]) else summary.centres[body],
+                radius=None if np.isnan(summary.radii[body]) else float(summary.radii[body]),
+                semi_axes=ellipses.semi_axes[body] if is_ellipse[body] else None,
+                angle=float(ellipses.angles[body]) if is_ellipse[body] else None,
+                coating=float(thickness) if thickness > 0 else None,
+                strength=float(factor) if varies else None,
+            )
+            for number, (body, thickness, factor) in enumerate(zip(bodies, summary.coatings, factors, strict=True), 1)
+        )
+
 
 @dataclass(frozen=True)
 class SolverInfo:
@@ -76,6 +104,27 @@ class SolverInfo:
     solves: int = described("dual problems solved")
     iterations: tuple[int, ...] = described("Krylov iterations of each state")
     converged_reason: tuple[int, ...] = described("PETSc's KSPConvergedReason of each state, negative if it failed")
+
+    @classmethod
+    def of(cls, cell: unit_cell.TornCell, iterations: Sequence[int], reasons: Sequence[int]) -> SolverInfo:
+        """Return the record of the solvers in all problems.  Collective."""
+        plan, solvers = cell.summary, [problem.solver for problem in cell.problems]
+        return cls(
+            ranks=cell.comm.size,
+            bodies=plan.bodies,
+            subdomains=plan.subdomains,
+            dofs=cell.sum_over_ranks(sum(s.n_dofs for solver in solvers for s in solver.subdomains)),
+            multipliers=sum(s.jump_operator.global_rows for s in solvers),
+            interface_nodes=plan.interface_nodes or cell.sum_over_ranks(len(cell.solver.jump_operator.nodes.row)),
+            kernel_dim=sum(s.natural.kernel_dimension for s in solvers),
+            coarse_dim=sum(s.coarse_dimension for s in solvers),
+            factorizations=cell.sum_over_ranks(sum(len(s.interface_operators.operators) for s in solvers)),
+            coarse_factorizations=sum(s.natural.factorizations for s in solvers),
+            rtol=cell.solver.rtol,
+            solves=sum(s.solves for s in solvers),
+            iterations=tuple(iterations),
+            converged_reason=tuple(reasons),
+        )
 
 
 @dataclass(frozen=True)

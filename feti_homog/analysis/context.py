@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,12 +16,13 @@ from feti_homog.homogenization import averaging, cell_remarks, phase_laws, unit_
 from feti_homog.interface import Load
 from feti_homog.interface.contact import BONDED, OPEN, BondState, Equilibrium, coupled_interfaces, load_scales
 from feti_homog.materials import voigt
-from feti_homog.results import checkpoints
+from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.runtime import progress_bar
 from feti_homog.typing import Float
 
 if TYPE_CHECKING:
     from feti_homog.homogenization import energy_release
+    from feti_homog.results import checkpoints
 
 
 class CellLoads:
@@ -38,11 +40,6 @@ class CellLoads:
         )
         self.interfaces = coupled_interfaces.CoupledInterfaces(*(problem.interface for problem in self.problems))
         self.names = tuple(name for problem in self.problems for name in problem.loads)
-
-    @property
-    def plane(self) -> averaging.Homogenization:
-        """The plane problem."""
-        return self.problems[0]
 
     def load(self, target: Mapping[str, float]) -> Load:
         """Return the load of a waypoint, a mapping of strains and stresses."""
@@ -104,7 +101,7 @@ class AnalysisContext:
         checks: checks of all responses so far.
         states: recorder of states.
         progress: printed lines and bars.
-        checkpoint: store of path events.
+        directory: folder of the result, if any, where path events are stored.
         resume: whether a path goes on from the checkpoint.
         log: function that is called with a line about each path event.
         events: name of the file with all these lines.
@@ -117,7 +114,7 @@ class AnalysisContext:
     checks: CheckRecorder
     states: StateRecorder
     progress: progress_bar.Progress
-    checkpoint: checkpoints.EventsInMemory
+    directory: Path | None = None
     resume: bool = False
     log: Callable[[str], object] = lambda line: None
     events: str = "result.path"
@@ -129,16 +126,15 @@ class AnalysisContext:
     def of(
         cls, cell: unit_cell.TornCell, progress: progress_bar.Progress, states: StateRecorder | None = None
     ) -> AnalysisContext:
-        """Return a context without checkpoint; `states` = None records no states."""
+        """Return a context without a folder; `states` = None records no states."""
         contact = cell.case.interface is not None and cell.case.interface.contact
         recorder = StateRecorder(cell, None, False, progress.say) if states is None else states
-        checks, checkpoint = CheckRecorder(cell.solver.rtol), checkpoints.EventsInMemory(cell.comm, 0)
-        return cls(CellLoads(cell, contact), checks, recorder, progress, checkpoint)
+        return cls(CellLoads(cell, contact), CheckRecorder(cell.solver.rtol), recorder, progress)
 
     @property
     def plane(self) -> averaging.Homogenization:
         """The plane problem."""
-        return self.loads.plane
+        return self.loads.problems[0]
 
     @property
     def cell(self) -> unit_cell.TornCell:
@@ -179,6 +175,19 @@ class AnalysisContext:
         for number, (name, response) in enumerate(zip(self.loads.names, responses, strict=True)):
             pair = (response, None) if number < in_plane else (None, response)
             self.states.record(pair, load_factor, f"{label}{name}", point)
+
+    @cached_property
+    def checkpoint(self) -> checkpoints.EventsInMemory:
+        """The store of path events, in the folder or in memory.  Collective when first read."""
+        from feti_homog.results import checkpoints  # paths alone have events
+
+        comm, jumps, room = self.cell.comm, self.cell.solver.jump_operator, checkpoints.room_of(self.case)
+        if self.directory is None:  # without fields and tips a path reads no event again
+            reads_again = self.states.has_place or self.plane.law.has_toughness
+            return checkpoints.EventsInMemory(comm, room if reads_again else 0)
+        pieces = f"{self.cell.summary.subdomains} subdomains on {comm.size} ranks, {jumps.global_rows} multipliers"
+        digest = mpi_errors.on_root(comm, self.case.digest, False)  # events are the same for any [output]
+        return checkpoints.Checkpoint(self.directory, comm, f"case {digest}, {pieces}", room)
 
     @cached_property
     def release_rates(self) -> energy_release.EnergyReleaseRates:

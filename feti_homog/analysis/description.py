@@ -32,10 +32,7 @@ def describe(case: Case, comm: MPI.Intracomm) -> str:
             cell, subdomains = case.cell, [count for count, _ in loads]
             nodes = [coarse_triangles * lattice.intervals**2 // 2 for _, coarse_triangles in loads]
             elements = summary.coarse_triangles * len(lattice.triangles)
-            plan = _plan(case, summary, multipliers, options, subdomains)
-            columns = multipliers if plan.preconditioner == "influence" else 0
             unresolved = cell_remarks.warnings(case, summary.width, summary.interface_edge)
-            solver = plan.in_words if multipliers else "one factor of the whole cell: no multipliers, no iterations"
             sizes = f"mesh_size = {cell.mesh_size:g}, refine = {cell.refine}, as asked for by accuracy"
             lines = [
                 f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",
@@ -46,12 +43,7 @@ def describe(case: Case, comm: MPI.Intracomm) -> str:
                 *([] if cell.accuracy is None else [f"sizes      {sizes}"]),
                 *_fibre_lines(case, summary),
                 f"tearing    {summary.bodies} bodies, {_subdomains(summary.subdomains)}, {multipliers} multipliers",
-                f"solver     {solver}",
-                *(
-                    f"rank {rank:<5} {_subdomains(count)}, about {2 * n} degrees of freedom"
-                    for rank, (count, n) in enumerate(zip(subdomains, nodes, strict=True))
-                ),
-                *_estimate_lines(case, summary, multipliers, nodes, subdomains, columns),
+                *_cost_lines(case, summary, multipliers, options, subdomains, nodes),
                 *(f"warning    {warning}" for warning in (*case.warnings(), *summary.warnings(), *unresolved)),
                 *(f"remark     {remark}" for remark in (*case.remarks(), *summary.remarks)),
                 "the case is valid",
@@ -61,59 +53,49 @@ def describe(case: Case, comm: MPI.Intracomm) -> str:
         return mpi_errors.on_root_only(comm, described) or ""
 
 
-def _estimate_lines(
-    case: Case,
-    summary: domain_partition.CellSummary,
-    multipliers: int,
-    nodes: Sequence[int],
-    subdomains: Sequence[int],
-    columns: int,
-) -> list[str]:
-    """Return lines about memory, of a path also to complete debonding, and about ranks.
-
-    `nodes` and `subdomains` are counted on each rank.
-    """
-    ranks, most_ranks = len(nodes), summary.coarse_triangles if summary.across else summary.bodies
-    components = [problem.components for problem in phase_laws.problems(case)]
-    memory = partition_policy.memory(nodes, subdomains, components, columns)
-    noun, limit = "rank" if ranks == 1 else "ranks", "" if summary.across else ", at most one per body"
-    end = partition_policy.memory_to_the_end(case, memory, multipliers, columns, ranks)
-    breaks = case.section.is_followed and case.interfaces and end > memory
-    few, all_bonds = partition_policy.in_words(memory), f", {partition_policy.in_words(end)} if all bonds break"
-    return [
-        f"estimate   on {ranks} {noun} about {few} on the largest{all_bonds if breaks else ''}, without pictures",
-        f"ranks      recommended: {partition_policy.recommended_ranks(sum(components) * sum(nodes), most_ranks)} "
-        f"({partition_policy.DOFS_OF_A_RANK} degrees of freedom per rank{limit})",
-    ]
-
-
 def _subdomains(count: int) -> str:
     return "1 subdomain" if count == 1 else f"{count} subdomains"
 
 
-def _plan(
+def _cost_lines(
     case: Case,
     summary: domain_partition.CellSummary,
     multipliers: int,
     options: solver_plan.SolverOptions,
     subdomains: Sequence[int],
-) -> solver_plan.SolverPlan:
-    """Plan the plane problem, with `subdomains` counted on each rank; pieces are dense by default.
+    nodes: Sequence[int],
+) -> Iterator[str]:
+    """Yield lines about the solver, ranks and memory, of a path also to complete debonding.
+
+    `subdomains` and `nodes` are counted on each rank; pieces are dense by default.
 
     Raises:
         CaseError: as `solver_plan.choose`; or with friction there are no influence columns.
     """
-    dense = options.operator != "implicit"
+    problems, ranks, dense = phase_laws.problems(case), len(nodes), options.operator != "implicit"
     has_thin = phase_names.COATING in case.materials and not summary.across
-    one_each = summary.across and len(subdomains) > 1 and set(subdomains) == {1}
-    applications = max(
-        partition_policy.applications(case, problem, summary.across) for problem in phase_laws.problems(case)
-    )
+    one_each = summary.across and ranks > 1 and set(subdomains) == {1}
+    applications = max(partition_policy.applications(case, problem, summary.across) for problem in problems)
     sizes = solver_plan.ProblemSizes(applications, summary.is_cut, dense, dense, multipliers, has_thin, one_each)
     plan = solver_plan.choose(sizes, options)
     if case.has_friction and plan.preconditioner != "influence":
         raise CaseError(solver_plan.WITHOUT_INVERSE)
-    return plan
+    solver = plan.in_words if multipliers else "one factor of the whole cell: no multipliers, no iterations"
+    yield f"solver     {solver}"
+    for rank, (count, n) in enumerate(zip(subdomains, nodes, strict=True)):
+        yield f"rank {rank:<5} {_subdomains(count)}, about {2 * n} degrees of freedom"
+    columns = multipliers if plan.preconditioner == "influence" else 0
+    components = [problem.components for problem in problems]
+    memory = partition_policy.memory(nodes, subdomains, components, columns)
+    end = partition_policy.memory_to_the_end(case, memory, multipliers, columns, ranks)
+    breaks = case.section.is_followed and case.interfaces and end > memory
+    all_bonds = f", {partition_policy.in_words(end)} if all bonds break" if breaks else ""
+    few, noun = partition_policy.in_words(memory), "rank" if ranks == 1 else "ranks"
+    yield f"estimate   on {ranks} {noun} about {few} on the largest{all_bonds}, without pictures"
+    most, limit = (summary.coarse_triangles, "") if summary.across else (summary.bodies, ", at most one per body")
+    recommended = partition_policy.recommended_ranks(sum(components) * sum(nodes), most)
+    reason = f"{partition_policy.DOFS_OF_A_RANK} degrees of freedom per rank{limit}"
+    yield f"ranks      recommended: {recommended} ({reason})"
 
 
 def _fibre_lines(case: Case, summary: domain_partition.CellSummary) -> Iterator[str]:

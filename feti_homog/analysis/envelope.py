@@ -17,8 +17,8 @@ from feti_homog.analysis.tip_records import DIRECTION_DIGITS, bond_directions, c
 from feti_homog.case import load_sections
 from feti_homog.errors import CaseError
 from feti_homog.homogenization import averaging
-from feti_homog.interface.laws import BondLaw
-from feti_homog.interface.path import onsets, path_points
+from feti_homog.interface.laws import UTILISATION_TIE, BondLaw
+from feti_homog.interface.path import onsets
 from feti_homog.materials import voigt
 from feti_homog.typing import Float, Int
 
@@ -141,7 +141,7 @@ class _Finder:
                     column = end
                 factors = self._onset.factors(directions, self._noise * total, start if rays.temperature else None)
             else:
-                breaks = used >= largest * (1.0 - path_points.UTILISATION_TIE)
+                breaks = used >= largest * (1.0 - UTILISATION_TIE)
                 factors = np.tile(np.where(breaks, 0.0, np.inf), (len(directions), 1))
             for ray, (factor, fibre, pair, angle, *shares) in enumerate(self._first(factors, start, directions), first):
                 if np.isinf(factor):
@@ -179,7 +179,7 @@ class _Finder:
         self._comm.Allreduce(MPI.IN_PLACE, smallest, MPI.MIN)
         best = np.full((n, 4 + len(self._break_names)), np.inf)
         best[:, 0] = smallest
-        together = factors[:, self._order] <= smallest[:, None] * (1.0 + path_points.UTILISATION_TIE)
+        together = factors[:, self._order] <= smallest[:, None] * (1.0 + UTILISATION_TIE)
         rays = np.flatnonzero(together.any(axis=1) & np.isfinite(smallest))
         node: Int = self._order[together[rays].argmax(axis=1)] if len(rays) else np.zeros(0, np.int64)
         best[rays, 1:4] = np.column_stack([self._fibre[node], self._pair[node], self._direction[node]])

@@ -19,10 +19,9 @@ from feti_homog.interface.friction import coulomb_faces, sliding_cell
 from feti_homog.interface.laws import BondLaw
 from feti_homog.interface.path import coulomb_leg, frictionless_leg, path_following, path_points
 from feti_homog.materials import voigt
-from feti_homog.results import checkpoints, landmarks
+from feti_homog.results import checkpoints, landmarks, path_curves
 
 NAMED_FIBRES = 8  # in a remark
-LEAST_STRESS = 1e-9  # in a fault, relative to the largest
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
@@ -39,7 +38,7 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
     to the checkpoint at once.
     """
     check_accuracy(context)
-    count = _events_in_checkpoint(context, law)
+    count = path_events.resumable(context, law)
     work, entries, last = path_events.Work(), list[dict[str, Any]](), None
     with path_events.EventProgress(context.progress, path_events.BARS[path.method], context.events) as progress:
         for number, (point, energies, responses) in enumerate(_points(context, path, law, count)):
@@ -72,27 +71,6 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
                 )
                 break
     return {"resumed": count} | ({"path": ()} if last is None else _completed(context, path, law, entries, last))
-
-
-def _events_in_checkpoint(context: AnalysisContext, law: BondLaw) -> int:
-    """Count the checkpoint events from which the run goes on, and drop all others.  Collective.
-
-    A run that does not resume drops all; otherwise the events before the first invalid one count.
-
-    Raises:
-        CaseError: the checkpoint cannot be used.
-    """
-    say = context.progress.say
-    if not context.resume:
-        if dropped := context.checkpoint.clear():
-            say(f"  {dropped} events of an earlier run are dropped; --resume would have gone on from them")
-        return 0
-    stored_events = context.checkpoint.count()
-    if (count := path_events.holding(context, law, stored_events)) < stored_events:
-        say(f"  event {count} of the checkpoint does not hold: it and all after it are found again")
-    begin = "there is no checkpoint: the path begins at its beginning"
-    say(f"  {f'{count} events are taken from the checkpoint' if stored_events else begin}")
-    return count
 
 
 def _points(
@@ -137,8 +115,8 @@ def _points(
         if count == 0:
             raise _with_advice(error, "", path) from error
         stress = np.asarray(context.loads.means(responses)["stress"])
-        named = zip(voigt.voigt_names(len(stress))[1], stress, strict=True)
-        large = [f", {name} {value:.6g}" for name, value in named if abs(value) > LEAST_STRESS * np.abs(stress).max()]
+        names, acting = voigt.voigt_names(len(stress))[1], path_curves.components_above(path_curves.ZERO, stress[None])
+        large = [f", {names[component]} {stress[component]:.6g}" for component in acting]
         place = f" beyond the last point{''.join(large)}"
         context.checks.faults.append(str(_with_advice(error, place, path)))
 

@@ -184,6 +184,27 @@ def read(context: AnalysisContext, law: BondLaw, number: int) -> tuple[checkpoin
     return event, point if checkpoints.has_multipliers(event) else found_again(point, cell, law)
 
 
+def resumable(context: AnalysisContext, law: BondLaw) -> int:
+    """Count the checkpoint events from which the run goes on, and drop all others.  Collective.
+
+    A run that does not resume drops all; otherwise the events before the first invalid one count.
+
+    Raises:
+        CaseError: the checkpoint cannot be used.
+    """
+    say = context.progress.say
+    if not context.resume:
+        if dropped := context.checkpoint.clear():
+            say(f"  {dropped} events of an earlier run are dropped; --resume would have gone on from them")
+        return 0
+    stored_events = context.checkpoint.count()
+    if (count := holding(context, law, stored_events)) < stored_events:
+        say(f"  event {count} of the checkpoint does not hold: it and all after it are found again")
+    begin = "there is no checkpoint: the path begins at its beginning"
+    say(f"  {f'{count} events are taken from the checkpoint' if stored_events else begin}")
+    return count
+
+
 def holding(context: AnalysisContext, law: BondLaw, count: int) -> int:
     """Count the valid events among the first `count` of the checkpoint.  Collective.
 

@@ -7,7 +7,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -18,8 +17,7 @@ from feti_homog.analysis.result import Fields, Result
 from feti_homog.case import Case
 from feti_homog.errors import ConvergenceError
 from feti_homog.homogenization import partition_policy, uniform_parts, unit_cell
-from feti_homog.microstructure.shapes import Ellipses
-from feti_homog.results import checkpoints, field_file, field_parts, output_folder, result_json, xdmf
+from feti_homog.results import field_file, field_parts, output_folder, result_json, xdmf
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.petsc import options_database
 from feti_homog.system.runtime import process_memory, progress_bar
@@ -69,9 +67,6 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
     with _torn(case, comm, progress) as cell:
         states = StateRecorder(cell, None, keep_fields, progress.say)
         context = AnalysisContext.of(cell, progress, states)
-        if keep_fields or context.plane.law.has_toughness:
-            context = replace(context, checkpoint=checkpoints.EventsInMemory(comm, room_of(case)))
-        _warn(context)
         result = _result(context, _analyse(context), states.fields())
     _print_summary(result, progress)
     if result.faults:
@@ -86,12 +81,6 @@ def _begun(case: Case, comm: MPI.Intracomm, quiet: bool) -> progress_bar.Progres
         for line in lines:
             progress.say(f"{label}: {line}")
     return progress
-
-
-def _warn(context: AnalysisContext) -> None:
-    """Print the warnings about probably unintended settings."""
-    for warning in context.warnings():
-        context.progress.say(f"warning: {warning}")
 
 
 @contextmanager
@@ -111,14 +100,6 @@ def _torn(case: Case, comm: MPI.Intracomm, progress: progress_bar.Progress) -> I
         cell.destroy()
 
 
-def room_of(case: Case) -> int | None:
-    """Return the bytes of events up to which checkpoints have multipliers.
-
-    There is no limit, None, if all fields are kept, and with friction, where one load has many equilibria.
-    """
-    return None if case.has_friction or case.output.states == "all" else checkpoints.WHOLE_BYTES
-
-
 def _run_and_write(
     cell: unit_cell.TornCell, directory: Path, progress: progress_bar.Progress, resume: bool, keep_fields: bool
 ) -> Result:
@@ -135,12 +116,7 @@ def _run_and_write(
     ):
         states = StateRecorder(cell, file, keep_fields, progress.say)
         context = AnalysisContext.of(cell, progress, states)
-        multipliers = cell.solver.jump_operator.global_rows
-        pieces = f"{cell.summary.subdomains} subdomains on {cell.comm.size} ranks, {multipliers} multipliers"
-        digest = mpi_errors.on_root(cell.comm, cell.case.digest, False)  # events are the same for any [output]
-        checkpoint = checkpoints.Checkpoint(directory, cell.comm, f"case {digest}, {pieces}", room_of(cell.case))
-        context = replace(context, checkpoint=checkpoint, resume=resume, log=log.write, events=output_folder.LOG)
-        _warn(context)
+        context = replace(context, directory=directory, resume=resume, log=log.write, events=output_folder.LOG)
         analysis = _analyse(context)
         seal = states.seal()
         if states.error is not None and not keep_fields:
@@ -151,16 +127,43 @@ def _run_and_write(
         raise states.error
     if cell.case.section.is_followed and not result.faults:
         context.checkpoint.clear()
-    for name, is_asked, make in (("pictures", output.pictures, _draw), ("report", output.report, _report)):
+
+    def draw() -> list[Path]:
+        from feti_homog.report.plots import figures  # with Matplotlib, which other ranks do not load
+
+        return figures.plot(directory)
+
+    def report() -> list[Path]:
+        from feti_homog.report import page  # with tables that other ranks do not load
+
+        return [page.write(directory)]
+
+    for name, is_asked, make in (("pictures", output.pictures, draw), ("report", output.report, report)):
         if is_asked:
             with progress.stage(name) as line:
-                line.append(", ".join(path.name for path in mpi_errors.on_root(cell.comm, make, directory)))
+                line.append(", ".join(path.name for path in mpi_errors.on_root(cell.comm, make)))
     _print_summary(result, progress)
     return result
 
 
+def _write(result: Result, directory: Path, cell: unit_cell.TornCell) -> None:
+    """Write result.json and its companions; remove files of earlier results.  Collective."""
+    mpi_errors.on_root_only(cell.comm, result_json.write, directory, result.document)
+    written = {result_json.NAME}
+    if result.result_h5 is not None:
+        written |= {field_file.NAME, *(path.name for path in mpi_errors.on_root(cell.comm, xdmf.write, directory))}
+    points = vars(result).get(name := cell.case.analysis.type)
+    if points is not None:
+        rows = points if isinstance(points, tuple) else (points,)
+        written.add(mpi_errors.on_root(cell.comm, result_json.write_csv, directory / f"{name}.csv", rows).name)
+    written |= {output_folder.LOG} if cell.case.section.is_followed else set()
+    mpi_errors.on_root_only(cell.comm, output_folder.remove_other_results, directory, written)
+
+
 def _analyse(context: AnalysisContext) -> dict[str, Any]:
-    """Run the analysis of the case and return its `Result` entries.  Collective."""
+    """Warn about settings, run the analysis of the case, and return its `Result` entries.  Collective."""
+    for warning in context.warnings():
+        context.progress.say(f"warning: {warning}")
     with context.progress.stage("solve") as line:
         module = import_module(f"feti_homog.analysis.{context.case.analysis.type}")
         analysis: dict[str, Any] = module.run(context)
@@ -198,8 +201,8 @@ def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Field
         case=cell.case.resolved(),
         digest=mpi_errors.on_root(cell.comm, cell.case.digest),
         cell=cell_info,
-        fibres=_fibres(cell),
-        solver=_solver_info(context),
+        fibres=FibreInfo.all_of(cell),
+        solver=SolverInfo.of(cell, checks.iterations, checks.reasons),
         checks=Checks(**checks.errors),
         check_tolerance=checks.tolerance("jump"),
         kkt_tolerance=CONTACT_TOLERANCE,
@@ -220,71 +223,6 @@ def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Field
     )
 
 
-def _fibres(cell: unit_cell.TornCell) -> tuple[FibreInfo, ...]:
-    """Return the records of the fibres, in the order of their numbers."""
-    summary, factors = cell.summary, cell.strength_factors
-    bodies, varies = summary.fibre_bodies, not (factors == 1.0).all()
-    ellipses = Ellipses(summary.centres, summary.frames)
-    is_ellipse = np.isnan(summary.radii) & ~np.isnan(ellipses.angles)
-    return tuple(
-        FibreInfo(
-            number=number,
-            phase=summary.phases[summary.constituent_phase[body]],
-            centre=None if np.isnan(summary.centres[body, 0]) else summary.centres[body],
-            radius=None if np.isnan(summary.radii[body]) else float(summary.radii[body]),
-            semi_axes=ellipses.semi_axes[body] if is_ellipse[body] else None,
-            angle=float(ellipses.angles[body]) if is_ellipse[body] else None,
-            coating=float(thickness) if thickness > 0 else None,
-            strength=float(factor) if varies else None,
-        )
-        for number, (body, thickness, factor) in enumerate(zip(bodies, summary.coatings, factors, strict=True), start=1)
-    )
-
-
-def _solver_info(context: AnalysisContext) -> SolverInfo:
-    """Return the record of the solvers in all problems.  Collective."""
-    cell = context.cell
-    plan, solver = cell.summary, cell.solver
-    solvers = [problem.solver for problem in cell.problems]
-    return SolverInfo(
-        ranks=cell.comm.size,
-        bodies=plan.bodies,
-        subdomains=plan.subdomains,
-        dofs=cell.sum_over_ranks(sum(s.n_dofs for solver in solvers for s in solver.subdomains)),
-        multipliers=sum(s.jump_operator.global_rows for s in solvers),
-        interface_nodes=plan.interface_nodes or cell.sum_over_ranks(len(solver.jump_operator.nodes.row)),
-        kernel_dim=sum(s.natural.kernel_dimension for s in solvers),
-        coarse_dim=sum(s.coarse_dimension for s in solvers),
-        factorizations=cell.sum_over_ranks(sum(len(s.interface_operators.operators) for s in solvers)),
-        coarse_factorizations=sum(s.natural.factorizations for s in solvers),
-        rtol=solver.rtol,
-        solves=sum(s.solves for s in solvers),
-        iterations=tuple(context.checks.iterations),
-        converged_reason=tuple(context.checks.reasons),
-    )
-
-
-def _write(result: Result, directory: Path, cell: unit_cell.TornCell) -> None:
-    """Write result.json and its companions; remove files of earlier results.  Collective."""
-    mpi_errors.on_root_only(cell.comm, result_json.write, directory, result.document)
-    written = {result_json.NAME}
-    if result.result_h5 is not None:
-        written |= {field_file.NAME, *(path.name for path in mpi_errors.on_root(cell.comm, xdmf.write, directory))}
-    points = vars(result).get(name := cell.case.analysis.type)
-    if points is not None:
-        rows = points if isinstance(points, tuple) else (points,)
-        written.add(mpi_errors.on_root(cell.comm, result_json.write_csv, directory / f"{name}.csv", rows).name)
-    written |= {output_folder.LOG} if cell.case.section.is_followed else set()
-    mpi_errors.on_root_only(cell.comm, output_folder.remove_other_results, directory, written)
-
-
-def _draw(directory: Path) -> list[Path]:
-    """Draw the pictures and return their files."""
-    from feti_homog.report.plots import figures  # with Matplotlib, which other ranks do not load
-
-    return figures.plot(directory)
-
-
 def _print_summary(result: Result, progress: progress_bar.Progress) -> None:
     """Print the summary on rank 0, which alone loads the tables.  Collective."""
     timings = progress.timings()
@@ -292,10 +230,3 @@ def _print_summary(result: Result, progress: progress_bar.Progress) -> None:
         from feti_homog.report.text import summary
 
         progress.say(f"\n{summary.summary(replace(result, timings=timings).document)}")
-
-
-def _report(directory: Path) -> list[Path]:
-    """Write report.html and return its file."""
-    from feti_homog.report import page  # with tables that other ranks do not load
-
-    return [page.write(directory)]

@@ -193,7 +193,20 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
         default = getattr(section, selector.key, None)
         value = table.get(selector.key, default) if isinstance(table, Mapping) else default
         selected[selector] = value if keys.keys_of(section)[selector.key].type.accepts(value) else None
-    faults = _top_level_faults(document)
+    faults = [f"[{section}]: missing section" for section in sections.REQUIRED if section not in document]
+    for name, value in document.items():
+        hint = wording.suggestion(name, sections.TOP_LEVEL, sections.KEY_OWNERS)
+        if name in sections.FIT_SECTIONS:
+            hint = "it belongs to the file of a fit; `feti-homog fit` runs it"
+        if name in STUDIES:
+            words = f"{name} = {wording.toml_value(value)}: expected a section [{name}]"
+            faults.append(f"[{name}]: {STUDIES[name]}" if isinstance(value, dict) else words)
+        elif name not in sections.TOP_LEVEL:
+            is_section = isinstance(value, dict)
+            key = f"[{wording.toml_key(name)}]" if is_section else wording.toml_key(name)
+            faults.append(f"{key}: unknown {'section' if is_section else 'key'}; {hint}")
+    if complaint := types.text.complaint(name := document.get("name", "case")):
+        faults.append(f"name = {wording.toml_value(name)}: {complaint}")
     reader = TableReader(selected, sections.KEY_OWNERS, faults)
     of_rules = [[*rule.faults(document, selected)] for rule in RULES]
     foreign = {rule.path[0] for rule, lines in zip(RULES, of_rules, strict=True) if lines and rule.holds is None}
@@ -212,26 +225,6 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
     # Sections that do not belong to the analysis have no further checks.
     faults += relation_faults(contents | {FIELDS.get(name, name): None for name in foreign}, document, selected[PLANE])
     return contents, faults
-
-
-def _top_level_faults(document: Mapping[str, Any]) -> list[str]:
-    """List faults in section names and in the keys before the first section."""
-    faults = [f"[{section}]: missing section" for section in sections.REQUIRED if section not in document]
-    for name, value in document.items():
-        hint = wording.suggestion(name, sections.TOP_LEVEL, sections.KEY_OWNERS)
-        if name in sections.FIT_SECTIONS:
-            hint = "it belongs to the file of a fit; `feti-homog fit` runs it"
-        if name in STUDIES:
-            words = f"{name} = {wording.toml_value(value)}: expected a section [{name}]"
-            faults.append(f"[{name}]: {STUDIES[name]}" if isinstance(value, dict) else words)
-        elif name not in sections.TOP_LEVEL and isinstance(value, dict):
-            faults.append(f"[{wording.toml_key(name)}]: unknown section; {hint}")
-        elif name not in sections.TOP_LEVEL:
-            faults.append(f"{wording.toml_key(name)}: unknown key; {hint}")
-    name = document.get("name", "case")
-    if complaint := types.text.complaint(name):
-        faults.append(f"name = {wording.toml_value(name)}: {complaint}")
-    return faults
 
 
 def _read_section(document: Mapping[str, Any], section: str, reader: TableReader) -> Any:

@@ -48,11 +48,6 @@ def checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
         elif size is not None:
             largest = name, size
     faults += mix_faults(cell)
-    return _with_files(cell, folder, faults)
-
-
-def _with_files(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """Return the cell with its full file path and its fibre table; add faults to `faults`."""
     if cell.geometry not in SUFFIXES or (cell.file is not None and cell.fibre_list is not None):
         return cell
     if cell.file is None:
@@ -63,9 +58,8 @@ def _with_files(cell: Cell, folder: Path, faults: list[str]) -> Cell:
         return cell
     if words := missing(file):
         faults.append(f"[cell] file = {wording.toml_value(str(cell.file))}: {words}")
-    elif cell.geometry == "table":
-        return _with_table(replace(cell, file=file), faults)
-    return replace(cell, file=file)
+        return replace(cell, file=file)
+    return _with_table(replace(cell, file=file), faults) if cell.geometry == "table" else replace(cell, file=file)
 
 
 def missing(file: Path) -> str:
@@ -134,24 +128,18 @@ def _with_table(cell: Cell, faults: list[str]) -> Cell:
         elif None not in (asked, stored) and asked != stored:
             faults.append(f"[cell] {name} = {asked:g}: {table.name} says {stored:g}; give one")
         table = replace(table, **{name: stored if asked is None else asked})
-    return replace(cell, table=_within(table) if cell.window == "cut" else table)
-
-
-def _within(table: fibre_table.FibreTable) -> fibre_table.FibreTable:
-    """Return the table without fibres whose centres lie outside by LEFT_OUT radii or more."""
-    if table.width is None or table.height is None:
-        return table
-    corner = np.array([table.left, table.bottom], float)
-    places = table.centres - np.where(np.isnan(corner), table.centres.min(axis=0), corner)
-    over = np.maximum(-places, places - [table.width, table.height]).max(axis=1)
-    outside = over > LEFT_OUT * table.radius
-    if not outside.any() or outside.all():
-        return table
-    retained, rows = table.rows(np.flatnonzero(~outside)), table.row[outside]
-    listed = ", ".join(map(str, rows[:MOST_LISTED])) + (", ..." if len(rows) > MOST_LISTED else "")
-    left = "1 row with its centre" if len(rows) == 1 else f"{len(rows)} rows with centres"
-    line = f'[cell] window = "cut": leaves out {left} outside: {listed}'
-    return replace(retained, remarks=(*table.remarks, line))
+    if cell.window == "cut" and table.width is not None and table.height is not None:
+        corner = np.array([table.left, table.bottom], float)
+        places = table.centres - np.where(np.isnan(corner), table.centres.min(axis=0), corner)
+        over = np.maximum(-places, places - [table.width, table.height]).max(axis=1)
+        outside = over > LEFT_OUT * table.radius
+        if outside.any() and not outside.all():
+            rows = table.row[outside]
+            listed = ", ".join(map(str, rows[:MOST_LISTED])) + (", ..." if len(rows) > MOST_LISTED else "")
+            left = "1 row with its centre" if len(rows) == 1 else f"{len(rows)} rows with centres"
+            line = f'[cell] window = "cut": leaves out {left} outside: {listed}'
+            table = replace(table.rows(np.flatnonzero(~outside)), remarks=(*table.remarks, line))
+    return replace(cell, table=table)
 
 
 # Smallest and largest ratio of inner to outer radius of hollow fibres.

@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from itertools import permutations
 from math import ceil, fsum, inf, log, pi, sqrt
-from typing import Any
 
 import numpy as np
 
@@ -17,7 +16,6 @@ from feti_homog.materials import laws, material_forms, voigt
 from feti_homog.microstructure import phase_names
 from feti_homog.schema import wording
 
-FEWEST = 0.5  # expected fibres of a phase; fewer are nearer to no fibre than to one
 LOCKING_POISSON = 0.49
 """Largest Poisson's ratio of linear triangles; above it they lock."""
 # Above it rounding brings checks to their tolerance: at 0.4999999, beside fibres a thousandth as stiff as the matrix,
@@ -64,15 +62,12 @@ COARSE_ERROR = {1: 0.12, 2: 0.0075}
 SOFT_FACTOR = 6.0
 # Upper bound of kappa s in cells with mixed elements alone.
 MIXED_CONDITION = 33.0
-# Element size of the coarsest mesh / fibre distance on a square lattice, and its bound / cell width. Circles and gaps
-# have smaller elements, so still coarser meshes have hardly fewer elements.
-PITCH_SHARE, LARGEST = 0.5, 0.5
 MOST_REFINED = 8
 
 
 def sized(
     cell: Cell,
-    table: Mapping[str, Any],
+    table: Mapping[str, object],
     materials: Mapping[str, material_forms.Material],
     plane: str,
     free_faces: bool,
@@ -83,7 +78,8 @@ def sized(
     For an accuracy eps and elements of order p, the coarsest mesh is refined r times, with the least r such that
     `coarse_error` / 4^(p r) <= eps. Of two orders, the result has the one with fewer nodes, about p^2 4^r. Faults go to
     `faults`: r above MOST_REFINED, and a given linear order whose elements lock. The size of the coarsest mesh is half
-    the distance between equally many fibres on a square lattice, in two digits.
+    the distance between equally many fibres on a square lattice, in two digits, and at most half the width: circles and
+    gaps have smaller elements, so still coarser meshes have hardly fewer elements.
 
     Args:
         table: the [cell] table of the file, with or without an order.
@@ -107,7 +103,7 @@ def sized(
             f"{MOST_REFINED}; expected {better}"
         )
     fibres, height = fibres_and_height(cell)
-    mesh_size = min(LARGEST, float(f"{PITCH_SHARE * sqrt(height / fibres):.2g}"))
+    mesh_size = float(f"{min(1.0, sqrt(height / fibres)) / 2:.2g}")
     return replace(cell, mesh_size=mesh_size, refine=refinements[order], order=order)
 
 
@@ -221,7 +217,7 @@ def mix_faults(cell: Cell) -> list[str]:
     if (count := fsum(expected_counts.values())) > MOST_FIBRES:
         return [f"{given}: makes {count:.2g} fibres; expected at most {MOST_FIBRES}, of larger radii or a smaller cell"]
     return [
-        f"{given}: makes {expected:.2g} fibres of {phase}; expected at least {FEWEST}, of more fibres or a wider cell"
+        f"{given}: makes {expected:.2g} fibres of {phase}; expected at least 0.5, of more fibres or a wider cell"
         for phase, expected in expected_counts.items()
-        if expected < FEWEST
+        if expected < 1 - expected  # nearer to no fibre than to one
     ]

@@ -4,7 +4,6 @@ import inspect
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from feti_homog.case import sections
 from feti_homog.errors import CaseError
@@ -18,7 +17,7 @@ ORDER = (
 """Sections in the order of the reference."""
 
 WIDTH = 100  # characters of a printed line
-INDENT: dict[str, Any] = {"initial_indent": "      ", "subsequent_indent": "      ", "break_on_hyphens": False}
+INDENTED = textwrap.TextWrapper(WIDTH, initial_indent=6 * " ", subsequent_indent=6 * " ", break_on_hyphens=False)
 
 MATERIAL_MEANING = (
     "One section for each phase: [material.matrix], [material.fibre] and, for phases of a mesh or a table, sections of "
@@ -85,8 +84,14 @@ PAIRS = KeyRow(sections.CORRELATION, PAIR_WORDS, "", "", "", "Correlation of pai
 AXIS = KeyRow("SECTION.KEY", sections.AXIS_EXPECTED, "", "", "", sections.AXIS_MEANING)
 
 
-def tables() -> list[TableReference]:
-    """Return all tables of the case file, in the order of `ORDER`."""
+def tables(section: str | None = None) -> list[TableReference]:
+    """Return all tables of the case file, or of one section, in the order of `ORDER`.
+
+    Raises:
+        CaseError: no section has this name.
+    """
+    if section is not None and section not in ORDER:
+        raise CaseError(f"{section}: unknown section; expected one of {', '.join(ORDER)}")
     ranges = _rows(sections.SWEEP, sections.RANGE_KEYS)
     references = [
         TableReference("name", "before the first section", "the case as a whole.", (NAME,)),
@@ -103,15 +108,8 @@ def tables() -> list[TableReference]:
             sections.SWEEP, f"a range in [{sections.SWEEP}]", "Values of a key that lie between two ends.", ranges
         ),
     ]
-    return sorted(references, key=lambda table: ORDER.index(table.section))
-
-
-def tables_of(section: str) -> list[TableReference]:
-    """Return the tables of a section. Raises CaseError if no section has this name."""
-    result = [table for table in tables() if table.section == section]
-    if not result:
-        raise CaseError(f"{section}: unknown section; expected one of {', '.join(ORDER)}")
-    return result
+    chosen = [table for table in references if section in (None, table.section)]
+    return sorted(chosen, key=lambda table: ORDER.index(table.section))
 
 
 def _table(table: sections.SectionTable, *rows: KeyRow) -> TableReference:
@@ -150,6 +148,6 @@ def as_text(references: Sequence[TableReference]) -> str:
             presence, only = ("required", " if") if row.default == "required" else (default, "; only if")
             when = f"{only} {row.applies}" if row.applies else ""
             words = (f"{row.accepts}{unit}; {presence}{when}", row.meaning)
-            lines += [f"\n  {row.key}", *(textwrap.fill(line, WIDTH, **INDENT) for line in words)]
+            lines += [f"\n  {row.key}", *map(INDENTED.fill, words)]
         blocks.append("\n".join(lines))
     return "\n\n".join(blocks)

@@ -1,7 +1,7 @@
 """Read the [interface] sections, and check relations between section values: faults, and remarks on loads."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -23,8 +23,22 @@ COMMON = tuple(name for name, entry in keys.keys_of(InterfaceSection).items() if
 def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], plane: str | None) -> list[str]:
     """List contradictions between valid section values; `plane` is None if the case has no valid plane state."""
     path, load, angle, envelope = (sections[name] for name in ("path", "single_load", "angle", "envelope"))
-    faults = [*_load_faults(path, load, plane)]
-    heated = []
+    faults, heated = list[str](), []
+    if load is not None and not any(load.to.named.values()):
+        faults.append(f"[load] to = {wording.toml_value(load.to.named)}: expected a load other than zero")
+    elif path is not None:
+        placed = path.placed
+        if plane is not None and [path.strain, path.to, path.waypoints].count(None) == 2:
+            loads = load_sections.completed(tuple(placed.values()), plane)
+            repeats = not any(loads[0].values()), *(before == after for before, after in pairwise(loads))
+            formers = "zero, where the path begins", *[*placed][:-1]
+            for (place, entry), former, is_repeat in zip(placed.items(), formers, repeats, strict=True):
+                value = entry.named if isinstance(entry, load_sections.MixedLoad) else entry
+                noun = "load" if isinstance(value, dict) else "strain"
+                line = f"[path] {place} = {wording.toml_value(value)}: expected a {noun} other than {former}"
+                faults += [line] * is_repeat
+        if path.increments is not None and path.increments < len(placed):
+            faults.append(f"[path] increments = {path.increments}: expected at least one for each waypoint")
     for kind, section in (("load", load), ("path", path)):
         placed = {} if section is None else section.placed
         heated += [
@@ -40,27 +54,6 @@ def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], pl
     if angle is not None and angle.strain is not None and not any(angle.strain):
         faults.append("[angle] strain: expected a strain other than zero")
     return faults
-
-
-def _load_faults(
-    path: load_sections.LoadPath | None, load: load_sections.SingleLoad | None, plane: str | None
-) -> Iterator[str]:
-    """Yield faults for zero loads, repeated loads and too few increments."""
-    if load is not None and not any(load.to.named.values()):
-        yield f"[load] to = {wording.toml_value(load.to.named)}: expected a load other than zero"
-    elif path is not None:
-        placed = path.placed
-        if plane is not None and [path.strain, path.to, path.waypoints].count(None) == 2:
-            loads = load_sections.completed(tuple(placed.values()), plane)
-            repeats = not any(loads[0].values()), *(before == after for before, after in pairwise(loads))
-            formers = "zero, where the path begins", *[*placed][:-1]
-            for (place, entry), former, is_repeat in zip(placed.items(), formers, repeats, strict=True):
-                value = entry.named if isinstance(entry, load_sections.MixedLoad) else entry
-                noun = "load" if isinstance(value, dict) else "strain"
-                if is_repeat:
-                    yield f"[path] {place} = {wording.toml_value(value)}: expected a {noun} other than {former}"
-        if path.increments is not None and path.increments < len(placed):
-            yield f"[path] increments = {path.increments}: expected at least one for each waypoint"
 
 
 def axes_lines(
@@ -107,32 +100,24 @@ def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[I
             interfaces.append(replace(named, **_of_branch(named)))
     if len(interfaces) < len(tables):
         return None
-    reader.faults += _faults_between(interfaces, tables)
-    for label, interface, table in zip(labels, interfaces, tables, strict=True):
-        reader.faults += [f"[{label}] {line}" for line in _faults_within(interface, table)]
-    return tuple(interfaces)
-
-
-def _faults_between(interfaces: Sequence[InterfaceSection], tables: Sequence[Mapping[str, Any]]) -> list[str]:
-    """List missing pairs, repeated pairs, and keys in which the interface sections must agree."""
-    faults: list[str] = []
     first: dict[frozenset[str], int] = {}
-    for number, interface in enumerate(interfaces[: None if len(interfaces) > 1 else 0]):
-        label = interface_label(number, len(interfaces))
+    for number, (label, interface) in enumerate(zip(labels, interfaces, strict=True) if len(tables) > 1 else ()):
         if interface.between is None:
-            faults.append(f"[{label}] between: missing; of several [[interface]] each needs {PAIR.expected}")
+            reader.faults.append(f"[{label}] between: missing; of several [[interface]] each needs {PAIR.expected}")
             continue
         other = first.setdefault(frozenset(interface.between), number)
         if other != number:
             pair = wording.toml_value(interface.between)
-            faults.append(f"[{label}] between = {pair}: expected another pair than [interface {other + 1}] has")
+            reader.faults.append(f"[{label}] between = {pair}: expected another pair than [interface {other + 1}] has")
         for name in COMMON:
             value, common = getattr(interface, name), getattr(interfaces[0], name)
             if value != common:
                 expected = f"expected {_written(common)}, as of [interface 1]"
                 word = "law" if name == "criterion" and name not in tables[number] else name
-                faults.append(f"[{label}] {word} = {_written(value)}: {expected}: all interfaces agree in it")
-    return faults
+                reader.faults.append(f"[{label}] {word} = {_written(value)}: {expected}: all interfaces agree in it")
+    for label, interface, table in zip(labels, interfaces, tables, strict=True):
+        reader.faults += [f"[{label}] {line}" for line in _faults_within(interface, table)]
+    return tuple(interfaces)
 
 
 def _written(value: Any) -> str:
@@ -160,7 +145,7 @@ def _of_branch(interface: InterfaceSection) -> dict[str, Any]:
 
 
 def _faults_within(interface: InterfaceSection, table: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the faults of an interface section: softening numbers and friction.
+    """Yield the faults of an interface section: softening numbers, too little energy, and friction.
 
     `table` is the section as in the file; a separate rule reports its missing keys.
     """
@@ -170,7 +155,17 @@ def _faults_within(interface: InterfaceSection, table: Mapping[str, Any]) -> Ite
         line = f"law = {wording.toml_value(law.name)} needs a finite one"
         faults = [f"{name}: {line}" for name in filter(table.__contains__, needed)]
         faults += _branch_faults(interface)
-        yield from faults if faults or needed else _short_of_energy(interface)
+        yield from faults
+        for kind in ("normal", "tangential") if not (faults or needed) else ():
+            names = (f"{kind}_{name}" for name in ("stiffness", "strength", "toughness"))
+            stiffness, strength, toughness = (getattr(interface, name) for name in names)
+            if None in (stiffness, strength, toughness):
+                continue
+            # A bond stores this energy at its peak.
+            least = strength**2 / (2 * stiffness)
+            if toughness < least * (1.0 - SAME):
+                line = f"expected at least {kind}_strength^2 / (2 {kind}_stiffness) = {least:.6g}, stored at the peak"
+                yield f"{kind}_toughness = {toughness:g}: {line}"
     if interface.friction == 0.0:
         return
     if not interface.contact:
@@ -206,17 +201,3 @@ def _branch_faults(interface: InterfaceSection) -> Iterator[str]:
         for name, number in _of_branch(bare).items():
             if not math.isclose(given := getattr(interface, name), number, rel_tol=SAME):
                 yield f"{name} = {given:g}: expected {number:g}, that of openings and tractions, or none"
-
-
-def _short_of_energy(interface: InterfaceSection) -> Iterator[str]:
-    """Yield the toughnesses below the elastic energy that a bond stores at its peak."""
-    for kind in ("normal", "tangential"):
-        stiffness, strength, toughness = (
-            getattr(interface, f"{kind}_{what}") for what in ("stiffness", "strength", "toughness")
-        )
-        if None in (stiffness, strength, toughness):
-            continue
-        least = strength**2 / (2 * stiffness)
-        if toughness < least * (1.0 - SAME):
-            line = f"expected at least {kind}_strength^2 / (2 {kind}_stiffness) = {least:.6g}, stored at the peak"
-            yield f"{kind}_toughness = {toughness:g}: {line}"

@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
-from operator import ne
 from typing import Any
 
 from feti_homog.case import section_values as kinds
@@ -51,20 +50,29 @@ class Rule:
     names: tuple[str, ...] = ()
 
     def faults(self, document: Mapping[str, Any], selected: keys.Selected) -> Iterator[str]:
-        """Yield one line for each invalid value in the document."""
+        """Yield one line for each invalid value in the document; sections in a list are numbered from 1."""
         if not all(condition.holds(selected) for condition in self.when):
             return
-        for section, place, value in _places(document, self.path):
-            if self.holds is None or not self.holds(value):
-                words = f": {self.words}" if isinstance(self.words, str) else self.words(value, selected)
-                yield f"[{section}]{self._keys(place, value)}{words}" if self.path else words[2:]
-
-    def _keys(self, place: str, value: Any) -> str:
-        """Return the part of a fault that names the keys of a table, or a key and its value."""
-        if not self.names:
-            return f" {place} = {wording.toml_value(value)}" if place else ""
-        above, names = f"{place}." if place else "", [name for name in self.names if name in value] or self.names
-        return f" {', '.join(above + name for name in names)}"
+        content = document.get(self.path[0]) if self.path else document
+        sections = content if isinstance(content, list) else [content]
+        label = " ".join(self.path[:1])
+        matches = [(f"{label} {k}" if len(sections) > 1 else label, "", each) for k, each in enumerate(sections, 1)]
+        for step in self.path[1:]:
+            parents, matches = matches, []
+            for name, place, parent in parents:
+                if step == ITEMS and isinstance(parent, list):
+                    matches += [(name, f"{place}[{k}]", item) for k, item in enumerate(parent)]
+                elif isinstance(parent, dict) and step in parent:
+                    matches.append((name, f"{place}.{step}" if place else step, parent[step]))
+        for section, place, value in matches:
+            if value is None or (self.holds is not None and self.holds(value)):
+                continue
+            words = f": {self.words}" if isinstance(self.words, str) else self.words(value, selected)
+            subject = f" {place} = {wording.toml_value(value)}" if place else ""
+            if self.names:
+                above, names = f"{place}." if place else "", [name for name in self.names if name in value]
+                subject = f" {', '.join(above + name for name in names or self.names)}"
+            yield f"[{section}]{subject}{words}" if self.path else words[2:]
 
 
 def has(table: Any, *names: str) -> bool:
@@ -106,31 +114,6 @@ def belonging(
         return f": belongs to {owner}{f'; use {instead}' if instead else ''}"
 
     return Rule(path, None, words, (*when, condition.selector.among(*others)))
-
-
-def _places(document: Mapping[str, Any], path: TablePath) -> Iterator[tuple[str, str, Any]]:
-    """Yield section, key within the section, and value at each match of a path.
-
-    Sections in a list are numbered from 1.
-    """
-
-    def within(section: str, place: str, value: Any, rest: TablePath) -> Iterator[tuple[str, str, Any]]:
-        if not rest:
-            if value is not None:
-                yield section, place, value
-        elif rest[0] == ITEMS and isinstance(value, list):
-            for k, item in enumerate(value):
-                yield from within(section, f"{place}[{k}]", item, rest[1:])
-        elif isinstance(value, dict) and rest[0] in value:
-            yield from within(section, f"{place}.{rest[0]}" if place else rest[0], value[rest[0]], rest[1:])
-
-    if not path:
-        yield "", "", document
-        return
-    content = document.get(path[0])
-    sections = content if isinstance(content, list) else [content]
-    for number, section in enumerate(sections, 1):
-        yield from within(path[0] if len(sections) == 1 else f"{path[0]} {number}", "", section, path[1:])
 
 
 def _values(selector: keys.Selector) -> Sequence[str]:
@@ -192,22 +175,17 @@ def _files() -> Iterator[Rule]:
     yield needed(CELL, "file", f"missing; expected the name of a {kinds.MESH_FILE}", MESH)
     line = "missing; expected the name of a .csv file, or fibre_list"
     yield needed(CELL, "file", line, TABLE, unless=("fibre_list",))
-    for suffixes, expected, geometry in (
-        (kinds.TABLE_SUFFIXES, kinds.MESH_FILE, MESH),
-        (kinds.MESH_SUFFIXES, ".csv file", TABLE),
-    ):
-        line = f"expected the name of a {expected} for {geometry.in_words('cell')}"
-        yield Rule((*CELL, "file"), partial(_has_other_end, suffixes), line, (geometry,))
-    for wrong, right, geometry in (("overlaps", "snap", MESH), ("snap", "overlaps", TABLE)):
-        line = f'expected "none" or "{right}" for {geometry.in_words("cell")}'
-        yield Rule((*CELL, "repair"), partial(ne, wrong), line, (geometry,))
+    line = f"expected the name of a {kinds.MESH_FILE} for {MESH.in_words('cell')}"
+    yield Rule((*CELL, "file"), lambda name: not str(name).endswith(kinds.TABLE_SUFFIXES), line, (MESH,))
+    line = f"expected the name of a .csv file for {TABLE.in_words('cell')}"
+    yield Rule((*CELL, "file"), lambda name: not str(name).endswith(kinds.MESH_SUFFIXES), line, (TABLE,))
+    line = f'expected "none" or "snap" for {MESH.in_words("cell")}'
+    yield Rule((*CELL, "repair"), lambda value: value != "overlaps", line, (MESH,))
+    line = f'expected "none" or "overlaps" for {TABLE.in_words("cell")}'
+    yield Rule((*CELL, "repair"), lambda value: value != "snap", line, (TABLE,))
     for name in ("width", "height"):
         line = "missing; fibre_list has no line such as # width = 120, height = 80"
         yield needed(CELL, name, line, TABLE, beside="fibre_list")
-
-
-def _has_other_end(suffixes: tuple[str, ...], name: Any) -> bool:
-    return not str(name).endswith(suffixes)
 
 
 def _bonds() -> Iterator[Rule]:

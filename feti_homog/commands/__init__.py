@@ -1,8 +1,8 @@
-"""Commands of `feti-homog`, a module for each subject: `add(actions)` gives the parser options and actions.
+"""Commands of `feti-homog`: the parser of their arguments, and a module for each subject, loaded when it is called.
 
 Imports `analysis`, `api`, `case`, `mesh`, `microstructure`, `report`, `results`, `studies`, `system` and `verify`.
-Modules import the computation inside their action, so that `--help` and `--version` start without NumPy and MPI.  Main
-entries: `run`, `products` and `studies`.
+`--help` and `--version` start without NumPy and MPI.  Main entries: `parser.command_parser`, `run`, `products`,
+`studies` and `verify`.
 """
 
-__all__ = ["products", "run", "studies"]
+__all__ = ["parser", "verify"]

@@ -1,9 +1,8 @@
 """Fibres of a case or result, as the table that [cell] geometry = "table" reads."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -102,15 +101,10 @@ def read(source: Path) -> ListedFibres:
 def _of_result(directory: Path) -> ListedFibres:
     """Return the fibres of a result, by its case if outlines are missing: voids, and shapes other than ellipses."""
     document = stored_result.read(directory)
-    is_complete = all("radius" in fibre or "semi_axes" in fibre for fibre in document["fibres"])
-    is_complete = is_complete and not document["cell"].get("porosity")
+    fibres, cell = document["fibres"], document["cell"]
+    is_complete = all("radius" in fibre or "semi_axes" in fibre for fibre in fibres) and not cell.get("porosity")
     if document["case"]["cell"]["geometry"] != "mesh" and not is_complete:
         return _of_cell(cases.parse(document["case"], directory).cell)
-    return _of_records(document["fibres"], document["cell"])
-
-
-def _of_records(fibres: Sequence[Mapping[str, Any]], cell: Mapping[str, Any]) -> ListedFibres:
-    """Return the fibres in `fibres` and `cell` of a result."""
     unknown = (np.nan, np.nan)
     centres = np.array([fibre.get("centre") or unknown for fibre in fibres], float).reshape(-1, 2)
     axes = [
@@ -129,7 +123,14 @@ def _of_records(fibres: Sequence[Mapping[str, Any]], cell: Mapping[str, Any]) ->
 
 def _of_cell(cell: cell_section.Cell) -> ListedFibres:
     if cell.has_own_mesh:
-        return _of_mesh(cell)
+        mesh = msh_reader.read_cell(cell)
+        torus = Torus.of(mesh)
+        numbers, is_fibre = mesh_fibres.fibre_numbers(torus)
+        ellipses = Ellipses(mesh_fibres.fibre_circles(torus)[:, :2] % mesh.period, mesh_fibres.fibre_frames(torus))
+        coatings = mesh_fibres.coating_thickness(numbers, is_fibre, ellipses.semi_axes)
+        phases = tuple(mesh.phases[phase] for phase in torus.constituent_phase[is_fibre])
+        has_voids = coarse_mesh.voids(mesh) > 0
+        return ListedFibres(mesh.period, ellipses[is_fibre], phases, coatings, np.zeros(len(phases)), has_voids)
     arrangement = arrange.arrange(cell)
     scale = gmsh_mesher.arrangement_scale(cell, arrangement)
     size = scale * arrangement.size
@@ -137,19 +138,6 @@ def _of_cell(cell: cell_section.Cell) -> ListedFibres:
     ellipses = Ellipses(scale * own.centres % size, scale * own.frames)
     coatings = scale * (arrangement.coating - arrangement.walls)
     cores = scale * np.where(arrangement.walls > 0, arrangement.radii, 0.0)
-    others = {}
-    if cell.table is not None:
-        others = shapes.columns_without_tips({name: of[arrangement.row] for name, of in cell.table.columns.items()})
+    columns = {} if cell.table is None else {name: of[arrangement.row] for name, of in cell.table.columns.items()}
+    others = shapes.columns_without_tips(columns) if columns else {}
     return ListedFibres(size, ellipses, arrangement.phase, coatings, cores, lacks_voids=False, others=others)
-
-
-def _of_mesh(cell: cell_section.Cell) -> ListedFibres:
-    mesh = msh_reader.read_cell(cell)
-    torus = Torus.of(mesh)
-    numbers, is_fibre = mesh_fibres.fibre_numbers(torus)
-    ellipses = Ellipses(mesh_fibres.fibre_circles(torus)[:, :2] % mesh.period, mesh_fibres.fibre_frames(torus))
-    coatings = mesh_fibres.coating_thickness(numbers, is_fibre, ellipses.semi_axes)
-    phases = tuple(mesh.phases[phase] for phase in torus.constituent_phase[is_fibre])
-    return ListedFibres(
-        mesh.period, ellipses[is_fibre], phases, coatings, np.zeros(len(phases)), coarse_mesh.voids(mesh) > 0
-    )

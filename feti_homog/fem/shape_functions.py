@@ -8,10 +8,8 @@ from feti_homog.typing import Float
 
 # Linear: exact for constants.  Quadratic: degree 4 with 6 points (Dunavant 1985), so that stiffness and
 # area are exact on straight elements, with a bubble too, and of full order on curved ones.
-_A, _B = 0.445948490915965, 0.091576213509771
-_P2_POINTS = np.array(
-    [[1 - 2 * c, c] for c in (_A, _B)] + [[c, 1 - 2 * c] for c in (_A, _B)] + [[c, c] for c in (_A, _B)]
-)
+_C = np.array([0.445948490915965, 0.091576213509771])
+_P2_POINTS = np.stack([np.r_[1 - 2 * _C, _C, _C], np.r_[_C, 1 - 2 * _C, _C]], axis=1)
 _P2_WEIGHTS = np.tile([0.223381589678011, 0.109951743655322], 3) / 2
 
 

@@ -7,7 +7,6 @@ from mpi4py import MPI
 from scipy.sparse.linalg import splu
 
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
-from feti_homog.feti.krylov import ActiveRows
 from feti_homog.feti.linalg.sparse_matrices import allreduce_sparse
 from feti_homog.feti.operators.interface_operators import DualOperator
 from feti_homog.feti.thresholds import ROUNDING_MARGIN, ZERO_JUMP
@@ -45,18 +44,29 @@ class DualSolution:
         return self.jump + self.compliance * self.lam
 
 
+class ActiveRows:
+    """The owned rows that carry multipliers: `mask` (owned rows,) is 1 there, else 0."""
+
+    def __init__(self, rows: int) -> None:
+        self.mask = np.ones(rows)
+
+    def restrict(self, x: Float) -> Float:
+        """Set x (rows,) or (rows, k) to 0 on the inactive rows."""
+        return distributed_arrays.scale_rows(self.mask, x)
+
+
 class ActiveJumps:
     """P of jumps on the active rows, and norms over all ranks.  All calls are collective."""
 
     def __init__(
         self, comm: MPI.Intracomm, operator: DualOperator, natural: NaturalCoarseSpace, active: ActiveRows
     ) -> None:
-        self._comm, self._operator, self._natural, self._active = comm, operator, natural, active
+        self.comm, self.operator, self.natural, self.active = comm, operator, natural, active
         self._rounding: Float | None = None
 
     def norms(self, x: Float) -> Float:
         """Compute the Euclidean norms (k,) of the columns of x (owned rows, k)."""
-        norms: Float = np.sqrt(distributed_arrays.allreduce_sum(self._comm, np.einsum("ik,ik->k", x, x)))
+        norms: Float = np.sqrt(distributed_arrays.allreduce_sum(self.comm, np.einsum("ik,ik->k", x, x)))
         return norms
 
     def projected(self, x: Float) -> Float:
@@ -64,7 +74,7 @@ class ActiveJumps:
 
         One projection leaves rounding of rigid-body motions.  No multipliers remove it, so that a Krylov method stalls.
         """
-        return self._natural.project(self._natural.project(self._active.restrict(x)))
+        return self.natural.project(self.natural.project(self.active.restrict(x)))
 
     def rounding(self, displacement: Float, loads: Float, seen: Float, torn: Float) -> Float:
         """Bound the rounding (k,) in jumps of the torn cell under k loads (v, k), on the active rows.
@@ -79,8 +89,8 @@ class ActiveJumps:
         rounding = ZERO_JUMP * torn
         if ((seen > rounding) & (seen < np.sqrt(np.finfo(float).eps) * torn)).any():
             if self._rounding is None:
-                self._rounding = jump_rounding(self._operator, displacement)
-            projected = self._natural.project(self._active.restrict(self._rounding @ loads))
+                self._rounding = jump_rounding(self.operator, displacement)
+            projected = self.natural.project(self.active.restrict(self._rounding @ loads))
             rounding = np.maximum(rounding, ROUNDING_MARGIN * self.norms(projected))
         return rounding
 
@@ -91,19 +101,19 @@ class ActiveJumps:
 
         `jump` (owned rows, k) is d E - F lam, without rigid-body motions; residuals are relative to `scale` (k,).
         """
-        alpha = np.zeros((self._natural.kernel_dimension, len(strains)))
-        if self._natural.kernel_dimension:
-            alpha -= self._natural.amplitudes(self._active.restrict(jump))
-            jump = jump + self._natural.G @ alpha
+        alpha = np.zeros((self.natural.kernel_dimension, len(strains)))
+        if self.natural.kernel_dimension:
+            alpha -= self.natural.amplitudes(self.active.restrict(jump))
+            jump = jump + self.natural.G @ alpha
         # Free bodies lie where faces part least, however they are cut.
-        if (Z := self._natural.unconstrained_modes).shape[1]:
-            M = self._natural.G @ Z
-            squares = allreduce_sparse(self._comm, (M.T @ M).tocsr())
-            sums = distributed_arrays.allreduce_sum(self._comm, M.T @ jump)
+        if (Z := self.natural.unconstrained_modes).shape[1]:
+            M = self.natural.G @ Z
+            squares = allreduce_sparse(self.comm, (M.T @ M).tocsr())
+            sums = distributed_arrays.allreduce_sum(self.comm, M.T @ jump)
             least = Z @ splu(squares.tocsc()).solve(sums)
-            alpha, jump = alpha - least, jump - self._natural.G @ least
-        residual = self.norms(self._active.restrict(jump)) / np.where(scale > 0, scale, 1.0)
-        C, parts = self._operator.compliance, (strains, lam.T.copy(), jump.T.copy(), alpha.T.copy(), residual)
+            alpha, jump = alpha - least, jump - self.natural.G @ least
+        residual = self.norms(self.active.restrict(jump)) / np.where(scale > 0, scale, 1.0)
+        C, parts = self.operator.compliance, (strains, lam.T.copy(), jump.T.copy(), alpha.T.copy(), residual)
         rows = zip(*parts, strict=True)
         return [DualSolution(E, x, g, a, iterations, reason, float(size), C) for E, x, g, a, size in rows]
 
@@ -113,7 +123,7 @@ class ActiveJumps:
         d (owned rows, v) are the jumps of the torn cell.
         """
         torn = (d @ solution.strain)[:, None]
-        jump = torn - self._operator.apply(solution.lam[:, None])
+        jump = torn - self.operator.apply(solution.lam[:, None])
         scale = self.norms(self.projected(torn))
         parts = solution.iterations, solution.reason, scale
         return self.solutions(solution.strain[None], solution.lam[:, None], jump, *parts)[0]

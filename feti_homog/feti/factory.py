@@ -14,7 +14,7 @@ from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.operators.preconditioners import Dirichlet, Identity, Lumped, Preconditioner
+from feti_homog.feti.operators.preconditioners import Dirichlet, Identity, Lumped, Preconditioner, SpringUpdated
 from feti_homog.feti.solver_plan import BONDED, ProblemSizes, SolverOptions, choose
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.system.parallel import mpi_errors
@@ -130,7 +130,17 @@ def build(
     how = operator, applications, soft, thresholds, springs, recovers and one_each
     with PETSc.Log.Event("FETISubdomains"):
         operators = mpi_errors.agree(comm, InterfaceOperators, jump_operator, subdomains, *how)
-    plan = choose(_sizes(operators, applications, are_cut, one_each), options, thresholds)
+    dense = [operator.is_dense for operator in operators.operators]
+    sizes = ProblemSizes(
+        applications=applications,
+        bodies_are_cut=are_cut,
+        all_dense=comm.allreduce(all(dense), MPI.LAND),
+        all_searchable=comm.allreduce(all(np.logical_or(dense, operators.facewise)), MPI.LAND),
+        shared_dofs=jump_operator.shared_dofs,
+        has_thin=comm.allreduce(any(s.is_thin for s in subdomains), MPI.LOR),
+        one_each=one_each,
+    )
+    plan = choose(sizes, options, thresholds)
     preconditioner = construct(plan.preconditioner, operators)
     with PETSc.Log.Event("FETINatural"):
         natural = NaturalCoarseSpace(operators)
@@ -144,22 +154,6 @@ def build(
     left_out = operators.compliance if plan.preconditioner == "dirichlet" else np.zeros(len(compliance))
     followed = plan.preconditioner == "influence" or not soften
     if not followed or comm.allreduce(bool(left_out.any()), MPI.LOR):
-        from feti_homog.feti.exact.spring_update import SpringUpdated  # of softening springs alone
-
         preconditioner = SpringUpdated(comm, preconditioner, jump_operator.owned[0], left_out)
     inverse = cast("ExactInverse", preconditioner) if plan.preconditioner == "influence" else None
     return SolverParts(operators, preconditioner, natural, adaptive, inverse)
-
-
-def _sizes(operators: InterfaceOperators, applications: int, are_cut: bool, one_each: bool) -> ProblemSizes:
-    """Collect the sizes that the choice depends on.  Collective."""
-    comm, dense = operators.comm, [o.is_dense for o in operators.operators]
-    return ProblemSizes(
-        applications=applications,
-        bodies_are_cut=are_cut,
-        all_dense=comm.allreduce(all(dense), MPI.LAND),
-        all_searchable=comm.allreduce(all(np.logical_or(dense, operators.facewise)), MPI.LAND),
-        shared_dofs=operators.jump_operator.shared_dofs,
-        has_thin=comm.allreduce(any(s.is_thin for s in operators.subdomains), MPI.LOR),
-        one_each=one_each,
-    )

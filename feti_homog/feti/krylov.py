@@ -9,33 +9,23 @@ Errors that the contexts raise are kept until PETSc has returned (`CallbackError
 from collections.abc import Callable
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
-from feti_homog.feti.coarse.natural import NaturalCoarseSpace
-from feti_homog.feti.operators.interface_operators import DualOperator
+from feti_homog.feti.dual_solution import ActiveJumps
 from feti_homog.feti.operators.preconditioners import Preconditioner
-from feti_homog.feti.thresholds import FORCE_STALL_ITERATIONS, MAX_ITERATIONS, RTOL, STALL_ITERATIONS
+from feti_homog.feti.thresholds import FORCE_STALL_ITERATIONS, MAX_ITERATIONS, MAX_RESTARTS, RTOL, STALL_ITERATIONS
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.system.petsc import c_functions
 from feti_homog.typing import Float
 
+# Reasons for which PETSc gives up where rounding is at work.
+REASON = PETSc.KSP.ConvergedReason
+BREAKDOWNS = (REASON.DIVERGED_INDEFINITE_PC, REASON.DIVERGED_INDEFINITE_MAT, REASON.DIVERGED_BREAKDOWN)
 # Methods that apply the preconditioner to the residual itself, so that the jump can be read off there.  With others
 # the convergence test sees only the forces; the checks of a response test the jump.
 PRECONDITION_TRUE_RESIDUAL = (PETSc.KSP.Type.CG, PETSc.KSP.Type.FCG)
 
 ESTIMATES_SINGULAR_VALUES = (PETSc.KSP.Type.CG, PETSc.KSP.Type.GMRES, PETSc.KSP.Type.FGMRES)
-
-
-class ActiveRows:
-    """The owned rows that carry multipliers: `mask` (owned rows,) is 1 there, else 0."""
-
-    def __init__(self, rows: int) -> None:
-        self.mask = np.ones(rows)
-
-    def restrict(self, x: Float) -> Float:
-        """Set x (rows,) or (rows, k) to 0 on the inactive rows."""
-        return distributed_arrays.scale_rows(self.mask, x)
 
 
 class ProjectedProblem:
@@ -44,22 +34,20 @@ class ProjectedProblem:
     def __init__(
         self,
         errors: c_functions.CallbackErrors,
-        operator: DualOperator,
         preconditioner: Preconditioner,
-        natural: NaturalCoarseSpace,
-        active: ActiveRows,
+        jumps: ActiveJumps,
         columns: int,
     ) -> None:
         """Set up for vectors with this number of `columns`."""
-        self._errors, self._operator, self._preconditioner = errors, operator, preconditioner
-        self._natural, self._active, self._residual = natural, active, np.zeros((0, columns))
+        self._errors, self._preconditioner, self._jumps = errors, preconditioner, jumps
+        self._residual = np.zeros((0, columns))
         self._events = PETSc.Log.Event("FETIDual"), PETSc.Log.Event("FETIPrecond")
 
     def mult(self, mat: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Set y = P F x.  Collective."""
         with self._events[0]:
             values = x.getArray(readonly=True).reshape(-1, self._residual.shape[1])
-            y.setArray(self._projected(lambda: self._active.restrict(self._operator.apply(values))))
+            y.setArray(self._projected(lambda: self._jumps.active.restrict(self._jumps.operator.apply(values))))
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, z: PETSc.Vec) -> None:
         """Set z = P H r.  Collective."""
@@ -69,15 +57,13 @@ class ProjectedProblem:
 
     def _projected(self, vectors: Callable[[], Float]) -> Float:
         """Project `vectors()` and flatten the result; NaN if `vectors` raises."""
-        nothing = np.full((len(self._active.mask), self._residual.shape[1]), np.nan)
-        return self._errors.call(lambda: self._natural.project(vectors()), nothing).ravel()
+        nothing = np.full((len(self._jumps.active.mask), self._residual.shape[1]), np.nan)
+        return self._errors.call(lambda: self._jumps.natural.project(vectors()), nothing).ravel()
 
     def jump_norm(self) -> float:
         """Compute |P r| of the last r, the jump that no rigid-body motion closes.  Collective."""
-        r = self._natural.project(self._residual)
-        return float(
-            np.sqrt(distributed_arrays.allreduce_sum(self._operator.boundary.comm, np.array([(r * r).sum()]))[0])
-        )
+        r = self._jumps.natural.project(self._residual)
+        return float(np.sqrt(distributed_arrays.allreduce_sum(self._jumps.comm, np.array([(r * r).sum()]))[0]))
 
 
 class Stall:
@@ -108,8 +94,8 @@ class PrimalTest:
         jump_scale, force_scale: norms of the torn cell's jump and of the forces that close it, for the next solve.
     """
 
-    def __init__(self, errors: c_functions.CallbackErrors, problem: ProjectedProblem) -> None:
-        self._errors, self._problem, self.ends_on_stall = errors, problem, False
+    def __init__(self, problem: ProjectedProblem) -> None:
+        self._problem, self.ends_on_stall = problem, False
         self.jump_scale, self.force_scale = 1.0, 1.0
         self._jump_stall, self._force_stall = Stall(STALL_ITERATIONS), Stall(FORCE_STALL_ITERATIONS)
 
@@ -119,34 +105,30 @@ class PrimalTest:
 
     def __call__(self, ksp: PETSc.KSP, iteration: int, residual: float) -> PETSc.KSP.ConvergedReason:
         """Test for convergence; `residual` is the norm |P H r|.  Collective."""
-        failed = PETSc.KSP.ConvergedReason.DIVERGED_NANORINF
-        return self._errors.call(lambda: self._judge(ksp, iteration, residual), failed)
-
-    def _judge(self, ksp: PETSc.KSP, iteration: int, residual: float) -> PETSc.KSP.ConvergedReason:
         rtol, atol, divtol, _ = ksp.getTolerances()
         if iteration == 0:
             self._jump_stall.reset()
             self._force_stall.reset()
         if not np.isfinite(residual):
-            return PETSc.KSP.ConvergedReason.DIVERGED_NANORINF
+            return REASON.DIVERGED_NANORINF
         if residual > divtol * self.force_scale:
-            return PETSc.KSP.ConvergedReason.DIVERGED_DTOL
+            return REASON.DIVERGED_DTOL
         if residual <= atol:
-            return PETSc.KSP.ConvergedReason.CONVERGED_ATOL
+            return REASON.CONVERGED_ATOL
         if residual > rtol * self.force_scale:
             return self._go_on(self._force_stall.is_reached(iteration, residual))
         if ksp.getType() not in PRECONDITION_TRUE_RESIDUAL:
-            return PETSc.KSP.ConvergedReason.CONVERGED_RTOL
+            return REASON.CONVERGED_RTOL
         jump = self._problem.jump_norm()
         if jump <= rtol * self.jump_scale:
-            return PETSc.KSP.ConvergedReason.CONVERGED_RTOL
+            return REASON.CONVERGED_RTOL
         return self._go_on(self._jump_stall.is_reached(iteration, jump))
 
     def _go_on(self, stalled: bool) -> PETSc.KSP.ConvergedReason:
         """Return DIVERGED_BREAKDOWN for a stall that ends the solve, else ITERATING."""
         if stalled and self.ends_on_stall:
-            return PETSc.KSP.ConvergedReason.DIVERGED_BREAKDOWN
-        return PETSc.KSP.ConvergedReason.ITERATING
+            return REASON.DIVERGED_BREAKDOWN
+        return REASON.ITERATING
 
 
 class Krylov:
@@ -157,22 +139,18 @@ class Krylov:
     """
 
     def __init__(
-        self,
-        comm: MPI.Intracomm,
-        vector: PETSc.Vec,
-        operator: DualOperator,
-        preconditioner: Preconditioner,
-        natural: NaturalCoarseSpace,
-        active: ActiveRows,
-        columns: int,
+        self, vector: PETSc.Vec, preconditioner: Preconditioner, jumps: ActiveJumps, columns: int, restarts: bool
     ) -> None:
-        """Create the KSP for `columns` load cases, each with the layout of `vector`.  Collective."""
-        self._columns = columns
+        """Create the KSP for `columns` load cases, each with the layout of `vector`.  Collective.
+
+        With `restarts`, a stall ends the iteration, which begins again with the residual of its last multipliers.
+        """
+        self._preconditioner, self._jumps, self._columns, self._restarts = preconditioner, jumps, columns, restarts
         owned_rows, all_rows = vector.getSizes()
         sizes = (owned_rows * columns, all_rows * columns)
-        self._errors = c_functions.CallbackErrors(comm)
-        context = ProjectedProblem(self._errors, operator, preconditioner, natural, active, columns)
-        self.test = PrimalTest(self._errors, context)
+        self._errors = errors = c_functions.CallbackErrors(jumps.comm)
+        context = ProjectedProblem(errors, preconditioner, jumps, columns)
+        self.test = test = PrimalTest(context)
         A = PETSc.Mat().createPython((sizes, sizes), context, comm=vector.comm)
         A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         A.setUp()
@@ -183,25 +161,50 @@ class Krylov:
         self.ksp.setType(PETSc.KSP.Type.CG)
         self.ksp.setNormType(PETSc.KSP.NormType.PRECONDITIONED)
         self.ksp.setTolerances(rtol=RTOL, atol=0.0, max_it=MAX_ITERATIONS)
-        self.ksp.setConvergenceTest(self.test)
+        self.ksp.setConvergenceTest(lambda *iteration: errors.call(lambda: test(*iteration), REASON.DIVERGED_NANORINF))
         pc = self.ksp.getPC()
         pc.setType(PETSc.PC.Type.PYTHON)
         pc.setOptionsPrefix("feti_projected_")
         pc.setPythonContext(context)
         self.ksp.setFromOptions()
 
-    def solve(self, residual: Float) -> Float:
-        """Solve for the multipliers (rows, k) that remove the residual (rows, k).  Collective.
+    def solve(self, lam: Float, right: Float) -> tuple[Float, Float, int, int]:
+        """Solve P F lam = right, for projected jumps (rows, k), beginning with multipliers lam (rows, k).  Collective.
+
+        With an adaptive coarse space the condition number is small: proven with all rows active, measured with others.
+        So only rounding stalls the iteration.  Then it restarts from its last multipliers, with their residual computed
+        anew; after MAX_RESTARTS restarts of this kind a stall does not end it any more.
 
         Errors in the operator, the preconditioner or the test are raised again if all ranks raise them; otherwise the
         job ends.
+
+        Returns:
+            Multipliers lam, F lam on all rows, the number of iterations, and the reason for their end.
         """
-        self._right.setArray(residual.ravel())
-        self._solution.zeroEntries()
-        with self._errors.raised():
-            self.ksp.solve(self._right, self._solution)
-        multipliers: Float = self._solution.getArray(readonly=True).reshape(residual.shape).copy()
-        return multipliers
+        iterations, jumps = 0, self._jumps
+        for restart in range(MAX_RESTARTS + 2):
+            self.test.ends_on_stall = self._restarts and restart <= MAX_RESTARTS
+            # Loads of which `lam` leaves a larger residual than 0 begin with 0.
+            applied, residual = np.zeros_like(lam), right
+            if jumps.norms(lam).any():
+                applied = jumps.operator.apply(lam)
+                residual = jumps.projected(right - applied)
+            is_better = jumps.norms(residual) <= jumps.norms(right)
+            lam, applied = np.where(is_better, lam, 0.0), np.where(is_better, applied, 0.0)
+            residual = np.where(is_better, residual, right)
+            jump = float(np.linalg.norm(jumps.norms(residual)))
+            if self.test.is_met(self.ksp.getTolerances()[0], jump, self._preconditioner.norm * jump):
+                return lam, applied, iterations, int(REASON.CONVERGED_RTOL)
+            self._right.setArray(residual.ravel())
+            self._solution.zeroEntries()
+            with self._errors.raised():
+                self.ksp.solve(self._right, self._solution)
+            lam = lam + self._solution.getArray(readonly=True).reshape(lam.shape)
+            iterations += self.ksp.getIterationNumber()
+            reason = int(self.ksp.getConvergedReason())
+            if reason not in BREAKDOWNS:
+                break
+        return lam, jumps.operator.apply(lam), iterations, reason
 
     def describe(self, iterations: int) -> str:
         """Describe the last solve for -feti_view: iterations and estimated condition number."""

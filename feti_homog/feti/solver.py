@@ -9,8 +9,8 @@ C is the compliance of elastic bonds, 0 of glue; then the faces part by B u* = C
 
 import weakref
 from collections.abc import Sequence
+from contextlib import ExitStack
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -21,26 +21,14 @@ from feti_homog.feti import factory
 from feti_homog.feti.decomposition.jump_operator import GLUE, InterfaceSprings, JumpOperator
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain
-from feti_homog.feti.dual_solution import ActiveJumps, DualSolution
-from feti_homog.feti.krylov import ActiveRows, Krylov
+from feti_homog.feti.dual_solution import ActiveJumps, ActiveRows, DualSolution
+from feti_homog.feti.krylov import Krylov
 from feti_homog.feti.operators.interface_operators import DualOperator
 from feti_homog.feti.operators.one_subdomain import CondensedLoads
-from feti_homog.feti.thresholds import DEFAULTS, MAX_RESTARTS, MOST_DOFS_UNTRIMMED, Thresholds
+from feti_homog.feti.thresholds import DEFAULTS, MOST_DOFS_UNTRIMMED, Thresholds
 from feti_homog.mesh import ReferenceLattice
 from feti_homog.system.runtime import process_memory
 from feti_homog.typing import Float
-
-# Reasons for which PETSc gives up where rounding is at work.
-REASON = PETSc.KSP.ConvergedReason
-BREAKDOWNS = (REASON.DIVERGED_INDEFINITE_PC, REASON.DIVERGED_INDEFINITE_MAT, REASON.DIVERGED_BREAKDOWN)
-
-
-class Iterate(NamedTuple):
-    """Multipliers lam, F lam on all rows, and the projected residual on the active ones, (owned rows, k) each."""
-
-    lam: Float
-    applied: Float
-    residual: Float
 
 
 class FetiSolver:
@@ -101,10 +89,11 @@ class FetiSolver:
 
             self._by_columns = InfluenceSolutions(comm, self.exact_inverse, self.operator, self.natural, self._jumps)
         self._view = PETSc.Options("feti_").getBool("view", False)
-        self._krylov: dict[int, Krylov] = {}
         # The shells call Python, so they are destroyed with the solver: PETSc's own finalization comes when the
         # interpreter has already shut down.
-        self._destroy_krylov = weakref.finalize(self, _destroy_all, self._krylov)
+        self._krylov: dict[int, Krylov] = {}
+        self._shells = ExitStack()
+        self._destroy_krylov = weakref.finalize(self, self._shells.close)
         self._krylov_for(1)
         self.solves = 0
         if self._view:
@@ -204,14 +193,13 @@ class FetiSolver:
         krylov.test.force_scale = float(np.linalg.norm(self._jumps.norms(closing)))
         starts = np.where(is_seen, self.natural.project(self.active.restrict(starts)), 0.0) / scale
         lam = closing if self.preconditioner.is_exact else starts
-        last = Iterate(lam, np.zeros_like(lam), right)
-        iterations, reason = 0, int(PETSc.KSP.ConvergedReason.CONVERGED_ATOL)
+        applied, iterations, reason = np.zeros_like(lam), 0, int(PETSc.KSP.ConvergedReason.CONVERGED_ATOL)
         if is_seen.any():
-            last, iterations, reason = self._solve_with_restarts(krylov, lam, right)
+            lam, applied, iterations, reason = krylov.solve(lam, right)
             if self._view:
                 PETSc.Sys.Print(krylov.describe(iterations), comm=self.comm)
-        lam, jump_left = last.lam * scale, torn_jump - last.applied * scale
-        solutions = self._jumps.solutions(strains, lam, jump_left, iterations, reason, np.maximum(jump, rounding))
+        parts = lam * scale, torn_jump - applied * scale, iterations, reason, np.maximum(jump, rounding)
+        solutions = self._jumps.solutions(strains, *parts)
         if self._by_columns is not None:
             self._by_columns.record(solutions if is_seen.all() else [], self.d)
         return solutions
@@ -247,45 +235,12 @@ class FetiSolver:
         if self.adaptive is not None:
             self.adaptive.destroy()
 
-    def _solve_with_restarts(self, krylov: Krylov, lam: Float, right: Float) -> tuple[Iterate, int, int]:
-        """Solve with restarts; return the last iterate, the number of iterations and the reason for their end.
-
-        With an adaptive coarse space the condition number is small: proven with all rows active, measured with others.
-        So only rounding stalls the iteration. Then it restarts from its last multipliers, with their residual computed
-        anew; after MAX_RESTARTS restarts of this kind a stall does not end it any more.
-        """
-        iterations = 0
-        for restart in range(MAX_RESTARTS + 2):
-            krylov.test.ends_on_stall = self.adaptive is not None and restart <= MAX_RESTARTS
-            # Loads of which `lam` leaves a larger residual than 0 begin with 0.
-            applied, residual = np.zeros_like(lam), right
-            if self._jumps.norms(lam).any():
-                applied = self.operator.apply(lam)
-                residual = self._jumps.projected(right - applied)
-            is_better = self._jumps.norms(residual) <= self._jumps.norms(right)
-            lam, applied = np.where(is_better, lam, 0.0), np.where(is_better, applied, 0.0)
-            first = Iterate(lam, applied, np.where(is_better, residual, right))
-            jump = float(np.linalg.norm(self._jumps.norms(first.residual)))
-            if krylov.test.is_met(self.rtol, jump, self.preconditioner.norm * jump):
-                return first, iterations, int(PETSc.KSP.ConvergedReason.CONVERGED_RTOL)
-            lam = first.lam + krylov.solve(first.residual)
-            iterations += krylov.ksp.getIterationNumber()
-            reason = int(krylov.ksp.getConvergedReason())
-            if reason not in BREAKDOWNS:
-                break
-        return Iterate(lam, self.operator.apply(lam), first.residual), iterations, reason
-
     def _krylov_for(self, columns: int) -> Krylov:
         """Return the Krylov method for this number of load cases, set up at the first call."""
         if columns not in self._krylov:
-            vector, parts = self.jump_operator.vector, (self.operator, self.preconditioner, self.natural, self.active)
-            self._krylov[columns] = Krylov(self.comm, vector, *parts, columns)
+            parts = self.jump_operator.vector, self.preconditioner, self._jumps, columns
+            self._krylov[columns] = Krylov(*parts, restarts=self.adaptive is not None)
+            self._shells.callback(self._krylov[columns].destroy)
             if self._view:
                 self._krylov[columns].ksp.setComputeSingularValues(True)
         return self._krylov[columns]
-
-
-def _destroy_all(krylov: dict[int, Krylov]) -> None:
-    for solver in krylov.values():
-        solver.destroy()
-    krylov.clear()

@@ -51,8 +51,8 @@ class Thresholds:
 DEFAULTS = Thresholds()
 
 # Relative size below which a number is zero but for rounding: |K R| beside |K| (a rotation that is wrong by 1 % gives
-# 1e-7), eigenvalues of G^T G, pivots of H, and energies of modes that no active row resists (one resisting row out of
-# n gives about 1 / n).  Rounding leaves about 1e-15.
+# 1e-7), eigenvalues of G^T G, pivots of H, energies of modes that no active row resists (one resisting row out of n
+# gives about 1 / n), and residuals of iterative methods in place of a factorization.  Rounding leaves about 1e-15.
 ZERO_TOLERANCE = 1e-10
 # Columns that are solved, copied or computed together.  Fewer take more time, and the right-hand sides take 8 bytes a
 # degree of freedom and column (`scripts/benchmark_path --to-the-end`).
@@ -60,8 +60,6 @@ COLUMNS_AT_ONCE = 64
 
 # linalg
 
-# Relative tolerance of an iterative method that an option chooses in place of a factorization.
-ITERATIVE_RTOL = 1e-10
 # MUMPS gets this much more workspace than its estimate, in per cent: its own 20 were too little for a matrix of 13 084
 # rows on two ranks.
 MUMPS_EXTRA_WORKSPACE_PERCENT = 100
@@ -107,13 +105,12 @@ DENSE_INVERSE_COST = 1 / 700
 SCALED_LAME = 2.0
 # Columns up to which dense products one after the other are faster than all at once (`scripts/measure_kernels.py`).
 DENSE_COLUMNS_ONE_BY_ONE = 6
-# Product of the largest diagonal entries of S and of its regularised inverse above which a thin body refines products
-# with the inverse: up to 3e3 for discs and pieces around them, 1.5e4 for rings a twentieth of their radius thick, 4e6
-# for a hundredth.  Forces balance to 4e-12 there, and to 5e-8 without refinement.
+# Ratio of the largest to the least stiffness of a body above which products with its inverse are refined.  Of a thin
+# body, the product of the largest diagonal entries of S and of its regularised inverse: up to 3e3 for discs and pieces
+# around them, 1.5e4 for rings a twentieth of their radius thick, 4e6 for a hundredth.  Forces balance to 4e-12 there,
+# and to 5e-8 without refinement.  Of any body 1 / `Subdomain.compressible_share`, so that nu is above 0.49999: beside
+# fibres of a thousandth of its modulus a matrix of nu = 0.4999999 balances energies to 3e-9, and to 2e-4 without.
 ILL_CONDITIONED = 1e4
-# `Subdomain.compressible_share` below which products are refined too: nu above 0.49999. Beside fibres of a thousandth
-# of its modulus a matrix of nu = 0.4999999 balances energies to 3e-9, and to 2e-4 without refinement.
-INCOMPRESSIBLE_SHARE = 1e-4
 
 # solver, krylov
 
@@ -131,7 +128,7 @@ FORCE_STALL_ITERATIONS = 50
 MAX_RESTARTS = 2
 # A jump on the active rows is rounding if it is below the first number times the jump of the torn cell.  A larger one
 # is rounding up to this multiple of the estimate by `dual_solution.jump_rounding`: with phases 1000 times apart
-# rounding was up to 20 times the estimate.
+# rounding was up to 20 times the estimate.  So are averaged modes up to this multiple of the machine precision.
 ZERO_JUMP, ROUNDING_MARGIN = 1e-13, 100.0
 
 # exact, confirmation
@@ -165,6 +162,3 @@ STIFF_FIBRES = 1e3
 # averaged modes may depend on each other.  In the lists of `scripts/robustness`, with contrasts to 1e6, the first was
 # enough.
 COARSE_REGULARISATIONS = (1e-12, 1e-10, 1e-8)
-# Energy of an averaged mode with all rows active, relative to the largest, that is rounding of displacements: the
-# square of their 1e-14.  Modes of two kinds have energies in different units, so it leaves room for any unit of stress.
-ROUNDED_MODE_ENERGY = 1e-28

@@ -16,7 +16,7 @@ from feti_homog.microstructure import phase_names
 from feti_homog.typing import Bool, Float, Int
 
 # The stress at a tip is singular, so that the energy errs by about the size of the elements there, elsewhere by
-# h^(2 order). At this share of a balance tips err no more than the rest (`scripts/measure_tips.py`).
+# h^(2 order). With this fraction of the balanced size tips err no more than the rest (`scripts/measure_tips.py`).
 TIP_SHARE = 0.5
 # Largest ratio of triangles that the tips of many openings, of which a state has one, add to a mesh by default.
 TIP_TRIANGLES = 2.0
@@ -38,12 +38,12 @@ def marks(case: Case, fibres: int) -> dict[int, list[float]]:
 def size(case: Case, estimate: element_estimate.ElementEstimate) -> float | None:
     """Return the element size at tips over the cell width; None for the size on interfaces.
 
-    Without `tip_size` in the case it is, with the mean radius / width R,
+    Without `tip_size` in the case the size is, with the mean radius / width R,
 
         h_t = 2^refine R (h / R)^(2 order) / 2,  h = interface_size / 2^refine,
 
-    with several openings so large that their tips take at most TIP_TRIANGLES.  Along paths, and so in envelopes, tips
-    move, and `tip_size` alone counts.
+    but with several openings so large that their tips take at most TIP_TRIANGLES.  Along paths, and so in envelopes,
+    tips move, and `tip_size` alone counts.
     """
     cell, tips = case.cell, sum(map(len, marks(case, estimate.fibres).values()))
     if cell.tip_size is not None or case.section.breaks or not tips:
@@ -90,7 +90,7 @@ class EstimatedNodes:
         return cls(numbers[inner[side]], pair[pair >= 0][side], directions, is_vertex)
 
     def moved_tips(self, case: Case, fibres: int) -> tuple[debonded_arcs.MovedTips, ...]:
-        """Return, by interface, the tips that the mesher moved into a near vertex; none in a user's mesh."""
+        """Return, by interface, the tips that the mesher moved into a near vertex; no tips in a user's mesh."""
         if case.cell.has_own_mesh:
             return (debonded_arcs.NOT_MOVED,) * len(case.interfaces)
         distance, moved = float(np.degrees(outline.MERGED)), []
@@ -121,14 +121,17 @@ def faults(case: Case, nodes: EstimatedNodes, moved: Sequence[debonded_arcs.Move
             angle, line = opening if arc.angle is None else arc.angle, f"[{label}] debonded[{place}]"
             inside = debonded_arcs.debonded([arc], opening, fibres, directions, moved[pair])
             for fibre in [None] if isinstance(arc.fibre, str) else arc.fibre:
-                if angle and not (inside if fibre is None else inside[fibres == fibre]).any():
-                    lines.append(line + _fault(angle, fibre, fibres, interface.between))
+                if not angle or (inside if fibre is None else inside[fibres == fibre]).any():
+                    continue
+                if fibre is not None and fibre not in fibres:
+                    which = (
+                        "that can debond" if interface.between is None else f"between {' and '.join(interface.between)}"
+                    )
+                    lines.append(f"{line}.fibre: fibre {fibre} has no interface {which}")
+                    continue
+                whose = "any fibre" if fibre is None else f"fibre {fibre}"
+                words = (
+                    f"no node of {whose} is within the arc of {angle} degrees; make it wider, or the elements smaller"
+                )
+                lines.append(f"{line}: {words}")
     return list(dict.fromkeys(lines))
-
-
-def _fault(angle: float, fibre: int | None, fibres: Int, between: Sequence[str] | None) -> str:
-    if fibre is not None and fibre not in fibres:
-        which = "that can debond" if between is None else f"between {' and '.join(between)}"
-        return f".fibre: fibre {fibre} has no interface {which}"
-    whose = "any fibre" if fibre is None else f"fibre {fibre}"
-    return f": no node of {whose} is within the arc of {angle} degrees; make it wider, or the elements smaller"

@@ -14,16 +14,7 @@ from feti_homog.errors import ConvergenceError
 from feti_homog.feti.decomposition import jump_operator
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface import Load
-from feti_homog.interface.contact import (
-    BONDED,
-    CLOSED,
-    OPEN,
-    BondState,
-    Equilibrium,
-    Status,
-    contact_problem,
-    coupled_interfaces,
-)
+from feti_homog.interface.contact import BondState, Contact, ContactProblem, Equilibrium, Status, coupled_interfaces
 from feti_homog.materials import voigt
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Bool, Float
@@ -36,7 +27,7 @@ class Response:
     Attributes:
         strain: (v,) E.
         stress: (v,) Sigma = <sigma>, which does work on E.
-        scale: the response is `scale` times `state`.
+        scale: factor from `state` to the response.
         stored: energy per cell area, 1/2 <sigma:eps> from the displacements plus spring energy.
         in_springs: spring energy, 1/2 sum lam^2 C / |UC|.
         state: interface states, multipliers, jumps and amplitudes.
@@ -53,7 +44,7 @@ class Response:
             stress from the strains in a bonded cell.  And the KKT certificate of contact.
         counts: numbers of `bonded`, `open` and `closed` interface nodes.
         damage: (k,) bond damage, 0 intact to 1 broken.
-        shares: (m,) this rank's element shares in the estimated error of E . Sigma; None without estimate.
+        shares: (m,) contribution of this rank's elements to the estimated error of E . Sigma; None without estimate.
     """
 
     strain: Float
@@ -70,7 +61,7 @@ class Response:
 
     @property
     def leading(self) -> str:
-        """Names and values for the largest plane strain and its stress."""
+        """The largest plane strain and its stress, in words."""
         k = int(np.abs(self.strain[: len(voigt.STRAINS)]).argmax())
         return f"{voigt.STRAINS[k]} {self.strain[k]:.4g}, {voigt.STRESSES[k]} {self.stress[k]:.4g}"
 
@@ -84,14 +75,14 @@ class Homogenization:
     """Averages over a torn cell with its interfaces.
 
     Attributes:
-        law: bond law, without energies that tips release.
+        law: bond law, without the energies released at tips.
         interface: the contact problem.
     """
 
     def __init__(self, cell: TornCell, contact: bool) -> None:
         self.cell, size = cell, np.array([cell.summary.width, cell.summary.height])
         self.law = cell.bond_law
-        self.interface = contact_problem.ContactProblem(cell.solver, contact, size, self.law.softening)
+        self.interface = ContactProblem(cell.solver, contact, size, self.law.softening)
 
     @property
     def intact(self) -> BondState:
@@ -123,7 +114,7 @@ class Homogenization:
         If `brief`, a state that F lambda did not confirm is averaged from its multipliers, with contact checks alone.
 
         Raises:
-            ConvergenceError: its numbers are not finite.
+            ConvergenceError: the numbers of the state are not finite.
         """
         if not np.isfinite(state.solution.residual):
             raise ConvergenceError(
@@ -180,9 +171,9 @@ class Homogenization:
         return Response(*means, scale, *energies, state, scale * u, errors, self.counts(state.status), damage)
 
     def damage(self, bonds: BondState) -> Float:
-        """(k,) bond damage, 0 intact to 1 broken."""
+        """Return the bond damage (k,), from 0, intact, to 1, broken."""
         damage = self.law.damage(bonds)
-        return (bonds.status != BONDED).astype(float) if damage is None else damage
+        return (bonds.status != Contact.BONDED).astype(float) if damage is None else damage
 
     def _rubbing(self, state: Equilibrium) -> float:
         """Return the work on faces with friction per area, which is not stored.  Collective."""
@@ -194,9 +185,9 @@ class Homogenization:
         return float(self.cell.comm.allreduce(work)) / self.cell.summary.area
 
     def _unmet_stress(self, state: Equilibrium, stress: Float) -> float:
-        """Return the prescribed stress error, relative to load and stresses.  Collective."""
+        """Return the largest error in a prescribed stress, relative to load and stresses.  Collective."""
         load, scales = state.load, self.interface.scales
-        # Scaled by the roots of their stiffnesses, so that none is small next to another.
+        # Roots of stiffnesses scale the stresses, so that no stress is small beside another.
         root, imposed = scales.roots, scales.imposed_strain(state.asked)
         error = np.abs((stress - load.values)[load.by_stress] / root[load.by_stress]).max()
         largest = max(np.abs(stress / root)[: len(imposed)].max(), (root[: len(imposed)] * imposed).max())
@@ -206,13 +197,13 @@ class Homogenization:
         """Count interface nodes in each state.  Collective."""
         if self.cell.summary.across:  # without multipliers there nothing can part
             return {"bonded": self.cell.summary.interface_nodes or 0, "open": 0, "closed": 0}
-        numbers = np.array([(status == kind).sum() for kind in (BONDED, OPEN, CLOSED)])
+        numbers = np.array([(status == kind).sum() for kind in (Contact.BONDED, Contact.OPEN, Contact.CLOSED)])
         sums = self.cell.comm.allreduce(numbers)
         return dict(zip(("bonded", "open", "closed"), sums.tolist(), strict=True))
 
     @cached_property
     def _strain_of_jumps(self) -> Float:
-        """(owned rows, m) nu = (B B^T)^-1 B int B_e: int eps* = nu^T B u."""
+        """The matrix nu = (B B^T)^-1 B N (owned rows, m): int eps* = nu^T B u."""
         solver = self.cell.solver
         B = solver.interface_operators.B
         integrals = solver.jump_operator.sum(B @ self._strain_of_displacements)
@@ -221,14 +212,14 @@ class Homogenization:
 
     @cached_property
     def _strain_of_displacements(self) -> Float:
-        """(boundary dofs, m) N: N^T u = int eps* over bodies and voids."""
+        """The matrix N (boundary dofs, m): N^T u = int eps* over bodies and voids."""
         m, dofs = self.cell.solver.problem.strains, self.cell.solver.interface_operators.dofs
         pairs = zip(self.cell.subdomains, dofs, strict=True)
         return np.concatenate([np.zeros((0, m)), *(s.mean_strain(boundary) for s, boundary in pairs)])
 
     @cached_property
     def _strain_inside(self) -> float:
-        """Return the largest relative share of inner nodes in int eps*, 0 for closed meshes.  Collective."""
+        """The largest relative contribution of inner nodes to int eps*, 0 for closed meshes.  Collective."""
         inner, size = 0.0, 0.0
         for s, boundary in zip(self.cell.subdomains, self.cell.solver.interface_operators.dofs, strict=True):
             size = max(size, float(np.sqrt(s.area)))
@@ -247,7 +238,7 @@ class Homogenization:
 
 
 class FibreInterfaces:
-    """Interfaces of a cell's f fibres, by number; a coated fibre may have two."""
+    """The interfaces of f fibres, by fibre number; a coated fibre may have two interfaces."""
 
     def __init__(self, cell: TornCell) -> None:
         """Sum all interface lengths.  Collective."""
@@ -261,33 +252,33 @@ class FibreInterfaces:
         self._degrees = np.where(np.isnan(radius), 360.0 / np.where(self._length > 0, self._length, 1.0), round_fibre)
 
     def length(self, which: Bool) -> Float:
-        """(f,) interface length at the nodes `which` (k,) on all ranks.  Collective."""
+        """Return the interface length (f,) at the nodes `which` (k,) of all ranks.  Collective."""
         sums: Float = np.bincount(self._fibre, self._nodes.length * which, self._fibres).astype(float)
         return distributed_arrays.allreduce_sum(self._comm, sums)
 
     def loose(self, status: Status) -> list[int]:
         """Return fibre numbers, from 1, without a bond that holds.  Collective."""
-        is_loose = (self.length(status == BONDED) == 0.0) & (self._length > 0.0)
+        is_loose = (self.length(status == Contact.BONDED) == 0.0) & (self._length > 0.0)
         return [int(number) for number in np.flatnonzero(is_loose) + 1]
 
     def angle(self, length: Float) -> Float:
-        """Convert lengths (f,) to degrees (f,): 360 times the fraction if not round, or coated with an interface."""
+        """Convert lengths (f,) to degrees; a fibre that is not round takes its fraction of 360."""
         return np.asarray(length * self._degrees)
 
     def share(self, length: Float) -> float:
-        """Return the share of lengths (f,) in the whole interface length."""
+        """Return the fraction of the whole interface length that lengths (f,) have."""
         return float(length.sum() / (self._length.sum() or 1.0))
 
     def shares(self, status: Status) -> Float:
         """Return the debonded fraction (i,) of the length of each [[interface]] section.  Collective."""
         length, debonded = (
             np.bincount(self._nodes.pair, values, self._pairs).astype(float)
-            for values in (self._nodes.length, self._nodes.length * (status != BONDED))
+            for values in (self._nodes.length, self._nodes.length * (status != Contact.BONDED))
         )
         length = distributed_arrays.allreduce_sum(self._comm, length)
         return np.asarray(distributed_arrays.allreduce_sum(self._comm, debonded) / np.where(length > 0, length, 1.0))
 
 
 def asymmetry(L: Float) -> float:
-    """max |L - L^T| / max |L|."""
+    """Return max |L - L^T| / max |L|."""
     return float(np.abs(L - L.T).max() / np.abs(L).max())

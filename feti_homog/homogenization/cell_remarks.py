@@ -12,14 +12,13 @@ from feti_homog.mesh import Torus, submeshes
 from feti_homog.schema import wording
 from feti_homog.typing import AnyInt, Float, Int
 
-SAME_FRACTION = 0.01  # of a matched table and its cell, relative
-# Largest element on an interface / length of the process zone. With 0.54 of it the stresses of the square cell of
-# tests/parallel/test_energy.py are within 1.4 % of those with elements a quarter as long, with 1.1 of it within 4.3 %.
+# Relative difference between fibre fractions, stiffness ratios or teeth that deserves no remark.
+SAME_RATIO = 0.01
+# Largest element on an interface / length of the process zone. With a ratio of 0.54 the stresses of the square cell of
+# tests/parallel/test_energy.py are within 1.4 % of the stresses with elements a quarter as long, with 1.1 within 4.3 %.
 RESOLVED = 0.5
-# The same of cohesive laws, whose tractions fall along it.
+# The ratio for cohesive laws, whose tractions fall along the process zone.
 RESOLVED_SOFTENING = 1 / 3
-# Relative difference of stiffness ratios, or of teeth, that is none.
-SAME_RATIO = 1e-3
 
 
 def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
@@ -56,7 +55,7 @@ def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -
 
 
 def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
-    """List remarks of the mesh, an [interface] without effect, and nodes that never part.
+    """List remarks on the mesh, on an [interface] without effect, and on nodes that never part.
 
     `pairs` as in `share_entities`.
     """
@@ -106,7 +105,7 @@ def table_remarks(case: Case) -> tuple[str, ...]:
         f"[cell] fibre_fraction = {cell.fibre_fraction:g}: {cell.match.name} has {fraction:.4g}; neighbours are as far "
         "away as there, in diameters"
     )
-    return (remark,) if abs(cell.fibre_fraction / fraction - 1.0) > SAME_FRACTION else ()
+    return (remark,) if abs(cell.fibre_fraction / fraction - 1.0) > SAME_RATIO else ()
 
 
 def longest(ends: Float) -> float:
@@ -117,9 +116,9 @@ def longest(ends: Float) -> float:
 def process_zone(case: Case) -> float | None:
     """Return the least process zone length E' G_Ic / sigma_c^2.
 
-    None unless bonds break by energy.  sigma_c = sqrt(2 k_n G_Ic); of cohesive laws G_Ic and sigma_c are toughness and
-    strength of the pure mode with the shorter zone.  E' is Young's modulus in the plane state, E / (1 - nu^2) in plane
-    strain, along the most compliant axis in all phases.
+    Return None unless bonds break by energy.  sigma_c = sqrt(2 k_n G_Ic); for cohesive laws G_Ic and sigma_c are the
+    toughness and strength in the pure mode with the shorter zone.  E' is Young's modulus in the plane state,
+    E / (1 - nu^2) in plane strain, along the most compliant axis in all phases.
     """
     lengths = [1 / (2 * bond.normal_stiffness) for bond in case.interfaces if bond.toughness and bond.normal_stiffness]
     for bond in case.interfaces:
@@ -135,7 +134,7 @@ def process_zone(case: Case) -> float | None:
 
 
 def warnings(case: Case, width: float, edge: float) -> list[str]:
-    """Warn about cohesive laws, and process zones shorter than interface elements resolve.
+    """Warn about cohesive laws, and about process zones that interface elements do not resolve.
 
     Args:
         width: cell width.

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from mpi4py import MPI
@@ -25,7 +24,7 @@ LAYERS = 3
 
 
 class SharedVertices:
-    """The shared vertices in this rank's meshes, each of which joins some pieces.
+    """The shared vertices of body pieces in this rank's meshes, each mesh with some pieces.
 
     Attributes:
         meshes: indices of this rank's meshes with shared vertices.
@@ -37,18 +36,38 @@ class SharedVertices:
     def __init__(self, comm: MPI.Intracomm, meshes: Sequence[tuple[Sequence[Submesh], FineMesh]]) -> None:
         """Find the common vertices and edges of several pieces.  Collective."""
         self._comm = comm
-        borders = [_border(pieces, mesh) for pieces, mesh in meshes]
+        # On the piece borders: vertices (n, 3) by body, entity and position, their classes (n,), coarse edges (e, 3) by
+        # body, entity and position, and the vertex classes (e, m) along these edges.
+        borders = []
+        for pieces, mesh in meshes:
+            first, parts = 0, list[tuple[Int, Int, Int, Int]]()
+            for s in pieces:
+                triangle, k, line = border_lines(s, mesh, mesh.node_class[mesh.nodes[first : first + len(s.triangles)]])
+                first, line = first + len(s.triangles), line[:, :: mesh.lattice.order]
+                ends = s.vertex_class[s.triangles[triangle[:, None], np.stack([k, (k + 1) % 3], axis=1)]]
+                back = s.backwards[triangle, k]
+                ends[back] = ends[back, ::-1]
+                place = np.arange(line.shape[1])
+                place[-1] = 0
+                entity = sharers.entity_code(s.edge_keys[s.edge_class[s.triangle_edges[triangle, k]]], True)
+                body = s.constituent[triangle]
+                key = np.tile(entity[:, None], len(place))
+                key[:, [0, -1]] = sharers.entity_code(s.class_keys[ends], False)
+                rows = np.stack(np.broadcast_arrays(body[:, None], key, place), axis=2).reshape(-1, 3)
+                classes, once = np.unique(line, return_index=True)
+                parts.append((rows[once], classes, np.column_stack([body, entity, np.zeros_like(entity)]), line))
+            borders.append([np.concatenate(table) for table in zip(*parts, strict=True)])
         vertex_copies, edge_copies = (self._copies([border[k] for border in borders]) for k in (0, 2))
         self._rows = NO_ROWS
         self.meshes, self.classes, self.sides, self.is_first = list[int](), list[Int](), list[Int](), list[Bool]()
-        for mesh, (rows, classes, _, line) in enumerate(borders):
-            shared, on_cut = vertex_copies[mesh][:, 0] > 1, edge_copies[mesh][:, 0] > 1
+        for number, (rows, classes, _, line) in enumerate(borders):
+            shared, on_cut = vertex_copies[number][:, 0] > 1, edge_copies[number][:, 0] > 1
             if shared.any():
                 self._rows = np.concatenate([self._rows, rows[shared]])
-                self.meshes.append(mesh)
+                self.meshes.append(number)
                 self.classes.append(classes[shared])
                 self.sides.append(np.stack([line[on_cut, :-1], line[on_cut, 1:]], axis=2).reshape(-1, 2))
-                self.is_first.append(np.repeat(edge_copies[mesh][on_cut, 1] == 1, line.shape[1] - 1))
+                self.is_first.append(np.repeat(edge_copies[number][on_cut, 1] == 1, line.shape[1] - 1))
 
     def sum(self, parts: Sequence[Float]) -> list[Float]:
         """Sum values (n, k) at each mesh's shared vertices over all pieces.  Collective."""
@@ -59,20 +78,25 @@ class SharedVertices:
             return np.asarray(totals[number])
 
         width = self._comm.allreduce(max((part.shape[1] for part in parts), default=0), MPI.MAX)
-        return _split(self._at_home(self._rows, np.concatenate([np.zeros((0, width)), *parts]), sums), self.classes)
+        return self._at_home(self._rows, np.concatenate([np.zeros((0, width)), *parts]), self.classes, sums)
 
-    def _copies(self, rows: Sequence[Int]) -> list[Int]:
-        """Return the copy count of each row (n, 3) in the meshes, and 1 at the first copy, else 0.  Collective."""
+    def _copies(self, parts: Sequence[Int]) -> list[Int]:
+        """Count the copies of each row (n, 3) in all meshes; the second column is 1 at the first copy.  Collective."""
 
         def copies(number: Int, _: Int) -> Int:
             _, first, count = np.unique(number, return_index=True, return_counts=True)
             return np.stack([count[number], first[number] == np.arange(len(number))], axis=1)
 
-        all_rows = np.concatenate([NO_ROWS, *rows])
-        return _split(self._at_home(all_rows, all_rows, copies), rows)
+        rows = np.concatenate([NO_ROWS, *parts])
+        return self._at_home(rows, rows, parts, copies)
 
-    def _at_home(self, rows: Int, values: Array, combine: Callable[[Int, Array], Array]) -> Array:
-        """Call `combine` on the home ranks with the numbers of rows (n, 3) and with values (n, k).  Collective."""
+    def _at_home(
+        self, rows: Int, values: Array, parts: Sequence[Array], combine: Callable[[Int, Array], Array]
+    ) -> list[Array]:
+        """Call `combine` on the home ranks with the numbers of rows (n, 3) and with values (n, k).  Collective.
+
+        Return the combined rows in arrays with the lengths of `parts`.
+        """
         comm, home = self._comm, rows[:, 1:].sum(axis=1) // 2 % self._comm.size
         rows, values, source, place = distributed_arrays.exchange(
             comm, home, rows, values, np.full(len(rows), comm.rank), np.arange(len(rows))
@@ -83,43 +107,11 @@ class SharedVertices:
         number = np.empty(len(order), np.int64)
         number[order] = np.cumsum(is_new) - 1
         place, combined = distributed_arrays.exchange(comm, source, place, combine(number, values))
-        return np.asarray(combined[np.argsort(place)])
-
-
-def _split(values: Array, parts: Sequence[Array]) -> list[Array]:
-    """Split the rows of values into arrays with the lengths of the parts."""
-    return [values[a:b] for a, b in pairwise(np.cumsum([0, *map(len, parts)]).tolist())]
-
-
-def _border(pieces: Sequence[Submesh], mesh: FineMesh) -> tuple[Int, Int, Int, Int]:
-    """Return the vertices and coarse edges on the piece borders of a joined mesh.
-
-    The result has the vertices (n, 3) by body, entity and position, the vertex classes (n,), the coarse edges (e, 3) by
-    body, entity and position, and the vertex classes (e, m) along these edges.
-    """
-    first, borders = 0, []
-    for s in pieces:
-        triangle, k, line = border_lines(s, mesh, mesh.node_class[mesh.nodes[first : first + len(s.triangles)]])
-        first, line = first + len(s.triangles), line[:, :: mesh.lattice.order]
-        ends = s.vertex_class[s.triangles[triangle[:, None], np.stack([k, (k + 1) % 3], axis=1)]]
-        back = s.backwards[triangle, k]
-        ends[back] = ends[back, ::-1]
-        place = np.arange(line.shape[1])
-        place[-1] = 0
-        key = np.tile(
-            sharers.entity_code(s.edge_keys[s.edge_class[s.triangle_edges[triangle, k]]], True)[:, None], len(place)
-        )
-        edges = np.column_stack([s.constituent[triangle], key[:, 0], np.zeros(len(key), np.int64)])
-        key[:, [0, -1]] = sharers.entity_code(s.class_keys[ends], False)
-        rows = np.stack(np.broadcast_arrays(s.constituent[triangle][:, None], key, place), axis=2).reshape(-1, 3)
-        classes, once = np.unique(line, return_index=True)
-        borders.append((rows[once], classes, edges, line))
-    vertices, classes, edges, lines = (np.concatenate(rows) for rows in zip(*borders, strict=True))
-    return vertices, classes, edges, lines
+        return np.split(combined[np.argsort(place)], np.cumsum([len(part) for part in parts])[:-1]) if parts else []
 
 
 def border_lines(s: Submesh, mesh: FineMesh, classes: Int32) -> tuple[Int, Int, Int]:
-    """Return the triangles (e,) at a piece border, their border edges (e,), and classes (e, M + 1) along the edges.
+    """Return the triangles (e,) at a piece border, their border edges (e,), and the edge classes (e, M + 1).
 
     `classes` (t, q) are the lattice node classes of all triangles.
     """
@@ -161,7 +153,7 @@ def fits_across_cuts(
 
 @dataclass(frozen=True)
 class _Strip:
-    """The elements about one mesh's shared vertices, with vertex numbers from 0.
+    """The elements about the shared vertices of a mesh, with vertex numbers from 0.
 
     Attributes:
         stress: recovered stress on these elements.
@@ -181,7 +173,7 @@ class _Strip:
 
     @classmethod
     def of(cls, body: stress_recovery.RecoveredStress, classes: Int, cut: Int, is_first: Bool) -> _Strip:
-        """Find the elements; of the sides `cut` (c, 2) on cuts, this piece counts the first copies."""
+        """Find the elements; this piece counts a side of `cut` (c, 2) only where its copy `is_first`."""
         is_vertex, at = np.zeros(len(body.u), bool), body.node_class[body.triangles[:, :3]]
         is_vertex[classes] = True
         for _ in range(LAYERS):
@@ -199,7 +191,7 @@ class _Strip:
         return cls(stress, is_vertex, stress.numbers[classes], sides[once], vector[once], np.unique(sides[single]))
 
     def neighbours(self, at_boundary: Bool) -> local_fits.PatchNeighbours:
-        """Return vertex pairs with the first on the body boundary; `at_boundary` (n,) tells it of shared vertices."""
+        """Return vertex pairs with the first on the body boundary, where shared vertices are `at_boundary` (n,)."""
         is_bound = np.zeros(int(self.is_vertex.sum()), bool)
         is_bound[self.bounds] = True
         is_bound[self.shared] = at_boundary
@@ -209,7 +201,7 @@ class _Strip:
 
 
 def _code(a: Int, b: Int, size: int) -> Int:
-    """Return one number for each vertex pair, among `size` vertices."""
+    """Return a number for each pair of vertices, among `size` vertices."""
     return np.asarray(np.minimum(a, b) * size + np.maximum(a, b))
 
 

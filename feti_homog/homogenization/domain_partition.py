@@ -1,4 +1,4 @@
-"""The cut cell on rank 0: from coarse mesh to ranks' submeshes."""
+"""Cut the cell on rank 0, from the coarse mesh to the submeshes of each rank."""
 
 from dataclasses import dataclass
 
@@ -25,20 +25,20 @@ class CellSummary:
     Attributes:
         width, height: periods.
         phases: material phase names, the matrix first.
-        bodies, subdomains, coarse_triangles: their numbers.
+        bodies, subdomains, coarse_triangles: numbers of bodies, subdomains and coarse triangles.
         interface_edge: longest coarse edge between phases.
         numbers: (constituents,) numbers from 1, as in case files, for fibres and the fibres that coatings coat; 0 for
             the matrix.
         is_fibre: (constituents,) mark fibres, not the matrix and coatings.
-        constituent_phase: (constituents,) place of each one's phase in `phases`.
+        constituent_phase: (constituents,) index of the phase in `phases`.
         centres, radii: (constituents, 2) and (constituents,) centres, in the cell, and radii of fibres, else NaN.
         frames: (constituents, 2, 2) as in `Ellipses`, for fibres that are circles or ellipses; else NaN.
         snapped: largest distance that a node in a user's mesh was moved to make sides match.
         voids: number of voids.
-        match_distance: distance from the fibres to the table that they match, see `random_fibres`; None without table.
+        match_distance: distance between the fibres and a matched table, see `random_fibres`; None without table.
         remarks: unexpected cell properties, a line each.
-        across: whether subdomains are pieces across materials.
-        interface_nodes: number of interface nodes, if `across`, which has no multipliers there.
+        across: whether subdomains reach across materials.
+        interface_nodes: number of interface nodes, which have no multipliers; None unless `across`.
     """
 
     width: float
@@ -74,16 +74,16 @@ class CellSummary:
 
     @property
     def fibre_bodies(self) -> Int:
-        """(fibres,) constituents that are fibres, by their numbers."""
+        """The constituents (fibres,) that are fibres, by their numbers."""
         return np.flatnonzero(self.is_fibre)
 
     @property
     def coatings(self) -> Float:
-        """(fibres,) coating thickness, 0 without one; NaN if not round."""
+        """The coating thicknesses (fibres,), 0 without a coating, NaN if not round."""
         return mesh_fibres.coating_thickness(self.numbers, self.is_fibre, Ellipses(self.centres, self.frames).semi_axes)
 
     def fibre_number(self, constituent: Int) -> Int:
-        """(k,) fibre `numbers` for constituents (k,)."""
+        """Return the fibre `numbers` (k,) for constituents (k,)."""
         return np.asarray(self.numbers[constituent])
 
     def warnings(self) -> list[str]:
@@ -93,7 +93,7 @@ class CellSummary:
 
     @property
     def period(self) -> Float:
-        """(2,) width and height."""
+        """Width and height (2,)."""
         return np.array([self.width, self.height])
 
     @property
@@ -104,7 +104,7 @@ class CellSummary:
 
 @dataclass(frozen=True)
 class RankShare:
-    """One rank's share in the cut cell.
+    """The part of the cut cell on one rank.
 
     Attributes:
         summary, table: for the whole cell.
@@ -125,7 +125,7 @@ def distribute(
     n_ranks: int,
     policy: partition_policy.PartitionPolicy = partition_policy.DEFAULT_POLICY,
 ) -> list[RankShare]:
-    """Cut the cell into subdomains; return a share for each rank.
+    """Cut the cell into subdomains, and deal them to the ranks.
 
     Raises:
         CaseError: an arc lies on a fibre that cannot have it, or selects no node.
@@ -220,7 +220,7 @@ def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triang
 def _cut_across(
     case: Case, torus: Torus, lattice: ReferenceLattice, n_ranks: int, policy: partition_policy.PartitionPolicy
 ) -> partition.Partition | None:
-    """Cut the cell across materials; None unless the policy wants it and each rank gets a piece."""
+    """Cut the cell across materials; return None against the policy, or if a rank gets no piece."""
     triangles = len(torus.mesh.triangles)
     dofs = triangles * lattice.intervals**2
     pieces = policy.across_pieces(dofs, n_ranks) if partition_policy.can_be_cut_across(case) else 0

@@ -24,13 +24,12 @@ from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.domain_partition import in_cell
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface import debonded_arcs
-from feti_homog.interface.contact import BONDED, Status, contact_problem
+from feti_homog.interface.contact import BONDED, ContactProblem, Status
 from feti_homog.materials import voigt
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Array, Float, Int
 
-DIRECTION_DIGITS = 9
-# Length at which the modes are separated / radius of the fibre; this length is one element at least.
+# Length at which the modes are separated / radius of the fibre; at least one element counts.
 MODE_LENGTH = 1e-3
 QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 # Radius around a tip beyond which no node turns / distance to boundaries; largest such radius / a period of the cell;
@@ -38,11 +37,10 @@ QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 REACH, REACH_OF_A_PERIOD, CORE = 0.8, 0.32, 0.5
 # Relative distance from a circle beyond which a node of both bodies is on another boundary, or on another image.
 OFF_CIRCLE = 1e-4
-VOID = -1
 
 
 class CrackExtension:
-    """The elements of a subdomain around a tip, and the energy change of a crack extension in these elements."""
+    """A virtual crack extension in the elements of a subdomain around a tip."""
 
     def __init__(self, subdomain: Subdomain, period: Float) -> None:
         """Prepare the search for elements around points; `period` (2,) is the period of the cell."""
@@ -117,23 +115,25 @@ class EnergyReleaseRates:
         interface: contact problem of the responses.
         points, bodies, pair, direction, length: (n, 2) and (n,) at all ranks' interface nodes: positions, outer and
             inner constituents, interface sections, degrees about the centre of the inner constituent, lengths.
+        fibre, radius: (n,) fibre numbers, also within coatings, and circle radii, NaN without a circle.
     """
 
-    def __init__(self, cell: TornCell, interface: contact_problem.ContactProblem) -> None:
+    def __init__(self, cell: TornCell, interface: ContactProblem) -> None:
         """Gather the interface nodes, and find the boundaries that limit a crack extension.  Collective."""
         nodes = interface.nodes
         self.cell, self.interface, self._period = cell, interface, cell.summary.period
         self._chains = debonded_arcs.InterfaceChains(cell.neighbours.adjacency)
         self._extensions = [CrackExtension(s, self._period) for s in cell.subdomains]
         self.points, self.bodies = self._gathered(nodes.points), self._gathered(nodes.bodies)
-        self.pair = self._gathered(nodes.pair)
-        # Rounded, lest rounding decide their order.
-        direction = np.round(self._gathered(cell.directions), DIRECTION_DIGITS)
+        self.pair, inner = self._gathered(nodes.pair), self.bodies[:, 1]
+        self.fibre, self.radius = cell.summary.fibre_number(inner), cell.summary.radii[inner]
+        # Rounding errors must not decide the order of directions.
+        direction = np.round(self._gathered(cell.directions), debonded_arcs.DIRECTION_DIGITS)
         self.direction, self.length = np.where(direction <= -180.0, 180.0, direction), self._gathered(nodes.length)
         # (interfaces, 2) normal and tangential stiffnesses of the bonds, infinite where they are rigid.
         self._stiffness = np.array(phase_laws.springs(cell.case).stiffness or ((np.inf, np.inf),))
         self._tree = cKDTree(in_cell(self.points, self._period), boxsize=self._period)
-        # (k, 2) body boundary nodes on all ranks, and (k,) their bodies, VOID at voids. Each body has its own nodes
+        # (k, 2) body boundary nodes on all ranks, and (k,) their bodies, -1 at voids. Each body has its own nodes
         # where two bodies meet; cuts between a body's pieces are no boundaries.
         borders = [np.bincount(s.submesh.edge_class[s.submesh.triangle_edges].ravel()) == 1 for s in cell.subdomains]
         rows, points, body = [np.zeros((0, 2), np.int64)], [np.zeros((0, 2))], [np.zeros(0, np.int64)]
@@ -144,7 +144,7 @@ class EnergyReleaseRates:
         cuts = edges[pieces > 1]
         for s, border in zip(cell.subdomains, borders, strict=True):
             cut = np.isin(s.submesh.edge_keys, cuts[cuts[:, 1] == s.submesh.body, 0])
-            for edge, name in ((border & ~cut & ~s.submesh.at_void, s.submesh.body), (s.submesh.at_void, VOID)):
+            for edge, name in ((border & ~cut & ~s.submesh.at_void, s.submesh.body), (s.submesh.at_void, -1)):
                 points.append(s.mesh.points[np.unique(assembly.nodes_along(s.submesh, s.mesh, edge))])
                 body.append(np.full(len(points[-1]), name))
         self._boundaries = self._gathered(np.concatenate(points)), self._gathered(np.concatenate(body))
@@ -154,8 +154,8 @@ class EnergyReleaseRates:
         solution, status = response.state.solution, self._gathered(response.state.status)
         tips = self._chains.tips(status)
         # Tips on circles, in the order of fibres, interfaces and directions.
-        order = np.lexsort((self.direction[tips.node], self.pair[tips.node], self._numbers(tips)))
-        tips = tips.chosen(order[np.isfinite(self._radius(tips)[order])])
+        order = np.lexsort((self.direction[tips.node], self.pair[tips.node], self.fibre[tips.node]))
+        tips = tips.chosen(order[np.isfinite(self.radius[tips.node[order]])])
         jump = self._gathered(self.interface.jump(solution))
         force = self._gathered(self.interface.traction(solution)) * self.length[:, None]
         jump[np.abs(jump) < self.interface.scales.gap_noise(solution.strain)] = 0.0
@@ -171,20 +171,12 @@ class EnergyReleaseRates:
         fraction = np.divide(closing[rigid], work, out=np.zeros_like(closing[rigid]), where=work > 0)
         modes[rigid] = fraction * np.maximum(0.0, self._released(tips.chosen(rigid), response))[:, None]
         return EnergyRelease(
-            fibre=self._numbers(tips),
+            fibre=self.fibre[tips.node],
             pair=self.pair[tips.node],
             direction=self.direction[tips.node],
             modes=response.scale**2 * modes,
             length=length,
         )
-
-    def _numbers(self, tips: debonded_arcs.CrackTips) -> Int:
-        """Return the fibre numbers (t,) of tips, also for fibres within coatings."""
-        return self.cell.summary.fibre_number(self.bodies[tips.node, 1])
-
-    def _radius(self, tips: debonded_arcs.CrackTips) -> Float:
-        """Return the circle radii (t,) at tips; NaN without a circle."""
-        return np.asarray(self.cell.summary.radii[self.bodies[tips.node, 1]])
 
     def _released(self, tips: debonded_arcs.CrackTips, response: Response) -> Float:
         """Return G (t,) from a virtual crack extension at each tip.  Collective."""
@@ -213,14 +205,14 @@ class EnergyReleaseRates:
             first = last
         turn = self.direction[tips.node] - self.direction[tips.behind]
         outward = np.sign((turn + 180.0) % 360.0 - 180.0)
-        return np.asarray(-outward * distributed_arrays.allreduce_sum(self.cell.comm, change) / self._radius(tips))
+        return np.asarray(-outward * distributed_arrays.allreduce_sum(self.cell.comm, change) / self.radius[tips.node])
 
     def _closing(self, tips: debonded_arcs.CrackTips, status: Status, force: Float, jump: Float) -> tuple[Float, Float]:
         """Return `closing_work` (t, 2) in opening and in shear, and the closed lengths (t,).
 
         A length is MODE_LENGTH times the radius, or the length of the element behind the tip if that is larger.
         """
-        smallest, order = MODE_LENGTH * self._radius(tips), self.cell.case.cell.order
+        smallest, order = MODE_LENGTH * self.radius[tips.node], self.cell.case.cell.order
         work, length = np.zeros((len(smallest), 2)), np.zeros(len(smallest))
         # Nodes of a chain within these lengths at most, and one element more.
         counts = self._tree.query_ball_point(

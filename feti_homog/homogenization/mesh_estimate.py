@@ -146,65 +146,62 @@ def _has_corners(cell: TornCell) -> bool:
 def _recovered(
     cell: TornCell, responses: Sequence[Response], keep: bool, lattice: ReferenceLattice
 ) -> Iterator[tuple[stress_recovery.RecoveredStress, arc_error.ArcSides]]:
-    """Yield recovered stresses and arcs by subdomain group, refined by the lattice.  Collective before the first."""
+    """Yield recovered stresses and arcs by subdomain group, on a lattice.  Collective before the first.
+
+    A coarser lattice has its own equilibrium, but across materials the mesh displacements at its nodes, whose error is
+    hardly less.
+    """
     u = np.stack([response.u for response in responses], axis=1)
     loads = np.stack([response.strain for response in responses], axis=1)
+    boundary, is_nested, across = cell.solver.interface_operators, lattice is not cell.lattice, cell.summary.across
+    # For groups with one phase: members, mesh, displacements (classes, c, k), and positions (c classes,) as in `Group`.
+    solved = list[tuple[Members, FineMesh, Float, Int]]()
+    if is_nested and not across:
+        for interior in cell.nested_interiors if keep else nested_interiors(boundary, cell.lattice, lattice):
+            displacement = interior.displacement(u, loads)
+            place = np.full(displacement.shape[0] * displacement.shape[1], NONE)
+            place[interior.fixed] = interior.place
+            solved.append((interior.members, interior.mesh, displacement, place))
+    else:
+        displacements, firsts = cell.displacements(u, loads, keep), cell.offsets if across else boundary.offsets
+        dofs = [np.arange(len(part.dofs)) for part in cell.parts] if across else boundary.dofs
+        for group in groups(cell.parts, lattice):
+            parts = [cell.parts[k] for k in group]
+            mesh = refinement.joined([part.mesh for part in parts])
+            places = [np.full(len(part.dofs), NONE) for part in parts]
+            if is_nested:
+                mesh = replace(mesh, nodes=mesh.nodes[:, lattice.within(cell.lattice)], lattice=lattice)
+            for k, place in zip(group, places, strict=True):
+                place[dofs[k]] = firsts[k] + np.arange(len(dofs[k]))
+            displacement = np.concatenate([next(displacements)[1] for _ in group])
+            shape = -1, parts[0].problem.components, len(responses)
+            solved.append((parts, mesh, displacement.reshape(shape), np.concatenate(places)))
     groups_of_rank, meshes = list[Group](), list[tuple[list[Submesh], FineMesh]]()
-    for members, mesh, displacement, place in _displacements(cell, u, loads, keep, lattice):
+    for members, mesh, displacement, place in solved:
         first, pieces = members[0], [s.submesh for s in members]
         stress = stress_recovery.RecoveredStress.on(mesh, first.L, first.problem, displacement, loads, first.is_mixed)
         sides = arc_error.ArcSides.of(stress, pieces, lattice)
         groups_of_rank.append(Group(stress, sides, place[:: first.problem.components]))
         meshes.append((pieces, mesh))
     body, shared, fits = cell.table.body, None, dict[int, tuple[Int, Float]]()
-    if (len(body) > 1) if cell.summary.across else (np.bincount(body) > 1).any():
+    if (len(body) > 1) if across else (np.bincount(body) > 1).any():
         from feti_homog.homogenization.cut_bodies import SharedVertices, fits_across_cuts  # most bodies are not cut
 
         shared = SharedVertices(cell.comm, meshes)
         fits = fits_across_cuts(shared, [group.stress for group in groups_of_rank])
     tractions = dict[int, local_fits.KnownTractions]()
     if lattice.order == 1:
-        tractions = boundary_tractions(cell, responses, groups_of_rank, shared, lattice is not cell.lattice)
+        tractions = boundary_tractions(cell, responses, groups_of_rank, shared, is_nested)
     for number in range(len(groups_of_rank)):
         stress, sides, _ = groups_of_rank.pop(0)
         yield replace(stress, known=tractions.get(number), shared=fits.get(number)), sides
 
 
-def _displacements(
-    cell: TornCell, u: Float, loads: Float, keep: bool, lattice: ReferenceLattice
-) -> Iterator[tuple[Members, FineMesh, Float, Int]]:
-    """Yield subdomain groups with one phase: members, mesh, displacements (classes, c, k), positions.
-
-    Positions (c classes,) number the displacements on all boundaries or, across materials, in all parts; NONE
-    elsewhere.  A coarser lattice has its own equilibrium, but across materials the mesh displacements at its nodes,
-    whose error is hardly less.
-    """
-    boundary, is_nested, across = cell.solver.interface_operators, lattice is not cell.lattice, cell.summary.across
-    if is_nested and not across:
-        for interior in cell.nested_interiors if keep else nested_interiors(boundary, cell.lattice, lattice):
-            displacement = interior.displacement(u, loads)
-            place = np.full(displacement.shape[0] * displacement.shape[1], NONE)
-            place[interior.fixed] = interior.place
-            yield interior.members, interior.mesh, displacement, place
-        return
-    displacements = cell.displacements(u, loads, keep)
-    firsts = cell.offsets if across else boundary.offsets
-    dofs = [np.arange(len(part.dofs)) for part in cell.parts] if across else boundary.dofs
-    for group in groups(cell.parts, lattice):
-        members = [cell.parts[k] for k in group]
-        mesh = refinement.joined([part.mesh for part in members])
-        places = [np.full(len(part.dofs), NONE) for part in members]
-        if is_nested:
-            mesh = replace(mesh, nodes=mesh.nodes[:, lattice.within(cell.lattice)], lattice=lattice)
-        for k, place in zip(group, places, strict=True):
-            place[dofs[k]] = firsts[k] + np.arange(len(dofs[k]))
-        displacement = np.concatenate([next(displacements)[1] for _ in group])
-        shape = -1, members[0].problem.components, u.shape[1]
-        yield members, mesh, displacement.reshape(shape), np.concatenate(places)
-
-
 class Group(NamedTuple):
-    """The recovered stresses and arcs of some subdomains, and positions (classes,) of boundary displacements."""
+    """The recovered stresses and arcs of some subdomains, and positions (classes,) of displacements.
+
+    Positions number the displacements on all boundaries or, across materials, in all parts; NONE elsewhere.
+    """
 
     stress: stress_recovery.RecoveredStress
     sides: arc_error.ArcSides
@@ -214,7 +211,7 @@ class Group(NamedTuple):
 def boundary_tractions(
     cell: TornCell, responses: Sequence[Response], groups: Sequence[Group], shared: SharedVertices | None, nested: bool
 ) -> dict[int, local_fits.KnownTractions]:
-    """Return, by group, the tractions where two sides on arcs meet, and zero tractions at voids.  Collective.
+    """Return, by group, the tractions between sides on arcs, and zero tractions at voids.  Collective.
 
     A traction is the force divided by the node length if the mesh is `nested`, and otherwise divided by the side
     length, so that uniform stresses give exact tractions.

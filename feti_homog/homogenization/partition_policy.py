@@ -1,4 +1,4 @@
-"""The number of pieces of a cell, and the cost: memory, useful ranks, and applications of the dual operator.
+"""Choose the number of pieces, and estimate memory, useful ranks, and dual operator applications.
 
 The memory is linear in the degrees of freedom, because bodies are cut into equally large pieces.
 `scripts/measure_cost.py` measures the constants.
@@ -13,7 +13,7 @@ from feti_homog.case import Case, bond_laws
 from feti_homog.fem import AXIAL, Problem
 from feti_homog.feti import thresholds
 from feti_homog.feti.decomposition import partition
-from feti_homog.homogenization import phase_laws
+from feti_homog.homogenization import phase_laws, uniform_parts
 from feti_homog.materials import laws
 from feti_homog.mesh import ReferenceLattice
 from feti_homog.mesh.tiles import tiling
@@ -21,25 +21,22 @@ from feti_homog.microstructure import phase_names
 from feti_homog.system.petsc import option_table, options_database
 from feti_homog.typing import Int
 
-# Poisson's ratio up to which single nodes of mixed elements are hardly stiffer than mu makes them (`SCALED_LAME`).
-MOST_POISSON = 0.45
 # Ratio of stiffnesses up to which subdomains may have several phases: above, rounding in their dense matrices costs
 # accuracy (4e-7 at 1e6, 2e-10 at 9e3) and then convergence.
 MOST_CONTRAST = 1e3
 # Options that only set the accuracy of the solver; other options need a dual problem, which one subdomain lacks.
 TOLERANCES = {"feti_ksp_rtol", "feti_ksp_atol", "feti_ksp_max_it"}
-# Bytes of a rank without degrees of freedom, for each of these, and for each multiplier that has influence columns.
+# Bytes of a rank without degrees of freedom, for each degree of freedom, and for each multiplier with stored columns.
 BASE_BYTES, DOF_BYTES, COLUMN_BYTES = 1.8e8, 1.5e3, 2.0e4
 # Bytes more for each displacement of the largest problem of a cell that is one factor: of seven bonded cells of 31 000
 # to 271 000 degrees of freedom estimates are 0.93 to 1.07 times the measured memory, of two of order 2 0.85 times.
 FACTOR_BYTES = 2.9e2
 # Bytes more of a path to complete debonding with influence columns: for each multiplier of a rank, and for each pair of
 # one and a column, of which a cell that is factored anew has `INFLUENCE_COLUMNS`. Of five paths of 1 to 50 fibres, 120
-# to 4 110 multipliers, on one rank, estimates are 0.93 to 1.17 times the measured memory.
+# to 4 110 multipliers, on one rank, estimates are 0.93 to 1.17 times the measured memory.  The six dense matrices of
+# debonded faces with friction (`interface.friction`) take as much for each pair of jumps.
 PATH_BYTES, PAIR_BYTES = 7e4, 50
-# Bytes for each pair of jumps of debonded faces with friction: six dense matrices (`interface.friction`).
-FACE_PAIR_BYTES = 48
-# Degrees of freedom of a rank; with fewer, its waiting for others takes more than it saves.
+# Degrees of freedom below which a further rank waits longer than it computes.
 DOFS_OF_A_RANK = 50_000
 # Typical numbers, by which operators are chosen; iterations with coatings are without influence columns.
 ITERATIONS_OF_A_SOLVE, ITERATIONS_WITH_COATINGS, SOLVES_OF_A_CONTACT, SOLVES_OF_A_PATH = 20, 400, 3, 100
@@ -54,7 +51,7 @@ class PartitionPolicy:
             dense matrices.
         piece_boundary_dofs: largest boundary between a piece and other bodies; for pieces in narrow bodies.
         cut_factor: a bonded body is cut if it, or its boundary, is larger than a piece's by this factor.
-        even_cut_factor, even_share: factor in place of `cut_factor` for bodies up to this share in a rank's load,
+        even_cut_factor, even_share: factor in place of `cut_factor` for bodies up to this fraction of a rank's load,
             which are distributed evenly without cuts.
         breakable_boundary_dofs: where bonds may break, a body is cut if its boundary is larger: the cell is solved so
             often that uncut bodies pay as long as their boundaries' dense matrices are small.
@@ -68,8 +65,8 @@ class PartitionPolicy:
         strip_dofs: cells from this size on are halved into strips: smaller ones have short boundaries anyway, and
             mesh errors, estimated up to boundaries, depend less on the direction that METIS cuts in.
 
-    `scripts/benchmark scripts/cases/benchmark_1m.toml --tools feti` times the bonded ones, `scripts/benchmark_path`
-    the ones for bodies that may part, and `scripts/benchmark --table small` the last five.
+    `scripts/benchmark scripts/cases/benchmark_1m.toml --tools feti` times the sizes of bonded bodies,
+    `scripts/benchmark_path` of bodies that may part, and `scripts/benchmark --table small` the last five sizes.
     """
 
     piece_dofs: int = 2200
@@ -116,7 +113,9 @@ def can_be_cut_across(case: Case) -> bool:
     pairs = [(problem, phase) for problem in phase_laws.problems(case) for phase in case.materials]
     sizes = np.array([np.abs(phase_laws.law(case, phase, problem)[:4, :4]).max() for problem, phase in pairs])
     sizes = sizes.reshape(-1, len(case.materials))
-    return max(ratios) <= MOST_POISSON and float((sizes.max(axis=1) / sizes.min(axis=1)).max()) <= MOST_CONTRAST
+    # Up to LOCKING single nodes of mixed elements are hardly stiffer than mu makes them (`SCALED_LAME`).
+    is_compressible = max(ratios) <= uniform_parts.LOCKING / (2.0 + 2.0 * uniform_parts.LOCKING)
+    return is_compressible and float((sizes.max(axis=1) / sizes.min(axis=1)).max()) <= MOST_CONTRAST
 
 
 def wanted_pieces(
@@ -127,7 +126,9 @@ def wanted_pieces(
     n_ranks: int,
     policy: PartitionPolicy = DEFAULT_POLICY,
 ) -> Int:
-    """Return the number of pieces (b,) of each body, at least one per rank, by the case or else by the policy.
+    """Return the piece count (b,) of each body, by the case or else by the policy.
+
+    There is at least one piece per rank.
 
     Args:
         load: (b,) coarse triangles in each body.
@@ -182,9 +183,9 @@ def memory(nodes: Sequence[int], subdomains: Sequence[int], components: Sequence
 
 
 def memory_to_the_end(case: Case, few: float, multipliers: int, columns: int, ranks: int) -> float:
-    """Estimate the bytes of the largest rank when all bonds have broken; `few` before the first break."""
+    """Estimate the bytes of the largest rank when all bonds have broken, from its bytes `few` before."""
     stored = columns if columns <= thresholds.NEVER_REFACTORED_ROWS else thresholds.INFLUENCE_COLUMNS
-    faces = FACE_PAIR_BYTES * multipliers**2 if case.has_friction else 0
+    faces = PAIR_BYTES * multipliers**2 if case.has_friction else 0
     return few + columns / ranks * (PATH_BYTES + stored * PAIR_BYTES) + faces
 
 

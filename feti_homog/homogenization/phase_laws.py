@@ -27,7 +27,7 @@ POWERS = {"strength": 1, "toughness": 2}
 
 
 def problems(case: Case) -> tuple[Problem, ...]:
-    """Return the plane and, in generalized plane strain, the axial problem; expansion makes temperature a load."""
+    """Return the plane problem and, in generalized plane strain, the axial problem; expansions add a temperature."""
     if not voigt.PLANE_STATES[case.analysis.plane].is_spatial:
         return (PLANE,)
     if any(laws.expansion(material) is None for material in case.materials.values()):
@@ -91,7 +91,7 @@ def components(plane: Float, *axial: Float) -> Float:
 
 
 def spatial_vector(plane: Float | None, axial: Float | None) -> Float:
-    """Join [11, 22, 12, 33, ...] of the plane problem and [13, 23] of the axial one to a vector (6,); None is zero."""
+    """Join the components of the plane and the axial problem to a vector (6,); None is zero."""
     vector = np.zeros(6)
     if plane is not None:
         vector[IN_PLANE] = plane[:4]
@@ -149,7 +149,7 @@ class SectionValues:
     factor: float | Float
 
     def __call__(self, key: str, *more: str) -> float | Float:
-        """Return the value of the first key that is set, one for all nodes or (k,); inf if no key is set."""
+        """Return the value of the first key that is set, a number or (k,); inf if no key is set."""
         sections = self.everywhere(key, *more)
         values = float(sections[0]) if len(sections) == 1 else sections[self.pair]
         power = POWERS.get(key.rpartition("_")[2], 0)

@@ -1,4 +1,4 @@
-"""Energy errors of springs at nodes, which add to the element and arc errors."""
+"""Estimate the energy errors of nodal springs, which add to the element and arc errors."""
 
 from collections.abc import Sequence
 
@@ -12,14 +12,14 @@ from feti_homog.interface import debonded_arcs
 from feti_homog.interface.contact import BONDED, Status
 from feti_homog.mesh import ReferenceLattice
 from feti_homog.system.parallel import distributed_arrays
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Float
 
 # Gauss points of a side: integrals along ellipses and of products of quadratic functions are exact or nearly exact.
 POINTS, WEIGHTS = roots_legendre(6)
 
 
 class SpringSides:
-    """The element sides along springs and the interface nodes of all ranks, which are the same in all states."""
+    """The element sides along springs, and the interface nodes of all ranks, for all states."""
 
     def __init__(
         self,
@@ -32,16 +32,27 @@ class SpringSides:
         """Find the fibre sides in `parts`; `period` (2,) is the period of the cell.  Collective."""
         self._comm, self._jumps, self._order, self._period = neighbours.comm, jumps, lattice.order, period
         self._chains = debonded_arcs.InterfaceChains(neighbours.adjacency)
-        nodes = jumps.nodes
-        rows = nodes.bodies[:, 1], nodes.points, nodes.normal
+        rows = jumps.nodes.bodies[:, 1], jumps.nodes.points, jumps.nodes.normal
         fibre, self._points, self._normal = (
             np.concatenate(table) for table in zip(*self._comm.allgather(rows), strict=True)
         )
         number, first = neighbours.node_numbers(jumps), 0
+        # For each side its nodes (order + 1,), normals (q, 2) at Gauss points, as long as the arc per unit of the arc's
+        # parameter, and turn.
+        starts = np.arange(0, lattice.intervals, lattice.order)
         sides = [(np.zeros((0, lattice.order + 1), np.int64), np.zeros((0, len(POINTS), 2)), np.zeros(0))]
         for part in parts:
-            sides.append(_sides(part, number[first : first + part.mesh.n_classes], fibre, lattice))
-            first += part.mesh.n_classes
+            triangle, k, line = border_lines(part.submesh, part.mesh, part.mesh.node_class[part.mesh.nodes])
+            nodes, first = number[first : first + part.mesh.n_classes][line], first + part.mesh.n_classes
+            inner = (nodes >= 0).all(axis=1)
+            inner[inner] = (fibre[nodes[inner]] == part.submesh.constituent[triangle[inner], None]).all(axis=1)
+            normal, turn = shared_entities.edge_normals(part.submesh, triangle[inner], k[inner])
+            nodes = nodes[inner][:, starts[:, None] + np.arange(lattice.order + 1)].reshape(-1, lattice.order + 1)
+            side = np.tile(np.arange(len(starts)), len(turn))
+            normal, turn = np.repeat(normal, len(starts), axis=0), np.repeat(turn, len(starts))
+            places = (side[:, None] + (1 + POINTS) / 2) * lattice.order / lattice.intervals
+            normal = np.stack([shared_entities.along(normal, turn, place) for place in places.T], axis=1)
+            sides.append((nodes, normal, turn))
         self._nodes, normal, turn = (np.concatenate(table) for table in zip(*sides, strict=True))
         speed = np.hypot(*np.moveaxis(normal, 2, 0))
         unit = normal / speed[:, :, None]
@@ -106,22 +117,3 @@ class SpringSides:
         normal = self._normal
         tangent = np.column_stack([-normal[:, 1], normal[:, 0]])
         return np.asarray(normal[..., None] * components[:, None, 0] + tangent[..., None] * components[:, None, 1])
-
-
-def _sides(part: UniformPart, number: Int, fibre: Int, lattice: ReferenceLattice) -> tuple[Int, Float, Float]:
-    """Return the sides of a fibre: nodes (f, order + 1), normals (f, q, 2) at Gauss points, and turns (f,).
-
-    The length of a normal is the arc length per unit of the arc's parameter.  `number` (classes,) has the interface
-    nodes of all ranks, -1 elsewhere, and `fibre` (n,) the inner body of each interface node.
-    """
-    triangle, k, line = border_lines(part.submesh, part.mesh, part.mesh.node_class[part.mesh.nodes])
-    nodes = number[line]
-    inner = (nodes >= 0).all(axis=1)
-    inner[inner] = (fibre[nodes[inner]] == part.submesh.constituent[triangle[inner], None]).all(axis=1)
-    normal, turn = shared_entities.edge_normals(part.submesh, triangle[inner], k[inner])
-    first = np.arange(0, lattice.intervals, lattice.order)
-    nodes = nodes[inner][:, first[:, None] + np.arange(lattice.order + 1)].reshape(-1, lattice.order + 1)
-    side = np.tile(np.arange(len(first)), len(turn))
-    normal, turn = np.repeat(normal, len(first), axis=0), np.repeat(turn, len(first))
-    places = (side[:, None] + (1 + POINTS) / 2) * lattice.order / lattice.intervals
-    return nodes, np.stack([shared_entities.along(normal, turn, place) for place in places.T], axis=1), turn

@@ -68,19 +68,28 @@ def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response
             rows = nodes.row[nodes.pair == section] + component
             work[section, component] = lam[rows].T @ (group[0].state.solution.compliance[rows, None] * lam[rows])
         springs.append(distributed_arrays.allreduce_sum(cell.comm, work))
-    for name, value, places in _spring_constants(case):
-        energies = tuple(
-            sum((work[place] for place in of_problem), np.zeros(work.shape[2:])) / (value * area)
-            for work, of_problem in zip(springs, places, strict=False)
-        )
-        changes.append(Derivative(name, value, energies))
+    for number, bond in enumerate(case.interfaces):
+        label = f"interface.{number + 1}" if len(case.interfaces) > 1 else "interface"
+        # The problems and components of the springs that have a stiffness.
+        places = {"normal_stiffness": [(0, 0)], "tangential_stiffness": [(0, 1)], "axial_stiffness": [(1, 0)]}
+        if bond.axial_stiffness is None:
+            places["tangential_stiffness"].append((1, 0))
+        for key, pairs_of_key in places.items():
+            value = getattr(bond, key)
+            if value is not None and np.isfinite(value):
+                energies = tuple(
+                    sum((work[number, i] for p, i in pairs_of_key if p == problem), np.zeros(work.shape[2:]))
+                    / (value * area)
+                    for problem, work in enumerate(springs)
+                )
+                changes.append(Derivative(f"{label}.{key}", value, energies))
     for f in _fractions(case):
         changes.append(Derivative("cell.fibre_fraction", f, tuple(growth / (2 * f * area) for _, growth in integrals)))
     return changes
 
 
 def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str, Float], Float]:
-    """Integrals (v, k, v, k) int e_i (x) e_j by material; changes by growth.  Collective.
+    """Integrate e_i (x) e_j (v, k, v, k) by material, and the change by growth.  Collective.
 
     There are k unit loads.  Changes (k, k) are energy derivatives by ln R of all fibres, 0 unless the case has such
     fibres.
@@ -144,7 +153,7 @@ class _Fields:
         return cls(g[:, :, :a], w, slopes, strain + loads, rest)
 
     def products(self) -> Float:
-        """(mk + 1, mk + 1) int f f^T for f = [strains, 1]."""
+        """Return int f f^T (mk + 1, mk + 1) for f = [strains, 1]."""
         *points, _, k = self.strain.shape
         gram = _gram(np.concatenate([self.strain.reshape(*points, -1), np.ones((*points, 1))], axis=2), self.weights)
         if self.rest is not None:  # 11 and 22 products have -d lambda r^2 from isotropic dA
@@ -154,7 +163,7 @@ class _Fields:
         return gram
 
     def change(self, problem: Problem, A: Float, V: Float, more: Float) -> Float:
-        """(k, k) derivative of int e_i A e_j where nodes move by s V.
+        """Differentiate int e_i A e_j (k, k) by s, while nodes move by s V.
 
         At fixed displacements, V (e, a, 2): int (de_i + div V e_i / 2) A e_j and its transpose, d grad u = -grad V grad
         u; `more` (v - m, k) other loads.
@@ -176,7 +185,7 @@ class _Fields:
 
 
 def _strains(slopes: Float, problem: Problem) -> Float:
-    """(e, q, m, k) strains from slopes (e, q, 2, c, k)."""
+    """Return the strains (e, q, m, k) of slopes (e, q, 2, c, k)."""
     strain = np.zeros((*slopes.shape[:2], problem.strains, slopes.shape[4]))
     for (i, d), number in np.ndenumerate(problem.voigt):
         strain[:, :, number] += slopes[:, :, d, i]
@@ -184,27 +193,9 @@ def _strains(slopes: Float, problem: Problem) -> Float:
 
 
 def _gram(fields: Float, weights: Float) -> Float:
-    """(n, n) int f f^T for fields (e, q, n)."""
+    """Return int f f^T (n, n) for fields (e, q, n)."""
     flat = fields.reshape(weights.size, -1)
     return np.asarray(flat.T @ (weights.reshape(-1, 1) * flat))
-
-
-def _spring_constants(case: Case) -> Iterator[tuple[str, float, tuple[list[tuple[int, int]], list[tuple[int, int]]]]]:
-    """Yield names and values of finite spring stiffnesses, with their sections and components by problem."""
-    several = len(case.interfaces) > 1
-    for number, bond in enumerate(case.interfaces):
-        section = f"interface.{number + 1}" if several else "interface"
-        along = [(number, 0)]
-        around = along if bond.axial_stiffness is None else []
-        places = {
-            "normal_stiffness": ([(number, 0)], []),
-            "tangential_stiffness": ([(number, 1)], around),
-            "axial_stiffness": ([], along),
-        }
-        for name, by_problem in places.items():
-            value = getattr(bond, name)
-            if value is not None and np.isfinite(value):
-                yield f"{section}.{name}", value, by_problem
 
 
 def _fractions(case: Case) -> Iterator[float]:

@@ -28,7 +28,7 @@ from feti_homog.typing import Float, Int
 
 
 def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy) -> RankShare:
-    """Mesh and cut the cell; return this rank's share.  Collective."""
+    """Mesh and cut the cell; return the part on this rank.  Collective."""
     noded = place_nodes(case, comm, policy.tiles)
     if mpi_errors.on_root(comm, can_be_torn_by_tiles, case, noded, lattice, policy):
         assert not isinstance(noded, CoarseMesh)
@@ -42,7 +42,7 @@ def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: Part
 def place_nodes(
     case: Case, comm: MPI.Intracomm, policy: tiling.TilePolicy
 ) -> gmsh_mesher.NodedCell | CoarseMesh | None:
-    """Return a user's mesh, or the cell with nodes on its lines, on rank 0; None on all other ranks.  Collective.
+    """Return on rank 0 a user's mesh, or the cell with nodes on its lines; None elsewhere.  Collective.
 
     Raises:
         CaseError, MeshError: on every rank, as `begin_mesh`.
@@ -140,14 +140,20 @@ def tear_by_tiles(
     comm: MPI.Intracomm,
     policy: PartitionPolicy,
 ) -> RankShare:
-    """Return this rank's share in a cell noded on rank 0.  Collective.
+    """Tear a cell by its tiles, from the nodes on rank 0; return the part on this rank.  Collective.
 
     Raises:
         CaseError, MeshError: on every rank, as `tiled_cell` and `filling.fill`.
     """
     phase_pairs, nesting, edges = mpi_errors.on_root(comm, tiled_cell, case, noded)
     regions: tiling.Regions = comm.bcast(None if noded is None else noded.regions)
-    torus, tile = _filled(noded, regions, comm)
+    dealt = deal_tiles(() if noded is None else noded.parts, comm)
+    fillings = mpi_errors.agree(comm, fill_own, dealt)
+    inner = dict(chain.from_iterable(comm.allgather([(k, len(filling.inner)) for k, filling in fillings])))
+    ends = regions.nodes + np.cumsum([0, *(inner[k] for k in range(len(inner)))])
+    pairs = zip(dealt, fillings, strict=True)
+    filled = [tiling.FilledTile(k, tile, filling, int(ends[k])) for (k, tile), (_, filling) in pairs]
+    torus, tile = mpi_errors.agree(comm, tiling.tile_torus, regions, filled, int(ends[-1]))
     load = np.bincount(torus.constituent, minlength=len(regions.phase))
     comm.Allreduce(MPI.IN_PLACE, load)
     pieces = wanted_pieces(case, load, edges, lattice, comm.size, policy)
@@ -174,17 +180,6 @@ def tear_by_tiles(
     return RankShare(summary, table, phase_pairs, submeshes.joined(distributed_arrays.alltoall(comm, shares)))
 
 
-def _filled(noded: gmsh_mesher.NodedCell | None, regions: tiling.Regions, comm: MPI.Intracomm) -> tuple[Torus, Int]:
-    """Return the torus that the tiles of this rank fill, and the tile (m,) of each triangle.  Collective."""
-    dealt = deal_tiles(() if noded is None else noded.parts, comm)
-    fillings = mpi_errors.agree(comm, fill_own, dealt)
-    inner = dict(chain.from_iterable(comm.allgather([(k, len(filling.inner)) for k, filling in fillings])))
-    ends = regions.nodes + np.cumsum([0, *(inner[k] for k in range(len(inner)))])
-    pairs = zip(dealt, fillings, strict=True)
-    filled = [tiling.FilledTile(k, tile, filling, int(ends[k])) for (k, tile), (_, filling) in pairs]
-    return mpi_errors.agree(comm, tiling.tile_torus, regions, filled, int(ends[-1]))
-
-
 def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) -> Int:
     """Return the subdomain (m,) of each triangle on this rank, numbered by constituent, then by tile."""
     a, b, _ = torus.sides
@@ -199,7 +194,7 @@ def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) ->
 
 
 def _neighbours(torus: Torus, subdomain: Int) -> tuple[Int, Int, Int, Int]:
-    """Return the neighbouring subdomains at this rank's edges, and the edges to triangles of other ranks.
+    """Return the subdomain neighbours at this rank's edges, and the edges to other ranks.
 
     The result has both subdomains (n,) and (n,) at each edge inside the rank, the edges (k,) with one triangle on this
     rank, and the subdomain (k,) of this triangle.
@@ -230,7 +225,7 @@ def tiled_cell(case: Case, noded: gmsh_mesher.NodedCell) -> tuple[Int, Int, Int]
         CaseError: an interface is between phases that do not touch.
     """
     regions, around, curves = noded.regions, noded.lines.around, noded.lines.curves
-    # The last of `constituent` is the matrix, which is around where `around` is MATRIX, -1.
+    # The last entry of `constituent` is the matrix, to which MATRIX = -1 in `around` leads.
     inside, outside = regions.constituent[:-1], regions.constituent[around]
     solid = (inside >= 0) & (outside >= 0)
     faults = cell_remarks.faults(case, regions.phases, regions.phase[inside[solid]], regions.phase[outside[solid]])

@@ -16,22 +16,15 @@ from scipy.sparse import csr_matrix
 from feti_homog.fem import Problem, assembly
 from feti_homog.feti.decomposition import JumpOperator, SharedEntities, Subdomain, jump_operator, shared_entities
 from feti_homog.feti.operators import interface_operators, one_subdomain
-from feti_homog.mesh import (
-    FineMesh,
-    ReferenceLattice,
-    Submesh,
-    SubmeshesOfRank,
-    periodic_topology,
-    refinement,
-    submeshes,
-)
+from feti_homog.mesh import FineMesh, ReferenceLattice, Submesh, periodic_topology, refinement, submeshes
 from feti_homog.typing import Float, Int
 
 # Number of elements in a group of subdomains: small enough for the processor's cache, large enough for NumPy.
 ELEMENTS_AT_ONCE = 1 << 13
-# Halvings from which on the mesh that is refined twice less serves, but across materials and where a phase locks.
+# Halvings from which a mesh refined twice less gives the error, but across materials and where a phase locks.
 REFINED_OFTEN = 3
-# Largest lambda / mu on that mesh, of a Poisson's ratio of 0.4: beyond, errors of coarse elements are no guide.
+# Largest lambda / mu on that mesh, and in subdomains across materials, for a Poisson's ratio of 0.4: beyond, errors of
+# coarse elements are no guide.
 LOCKING = 4.0
 # Position of a displacement that is not on a boundary: the last position, where the displacement is zero.
 NONE = -1
@@ -102,7 +95,7 @@ def share_parts(
     body = np.array([p.submesh.body for p in parts])
     member = np.repeat(np.arange(len(parts)), [len(p.mesh.nodes) for p in parts])
     index, phase = np.array([p.submesh.index for p in parts]), tuple(p.submesh.phase for p in parts)
-    joined = SubmeshesOfRank(submeshes.joined_meshes([p.submesh for p in parts]), member, index, body, phase)
+    joined = submeshes.SubmeshesOfRank(submeshes.joined_meshes([p.submesh for p in parts]), member, index, body, phase)
     bodies = comm.allgather(body)
     rank = np.repeat(np.arange(comm.size), [len(bodies_of_rank) for bodies_of_rank in bodies])
     table = submeshes.SubdomainTable(np.concatenate(bodies), rank, table.nesting, table.phase)
@@ -137,7 +130,7 @@ class ForcesBetweenParts:
 
 @dataclass(frozen=True)
 class NestedInterior:
-    """The factored interior of some subdomains with one phase on a coarser mesh, with c displacements per node.
+    """The factored interior of one-phase subdomains on a coarser mesh, with c displacements per node.
 
     Attributes:
         members: subdomains.
@@ -154,34 +147,6 @@ class NestedInterior:
     place: Int
     interior: one_subdomain.Interior
     loads: Float | None
-
-    @classmethod
-    def of(
-        cls,
-        places: Sequence[int],
-        boundary: interface_operators.InterfaceOperators,
-        lattice: ReferenceLattice,
-        nested: Int,
-    ) -> NestedInterior:
-        """Refine, assemble and factor; `nested` numbers lattice nodes among finer ones."""
-        members = [boundary.subdomains[place] for place in places]
-        first, meshes, numbers = members[0], [refinement.refine(s.submesh, lattice) for s in members], list[Int]()
-        for k, s, mesh in zip(places, members, meshes, strict=True):
-            inside = NONE - 1
-            of_fine = np.full(s.n_dofs, inside)
-            of_fine[boundary.dofs[k]] = boundary.offsets[k] + np.arange(len(boundary.dofs[k]))
-            if s.submesh.pinned >= 0:
-                of_fine[s.problem.dofs(np.array([s.submesh.pinned]))] = NONE
-            fine = np.empty(mesh.n_classes, np.int64)
-            fine[mesh.node_class[mesh.nodes]] = s.mesh.node_class[s.mesh.nodes[:, nested]]
-            numbers.append(of_fine[s.problem.dofs(fine)])
-        place = np.concatenate(numbers)
-        fixed = np.flatnonzero(place != inside)
-        mesh = refinement.joined(meshes)
-        body = assembly.assemble(mesh, first.L, first.problem, first.is_mixed)
-        interior = one_subdomain.Interior(body.K, fixed)
-        loads = body.Q[interior.dofs] if any(s.submesh.at_void.any() for s in members) else None
-        return cls(members, mesh, fixed, place[fixed], interior, loads)
 
     def displacement(self, u: Float, loads: Float) -> Float:
         """Return u* (classes, c, k) from u (boundary dofs, k) on all boundaries under the loads (v, k)."""
@@ -203,10 +168,26 @@ def locks(subdomains: Sequence[Subdomain | UniformPart], comm: MPI.Intracomm) ->
 def nested_interiors(
     boundary: interface_operators.InterfaceOperators, lattice: ReferenceLattice, coarser: ReferenceLattice
 ) -> Iterator[NestedInterior]:
-    """Yield this rank's subdomain interiors on the coarser lattice, in groups."""
-    nested = coarser.within(lattice)
+    """Refine, assemble and factor this rank's subdomain interiors on the coarser lattice, group by group."""
+    nested, inside = coarser.within(lattice), NONE - 1
     for group in groups(boundary.subdomains, coarser):
-        yield NestedInterior.of(group, boundary, coarser, nested)
+        members = [boundary.subdomains[k] for k in group]
+        first, meshes, numbers = members[0], [refinement.refine(s.submesh, coarser) for s in members], list[Int]()
+        for k, s, mesh in zip(group, members, meshes, strict=True):
+            of_fine = np.full(s.n_dofs, inside)
+            of_fine[boundary.dofs[k]] = boundary.offsets[k] + np.arange(len(boundary.dofs[k]))
+            if s.submesh.pinned >= 0:
+                of_fine[s.problem.dofs(np.array([s.submesh.pinned]))] = NONE
+            fine = np.empty(mesh.n_classes, np.int64)
+            fine[mesh.node_class[mesh.nodes]] = s.mesh.node_class[s.mesh.nodes[:, nested]]
+            numbers.append(of_fine[s.problem.dofs(fine)])
+        place = np.concatenate(numbers)
+        fixed = np.flatnonzero(place != inside)
+        mesh = refinement.joined(meshes)
+        body = assembly.assemble(mesh, first.L, first.problem, first.is_mixed)
+        interior = one_subdomain.Interior(body.K, fixed)
+        loads = body.Q[interior.dofs] if any(s.submesh.at_void.any() for s in members) else None
+        yield NestedInterior(members, mesh, fixed, place[fixed], interior, loads)
 
 
 def groups(subdomains: Sequence[Subdomain | UniformPart], lattice: ReferenceLattice) -> Iterator[list[int]]:

@@ -118,7 +118,7 @@ class TornCell:
 
     @cached_property
     def class_nodes(self) -> Int:
-        """A plane node (c,) of each class in this rank's parts, part by part."""
+        """One plane node (c,) of each class in this rank's parts, part by part."""
         nodes, first = [np.zeros(0, np.int64)], 0
         for mesh in (part.mesh for part in self.parts):
             nodes.append(np.empty(mesh.n_classes, np.int64))
@@ -128,7 +128,7 @@ class TornCell:
 
     @cached_property
     def strength_factors(self) -> Float:
-        """(fibres,) each fibre's bond strength / strength in the case."""
+        """The bond strength of each fibre (fibres,) / strength in the case."""
         return phase_laws.strength_factors(self.case, self.summary.fibres)
 
     @cached_property
@@ -141,13 +141,13 @@ class TornCell:
 
     @cached_property
     def directions(self) -> Float:
-        """(k,) directions in degrees from fibre centres to this rank's interface nodes."""
+        """The directions (k,) in degrees from fibre centres to this rank's interface nodes."""
         nodes = self.solver.jump_operator.nodes
         return debonded_arcs.angles(nodes.points, nodes.fibre, self.summary.centres, self.summary.period)
 
     @cached_property
     def nested_lattice(self) -> ReferenceLattice:
-        """Lattice refined once less, or twice if nothing is against it.  Collective when first read."""
+        """The lattice refined once less, or twice less if that is enough.  Collective when first read."""
         often = not locks(self.subdomains, self.comm) and self.lattice.halvings >= uniform_parts.REFINED_OFTEN
         return self.lattice.coarser(2 if often and not self.summary.across else 1)
 
@@ -167,7 +167,7 @@ class TornCell:
         return np.asarray(is_debonded)
 
     def areas(self) -> dict[str, float]:
-        """Meshed area of each phase.  Collective."""
+        """Return the meshed area of each phase.  Collective."""
         local = dict.fromkeys(self.summary.phases, 0.0)
         for s in self.subdomains:
             for phase, area in zip(_phases(self.summary, s.submesh), s.areas.tolist(), strict=True):
@@ -175,7 +175,7 @@ class TornCell:
         return {phase: self.comm.allreduce(area) for phase, area in local.items()}
 
     def fractions(self) -> dict[str, float]:
-        """Each phase's cell area share; without voids, of meshed area.  Collective."""
+        """Return the area fraction of each phase: of the cell with voids, else of the mesh.  Collective."""
         areas = self.areas()
         total = self.summary.area if self.summary.voids else sum(areas.values())
         return {phase: area / total for phase, area in areas.items()}
@@ -238,7 +238,7 @@ def assemble_subdomains(
 ) -> tuple[RankShare, SharedEntities, ReferenceLattice, list[Subdomain]]:
     """Mesh and cut the cell; refine and assemble subdomains on their ranks.  Collective.
 
-    Returns this rank's share, its entities shared with other ranks, the refinement lattice, and the subdomains.
+    Returns the part of the cell on this rank, its entities shared with other ranks, the lattice, and the subdomains.
     Raises as `tear`.
     """
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
@@ -249,27 +249,26 @@ def assemble_subdomains(
         line.append(f"{summary.coarse_triangles} triangles, {summary.bodies} bodies, {summary.subdomains} subdomains")
     for remark in summary.remarks:
         progress.say(f"remark: {remark}")
+
+    def assembled() -> list[Subdomain]:
+        problem, subdomains = phase_laws.problems(case)[0], list[Subdomain]()
+        for s in share.submeshes.cut():
+            phase_of = summary.constituent_phase[s.constituent]
+            material = None if s.phase else np.unique(phase_of, return_inverse=True)[1]
+            mixed = tuple(phase_laws.is_mixed(case, name) for name in _phases(summary, s))
+            flags = {"is_thin": s.phase == phase_names.COATING, "is_outer": s.phase == phase_names.MATRIX}
+            laws = _laws(case, summary, s, problem)
+            subdomains.append(Subdomain.build(s, lattice, laws, problem, material, mixed, **flags))
+        return subdomains
+
     with progress.stage("assemble") as line:
-        subdomains = mpi_errors.agree(comm, _assemble, case, share, lattice)
+        subdomains = mpi_errors.agree(comm, assembled)
         dofs = comm.allreduce(sum(s.n_dofs for s in subdomains))
         meshed = comm.allreduce(sum(s.area for s in subdomains))
         if summary.voids:
             line.append(f"{summary.voids} voids, porosity {1 - meshed / summary.area:.6g},")
         line.append(f"{dofs} degrees of freedom, refine = {case.cell.refine}, order = {case.cell.order}")
     return share, shared, lattice, subdomains
-
-
-def _assemble(case: Case, share: RankShare, lattice: ReferenceLattice) -> list[Subdomain]:
-    """Refine and assemble this rank's subdomains."""
-    summary, problem, subdomains = share.summary, phase_laws.problems(case)[0], list[Subdomain]()
-    for s in share.submeshes.cut():
-        phase_of = summary.constituent_phase[s.constituent]
-        material = None if s.phase else np.unique(phase_of, return_inverse=True)[1]
-        mixed = tuple(phase_laws.is_mixed(case, name) for name in _phases(summary, s))
-        flags = {"is_thin": s.phase == phase_names.COATING, "is_outer": s.phase == phase_names.MATRIX}
-        laws = _laws(case, summary, s, problem)
-        subdomains.append(Subdomain.build(s, lattice, laws, problem, material, mixed, **flags))
-    return subdomains
 
 
 def _laws(case: Case, summary: CellSummary, submesh: Submesh, problem: Problem) -> Float:

@@ -13,12 +13,14 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from feti_homog.case import interface_section
-from feti_homog.interface.contact.states import BONDED, Status
+from feti_homog.interface.contact import BONDED, Status
 from feti_homog.schema import wording
 from feti_homog.typing import Bool, Float, Int
 
 # A node this close to a tip, in degrees, is the tip: coordinates in files and on circles are rounded.
 TIP_TOLERANCE_DEGREES = 1e-6
+# Decimals by which directions are sorted and compared, in degrees: rounding must not change their order.
+DIRECTION_DIGITS = 9
 # Fibre number and direction of a tip, as `tips` has it -> direction in the mesh.
 MovedTips = Mapping[tuple[int, float], float]
 NOT_MOVED: MovedTips = MappingProxyType({})
@@ -32,7 +34,7 @@ class InterfaceChains:
     """
 
     def __init__(self, adjacency: csr_matrix) -> None:
-        """`adjacency` (n, n) is 1 between neighbours."""
+        """Find the neighbours of all nodes; `adjacency` (n, n) is 1 between neighbours."""
         two = np.diff(adjacency.indptr) == 2
         self.neighbours = np.full((len(two), 2), -1)
         self.neighbours[two] = adjacency.indices[adjacency.indptr[:-1][two][:, None] + np.arange(2)]
@@ -46,7 +48,7 @@ class InterfaceChains:
         return CrackTips(node, np.take_along_axis(pair, side[:, None], 1)[:, 0], pair[np.arange(len(node)), 1 - side])
 
     def onward(self, start: Int, through: Int, steps: int) -> Int:
-        """Return the chains (t, steps + 1) from nodes `start` through nodes `through` (t,); -1 beyond the end."""
+        """Walk along interfaces from nodes `start` through `through` (t,): chains (t, steps + 1), -1 beyond an end."""
         nodes = [start, through]
         while len(nodes) <= steps:
             before, last = nodes[-2:]
@@ -75,7 +77,7 @@ class CrackTips:
 
 
 def closing_work(length: float, before: Float, force: Float, behind: Float, jump: Float) -> Float:
-    """Return the work (2,) that closes the last part of a crack, over the length a of this part (Irwin's integral):
+    """Return the work (2,) of closing the last part of a crack, over its length a, by Irwin's integral:
 
         sum_k F_k w(a - s_k) / (2 a)  ->  1 / (2 a) int_0^a t(s) w(a - s) ds,
 
@@ -105,14 +107,14 @@ def tips(arcs: Sequence[interface_section.Arc], values: Sequence[float], fibres:
 
 
 def angles(points: Float, fibre: Int, centres: Float, period: Float) -> Float:
-    """(k,) directions in (-180, 180] of points (k, 2) from the nearest image of centres[fibre]; NaN without centre."""
+    """Return the directions (k,) of points (k, 2) about their fibre centres, in (-180, 180]; NaN without a centre."""
     offset = points - centres[fibre]
     offset -= np.round(offset / period) * period
     return np.asarray(np.degrees(np.arctan2(offset[:, 1], offset[:, 0])))
 
 
 def moved_tips(marks: Mapping[int, Sequence[float]], fibre: Int, direction: Float, limit: float) -> MovedTips:
-    """Return the tips that a mesh moves, by at most `limit` degrees, to the nearest of its vertices.
+    """Return the tips that a mesh moves to the nearest vertex, at most `limit` degrees away.
 
     Vertices lie on the fibres `fibre` (k,), numbered from 1, in the directions (k,).
     """
@@ -130,7 +132,7 @@ def moved_tips(marks: Mapping[int, Sequence[float]], fibre: Int, direction: Floa
 def debonded(
     arcs: Sequence[interface_section.Arc], opening: float | None, fibre: Int, angle: Float, moved: MovedTips = NOT_MOVED
 ) -> Bool:
-    """Return whether nodes (k,) are within an arc, on fibres (k,), numbered from 1, in directions (k,).
+    """Mark the nodes (k,) within debonded arcs, on fibres (k,), numbered from 1, in directions (k,).
 
     Arcs without an angle take `opening`; `moved` are the tips that the mesh has moved.
     """
@@ -155,11 +157,11 @@ def debonded(
 
 def _end(arc: interface_section.Arc, half: float) -> float:
     """Return the direction in [0, 360) of an arc's tip, `half` away from its centre."""
-    return round(arc.centre + half, 9) % 360.0
+    return round(arc.centre + half, DIRECTION_DIGITS) % 360.0
 
 
 def faults(arcs: Sequence[interface_section.Arc], centres: Float, label: str = "interface") -> list[str]:
-    """List faults in the arcs of interface `label`, on fibres with centres (fibres, 2), NaN without one."""
+    """List faults in the arcs of interface `label`; centres (fibres, 2) are NaN for fibres without a centre."""
     messages = []
     for number, arc in enumerate(arcs):
         chosen = range(1, len(centres) + 1) if isinstance(arc.fibre, str) else arc.fibre

@@ -73,7 +73,7 @@ class Load:
         return [Load(*part) for part in zip(np.split(self.values, ends), np.split(self.by_stress, ends), strict=True)]
 
     def after(self, share: float, end: Load) -> Load:
-        """Interpolate to another load: (1 - share) load + share end; components that cancel are zero."""
+        """Interpolate to the load `end`: (1 - share) load + share end; components that cancel are zero."""
         values = (1.0 - share) * self.values + share * end.values
         largest = np.abs([self.values, end.values]).max(axis=0)
         return Load(np.where(np.abs(values) <= ROUNDING * largest, 0.0, values), self.by_stress)

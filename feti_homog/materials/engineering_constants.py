@@ -14,14 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from feti_homog.materials.laws import COUPLINGS
+from feti_homog.materials.laws import COUPLINGS, ISOTROPY
 from feti_homog.materials.material_forms import PER_TEMPERATURE
 from feti_homog.materials.voigt import EXPANSIONS, THERMAL_STRESSES
 from feti_homog.system.runtime import described, records
 from feti_homog.typing import Array, Float
 
 DIRECTIONS = 720  # across the fibres
-TRANSVERSELY_ISOTROPIC = 1e-9  # relative distance to the nearest transversely isotropic stiffness, from rounding
 
 # Turns the components of a stiffness, (3, 3) or (6, 6), into components of the same Frobenius norm as the tensor.
 _MANDEL = {n: np.sqrt(np.outer(scale, scale)) for n, scale in ((3, [1, 1, 2]), (6, [1, 1, 1, 2, 2, 2]))}
@@ -64,7 +63,7 @@ class EngineeringConstants:
 
 @dataclass(frozen=True)
 class TransverseIsotropy:
-    """Constants for the nearest transversely isotropic material about x3; five of the first seven are independent."""
+    """Constants of the nearest transversely isotropic material about x3; five of seven are independent."""
 
     E_axial: float = described("Young's modulus along the fibres", records.STRESS)
     E_transverse: float = described("Young's modulus across the fibres", records.STRESS)
@@ -178,7 +177,7 @@ def isotropic_stiffness(bulk: float, shear: float) -> Float:
 
 
 def anisotropy(stiffness: ArrayLike) -> float:
-    """||C - C_iso|| / ||C|| as fourth-order tensors, C_iso the nearest isotropic; the same in all axes."""
+    """Return ||C - C_iso|| / ||C|| of the tensors, C_iso the nearest isotropic stiffness; equal in all axes."""
     c = np.asarray(stiffness, dtype=float)
     return _distance(c, isotropic_stiffness(*isotropic_part(c)))
 
@@ -210,7 +209,10 @@ def transversely_isotropic_part(stiffness: ArrayLike, expansion: ArrayLike | Non
 
 
 def transversely_isotropic_stiffness(constants: TransverseIsotropy) -> Float:
-    """(6, 6) C11 = C22 = k + m, C12 = k - m, C13 = C23 = 2 nu_A k, C33 = E_A + 4 nu_A^2 k, C44 = C55 = G_A, C66 = m."""
+    """Return the stiffness C (6, 6) of these constants.
+
+    C11 = C22 = k + m, C12 = k - m, C13 = C23 = 2 nu_A k, C33 = E_A + 4 nu_A^2 k, C44 = C55 = G_A, C66 = m.
+    """
     k, m = constants.K_transverse, constants.G_transverse
     across = 2 * constants.nu_axial * k
     along = constants.E_axial + 2 * constants.nu_axial * across
@@ -222,7 +224,7 @@ def transversely_isotropic_stiffness(constants: TransverseIsotropy) -> Float:
 
 def is_transversely_isotropic(constants: TransverseIsotropy) -> bool:
     """Return whether the stiffness with these constants is transversely isotropic, up to rounding."""
-    return constants.deviation < TRANSVERSELY_ISOTROPIC
+    return constants.deviation < ISOTROPY
 
 
 def transverse_moduli(stiffness: ArrayLike) -> TransverseModuli:
@@ -287,7 +289,7 @@ _READ_EITHER_WAY = {
 
 
 def axes_line(names: Iterable[str]) -> str:
-    """Describe the axes of names, such as `S12`, that mean something else in a ply; may be empty."""
+    """Describe the axes of names, such as `S12`, that mean something else in a ply; '' without such names."""
     bare = dict.fromkeys(name.rpartition("_")[2] for name in names)
     return ". ".join(
         f"{name} is {kind} {way} the fibres; {ALONG if way == ACROSS else ACROSS} them {others}"

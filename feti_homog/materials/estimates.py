@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from feti_homog.materials import engineering_constants, phase_bounds
+from feti_homog.materials.engineering_constants import TransverseIsotropy
+from feti_homog.materials.phase_bounds import NOTHING, Estimate, Estimates, Fibres
 
 
-def estimates(
-    matrix: engineering_constants.TransverseIsotropy, fibres: Sequence[phase_bounds.Fibres]
-) -> phase_bounds.Estimates:
+def estimates(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimates:
     """Return each method's estimates for fibres in a matrix.
 
     The rule of mixtures and Mori and Tanaka's estimate are defined for any kinds of fibres, the others for one; on
@@ -26,14 +26,12 @@ def estimates(
     if not all(
         map(engineering_constants.is_transversely_isotropic, [matrix, *(family.constants for family in fibres)])
     ):
-        return phase_bounds.Estimates(**dict.fromkeys(METHODS, phase_bounds.NOTHING))
-    return phase_bounds.Estimates(**{name: method(matrix, fibres) for name, method in METHODS.items()})
+        return Estimates(**dict.fromkeys(METHODS, NOTHING))
+    return Estimates(**{name: method(matrix, fibres) for name, method in METHODS.items()})
 
 
-def rule_of_mixtures(
-    matrix: engineering_constants.TransverseIsotropy, fibres: Sequence[phase_bounds.Fibres]
-) -> phase_bounds.Estimate:
-    """Phases in parallel along the fibres, in series across them; any number of phases.
+def rule_of_mixtures(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
+    """Put phases in parallel along the fibres and in series across them; any number of phases.
 
         E_A = sum c E_A,  nu_A = sum c nu_A,  1/E_T = sum c/E_T,  1/G_A = sum c/G_A,  1/G_T = sum c/G_T,
         alpha_A = sum c E_A alpha_A / E_A*,  alpha_T = sum c (alpha_T + nu_A alpha_A) - nu_A* alpha_A*,
@@ -42,12 +40,12 @@ def rule_of_mixtures(
     Voigt 1889, Reuss 1929; the expansions Schapery 1968, of anisotropic fibres Hashin 1979.
     """
     if any(family.springs is not None for family in fibres):
-        return phase_bounds.NOTHING
+        return NOTHING
     phases, along = _phases(matrix, fibres), _in_parallel(matrix, fibres)
     E, nu, *_ = along.values()
     E_transverse = 1 / sum(c / x.E_transverse for c, x in phases)
     G = 1 / sum(c / x.G_transverse for c, x in phases)
-    return phase_bounds.Estimate(
+    return Estimate(
         **along,
         E_transverse=E_transverse,
         nu_transverse=E_transverse / (2 * G) - 1,
@@ -57,9 +55,7 @@ def rule_of_mixtures(
     )
 
 
-def chamis(
-    matrix: engineering_constants.TransverseIsotropy, fibres: Sequence[phase_bounds.Fibres]
-) -> phase_bounds.Estimate:
+def chamis(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
     """Return Chamis's simplified equations; one kind of fibres.
 
         E_A, nu_A: rule of mixtures,  M = M_m / (1 - sqrt(c) (1 - M_m/M_f)) for M = E_T, G_A, G_T,
@@ -70,7 +66,7 @@ def chamis(
     matrix.
     """
     if len(fibres) != 1 or fibres[0].springs is not None:
-        return phase_bounds.NOTHING
+        return NOTHING
     fibre, c = fibres[0].constants, fibres[0].fraction
     root = math.sqrt(c)
 
@@ -83,7 +79,7 @@ def chamis(
     if (of_fibre := phase_bounds.expansions(fibre)) and (of_matrix := phase_bounds.expansions(matrix)):
         restrained = c * matrix.nu_axial * fibre.E_axial / along["E_axial"] * of_matrix[0]
         along["expansion_transverse"] = root * of_fibre[1] + (1 - root) * (of_matrix[1] + restrained)
-    return phase_bounds.Estimate(
+    return Estimate(
         **along,
         E_transverse=E_transverse,
         nu_transverse=E_transverse / (2 * G) - 1,
@@ -93,9 +89,7 @@ def chamis(
     )
 
 
-def halpin_tsai(
-    matrix: engineering_constants.TransverseIsotropy, fibres: Sequence[phase_bounds.Fibres]
-) -> phase_bounds.Estimate:
+def halpin_tsai(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
     """Return Halpin and Tsai's equations; one kind of fibres.
 
         E_A, nu_A: rule of mixtures,  M = M_m (1 + xi eta c)/(1 - eta c),  eta = (M_f - M_m)/(M_f + xi M_m),
@@ -105,7 +99,7 @@ def halpin_tsai(
     Halpin and Kardos 1976.
     """
     if len(fibres) != 1 or fibres[0].springs is not None:
-        return phase_bounds.NOTHING
+        return NOTHING
     fibre, c = fibres[0].constants, fibres[0].fraction
 
     def mean(of_matrix: float, of_fibre: float, xi: float) -> float:
@@ -115,7 +109,7 @@ def halpin_tsai(
     k, G = matrix.K_transverse, matrix.G_transverse
     along = _in_parallel(matrix, fibres)
     return dataclasses.replace(
-        phase_bounds.NOTHING,
+        NOTHING,
         E_axial=along["E_axial"],
         E_transverse=mean(matrix.E_transverse, fibre.E_transverse, 2),
         nu_axial=along["nu_axial"],
@@ -125,16 +119,12 @@ def halpin_tsai(
     )
 
 
-def _phases(
-    matrix: engineering_constants.TransverseIsotropy, fibres: Sequence[phase_bounds.Fibres]
-) -> list[tuple[float, engineering_constants.TransverseIsotropy]]:
+def _phases(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> list[tuple[float, TransverseIsotropy]]:
     rest = 1 - sum(family.fraction for family in fibres)
     return [(rest, matrix), *((family.fraction, family.constants) for family in fibres)]
 
 
-def _in_parallel(
-    matrix: engineering_constants.TransverseIsotropy, fibres: Sequence[phase_bounds.Fibres]
-) -> dict[str, Any]:
+def _in_parallel(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> dict[str, Any]:
     """Return E_A, nu_A, alpha_A and alpha_T by the rule of mixtures; alpha if all phases have it."""
     phases = _phases(matrix, fibres)
     E, nu = sum(c * x.E_axial for c, x in phases), sum(c * x.nu_axial for c, x in phases)
@@ -147,60 +137,50 @@ def _in_parallel(
     return {"E_axial": E, "nu_axial": nu, "expansion_axial": axial, "expansion_transverse": transverse - nu * axial}
 
 
-def cylinders_in_matrix(
-    matrix: engineering_constants.TransverseIsotropy, fibres: Sequence[phase_bounds.Fibres]
-) -> engineering_constants.TransverseIsotropy:
-    """`aligned_cylinders` with the matrix around, and for a fibre on springs the bonded one that does the same."""
+def cylinders_in_matrix(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> TransverseIsotropy:
+    """Estimate by `aligned_cylinders` with the matrix around, and `equivalent_fibre` for fibres on springs."""
     fractions = [c for c, _ in _phases(matrix, fibres)]
     phases = [matrix, *(phase_bounds.equivalent_fibre(family, matrix) for family in fibres)]
     return phase_bounds.aligned_cylinders(fractions, phases, (matrix.K_transverse, matrix.G_transverse, matrix.G_axial))
 
 
-def mori_tanaka(
-    matrix: engineering_constants.TransverseIsotropy, fibres: Sequence[phase_bounds.Fibres]
-) -> phase_bounds.Estimate:
-    """Every fibre is alone in the matrix, under the matrix's mean field; any kinds of round fibres, on springs too.
+def mori_tanaka(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
+    """Put every fibre alone in the matrix, under the mean field of the matrix, by `cylinders_in_matrix`.
 
-    `cylinders_in_matrix`.  Mori and Tanaka 1973, Benveniste 1987; transversely isotropic phases Chen, Dvorak and
-    Benveniste 1992; springs Benveniste 1985.
+    For any kinds of round fibres, on springs too.  Mori and Tanaka 1973, Benveniste 1987; transversely isotropic phases
+    Chen, Dvorak and Benveniste 1992; springs Benveniste 1985.
     """
-    return phase_bounds.Estimate.of(cylinders_in_matrix(matrix, fibres))
+    return Estimate.of(cylinders_in_matrix(matrix, fibres))
 
 
-def composite_cylinders(
-    matrix: engineering_constants.TransverseIsotropy, fibres: Sequence[phase_bounds.Fibres]
-) -> phase_bounds.Estimate:
-    """Cylinders of fibre and matrix, alike but for their size, that fill space; one kind of fibres, on springs too.
+def composite_cylinders(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
+    """Fill space with cylinders of fibre and matrix, alike but for their size; one kind of fibres, on springs too.
 
-    Exact for this arrangement: k, E_A, nu_A, G_A and the expansions, as of `cylinders_in_matrix`.  Of
-    shear across the fibres there are bounds only.  Hashin and Rosen 1964; anisotropic fibres Hashin 1979; expansions
+    k, E_A, nu_A, G_A and the expansions by `cylinders_in_matrix` are exact for this arrangement; for shear across the
+    fibres there are only bounds.  Hashin and Rosen 1964; anisotropic fibres Hashin 1979; expansions
     Rosen and Hashin 1970; springs, of fibres of equal radius, Hashin 1990.
     """
     if len(fibres) != 1:
-        return phase_bounds.NOTHING
-    exact = phase_bounds.Estimate.of(cylinders_in_matrix(matrix, fibres))
+        return NOTHING
+    exact = Estimate.of(cylinders_in_matrix(matrix, fibres))
     return dataclasses.replace(exact, E_transverse=None, nu_transverse=None, G_transverse=None)
 
 
-def self_consistent(
-    matrix: engineering_constants.TransverseIsotropy, fibres: Sequence[phase_bounds.Fibres]
-) -> phase_bounds.Estimate:
+def self_consistent(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
     """Christensen and Lo's estimate; one kind of fibres, on springs too.
 
     k, E_A, nu_A, G_A and the expansions come from `composite_cylinders`, G_T from `transverse_shear`;
     E_T and nu_T follow.  Christensen and Lo 1979; springs, of fibres of equal radius, Hashin 1990.
     """
     if len(fibres) != 1:
-        return phase_bounds.NOTHING
+        return NOTHING
     x = cylinders_in_matrix(matrix, fibres)
     G = transverse_shear(matrix, fibres[0])
     E_transverse, nu_transverse = engineering_constants.transverse_constants(x.E_axial, x.nu_axial, x.K_transverse, G)
-    return dataclasses.replace(
-        phase_bounds.Estimate.of(x), E_transverse=E_transverse, nu_transverse=nu_transverse, G_transverse=G
-    )
+    return dataclasses.replace(Estimate.of(x), E_transverse=E_transverse, nu_transverse=nu_transverse, G_transverse=G)
 
 
-def transverse_shear(matrix: engineering_constants.TransverseIsotropy, family: phase_bounds.Fibres) -> float:
+def transverse_shear(matrix: TransverseIsotropy, family: Fibres) -> float:
     """Return the shear modulus m* of the medium that a coated fibre does not change.
 
     Under shear across it the coated fibre has the energy of the medium.
@@ -237,9 +217,7 @@ def transverse_shear(matrix: engineering_constants.TransverseIsotropy, family: p
     return float(m * roots.real.max())
 
 
-METHODS: Mapping[
-    str, Callable[[engineering_constants.TransverseIsotropy, Sequence[phase_bounds.Fibres]], phase_bounds.Estimate]
-] = {
+METHODS: Mapping[str, Callable[[TransverseIsotropy, Sequence[Fibres]], Estimate]] = {
     method.__name__: method
     for method in (rule_of_mixtures, chamis, halpin_tsai, mori_tanaka, composite_cylinders, self_consistent)
 }

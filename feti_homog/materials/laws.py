@@ -29,10 +29,10 @@ NEEDED: dict[
 }
 """Optional constants that each plane state requires."""
 OF_DATA_SHEETS = "axis 3 is along the fibres: with constants of a data sheet give E_axial, E_transverse, nu_axial, ..."
-# Relative tolerance for isotropic constants of a material.
+# Relative rounding in the constants and the stiffness of an isotropic, or transversely isotropic, material.
 ISOTROPY = 1e-9
-# Beyond the first, rounding of displacements makes stresses as large as those of the soft phase are allowed to be off;
-# beyond the second, it leaves nothing of them.
+# Beyond the first contrast the rounding of displacements costs the soft phase its allowed stress error; beyond the
+# second contrast it leaves nothing of the soft phase's stresses.
 WORRYING_CONTRAST, LARGEST_CONTRAST = 1e10, 1e14
 
 
@@ -45,10 +45,10 @@ def stiffness_of(material: material_forms.Material, plane: str) -> Float:
 
 
 def plane_stiffness(material: material_forms.Material, plane: str) -> Float:
-    """C with [S11, S22, S12] = C [E11, E22, gamma12], (3, 3), symmetric positive definite, stress unit.
+    """Return C (3, 3): [S11, S22, S12] = C [E11, E22, gamma12], symmetric positive definite, in stress units.
 
-    `plane` is "stress" (S33 = 0), "strain" (E33 = 0), or "generalized", where C is that at E33 = 0. Raises ValueError,
-    with the keys at fault, if the constants leave C open or no material is stable with them.
+    `plane` is "stress" (S33 = 0), "strain" (E33 = 0), or "generalized", where C is the block at E33 = 0. Raises
+    ValueError, with the keys at fault, if the constants leave C open or no material is stable with them.
     """
     if isinstance(material, material_forms.Isotropic):
         lame, shear = _lame(material, plane)
@@ -69,9 +69,9 @@ def plane_stiffness(material: material_forms.Material, plane: str) -> Float:
 
 
 def isotropic_ratio(material: material_forms.Material) -> float | None:
-    """Poisson's ratio of an isotropic material, None for another, and for one that gives its stiffness.
+    """Return Poisson's ratio of an isotropic material; None for other materials, and for a given stiffness.
 
-    A transversely isotropic one is isotropic if its constants are, to ISOTROPY.
+    A transversely isotropic material is isotropic if its constants are, up to ISOTROPY.
     """
     if isinstance(material, material_forms.TransverselyIsotropic):
         young, ratio, shear = material.E_transverse, material.nu_transverse, material.G_axial
@@ -83,7 +83,7 @@ def isotropic_ratio(material: material_forms.Material) -> float | None:
 
 
 def spatial_stiffness(material: material_forms.Material) -> Float:
-    """C with S = C E in the cell's axes, (6, 6), symmetric positive definite, unit of stress.
+    """Return C (6, 6): S = C E in the cell's axes, symmetric positive definite, in stress units.
 
     Raises ValueError as `plane_stiffness` does.
     """
@@ -103,9 +103,9 @@ def spatial_stiffness(material: material_forms.Material) -> Float:
 
 
 def expansion(material: material_forms.Material) -> Float | None:
-    """Strains per unit of temperature in the free material, in the cell's axes, (6,); None if not given.
+    """Return the free strains (6,) per unit of temperature in the cell's axes; None if not given.
 
-    Raises ValueError, with the keys at fault, if they are given twice or by half.
+    Raises ValueError, with the keys at fault, if expansions are given twice or by half.
     """
     free = material.expansion
     if isinstance(material, material_forms.TransverselyIsotropic):
@@ -125,7 +125,7 @@ def expansion(material: material_forms.Material) -> Float | None:
 
 
 def out_of_plane(material: material_forms.Material, plane: str) -> tuple[Float, Float]:
-    """s and e, (3,) each, with S33 = s . [S11, S22, S12] and E33 = e . [S11, S22, S12], in plane strain and stress.
+    """Return s and e (3,): S33 = s . [S11, S22, S12], E33 = e . [S11, S22, S12], in plane strain and stress.
 
     S33 vanishes in plane stress, E33 in plane strain. NaN if the material's constants leave it open.
     """

@@ -68,7 +68,7 @@ def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawCh
 
 
 def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:
-    """Engineering constants: dC = -C dS C with the plane state's compliance S, in the cell's axes."""
+    """Yield the derivatives by engineering constants: dC = -C dS C with the plane state's compliance S."""
     skipped = ("angle", "expansion", "strength", *material_forms.EXPANSION_PAIR)
     names = [field.name for field in fields(material) if field.name not in skipped]
     values = {name: value for name in names if (value := getattr(material, name)) is not None}
@@ -100,7 +100,7 @@ def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, floa
 def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
     """Differentiate a complex stiffness or compliance, reduced to a plane state.
 
-    In space it is the whole matrix, in the plane its block; the state `condensed` eliminates component 33.
+    A spatial state takes the whole matrix, a plane state its block; the state `condensed` eliminates component 33.
     """
     if PLANE_STATES[plane].is_spatial:
         return np.asarray(M.imag / STEP)

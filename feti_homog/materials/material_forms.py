@@ -87,7 +87,7 @@ class Orthotropic:
 
 @dataclass(frozen=True, kw_only=True)
 class TransverselyIsotropic:
-    """Engineering constants of a phase that is isotropic in the plane, as most fibres along x3.
+    """Engineering constants of a phase that is isotropic in the plane, such as most fibres.
 
     Plane stress needs E_transverse and nu_transverse, plane strain also E_axial and nu_axial, generalized plane strain
     all.
@@ -124,7 +124,7 @@ class TransverselyIsotropic:
 
 @dataclass(frozen=True)
 class General:
-    """The stiffness itself: 3x3, that of the plane state for which the case asks, or 6x6, which serves for all.
+    """The stiffness itself: 3x3 for the plane state of the case, or 6x6 for all plane states.
 
     x3 is normal to a plane of symmetry: of a 6x6 stiffness, 23 and 13 are coupled to each other alone.
     """

@@ -19,6 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from feti_homog.materials import engineering_constants
+from feti_homog.materials.engineering_constants import TransverseIsotropy
+from feti_homog.materials.laws import ISOTROPY
 from feti_homog.materials.material_forms import PER_TEMPERATURE
 from feti_homog.system.runtime import described, records
 from feti_homog.typing import Float
@@ -75,7 +77,7 @@ class Fibres:
     """Fibres of one phase: volume fraction, constants and, around equal radii, springs."""
 
     fraction: float
-    constants: engineering_constants.TransverseIsotropy
+    constants: TransverseIsotropy
     springs: Springs | None = None
 
 
@@ -94,7 +96,7 @@ class Estimate:
     expansion_transverse: float | None = described("expansion across the fibres", PER_TEMPERATURE)
 
     @classmethod
-    def of(cls, constants: engineering_constants.TransverseIsotropy) -> Estimate:
+    def of(cls, constants: TransverseIsotropy) -> Estimate:
         """Return the estimate of all constants."""
         return cls(**{name: getattr(constants, name) for name in CONSTANTS})
 
@@ -126,11 +128,11 @@ def reuss(fractions: ArrayLike, stiffnesses: ArrayLike) -> Float:
 
 
 def is_isotropic(stiffness: ArrayLike) -> bool:
-    return engineering_constants.anisotropy(stiffness) < 1e-9
+    return engineering_constants.anisotropy(stiffness) < ISOTROPY
 
 
 def hashin_shtrikman(fractions: ArrayLike, stiffnesses: Sequence[ArrayLike]) -> Bounds:
-    """Bounds on an isotropic composite of isotropic phases, (n,) and (n, 3, 3), in the plane.
+    """Bound the moduli of an isotropic composite of isotropic phases, (n,) and (n, 3, 3), in the plane.
 
     k* = (sum c_i/(k_i + mu0))^-1 - mu0, mu* = (sum c_i/(mu_i + h0))^-1 - h0, h0 = k0 mu0/(k0 + 2 mu0), with
     k0, mu0 the least moduli of the phases for the lower bound and the greatest for the upper (Hashin 1965,
@@ -152,9 +154,9 @@ def hashin_shtrikman(fractions: ArrayLike, stiffnesses: Sequence[ArrayLike]) -> 
 
 def aligned_cylinders(
     fractions: Sequence[float],
-    phases: Sequence[engineering_constants.TransverseIsotropy],
+    phases: Sequence[TransverseIsotropy],
     surroundings: tuple[float, float, float],
-) -> engineering_constants.TransverseIsotropy:
+) -> TransverseIsotropy:
     """Estimate the constants of cylinders in a reference medium k0, m0, p0 under equal far fields.
 
     With x_i = k_i + m0 and h0 = k0 m0/(k0 + 2 m0),
@@ -186,7 +188,7 @@ def aligned_cylinders(
         stresses = [B / np.sum(c / x), np.sum(c * (g - across * b / x)) + coupling * B]
         area, length = np.linalg.solve([[bulk, coupling], [coupling, young + coupling**2 / bulk]], stresses)
         strains = float(length), float(area / 2)
-    return engineering_constants.TransverseIsotropy(
+    return TransverseIsotropy(
         E_axial=float(young),
         E_transverse=float(E_transverse),
         nu_axial=float(poisson),
@@ -200,17 +202,15 @@ def aligned_cylinders(
     )
 
 
-def expansions(phase: engineering_constants.TransverseIsotropy) -> Pair | None:
+def expansions(phase: TransverseIsotropy) -> Pair | None:
     """Return axial and transverse expansion, if the phase has both."""
     if phase.expansion_axial is None or phase.expansion_transverse is None:
         return None
     return phase.expansion_axial, phase.expansion_transverse
 
 
-def equivalent_fibre(
-    family: Fibres, matrix: engineering_constants.TransverseIsotropy
-) -> engineering_constants.TransverseIsotropy:
-    """Return the bonded fibre that replaces one on springs in a matrix whose field is uniform far away.
+def equivalent_fibre(family: Fibres, matrix: TransverseIsotropy) -> TransverseIsotropy:
+    """Return the bonded fibre that replaces a fibre on springs, under a uniform far field.
 
     E_axial, nu_axial and the expansions stay;
 
@@ -239,8 +239,8 @@ def equivalent_fibre(
     )
 
 
-def fibre_bounds(fractions: Sequence[float], phases: Sequence[engineering_constants.TransverseIsotropy]) -> FibreBounds:
-    """Bounds on bonded, transversely isotropic phases: cylinders along x3 with any section.
+def fibre_bounds(fractions: Sequence[float], phases: Sequence[TransverseIsotropy]) -> FibreBounds:
+    """Bound the constants of bonded, transversely isotropic cylinders along x3, with any section.
 
     `aligned_cylinders` with the least moduli of the phases around, and with the greatest.  Bounds on nu_A are the
     values of Hill's relation at the bounds on k, so for two phases only.  All but the bounds on G_T hold for square

@@ -80,7 +80,7 @@ def strain_tensor(strain: Float) -> Float:
 
 
 def rotated(stiffness: Float, angle: float) -> Float:
-    """Stiffness, (3, 3) or (6, 6), in the cell's axes, for a material whose axis 1 is turned by `angle` degrees.
+    """Turn a stiffness, (3, 3) or (6, 6), to the cell's axes from material axes turned by `angle` degrees.
 
     C = T^T C' T, where T takes strains to the material axes.
     """
@@ -123,7 +123,7 @@ def principal(stress: Float, S33: Float) -> Float:
 
 
 def spatial_von_mises(stress: Float, S33: Float, axial: Float) -> Float:
-    """(m,) von Mises stress as by `von_mises`, with the axial stresses [S23, S13] (m, 2)."""
+    """Return the von Mises stress (m,), as `von_mises`, with the axial stresses [S23, S13] (m, 2)."""
     return np.asarray(np.hypot(von_mises(stress, S33), np.sqrt(3) * np.hypot(*axial.T)))
 
 

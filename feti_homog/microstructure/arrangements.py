@@ -16,16 +16,15 @@ from feti_homog.typing import Bool, Float, Int
 
 # Decimals in which lengths / width of the cell are compared.
 DECIMALS = 10
+# Decimals of coordinates and sizes that gmsh is given. The last bits differ from machine to machine, and with them gmsh
+# would make other triangles.
+GMSH_DECIMALS = 12
 # Radius / width of the cell above which positions on a circle differ by more than rounding.
 SMALLEST_RADIUS = 1e-6
 # Gaps between tangents that are looked at, and the narrowest of them / the widest.
 MOST_GAPS, NARROWEST = 4, 0.7
-# Directions of the lines that may part a place from a convex outline.
-NORMALS = 360
 # Fibres beside each other have three pairs each; those on top of each other would fill the memory.
 MOST_PAIRS = 100_000_000
-# Distances that are computed one by one faster than a tree is made.
-FEW = 4000
 # Periods from a cell to those around it.
 STEPS = np.array([step for step in product((-1, 0, 1), repeat=2) if any(step)])
 
@@ -195,7 +194,7 @@ def in_voids(arrangement: Arrangement, corners: Float) -> Bool:
         voids = arrangement.outlines[arrangement.is_void | arrangement.is_hollow]
         away = _away(voids, corners, arrangement.size)
         corner, void = np.nonzero((np.abs(away) < voids.extents.max(axis=2)).all(axis=2))
-        normal = directions(np.linspace(0.0, 2 * np.pi, NORMALS, endpoint=False))
+        normal = directions(np.linspace(0.0, 2 * np.pi, convex_sums.POINTS, endpoint=False))
         reach = voids[void].support(np.broadcast_to(normal, (len(void), *normal.shape)))
         result[corner[(-away[corner, void] @ normal.T < reach).all(axis=1)]] = True
     return result
@@ -234,13 +233,9 @@ def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Flo
                 f"[cell] about {count:.2g} pairs of fibres are nearer to each other than {reach:.2g}; expected at most "
                 f"{MOST_PAIRS}: they lie on top of each other, or one is much larger than the others"
             )
-    if len(centres) * len(place) <= FEW:
-        away = place - inside[:, None]
-        first, second = np.nonzero(np.triu((away * away).sum(axis=2) <= reach * reach, 1))
-    else:
-        # A tree that is used once is not worth being balanced.
-        tree = cKDTree(place, balanced_tree=False, compact_nodes=False)
-        first, second = tree.query_pairs(reach, output_type="ndarray").T
+    # A tree that is used once is not worth being balanced.
+    tree = cKDTree(place, balanced_tree=False, compact_nodes=False)
+    first, second = tree.query_pairs(reach, output_type="ndarray").T
     keep = np.flatnonzero((first < len(centres)) & (who[first] <= who[second]))
     keep = keep[np.argsort(first[keep] * len(place) + second[keep])]
     first, second = first[keep], second[keep]

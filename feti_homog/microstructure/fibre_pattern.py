@@ -10,12 +10,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.errors import CaseError
-from feti_homog.microstructure.fibre_table import FibreTable, read_table
+from feti_homog.microstructure.fibre_table import SAME_FIBRE, FibreTable, read_table
 from feti_homog.microstructure.shapes.shapes import BOTH_SIZES, have_both_sizes
 from feti_homog.typing import Bool, Float, Int
-
-# Centres nearer than this share of the radius are one fibre twice.
-SAME_CENTRE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -107,7 +104,7 @@ def read_window(path: Path, size: tuple[float, float] | None = None) -> FibrePat
         *_faults(table, outside, f"its centre is outside of the window of {width:g} x {height:g}"),
     ]
     if not faults:
-        pairs = cKDTree(centres).query_pairs(SAME_CENTRE * float(radii.min()), output_type="ndarray")
+        pairs = cKDTree(centres).query_pairs(SAME_FIBRE * float(radii.min()), output_type="ndarray")
         again = np.isin(np.arange(len(centres)), pairs.max(axis=1, initial=-1))
         faults = _faults(table, again, "there is a fibre at the same place before")
     if len(centres) < 2:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -23,6 +23,9 @@ COLUMNS = (*list(table_columns.NUMBERS)[:3], "phase", *list(table_columns.NUMBER
 SIZES = ("width", "height", "left", "bottom")
 """Names in comment lines about the cell: its size, and the coordinates of its lower left corner."""
 OF_FIBRES = ("coating", "inner_radius")
+# Errors of centres and radii in tables / radius: rows nearer to each other are one fibre, and overlaps up to it can be
+# repaired.
+SAME_FIBRE = 0.01
 SIZE = re.compile(r"\b(width|height|left|bottom)\s*[=:]\s*([^\s;=]+?)(?=,?\s|,?$|;|,[a-z])")
 
 
@@ -112,18 +115,28 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
     sizes: dict[str, float] = {}
     lines = list[tuple[int, str]]()
     for number, contents, comment in table_columns.lines_of(path):
-        _read_sizes(comment, number, sizes, faults)
+        for key, word in SIZE.findall(comment):
+            value = table_columns.number_of(word, ";")
+            if value is None or not types.is_number(value) or (value <= 0 and key in SIZES[:2]):
+                expected = "a number above 0" if key in SIZES[:2] else "a number"
+                faults.add(number, f"{key} = {word}: expected {expected}")
+            elif sizes.setdefault(key, value) != value:
+                faults.add(number, f"{key} = {word}: an earlier line has {sizes[key]:g}")
         if contents:
             lines.append((number, contents))
     if not lines:
         raise CaseError(*faults.lines, f"{name}: no rows; expected a line of names such as x, y, radius, then fibres")
     delimiter = table_columns.delimiter_of(lines[0][1])
-    words = table_columns.cells_of(lines[0][1], delimiter) if columns is None else list(columns)
+    head = [table_columns.cells_of(line, delimiter) for _, line in lines[:2]]
+    words = head[0] if columns is None else list(columns)
     read, unread = table_columns.understood(words, COLUMNS)
     _check_names(words, read, unread, lines[0][0], faults)
     faults.throw()
     rows: dict[int, dict[str, Any]] = {}
-    for number, line in _below_names(lines, columns is None, delimiter):
+    # The first line has names, or no numbers, and units may follow.
+    if columns is None or all(table_columns.number_of(word, delimiter) is None for word in head[0]):
+        lines = lines[2 if any(map(table_columns.are_units, head[1:])) else 1 :]
+    for number, line in lines:
         cells = table_columns.cells_of(line, delimiter)
         if fault := table_columns.row_fault(line, cells, len(words)):
             faults.add(number, fault)
@@ -164,25 +177,6 @@ class _Faults:
             raise CaseError(*self.lines)
 
 
-def _below_names(lines: list[tuple[int, str]], has_names: bool, delimiter: str | None) -> list[tuple[int, str]]:
-    """Return the fibre lines: without the first if it has names, or no numbers, and without a next one with units."""
-    first, *following = [table_columns.cells_of(line, delimiter) for _, line in lines[:2]]
-    if not has_names and any(table_columns.number_of(word, delimiter) is not None for word in first):
-        return lines
-    return lines[2 if following and table_columns.are_units(following[0]) else 1 :]
-
-
-def _read_sizes(comment: str, row: int, sizes: dict[str, float], faults: _Faults) -> None:
-    """Add the cell sizes in a comment to `sizes`."""
-    for key, word in SIZE.findall(comment):
-        value = table_columns.number_of(word, ";")
-        if value is None or not types.is_number(value) or (value <= 0 and key in SIZES[:2]):
-            expected = "a number above 0" if key in SIZES[:2] else "a number"
-            faults.add(row, f"{key} = {word}: expected {expected}")
-        elif sizes.setdefault(key, value) != value:
-            faults.add(row, f"{key} = {word}: an earlier line has {sizes[key]:g}")
-
-
 def _check_names(
     words: Sequence[str], read: Sequence[table_columns.SourceColumn], unread: Sequence[str], row: int, faults: _Faults
 ) -> None:
@@ -211,8 +205,19 @@ def _table(
 ) -> FibreTable:
     """Return the table of rows whose cells are numbers, or texts if they are faulty."""
     for row, cells in rows.items():
-        for words in _cell_faults(cells):
-            faults.add(row, words)
+        has_size = any(set(replacing) <= cells.keys() for replacing in REPLACING)
+        for key in ("x", "y", *([] if has_size else ["radius"])):
+            if key not in cells:
+                faults.add(row, f"{key}: no value; expected a number")
+        for key in table_columns.NUMBERS:
+            if complaint := table_columns.FIBRE_CELLS[key].complaint(cells.get(key, 1.0)):
+                faults.add(row, f"{key} = {wording.toml_value(cells[key])}: {complaint}")
+        phase = cells.get("phase", "fibre")
+        for key in (key for key in OF_FIBRES if phase == VOID and cells.get(key)):
+            faults.add(row, f"{key} = {wording.toml_value(cells[key])}: a void has none")
+        if not isinstance(phase, str) or not (phase == VOID or PHASE.fullmatch(phase)) or phase == MATRIX:
+            words = f"phase = {wording.toml_value(phase)}: expected a name of letters, digits, _, - and :"
+            faults.add(row, f'{words}, but not "matrix", which is around the fibres')
     if not rows and not faults.lines:
         faults.lines.append(f"{name}: no fibres; expected a row for each")
     faults.throw()
@@ -231,23 +236,3 @@ def _table(
         left=sizes.get("left"),
         bottom=sizes.get("bottom"),
     )
-
-
-def _cell_faults(cells: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the faults of one row."""
-    has_size = any(set(sizes) <= cells.keys() for sizes in REPLACING)
-    for key in ("x", "y", *([] if has_size else ["radius"])):
-        if key not in cells:
-            yield f"{key}: no value; expected a number"
-    for key in table_columns.NUMBERS:
-        complaint = table_columns.FIBRE_CELLS[key].complaint(cells.get(key, 1.0))
-        if complaint:
-            yield f"{key} = {wording.toml_value(cells[key])}: {complaint}"
-    phase = cells.get("phase", "fibre")
-    if phase == VOID:
-        yield from (f"{key} = {wording.toml_value(cells[key])}: a void has none" for key in OF_FIBRES if cells.get(key))
-    if not isinstance(phase, str) or not (phase == VOID or PHASE.fullmatch(phase)) or phase == MATRIX:
-        yield (
-            f"phase = {wording.toml_value(phase)}: expected a name of letters, digits, _, - and :, "
-            'but not "matrix", which is around the fibres'
-        )

@@ -4,15 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from feti_homog.errors import MeshError
+from feti_homog.errors import MOST_FAULTS, MeshError
 from feti_homog.microstructure import Arrangement, arrangements, cut_window
-from feti_homog.microstructure.fibre_table import FibreTable
+from feti_homog.microstructure.fibre_table import SAME_FIBRE, FibreTable
 from feti_homog.microstructure.shapes import Discs, Outlines, directions
 from feti_homog.microstructure.shapes.shapes import SHAPES, with_parts
 from feti_homog.typing import Bool, Float, Int
 
-# Relative to the radius: rows nearer than this, or a period apart to this, are one fibre.
-SAME_FIBRE = 0.01
 # Directions in which outlines are compared.
 COMPARED = directions(np.linspace(0.0, 2 * np.pi, 24, endpoint=False))
 # Gap / mean radius of two fibres below which they touch: elements between them would be too many.
@@ -21,12 +19,6 @@ LEAST_GAP = 1e-4
 COATINGS = 0.01, 1.0
 # Distance of the sides of a cell from tangency with an outline / mean radius, below which elements there are needles.
 LEAST_CLEARANCE = 1e-3
-# Decimals of height / width of tables that may have any origin and unit; coordinates have `arrangements.DECIMALS`. gmsh
-# may put other elements beside ellipses and polygons where the last digit of a length is another.
-HEIGHT_DECIMALS = 12
-# Overlap / radius of the smaller fibre, up to which fibres are repaired.
-REPAIRED = 0.01
-MOST_LISTED = 30  # moved fibres that are listed one by one
 
 
 def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> Arrangement:
@@ -43,8 +35,16 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
     Raises:
         MeshError: rows lie outside, come twice, overlap or touch; a line for each fault.
     """
-    table, repaired = _repaired(table, window) if repairs else (table, ())
+    table, remarks = _repaired(table, window) if repairs else (table, ())
     retained, centres, moves, size = on_torus(table, window)
+    if window == "cut":
+        distance = np.linalg.norm(moves, axis=1)
+        moved = np.flatnonzero(distance > cut_window.TOLERANCE * table.radius.mean())
+        farthest = moved[np.argsort(-distance[moved], kind="stable")][:MOST_FAULTS]
+        listed = [f"row {table.row[retained[k]]} by {distance[k]:.3g}" for k in farthest]
+        listed += [f"and {len(moved) - MOST_FAULTS} others by less"] if len(moved) > MOST_FAULTS else []
+        which = f": {', '.join(listed)}" if listed else ""
+        remarks += (f'[cell] window = "cut": {len(moved)} of {len(table.row)} fibres moved{which}',)
     order = np.argsort(table.is_void[retained], kind="stable")
     rows, places = retained[order], (centres + moves)[order] % size / size[0]
     outlines, core = table.outlines[rows].per(size[0]).at(places), table.inner_radius[rows] / size[0]
@@ -57,7 +57,7 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
         coating=np.where(is_hollow, outlines.radii - core, table.coating[rows] * outlines.radii),
         is_hollow=is_hollow,
         row=rows,
-        remarks=repaired + (_moved_fibres(table, retained, moves) if window == "cut" else ()),
+        remarks=remarks,
     )
     shifted = arrangements.clear_shift(fibres)
     is_placed = table.left is not None and table.bottom is not None
@@ -71,7 +71,7 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
 def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ...]]:
     """Shrink fibres that overlap slightly; return the table, and a remark with their rows.
 
-    Fibres that touch or overlap by up to REPAIRED of a radius shrink until they part.
+    Fibres that touch or overlap by up to SAME_FIBRE of a radius shrink until they part.
     """
     assert table.width is not None and table.height is not None
     size, centres = np.array([table.width, table.height]), table.centres - _corner(table)
@@ -80,7 +80,7 @@ def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ..
     first, second, gap, _, across = _gaps(table, retained, outer, size)
     least = LEAST_GAP * (table.outer_radius[retained][first] + table.outer_radius[retained][second]) / 2
     smaller = np.minimum(table.radius[retained][first], table.radius[retained][second])
-    near = (gap < least) & (gap > -REPAIRED * smaller) & ~(across & (window == "cut"))
+    near = (gap < least) & (gap > -SAME_FIBRE * smaller) & ~(across & (window == "cut"))
     share = np.zeros(len(table.row))
     for fibre in (first[near], second[near]):
         sizes = np.stack([table.columns[name][retained[fibre]] for name in ("radius", "a", "b")])
@@ -89,34 +89,23 @@ def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ..
     # A little more than enough, for the gap is compared with the radii that are left.
     columns = {name: values * (1 - 0.51 * share) if name in names else values for name, values in table.columns.items()}
     rows = table.row[share > 0]
-    listed = f"rows {', '.join(map(str, rows[:MOST_LISTED]))}{', ...' if len(rows) > MOST_LISTED else ''}"
+    listed = f"rows {', '.join(map(str, rows[:MOST_FAULTS]))}{', ...' if len(rows) > MOST_FAULTS else ''}"
     words = f"{listed} are smaller by up to {100 * 0.51 * share.max():.2g} %" if len(rows) else "nothing to repair"
     return replace(table, columns=columns), (f'[cell] repair = "overlaps": {words}',)
 
 
 def _rounded(arrangement: Arrangement) -> Arrangement:
-    """Round the lengths of an arrangement to `arrangements.DECIMALS`, and its height to HEIGHT_DECIMALS.
+    """Round the lengths of an arrangement to `arrangements.DECIMALS`, and its height to GMSH_DECIMALS.
 
     Centres on the right or upper side move to 0.
     """
     outlines, least = arrangement.outlines.rounded(arrangements.DECIMALS), 10.0**-arrangements.DECIMALS
     return replace(
         arrangement,
-        height=round(arrangement.height, HEIGHT_DECIMALS),
+        height=round(arrangement.height, arrangements.GMSH_DECIMALS),
         outlines=outlines.at(np.where(outlines.centres >= arrangement.size - least, 0.0, outlines.centres)),
         coating=arrangement.coating.round(arrangements.DECIMALS),
     )
-
-
-def _moved_fibres(table: FibreTable, kept: Int, moves: Float) -> tuple[str, ...]:
-    """List the rows of `kept` (k,) that a cut window moves (k, 2), and how far, in one line."""
-    distance = np.linalg.norm(moves, axis=1)
-    moved = distance > cut_window.TOLERANCE * table.radius.mean()
-    rows, length = table.row[kept[moved]], distance[moved]
-    listed = [f"row {rows[k]} by {length[k]:.3g}" for k in np.argsort(-length, kind="stable")[:MOST_LISTED]]
-    remainder = [f"and {len(rows) - MOST_LISTED} others by less"] if len(rows) > MOST_LISTED else []
-    which = f": {', '.join(listed + remainder)}" if listed else ""
-    return (f'[cell] window = "cut": {len(rows)} of {len(table.row)} fibres moved{which}',)
 
 
 def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
@@ -128,7 +117,25 @@ def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
     size = np.array([table.width, table.height])
     centres = table.centres - _corner(table)
     is_cut = window == "cut"
-    _raise_faults(table, _outside(table, centres, size, is_cut))
+    # The largest of the lengths that each row gives, and its column.
+    names = ["radius", *(name for shape in SHAPES for name in shape.sizes if name != "radius")]
+    sizes = np.nan_to_num(np.stack([table.columns[name] for name in names]))
+    radius, column, faults = sizes.max(axis=0), sizes.argmax(axis=0), list[str]()
+    # Discs reach into a periodic cell; in a cut window the centres are within.
+    for axis, (name, width) in enumerate(zip(("width", "height"), size.tolist(), strict=True)):
+        over = np.maximum(-centres[:, axis], centres[:, axis] - width)
+        reach = radius if (table.left, table.bottom)[axis] is not None else np.full_like(radius, 2 * radius.max())
+        for k in np.flatnonzero(over > (SAME_FIBRE * radius if is_cut else (1 + SAME_FIBRE) * reach)).tolist():
+            value = table.centres[k, axis]
+            faults.append(f"row {table.row[k]}: {'xy'[axis]} = {value:g}: lies outside the cell, of {name} {width:g}")
+    for k in np.flatnonzero((2 * radius >= size.min()) | (radius < arrangements.SMALLEST_RADIUS * size[0])).tolist():
+        limits = f"from {arrangements.SMALLEST_RADIUS * size[0]:g} to below {size.min() / 2:g} in this cell"
+        faults.append(f"row {table.row[k]}: {names[column[k]]} = {radius[k]:g}: expected {limits}")
+    least, most = COATINGS
+    for k in np.flatnonzero((table.coating > 0) & ((table.coating < least) | (table.coating > most))).tolist():
+        value = table.coating[k]
+        faults.append(f"row {table.row[k]}: coating = {value:g}: expected 0, or from {least:g} to {most:g}")
+    _raise_faults(table, faults)
     first, faults = _without_images(table, centres, size, is_cut)
     _raise_faults(table, faults)
     retained = np.flatnonzero(first)
@@ -141,7 +148,7 @@ def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
         i, j = table.row[retained[one[k]]], table.row[retained[other[k]]]
         who = f"rows {i} and {j}" if i != j else f"row {i} and its image"
         what = f"overlap by {-gap[k]:.3g}" if gap[k] < -LEAST_GAP * together[k] / 2 else "touch"
-        least = REPAIRED * min(table.radius[retained[[one[k], other[k]]]])
+        least = SAME_FIBRE * min(table.radius[retained[[one[k], other[k]]]])
         hint = '; repair = "overlaps" makes them smaller' if -gap[k] < least else ""
         faults.append(f"{who}: {what}{' across the border' if across[k] else ''}{hint}")
     if across[bad].any():
@@ -172,30 +179,6 @@ def _corner(table: FibreTable) -> Float:
 def _raise_faults(table: FibreTable, faults: list[str]) -> None:
     if faults:
         raise MeshError(*(f"[cell] {table.name}: {fault}" for fault in faults))
-
-
-def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> list[str]:
-    """List faults of fibres that are no part of the cell, or too large or too small for it.
-
-    Discs reach into a periodic cell; in a cut window the centres are within.
-    """
-    # The largest of the lengths that each row gives, and its column.
-    names = ["radius", *(name for shape in SHAPES for name in shape.sizes if name != "radius")]
-    sizes = np.nan_to_num(np.stack([table.columns[name] for name in names]))
-    radius, column, faults = sizes.max(axis=0), sizes.argmax(axis=0), []
-    for axis, (name, width) in enumerate(zip(("width", "height"), size.tolist(), strict=True)):
-        over = np.maximum(-centres[:, axis], centres[:, axis] - width)
-        reach = radius if (table.left, table.bottom)[axis] is not None else np.full_like(radius, 2 * radius.max())
-        for k in np.flatnonzero(over > (SAME_FIBRE * radius if is_cut else (1 + SAME_FIBRE) * reach)).tolist():
-            value = table.centres[k, axis]
-            faults.append(f"row {table.row[k]}: {'xy'[axis]} = {value:g}: lies outside the cell, of {name} {width:g}")
-    for k in np.flatnonzero((2 * radius >= size.min()) | (radius < arrangements.SMALLEST_RADIUS * size[0])).tolist():
-        limits = f"from {arrangements.SMALLEST_RADIUS * size[0]:g} to below {size.min() / 2:g} in this cell"
-        faults.append(f"row {table.row[k]}: {names[column[k]]} = {radius[k]:g}: expected {limits}")
-    least, most = COATINGS
-    bad = np.flatnonzero((table.coating > 0) & ((table.coating < least) | (table.coating > most)))
-    expected = f"expected 0, or from {least:g} to {most:g}"
-    return faults + [f"row {table.row[k]}: coating = {table.coating[k]:g}: {expected}" for k in bad.tolist()]
 
 
 def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> tuple[Bool, list[str]]:

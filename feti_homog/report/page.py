@@ -4,6 +4,7 @@ import base64
 from html import escape
 from importlib import resources
 from pathlib import Path
+from string import Template
 
 from feti_homog.errors import CaseError
 from feti_homog.materials import voigt
@@ -58,8 +59,16 @@ def write(directory: Path) -> Path:
 
 def page(document: Document, directory: Path) -> str:
     """Return the page of a result.  Raises OSError or KeyError where its files are damaged."""
-    title, status = escape(title_of(document)), document["status"]
-    style = resources.files("feti_homog.report").joinpath("page.css").read_text(encoding="utf-8")
+    title, status, files = escape(title_of(document)), document["status"], resources.files("feti_homog.report")
+    style = files.joinpath("page.css").read_text(encoding="utf-8")
+    captions = {directory / f"{name}.png": caption for name, caption in PICTURES.items()}
+    captions |= {at: f"Deformed cell, {at.stem.replace('_', ' ')}" for at in sorted(directory.glob("state_*.png"))}
+    pictures = [
+        f'<figure><img src="data:image/png;base64,{base64.b64encode(path.read_bytes()).decode()}" alt="{caption}">'
+        f"<figcaption>{caption}</figcaption></figure>"
+        for path, caption in captions.items()
+        if path.is_file()
+    ]
     remarks = [
         f'<p class="{label.lower()}"><strong>{label}</strong> {escape(remark)}</p>'
         for label in REMARKS
@@ -69,7 +78,7 @@ def page(document: Document, directory: Path) -> str:
         "Results": "\n".join(f'<div class="scroll">{answer.html}</div>' for answer in answers(document, MOST_ROWS)),
         "Remarks": "\n".join(remarks),
         "Checks": f'<div class="scroll">{checks(document).html}</div>',
-        "Pictures": "\n".join(_figures(directory)) or "<p>None: <code>feti-homog plot</code> draws them.</p>",
+        "Pictures": "\n".join(pictures) or "<p>None: <code>feti-homog plot</code> draws them.</p>",
         "Summary": f"<pre>{escape(summary(document))}</pre>",
     }
     filled = {name: body for name, body in sections.items() if body}
@@ -77,40 +86,14 @@ def page(document: Document, directory: Path) -> str:
     body = "\n".join(
         f'<section id="{name.lower()}">\n<h2>{name}</h2>\n{text}\n</section>' for name, text in filled.items()
     )
-    return f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta http-equiv="Content-Security-Policy" content="{POLICY}">
-<title>{title}</title>
-<style>
-{style}</style>
-</head>
-<body>
-<header>
-<p class="program">feti-homog {escape(str(document["version"]))}</p>
-<h1>{title}</h1>
-<p class="status {"good" if status == "done" else "bad"}">{escape(status)}</p>
-<nav>
-{links}
-</nav>
-</header>
-<main>
-{body}
-</main>
-</body>
-</html>
-"""
-
-
-def _figures(directory: Path) -> list[str]:
-    """Return the pictures of the folder with their captions."""
-    captions = {directory / f"{name}.png": caption for name, caption in PICTURES.items()}
-    captions |= {at: f"Deformed cell, {at.stem.replace('_', ' ')}" for at in sorted(directory.glob("state_*.png"))}
-    return [
-        f'<figure><img src="data:image/png;base64,{base64.b64encode(path.read_bytes()).decode()}" alt="{caption}">'
-        f"<figcaption>{caption}</figcaption></figure>"
-        for path, caption in captions.items()
-        if path.is_file()
-    ]
+    verdict, version = "good" if status == "done" else "bad", escape(str(document["version"]))
+    return Template(files.joinpath("page.html").read_text(encoding="utf-8")).substitute(
+        policy=POLICY,
+        title=title,
+        style=style,
+        version=version,
+        verdict=verdict,
+        status=escape(status),
+        links=links,
+        body=body,
+    )

@@ -23,6 +23,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from feti_homog.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.results import atomic
 from feti_homog.system.parallel import mpi_errors
@@ -39,6 +40,14 @@ WHOLE_BYTES = 64 * 2**20
 FOUND_AGAIN = re.compile(r"(lam|jump|used|alpha)(_axial)?(_ends)?")
 
 Arrays = dict[str, NDArray[Any]]
+
+
+def room_of(case: Case) -> int | None:
+    """Return the bytes of events up to which checkpoints have multipliers.
+
+    There is no limit, None, if all fields are kept, and with friction, where one load has many equilibria.
+    """
+    return None if case.has_friction or case.output.states == "all" else WHOLE_BYTES
 
 
 class EventsInMemory:
@@ -107,31 +116,58 @@ class Checkpoint(EventsInMemory):
         self._ends: list[int] = []  # ends of the records on rank 0; the first record is the signature
 
     def clear(self) -> int:
-        return mpi_errors.on_root(self.comm, self._clear)
+        def cleared() -> int:
+            try:
+                number = self._count_records()
+            except CaseError:  # the file of another run counts as one event
+                number = 1
+            remove(self.path.parents[1])
+            self._ends = []
+            return number
+
+        return mpi_errors.on_root(self.comm, cleared)
 
     def count(self) -> int:
+        def counted() -> int:
+            if number := self._count_records():
+                written = next(records(self.path))[1].decode()
+                if written != self.signature:
+                    raise CaseError(f"{self.path} is of another run: expected {self.signature}; found {written}")
+            return number
+
         try:
-            return mpi_errors.on_root(self.comm, self._count)
+            return mpi_errors.on_root(self.comm, counted)
         except CaseError as error:
             raise CaseError(*(f"--resume: {fault}" for fault in error.faults)) from error
 
     def read(self, number: int) -> Arrays:
+        size = self.comm.size
         event = mpi_errors.on_root_only(self.comm, lambda: unpacked(next(records(self.path, self._ends[number]))[1]))
-        part: Arrays = self.comm.scatter([] if event is None else [_part(event, k) for k in range(self.comm.size)])
+        parts = []
+        if event is not None:  # on rank 0, which cuts the distributed arrays
+            ends = {name: event.get(f"{name}_ends") for name in event if not name.endswith("_ends")}
+            whole = [np.split(event[n], at[:-1]) if at is not None else [event[n]] * size for n, at in ends.items()]
+            parts = [dict(zip(ends, arrays, strict=True)) for arrays in zip(*whole, strict=True)]
+        part: Arrays = self.comm.scatter(parts)
         return part
 
     def write(self, number: int, shared: Mapping[str, Any], distributed: Arrays, light: bool = False) -> None:
-        gathered = {name: self.comm.gather(part) for name, part in distributed.items()}
-        mpi_errors.on_root(self.comm, self._write, number, shared, gathered, light)
+        gathered = {name: self.comm.gather(part) or [] for name, part in distributed.items()}
 
-    def _clear(self) -> int:
-        try:
-            number = self._count_records()
-        except CaseError:  # the file of another run counts as one event
-            number = 1
-        remove(self.path.parents[1])
-        self._ends = []
-        return number
+        def append() -> None:
+            event = {name: np.asarray(value) for name, value in shared.items()}
+            event |= {name: np.concatenate(parts) for name, parts in gathered.items()}
+            event |= {f"{name}_ends": np.cumsum([len(p) for p in parts]) for name, parts in gathered.items()}
+            if not self._ends:
+                first = begin(self.signature)
+                atomic.append(self.path, 0, first, False)
+                self._ends = [len(first)]
+            del self._ends[number + 1 :]
+            content = record(packed(self._kept(event, self._ends[-1])))
+            atomic.append(self.path, self._ends[-1], content, not light)
+            self._ends.append(self._ends[-1] + len(content))
+
+        mpi_errors.on_root(self.comm, append)
 
     def _count_records(self) -> int:
         if former := sorted(path.name for path in self.path.parent.glob("[0-9]*.h5")):
@@ -139,38 +175,10 @@ class Checkpoint(EventsInMemory):
         self._ends = [end for end, _ in records(self.path)] if self.path.is_file() else []
         return max(len(self._ends) - 1, 0)
 
-    def _count(self) -> int:
-        if number := self._count_records():
-            written = next(records(self.path))[1].decode()
-            if written != self.signature:
-                raise CaseError(f"{self.path} is of another run: expected {self.signature}; found {written}")
-        return number
-
-    def _write(
-        self, number: int, shared: Mapping[str, Any], gathered: Mapping[str, list[NDArray[Any]]], light: bool
-    ) -> None:
-        event = {name: np.asarray(value) for name, value in shared.items()}
-        event |= {name: np.concatenate(parts) for name, parts in gathered.items()}
-        event |= {f"{name}_ends": np.cumsum([len(p) for p in parts]) for name, parts in gathered.items()}
-        if not self._ends:
-            first = begin(self.signature)
-            atomic.append(self.path, 0, first, False)
-            self._ends = [len(first)]
-        del self._ends[number + 1 :]
-        content = record(packed(self._kept(event, self._ends[-1])))
-        atomic.append(self.path, self._ends[-1], content, not light)
-        self._ends.append(self._ends[-1] + len(content))
-
 
 def has_multipliers(event: Arrays) -> bool:
     """Return whether an event holds its multipliers."""
     return "lam" in event
-
-
-def _part(event: Arrays, rank: int) -> Arrays:
-    """Return the part of an event for one rank: distributed arrays are cut."""
-    ends = {name: event.get(f"{name}_ends") for name in event if not name.endswith("_ends")}
-    return {name: event[name] if at is None else np.split(event[name], at[:-1])[rank] for name, at in ends.items()}
 
 
 def begin(signature: str) -> bytes:
@@ -194,10 +202,19 @@ def records(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
     """
     try:
         with path.open("rb") as stream:
-            place = stream.seek(start) or len(_head(stream.readline(), path))
+            place = stream.seek(start)
+            if not place:
+                line, expected = stream.readline(), begin("").partition(b"\n")[0] + b"\n"
+                if line != expected and expected.startswith(line):  # the first line is unfinished
+                    return
+                if (match := HEAD.fullmatch(line)) is None:
+                    raise CaseError(f"{path} is damaged: it does not begin as an event file")
+                if int(match[1]) != FORMAT:
+                    raise _other_format(path, int(match[1]))
+                place = len(line)
             for number in count():
                 prefix = stream.read(PREFIX.size)
-                if place == 0 or len(prefix) < PREFIX.size:
+                if len(prefix) < PREFIX.size:
                     return
                 size, checksum, of_both = PREFIX.unpack(prefix)
                 is_sound = of_both == zlib.crc32(b"%d %d" % (size, checksum))
@@ -210,18 +227,6 @@ def records(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
                 yield place, content
     except OSError as error:
         raise CaseError(f"{path} is no readable event file: {error.strerror}") from error
-
-
-def _head(line: bytes, path: Path) -> bytes:
-    """Check the first line of an event file; return b"" for an unfinished line."""
-    expected = begin("").partition(b"\n")[0] + b"\n"
-    if line != expected and expected.startswith(line):
-        return b""
-    if (match := HEAD.fullmatch(line)) is None:
-        raise CaseError(f"{path} is damaged: it does not begin as an event file")
-    if int(match[1]) != FORMAT:
-        raise _other_format(path, int(match[1]))
-    return line
 
 
 def _other_format(path: Path, number: int | str) -> CaseError:

@@ -109,8 +109,19 @@ class FieldFile:
 
     def close(self) -> Path:
         """Complete the file, give it its final name, and return its path."""
+
+        def complete() -> None:
+            """Add views and rename the file, on one rank: on all, views cost as much as tables."""
+            # No lock: only this process has the file open, and some file systems have no locks.
+            with h5py.File(self.part, "r", locking=False) as file:
+                size = bytes_of_views(file)
+            _reserve(self.part, self.part.stat().st_size, size)
+            with h5py.File(self.part, "r+", locking=False) as file:
+                add_views(file)
+            atomic.commit(self.part, self.path)
+
         self._agreed(mpi_errors.agree_after, self._opened.close)
-        self._agreed(mpi_errors.on_root_only, _complete, self.part, self.path)
+        self._agreed(mpi_errors.on_root_only, complete)
         self._is_open = False
         file_locks.files.discard(self.part)
         return self.path
@@ -144,13 +155,19 @@ class FieldFile:
         self._agreed(mpi_errors.on_root_only, _reserve, self.part, self._reserved, size)
         self._reserved += size
         described = field_layout.tables(part)
-        for symbol, rows in self._rows.items():
-            of_rows = {name: d for name, d in described.items() if field_layout.rows_of(d) == symbol}
-            arrays = mpi_errors.agree(self._comm, _arrays, group, rows.count, part, of_rows) if of_rows else {}
-            for name, array in arrays.items():
-                d = of_rows[name]
-                texts = {"meaning": d.meaning, "unit": self._units.get(d.unit) or d.unit or PURE_NUMBER}
-                self._agreed(mpi_errors.agree_after, _write_rows, self._file, f"{group}/{name}", rows, array, texts)
+
+        def arrays() -> dict[str, NDArray[Any]]:
+            converted = {n: np.ascontiguousarray(getattr(part, n), np.dtype(d.dtype)) for n, d in described.items()}
+            for name, array in converted.items():
+                if len(array) != (count := self._rows[field_layout.rows_of(described[name])].count):
+                    raise ValueError(f"/{group}/{name} has {len(array)} rows, not {count}")
+            return converted
+
+        for name, array in mpi_errors.agree(self._comm, arrays).items():
+            d = described[name]
+            rows = self._rows[field_layout.rows_of(d)]
+            texts = {"meaning": d.meaning, "unit": self._units.get(d.unit) or d.unit or PURE_NUMBER}
+            self._agreed(mpi_errors.agree_after, _write_rows, self._file, f"{group}/{name}", rows, array, texts)
 
     def _agreed(self, agreed: Callable[..., Any], function: Callable[..., Any], *args: Any) -> Any:
         """Call a function, and agree on its errors by the collective call `agreed`.
@@ -200,29 +217,10 @@ def _create(part: Path, size: int) -> None:
         raise
 
 
-def _complete(part: Path, path: Path) -> None:
-    """Add views and rename the file, on one rank: on all, views cost as much as tables."""
-    # No lock: only this process has the file open, and some file systems have no locks.
-    with h5py.File(part, "r", locking=False) as file:
-        size = bytes_of_views(file)
-    _reserve(part, part.stat().st_size, size)
-    with h5py.File(part, "r+", locking=False) as file:
-        add_views(file)
-    atomic.commit(part, path)
-
-
 def _set_attributes(file: Any, name: str, attributes: Mapping[str, Any]) -> None:
     target = file[name]
     for key, value in attributes.items():
         target.attrs[key] = value
-
-
-def _arrays(group: str, count: int, part: Any, described: Mapping[str, records.Description]) -> dict[str, NDArray[Any]]:
-    arrays = {name: np.ascontiguousarray(getattr(part, name), np.dtype(d.dtype)) for name, d in described.items()}
-    for name, array in arrays.items():
-        if len(array) != count:
-            raise ValueError(f"/{group}/{name} has {len(array)} rows, not {count}")
-    return arrays
 
 
 def _reserve(part: Path, start: int, size: int) -> None:

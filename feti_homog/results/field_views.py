@@ -13,7 +13,6 @@ import numpy as np
 from feti_homog.materials import voigt
 
 GROUP_OF_STATES = "state/K"
-WHOLE = -1  # column number of a dataset without columns
 
 
 @dataclass(frozen=True)
@@ -23,7 +22,7 @@ class View:
     Attributes:
         components: number of columns; 0 for a dataset with one dimension.
         source: dataset that provides type and unit.
-        columns: for each column that is not zero, its dataset and the column number there.
+        columns: for each column that is not zero, its dataset and the column there; None for all of the dataset.
         meaning: description in words.
     """
 
@@ -31,7 +30,7 @@ class View:
     name: str
     components: int
     source: str
-    columns: Mapping[int, tuple[str, int]]
+    columns: Mapping[int, tuple[str, int | None]]
     meaning: str
 
     @property
@@ -45,15 +44,15 @@ class View:
 
 
 def _vector(name: str, third: str = "") -> View:
-    columns = {0: (name, 0), 1: (name, 1)} | ({2: (third, WHOLE)} if third else {})
+    columns = {0: (name, 0), 1: (name, 1)} | ({2: (third, None)} if third else {})
     sentence = f"`{name}` with `{third}` as third component" if third else f"`{name}` with a third component 0"
     return View("vector", name, 3, name, columns, sentence)
 
 
-def _tensor(name: str, source: str, entries: Mapping[tuple[int, int], tuple[str, int]]) -> View:
-    """Return the view of a symmetric tensor [11, 12, 13, 21, 22, 23, 31, 32, 33]."""
-    places = [(3 * i + j, (min(i, j), max(i, j))) for i in range(3) for j in range(3)]
-    columns = {place: entries[pair] for place, pair in places if pair in entries}
+def _tensor(name: str, source: str, entries: Mapping[str, tuple[str, int | None]]) -> View:
+    """Return the view of a symmetric tensor [11, 12, 13, 21, 22, 23, 31, 32, 33] with some `entries`."""
+    places = enumerate(("11", "12", "13", "12", "22", "23", "13", "23", "33"))
+    columns = {place: entries[entry] for place, entry in places if entry in entries}
     sentence = f"tensor of `{source}`, rows of [[11, 12, 13], [12, 22, 23], [13, 23, 33]]"
     return View("tensor", name, 9, source, columns, sentence)
 
@@ -62,14 +61,15 @@ def _column(name: str, source: str, column: int) -> View:
     return View("column", name, 0, source, {0: (source, column)}, f"column {column} of `{source}`")
 
 
-PLACES = ((0, 0), (1, 1), (0, 1), (2, 2))  # of 11, 22, 12, 33
-STRESS_TENSOR = dict(zip(PLACES, (("stress", 0), ("stress", 1), ("stress", 2), ("stress_33", WHOLE)), strict=True))
+STRESS_TENSOR: dict[str, tuple[str, int | None]] = {
+    **{name[1:]: ("stress", column) for column, name in enumerate(voigt.STRESSES)},
+    "33": ("stress_33", None),
+}
 COLUMNS = (
     *(_column(name, "stress", column) for column, name in enumerate(voigt.STRESSES)),
     *(_column(f"{table}_{name}", table, k) for table in ("traction", "jump") for k, name in enumerate("nt")),
 )
 AXIAL = "axial_displacement"  # dataset that only states of generalized plane strain have
-AXIAL_PLACES = ((1, 2), (0, 2))  # of 23, 13
 
 # The views of each group; /state/K stands for every state.
 VIEWS: dict[str, tuple[View, ...]] = {
@@ -84,7 +84,9 @@ VIEWS: dict[str, tuple[View, ...]] = {
 # The views of a state in generalized plane strain.
 SPATIAL_VIEWS: tuple[View, ...] = (
     _vector("displacement", AXIAL),
-    _tensor("stress", "stress", STRESS_TENSOR | {at: ("axial_stress", k) for k, at in enumerate(AXIAL_PLACES)}),
+    _tensor(
+        "stress", "stress", STRESS_TENSOR | {s[1:]: ("axial_stress", k) for k, s in enumerate(voigt.AXIAL_STRESSES)}
+    ),
     *COLUMNS,
     *(_column(name, "axial_stress", column) for column, name in enumerate(voigt.AXIAL_STRESSES)),
 )
@@ -100,7 +102,7 @@ def add_views(file: Any) -> None:
             table = file[f"{group}/{name}"]
             source = h5py.VirtualSource(".", table.name, shape=table.shape, dtype=table.dtype)
             target: Any = (slice(None), place) if view.components else slice(None)
-            layout[target] = source if column == WHOLE else source[:, column]
+            layout[target] = source if column is None else source[:, column]
         dataset = file.create_virtual_dataset(view.path(group), layout, np.zeros((), layout.dtype)[()])
         dataset.attrs["meaning"] = view.words
         dataset.attrs["unit"] = original.attrs["unit"]

@@ -48,11 +48,24 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
     The peak is the largest stress up to the deepest fall in which bonds break, or on the whole path without such a
     fall: after all fibres debond, the matrix alone may carry a larger stress than the composite did.  A path that
     stopped early without a fall has no peak, but a largest stress `so_far`.
+
+    On a path with one leg the load only rises: where bonds break, the cell drops to the next stable branch.
     """
     points, component = document["path"], path_curves.leading_component(document)
     # The sum with 0.0 turns -0.0 into 0.0.
     stress, strain = (np.array([p[name] for p in points], float)[:, component] + 0.0 for name in ("stress", "strain"))
-    event, remaining, valley = _deepest_fall(document, stress)
+    number, curve, broke = np.arange(len(stress)), stress, np.array([point["broke"] for point in points])
+    if path_curves.is_proportional(document):
+        load = np.array([point["load_factor"] for point in points])
+        records = np.flatnonzero(load >= np.maximum.accumulate(load))
+        fallen = stress[records[1:]] * load[records[:-1]] / load[records[1:]]
+        curve = np.r_[stress[records[0]], np.column_stack([fallen, stress[records[1:]]]).ravel()]
+        number = np.r_[records[0], np.repeat(records[1:], 2)]
+    size = np.abs(curve)
+    turns = pairwise(turning_points(size, LEAST_DROP * float(size.max())))
+    falls = [(size[a] - size[b], a, b) for a, b in turns if size[a] > size[b] and broke[number[a] : number[b]].any()]
+    _, top, valley = max(falls, default=(0.0, len(size), None))
+    event = int(number[size[: top + 1].argmax()])
     names = [names[component] for names in voigt.voigt_names(len(points[0]["stress"]))]
     entries = {"stress": float(stress[event]), "strain": float(strain[event]), "event": event}
     first = next((number for number, point in enumerate(points) if point["broke"]), None)
@@ -63,7 +76,7 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
             "first_break_event": first,
         }
     if valley is not None:
-        entries |= {"stress_left": remaining, "event_left": valley}
+        entries |= {"stress_left": float(curve[valley]), "event_left": int(number[valley])}
     elif points[-1]["load_factor"] < 1.0 - path_curves.SAME_LOAD:
         entries["so_far"] = True
     entries["dissipated"] = points[event].get("dissipated", 0.0)
@@ -87,30 +100,6 @@ def name_of(document: path_curves.Document, peak: path_curves.Document) -> str:
     if "so_far" in peak:
         return SO_FAR
     return LARGEST if fall_of(document, peak) < LEAST_FALL else PEAK
-
-
-def _deepest_fall(document: path_curves.Document, stress: Float) -> tuple[int, float, int | None]:
-    """Return peak number, valley stress and valley number of the deepest fall.
-
-    The peak is the largest stress (n,) up to the deepest fall in which bonds break.  Without a fall, the peak is the
-    largest stress on the path, the valley stress is 0, and the valley number is None.
-
-    On a path with one leg the load only rises: where bonds break, the cell drops to the next stable branch.
-    """
-    number, broke = np.arange(len(stress)), np.array([point["broke"] for point in document["path"]])
-    if path_curves.is_proportional(document):
-        load = np.array([point["load_factor"] for point in document["path"]])
-        records = np.flatnonzero(load >= np.maximum.accumulate(load))
-        fallen = stress[records[1:]] * load[records[:-1]] / load[records[1:]]
-        stress = np.r_[stress[records[0]], np.column_stack([fallen, stress[records[1:]]]).ravel()]
-        number = np.r_[records[0], np.repeat(records[1:], 2)]
-    size = np.abs(stress)
-    turns = pairwise(turning_points(size, LEAST_DROP * float(size.max())))
-    falls = [(size[a] - size[b], a, b) for a, b in turns if size[a] > size[b] and broke[number[a] : number[b]].any()]
-    if not falls:
-        return int(number[size.argmax()]), 0.0, None
-    _, top, valley = max(falls)
-    return int(number[size[: top + 1].argmax()]), float(stress[valley]), int(number[valley])
 
 
 def marks(document: path_curves.Document) -> dict[int, str]:

@@ -15,7 +15,7 @@ from typing import TextIO
 
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.materials import voigt
-from feti_homog.results import atomic, checkpoints, field_file, result_json
+from feti_homog.results import atomic, field_file, result_json
 from feti_homog.results.field_layout import PROGRAM
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.runtime import file_locks, input_files
@@ -79,7 +79,10 @@ def refuse_files_of_others(directory: Path) -> None:
             kind = "a folder there" if path.is_dir() else "" if path.exists() else "a link there that leads nowhere"
             if kind:
                 raise CaseError(f"--out {directory}: {path.name} is {kind}, and a run writes a file of that name")
-        checkpoints.refuse_others(directory)
+        if any(path.name.startswith("checkpoint") for path in directory.iterdir()):
+            from feti_homog.results import checkpoints  # paths alone have checkpoints
+
+            checkpoints.refuse_others(directory)
         signs = [path for path in paths if path.name in SIGNS]
         # Without any sign of a run, all files that are not empty are foreign.
         others = [path for path in signs or paths if path.stat().st_size and not (signs and _is_own(path))]
@@ -123,7 +126,28 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
         CaseError: the folder cannot be made, or another run has locked it.
     """
     lock = file_locks.Lock(directory / LOCK)
-    made, warning = mpi_errors.on_root(comm, _hold, lock, directory)
+
+    def hold() -> tuple[list[Path], str]:
+        """Return new folders, innermost first, and a warning or an empty text."""
+        made = [path for path in (directory, *directory.parents) if not path.exists()]
+        try:
+            directory.mkdir(parents=True, exist_ok=True)
+            lock.acquire()
+        except OSError as error:
+            _remove_empty(made)
+            raise CaseError(f"--out {directory}: cannot be made: {error.strerror}") from error
+        except file_locks.LockHeld as held:
+            raise _busy(directory, str(held)) from held
+        except file_locks.LocksUnsupported as error:
+            lock.path.unlink(missing_ok=True)
+            return made, f"{error}; nothing keeps another run from writing to the same folder"
+        except FetiHomogError:
+            _remove_empty(made)
+            raise
+        atomic.remove_unfinished(directory, RESULT_FILE)
+        return made, ""
+
+    made, warning = mpi_errors.on_root(comm, hold)
     if warning:
         say(f"warning: {warning}")
     try:
@@ -165,27 +189,6 @@ def write_product(path: Path, text: str) -> Path:
     atomic.remove_unfinished(target.parent, re.compile(re.escape(target.name)), alone=False)
     atomic.replace_text(target, f"{text}\n")
     return path
-
-
-def _hold(lock: file_locks.Lock, directory: Path) -> tuple[list[Path], str]:
-    """Create and lock the folder; return new folders, innermost first, and a lock warning or an empty text."""
-    made = [path for path in (directory, *directory.parents) if not path.exists()]
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        lock.acquire()
-    except OSError as error:
-        _remove_empty(made)
-        raise CaseError(f"--out {directory}: cannot be made: {error.strerror}") from error
-    except file_locks.LockHeld as held:
-        raise _busy(directory, str(held)) from held
-    except file_locks.LocksUnsupported as error:
-        lock.path.unlink(missing_ok=True)
-        return made, f"{error}; nothing keeps another run from writing to the same folder"
-    except FetiHomogError:
-        _remove_empty(made)
-        raise
-    atomic.remove_unfinished(directory, RESULT_FILE)
-    return made, ""
 
 
 def _remove_empty(folders: list[Path]) -> None:

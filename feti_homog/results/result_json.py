@@ -99,7 +99,7 @@ def columns(kind: type) -> Iterator[DescribedColumn]:
     """Yield the columns of a CSV file with records of a class, for the reference."""
     for name, description in _in_columns(kind).items():
         # The components in the plane are among the spatial components, in the same order.
-        for component in description.spatial_components or _names(name, description):
+        for component in description.spatial_components or description.components or (name,):
             sentence = f"{component}, {description.meaning}" if description.components else description.meaning
             yield DescribedColumn(component, description.unit, sentence)
 
@@ -118,7 +118,7 @@ def write_csv(path: Path, points: Sequence[Any]) -> Path:
         row: dict[str, Any] = {}
         for name, value in records.plain(point).items():
             if name in fields:
-                values, components = np.ravel(value).tolist(), _names(name, fields[name])
+                values, components = np.ravel(value).tolist(), fields[name].components or (name,)
                 if len(values) > len(components):
                     components = fields[name].spatial_components
                 row |= dict(zip(components, values, strict=True))
@@ -130,11 +130,6 @@ def write_csv(path: Path, points: Sequence[Any]) -> Path:
     writer.writeheader()
     writer.writerows(rows)
     return atomic.replace_text(path, stream.getvalue())
-
-
-def _names(name: str, description: records.Description) -> tuple[str, ...]:
-    """Return the columns of a field: its name, or its components in the plane."""
-    return description.components or (name,)
 
 
 def _in_columns(kind: type) -> dict[str, records.Description]:

@@ -93,7 +93,7 @@ def cell_state(file: Any, state: int) -> ViewedState:
     elements["von_mises"] = voigt.spatial_von_mises(in_plane, S33, shears)
     principal = voigt.spatial_principal(in_plane, S33, shears) if more else voigt.principal(in_plane, S33)
     elements |= {f"principal_{k + 1}": column for k, column in enumerate(principal.T)}
-    return ViewedState(np.pad(points, IN_SPACE), triangles, nodes, elements, str(group.attrs["label"]))
+    return ViewedState(np.pad(points, [(0, 0), (0, 1)]), triangles, nodes, elements, str(group.attrs["label"]))
 
 
 def interface_state(file: Any, state: int) -> ViewedState:
@@ -101,8 +101,8 @@ def interface_state(file: Any, state: int) -> ViewedState:
     group = file[f"state/{state}"]
     more = xdmf.SPATIAL_POINTS if AXIAL_DISPLACEMENT in group else {}
     nodes = _tables(file, state, xdmf.INTERFACE_POINTS | more)
-    label = str(group.attrs["label"])
-    return ViewedState(np.pad(file["interface/points"][()], IN_SPACE), file["interface/vertex"][()], nodes, {}, label)
+    points = np.pad(file["interface/points"][()], [(0, 0), (0, 1)])
+    return ViewedState(points, file["interface/vertex"][()], nodes, {}, str(group.attrs["label"]))
 
 
 def _tables(file: Any, state: int, places: Mapping[str, str]) -> dict[str, Array]:
@@ -111,7 +111,6 @@ def _tables(file: Any, state: int, places: Mapping[str, str]) -> dict[str, Array
     return {name: file[place][()] for name, place in existing.items() if place in file}
 
 
-IN_SPACE = ((0, 0), (0, 1))  # of points (n, 2)
 FORMATS = ("vtu", "vtkhdf")
 KINDS = {1: 1, 3: 5, 6: 22}  # VTK's cell types, vertex and triangles, by number of nodes
 TYPES = {"f4": "Float32", "f8": "Float64", "i1": "Int8", "i4": "Int32", "i8": "Int64", "u1": "UInt8"}

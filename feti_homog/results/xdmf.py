@@ -6,6 +6,7 @@ the name of a block, which two readers show, and an array of bytes, with the sam
 """
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -65,50 +66,47 @@ def write(directory: Path) -> list[Path]:
     Raises:
         FetiHomogError: result.h5 cannot be read or a file cannot be written.
     """
-    h5 = Path(directory) / field_file.NAME
+    h5, paths = Path(directory) / field_file.NAME, list[Path]()
     with atomic.write_errors(Path(directory) / CELL), h5py.File(h5, "r", locking=False) as file:
-        names = (CELL, INTERFACE) if len(file["interface/points"]) else (CELL,)
-        return [_write(h5.with_name(name), file) for name in names]
-
-
-def _write(path: Path, file: h5py.File) -> Path:
-    """Write the XDMF file of the cell or the interface; return its path."""
-    root = ET.Element("Xdmf", Version="3.0")
-    name = "cell" if path.name == CELL else "interface"
-    collection = ET.SubElement(
-        ET.SubElement(root, "Domain"), "Grid", Name=name, GridType="Collection", CollectionType="Temporal"
-    )
-    states = sorted(file.get("state", ()), key=int)
-    labels = [str(file[f"state/{state}"].attrs["label"]) for state in states]
-    longest = max((len(label.encode()) for label in labels), default=0)
-    for state, label in zip(states, labels, strict=True):
-        # One collection for each state: readers show grid names only inside a spatial collection.
-        kind = {"Name": f"state {state}", "GridType": "Collection", "CollectionType": "Spatial"}
-        block = ET.SubElement(collection, "Grid", kind)
-        ET.SubElement(block, "Time", Value=state)
-        grid = ET.SubElement(block, "Grid", Name=label, GridType="Uniform")
-        _numbers(grid, "label", "Scalar", list(label.encode().ljust(longest)))
-        means = file[f"state/{state}"].attrs
-        _numbers(grid, "load_factor", "Scalar", [float(means["load_factor"])])
-        strain, stress, kind_of_means = means["strain"], means["stress"], "Vector"
-        if "temperature" in means:
-            _numbers(grid, "temperature", "Scalar", [float(means["temperature"])])
-            kind_of_means, stress = "Tensor", stress[TENSOR]
-            strain = strain[TENSOR] * np.where(TENSOR < 3, 1.0, 0.5)
-        _numbers(grid, "mean_strain", kind_of_means, strain.tolist())
-        _numbers(grid, "mean_stress", kind_of_means, stress.tolist())
-        is_spatial = AXIAL in file[f"state/{state}"]
-        if path.name == CELL:
-            triangles = "Triangle_6" if file["mesh/triangles"].shape[1] == 6 else "Triangle"
-            _mesh(grid, {"TopologyType": triangles}, file["mesh/triangles"], file["mesh/points"])
-            _attributes(grid, file, state, CELL_NODES, "Node")
-            _attributes(grid, file, state, CELL_ELEMENTS | (SPATIAL_ELEMENTS if is_spatial else {}), "Cell")
-        else:
-            vertices = {"TopologyType": "Polyvertex", "NodesPerElement": "1"}
-            _mesh(grid, vertices, file["interface/vertex"], file["interface/points"])
-            _attributes(grid, file, state, INTERFACE_POINTS | (SPATIAL_POINTS if is_spatial else {}), "Node")
-    ET.indent(root)
-    return atomic.replace(path, lambda part: ET.ElementTree(root).write(part, encoding="utf-8", xml_declaration=True))
+        states = sorted(file.get("state", ()), key=int)
+        labels = [str(file[f"state/{state}"].attrs["label"]) for state in states]
+        longest = max((len(label.encode()) for label in labels), default=0)
+        for name in (CELL, INTERFACE) if len(file["interface/points"]) else (CELL,):
+            root = ET.Element("Xdmf", Version="3.0")
+            title = "cell" if name == CELL else "interface"
+            collection = ET.SubElement(
+                ET.SubElement(root, "Domain"), "Grid", Name=title, GridType="Collection", CollectionType="Temporal"
+            )
+            for state, label in zip(states, labels, strict=True):
+                # One collection for each state: readers show grid names only inside a spatial collection.
+                kind = {"Name": f"state {state}", "GridType": "Collection", "CollectionType": "Spatial"}
+                block = ET.SubElement(collection, "Grid", kind)
+                ET.SubElement(block, "Time", Value=state)
+                grid = ET.SubElement(block, "Grid", Name=label, GridType="Uniform")
+                _numbers(grid, "label", "Scalar", list(label.encode().ljust(longest)))
+                means = file[f"state/{state}"].attrs
+                _numbers(grid, "load_factor", "Scalar", [float(means["load_factor"])])
+                strain, stress, kind_of_means = means["strain"], means["stress"], "Vector"
+                if "temperature" in means:
+                    _numbers(grid, "temperature", "Scalar", [float(means["temperature"])])
+                    kind_of_means, stress = "Tensor", stress[TENSOR]
+                    strain = strain[TENSOR] * np.where(TENSOR < 3, 1.0, 0.5)
+                _numbers(grid, "mean_strain", kind_of_means, strain.tolist())
+                _numbers(grid, "mean_stress", kind_of_means, stress.tolist())
+                is_spatial = AXIAL in file[f"state/{state}"]
+                if name == CELL:
+                    triangles = "Triangle_6" if file["mesh/triangles"].shape[1] == 6 else "Triangle"
+                    _mesh(grid, {"TopologyType": triangles}, file["mesh/triangles"], file["mesh/points"])
+                    _attributes(grid, file, state, CELL_NODES, "Node")
+                    _attributes(grid, file, state, CELL_ELEMENTS | (SPATIAL_ELEMENTS if is_spatial else {}), "Cell")
+                else:
+                    vertices = {"TopologyType": "Polyvertex", "NodesPerElement": "1"}
+                    _mesh(grid, vertices, file["interface/vertex"], file["interface/points"])
+                    _attributes(grid, file, state, INTERFACE_POINTS | (SPATIAL_POINTS if is_spatial else {}), "Node")
+            ET.indent(root)
+            write_tree = partial(ET.ElementTree(root).write, encoding="utf-8", xml_declaration=True)
+            paths.append(atomic.replace(h5.with_name(name), write_tree))
+    return paths
 
 
 def _numbers(grid: ET.Element, name: str, kind: str, values: Sequence[float]) -> None:

@@ -113,9 +113,7 @@ def key(
     written = toml_value(list(default) if isinstance(default, tuple) else default)
     words = absent or default_words or ("" if required or default is None else written)
     entry = Key(type_, meaning, default=words, only=conditions, required=required, **attributes)
-    if required and not conditions:
-        return dataclasses.field(metadata={"key": entry})
-    return dataclasses.field(default=None if required else default, metadata={"key": entry})
+    return dataclasses.field(default=None if required and conditions else default, metadata={"key": entry})
 
 
 def keys_of(table_class: type[Any]) -> dict[str, Key]:

@@ -60,11 +60,10 @@ def magnitudes_in_words(value: Any) -> str:
     return MAGNITUDES if is_of_type and not is_number(value) and value == value else ""
 
 
-def is_number(value: object) -> bool:
+def is_number(value: Any) -> bool:
     """Return whether a value is a number, no truth value, within the magnitude limits."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    return value == 0 or SMALLEST <= abs(value) <= LARGEST
+    is_of_type = isinstance(value, int | float) and not isinstance(value, bool)
+    return is_of_type and (value == 0 or SMALLEST <= abs(value) <= LARGEST)
 
 
 def real(**limits: float) -> ValueType:
@@ -81,16 +80,15 @@ def integer(**limits: float) -> ValueType:
 
 
 def _within(name: str, is_of_type: Test, store: Callable[[Any], Any], limits: Mapping[str, float]) -> ValueType:
-    tests = {"above": operator.gt, "least": operator.ge, "below": operator.lt, "most": operator.le}
-    words = {"above": "above", "least": "at least", "below": "below", "most": "at most"}
-    finite = {kind: limits[kind] for kind in tests if math.isfinite(limits.get(kind, math.inf))}
-    texts = {kind: str(limit) if isinstance(limit, int) else f"{limit:.6g}" for kind, limit in finite.items()}
-    expected = f"{name} {' and '.join(f'{words[kind]} {text}' for kind, text in texts.items())}".strip()
+    kinds = {"above": operator.gt, "at least": operator.ge, "below": operator.lt, "at most": operator.le}
+    bounds = [(words, limits.get(words.split()[-1], math.inf)) for words in kinds]
+    finite = [(words, limit) for words, limit in bounds if math.isfinite(limit)]
+    texts = [f"{words} {limit if isinstance(limit, int) else f'{limit:.6g}'}" for words, limit in finite]
 
     def accepts(value: Any) -> bool:
-        return is_of_type(value) and all(tests[kind](value, limit) for kind, limit in finite.items())
+        return is_of_type(value) and all(kinds[words](value, limit) for words, limit in finite)
 
-    return ValueType(expected, accepts, store)
+    return ValueType(f"{name} {' and '.join(texts)}".strip(), accepts, store)
 
 
 def list_of(
@@ -100,12 +98,11 @@ def list_of(
 
     A list has at least `least` or exactly `count` entries, all different if `unique`.
     """
-    fewest = least if count is None else count
+    fewest, most = (least, math.inf) if count is None else (count, count)
 
     def accepts(value: Any) -> bool:
-        if not isinstance(value, list) or len(value) < fewest or (count is not None and len(value) > count):
-            return False
-        return all(map(item.accepts, value)) and not (unique and len({*value}) < len(value))
+        has_length = isinstance(value, list) and fewest <= len(value) <= most
+        return has_length and all(map(item.accepts, value)) and not (unique and len({*value}) < len(value))
 
     return ValueType(expected, accepts, lambda value: tuple(map(item.store, value)), item=item if item.table else None)
 

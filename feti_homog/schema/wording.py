@@ -69,9 +69,7 @@ def suggestion(name: str, known: Iterable[str], owners: Mapping[str, str]) -> st
     `owners` maps each key of the file to its sections, in words.
     """
     known = list(known)
-    nearest = difflib.get_close_matches(name, known, n=1)
-    meant = [key for key in SYNONYMS.get(name.lower(), ()) if key in known]
-    if meant:
+    if meant := [key for key in SYNONYMS.get(name.lower(), ()) if key in known]:
         return f"did you mean {' or '.join(meant)}?"
     key, words = IN_PLACE.get(name.lower(), ("", ""))
     if key in known:
@@ -80,7 +78,7 @@ def suggestion(name: str, known: Iterable[str], owners: Mapping[str, str]) -> st
         return ABSENT[name.lower()]
     if name in owners:
         return f"it belongs to {owners[name]}"
-    if nearest:
+    if nearest := difflib.get_close_matches(name, known, n=1):
         return f"did you mean {toml_key(nearest[0])}?"
     return "expected one of " + ", ".join(map(toml_key, known))
 

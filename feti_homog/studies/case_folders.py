@@ -73,7 +73,7 @@ class SweepIndex:
 
 
 def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str) -> None:
-    """Check that nothing stands under names of a study in a folder without its document.  On one rank.
+    """Refuse a folder without a study whose files have the names of a study.  On one rank.
 
     Raises:
         CaseError: a file that is not empty, or such a folder.
@@ -85,7 +85,7 @@ def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str)
 
 
 def prepare_folder(directory: Path, sweep: Sweep) -> None:
-    """Make the folder of a sweep, or check that it is, perhaps with fewer cases.  On one rank.
+    """Make the folder of a sweep, or check a folder that has its cases, or the first of them.  On one rank.
 
     Raises:
         CaseError: the folder has another sweep, or foreign files under a sweep's names.
@@ -100,7 +100,15 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
     try:
         with file_locks.Lock(directory / INDEX_LOCK_FILE, timeout=INDEX_LOCK_TIMEOUT_S):
             stored = _stored_entries(directory)
-            if reason := _difference(stored, sweep.entries):
+            reason = f"it has {len(stored)} cases, this file {len(sweep.entries)}"
+            for old, new in zip(stored, sweep.entries, strict=False):
+                if old != new:
+                    reason = f"its {old.folder} ({old.describe('')}) differs from this file ({new.describe('')})"
+                    if old.inputs == new.inputs:
+                        in_words = "keys that do not vary, or in the content of a mesh"
+                        reason = f"its {old.folder} differs from this file in {in_words}"
+                    break
+            if stored != sweep.entries[: len(stored)]:
                 raise CaseError(f"--out {directory} holds another sweep: {reason}; choose another folder")
             if not stored:
                 refuse_files_of_others(directory, SWEEP_ENTRIES, "sweep")
@@ -121,16 +129,6 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
 
 def _stored_entries(directory: Path) -> tuple[SweepCase, ...]:
     return read_index(directory).entries if (directory / INDEX_FILE).exists() else ()
-
-
-def _difference(stored: Sequence[SweepCase], entries: Sequence[SweepCase]) -> str:
-    """Return how cases differ from the stored ones, with which they should begin; empty if they do."""
-    for old, new in zip(stored, entries, strict=False):
-        if old != new and old.inputs == new.inputs:
-            return f"its {old.folder} differs from this file in keys that do not vary, or in the content of a mesh"
-        if old != new:
-            return f"its {old.folder} ({old.describe('')}) differs from this file ({new.describe('')})"
-    return f"it has {len(stored)} cases, this file {len(entries)}" if len(stored) > len(entries) else ""
 
 
 def csv_text(rows: Iterable[Iterable[Any]]) -> str:
@@ -166,14 +164,14 @@ def _replaced(value: Any, old: Any, new: Any) -> Any:
 
 
 def case_state(directory: Path, entry: SweepCase) -> CaseState:
-    """Return case progress; RUNNING while another process holds the case's lock.  On one rank."""
+    """Return the progress of a case; RUNNING while a process holds its lock.  On one rank."""
     state = stored_state(directory, entry)
     is_open = state.status in (Status.WAITING, Status.FAILED)
     return CaseState(Status.RUNNING) if is_open and file_locks.holder(directory / entry.folder / LOCK_FILE) else state
 
 
 def stored_state(directory: Path, entry: SweepCase) -> CaseState:
-    """Return case progress by files alone, as the lock's holder needs it.  On one rank."""
+    """Return the progress of a case by its files alone, for the holder of its lock.  On one rank."""
     folder = directory / entry.folder
     path = folder / result_json.NAME
     try:

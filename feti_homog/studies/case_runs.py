@@ -1,7 +1,5 @@
 """Check a sweep and describe its first case; run all cases by rank groups, or one case in a job array."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Iterator
@@ -32,14 +30,18 @@ def list_cases(sweep: Sweep, directory: Path | None) -> list[str]:
     ]
 
 
-def check_groups(comm: Intracomm, ranks_per_case: int) -> None:
-    """Raise CaseError unless the ranks make groups of this size."""
-    if ranks_per_case < 1 or comm.size % ranks_per_case:
-        raise CaseError(f"--ranks-per-case {ranks_per_case}: expected a divisor of the {comm.size} ranks")
+def group_size(comm: Intracomm, ranks_per_case: int | None) -> int:
+    """Return the number of ranks of a case, by default all.  Raises CaseError unless they make such groups."""
+    size = comm.size if ranks_per_case is None else ranks_per_case
+    if size < 1 or comm.size % size:
+        raise CaseError(f"--ranks-per-case {size}: expected a divisor of the {comm.size} ranks")
+    return size
 
 
-def run_all(sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int, retry: bool, quiet: bool) -> None:
-    """Run all cases, each on so many ranks; as many at once as there are such groups.  Collective.
+def run_all(
+    sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int | None, retry: bool, quiet: bool
+) -> None:
+    """Run all cases, each on `ranks_per_case` ranks, by default all; groups of ranks run at once.  Collective.
 
     Raises:
         CaseError: PETSc options are faulty, `ranks_per_case` does not divide the rank count, or the folder
@@ -47,11 +49,10 @@ def run_all(sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int,
         ConvergenceError: cases failed; they are printed.
         FetiHomogError: a result could not be written; the finished ones are kept.
     """
-    check_groups(comm, ranks_per_case)
+    size = group_size(comm, ranks_per_case)
     check_options(sweep)
     with _sweep_lock(directory, comm, sweep, shared=False):
-        is_split = ranks_per_case != comm.size
-        group: Any = comm.Split(comm.rank // ranks_per_case) if is_split else comm
+        group: Any = comm if size == comm.size else comm.Split(comm.rank // size)
         if retry:
 
             def reset_failures() -> None:
@@ -61,9 +62,8 @@ def run_all(sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int,
                         case_folders.reset(directory, entry, status)
 
             mpi_errors.on_root_only(comm, reset_failures)
-        fault = _run_free_cases(CaseRunner(group, directory, False, quiet), sweep)
-        faults = [fault for fault in comm.allgather(fault) if fault is not None]
-        if faults:
+        fault = CaseRunner(group, directory, sweep, False, quiet).run_free()
+        if faults := [fault for fault in comm.allgather(fault) if fault is not None]:
             remark = "finished cases are kept; the same command goes on with the others"
             raise FetiHomogError(*dict.fromkeys(line for fault in faults for line in fault.faults), remark)
     states = mpi_errors.on_root(comm, lambda: [case_folders.case_state(directory, entry) for entry in sweep.entries])
@@ -78,7 +78,7 @@ def run_all(sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int,
 
 
 def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: bool, quiet: bool) -> None:
-    """Run the case of that number (from 1) on all ranks; others may be run at the same time.  Collective.
+    """Run one case, by its number from 1, on all ranks.  Collective; other jobs may run other cases at the same time.
 
     Raises:
         CaseError: as `run_all`, or there is no such case, or another process has it.
@@ -88,9 +88,9 @@ def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: 
     if not 1 <= number <= len(sweep.entries):
         raise CaseError(f"--index {number}: expected the number of a case, 1 to {len(sweep.entries)}")
     check_options(sweep)
-    entry, case = sweep.entries[number - 1], sweep.cases[number - 1]
+    entry = sweep.entries[number - 1]
     with _sweep_lock(directory, comm, sweep, shared=True):
-        outcome, holder = CaseRunner(comm, directory, retry, quiet).run(entry, case, len(sweep.entries))
+        outcome, holder = CaseRunner(comm, directory, sweep, retry, quiet).run(entry)
     if outcome is Outcome.HELD_ELSEWHERE:
         raise CaseError(f"--index {number}: {entry.folder} is being computed by {holder}")
     if outcome is Outcome.FINISHED_BEFORE and comm.rank == 0 and not quiet:
@@ -101,31 +101,9 @@ def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: 
         raise ConvergenceError(f"{entry.folder} ({entry.describe(sweep.stress_unit)}): {state.reason}{hint}")
 
 
-def _run_free_cases(runner: CaseRunner, sweep: Sweep) -> FetiHomogError | None:
-    """Run free cases until there are none; returns the error that stopped the group.  Collective in the group.
-
-    The group passes over cases of others at once; in a last round it waits for each as `Lock` does.
-    """
-    timeouts = [0.0, file_locks.LOCK_TIMEOUT_S]
-    try:
-        while timeouts:
-            some_computed = False
-            for entry, case in zip(sweep.entries, sweep.cases, strict=True):
-                outcome, _ = runner.run(entry, case, len(sweep.entries), timeouts[0])
-                some_computed = some_computed or outcome is Outcome.COMPUTED
-            timeouts = timeouts if some_computed else timeouts[1:]
-    except FetiHomogError as error:
-        if not mpi_errors.others_come(runner.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
-            raise
-        if runner.comm.rank == 0:
-            standard_streams.complain(*error.faults)
-        return error
-    return None
-
-
 @contextmanager
 def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) -> Iterator[None]:
-    """Provide the folder made and held: by one sweep, or by any number of single cases. Collective."""
+    """Make the folder of a sweep and hold its lock, which single cases share.  Collective."""
     lock = file_locks.Lock(directory / case_folders.LOCK_FILE, shared)
 
     def prepare() -> None:
@@ -154,29 +132,46 @@ class Outcome(Enum):
 
 @dataclass(frozen=True)
 class CaseRunner:
-    """Runs one sweep's cases on the ranks in `comm`; `retry` takes up failed ones, `quiet` prints nothing."""
+    """Runs the cases of a sweep on the ranks of `comm`; `retry` repeats failed cases, `quiet` prints nothing."""
 
     comm: Intracomm
     directory: Path
+    sweep: Sweep
     retry: bool
     quiet: bool
 
-    def run(
-        self, entry: SweepCase, case: Case, total: int, timeout: float = file_locks.LOCK_TIMEOUT_S
-    ) -> tuple[Outcome, str]:
-        """Run a case unless it is finished, failed before, or another has it for `timeout` seconds.  Collective.
+    def run_free(self) -> FetiHomogError | None:
+        """Run cases until no other is free; returns the error that stopped the group.  Collective in the group.
 
-        Returns the outcome, and the other process that has the case, if any.  Raises FetiHomogError if the folder
-        cannot be written.
+        Cases that other groups hold are passed over at once; a last round waits for their locks, as `Lock` does.
         """
-        lock = file_locks.Lock(self.directory / entry.folder / case_folders.LOCK_FILE, timeout=timeout)
+        timeouts = [0.0, file_locks.LOCK_TIMEOUT_S]
+        try:
+            while timeouts:
+                outcomes = [self.run(entry, timeouts[0])[0] for entry in self.sweep.entries]
+                timeouts = timeouts if Outcome.COMPUTED in outcomes else timeouts[1:]
+        except FetiHomogError as error:
+            if not mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
+                raise
+            if self.comm.rank == 0:
+                standard_streams.complain(*error.faults)
+            return error
+        return None
+
+    def run(self, entry: SweepCase, timeout: float = file_locks.LOCK_TIMEOUT_S) -> tuple[Outcome, str]:
+        """Run a case unless it is finished, has failed, or is held by another process.  Collective.
+
+        Waits `timeout` seconds for the lock.  Returns the outcome, and the other process that holds the case, if any.
+        Raises FetiHomogError if the folder cannot be written.
+        """
+        case, folder = self.sweep.cases[entry.number - 1], self.directory / entry.folder
+        lock = file_locks.Lock(folder / case_folders.LOCK_FILE, timeout=timeout)
         try:
             outcome, holder = mpi_errors.on_root(self.comm, self._claim, lock, entry, case)
             if outcome is Outcome.COMPUTED:
                 start, status = time.perf_counter(), str(case_folders.Status.DONE)
                 try:
-                    folder, resume = self.directory / entry.folder, case.section.is_followed
-                    runner.run(case, folder, self.comm, quiet=True, resume=resume)
+                    runner.run(case, folder, self.comm, quiet=True, resume=case.section.is_followed)
                 except (CaseError, MeshError, ConvergenceError) as error:  # the case's own
                     if not mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
                         raise
@@ -189,7 +184,7 @@ class CaseRunner:
                         )
                     raise
                 seconds, inputs = time.perf_counter() - start, entry.describe(case.output.stress_unit)
-                self._print(f"{entry.folder} of {total}: {status}, {seconds:.2f} s; {inputs}")
+                self._print(f"{entry.folder} of {len(self.sweep.entries)}: {status}, {seconds:.2f} s; {inputs}")
             return outcome, holder
         finally:
             lock.release()

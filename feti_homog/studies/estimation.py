@@ -14,9 +14,9 @@ from scipy.stats import chi2, norm
 from feti_homog.typing import Array, Float
 
 CONFIDENCE = 0.95
-# Of the largest singular value: below are directions that no datum sees; of a direction: smaller entries are rounding.
+# No datum sees directions with smaller singular values / the largest; smaller entries of a direction are rounding.
 RANK_TOLERANCE, ENTRY = 1e-6, 1e-2
-STEP, FALL, SLOPE, MOST_EVALUATIONS = 1e-8, 1e-9, 1e-9, 60
+STEP, MOST_EVALUATIONS = 1e-8, 60
 Model = Callable[[Float], Float]
 
 
@@ -120,8 +120,6 @@ def estimate(
         bounds=(bounds[0] / size, bounds[1] / size),
         method="dogbox" if is_full else "trf",
         xtol=STEP,
-        ftol=FALL,
-        gtol=SLOPE,
         max_nfev=MOST_EVALUATIONS,
     )
     x, derivatives = minimum.x * size, minimum.jac * std[:, None] / size

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case import sections, toml_files
+from feti_homog.case import interface_section, sections, toml_files
 from feti_homog.materials import engineering_constants, voigt
 from feti_homog.report.text import study_tables
 from feti_homog.results import atomic
 from feti_homog.studies import estimation, fit_result
-from feti_homog.studies.axes import Assignment
+from feti_homog.studies.axes import Assignment, rounded
 from feti_homog.studies.predictions import Datum, exact_derivatives, predicted
 from feti_homog.studies.study import SILENT, Evaluator, Study
 from feti_homog.studies.sweep_cases import Sweep, cases_at
@@ -26,7 +26,6 @@ from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.runtime import standard_streams
 from feti_homog.typing import Float
 
-DIGITS = 12  # of a value of an unknown, so that a repeated fit makes the same cases
 DIFFERENCE = 0.01  # of a value, or of the width of its bounds where it is 0: meshes differ on both sides
 Point = tuple[float, ...]
 
@@ -60,8 +59,21 @@ class Fit(Study):
         Raises:
             CaseError: with the faults of all cases.
         """
+
+        def set_output(document: dict[str, Any]) -> None:
+            """Let a case write its numbers alone, and a stiffness its derivatives unless debonded faces may touch."""
+            cell, analysis, output = (document.get(name, {}) for name in ("cell", "analysis", "output"))
+            if isinstance(output, dict):
+                is_stiffness = isinstance(analysis, dict) and analysis.get("type") == "stiffness"
+                # Faces in contact may be debonded from the start: arcs, or lines of a user's mesh.
+                is_mesh = isinstance(cell, dict) and cell.get("geometry") == "mesh"
+                tables = [table for table in interface_section.interface_tables(document) if isinstance(table, dict)]
+                touching = [table.get("contact") is not False for table in tables if is_mesh or table.get("debonded")]
+                has_derivatives = is_stiffness and not any(touching)
+                document["output"] = {"mesh_error": False} | output | SILENT | {"sensitivities": has_derivatives}
+
         points = [self.tests[test] | dict(zip(self.paths, _rounded(x), strict=True)) for test, x in places]
-        return cases_at(self.document, points, self.folder, section=sections.UNKNOWN, complete=_set_output)
+        return cases_at(self.document, points, self.folder, section=sections.UNKNOWN, complete=set_output)
 
     def first_cases(self) -> Sweep:
         return self.at([unknown.start for unknown in self.unknowns.values()])
@@ -71,7 +83,7 @@ class Fit(Study):
         return [datum for datum in self.data if datum.test == test]
 
     def rows_of(self, test: int) -> slice:
-        """Return the place of a test's data among all."""
+        """Return the slice of a test's data in all data."""
         first = next(k for k, datum in enumerate(self.data) if datum.test == test)
         return slice(first, first + len(self.data_of(test)))
 
@@ -109,28 +121,14 @@ class Fit(Study):
         return study_tables.fit_text(document)
 
 
-def _set_output(document: dict[str, Any]) -> None:
-    """Let a case write its numbers alone, and a stiffness its derivatives unless debonded faces may touch."""
-    analysis, output = document.get("analysis"), document.get("output", {})
-    if isinstance(output, dict):
-        is_stiffness = isinstance(analysis, dict) and analysis.get("type") == "stiffness"
-        # Faces in contact may be debonded from the start: arcs, or lines of a user's mesh.
-        cell, sections = document.get("cell"), document.get("interface", [])
-        is_mesh = isinstance(cell, dict) and cell.get("geometry") == "mesh"
-        tables = [each for each in (sections if isinstance(sections, list) else [sections]) if isinstance(each, dict)]
-        may_touch = any(table.get("contact") is not False for table in tables if is_mesh or table.get("debonded"))
-        has_derivatives = is_stiffness and not may_touch
-        document["output"] = {"mesh_error": False} | output | SILENT | {"sensitivities": has_derivatives}
-
-
 def _rounded(x: Sequence[float] | Float) -> Point:
     """Return x to the digits of its cases."""
-    return tuple(float(f"{value:.{DIGITS}g}") for value in x)
+    return tuple(map(rounded, x))
 
 
 @dataclass(frozen=True)
 class Answer:
-    """A test's result.json, and its values (m,) in place of the test's data."""
+    """The result.json of a test, and its values (m,) for the data of the test."""
 
     document: Mapping[str, Any]
     values: Float

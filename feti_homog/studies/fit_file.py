@@ -1,19 +1,18 @@
 """A fit file: cases with unknown constants, and measured values; all their faults."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from feti_homog.case import Case, load_sections, sections, toml_files
+from feti_homog.case import sections, toml_files
 from feti_homog.errors import CaseError
-from feti_homog.materials import engineering_constants, voigt
+from feti_homog.materials import voigt
 from feti_homog.microstructure import table_columns
-from feti_homog.results import path_curves
 from feti_homog.schema import TableReader, keys, types, wording
 from feti_homog.studies.axes import Assignment
 from feti_homog.studies.fit import Fit
-from feti_homog.studies.predictions import Datum, available
+from feti_homog.studies.predictions import Datum, data_faults
 
 MOST_ROWS = 10_000
 LEAST_STD = 1e-12  # of the value: below it are the roundings of what is computed
@@ -40,7 +39,20 @@ def parse(values: Mapping[str, Any], folder: Path) -> Fit:
         raise CaseError(*reader.faults)
     named = {".".join(path): unknown for path, unknown in unknowns.items()}
     fit = Fit(document, folder, named, [*unknowns], assignments, data)
-    faults = [*_case_faults(fit)]
+    start, faults = [unknown.start for unknown in unknowns.values()], list[str]()
+    cases = fit.at(start).cases
+    for test, case in enumerate(cases):
+        place = f"[[{sections.TEST}]] {test + 1}, {sections.MEASURED}." if len(cases) > 1 else f"[{sections.MEASURED}] "
+        faults += data_faults(case, fit.data_of(test), place)
+    digests = [case.digest() for case in cases]
+    for k, (name, unknown) in enumerate(named.items()):
+        lines, changes = list[str](), False
+        for side, end in (("lower", unknown.lower), ("upper", unknown.upper)):
+            try:
+                changes |= [case.digest() for case in fit.at([*start[:k], end, *start[k + 1 :]]).cases] != digests
+            except CaseError as error:
+                lines += [f"[{sections.UNKNOWN}] {name}, {side} = {end}: {fault}" for fault in error.faults]
+        faults += lines if changes or lines else [f"[{sections.UNKNOWN}] {name}: no measured value depends on it"]
     if faults:
         raise CaseError(*dict.fromkeys(faults))
     return fit
@@ -85,30 +97,26 @@ class FitReader:
             self.faults.append(f"{sections.TEST} = {wording.toml_value(rows)}: expected sections [[{sections.TEST}]]")
             return [], []
         assignments, data = list[Assignment](), list[Datum]()
+        both = {*keys.keys_of(sections.Measured), *keys.keys_of(sections.MeasuredCurve)}
         for number, row in enumerate(rows):
             place = sections.MEASURED if tests is None else f"[{sections.TEST}]] {number + 1}, [{sections.MEASURED}"
-            data += self._data(row.get(sections.MEASURED), number, place)
+            table = row.get(sections.MEASURED)
+            if not isinstance(table, dict) or not table:
+                self.faults.append(f"[{place}]: expected a table of NAME = {{value, std}}")
+                table = {}
+            for path, value in _entries(table, both):
+                name = ".".join(path)
+                if path == (sections.CURVE,):
+                    data += self._curve(value, number, place)
+                elif (datum := self._read(sections.Measured, value, place, name, "{value, std}")) is not None:
+                    data.append(Datum(number, name, datum.value, datum.std))
+                    self._check_std(datum.std, datum.value, f"[{place}] {name}.std")
             changes = dict(toml_files.leaves({name: value for name, value in row.items() if name != sections.MEASURED}))
             assignments.append(changes)
             for path in changes.keys() & unknowns:
                 name = f"[[{sections.TEST}]] {number + 1}, {wording.dotted_key(path)}"
                 self.faults.append(f"{name}: it is an unknown of [{sections.UNKNOWN}]")
         return assignments, data
-
-    def _data(self, table: object, test: int, place: str) -> list[Datum]:
-        """Return the data of one test."""
-        if not isinstance(table, dict) or not table:
-            self.faults.append(f"[{place}]: expected a table of NAME = {{value, std}}")
-            return []
-        data = list[Datum]()
-        for path, value in _entries(table, {*keys.keys_of(sections.Measured), *keys.keys_of(sections.MeasuredCurve)}):
-            name = ".".join(path)
-            if path == (sections.CURVE,):
-                data += self._curve(value, test, place)
-            elif (measured := self._read(sections.Measured, value, place, name, "{value, std}")) is not None:
-                data.append(Datum(test, name, measured.value, measured.std))
-                self._check_std(measured.std, measured.value, f"[{place}] {name}.std")
-        return data
 
     def _check_std(self, std: float, value: float, place: str) -> None:
         if std < LEAST_STD * abs(value):
@@ -170,74 +178,3 @@ def _curve_rows(path: Path) -> tuple[tuple[str, str], list[tuple[float, float]]]
             values.append(value)
         rows.append((values[0], values[1]))
     return (heads[strains[0]], heads[stresses[0]]), rows
-
-
-def _case_faults(fit: Fit) -> Iterator[str]:
-    """Yield faults of cases at the start and at the bounds, and faulty data names."""
-    start = [unknown.start for unknown in fit.unknowns.values()]
-    cases = fit.at(start).cases
-    for test, case in enumerate(cases):
-        place = f"[[{sections.TEST}]] {test + 1}, {sections.MEASURED}." if len(cases) > 1 else f"[{sections.MEASURED}] "
-        yield from _name_faults(place, case, fit.data_of(test))
-    digests = [case.digest() for case in cases]
-    for k, (name, unknown) in enumerate(fit.unknowns.items()):
-        ends = {"lower": unknown.lower, "upper": unknown.upper}
-        lines, changes = list[str](), False
-        for side, end in ends.items():
-            try:
-                changes |= [case.digest() for case in fit.at([*start[:k], end, *start[k + 1 :]]).cases] != digests
-            except CaseError as error:
-                lines += [f"[{sections.UNKNOWN}] {name}, {side} = {end}: {fault}" for fault in error.faults]
-        yield from lines if changes or lines else [f"[{sections.UNKNOWN}] {name}: no measured value depends on it"]
-
-
-def _name_faults(place: str, case: Case, data: Sequence[Datum]) -> Iterator[str]:
-    """Yield data names that a test's analysis does not give."""
-    names = available(case)
-    if not names:
-        yield f'[analysis] type = "{case.analysis.type}": a fit takes "stiffness" and "path"'
-        return
-    yield from _curve_faults(f"{place}{sections.CURVE}: ", case, [datum for datum in data if datum.strain is not None])
-    for name in dict.fromkeys(datum.name for datum in data if datum.strain is None):
-        if name in engineering_constants.FORMER:
-            yield f"{place}{wording.toml_key(name)}: its name is {engineering_constants.FORMER[name]}"
-        elif name not in names:
-            hint = wording.suggestion(name, names, {})
-            yield f"{place}{wording.toml_key(name)}: the analysis does not give it; {hint}"
-
-
-def _curve_faults(place: str, case: Case, points: Sequence[Datum]) -> Iterator[str]:
-    """Yield faults of a measured curve beside its test's analysis."""
-    if not points:
-        return
-    state = voigt.PLANE_STATES[case.analysis.plane]
-    names = voigt.voigt_names(6 if state.is_spatial else 3)
-    unknown = sorted({name for datum in points for name in (datum.strain_name, datum.name)}.difference(*names))
-    for name in unknown:
-        yield f'{place}plane = "{case.analysis.plane}" has no {name}'
-    if case.analysis.type != "path" or len(case.targets) != 1:
-        yield f"{place}expected an analysis of type path, of one leg"
-    elif not unknown and (leading := _rising(case.targets[0], state.components)) is not None:
-        rising, end, is_strain = leading
-        strains = [datum.strain or 0.0 for datum in points]
-        if rising != points[0].strain_name:
-            yield f"{place}expected the strain that rises along the path, {rising}"
-        elif any(strain * end < 0 for strain in strains):
-            yield f"{place}expected strains of the sign of the path, which ends at {end:g}"
-        elif is_strain and (largest := max(map(abs, strains))) > abs(end) * (1 + path_curves.SAME_LOAD):
-            yield f"{place}a strain of {largest:g} is beyond the end of the path at {abs(end):g}"
-
-
-def _rising(target: Mapping[str, float], components: Sequence[tuple[str, str]]) -> tuple[str, float, bool] | None:
-    """Return the strain that leads along one leg, the load of its component, and whether that load is the strain.
-
-    The load is 0 where a temperature beside it decides the sign; None if the strain follows from the answer alone.
-    """
-    loads = [(strain, name, target[name]) for strain, stress in components for name in (strain, stress)
-             if target.get(name)]  # fmt: skip
-    if loads and all(name == strain for strain, name, _ in loads):
-        strain, _, end = max(loads, key=lambda load: abs(load[2]))
-        return strain, end, True
-    return (
-        (loads[0][0], 0.0 if target.get(load_sections.TEMPERATURE) else loads[0][2], False) if len(loads) == 1 else None
-    )

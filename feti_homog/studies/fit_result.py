@@ -16,8 +16,15 @@ HEAD = ("test", "name", "strain", "value", "std", "computed", "residual")
 def content(
     unknowns: Mapping[str, sections.Unknown], data: Sequence[Datum], estimates: ParameterEstimates
 ) -> dict[str, Any]:
-    """Return the content of fit.json behind its name; numbers that are not finite are None."""
-    faults = _faults(unknowns, estimates)
+    """Return the content of fit.json after its name; numbers that are not finite are None."""
+    faults = [] if estimates.converged else [f"no minimum after {estimates.evaluations} evaluations"]
+    faults += names_of(estimates.undetermined, [*unknowns])
+    faults += [
+        f"[unknown] {name}: the measured values hardly determine it: its standard deviation {std:.3g} is more than the "
+        f"width {unknown.upper - unknown.lower:.3g} of its bounds"
+        for (name, unknown), std in zip(unknowns.items(), estimates.std, strict=True)
+        if np.isfinite(std) and std > unknown.upper - unknown.lower
+    ]
     return {
         "status": "not converged" if faults else "done",
         "faults": faults,
@@ -46,18 +53,6 @@ def content(
             for datum, f, r in zip(data, estimates.computed, estimates.residuals, strict=True)
         ],
     }  # fmt: skip
-
-
-def _faults(unknowns: Mapping[str, sections.Unknown], estimates: ParameterEstimates) -> list[str]:
-    """Return a line for each reason to distrust the estimates."""
-    faults = [] if estimates.converged else [f"no minimum after {estimates.evaluations} evaluations"]
-    faults += names_of(estimates.undetermined, [*unknowns])
-    return faults + [
-        f"[unknown] {name}: the measured values hardly determine it: its standard deviation {std:.3g} is more than the "
-        f"width {unknown.upper - unknown.lower:.3g} of its bounds"
-        for (name, unknown), std in zip(unknowns.items(), estimates.std, strict=True)
-        if np.isfinite(std) and std > unknown.upper - unknown.lower
-    ]
 
 
 def _finite(value: float) -> float | None:

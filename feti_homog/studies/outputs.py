@@ -17,7 +17,7 @@ Column = result_json.DescribedColumn
 
 
 def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
-    """Numbers i and j in a sweep's names Cij, for its plane states.
+    """Return the numbers i and j of names Cij in a sweep with these plane states.
 
     Where some cases are in space, Cij is the same entry in all.
     """
@@ -41,7 +41,24 @@ def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numb
             _entries(point["stiffness"], numbers) if "stiffness" in point else _named(voigt.STRESSES, point["stress"])
         )
         values |= {f"angle_{point['angle']:g}_{name}": value for name, value in entries.items()}
-    values |= _path(document) | _envelope(document)
+    if path := document.get("path"):  # the first break or softening, the end, the largest stresses, the peak
+        stress = np.array([point["stress"] for point in path])
+        stresses = voigt.voigt_names(stress.shape[1])[1]
+        if (onset := next((p for p in path if p["broke"] or p.get("softened")), None)) is not None:
+            values |= {"onset_load_factor": onset["load_factor"]} | _at_point("onset", onset)
+        values |= _at_point("end", path[-1]) | {name: path[-1][name] for name in ("dissipated", "work")}
+        largest = stress[np.abs(stress).argmax(axis=0), range(len(stresses))]
+        values |= {f"peak_{name}": value for name, value in zip(stresses, largest.tolist(), strict=True)}
+        peak = landmarks.peak_of(document)
+        values |= {f"peak_{peak[f'{kind}_name']}": peak[kind] for kind in ("stress", "strain")}
+        values |= {f"end_{state}": path[-1][state] for state in point_tables.STATES}
+    if envelope := document.get("envelope"):  # along the first axis, the least, the largest if every direction has one
+        first, second = document["case"]["envelope"]["plane"]
+        factors = sorted(point["factor"] for point in envelope if "factor" in point)
+        values |= {f"envelope_{first}": point["factor"] for point in envelope[:1] if "factor" in point}
+        values |= {f"envelope_least_{first}_{second}": factors[0]} if factors else {}
+        is_closed = len(factors) == len(envelope)
+        values |= {f"envelope_largest_{first}_{second}": factors[-1]} if is_closed else {}
     if (load := document.get("load")) is not None:
         values |= _at_point("load", load) | {f"load_{name}": load[name] for name in ("stored", *point_tables.STATES)}
     values |= _phases(document)
@@ -88,24 +105,6 @@ def _entries(stiffness: Any, numbers: Sequence[int], suffix: str = "") -> dict[s
     return _named((f"C{i}{j}{suffix}" for i in rows for j in rows), np.ravel(stiffness).tolist())
 
 
-def _path(document: Document) -> dict[str, float]:
-    """Return the first break or softening if any, the largest stresses, the leading strain at the peak, and the end."""
-    points = document.get("path")
-    if not points:
-        return {}
-    stress = np.array([point["stress"] for point in points])
-    stresses = voigt.voigt_names(stress.shape[1])[1]
-    peak = stress[np.abs(stress).argmax(axis=0), range(len(stresses))]
-    onset = next((point for point in points if point["broke"] or point.get("softened")), None)
-    values = {} if onset is None else {"onset_load_factor": onset["load_factor"]} | _at_point("onset", onset)
-    values |= _at_point("end", points[-1])
-    values |= {name: points[-1][name] for name in ("dissipated", "work")}
-    values |= {f"peak_{name}": value for name, value in zip(stresses, peak.tolist(), strict=True)}
-    summit = landmarks.peak_of(document)
-    values |= {f"peak_{summit[f'{kind}_name']}": summit[kind] for kind in ("stress", "strain")}
-    return values | {f"end_{state}": points[-1][state] for state in point_tables.STATES}
-
-
 def _phases(document: Document) -> dict[str, float]:
     """Return the largest stresses of the phases under each load; of angles and paths those of all states."""
     values, is_curve = dict[str, float](), "angle" in document or "path" in document
@@ -115,19 +114,6 @@ def _phases(document: Document) -> dict[str, float]:
             columns = {"": max(named.values())} if is_curve else {f"{label}_": value for label, value in named.items()}
             values |= {f"{place}{phase['phase']}_{measure}": value for place, value in columns.items()}
     return values
-
-
-def _envelope(document: Document) -> dict[str, float]:
-    """Return loads at onset of an envelope: along its first axis, least, and largest if every direction has one."""
-    points = document.get("envelope")
-    if not points:
-        return {}
-    first, second = document["case"]["envelope"]["plane"]
-    factors = sorted(point["factor"] for point in points if "factor" in point)
-    values = {f"envelope_{first}": point["factor"] for point in points[:1] if "factor" in point}
-    values |= {f"envelope_least_{first}_{second}": factors[0]} if factors else {}
-    is_closed = len(factors) == len(points)
-    return values | ({f"envelope_largest_{first}_{second}": factors[-1]} if is_closed else {})
 
 
 def _at_point(place: str, point: Document) -> dict[str, float]:

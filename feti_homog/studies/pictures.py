@@ -1,6 +1,7 @@
 """moduli.png of a sweep, over the fibre fraction and between bounds; fit.png, with computed and measured values."""
 
 from collections.abc import Mapping
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,6 @@ SECANTS = ("C11", "C33", "C44", "C66")  # of generalized plane strain where face
 COMMON_PANELS = ("C11", "C66")  # of generalized plane strain and plane states together
 BANDS = {"C11": "Reuss to Voigt", "C33": "Reuss to Voigt", "bulk": "Hashin-Shtrikman", "shear": "Hashin-Shtrikman"}
 MARKERS = ("o", "s", "^", "D", "v", "P")
-LEGEND_HANDLE, LEGEND_CHARACTER = 0.7, 0.085  # inches of an entry: its line with the space around, a letter
 NAMES = {
     **{name: f"$C_{{{name[1:]}}}$" for name in ("C11", "C33", "C44", "C66")},
     **{
@@ -76,10 +76,11 @@ def moduli_figure(table: SweepTable) -> Figure:
     for axes in panels[::-1]:
         handles, labels = axes.get_legend_handles_labels()
         legend |= dict(zip(labels, handles, strict=True))
-    if legend:
-        widest = LEGEND_HANDLE + LEGEND_CHARACTER * max(map(len, legend))
-        columns = max(1, min(len(legend), 5, int(picture.get_figwidth() / widest)))
-        picture.legend(list(legend.values()), list(legend), loc="outside lower center", ncols=columns, frameon=False)
+    for columns in range(min(len(legend), 5), 0, -1):  # the most that are not wider than the picture
+        box = picture.legend([*legend.values()], [*legend], loc="outside lower center", ncols=columns, frameon=False)
+        if columns == 1 or box.get_window_extent().width <= picture.bbox.width:
+            break
+        box.remove()
     return picture
 
 
@@ -119,50 +120,42 @@ def _plot_series(axes: Axes, table: SweepTable, series: Series, name: str, style
         axes.errorbar(series.x, mean, np.nan_to_num(errors.mean[numbers]), fmt="none", ecolor=colour, **wide)
 
 
-Rows = list[Mapping[str, Any]]
-
-
 def draw_fit(path: Path, document: Mapping[str, Any]) -> Path:
     """Draw a fit: residuals, and curves over their strain.  Raises FetiHomogError if it cannot be written."""
-    single = [row for row in document["measured"] if row["strain"] is None]
-    curves = [row for row in document["measured"] if row["strain"] is not None]
-    parts = [(_draw_residuals, single)] * bool(single) + [(_draw_curves, curves)] * bool(curves)
     with mpl.rc_context(plot_helpers.STYLE):
-        figure = Figure(figsize=(6.5 * len(parts), 4.5), layout="constrained")
-        for axes, (draw, rows) in zip(figure.subplots(1, len(parts), squeeze=False)[0], parts, strict=True):
-            draw(axes, rows)
-        figure.suptitle(f"{plot_helpers.plain(document['name'])}: computed and measured", fontsize=12)
-        return plot_helpers.save(figure, path)
+        return plot_helpers.save(fit_figure(document), path)
 
 
-def _draw_residuals(axes: Axes, rows: Rows) -> None:
-    """Draw residuals in standard deviations, a row for each value."""
-    place = np.arange(len(rows))
-    tests = np.array([row["test"] for row in rows])
-    residuals = np.array([row["residual"] for row in rows])
-    axes.axvspan(-1.96, 1.96, color="0.93", zorder=0)
-    axes.axvline(0.0, color="0.5", linewidth=0.8)
-    for k, test in enumerate(np.unique(tests)):
-        colour, marker = plot_helpers.INK[k % len(plot_helpers.INK)], MARKERS[k % len(MARKERS)]
-        axes.plot(residuals[tests == test], place[tests == test], marker, color=colour, label=f"test {test}")
-    labels = [f"{row['name']} {row['value']:.4g} / {row['computed']:.4g}" for row in rows]
-    axes.set_yticks(place, [plot_helpers.plain(label) for label in labels])
-    axes.invert_yaxis()
-    axes.set_xlabel("(computed - measured) / std")
-    axes.set_title("measured / computed")
-    if len(np.unique(tests)) > 1:
-        axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
-
-
-def _draw_curves(axes: Axes, rows: Rows) -> None:
-    """Draw points of measured curves with their standard deviations, and the computed curves through them."""
-    for k, test in enumerate(dict.fromkeys(row["test"] for row in rows)):
-        points = [row for row in rows if row["test"] == test]
-        x, y, std, computed = (
-            np.array([row[name] for row in points]) for name in ("strain", "value", "std", "computed")
-        )
-        colour, marker = plot_helpers.INK[k % len(plot_helpers.INK)], MARKERS[k % len(MARKERS)]
-        axes.errorbar(x, y, std, fmt=marker, color=colour, markersize=4, label=f"test {test}, measured")
-        axes.plot(x, computed, color=colour, label=f"test {test}, computed")
-    axes.set(xlabel=rows[0]["strain_name"], ylabel=rows[0]["name"])
-    axes.legend(frameon=False)
+def fit_figure(document: Mapping[str, Any]) -> Figure:
+    """Residuals in standard deviations, a row for each value, and the points of curves with the computed curves."""
+    single = [row for row in document["measured"] if row["strain"] is None]
+    points = [row for row in document["measured"] if row["strain"] is not None]
+    count = bool(single) + bool(points)
+    figure = Figure(figsize=(6.5 * count, 4.5), layout="constrained")
+    panels = figure.subplots(1, count, squeeze=False)[0]
+    if single:
+        axes, place = panels[0], np.arange(len(single))
+        tests, residuals = (np.array([row[name] for row in single]) for name in ("test", "residual"))
+        axes.axvspan(-1.96, 1.96, color="0.93", zorder=0)
+        axes.axvline(0.0, color="0.5", linewidth=0.8)
+        for test, colour, marker in zip(np.unique(tests), cycle(plot_helpers.INK), cycle(MARKERS), strict=False):
+            axes.plot(residuals[tests == test], place[tests == test], marker, color=colour, label=f"test {test}")
+        labels = [f"{row['name']} {row['value']:.4g} / {row['computed']:.4g}" for row in single]
+        axes.set_yticks(place, [plot_helpers.plain(label) for label in labels])
+        axes.invert_yaxis()
+        axes.set(xlabel="(computed - measured) / std", title="measured / computed")
+        if len(np.unique(tests)) > 1:
+            axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    if points:
+        numbers = dict.fromkeys(row["test"] for row in points)
+        for test, colour, marker in zip(numbers, cycle(plot_helpers.INK), cycle(MARKERS), strict=False):
+            x, y, std, computed = (
+                np.array([row[name] for row in points if row["test"] == test])
+                for name in ("strain", "value", "std", "computed")
+            )
+            panels[-1].errorbar(x, y, std, fmt=marker, color=colour, markersize=4, label=f"test {test}, measured")
+            panels[-1].plot(x, computed, color=colour, label=f"test {test}, computed")
+        panels[-1].set(xlabel=points[0]["strain_name"], ylabel=points[0]["name"])
+        panels[-1].legend(frameon=False)
+    figure.suptitle(f"{plot_helpers.plain(document['name'])}: computed and measured", fontsize=12)
+    return figure

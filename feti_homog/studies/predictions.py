@@ -1,21 +1,21 @@
 """Measured values, and the values of a result.json in their place, with derivatives where they are exact."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.case import Case, bond_laws
+from feti_homog.case import Case, bond_laws, load_sections, sections
 from feti_homog.errors import CaseError
 from feti_homog.materials import engineering_constants, laws, voigt
 from feti_homog.report.text import point_tables
 from feti_homog.results import path_curves
+from feti_homog.schema import wording
 from feti_homog.studies.outputs import outputs
-from feti_homog.typing import Document, Float
+from feti_homog.typing import Float
 
 TOUGHNESS = "toughness"
-OF_PATHS = ("onset", "peak", "end")
 
 
 @dataclass(frozen=True)
@@ -37,18 +37,58 @@ class Datum:
     strain_name: str = ""
 
 
-def available(case: Case) -> list[str]:
-    """Return the value names in a result; none for analyses that no fit takes."""
-    spatial = voigt.PLANE_STATES[case.analysis.plane].is_spatial
-    size = 6 if spatial else 3
-    if case.analysis.type == "stiffness":
-        is_heated = spatial and all(laws.expansion(material) is not None for material in case.materials.values())
-        return [*engineering_constants.constants(np.eye(size), np.zeros(6) if is_heated else None)]
-    if case.analysis.type == "path":
-        strains, stresses = voigt.voigt_names(size)
-        places = [f"{place}_{name}" for place in OF_PATHS for name in (*stresses, *strains)]
-        return ["onset_load_factor", *places, "dissipated", "work"]
-    return []
+def data_faults(case: Case, data: Sequence[Datum], place: str) -> Iterator[str]:
+    """Yield the reasons why results of a case lack values for the data; `place` precedes each reason."""
+    state, kind = voigt.PLANE_STATES[case.analysis.plane], case.analysis.type
+    strains, stresses = voigt.voigt_names(6 if state.is_spatial else 3)
+    if kind == "stiffness":
+        is_heated = state.is_spatial and all(laws.expansion(each) is not None for each in case.materials.values())
+        names = [*engineering_constants.constants(np.eye(len(strains)), np.zeros(6) if is_heated else None)]
+    elif kind == "path":
+        names = [f"{mark}_{name}" for mark in ("onset", "peak", "end") for name in (*stresses, *strains)]
+        names = ["onset_load_factor", *names, "dissipated", "work"]
+    else:
+        yield f'[analysis] type = "{kind}": a fit takes "stiffness" and "path"'
+        return
+    if points := [datum for datum in data if datum.strain is not None]:
+        yield from (f"{place}{sections.CURVE}: {fault}" for fault in _curve_faults(case, points))
+    for name in dict.fromkeys(datum.name for datum in data if datum.strain is None):
+        if name in engineering_constants.FORMER:
+            yield f"{place}{wording.toml_key(name)}: its name is {engineering_constants.FORMER[name]}"
+        elif name not in names:
+            hint = wording.suggestion(name, names, {})
+            yield f"{place}{wording.toml_key(name)}: the analysis does not give it; {hint}"
+
+
+def _curve_faults(case: Case, points: Sequence[Datum]) -> Iterator[str]:
+    """Yield faults of a measured curve beside its test's analysis.
+
+    The strain that rises along a leg is the largest, or that of the only loaded component: a strain or a stress.
+    """
+    state = voigt.PLANE_STATES[case.analysis.plane]
+    names = {name for datum in points for name in (datum.strain_name, datum.name)}
+    unknown = sorted(names.difference(*state.components))
+    for name in unknown:
+        yield f'plane = "{case.analysis.plane}" has no {name}'
+    if case.analysis.type != "path" or len(case.targets) != 1:
+        yield "expected an analysis of type path, of one leg"
+        return
+    target = case.targets[0]
+    loads = [(strain, name, target[name]) for strain, stress in state.components for name in (strain, stress)
+             if target.get(name)]  # fmt: skip
+    is_strain = bool(loads) and all(name == strain for strain, name, _ in loads)
+    if unknown or not (is_strain or len(loads) == 1):
+        return
+    rising, _, end = max(loads, key=lambda load: abs(load[2]))
+    if not is_strain and target.get(load_sections.TEMPERATURE):
+        end = 0.0  # the temperature beside the stress decides the sign
+    values = [datum.strain or 0.0 for datum in points]
+    if rising != points[0].strain_name:
+        yield f"expected the strain that rises along the path, {rising}"
+    elif any(value * end < 0 for value in values):
+        yield f"expected strains of the sign of the path, which ends at {end:g}"
+    elif is_strain and (largest := max(map(abs, values))) > abs(end) * (1 + path_curves.SAME_LOAD):
+        yield f"a strain of {largest:g} is beyond the end of the path at {abs(end):g}"
 
 
 def responses(document: path_curves.Document) -> dict[str, float]:
@@ -91,10 +131,12 @@ def predicted(document: path_curves.Document, data: Sequence[Datum]) -> Float:
 def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], name: str) -> Float | None:
     """(m,) derivatives of the values by an unknown; None where the result does not give them.
 
-    Constants have none by strengths, and by expansions in a plane.
+    Constants have none by strengths, and by expansions in a plane.  Loads at breaks are homogeneous in a key of the
+    only interface: of degree 1 in the only strength, of degree 1/2 in the toughness of springs that do not soften.  All
+    loads up to the onset must grow alike; a temperature that comes before them does not.
     """
-    sections = path_curves.interface_sections(document)
-    name = name.replace("interface.1.", "interface.") if len(sections) == 1 else name
+    tables = path_curves.interface_sections(document)
+    name = name.replace("interface.1.", "interface.") if len(tables) == 1 else name
     if (sensitivities := document.get("sensitivities")) is not None:
         if name in sensitivities["parameters"]:
             values = np.array(sensitivities["derivatives"])[:, sensitivities["parameters"].index(name)]
@@ -103,12 +145,19 @@ def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], nam
         section, idle = name.partition(".")[0], ("strength", "toughness")
         is_idle = ".expansion" in name if section == "material" else section == "interface" and name.endswith(idle)
         return np.zeros(len(data)) if is_idle else None
-    key = name.removeprefix("interface.")
-    exponent = _exponent(document, sections[0], key) if name != key and len(sections) == 1 else None
-    if exponent is None:
+    key, case = name.removeprefix("interface."), document["case"]
+    is_alike = case["analysis"]["type"] == "path" and path_curves.is_proportional(document)
+    is_alike |= case["analysis"]["type"] == "envelope" and case["envelope"].get("temperature") is None
+    if name == key or len(tables) != 1 or not is_alike:
+        return None
+    law = bond_laws.LAWS[tables[0].get("criterion", bond_laws.DEFAULT)]
+    strengths = [name for name in law.limits if math.isfinite(float(tables[0].get(name) or "inf"))]
+    is_toughness = key == TOUGHNESS and key in law.keys and not law.softens
+    if not is_toughness and strengths != [key]:
         return None
     # S(E; s R) = s S(E / s; R), unless a value depends on the end of the load.
-    relative, numbers, derivatives = exponent / float(sections[0][key]), _values(document), list[float]()
+    relative = (0.5 if is_toughness else 1.0) / float(tables[0][key])
+    numbers, derivatives = _values(document), list[float]()
     for datum in data:
         if datum.strain is not None:
             value, slope = _on_curve(document, datum)
@@ -120,23 +169,6 @@ def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], nam
             return None
         derivatives.append(numbers[datum.name] * relative)
     return np.array(derivatives)
-
-
-def _exponent(document: path_curves.Document, section: Document, key: str) -> float | None:
-    """Return the degree to which loads at breaks are homogeneous in a key of the only interface.
-
-    All loads up to the onset must grow alike; a temperature that comes before them does not.  The degree is 1/2 in the
-    toughness of springs that it does not change, and 1 in the only strength; None in other keys.
-    """
-    case = document["case"]
-    is_envelope = case["analysis"]["type"] == "envelope" and case["envelope"].get("temperature") is None
-    if not is_envelope and not (case["analysis"]["type"] == "path" and path_curves.is_proportional(document)):
-        return None
-    law = bond_laws.LAWS[section.get("criterion", bond_laws.DEFAULT)]
-    if key == TOUGHNESS and key in law.keys and not law.softens:
-        return 0.5
-    strengths = [name for name in law.limits if math.isfinite(float(section.get(name) or "inf"))]
-    return 1.0 if strengths == [key] else None
 
 
 def _on_curve(document: path_curves.Document, datum: Datum) -> tuple[float, float]:

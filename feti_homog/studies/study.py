@@ -103,15 +103,17 @@ class Study(ABC):
         heading = mpi_errors.on_root(comm, self.heading)
         return case_runs.describe_first(mpi_errors.on_root(comm, self.first_cases), heading, comm)
 
-    def run(self, directory: Path, comm: Intracomm, ranks_per_case: int, retry: bool, quiet: bool) -> dict[str, Any]:
-        """Run the study, or resume it, and return its document on every rank.  Collective.
+    def run(
+        self, directory: Path, comm: Intracomm, ranks_per_case: int | None, retry: bool, quiet: bool
+    ) -> dict[str, Any]:
+        """Run the study, or resume it, and return its document on every rank.  Collective.  Arguments as `run_all`.
 
         Raises:
             CaseError: the folder has another study or files of others, another run writes there, or a result lacks a
                 value that the study asks for.
             ConvergenceError: a case failed, or the study has no sound answer; then its files are written.
         """
-        case_runs.check_groups(comm, ranks_per_case)
+        size = case_runs.group_size(comm, ranks_per_case)
         mpi_errors.on_root(comm, output_folder.usable, directory)
         head = {"version": __version__, "digest": mpi_errors.on_root(comm, self.digest)}
         path = directory / self.FILE
@@ -135,7 +137,7 @@ class Study(ABC):
             directory, comm, lambda line: standard_streams.complain(line) if comm.rank == 0 else None
         ):
             mpi_errors.on_root(comm, begin)
-            document = head | self.answer(Evaluator(directory, comm, ranks_per_case, retry, quiet))
+            document = head | self.answer(Evaluator(directory, comm, size, retry, quiet))
             mpi_errors.on_root_only(comm, atomic.replace_text, path, result_json.dumps(document))
         if comm.rank == 0 and not quiet:
             standard_streams.say(self.text(document))

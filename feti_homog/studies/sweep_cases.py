@@ -1,4 +1,4 @@
-"""A sweep file expanded: its numbered cases, all of them checked."""
+"""Expand a sweep file to numbered cases, and check all of them."""
 
 import copy
 import json
@@ -72,7 +72,7 @@ def load(path: str | Path) -> Sweep:
 def expand(values: Mapping[str, Any], folder: Path) -> Sweep:
     """Return the sweep of nested dictionaries with a table "sweep"; its files are relative to `folder`.
 
-    All points come once before any comes in its next realisation, so that more realisations add cases at the end.
+    A realisation of all points precedes the next one, so that more realisations add cases at the end.
     Raises CaseError as `load` does.
     """
     document = toml_files.to_document(values)
@@ -173,13 +173,19 @@ def case_documents(
 
 
 def _with_values(base: Mapping[str, Any], point: Assignment, faults: list[str], section: str) -> dict[str, Any]:
-    """Return the base with a point's values; a table is merged into its section."""
+    """Return the base with a point's values; a table is merged into its section.
+
+    A section that is missing is made; of several sections a number, from 1, names one.
+    """
     document = copy.deepcopy(dict(base))
     for path, value in point.items():
-        table = document
+        table: Any = document
         for name in path[:-1]:
-            table = _entry(table, name)
-            if table is None:
+            if isinstance(table, list):
+                table = table[int(name) - 1] if name.isdecimal() and 0 < int(name) <= len(table) else None
+            else:
+                table = table.setdefault(name, {})
+            if not isinstance(table, dict | list):
                 faults.append(f"[{section}] {wording.dotted_key(path)}: {wording.toml_value(name)} is no section")
                 return document
         if isinstance(table, list) and len(table) == 1 and isinstance(table[0], dict):
@@ -192,19 +198,6 @@ def _with_values(base: Mapping[str, Any], point: Assignment, faults: list[str], 
         is_merged = isinstance(value, dict) and isinstance(table.get(last, {}), dict)
         table[last] = table.get(last, {}) | value if is_merged else value
     return document
-
-
-def _entry(table: Any, name: str) -> Any:
-    """Return the table or table list of a name; in a list the table of a number, from 1.
-
-    A new one is made if there is none; None if there is something else.
-    """
-    if isinstance(table, list):
-        is_one = name.isdecimal() and 0 < int(name) <= len(table)
-        entry = table[int(name) - 1] if is_one else None
-    else:
-        entry = table.setdefault(name, {})
-    return entry if isinstance(entry, dict | list) else None
 
 
 def _is_random(document: Mapping[str, Any]) -> bool:

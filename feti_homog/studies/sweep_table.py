@@ -1,22 +1,43 @@
 """The table of a sweep: inputs, outputs and results of all cases, and statistics over realisations."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from scipy.stats import t as student
 
 from feti_homog.report.text import tables
 from feti_homog.results import path_curves
+from feti_homog.studies.estimation import CONFIDENCE
 from feti_homog.typing import Document, Float
 
-CONFIDENCE = 0.95
 PARTS = ("count", "mean", "std", "ci95")
 CURVE_POINTS = 401  # strains at which curves are averaged
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Statistics over finished realisations, (points, ...).
+
+    `ci95` is the mean's half 95 % confidence interval by Student's t; it and `std` are NaN for fewer than two.
+    """
+
+    count: Float
+    mean: Float
+    std: Float
+    ci95: Float
+
+    @classmethod
+    def of(cls, samples: Float) -> Self:
+        """Return statistics over the first axis of samples (n, ...), without NaN."""
+        is_known = np.isfinite(samples)
+        count = is_known.sum(axis=0)
+        several = np.where(count > 1, count, np.nan)
+        mean = np.where(is_known, samples, 0.0).sum(axis=0) / np.where(count > 0, count, np.nan)
+        std = np.sqrt(np.where(is_known, (samples - mean) ** 2, 0.0).sum(axis=0) / (several - 1))
+        return cls(count.astype(float), mean, std, student.ppf((1 + CONFIDENCE) / 2, several - 1) * std / several**0.5)
 
 
 @dataclass(frozen=True)
@@ -53,7 +74,7 @@ class SweepTable:
 
     @cached_property
     def statistics(self) -> dict[str, Statistics]:
-        """By output, over the realisations of each point."""
+        """The statistics of each output over the realisations of each point."""
         statistics = {}
         for name, values in self.outputs.items():
             samples = [Statistics.of(values[self.rows(point)]) for point in self.points]
@@ -77,12 +98,21 @@ class SweepTable:
         """Return the inputs of a point in words, but for some keys and for seeds."""
         keys = [name for name in self.inputs if name not in without and name != "cell.seed"]
         varied = [name for name in keys if len({repr(value) for value in self.inputs[name]}) > 1]
-        values = [(name, self.input_of(point, name)) for name in varied]
-        return ", ".join(
-            f"{_in_words(name, value)} {tables.unit(name, self.stress_unit)}".rstrip()
-            for name, value in values
-            if value is not None
-        )
+        labels = []
+        for key in varied:
+            if (value := self.input_of(point, key)) is None:
+                continue
+            # Without its section, but with a material's phase and an interface's number.
+            section, _, rest = key.partition(".")
+            name = rest if section == "material" else key.partition("interface.")[2] or key.rpartition(".")[2]
+            name = name.replace(".", " ").replace("_", " ")
+            words = value if isinstance(value, str) else f"{name} {value}"
+            if name == "fibres":
+                words = f"{value} fibres"
+            elif isinstance(value, float | int) and not isinstance(value, bool):
+                words = f"{name} {value:g}"
+            labels.append(f"{words} {tables.unit(key, self.stress_unit)}".rstrip())
+        return ", ".join(labels)
 
     def curves(self, point: int) -> tuple[Float, Float]:
         """Strains (g,), g = CURVE_POINTS, and the c stresses of each finished realisation there, (n, g, c).
@@ -96,41 +126,6 @@ class SweepTable:
         stresses = range(paths[0].shape[1] - 1)
         curves = np.array([[np.interp(strain, p[:, -1], p[:, k]) for k in stresses] for p in paths])
         return strain, curves.swapaxes(1, 2)
-
-
-def _in_words(key: str, value: Any) -> str:
-    """Return an input without its section, but with a material's phase and an interface's number."""
-    section, _, rest = key.partition(".")
-    name = rest if section == "material" else key.partition("interface.")[2] or key.rpartition(".")[2]
-    name = name.replace(".", " ").replace("_", " ")
-    if name == "fibres":
-        return f"{value} fibres"
-    if isinstance(value, float | int) and not isinstance(value, bool):
-        return f"{name} {value:g}"
-    return value if isinstance(value, str) else f"{name} {value}"
-
-
-@dataclass(frozen=True)
-class Statistics:
-    """Statistics over finished realisations, (points, ...).
-
-    `ci95` is the mean's half 95 % confidence interval by Student's t; it and `std` are NaN for fewer than two.
-    """
-
-    count: Float
-    mean: Float
-    std: Float
-    ci95: Float
-
-    @classmethod
-    def of(cls, samples: Float) -> Statistics:
-        """Return statistics over the first axis of samples (n, ...), without NaN."""
-        is_known = np.isfinite(samples)
-        count = is_known.sum(axis=0)
-        several = np.where(count > 1, count, np.nan)
-        mean = np.where(is_known, samples, 0.0).sum(axis=0) / np.where(count > 0, count, np.nan)
-        std = np.sqrt(np.where(is_known, (samples - mean) ** 2, 0.0).sum(axis=0) / (several - 1))
-        return cls(count.astype(float), mean, std, student.ppf(0.5 + CONFIDENCE / 2, several - 1) * std / several**0.5)
 
 
 @dataclass(frozen=True)

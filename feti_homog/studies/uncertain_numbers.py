@@ -2,7 +2,7 @@
 
 import copy
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +14,6 @@ from feti_homog.typing import Float
 
 STIFFNESS = "stiffness"
 SECTIONS = ("material", "interface")
-ROUNDING = 1e-12
 EXPECTED = "expected {mean, std} or {mean, cv}, numbers, std and cv above 0"
 
 
@@ -64,29 +63,26 @@ def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty
     given = [(path, value) for path, value in stds if value != {}]
     for section in document:
         document[section] = _means(document[section], (section,), given, faults)
-    named, pairs = {".".join(path): value for path, value in dict(given).items()}, table.get(sections.CORRELATION, [])
-    faults += [*_deviation_faults(document, given), *_pair_faults(pairs, named)]
-    if faults:
-        return Uncertainty({})
-    result = Uncertainty(named, tuple((first, second, float(value)) for first, second, value in pairs))
-    if named and np.linalg.eigvalsh(result.matrix()).min() < -ROUNDING:
-        place = f"[{sections.UNCERTAINTY}] {sections.CORRELATION}"
-        faults.append(f"{place}: no constants are so correlated; expected a positive matrix")
-    return result
-
-
-def _deviation_faults(document: Mapping[str, Any], given: Sequence[tuple[toml_files.TomlPath, Any]]) -> Iterator[str]:
-    """Yield what is wrong with standard deviations and their places."""
-    paths = [path for path, _ in given]
+    paths, named = [path for path, _ in given], {".".join(path): value for path, value in given}
     for path, value in dict(given).items():
         name = f"[{sections.UNCERTAINTY}] {wording.dotted_key(path)}"
         if paths.count(path) > 1:
-            yield f"{name}: its standard deviation is given twice"
+            faults.append(f"{name}: its standard deviation is given twice")
         if not types.is_number(value) or value <= 0:
             words = f"expected a standard deviation above 0{types.magnitudes_in_words(value)}"
-            yield f"{name} = {wording.toml_value(value)}: {words}"
+            faults.append(f"{name} = {wording.toml_value(value)}: {words}")
         elif number_at(document, path) is None:
-            yield f"{name}: expected a key of the case whose value is a number"
+            faults.append(f"{name}: expected a key of the case whose value is a number")
+    pairs = table.get(sections.CORRELATION, [])
+    faults += _pair_faults(pairs, named)
+    if faults:
+        return Uncertainty({})
+    result = Uncertainty(named, tuple((first, second, float(value)) for first, second, value in pairs))
+    # Rounding of an eigenvalue: at most the order of the matrix times its norm, which is no more than the order.
+    if named and np.linalg.eigvalsh(result.matrix()).min() < -(len(named) ** 2) * np.finfo(float).eps:
+        place = f"[{sections.UNCERTAINTY}] {sections.CORRELATION}"
+        faults.append(f"{place}: no constants are so correlated; expected a positive matrix")
+    return result
 
 
 def _pair_faults(pairs: Any, named: Mapping[str, Any]) -> Iterator[str]:
@@ -137,7 +133,7 @@ def _in_lists(path: toml_files.TomlPath) -> toml_files.TomlPath:
 
 
 def number_at(document: Mapping[str, Any], path: toml_files.TomlPath) -> float | None:
-    """Return the number at a place of the case; None for other values, and in a section that stands several times."""
+    """Return the number at a path; None for other values, and in a section of which the case has several."""
     result = _at(document, _in_lists(path))
     return float(result) if types.is_number(result) else None
 
@@ -145,7 +141,7 @@ def number_at(document: Mapping[str, Any], path: toml_files.TomlPath) -> float |
 def with_number(
     document: Mapping[str, Any], path: toml_files.TomlPath, value: float
 ) -> tuple[toml_files.TomlPath, Any]:
-    """Return a number's key and another value for it; for one in a list the list's key and value."""
+    """Return the key of a number with a new value; of a number in a list, the key of the list and the new list."""
     full = _in_lists(path)
     for k in range(1, len(full)):
         result = _at(document, full[:k])

@@ -8,13 +8,11 @@ DIR/differences               the cases with each number without derivatives les
 DIR/uncertainty.json
 """
 
-from __future__ import annotations
-
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -30,8 +28,7 @@ from feti_homog.studies.uncertain_numbers import SECTIONS, Uncertainty, number_a
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.typing import Float
 
-if TYPE_CHECKING:
-    Documents = Sequence[Mapping[str, Any]]
+Documents = Sequence[Mapping[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -46,7 +43,7 @@ class ScatterStudy(Study):
     realisations: int | None
 
     def cases(self, points: Sequence[Assignment], **output: bool) -> Sweep:
-        """Return the cases at some values, every realisation of each. Raises CaseError with their faults."""
+        """Return all realisations of the cases at some points. Raises CaseError with their faults."""
         document = {**self.document, "output": self.document["output"] | output}
         return cases_at(document, points, self.folder, self.realisations, section=sections.UNCERTAINTY)
 
@@ -54,7 +51,7 @@ class ScatterStudy(Study):
         return self.cases([{}])
 
     def differing(self, names: Sequence[str]) -> Sweep:
-        """Return the cases with each of these numbers less and more by its standard deviation."""
+        """Return two cases for each number: one standard deviation below and above its mean."""
         ends = [(name, self.means[name] + sign * self.uncertainty.std[name]) for name in names for sign in (-1, 1)]
         points = [dict([with_number(self.document, _path(name), end)]) for name, end in ends]
         return self.cases(points, mesh_error=False)
@@ -86,7 +83,7 @@ class ScatterStudy(Study):
         return study_tables.scatter_text(document)
 
     def _content(self, means: Documents, inexact: Sequence[str], ends: Documents) -> dict[str, Any]:
-        """Return the content of uncertainty.json behind its digest."""
+        """Return the content of uncertainty.json after its digest."""
         data, uncertainty, count = _data([*means, *ends]), self.uncertainty, len(means)
         values, mesh_errors = _values(means, data), [constant_tables.mesh_errors(document) for document in means]
         sides = _values(ends, data).reshape(count, len(inexact), 2, len(data))
@@ -160,7 +157,14 @@ def parse(values: Mapping[str, Any], folder: Path) -> ScatterStudy:
         output["sensitivities"] = True
     means = {name: number_at(document, _path(name)) or 0.0 for name in uncertainty.std}
     study = ScatterStudy(document, folder, uncertainty, means, settings.realisations)
-    if faults := [*_faults_of_ends(study)]:
+    for name, std in uncertainty.std.items():  # cases one standard deviation from the means
+        if not output.get("sensitivities") or name.partition(".")[0] not in SECTIONS:
+            try:
+                study.differing([name])
+            except CaseError as error:
+                place = f"[{sections.UNCERTAINTY}] {name} = {means[name]:g} +- {std:g}"
+                faults += [f"{place}: {fault}" for fault in error.faults]
+    if faults:
         raise CaseError(*faults)
     return study
 
@@ -169,19 +173,6 @@ def is_study(values: Mapping[str, Any]) -> bool:
     """Return whether a document has uncertain numbers."""
     document = toml_files.to_document(values)
     return sections.UNCERTAINTY in document or bool(read_uncertainty(document, []).std)
-
-
-def _faults_of_ends(study: ScatterStudy) -> Iterator[str]:
-    """Yield faults of cases one standard deviation from the means."""
-    is_exact = bool(study.document["output"].get("sensitivities"))
-    for name, std in study.uncertainty.std.items():
-        if is_exact and name.partition(".")[0] in SECTIONS:
-            continue
-        try:
-            study.differing([name])
-        except CaseError as error:
-            place = f"[{sections.UNCERTAINTY}] {name} = {study.means[name]:g} +- {std:g}"
-            yield from (f"{place}: {fault}" for fault in error.faults)
 
 
 def _path(name: str) -> toml_files.TomlPath:

@@ -188,15 +188,6 @@ def cohesive_traction(files: ResultFiles, state: State) -> Float:
     return traction
 
 
-def energy_of_springs(files: ResultFiles, state: State) -> float:
-    """Sum the energy of all springs; in rubbing bonds it is (1 - d) K s^2 / 2 + d f^2 / (2 K)."""
-    traction, force = cohesive_traction(files, state), rubbing_force(files, state)
-    law = law_at(files, damage=state.damage)
-    intact = law_at(files, damage=np.zeros(len(force))).jumps(np.ones_like(traction))[:, 1]
-    twice = (traction * law.jumps(traction)).sum(axis=1) + state.damage * intact * force**2
-    return float(twice @ files.interface.length) / 2
-
-
 def pairs_of(files: ResultFiles) -> Int:
     """(phases, phases) index of the section between two phases, -1 where bonds never part."""
     pairs = np.full((len(files.phases),) * 2, -1)

@@ -9,16 +9,16 @@ import numpy as np
 
 from feti_homog.errors import CaseError
 from feti_homog.system.runtime import input_files
-from feti_homog.verify.check_constants import check_constants
-from feti_homog.verify.check_loads import StateNumbers, States, check_loads
+from feti_homog.verify.check_constants import check_constants, check_reciprocity, check_status
+from feti_homog.verify.check_loads import StateNumbers, States, check_loads, check_tables, rows_of
 from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh, check_mesh_error, check_rates
-from feti_homog.verify.check_path import check_envelope, check_path
+from feti_homog.verify.check_path import check_breaks, check_envelope, check_strength
 from feti_homog.verify.check_phases import check_phases
 from feti_homog.verify.check_sensitivities import check_sensitivities
-from feti_homog.verify.check_state import check_state
+from feti_homog.verify.check_state import check_bonds, check_gluing, check_state
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Finding, Findings, checks, unchecked
-from feti_homog.verify.path_energies import check_step_heat
+from feti_homog.verify.path_energies import check_heat, check_losses, check_stored
 from feti_homog.verify.reading import COATING, altered, opened
 
 # Raised by numbers of unexpected kind or shape.
@@ -44,7 +44,7 @@ class Certificate:
 
     @property
     def text(self) -> str:
-        """A line for each law."""
+        """Return the certificate as text, with a line for each law."""
         broken = sum(not finding.holds for finding in self.findings)
         verdict = f"{broken} of {len(self.findings)} laws are broken" if broken else "every law holds"
         names = [f"  {', '.join(names)}: {reason}" for reason, names in self.unchecked.items()]
@@ -53,7 +53,7 @@ class Certificate:
 
     @property
     def document(self) -> dict[str, Any]:
-        """Certificate for programs."""
+        """Return the certificate as values of JSON."""
         laws = [dict(finding.document) for finding in self.findings]
         about = {"title": self.title, "status": self.status, "holds": self.holds}
         return about | {"laws": laws, "not_checked": self.unchecked}
@@ -83,7 +83,7 @@ def _verified(directory: Path) -> Certificate:
         raise CaseError(f"{directory}: its files do not belong together or are incomplete: {fault}") from error
 
 
-def checks_of(cell: DiscreteCell) -> tuple[Finding, ...]:
+def checks_of(cell: DiscreteCell) -> list[Finding]:
     """List the laws of a result with their limits."""
     case, rtol = cell.files.case, float(cell.files.document["solver"].hint("rtol"))
     return checks(rtol, case["cell"]["geometry"] == "mesh", COATING in case["material"], cell.elements.contrasts)
@@ -94,18 +94,17 @@ def laws_of_fields(findings: Findings, cell: DiscreteCell) -> list[StateNumbers]
     files = cell.files
     check_mesh(findings, cell)
     check_interface(findings, cell)
-    states, before = list[StateNumbers](), None
+    states = list[StateNumbers]()
     for state in files.states():
         arrays = (state.displacement, state.fluctuation, state.stress, state.traction, state.jump, state.strain)
         findings.record("numbers", [np.count_nonzero(~np.isfinite(array)) for array in arrays], state.name)
         terms = np.abs(state.displacement) + np.abs(state.fluctuation)
         fields = cell.elements.fields(state.displacement, terms, state.along, state.temperature * cell.expansions)
         check_state(findings, cell, state, fields)
+        check_gluing(findings, cell, state, fields)
+        check_bonds(findings, cell, state)
         check_mesh_error(findings, cell, state)
         check_phases(findings, cell, state, len(states))
-        if before is not None and "path" in files.document:
-            check_step_heat(findings, cell, before, state)
-        before = state
         states.append(StateNumbers.of(cell, state, fields))
     return states
 
@@ -113,14 +112,23 @@ def laws_of_fields(findings: Findings, cell: DiscreteCell) -> list[StateNumbers]
 def laws_of_numbers(findings: Findings, cell: DiscreteCell, states: States) -> None:
     """Check the numbers of result.json against the states."""
     document = cell.files.document
-    check_loads(findings, cell, states)
+    pairs = check_loads(findings, cell, states, rows_of(cell))
+    check_tables(findings, cell, states, pairs)
     check_arcs(findings, cell, states)
     if "path" in document:
-        check_path(findings, cell, states)
+        points = document["path"]
+        if all(0 <= state.point < len(points) for state in states):  # others break the law of the load
+            for check in (check_breaks, check_strength, check_stored):
+                check(findings, cell, states)
+            (check_heat if "friction_heat" in points[0] else check_losses)(findings, cell, states)
     else:
         for number, table in enumerate([document, *cell.files.points], start=-1):
-            check_rates(findings, cell, table.get("tips"), f"point {number}")
+            if (tips := table.get("tips")) is not None:
+                check_rates(findings, cell, tips, f"point {number}")
     if "envelope" in document:
         check_envelope(findings, cell, states)
-    check_constants(findings, cell, states)
+    check_status(findings, cell)
+    check_reciprocity(findings, cell, states)
+    if "effective_stiffness" in document:
+        check_constants(findings, cell)
     check_sensitivities(findings, cell)

@@ -1,14 +1,13 @@
-"""Laws of the summary in result.json: status, mesh counts, moduli, engineering constants, expansion, bounds."""
+"""Laws of the summary in result.json: status, reciprocity, moduli, engineering constants, expansion, bounds."""
 
 import numpy as np
-from scipy.special import gammaln
 
 from feti_homog.typing import Float
 from feti_homog.verify.check_loads import States
 from feti_homog.verify.constitutive_law import VOIGT, turned
-from feti_homog.verify.discrete_cell import BONDED, DiscreteCell
-from feti_homog.verify.findings import KKT, Findings, Section, relative, solver_limit
-from feti_homog.verify.reading import COATING
+from feti_homog.verify.discrete_cell import DiscreteCell
+from feti_homog.verify.findings import KKT, Findings, relative, solver_limit
+from feti_homog.verify.reading import Status
 
 RTOL = 1e-8  # of the dual problems, by default
 DIRECTIONS = 720  # across the fibres, in half a turn
@@ -18,12 +17,8 @@ NOISE = 1e-3  # share of the largest constant of a kind, and Poisson's ratio, be
 RATIOS = ("eta", "anisotropy", "deviation")
 
 
-def check_constants(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check the numbers of result.json that sum up a run.
-
-    Tolerances follow from rtol, the status from checks, convergence and other faults.  Thermal stresses obey
-    reciprocity, which contact without tension breaks.
-    """
+def check_status(findings: Findings, cell: DiscreteCell) -> None:
+    """Check that tolerances follow from rtol, and the status from checks, convergence and other faults."""
     document, solver = cell.files.document, cell.files.document["solver"]
     # Options of the command line are in no file.
     is_of_case = solver.hint("rtol") == float(cell.files.case.get("petsc", {}).get("feti_ksp_rtol", RTOL))
@@ -36,22 +31,32 @@ def check_constants(findings: Findings, cell: DiscreteCell, states: States) -> N
     failed += [reason for reason in solver.hint("converged_reason") if reason < 0]
     failed += [fault for fault in faults if "check " not in fault and "no convergence" not in fault]
     findings.require("status", document["status"] == ("not converged" if failed else "done"), "status")
-    _check_cell(findings, cell, document["cell"])
-    if "effective_stiffness" in document:
-        _check_stiffness(findings, cell, document)
+
+
+def check_reciprocity(findings: Findings, cell: DiscreteCell, states: States) -> None:
+    """Check that stiffnesses are symmetric, and thermal stresses obey Levin's formula.
+
+    Contact without tension breaks the reciprocity of debonded cells.
+    """
+    document = cell.files.document
     for number, table in enumerate([document, *document.get("angle", ())], start=-1):
         of_table = [state for state in states if number < 0 or state.point == number]
-        is_linear = not (cell.files.contact and any((state.status != BONDED).any() for state in of_table))
-        if "thermal_stress" in table and is_linear:
-            thermal, place = np.array(table["thermal_stress"]), f"angle[{number}].thermal_stress"
-            for state in of_table:
+        if cell.files.contact and any((state.status != Status.BONDED).any() for state in of_table):
+            continue
+        place = f"angle[{number}]." if number >= 0 else ""
+        for name in {"effective_stiffness", "stiffness"} & table.keys():
+            C = np.array(table[name])
+            findings.compare("symmetry", C, C.T, np.abs(C).max(), place + name)
+        if "thermal_stress" in table:
+            thermal = np.array(table["thermal_stress"])
+            for state in [state for state in of_table if not state.temperature]:
                 error = relative(thermal @ state.strain + state.expanding, np.abs(thermal).max())
-                where = f"{place.removeprefix('angle[-1].')}, {state.name}"
-                findings.record("Levin", [] if state.temperature else error, where)
+                findings.record("Levin", error, f"{place}thermal_stress, {state.name}")
 
 
-def _check_stiffness(findings: Findings, cell: DiscreteCell, document: Section) -> None:
-    """Check bounds, compliance, thermal expansion and constants of the stiffness."""
+def check_constants(findings: Findings, cell: DiscreteCell) -> None:
+    """Check the bounds, compliance, thermal expansion and constants of the effective stiffness."""
+    document = cell.files.document
     C, heat = np.array(document["effective_stiffness"]), document.get("thermal_stress")
     heat = None if heat is None else np.array(heat)
     if (bounds := document.get("bounds")) is not None:
@@ -81,42 +86,14 @@ def _check_stiffness(findings: Findings, cell: DiscreteCell, document: Section) 
             strains, place = -np.linalg.solve(C, heat), "thermal_expansion"
             findings.compare("compliance", document[place], strains, np.abs(strains).max(), place)
     for section in SECTIONS & document.keys():
-        constants = {} if document.get(section) is None else constants_of(C, heat)
-        for name, value in (document.get(section) or {}).items():
-            expected, place = constants.get(name), f"{section}.{name}"
+        constants = {} if document[section] is None else constants_of(C, heat)
+        for name in document[section] or ():
+            value, expected, place = document[section][name], constants.get(name), f"{section}.{name}"
             if value is None or expected is None:
                 findings.require("moduli", value is expected, place)
             else:
                 least = NOISE if name.startswith("nu") else float(name.startswith(RATIOS))
                 findings.compare("moduli", value, expected, max(abs(expected), least), place)
-
-
-def _check_cell(findings: Findings, cell: DiscreteCell, section: Section) -> None:
-    """Check sizes, counts and area fractions against the mesh, and the scatter of strengths against the case."""
-    mesh, (width, height), phases = cell.files.mesh, cell.files.size, cell.files.phases
-    fibres = [number for number, name in enumerate(phases) if name not in ("matrix", COATING)]
-    counts = {"width": width, "height": height, "area": width * height}
-    counts |= {"elements": len(mesh.triangles), "nodes": len(mesh.points)}
-    for name, value in counts.items():
-        findings.compare("cell", section[name], value, value, f"cell.{name}")
-    shares = {"fibre_fraction": cell.fractions[fibres].sum(), "porosity": cell.porosity}
-    for name, value in shares.items():
-        findings.compare("cell", section.get(name, 0.0), value, 1.0, f"cell.{name}")
-    for name, value in zip(phases, cell.fractions, strict=True):
-        findings.compare("cell", section["fractions"][name], value, 1.0, f"cell.fractions.{name}")
-    bonds, rows = cell.files.document["solver"]["interface_nodes"], len(cell.files.interface.points)
-    findings.compare("cell", bonds, rows, 1.0, "solver.interface_nodes")
-    order = 1 + mesh.triangles.shape[1] // 6
-    findings.compare("cell", cell.files.case["cell"].get("order", order), order, 1.0, "case.cell.order")
-    # Strengths scatter by Weibull's distribution with mean 1; a table may have others.
-    strength, scatter = cell.files.fibres.strength, next(iter(cell.files.interfaces), {}).get("scatter")
-    if cell.files.case["cell"]["geometry"] != "table":
-        expected = np.ones_like(strength)
-        if scatter is not None:
-            stream = np.random.default_rng(np.random.SeedSequence(scatter["seed"], spawn_key=(1,)))
-            m = scatter["shape"]
-            expected = np.exp(np.log(-np.log(1.0 - stream.random(len(strength)))) / m - gammaln(1.0 + 1.0 / m))
-        findings.compare("tables", strength, expected, expected, "/fibre/strength at fibre {}".format)
 
 
 def constants_of(C: Float, heat: Float | None) -> dict[str, float]:

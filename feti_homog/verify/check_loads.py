@@ -4,29 +4,26 @@ A case prescribes the strain or the stress of every component; in generalized pl
 strain component.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from feti_homog.typing import Bool, Document, Float
-from feti_homog.verify.bonds import cohesive_traction, energy_of_springs, law_at
-from feti_homog.verify.discrete_cell import BONDED, CLOSED, OPEN, DiscreteCell
+from feti_homog.verify.bonds import cohesive_traction, law_at, rubbing_force
+from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.elements import ElementFields
-from feti_homog.verify.findings import Findings
-from feti_homog.verify.reading import State
+from feti_homog.verify.findings import ROUNDING, Findings
+from feti_homog.verify.reading import State, Status
 
 NAMES = {
     3: (("E11", "E22", "gamma12"), ("S11", "S22", "S12")),
     6: (("E11", "E22", "E33", "gamma23", "gamma13", "gamma12"), ("S11", "S22", "S33", "S23", "S13", "S12")),
 }
-TEMPERATURE, COUNTS = "temperature", {"bonded": BONDED, "closed": CLOSED, "open": OPEN}
-SAME_SHARE = 1e-12  # rounding of shares of a leg
+TEMPERATURE, COUNTS = "temperature", {status.name.lower(): status for status in Status}
 OF_ARCS = "debonded_length", "damaged_length", "debonded_shares"  # of an angle, in all unit loads
 UNIT_LOADS = {3: [0, 1, 2], 6: [0, 1, 5, 2, 6, 4, 3]}  # components in the order of the states; 6 is the temperature
 FIELDS = ("displacement", "fluctuation", "stress", "mesh_error", "stress_33")  # of a state on its mesh
@@ -73,7 +70,7 @@ def at_points(case: Document, points: Sequence[Document]) -> Iterator[Prescribed
     start, last = np.zeros(len(ends[0].values)), None
     for point in points:
         along = float(point["load_factor"]) * len(ends)
-        while leg < len(ends) - 1 and (ended or along > leg + 1 + SAME_SHARE):
+        while leg < len(ends) - 1 and (ended or along > leg + 1 + ROUNDING):
             before, end, leg, ended = ends[leg], ends[leg + 1], leg + 1, False
             start = before.values
             if last is not None:
@@ -82,7 +79,7 @@ def at_points(case: Document, points: Sequence[Document]) -> Iterator[Prescribed
         share = along - leg
         yield Prescribed((1 - share) * start + share * ends[leg].values, ends[leg].by_stress)
         # After the last break at a waypoint comes a point without breaks.
-        ended, last = abs(share - 1) <= SAME_SHARE and not (by_events and damaged_at(point)), point
+        ended, last = abs(share - 1) <= ROUNDING and not (by_events and damaged_at(point)), point
 
 
 def damaged_at(point: Document) -> int:
@@ -110,13 +107,17 @@ class StateNumbers(State):
     expanding: float
 
     @classmethod
-    def of(cls, cell: DiscreteCell, state: State, fields: ElementFields) -> StateNumbers:
+    def of(cls, cell: DiscreteCell, state: State, fields: ElementFields) -> Self:
         """Return the numbers of a state."""
         law = law_at(cell.files, damage=state.damage)
         released = cell.tips(state.status) & law.grows_by_release
         traction = cohesive_traction(cell.files, state)
-        used = np.where(released, np.nan, np.where(state.status == BONDED, law.utilisation(traction), 0.0))
-        in_springs = energy_of_springs(cell.files, state) / cell.area
+        used = np.where(released, np.nan, np.where(state.status == Status.BONDED, law.utilisation(traction), 0.0))
+        # In rubbing bonds the springs store (1 - d) K s^2 / 2 + d f^2 / (2 K).
+        intact = law_at(cell.files, damage=np.zeros(len(traction))).jumps(np.ones_like(traction))[:, 1]
+        twice = (traction * law.jumps(traction)).sum(axis=1)
+        twice += state.damage * intact * rubbing_force(cell.files, state) ** 2
+        in_springs = float(twice @ cell.files.interface.length) / (2 * cell.area)
         weights, phase = cell.elements.area / cell.area, cell.files.mesh.phase
         heat = -float(weights @ (cell.expansions[phase] * state.stress).sum(axis=1))
         thermal = np.einsum("pij,pj->pi", cell.stiffnesses, cell.expansions)[phase]
@@ -128,60 +129,72 @@ class StateNumbers(State):
 
 
 States = Sequence[StateNumbers]
+Rows = Sequence[tuple[Prescribed, Document]]
+Pairs = Sequence[tuple[StateNumbers, tuple[Prescribed, Document]]]
 
 
-def check_loads(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check loads against the case, and points or columns of result.json against the states.
+def check_loads(findings: Findings, cell: DiscreteCell, states: States, rows: Rows) -> Pairs:
+    """Check loads of points and states against the case, and return the states with their rows.
 
     A path keeps as many states as the case asks for, at points that result.json lists, the first and the last among
     them; other analyses keep all.
     """
-    document, case, rows, numbers = cell.files.document, cell.files.case, list(_rows(cell)), [s.point for s in states]
-    same = json.loads(str(cell.files.file.attrs["case"])) == case
-    findings.require("tables", same, "the case, which differs between the two files")
-    scales = _scales(cell, states, [load for load, _ in rows])
+    document, numbers, count = cell.files.document, [state.point for state in states], len(rows)
+    largest, imposed = max((float(np.abs(state.mean_stress).max()) for state in states), default=0.0), 0.0
+    for state, (load, _) in product(states[:1], rows):
+        # Stress scale of the loads in the bonded cell; computed strains are no scale for prescribed stresses.
+        strains, v = np.where(load.by_stress, 0.0, load.values), len(state.strain)
+        imposed = max(imposed, float(np.abs(cell.reuss @ cell.loads(strains[:v], float(strains[v:].sum()))).max()))
+    scales = cell.largest_strain or 1.0, max(largest, imposed) or 1.0
     if "path" in document:
         findings.require("tables", list(document["states"]) == numbers, "states, which differ between the two files")
-        in_order = [*numbers[:1], *numbers[-1:]] == [0, len(rows) - 1] and numbers == sorted({*numbers})
+        in_order = [*numbers[:1], *numbers[-1:]] == [0, count - 1] and numbers == sorted({*numbers})
         findings.require("load", in_order, "states, which are not from the first point to the last")
-        key = case["output"]["states"]
-        count = len(rows) if key == "all" else min(key, len(rows)) if isinstance(key, int) else len(numbers)
         for number, (load, entries) in enumerate(rows):
-            _check_prescribed(findings, load, entries, scales, f"path[{number}]")
+            _check_load(findings, load, entries, scales, f"path[{number}]")
+        key = cell.files.case["output"]["states"]
+        count = min(key, count) if isinstance(key, int) else count if key == "all" else len(numbers)
         pairs = [(state, rows[state.point]) for state in states if 0 <= state.point < len(rows)]
     else:
-        count, pairs = len(rows), list(zip(states, rows, strict=False))
-        points = np.arange(len(numbers)) // (len(rows) // len(document.get("angle", [None])))
+        pairs = list(zip(states, rows, strict=False))
+        points = np.arange(len(numbers)) // (count // len(document.get("angle", [None])))
         findings.compare("tables", numbers, points, 1.0, lambda k: f"{states[k].name}, point")
     findings.compare("load", len(states), count, 1.0, f"{len(states)} states, {count} asked for")
-    _check_states(findings, cell, pairs, scales)
-    matrices = {}  # of cells without one-sided contact
-    if "effective_stiffness" in document and "effective_stiffness_compression" not in document:
-        matrices["effective_stiffness"] = np.array(document["effective_stiffness"])
-    for number, point in enumerate(document.get("angle", ())):
-        if "stiffness" in point and not (cell.files.contact and point["open"] + point["closed"]):
-            matrices[f"angle[{number}].stiffness"] = np.array(point["stiffness"])
-    for place, matrix in matrices.items():
-        findings.compare("symmetry", matrix, matrix.T, np.abs(matrix).max(), place)
-
-
-def _check_states(findings: Findings, cell: DiscreteCell, pairs: Sequence[Any], scales: tuple[float, ...]) -> None:
-    """Check states against their loads, and their numbers in result.json; `pairs` are (state, (load, entries))."""
-    rows, sections = cell.files.interface, len(cell.files.interfaces)
-
-    def lengths(nodes: Bool) -> Float:
-        return np.asarray(np.bincount(rows.fibre - 1, rows.length * nodes, len(cell.files.fibres.radius)), float)
-
-    longest = float(lengths(np.ones(len(rows.length), bool)).max(initial=0.0)) or 1.0
-    of_section = rows.length[:, None] * (rows.pair[:, None] == np.arange(sections))
-    energy = max([state.stored for state, _ in pairs], default=0.0) + cell.rounded_energy
-    for state, (load, entries) in pairs:
+    for state, (load, _) in pairs:
         own = {"strain": state.strain, "stress": state.mean_stress, TEMPERATURE: state.temperature}
-        _check_prescribed(findings, load, own, scales, state.name)
-        debonded, damaged = state.status != BONDED, (state.damage > 0.0) & (state.damage < 1.0)
+        _check_load(findings, load, own, scales, state.name)
+    return pairs
+
+
+def _check_load(findings: Findings, load: Prescribed, numbers: Document, scales: Sequence[float], place: str) -> None:
+    """Check the strains, stresses and temperature that a load prescribes."""
+    strain, stress, v = np.array(numbers["strain"]), np.array(numbers["stress"]), len(numbers["strain"])
+    values, by_stress = load.values[:v], load.by_stress[:v]
+    findings.record("load", np.abs(strain - values)[~by_stress] / scales[0], f"{place}, strain")
+    findings.record("stress load", np.abs(stress - values)[by_stress] / scales[1], f"{place}, stress")
+    temperature = float(load.values[v:].sum())
+    off = float(numbers.get(TEMPERATURE, 0.0)) - temperature
+    findings.record("load", abs(off) / max(abs(temperature), 1.0), f"{place}, temperature")
+
+
+def check_tables(findings: Findings, cell: DiscreteCell, states: States, pairs: Pairs) -> None:
+    """Check the points or columns of result.json against the states."""
+    files, nodes, sections = cell.files, cell.files.interface, len(cell.files.interfaces)
+    same = json.loads(str(files.file.attrs["case"])) == files.case
+    findings.require("tables", same, "the case, which differs between the two files")
+
+    def lengths(where: Bool) -> Float:
+        return np.asarray(np.bincount(nodes.fibre - 1, nodes.length * where, len(files.fibres.radius)), float)
+
+    longest = float(lengths(np.ones(len(nodes.length), bool)).max(initial=0.0)) or 1.0
+    of_section = nodes.length[:, None] * (nodes.pair[:, None] == np.arange(sections))
+    stress = max((float(np.abs(state.mean_stress).max()) for state in states), default=0.0) or 1.0
+    energy = max([state.stored for state, _ in pairs], default=0.0) + cell.rounded_energy
+    for state, (_, entries) in pairs:
+        debonded, damaged = state.status != Status.BONDED, (state.damage > 0.0) & (state.damage < 1.0)
         numbers: dict[str, tuple[Any, float]] = {
-            "strain": (state.strain, scales[0]),
-            "stress": (state.mean_stress, scales[1]),
+            "strain": (state.strain, cell.largest_strain or 1.0),
+            "stress": (state.mean_stress, stress),
             TEMPERATURE: (state.temperature, max(abs(state.temperature), 1.0)),
             "load_factor": (state.load_factor, 1.0),
             "stored": (state.stored, energy),
@@ -194,66 +207,37 @@ def _check_states(findings: Findings, cell: DiscreteCell, pairs: Sequence[Any], 
         for name in [name for name in numbers if name in entries]:
             law, (value, scale) = "energy" if name.startswith("stored") else "tables", numbers[name]
             findings.compare(law, entries[name], value, scale, f"{state.name}, {name}")
-    for number, point in enumerate(cell.files.points):
+    for number, point in enumerate(files.points):
         count, place = sum(point[name] for name in COUNTS), f"point {number}, {', '.join(COUNTS)}"
-        findings.compare("tables", count, len(rows.length), 1.0, place)
+        findings.compare("tables", count, len(nodes.length), 1.0, place)
         missing = sorted({"debonded_length", *["debonded_shares"] * (sections > 1)}.difference(point))
         findings.require("tables", not missing, f"point {number}, {', '.join(missing)}")
 
 
-def _scales(cell: DiscreteCell, states: States, loads: Sequence[Prescribed]) -> tuple[float, float, float]:
-    """Largest strain and stress in all states, and largest stress by the loads in the bonded cell."""
-    largest, imposed = max((float(np.abs(state.mean_stress).max()) for state in states), default=0.0), 0.0
-    for state, load in product(states[:1], loads):
-        # Computed strains are no scale for prescribed stresses.
-        strains, v = np.where(load.by_stress, 0.0, load.values), len(state.strain)
-        loaded = cell.loads(strains[:v], float(strains[v:].sum()))
-        imposed = max(imposed, float(np.abs(cell.reuss @ loaded).max()))
-    return cell.largest_strain or 1.0, largest or 1.0, max(largest, imposed) or 1.0
-
-
-def _check_prescribed(
-    findings: Findings, load: Prescribed, numbers: Document, scales: tuple[float, ...], place: str
-) -> None:
-    """Check the strains, stresses and temperature that a load prescribes."""
-    strain, stress, v = np.array(numbers["strain"]), np.array(numbers["stress"]), len(numbers["strain"])
-    values, by_stress = load.values[:v], load.by_stress[:v]
-    findings.record("load", np.abs(strain - values)[~by_stress] / scales[0], f"{place}, strain")
-    findings.record("stress load", np.abs(stress - values)[by_stress] / scales[2], f"{place}, stress")
-    temperature = float(load.values[v:].sum())
-    off = float(numbers.get(TEMPERATURE, 0.0)) - temperature
-    findings.record("load", abs(off) / max(abs(temperature), 1.0), f"{place}, temperature")
-
-
-def _rows(cell: DiscreteCell) -> Iterator[tuple[Prescribed, Document]]:
-    """Yield the load and the entry in result.json for each point on a path, or for each state without a path."""
+def rows_of(cell: DiscreteCell) -> Rows:
+    """Return the load and the entry in result.json for each point on a path, or for each state without a path."""
     document, case = cell.files.document, cell.files.case
     if "path" in document:
-        yield from zip(at_points(case, document["path"]), document["path"], strict=True)
-    elif "load" in document:
-        yield from ((load, document["load"]) for load in targets(case))
-    elif "angle" in document:
-        strain = case["angle"].get("strain")
-        for point in document["angle"]:
-            if strain is None:
-                yield from _columns(point, "stiffness", "", 1.0)
-            else:
-                values = np.array([*strain, 0.0] if len(strain) > 3 else strain, float)
-                yield Prescribed(values, np.zeros(len(values), bool)), point
-    else:
-        for suffix, sign in (("", 1.0), ("_compression", -1.0)):
-            if f"effective_stiffness{suffix}" in document:
-                yield from _columns(document, "effective_stiffness", suffix, sign)
-
-
-def _columns(table: Document, stiffness: str, suffix: str, sign: float) -> Iterator[tuple[Prescribed, Document]]:
-    """Yield the unit loads, or minus them, with their stresses: columns of a stiffness, and `thermal_stress`."""
-    columns = np.array(table[f"{stiffness}{suffix}"])
-    v = len(columns)
-    n = v + (v > 3)
-    if f"thermal_stress{suffix}" in table:
-        columns = np.column_stack([columns, table[f"thermal_stress{suffix}"]])
-    for k in [k for k in UNIT_LOADS[v] if k < columns.shape[1]]:
-        names = (*OF_ARCS, *COUNTS) if k == v - 1 else OF_ARCS  # the state of gamma12 has the counts
-        entries = {"stress": sign * columns[:, k]} | {name: table[name] for name in names if name in table}
-        yield Prescribed(sign * np.eye(n)[k], np.zeros(n, bool)), entries
+        return list(zip(at_points(case, document["path"]), document["path"], strict=True))
+    if "load" in document:
+        return [(load, document["load"]) for load in targets(case)]
+    if strain := case.get("angle", {}).get("strain"):
+        values = np.array([*strain, 0.0] if len(strain) > 3 else strain, float)
+        return [(Prescribed(values, np.zeros(len(values), bool)), point) for point in document["angle"]]
+    # Unit loads, or minus them, with their stresses: columns of a stiffness, and `thermal_stress`.
+    tables = [(point, "stiffness", "", 1.0) for point in document.get("angle", ())]
+    tables = tables or [(document, "effective_stiffness", *signed) for signed in (("", 1.0), ("_compression", -1.0))]
+    rows = []
+    for table, stiffness, suffix, sign in tables:
+        if f"{stiffness}{suffix}" not in table:
+            continue
+        columns = np.array(table[f"{stiffness}{suffix}"])
+        v = len(columns)
+        n = v + (v > 3)
+        if f"thermal_stress{suffix}" in table:
+            columns = np.column_stack([columns, table[f"thermal_stress{suffix}"]])
+        for k in [k for k in UNIT_LOADS[v] if k < columns.shape[1]]:
+            names = (*OF_ARCS, *COUNTS) if k == v - 1 else OF_ARCS  # the state of gamma12 has the counts
+            entries = {"stress": sign * columns[:, k]} | {name: table[name] for name in names if name in table}
+            rows.append((Prescribed(sign * np.eye(n)[k], np.zeros(n, bool)), entries))
+    return rows

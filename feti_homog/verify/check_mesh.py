@@ -6,14 +6,14 @@ Element shares of the mesh error are compared with averages at nodes (Zienkiewic
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.special import roots_legendre
+from scipy.special import gammaln, roots_legendre
 
 from feti_homog.typing import Bool, Float
 from feti_homog.verify.check_loads import NAMES, States
-from feti_homog.verify.discrete_cell import BONDED, DiscreteCell
+from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.elements import PLACES, add_at_nodes, quadrature_points
 from feti_homog.verify.findings import ROUNDING, Findings, Section
-from feti_homog.verify.reading import State
+from feti_homog.verify.reading import COATING, State, Status
 from feti_homog.verify.torus import from_centre
 
 # The mesher moves the tips of arcs by so many degrees at most; nodes nearer to a tip are on neither side.
@@ -26,17 +26,19 @@ LENGTH_ERROR, NORMAL_ERROR = np.pi / 2 - 1, np.sqrt(2.0)
 WITHOUT_BUBBLE = 1.7
 # Share of the elements' errors to which arcs may cancel them.
 LEAST_SHARE = 0.05
-# Tips and first bonds are at nodes, to the rounding of directions, in radii or degrees; lengths for modes are at least
-# this share of the radius.
-AT_NODE, MODE_LENGTH = 1e-6, 1e-3
+MODE_LENGTH = 1e-3  # least length for modes / radius
 LOADS = [sign + name for sign in ("", "-") for name in (*NAMES[3][0], "strain")]  # of release rates
 # Middles of sides, a quadrature rule for squares of linear functions.
 MIDDLES = np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])
 
 
 def check_mesh(findings: Findings, cell: DiscreteCell) -> None:
-    """Check that elements with positive areas fill the cell except voids, and torn sides have one partner or a void."""
-    elements, sides, porosity = cell.elements, cell.sides, cell.files.document["cell"].get("porosity", 0.0)
+    """Check that elements with positive areas fill the cell except voids, and torn sides have one partner or a void.
+
+    Sizes, counts and area fractions in result.json are those of the mesh.
+    """
+    elements, sides, section, phases = cell.elements, cell.sides, cell.files.document["cell"], cell.files.phases
+    mesh, (width, height), porosity = cell.files.mesh, cell.files.size, section.get("porosity", 0.0)
     findings.record("mesh", np.where(elements.least_jacobian > 0, 0.0, np.inf), "element {}".format)
     findings.compare("mesh", elements.area.sum(), (1 - porosity) * cell.area, cell.area, "the sum of all areas")
     normals = sides.normal[sides.at_void]
@@ -46,11 +48,34 @@ def check_mesh(findings: Findings, cell: DiscreteCell) -> None:
     sums = np.hypot(*(sides.normal + sides.normal[sides.partner]).T) / np.hypot(*sides.normal.T)
     mismatch = np.where(sides.at_void, 0.0, np.where(sides.partner < 0, np.inf, sums))  # inf: several partners
     findings.record("mesh", mismatch, lambda i: f"a side of element {sides.element[i]}")
+    counts = {"width": width, "height": height, "area": cell.area}
+    counts |= {"elements": len(mesh.triangles), "nodes": len(mesh.points)}
+    for name, value in counts.items():
+        findings.compare("cell", section[name], value, value, f"cell.{name}")
+    fibres = [number for number, name in enumerate(phases) if name not in ("matrix", COATING)]
+    shares = {"fibre_fraction": cell.fractions[fibres].sum(), "porosity": cell.porosity}
+    for name, value in shares.items():
+        findings.compare("cell", section.get(name, 0.0), value, 1.0, f"cell.{name}")
+    for name, value in zip(phases, cell.fractions, strict=True):
+        findings.compare("cell", section["fractions"][name], value, 1.0, f"cell.fractions.{name}")
+    order = 1 + mesh.triangles.shape[1] // 6
+    findings.compare("cell", cell.files.case["cell"].get("order", order), order, 1.0, "case.cell.order")
 
 
 def check_interface(findings: Findings, cell: DiscreteCell) -> None:
-    """Check that interface nodes stand where two bodies may part, and their sections and shapes."""
+    """Check that interface nodes stand where two bodies may part, and their sections, shapes and strengths."""
     rows, faces, at = cell.files.interface, cell.faces, "interface node {}".format
+    nodes, k = cell.files.document["solver"]["interface_nodes"], len(rows.points)
+    findings.compare("cell", nodes, k, 1.0, "solver.interface_nodes")
+    # Strengths scatter by Weibull's distribution with mean 1; a table may have others.
+    strength, scatter = cell.files.fibres.strength, next(iter(cell.files.interfaces), {}).get("scatter")
+    if cell.files.case["cell"]["geometry"] != "table":
+        expected = np.ones_like(strength)
+        if scatter is not None:
+            stream = np.random.default_rng(np.random.SeedSequence(scatter["seed"], spawn_key=(1,)))
+            m = scatter["shape"]
+            expected = np.exp(np.log(-np.log(1.0 - stream.random(len(strength)))) / m - gammaln(1.0 + 1.0 / m))
+        findings.compare("tables", strength, expected, expected, "/fibre/strength at fibre {}".format)
     findings.record("interface", faces.distance / cell.files.size.max(), at)
     count = np.bincount(faces.place[faces.place >= 0], minlength=cell.nodes.places)
     wrong = np.flatnonzero(count != (faces.pair >= 0))
@@ -141,18 +166,16 @@ def check_arcs(findings: Findings, cell: DiscreteCell, states: States) -> None:
         # A wrong number of a point breaks the law of the tables.
         opening = points[min(max(state.point, 0), len(points) - 1)]["angle"] if points else None
         inside, outside = _sides(cell, opening)
-        bonded = state.status == BONDED
+        bonded = state.status == Status.BONDED
         findings.record("arcs", np.count_nonzero(inside & bonded), f"{state.name}, bonded within arcs")
         # The first state of a path by events is the one at which the first bonds break.
         intact = "path" not in document or (state.point == 0 and case["path"]["method"] == "events")
         if intact and not from_mesh:
             findings.record("arcs", np.count_nonzero(outside & ~bonded), f"{state.name}, debonded outside of arcs")
-
-
-def check_first_step(findings: Findings, cell: DiscreteCell, first: Section) -> None:
-    """Check that all nodes outside of the case's arcs, and no others, have bonds before the first increment."""
-    if cell.files.case["cell"]["geometry"] != "mesh" or "interface" not in cell.files.case:
-        (inside, outside), count = _sides(cell, None), first["bonded"] + first["broke"]
+    if "path" in document and case["path"]["method"] != "events" and not from_mesh:
+        # Before the first increment all nodes outside of the case's arcs, and no others, have bonds.
+        (inside, outside), first = _sides(cell, None), document["path"][0]
+        count = first["bonded"] + first["broke"]
         excess = max(np.count_nonzero(outside) - count, count - np.count_nonzero(~inside), 0)
         findings.record("arcs", excess, "path[0].broke")
 
@@ -171,10 +194,8 @@ def _sides(cell: DiscreteCell, opening: float | None) -> tuple[Bool, Bool]:
     return inside, outside
 
 
-def check_rates(findings: Findings, cell: DiscreteCell, tips: Section | None, where: str) -> None:
+def check_rates(findings: Findings, cell: DiscreteCell, tips: Section, where: str) -> None:
     """Check that release rates agree with each other, and tips and their lengths for modes with the mesh."""
-    if tips is None:
-        return
     rows, at = cell.files.interface, f"{where}, tip {{}}".format
     table = {name: np.array(tips[name]) for name in ("G", "G_I", "G_II", "psi", "length", "angle", "fibre", "load")}
     G, first, second, psi, length, angle, number, load = table.values()
@@ -189,8 +210,8 @@ def check_rates(findings: Findings, cell: DiscreteCell, tips: Section | None, wh
         radius = float(np.median(radii[on_curve])) if on_curve.any() else np.nan
         chords = 2 * radius * np.abs(np.sin(np.radians(cell.bond_directions[on_curve] - angle[t]) / 2))
         off = np.abs(np.append(chords, MODE_LENGTH * radius) - length[t]).min() / length[t]
-        off += chords.min(initial=np.inf) > AT_NODE * radius
-        findings.record("rates", max(off - AT_NODE, 0.0), at(t))
+        off += chords.min(initial=np.inf) > ROUNDING * radius
+        findings.record("rates", max(off - ROUNDING, 0.0), at(t))
 
 
 def check_mesh_error(findings: Findings, cell: DiscreteCell, state: State) -> None:
@@ -206,13 +227,9 @@ def check_mesh_error(findings: Findings, cell: DiscreteCell, state: State) -> No
         ratio = (LEAST_SHARE * total + ROUNDING) / (error + ROUNDING)
         findings.record("mesh error", ratio - 1, f"{state.name}, the error of its energy")
     energy = float(state.strain @ state.mean_stress) * cell.area
-    if cell.files.case["analysis"]["type"] == "stiffness" and energy > 0 and not np.isnan(state.mesh_error).all():
-        ratio = (total + ROUNDING) / (_averaged(cell, state) / energy + ROUNDING)
-        findings.record("mesh error", max(ratio, 1 / ratio) - 1, state.name)
-
-
-def _averaged(cell: DiscreteCell, state: State) -> float:
-    """int d : S : d, with d the stresses interpolated from averages at nodes less the elements' stresses."""
+    if cell.files.case["analysis"]["type"] != "stiffness" or not energy > 0 or np.isnan(state.mesh_error).all():
+        return
+    # int d : S : d, with d the stresses interpolated from averages at nodes less the elements' stresses.
     mesh, v, elements = cell.files.mesh, cell.stiffnesses.shape[1], cell.elements
     n, is_linear = mesh.triangles.shape[1], mesh.triangles.shape[1] == 3
     r = MIDDLES if is_linear else quadrature_points()  # (q, 3) barycentric coordinates
@@ -232,7 +249,7 @@ def _averaged(cell: DiscreteCell, state: State) -> float:
         weights += np.bincount(nodes.ravel(), np.repeat(area, n), len(weights))
         add_at_nodes(sums, nodes, stress * area[:, None, None])
     averages = sums / np.where(weights > 0.0, weights, 1.0)[:, None]
-    components, total = np.unique(PLACES[v]), 0.0  # on which displacements work; bubbles are in the plane
+    components, averaged = np.unique(PLACES[v]), 0.0  # on which displacements work; bubbles are in the plane
     has_bubble = elements.mixed[:, None] & np.isin(components, PLACES[v][:2])
     factor = np.where(has_bubble | is_linear, 1.0, np.sqrt(WITHOUT_BUBBLE))
     flexibility = np.linalg.inv(cell.stiffnesses[:, components[:, None], components])
@@ -241,5 +258,6 @@ def _averaged(cell: DiscreteCell, state: State) -> float:
     for part, w, stress in stresses():
         phase = mesh.phase[part]
         off = (functions @ averages[mesh.triangles[part]] - stress)[..., components] * factor[phase, None]
-        total += float(np.einsum("eq,eqi,eij,eqj->", w, off, flexibility[phase], off, optimize=True))
-    return total
+        averaged += float(np.einsum("eq,eqi,eij,eqj->", w, off, flexibility[phase], off, optimize=True))
+    ratio = (total + ROUNDING) / (averaged / energy + ROUNDING)
+    findings.record("mesh error", max(ratio, 1 / ratio) - 1, state.name)

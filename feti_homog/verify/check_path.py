@@ -4,69 +4,37 @@ Fields may be kept at some points only; the others in result.json obey the same 
 """
 
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 
 import numpy as np
 
-from feti_homog.typing import Bool, Float
+from feti_homog.typing import Bool
 from feti_homog.verify.bonds import law_at
-from feti_homog.verify.check_loads import NAMES, SAME_SHARE, TEMPERATURE, StateNumbers, States, damaged_at
-from feti_homog.verify.check_mesh import AT_NODE, check_first_step
-from feti_homog.verify.discrete_cell import BONDED, DIRECTION_DIGITS, DiscreteCell
-from feti_homog.verify.findings import STRENGTH, Findings, Points, Section, relative, solver_limit
-from feti_homog.verify.path_energies import check_path_energies
-
-# Utilisations by tractions below 10 rtol of the stress are none to the program; twice as many are here.
-NOISE_PER_RTOL = 20.0
+from feti_homog.verify.check_loads import NAMES, TEMPERATURE, StateNumbers, States, damaged_at
+from feti_homog.verify.discrete_cell import DiscreteCell
+from feti_homog.verify.findings import CONTACT_PER_RTOL, ROUNDING, STRENGTH, Findings, Points, Section, solver_limit
+from feti_homog.verify.reading import Status
 
 
-def check_path(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check the points of a path in result.json, and its states."""
-    points = cell.files.document["path"]
-    if any(not 0 <= state.point < len(points) for state in states):  # which breaks the law of the load
-        return
-    by_events, law = cell.files.case["path"]["method"] == "events", law_at(cell.files)
-    if not by_events:
-        check_first_step(findings, cell, points[0])
-    for number, (point, after) in enumerate(pairwise(points)):
-        broke = (point if by_events else after)["broke"]
-        findings.compare("breaks", point["bonded"] - after["bonded"], broke, 1.0, f"path[{number + 1}].bonded")
-    if by_events and points[-1]["load_factor"] == 1.0:
-        findings.record("breaks", points[-1]["broke"], f"path[{len(points) - 1}], bonds that broke at the end")
-    # Signs are sure where a force or a gap is 20 rtol beyond zero.  While contact changes at one load, all else moves
-    # by 115 rtol then, the median of 276 changes, and by 2100 rtol at most.
-    tolerance = max(STRENGTH, 10.0 * solver_limit(float(cell.files.document["solver"].hint("rtol"))))
-    if law.has_tips:
-        states = [_check_tips(findings, cell, state, points[state.point]["tips"]) for state in states]
-    # Events break the worst bonds. No bond exceeds its strength unless a jump at this load overloads it and it breaks.
-    for number, state in enumerate(states):
-        used, where = np.nan_to_num(state.used), f"{state.name}, interface node {{}}".format
-        overloaded = by_events & overloaded_by_jump(state, points, tolerance)
-        findings.record("strength", np.where(overloaded, 0.0, np.maximum(used - 1.0, 0.0)), where)
-        largest, after = used.max(initial=1.0), states[min(number + 1, len(states) - 1)]
-        if by_events and (broke := damaged_at(points[state.point])):
-            # The next point has the bonds that break; here so many are as near to their strength as the worst.
-            worst = np.sort(np.where(np.isnan(state.used), np.inf, state.used))[-broke:]
-            findings.record("strength", np.maximum(1.0 - worst / largest, 0.0), f"{state.name}, bonds that break")
-        if by_events and after.point == state.point + 1:
-            broken = (after.damage > state.damage) & ~np.isnan(state.used)
-            findings.record("strength", np.where(broken, 1.0 - state.used / largest, 0.0), where)
-    _check_steps(findings, cell, states, points, by_events)
-    check_path_energies(findings, cell, states, points)
-
-
-def _check_steps(findings: Findings, cell: DiscreteCell, states: States, points: Points, by_events: bool) -> None:
-    """Check the breaks between consecutive states, which never heal, and the growth of the fracture energy.
+def check_breaks(findings: Findings, cell: DiscreteCell, states: States) -> None:
+    """Check that bonds break as the points of a path report, never heal, and absorb the fracture energy.
 
     This energy grows with the broken length by G_c in the mode of the state before, if the files have that state, else
     by the range over all modes.
     """
+    points, by_events = cell.files.document["path"], cell.files.case["path"]["method"] == "events"
+    for number, (point, after) in enumerate(pairwise(points), start=1):
+        broke = (point if by_events else after)["broke"]
+        findings.compare("breaks", point["bonded"] - after["bonded"], broke, 1.0, f"path[{number}].bonded")
+    if by_events and points[-1]["load_factor"] == 1.0:
+        findings.record("breaks", points[-1]["broke"], f"path[{len(points) - 1}], bonds that broke at the end")
     has_toughness, scale = law_at(cell.files).has_toughness, float(np.finfo(float).tiny)
     if has_toughness:
         scale = max(points[-1]["fracture_energy"], scale)
         findings.record("energy", points[0]["fracture_energy"] * by_events / scale, "path[0].fracture_energy")
     for state, after in pairwise(states):
-        bonded, still, damaged = state.status == BONDED, after.status == BONDED, after.damage > state.damage
+        bonded, still = (each.status == Status.BONDED for each in (state, after))
+        damaged = after.damage > state.damage
         between = points[state.point : after.point] if by_events else points[state.point + 1 : after.point + 1]
         softened, limit = np.count_nonzero(still & damaged), sum(point.get("softened", 0) for point in between)
         off = abs(softened - limit) if len(between) == 1 else max(softened - limit, 0)
@@ -86,6 +54,33 @@ def _check_steps(findings: Findings, cell: DiscreteCell, states: States, points:
             findings.record("energy", off, f"{after.name}, fracture_energy")
 
 
+def check_strength(findings: Findings, cell: DiscreteCell, states: States) -> None:
+    """Check that no bond exceeds its strength, and events break the worst bonds.
+
+    A jump at this load may overload bonds that break.
+    """
+    points, law = cell.files.document["path"], law_at(cell.files)
+    # Signs are sure where a force or a gap is 20 rtol beyond zero.  While contact changes at one load, all else moves
+    # by 115 rtol then, the median of 276 changes, and by 2100 rtol at most.
+    tolerance = max(STRENGTH, 10.0 * solver_limit(float(cell.files.document["solver"].hint("rtol"))))
+    if law.has_tips:
+        states = [_check_tips(findings, cell, state, points[state.point]["tips"]) for state in states]
+    by_events = cell.files.case["path"]["method"] == "events"
+    for state, after in zip_longest(states, states[1:]):
+        used, where = np.nan_to_num(state.used), f"{state.name}, interface node {{}}".format
+        overloaded = by_events & overloaded_by_jump(state, points, tolerance)
+        findings.record("strength", np.where(overloaded, 0.0, np.maximum(used - 1.0, 0.0)), where)
+        if not by_events:
+            continue
+        largest, broke = used.max(initial=1.0), damaged_at(points[state.point])
+        # The next point has the bonds that break; here so many are as near to their strength as the worst.
+        worst = np.sort(np.where(np.isnan(state.used), np.inf, state.used))[::-1][:broke]
+        findings.record("strength", np.maximum(1.0 - worst / largest, 0.0), f"{state.name}, bonds that break")
+        if after is not None and after.point == state.point + 1:
+            broken = (after.damage > state.damage) & ~np.isnan(state.used)
+            findings.record("strength", np.where(broken, 1.0 - state.used / largest, 0.0), where)
+
+
 def overloaded_by_jump(state: StateNumbers, points: Points, tolerance: float) -> Bool:
     """(k,) bonds that may exceed their strength where some break.
 
@@ -95,7 +90,7 @@ def overloaded_by_jump(state: StateNumbers, points: Points, tolerance: float) ->
     if state.point == 0 or damaged_at(points[state.point]) == 0:
         return np.zeros(len(state.released), bool)
     before, now = points[state.point - 1 : state.point + 1]
-    if damaged_at(before) > 0 and abs(before["load_factor"] - now["load_factor"]) <= SAME_SHARE:
+    if damaged_at(before) > 0 and abs(before["load_factor"] - now["load_factor"]) <= ROUNDING:
         return np.ones(len(state.released), bool)
     same = damaged_at(before) == 0 and before["closed"] != now["closed"]
     for name in ("strain", "stress", TEMPERATURE):
@@ -111,7 +106,7 @@ def _check_tips(findings: Findings, cell: DiscreteCell, state: StateNumbers, tip
     """
     # By fibre, section and direction.
     node, rows = np.flatnonzero(cell.tips(state.status)), cell.files.interface
-    turned = np.round(cell.bond_directions[node], DIRECTION_DIGITS)
+    turned = np.round(cell.bond_directions[node] / ROUNDING)
     node = node[np.lexsort((turned, rows.pair[node], rows.fibre[node]))]
     law, where, used = law_at(cell.files, node), f"{state.name}, tip {{}}".format, state.used.copy()
     psi, first, second = law.mode(state.traction[node]), np.array(tips["G_I"]), np.array(tips["G_II"])
@@ -127,8 +122,7 @@ def _check_tips(findings: Findings, cell: DiscreteCell, state: StateNumbers, tip
         findings.compare("tables", tips["psi"], np.degrees(psi), 90.0, where)
         findings.compare("tables", first * np.sin(psi) ** 2, second * np.cos(psi) ** 2, first + second, where)
         if law.grows_by_release:
-            for name in ("G_I", "G_II"):
-                tips.leaves_open(name)
+            tips.leaves_open("G_I", "G_II")
         else:
             energies = law.energies(state.traction[node])
             total = energies.sum(axis=1)[:, None]
@@ -137,11 +131,14 @@ def _check_tips(findings: Findings, cell: DiscreteCell, state: StateNumbers, tip
 
 
 def check_envelope(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check the points of `envelope` in result.json, by the states of the unit loads."""
+    """Check the points of `envelope` in result.json, by the states of the unit loads.
+
+    Utilisations are 0 at debonded nodes and at tips that break by energy release.
+    """
     document, keys, law = cell.files.document, cell.files.case["envelope"], law_at(cell.files)
-    points, n, status = document["envelope"], keys["directions"], states[0].status
+    rows, points, n, status = cell.files.interface, document["envelope"], keys["directions"], states[0].status
     released = cell.tips(status) & law.grows_by_release
-    may_break = (status == BONDED) & ~released
+    may_break = (status == Status.BONDED) & ~released
     unit_loads = np.array([[*state.strain, state.temperature] for state in states]).T
     unit_tractions = np.stack([state.traction for state in states])
     findings.compare("load", len(points), n, 1.0, "envelope, which lacks directions or has too many")
@@ -160,39 +157,29 @@ def check_envelope(findings: Findings, cell: DiscreteCell, states: States) -> No
         shares, *_ = np.linalg.lstsq(unit_loads, np.array([*strain, temperature * has_factor]), rcond=None)
         traction = np.tensordot(shares, unit_tractions, axes=1)
         used = np.where(may_break, law.onset(traction), 0.0)
-        if has_factor:
-            stress, factor = np.array(point["stress"]), float(point["factor"])
-            value = strain if of_strains else stress
-            scale = max(factor, float(np.abs(value).max()))
-            findings.compare("load", value, factor * unit, scale, f"{at}, {' and '.join(keys['plane'])}")
-            terms = np.abs(stiffness) @ np.abs(strain) + np.abs(thermal)
-            findings.compare("load", stress, stiffness @ strain + thermal, terms.max(), f"{at}.stress")
-            _check_onset(findings, cell, point, traction, used, released, at)
-        else:
-            noise = NOISE_PER_RTOL * float(document["solver"].hint("rtol")) * np.abs(stiffness @ strain).max()
+        if not has_factor:
+            noise = CONTACT_PER_RTOL * float(document["solver"].hint("rtol")) * np.abs(stiffness @ strain).max()
             over = used > law.onset(np.full_like(traction, noise))
             findings.require("onset", not over.any(), f"{at}, where some load breaks a bond")
-
-
-def _check_onset(
-    findings: Findings, cell: DiscreteCell, point: Section, traction: Float, used: Float, released: Bool, at: str
-) -> None:
-    """Check that no bond exceeds its strength, and the bond in the file is at its strength and breaks as written.
-
-    Utilisations `used` (k,) are 0 at debonded nodes and at tips that break by energy release, `released` (k,).
-    """
-    rows, largest, away = cell.files.interface, float(used.max(initial=0.0)), cell.bond_directions - point["bond_angle"]
-    on_curve = (rows.fibre == point["fibre"]) & (rows.pair == point.get("interface", 1) - 1)
-    nodes = np.flatnonzero(on_curve & (np.abs((away + 180.0) % 360.0 - 180.0) < AT_NODE))
-    findings.require("tables", bool(len(nodes)), f"{at}, where no bond is")
-    if not len(nodes):
-        return
-    is_tip, node = bool(released[nodes].any()), int(nodes[np.argmax(used[nodes])])
-    if point["factor"] == 0.0:
-        findings.record("onset", max(1.0 - largest, 0.0) if not is_tip else 0.0, f"{at}, of the temperature alone")
-    else:
-        findings.record("onset", max(largest - 1.0, 0.0) if is_tip else abs(largest - 1.0), at)
-    if not is_tip:
-        findings.record("strength", (largest - used[node]) / largest, f"{at}, fibre and bond_angle")
-    for name, value in law_at(cell.files, np.array([node])).breaks(traction[node : node + 1]).items():
-        findings.record("onset", relative(point[name] - value, 90.0 if name == "psi" else 1.0), f"{at}.{name}")
+            continue
+        stress, factor = np.array(point["stress"]), float(point["factor"])
+        value, terms = strain if of_strains else stress, np.abs(stiffness) @ np.abs(strain) + np.abs(thermal)
+        scale = max(factor, float(np.abs(value).max()))
+        findings.compare("load", value, factor * unit, scale, f"{at}, {' and '.join(keys['plane'])}")
+        findings.compare("load", stress, stiffness @ strain + thermal, terms.max(), f"{at}.stress")
+        # No bond exceeds its strength, and the bond in the file is at its strength and breaks as written.
+        largest, away = float(used.max(initial=0.0)), cell.bond_directions - point["bond_angle"]
+        on_curve = (rows.fibre == point["fibre"]) & (rows.pair == point.get("interface", 1) - 1)
+        nodes = np.flatnonzero(on_curve & (np.abs((away + 180.0) % 360.0 - 180.0) < ROUNDING))
+        findings.require("tables", bool(len(nodes)), f"{at}, where no bond is")
+        if not len(nodes):
+            continue
+        is_tip, node, off = bool(released[nodes].any()), int(nodes[np.argmax(used[nodes])]), largest - 1.0
+        if factor == 0.0:
+            findings.record("onset", 0.0 if is_tip else max(-off, 0.0), f"{at}, of the temperature alone")
+        else:
+            findings.record("onset", max(off, 0.0) if is_tip else abs(off), at)
+        if not is_tip:
+            findings.record("strength", (largest - used[node]) / largest, f"{at}, fibre and bond_angle")
+        for name, expected in law_at(cell.files, np.array([node])).breaks(traction[node : node + 1]).items():
+            findings.compare("onset", point[name], expected, 90.0 if name == "psi" else 1.0, f"{at}.{name}")

@@ -1,7 +1,7 @@
 """Sensitivity law: field energies change as in the file where constants of the case change."""
 
 import copy
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -12,13 +12,13 @@ from feti_homog.verify.bonds import law_at
 from feti_homog.verify.check_constants import NOISE, constants_of
 from feti_homog.verify.check_loads import NAMES
 from feti_homog.verify.constitutive_law import laws, mixed_phases
-from feti_homog.verify.discrete_cell import BONDED, CLOSED, DiscreteCell
+from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.elements import Elements
 from feti_homog.verify.findings import STEP, Findings, Section, relative
-from feti_homog.verify.reading import Mesh, State
+from feti_homog.verify.reading import State, Status, gradient
+from feti_homog.verify.torus import from_centre
 
-TINY = np.finfo(float).tiny
-WEIGHTS = (1.0, -0.7, 0.5, 0.9, -0.8)
+TINY = float(np.finfo(float).tiny)
 SPRINGS = ("normal_stiffness", "tangential_stiffness", "axial_stiffness")
 Case = dict[str, Any]
 
@@ -32,79 +32,80 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
         return
     data = document["sensitivities"]
     names = data["parameters"]
-    missing = sorted({*_parameters(cell)}.difference(names))
-    findings.record("tables", [np.inf] * len(missing), lambda k: f"sensitivities, {missing[k]}")
+    # All constants of phases and springs that the answer depends on: names end in .k for one of several numbers, in
+    # .Cij for an entry of a stiffness.
+    material, sections, needed = cell.files.case["material"], cell.files.interfaces, set[str]()
+    for phase in {*cell.files.phases} & material.keys():
+        for key, value in material[phase].items():
+            if "thermal_stress" in document or not key.startswith("expansion"):
+                numbers = np.array(value, float)
+                ends = [f".{k + 1}" for k in range(len(numbers))] if numbers.ndim else [""]
+                if numbers.ndim > 1:
+                    ends = [f".C{i + 1}{j + 1}" for i, j in np.argwhere(np.triu(numbers))]
+                needed |= {f"material.{phase}.{key}{end}" for end in ends}
+    for number, section in enumerate(sections, start=1):
+        name = f"interface.{number}" if len(sections) > 1 else "interface"
+        needed |= {f"{name}.{key}" for key in SPRINGS if np.isfinite(float(section.get(key) or np.inf))}
+    missing = sorted(needed.difference(names))
+    findings.record("tables", [np.inf] * len(missing), lambda i: f"sensitivities, {missing[i]}")
     places = (_place(dict(cell.files.case), name) for name in names)
     values = np.array([np.array(table[key], float)[index] for table, key, index in places])
     # Changes over which the laws are nearly linear.
     ratios = np.array([name.endswith(".poisson") for name in names]) & (values < 0.5)
     sizes = np.where(ratios, 0.5 - values, np.where(values == 0.0, 1.0, np.abs(values)))
-    direction = sizes * np.resize(WEIGHTS, len(values))
+    k = np.arange(1, len(values) + 1)
+    direction = sizes * (-1.0) ** k * (1 + 1 / k)  # of both signs and different sizes, none small
     states = list(cell.files.states())
-    fixed_status = "load" not in document and data.get("at_fixed_status")
-    if fixed_status:
+    if "load" not in document and data.get("at_fixed_status"):
         states = states[: len(states) // 2]  # the second half is under minus the unit loads
-    moved = [_moved(cell, names, values + sign * STEP * direction) for sign in (1, -1)]
-    above, below = (_energies(cell, states, case) for case in moved)
-    slope = (above - below) / (2 * STEP)
-    if "load" in document or fixed_status:
-        check = _check_secants if fixed_status else _check_load
-        check(findings, cell, states, slope, direction)
-        return
-    # All constants of a linear cell.
-    C, heat = np.array(document["effective_stiffness"]), document.get("thermal_stress")
-    heat = None if heat is None else np.array(heat)
-    constants, n = constants_of(C, heat), len(C)
-    step = STEP * np.abs(C).max() / max(float(np.abs(slope).max()), TINY)
-    ends = [
-        constants_of(C + change[:, :n], None if heat is None else heat + change[:, n])
-        for change in (step * slope, -step * slope)
-    ]
-    for k, name in enumerate(data["constants"]):
-        kind = NOISE * max(abs(value) for other, value in constants.items() if other[0] == name[0])
-        terms, size = np.array(data["derivatives"][k]) * direction, max(abs(constants[name]), kind)
-        expected, scale = (ends[0][name] - ends[1][name]) / (2 * step), max(float(np.abs(terms).max()), size)
-        findings.compare("sensitivities", terms.sum(), expected, scale, name)
-        findings.compare("moduli", data["constant_values"][k], constants[name], size, f"sensitivities, {name}")
+    energies = []
+    for sign in (1, -1):
+        case: Case = copy.deepcopy(dict(cell.files.case))
+        for name, value in zip(names, values + sign * STEP * direction, strict=True):
+            table, key, index = _place(case, name)
+            numbers = np.array(table[key], float)
+            numbers[index] = numbers[index[::-1]] = value
+            table[key] = numbers.tolist()
+        energies.append(_energies(cell, states, case))
+    check = _check_load if "load" in document else _check_moduli
+    check(findings, cell, states, (energies[0] - energies[1]) / (2 * STEP), direction)
 
 
-def _parameters(cell: DiscreteCell) -> Iterator[str]:
-    """Yield the names of all constants of phases and springs that the answer depends on.
+def _check_moduli(findings: Findings, cell: DiscreteCell, states: list[State], slope: Float, direction: Float) -> None:
+    """Check the constants of a stiffness and their derivatives.
 
-    Names end in .k for one of several numbers, in .Cij for an entry of a stiffness.
-    """
-    material, sections = cell.files.case["material"], cell.files.interfaces
-    for phase in {*cell.files.phases} & material.keys():
-        for key, value in material[phase].items():
-            if "thermal_stress" in cell.files.document or not key.startswith("expansion"):
-                numbers = np.array(value, float)
-                places = [f".{k + 1}" for k in range(len(numbers))] if numbers.ndim else [""]
-                if numbers.ndim > 1:
-                    places = [f".C{i + 1}{j + 1}" for i, j in np.argwhere(np.triu(numbers))]
-                yield from (f"material.{phase}.{key}{place}" for place in places)
-    for number, section in enumerate(sections, start=1):
-        name = f"interface.{number}" if len(sections) > 1 else "interface"
-        yield from (f"{name}.{key}" for key in SPRINGS if np.isfinite(float(section.get(key) or np.inf)))
-
-
-def _check_secants(findings: Findings, cell: DiscreteCell, states: list[State], slope: Float, direction: Float) -> None:
-    """Check derivatives of contact states' energies, which are stationary, too: the diagonal of the secants.
-
-    Other derivatives need fields under other loads at the same status, which no file has; only values are checked.
+    Energies of contact states are stationary, too: the diagonal of the secants. Other derivatives need fields under
+    other loads at the same status, which no file has; only values are checked.
     """
     document, data = cell.files.document, cell.files.document["sensitivities"]
-    data.leaves_open("derivatives")
-    entries = {f"C{i + 1}{j + 1}": C for (i, j), C in np.ndenumerate(np.array(document["effective_stiffness"]))}
-    entries |= {f"thermal_S{k + 1}{k + 1}": heat for k, heat in enumerate(document.get("thermal_stress", ()))}
-    for name, value in zip(data["constants"], data["constant_values"], strict=True):
-        findings.compare("constants", value, entries.get(name, np.inf), abs(value) or TINY, name)
-    diagonals = zip(np.diag(_energies(cell, states, cell.files.case)), np.diag(slope), strict=True)
-    for number, (energy, change) in enumerate(diagonals, start=1):
-        k = data["constants"].index(name := f"C{number}{number}")
-        terms, value = np.array(data["derivatives"][k]) * direction, data["constant_values"][k]
-        scale = max(float(np.abs(terms).max()), abs(value))
-        findings.compare("sensitivities", terms.sum(), change, scale, name)
-        findings.compare("constants", value, energy, max(abs(energy), TINY), name)
+    C, heat = np.array(document["effective_stiffness"]), document.get("thermal_stress")
+    heat, n = None if heat is None else np.array(heat), len(C)
+    law, floor, constants = "moduli", NOISE, constants_of(C, heat)
+    if data.get("at_fixed_status"):
+        data.leaves_open("derivatives")
+        law, floor = "constants", 0.0
+        entries = {f"C{i + 1}{j + 1}": value for (i, j), value in np.ndenumerate(C)}
+        constants = {name: value for name, value in constants.items() if name.startswith("thermal")} | entries
+        changes = {f"C{k + 1}{k + 1}": slope[k, k] for k in range(n)}
+        for name, energy in zip(changes, np.diag(_energies(cell, states, cell.files.case)), strict=True):
+            value = data["constant_values"][data["constants"].index(name)]
+            findings.compare("constants", value, energy, max(abs(energy), TINY), name)
+    else:
+        step = STEP * np.abs(C).max() / max(float(np.abs(slope).max()), TINY)
+        ends = [
+            constants_of(C + change[:, :n], None if heat is None else heat + change[:, n])
+            for change in (step * slope, -step * slope)
+        ]
+        changes = {name: (ends[0][name] - ends[1][name]) / (2 * step) for name in constants}
+    rows = zip(data["constants"], data["constant_values"], data["derivatives"], strict=True)
+    for name, value, derivatives in rows:
+        expected, terms = constants.get(name, np.nan), np.array(derivatives) * direction
+        largest = max([abs(constants[other]) for other in constants if other[0] == name[0]], default=0.0)
+        size = max(abs(expected), floor * largest, TINY)
+        findings.compare(law, value, expected, size, f"sensitivities, {name}")
+        if name in changes:
+            scale = max(float(np.abs(terms).max()), size)
+            findings.compare("sensitivities", terms.sum(), changes[name], scale, name)
 
 
 def _check_load(findings: Findings, cell: DiscreteCell, states: list[State], slope: Float, direction: Float) -> None:
@@ -149,22 +150,22 @@ def _place(case: Case, name: str) -> tuple[Any, str, tuple[int, ...]]:
     return table, keys[0], tuple(int(digit) - 1 for digit in "".join(keys[1:]) if digit.isdigit())
 
 
-def _moved(cell: DiscreteCell, names: Sequence[str], values: Float) -> Case:
-    """Return the case with other values of the parameters."""
-    case: Case = copy.deepcopy(dict(cell.files.case))
-    for name, value in zip(names, values, strict=True):
-        table, key, index = _place(case, name)
-        numbers = np.array(table[key], float)
-        numbers[index] = numbers[index[::-1]] = value
-        table[key] = numbers.tolist()
-    return case
-
-
 def _energies(cell: DiscreteCell, states: list[State], case: Mapping[str, Any]) -> Float:
     """(v, v) or (6, 7) energies of unit-load field pairs in this case; the first field in a pair is under a strain."""
     files, phases = cell.files, cell.files.phases
     growth = float(np.log(case["cell"].get("fibre_fraction", 1.0) / files.case["cell"].get("fibre_fraction", 1.0))) / 2
-    mesh, states = _grown(cell, growth, states) if growth else (files.mesh, states)
+    x, V = files.mesh.points, np.zeros_like(files.mesh.points)
+    fibres, images = files.fibres, np.array([[i, j] for i in (-1, 0, 1) for j in (-1, 0, 1)]) * files.size
+    # Where radii grow, nodes around a fibre move with its circle, less and less to nothing halfway to the next fibre;
+    # the states keep u - E x.
+    for c, R in zip(fibres.centre, fibres.radius, strict=True) if growth else ():
+        gaps = np.linalg.norm(fibres.centre[:, None] + images - c, axis=2) - fibres.radius[:, None] - R
+        half = np.partition(gaps.ravel(), 1)[1] / 2  # the least is to the fibre itself, -2 R
+        d = from_centre(x, c, files.size)
+        r = np.hypot(*d.T)
+        V += growth * d * (R / np.maximum(r, R) * np.clip(1 - (r - R) / half, 0.0, 1.0))[:, None]
+    mesh = replace(files.mesh, points=x + V)
+    states = [replace(state, displacement=state.displacement + V @ gradient(state.strain).T) for state in states]
     stiffnesses, free = laws(case, phases)
     # Elements keep their kind where equal constants change apart.
     elements = Elements(mesh, stiffnesses, mixed_phases(files.case, phases))
@@ -179,28 +180,7 @@ def _energies(cell: DiscreteCell, states: list[State], case: Mapping[str, Any]) 
         out = float(elements.area @ fields.stress[:, 2]) if files.is_spatial else 0.0
         columns.append([float((other.displacement * fields.force).sum()) + other.along * out for other in strains])
         for row, other in enumerate(strains):
-            acts = np.repeat((other.status == BONDED)[:, None], other.jump.shape[1], axis=1)
-            acts[other.status == CLOSED, 0] = True  # closed faces press on the rest of their springs
+            acts = np.repeat((other.status == Status.BONDED)[:, None], other.jump.shape[1], axis=1)
+            acts[other.status == Status.CLOSED, 0] = True  # closed faces press on the rest of their springs
             columns[-1][row] += float((springs * other.jump * state.jump)[acts].sum())
     return np.array(columns).T / cell.area
-
-
-def _grown(cell: DiscreteCell, growth: float, states: list[State]) -> tuple[Mesh, list[State]]:
-    """Return the mesh with radii larger by the fraction `growth`, and the states with equal u - E x.
-
-    Nodes around a fibre move with its circle, less and less to nothing halfway to the next fibre.
-    """
-    files, x = cell.files, cell.files.mesh.points
-    fibres, images = files.fibres, np.array([[i, j] for i in (-1, 0, 1) for j in (-1, 0, 1)]) * files.size
-    V = np.zeros_like(x)
-    for c, R in zip(fibres.centre, fibres.radius, strict=True):
-        gaps = np.linalg.norm(fibres.centre[:, None] + images - c, axis=2) - fibres.radius[:, None] - R
-        half = np.partition(gaps.ravel(), 1)[1] / 2  # the least is to the fibre itself, -2 R
-        d = (x - c + files.size / 2) % files.size - files.size / 2
-        r = np.hypot(*d.T)
-        V += d * (R / np.maximum(r, R) * np.clip(1 - (r - R) / half, 0.0, 1.0))[:, None]
-    terms, grown = np.column_stack([x, np.ones(len(x))]), []
-    for state in states:
-        H = np.linalg.lstsq(terms, state.displacement - state.fluctuation, rcond=None)[0][:2]
-        grown.append(replace(state, displacement=state.displacement + growth * V @ H))
-    return replace(files.mesh, points=x + growth * V), grown

@@ -1,31 +1,21 @@
-"""Laws of one state: stresses, periodicity, equilibrium, averages; jumps, bonds, contact, friction."""
+"""Laws of one state: stresses, averages; periodicity, continuity, equilibrium; jumps, bonds, contact, friction."""
 
 import numpy as np
 
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Float
 from feti_homog.verify.bonds import friction_at, law_at, rubbing_force
 from feti_homog.verify.constitutive_law import out_of_plane
-from feti_homog.verify.discrete_cell import BONDED, CLOSED, OPEN, ROUNDED_TERMS, DiscreteCell
+from feti_homog.verify.discrete_cell import ROUNDED_TERMS, DiscreteCell
 from feti_homog.verify.elements import PLACES, ElementFields
 from feti_homog.verify.findings import Findings, relative
-from feti_homog.verify.reading import State
+from feti_homog.verify.reading import State, Status
 
 
 def check_state(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
-    """Check all laws of a single state; `fields` follow from its displacements."""
+    """Check stresses and averages of a state; `fields` follow from its displacements."""
     element = f"{state.name}, element {{}}".format
     stiffest = np.abs(cell.stiffnesses).max(axis=(1, 2))[cell.files.mesh.phase]
     findings.compare("stress", state.stress, fields.stress, (stiffest * fields.strain_size)[:, None], element)
-    # Copies of a node have one fluctuation: by periodicity in a subdomain, by gluing elsewhere.
-    nodes, scale = cell.nodes, cell.largest_displacement(state)
-    values = state.fluctuation[nodes.node]
-    in_subdomain = nodes.place * (int(nodes.subdomain.max()) + 1) + nodes.subdomain
-    for law, group in (("periodicity", in_subdomain), ("continuity", _glued(cell))):
-        _, inverse, count = np.unique(group, return_inverse=True, return_counts=True)
-        copy = inverse.ravel()
-        means = np.stack([(np.bincount(copy, column) / count)[copy] for column in values.T], axis=1)
-        findings.compare(law, values, means, scale, lambda i: f"{state.name}, mesh node {nodes.node[i]}")
-    _check_equilibrium(findings, cell, state, fields)
     # <sigma> = Sigma, <eps> = E with face openings and void strains, and Hill's condition.
     area, weights, v, scales = cell.area, cell.elements.area[:, None], len(state.strain), cell.scales_of(state)
     mean = (weights * fields.stress).sum(axis=0) / area
@@ -48,7 +38,6 @@ def check_state(findings: Findings, cell: DiscreteCell, state: State, fields: El
         undetermined = np.isnan(S33) & np.isnan(state.stress_33)  # by the constants
         off = np.where(undetermined, 0.0, state.stress_33 - S33)
         findings.record("stress 33", relative(off, np.where(undetermined, 1.0, terms)), element)
-    _check_bonds(findings, cell, state)
 
 
 def interface_forces(cell: DiscreteCell, state: State) -> Float:
@@ -56,50 +45,52 @@ def interface_forces(cell: DiscreteCell, state: State) -> Float:
     return cell.in_axes(state.traction * cell.files.interface.length[:, None])
 
 
-def _glued(cell: DiscreteCell) -> Int:
-    """(b,) numbers that glued nodes share: one at a place, two at an interface node, the odd number on the fibre."""
-    return np.asarray(2 * cell.nodes.place + ((cell.faces.row >= 0) & cell.faces.is_fibre))
-
-
-def _check_equilibrium(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
-    """Check that forces on all node copies balance, on interface faces with the traction.
+def check_gluing(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
+    """Check that copies of a node have one fluctuation and balanced forces, on interface faces with the traction.
 
     The fixed place, where u* = 0, collects all rounding, with independent signs: the root of summed squares.
     """
-    nodes, faces, traction = cell.nodes, cell.faces, interface_forces(cell, state)
+    nodes, traction, largest = cell.nodes, interface_forces(cell, state), cell.largest_displacement(state)
+    # Periodic copies lie in one subdomain.  Glued nodes share a number: one at a place, two at an interface node, the
+    # odd number on the fibre.
+    in_subdomain = nodes.place * (int(nodes.subdomain.max()) + 1) + nodes.subdomain
+    glued = 2 * nodes.place + ((cell.faces.row >= 0) & cell.faces.is_fibre)
+    values = state.fluctuation[nodes.node]
+    for law, group in (("periodicity", in_subdomain), ("continuity", glued)):
+        side, first, copy, count = np.unique(group, return_index=True, return_inverse=True, return_counts=True)
+        copy = copy.ravel()
+        means = np.stack([(np.bincount(copy, column) / count)[copy] for column in values.T], axis=1)
+        findings.compare(law, values, means, largest, lambda i: f"{state.name}, mesh node {nodes.node[i]}")
     scale = max(fields.largest_force, float(np.abs(traction).max(initial=0.0)))
     scale = max(scale, cell.scales_of(state).stress * float(np.sqrt(cell.elements.area.min())) * 1e-3)
     is_fixed = (state.fluctuation == 0.0).all(axis=1)
-    rounding = ROUNDED_TERMS * fields.force_size.max()
-    rounding_of_all = ROUNDED_TERMS * np.linalg.norm(fields.force_size)
-    inner = fields.force.copy()
+    rounding, rounding_of_all = (ROUNDED_TERMS * np.linalg.norm(fields.force_size, order) for order in (np.inf, 2))
+    inner = fields.force.copy()  # of nodes within subdomains
     inner[nodes.node] = 0.0
     scales = scale + np.where(is_fixed, rounding_of_all, rounding)
     findings.record("equilibrium", relative(inner, scales[:, None]), f"{state.name}, mesh node {{}}".format)
-    side, first, inverse = np.unique(_glued(cell), return_index=True, return_inverse=True)
-    inverse, row = inverse.ravel(), np.full(nodes.places, -1)
-    sums = np.stack([np.bincount(inverse, column, len(side)) for column in fields.force[nodes.node].T], axis=1)
-    row[nodes.place] = faces.row
-    at = row[side // 2]
+    # Forces of glued nodes, the last group.
+    sums = np.stack([np.bincount(copy, column) for column in fields.force[nodes.node].T], axis=1)
     # The traction pulls the fibre, its reaction the matrix.
-    on_face = at >= 0
-    sums[on_face] -= np.where(side % 2 == 1, 1.0, -1.0)[on_face, None] * traction[at[on_face]]
+    row = cell.faces.row[first]
+    on_face = row >= 0
+    sums[on_face] -= np.where(side % 2 == 1, 1.0, -1.0)[on_face, None] * traction[row[on_face]]
 
     def name(i: int) -> str:
-        return f"{state.name}, mesh node {nodes.node[first[i]]}" + f" (interface node {at[i]})" * bool(at[i] >= 0)
+        return f"{state.name}, mesh node {nodes.node[first[i]]}" + f" (interface node {row[i]})" * bool(on_face[i])
 
-    has_fixed = np.bincount(inverse, is_fixed[nodes.node], len(side)) > 0
+    has_fixed = np.bincount(copy, is_fixed[nodes.node]) > 0
     scales = scale + np.where(has_fixed, rounding_of_all, rounding)
     findings.record("equilibrium", relative(sums, scales[:, None]), name)
 
 
-def _check_bonds(findings: Findings, cell: DiscreteCell, state: State) -> None:
+def check_bonds(findings: Findings, cell: DiscreteCell, state: State) -> None:
     """Check jumps by displacements, bonds by their springs, friction by mu p, and contact.
 
     On debonded faces gap >= 0, traction <= 0, gap traction = 0, and only friction acts along them.
     """
     files, at = cell.files, f"{state.name}, interface node {{}}".format
-    values, bonded = state.fluctuation[cell.nodes.node], state.status == BONDED
+    values, bonded = state.fluctuation[cell.nodes.node], state.status == Status.BONDED
     parted = cell.faces.means(values, of_fibre=False) - cell.faces.means(values, of_fibre=True)
     largest = cell.largest_displacement(state)
     findings.compare("jump", cell.in_axes(state.jump), parted, largest, at)
@@ -108,31 +99,32 @@ def _check_bonds(findings: Findings, cell: DiscreteCell, state: State) -> None:
     slack = state.jump - law_at(files, damage=state.damage).jumps(state.traction)
     rubs = (friction_at(files, on_damage=True) > 0.0) & bonded & (state.damage > 0.0)
     gap = slack[:, 0].copy()
-    slack[rubs, 1] = slack[~bonded, 1:] = slack[state.status == OPEN] = 0.0
+    slack[rubs, 1] = slack[~bonded, 1:] = slack[state.status == Status.OPEN] = 0.0
     findings.record("bond", relative(slack, largest), at)
     if not len(bonded):
         return
     normal, shear = state.traction[:, 0], np.abs(state.traction[:, 1:]).max(axis=1)
     pressure, (_, least, imposed) = np.maximum(-normal, 0.0), cell.scales_of(state)
     pull, force = max(float(np.abs(state.traction).max()), least), np.abs(normal) * files.interface.length
-    laws = []
+
+    def record(law: str, violation: Float, scale: float) -> None:
+        findings.record(law, relative(violation, scale), at)
+
     if not bonded.all():
-        friction, closed = friction_at(files) * pressure, state.status == CLOSED
+        friction, closed = friction_at(files) * pressure, state.status == Status.CLOSED
         push = max(float(force.max()), least * float(files.interface.length.max()))
         excess = np.where(bonded, 0.0, np.maximum(shear - friction, 0.0))
-        laws.append(("free faces", excess + np.where(state.status == OPEN, np.abs(normal), 0.0), pull))
+        record("free faces", excess + np.where(state.status == Status.OPEN, np.abs(normal), 0.0), pull)
         if friction.any():
             slides = (state.sliding != 0) & closed
-            laws.append(("sliding", np.where(slides, state.sliding * state.traction[:, 1] - friction, 0.0), pull))
-            laws.append(("sliding", np.where(closed | rubs, 0.0, np.abs(state.sliding)), 1.0))
+            record("sliding", np.where(slides, state.sliding * state.traction[:, 1] - friction, 0.0), pull)
+            record("sliding", np.where(closed | rubs, 0.0, np.abs(state.sliding)), 1.0)
         if files.contact:
-            laws.append(("penetration", np.where(bonded, 0.0, np.maximum(-gap, 0.0)), imposed))
-            laws.append(("tension", np.where(closed, np.maximum(normal, 0.0), 0.0), pull))
-            laws.append(("complementarity", np.where(bonded, 0.0, force * gap), push * imposed))
+            record("penetration", np.where(bonded, 0.0, np.maximum(-gap, 0.0)), imposed)
+            record("tension", np.where(closed, np.maximum(normal, 0.0), 0.0), pull)
+            record("complementarity", np.where(bonded, 0.0, force * gap), push * imposed)
     if rubs.any():
         rubbing, limit = rubbing_force(files, state), friction_at(files, on_damage=True) * pressure
         sticks = np.maximum(np.abs(rubbing) - limit, 0.0)
         off = np.where(state.sliding != 0, state.sliding * rubbing - limit, sticks)
-        laws.append(("sliding", np.where(rubs, off, 0.0), pull))
-    for law, violation, scale in laws:
-        findings.record(law, relative(violation, scale), at)
+        record("sliding", np.where(rubs, off, 0.0), pull)

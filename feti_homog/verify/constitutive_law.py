@@ -52,12 +52,9 @@ def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
     mixed = []
     for constants in (phase_constants(case, phase) for phase in phases):
         is_isotropic = "young" in constants
-        if "E_transverse" in constants:
-            E, nu = float(constants["E_transverse"]), float(constants["nu_transverse"])
-            axial = [constants.get("E_axial"), constants.get("nu_axial")]
-            axial += [constants["G_axial"]] if constants.get("G_axial") is not None else []
-            expected = [E, nu, E / 2 / (1 + nu)][: len(axial)]
-            is_isotropic = None not in axial and np.allclose(np.array(axial, float), expected, rtol=ROUNDING, atol=0)
+        if constants.get("E_axial") is not None and constants.get("nu_axial") is not None:
+            isotropic = {"young": constants["E_transverse"], "poisson": constants["nu_transverse"]}
+            is_isotropic = np.allclose(_compliance(constants), _compliance(isotropic), rtol=ROUNDING, atol=0)
         mixed.append(is_isotropic)
     has_mixed = case["cell"].get("element", "mixed") == "mixed" and case["analysis"]["plane"] != "stress"
     return np.asarray(np.array(mixed, bool) & has_mixed)

@@ -1,10 +1,8 @@
 """The cell in a result: its elements, torn nodes, interface faces, and scales for its states."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -15,12 +13,10 @@ from feti_homog.verify.bonds import friction_at, pairs_of
 from feti_homog.verify.constitutive_law import laws, mixed_phases
 from feti_homog.verify.elements import Elements, add_at_nodes
 from feti_homog.verify.findings import ROUNDING
-from feti_homog.verify.reading import ResultFiles, State, gradient
+from feti_homog.verify.reading import ResultFiles, State, Status, gradient
 
 # Share of the terms that adds to the scale of their sum: 1e-15 of the terms are rounding.
 ROUNDED_TERMS = 1e-5
-BONDED, CLOSED, OPEN = 0, 1, 2
-DIRECTION_DIGITS = 9  # to which directions of tips differ
 
 
 class Scales(NamedTuple):
@@ -91,7 +87,7 @@ class DiscreteCell:
     largest_strain: float
 
     @classmethod
-    def of(cls, files: ResultFiles) -> DiscreteCell:
+    def of(cls, files: ResultFiles) -> Self:
         """Return the cell of a result. Raises CaseError if a phase has no material."""
         mesh = files.mesh
         stiffnesses, free = laws(files.case, files.phases)
@@ -109,12 +105,9 @@ class DiscreteCell:
         is_fibre = np.asarray((pair[nodes.place] >= 0) & (node_depth == innermost[nodes.place]))
         # The place nearest to each interface node.
         points, size = files.interface.points, files.size
-        place, distance = np.full(len(points), -1), np.full(len(points), np.inf)
-        if len(points) and len(nodes.node):
-            tree = cKDTree(torus.wrapped(mesh.points[nodes.node], size), boxsize=size)
-            away, nearest = tree.query(torus.wrapped(points, size), distance_upper_bound=radius)
-            on_mesh = np.flatnonzero(np.isfinite(away))
-            place[on_mesh], distance[on_mesh] = nodes.place[nearest[on_mesh]], away[on_mesh]
+        tree = cKDTree(torus.wrapped(mesh.points[nodes.node], size), boxsize=size)
+        distance, nearest = tree.query(torus.wrapped(points, size), distance_upper_bound=radius)
+        place = np.append(nodes.place, -1)[nearest]
         row_of = np.full(nodes.places, -1)
         row_of[place[place >= 0]] = np.flatnonzero(place >= 0)
         labels = nodes.place * (int(nodes.subdomain.max(initial=0)) + 1) + nodes.subdomain
@@ -152,7 +145,7 @@ class DiscreteCell:
 
     def tips(self, status: AnyInt) -> Bool:
         """(k,) bonds next to a broken one."""
-        rows, broken, near_break = self.inner_rows, status != BONDED, np.zeros(len(status), bool)
+        rows, broken, near_break = self.inner_rows, status != Status.BONDED, np.zeros(len(status), bool)
         pairs = (rows[:, [0, 2, 2, 1]] if rows.shape[1] == 3 else rows).reshape(-1, 2)
         pairs = pairs[(pairs >= 0).all(axis=1)].T
         for node, neighbour in (pairs, pairs[::-1]):
@@ -171,7 +164,7 @@ class DiscreteCell:
         """(k,) `directions` in (-180, 180], or normal directions on fibres without a centre."""
         n1, n2 = self.files.interface.normal.T
         angle = np.where(np.isnan(self.directions), np.degrees(np.arctan2(n2, n1)), self.directions)
-        return np.asarray(angle + 360.0 * (np.round(angle, DIRECTION_DIGITS) <= -180.0))
+        return np.asarray(angle + 360.0 * (angle <= -180.0 + ROUNDING))
 
     def in_axes(self, vectors: Float) -> Float:
         """(k, c) x1, x2 and x3 components of normal, tangential and axial ones; the tangent is (-n2, n1)."""
@@ -181,17 +174,11 @@ class DiscreteCell:
 
     @cached_property
     def void_integrals(self) -> Float:
-        """(n, 2) int N n ds along the voids, by Gauss' rule of two points."""
+        """(n, 2) int N n ds along the voids: int N_a dN_b/ds, turned, times the places of the nodes b of a side."""
         sums, points = np.zeros_like(self.files.mesh.points), self.files.mesh.points
         nodes = self.sides.nodes[self.sides.at_void]
-        for t in (0.5 - np.sqrt(1 / 12), 0.5 + np.sqrt(1 / 12)):
-            if nodes.shape[1] == 2:
-                shapes, slopes = np.array([1 - t, t]), np.array([-1.0, 1.0])
-            else:
-                shapes = np.array([(1 - t) * (1 - 2 * t), t * (2 * t - 1), 4 * t * (1 - t)])
-                slopes = np.array([4 * t - 3, 4 * t - 1, 4 - 8 * t])
-            dx, dy = np.einsum("a,sad->ds", slopes, points[nodes])
-            add_at_nodes(sums, nodes, 0.5 * np.stack([-dy, dx], axis=1)[:, None] * shapes[:, None])
+        M = np.array([[-3, -1, 4], [1, 3, -4], [-4, 4, 0]]) / 6 if nodes.shape[1] == 3 else np.array([[-1, 1]] * 2) / 2
+        add_at_nodes(sums, nodes, M @ points[nodes] @ np.array([[0, 1], [-1, 0]]))
         return sums
 
     def loads(self, strain: Float, temperature: float) -> Float:

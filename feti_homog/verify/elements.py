@@ -17,8 +17,6 @@ from feti_homog.typing import Bool, Float, Int
 from feti_homog.verify.reading import Mesh
 
 ELEMENTS_AT_ONCE = 1 << 15
-MOST_KEPT = 50_000_000  # numbers of gradients that stay from state to state: 400 MB
-SIDES = ((0, 1), (1, 2), (2, 0))
 # (c, 2) place of du_i/dx_d in the strains, by the number of strains.
 PLACES = {3: np.array([[0, 2], [2, 1]]), 6: np.array([[0, 5], [5, 1], [4, 3]])}
 # r_a = N_a + half of the functions of the two sides at vertex a.
@@ -121,8 +119,6 @@ class Elements:
                 lame = np.stack([self._stiffnesses[phase[mixed], 0, 1], self._stiffnesses[phase[mixed], -1, -1]], 1)
                 elastic = local[mixed] - own_free[mixed, None]
                 inner, pressure = inner_fields(gradients[mixed], weights[mixed], elastic, lame)
-                if v == 6:
-                    inner = np.concatenate([inner, np.zeros((*inner.shape[:2], 1, 2))], axis=2)
                 bubble = _strains(inner, v, 0.0)
                 local[mixed] += bubble
                 excess[mixed] = pressure - lame[:, :1] * (elastic + bubble)[..., NORMAL[v]].sum(axis=2)
@@ -131,16 +127,17 @@ class Elements:
             yield part, gradients, weights, slope, local, answer
 
     def _parts(self) -> Iterator[tuple[slice, Float, Float]]:
-        """Yield elements in portions, with gradients (e, q, a, 2) and weights (e, q) at their quadrature points."""
-        return iter(self._kept) if self._kept else self._computed()
+        """Yield elements in portions, with gradients (e, q, a, 2) and weights (e, q) at their quadrature points.
 
-    @cached_property
-    def _kept(self) -> list[tuple[slice, Float, Float]]:
-        points, nodes = _rule(self._mesh.triangles.shape[1])[0].shape[:2]
-        return list(self._computed()) if len(self._mesh.triangles) * points * nodes * 2 <= MOST_KEPT else []
-
-    def _computed(self) -> Iterator[tuple[slice, Float, Float]]:
-        slopes, shares = _rule(self._mesh.triangles.shape[1])
+        The rule is exact for constants, or for degree 4: Dunavant's (1985), at `quadrature_points`.
+        """
+        shares, slopes = np.ones(1), np.eye(3)[None]  # weights, their sum 1; dN_a/dr_b (q, a, 3)
+        if self._mesh.triangles.shape[1] == 6:
+            root, r = np.sqrt(213125 - 53320 * np.sqrt(10.0)), quadrature_points()
+            shares, slopes = (620 + root * np.repeat([1.0, -1.0], 3)) / 3720, np.zeros((6, 6, 3))
+            for a, b in ((0, 1), (1, 2), (2, 0)):
+                slopes[:, a, a] = 4 * r[:, a] - 1
+                slopes[:, 3 + a, a], slopes[:, 3 + a, b] = 4 * r[:, b], 4 * r[:, a]
         # r_0 = 1 - r_1 - r_2, so the columns of the Jacobian are dx/dr_1 - dx/dr_0 and dx/dr_2 - dx/dr_0.
         free = slopes[:, :, 1:] - slopes[:, :, :1]
         for first in range(0, len(self._mesh.triangles), ELEMENTS_AT_ONCE):
@@ -155,24 +152,6 @@ class Elements:
 
 
 @cache
-def _rule(nodes: int) -> tuple[Float, Float]:
-    """dN_a/dr_b (q, a, 3) and weights (q,), their sum 1, of a rule exact for constants or for degree 4.
-
-    The six points are Dunavant's (1985), `quadrature_points`.
-    """
-    if nodes == 3:
-        return np.eye(3)[None], np.ones(1)
-    root = np.sqrt(213125 - 53320 * np.sqrt(10.0))
-    weights, r = [(620 + sign * root) / 3720 for sign in (1, 1, 1, -1, -1, -1)], quadrature_points()
-    slopes = np.zeros((6, 6, 3))
-    for a in range(3):
-        slopes[:, a, a] = 4 * r[:, a] - 1
-    for side, (a, b) in enumerate(SIDES):
-        slopes[:, 3 + side, a], slopes[:, 3 + side, b] = 4 * r[:, b], 4 * r[:, a]
-    return slopes, np.array(weights)
-
-
-@cache
 def quadrature_points() -> Float:
     """(6, 3) barycentric coordinates (b, b, 1 - 2 b), turned, with 18 b = 8 - sqrt(10) +- sqrt(38 - 44 sqrt(2/5))."""
     spread, places = np.sqrt(38 - 44 * np.sqrt(0.4)), []
@@ -183,9 +162,9 @@ def quadrature_points() -> Float:
 
 
 def _strains(slope: Float, v: int, along: float) -> Float:
-    """(e, q, v) from du_i/dx_d (e, q, c, 2) and E33."""
+    """(e, q, v) from du_i/dx_d (e, q, c, 2), or of the plane (e, q, 2, 2), and E33."""
     local = np.zeros((*slope.shape[:2], v))
-    for (i, d), place in np.ndenumerate(PLACES[v]):
+    for (i, d), place in np.ndenumerate(PLACES[v][: slope.shape[2]]):
         local[..., place] += slope[..., i, d]
     if along:
         local[..., 2] = along

@@ -11,7 +11,7 @@ checks, min(1000 rtol, 1e-4).  `rtol` is written in the result, so 1e-4 is the m
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -65,7 +65,7 @@ class Finding:
 
     @property
     def document(self) -> Mapping[str, Any]:
-        """The finding for JSON; an infinite violation is null."""
+        """Return the finding as values of JSON; an infinite violation is null."""
         violation = self.violation if np.isfinite(self.violation) else None
         law = {"law": self.name, "words": self.description, "limit": self.limit}
         return law | {"violation": violation, "where": self.where, "holds": self.holds}
@@ -118,9 +118,7 @@ def solver_limit(rtol: float) -> float:
     return min(CHECK_PER_RTOL * rtol, LARGEST_CHECK)
 
 
-def checks(
-    rtol: float, users_mesh: bool, has_coatings: bool, mixed: tuple[float, float] = (0.0, 0.0)
-) -> tuple[Finding, ...]:
+def checks(rtol: float, users_mesh: bool, has_coatings: bool, mixed: tuple[float, float] = (0.0, 0.0)) -> list[Finding]:
     """List the laws with their limits, without violations, for dual problems solved to `rtol`.
 
     mixed: largest lambda / mu of mixed elements; largest mu of all / least mu of mixed elements.
@@ -173,7 +171,7 @@ def checks(
         ("sensitivities", "constants change with those of the case as in the file, relative", max(STEP, solver)),
         ("bounds", "bounds follow from fractions and materials, and the stiffness is between them", sums),
     )
-    return tuple(Finding(*row) for row in rows)
+    return [Finding(*row) for row in rows]
 
 
 # Why laws leave numbers alone, by a part of their names; the first that fits.
@@ -226,17 +224,13 @@ class Section(dict[str, Any]):
         """Return an entry, which counts as read."""
         return self[key] if key in self else default  # noqa: SIM401, which would be this again
 
-    def items(self) -> Iterator[tuple[str, Any]]:  # type: ignore[override]
-        """Yield all entries, which count as read."""
-        return ((key, self[key]) for key in self)
-
     def hint(self, key: str, default: Any = None) -> Any:
         """Return an entry that a law uses without checking it."""
         return super().get(key, default)
 
-    def leaves_open(self, key: str) -> None:
-        """Count an entry as unread for good: laws use its value but do not determine it."""
-        self.unread[self._prefix + key] = True
+    def leaves_open(self, *keys: str) -> None:
+        """Count entries as unread for good: laws use their values but do not determine them."""
+        self.unread |= dict.fromkeys((self._prefix + key for key in keys), True)
 
 
 Points = Sequence[Section]

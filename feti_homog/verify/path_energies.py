@@ -17,21 +17,18 @@ cascade, and where a later leg is on a ray.  There the loss obeys an equation; e
 Between event points without breaks the response is straight, so the work is (Sigma + Sigma').(E' - E) / 2.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Self
 
 import numpy as np
 
 from feti_homog.typing import Float
 from feti_homog.verify.bonds import friction_at, law_at
-from feti_homog.verify.check_loads import SAME_SHARE, TEMPERATURE, Prescribed, States, at_points, damaged_at, targets
-from feti_homog.verify.discrete_cell import CLOSED, DiscreteCell
-from feti_homog.verify.findings import ROUNDING, Findings, Points
-from feti_homog.verify.reading import State
-
-# Shares below which energies are rounding: a step's in the path energies so far, an increment's heat in the stored
-# energy.
-LEAST_STEP, LEAST_HEAT = 1e-6, 1e-4
+from feti_homog.verify.check_loads import TEMPERATURE, Prescribed, StateNumbers, States, at_points, damaged_at, targets
+from feti_homog.verify.discrete_cell import ROUNDED_TERMS, DiscreteCell
+from feti_homog.verify.findings import ROUNDING, Findings
+from feti_homog.verify.reading import Status
 
 
 @dataclass(frozen=True)
@@ -48,6 +45,27 @@ class PointNumbers:
     load: Prescribed
     terms: float = 0.0
 
+    @classmethod
+    def of(cls, cell: DiscreteCell, number: int, load: Prescribed, state: StateNumbers | None) -> Self:
+        """Return the numbers of a point, with the fields' energy, or without a state by Hill E.Sigma / 2.
+
+        The conjugate to a temperature follows from the stored energy.
+        """
+        point, n = cell.files.document["path"][number], len(load.values)
+        strain, stress, name = np.array(point["strain"]), np.array(point["stress"]), f"path[{number}]"
+        temperature, stored, heat = float(point.get(TEMPERATURE, 0.0)), float(strain @ stress) / 2, 0.0
+        if state is not None:
+            name, strain, stress, temperature = state.name, state.strain, state.mean_stress, state.temperature
+            stored, heat = state.stored, state.heat
+        elif temperature:
+            work, stored = 2 * stored, float(point["stored"])
+            heat = (2 * stored - work) / temperature
+        elif cell.expansions.any():
+            heat = np.nan
+        scales = cell.scales(strain, temperature)
+        pairs = np.array([*strain, temperature][:n]), np.array([*stress, heat][:n])
+        return cls(name, *pairs, stored, load, scales.stress * scales.strain)
+
     @property
     def potential(self) -> float:
         """P of the load, per area."""
@@ -59,8 +77,9 @@ class PointNumbers:
         return self.load.values[kind], (self.strain if by_stress else self.stress)[kind]
 
 
-def check_path_energies(findings: Findings, cell: DiscreteCell, states: States, points: Points) -> None:
-    """Check work, stored and dissipated energy at all points."""
+def check_stored(findings: Findings, cell: DiscreteCell, states: States) -> None:
+    """Check stored energies, and dissipation under control of the strain, at all points."""
+    points = cell.files.document["path"]
     # Without temperature and friction the stored energy is E.Sigma / 2.
     with_fields = {state.point for state in states}
     scale = max([state.stored for state in states], default=0.0) + cell.rounded_energy
@@ -76,44 +95,38 @@ def check_path_energies(findings: Findings, cell: DiscreteCell, states: States, 
     names = "dissipated", "dissipated_strain_controlled", "load_factor", "stored"
     lost, rising, factor, stored = np.array([[point[name] for name in names] for point in points]).T
     first_leg = 1.0 / len(targets(cell.files.case)) if by_events else 0.0
-    falls = (factor > 0.0) & (factor < first_leg - SAME_SHARE)
+    falls = (factor > 0.0) & (factor < first_leg - ROUNDING)
     rise = np.where(falls, np.maximum.accumulate(factor) / np.where(falls, factor, 1.0), 1.0)
     expected = lost[0] + np.cumsum(np.r_[0.0, rise[:-1] ** 2 * np.diff(lost)])
     scale = max(float(np.abs(expected).max()), float(np.abs(stored).max()))
     findings.compare("energy", rising, expected, scale, "path[{}].dissipated_strain_controlled".format)
-    if "friction_heat" in points[0]:
-        _check_heat(findings, states, points, by_events)
-        return
-    numbers = _numbers(cell, states, points)
-    scale = max(each.stored for each in numbers) + cell.rounded_energy or 1e-300
-    for each, point in zip(numbers, points, strict=True):
-        place = f"{each.name}, work less stored and dissipated"
-        findings.compare("energy", point["work"], each.stored + point["dissipated"], scale, place)
-    _check_losses(findings, cell, numbers, points, scale)
 
 
-def _check_heat(findings: Findings, states: States, points: Points, by_events: bool) -> None:
+def check_heat(findings: Findings, cell: DiscreteCell, states: States) -> None:
     """Check that the work is stored, lost to breaks or heat, which never falls; only breaks change `dissipated`.
 
     With friction the energy depends on the way, so nothing bounds the loss in breaks.  Bonds break after an event
     point, before an increment point.
     """
+    points, by_events = cell.files.document["path"], cell.files.case["path"]["method"] == "events"
     stored = {number: float(point["stored"]) for number, point in enumerate(points)}
     stored |= {state.point: state.stored for state in states}
     terms = np.array([[p["work"], stored[n], p["dissipated"], p["friction_heat"]] for n, p in enumerate(points)])
     # Sums along the path have the rounding of their largest terms; its share in an increment is far less.
     scale = np.maximum.accumulate(np.abs(terms).max(axis=1)) + np.finfo(float).tiny
     steps = np.diff(terms, axis=0, prepend=0.0)
-    of_step = np.abs(steps).max(axis=1) + LEAST_STEP * scale
+    of_step = np.abs(steps).max(axis=1) + ROUNDED_TERMS * scale
     findings.record("heat", np.abs(terms @ [1.0, -1.0, -1.0, -1.0]) / scale, "path[{}].work".format)
     findings.record("heat", np.maximum(-steps[:, 3], 0.0) / of_step, "path[{}].friction_heat".format)
     breaks = np.array([damaged_at(point) for point in points])
     breaks = np.r_[0, breaks[:-1]] if by_events else breaks
     lost = np.where(breaks > 0, 0.0, np.abs(steps[:, 2]))
     findings.record("heat", lost / of_step, "path[{}].dissipated".format)
+    for before, state in pairwise(states):
+        check_step_heat(findings, cell, before, state)
 
 
-def check_step_heat(findings: Findings, cell: DiscreteCell, before: State, state: State) -> None:
+def check_step_heat(findings: Findings, cell: DiscreteCell, before: StateNumbers, state: StateNumbers) -> None:
     """Check that an increment without breaks makes the heat from its slips under the tractions at its end.
 
     It is relative to the tractions times the slips since the beginning, whose difference it is.  The work of increments
@@ -121,40 +134,17 @@ def check_step_heat(findings: Findings, cell: DiscreteCell, before: State, state
     """
     files, at = cell.files, state.point
     points = files.document["path"]
-    if at != before.point + 1 or "friction_heat" not in points[at] or damaged_at(points[at]):
+    if at != before.point + 1 or damaged_at(points[at]):
         return
     if files.case["path"]["method"] == "events" or friction_at(files, on_damage=True).any():
         return
     slips = [(s.jump - law_at(files, damage=s.damage).jumps(s.traction))[:, 1] for s in (before, state)]
-    rubs = (state.status == CLOSED) & (friction_at(files) > 0.0)
+    rubs = (state.status == Status.CLOSED) & (friction_at(files) > 0.0)
     force = np.where(rubs, state.traction[:, 1], 0.0) * files.interface.length / cell.area
     heat = points[at]["friction_heat"] - points[before.point]["friction_heat"]
     scale = np.abs(force) @ (np.abs(slips[0]) + np.abs(slips[1]))
-    scale += LEAST_HEAT * max(abs(points[number]["stored"]) for number in (before.point, at))
+    scale += ROUNDED_TERMS * max(abs(points[number]["stored"]) for number in (before.point, at))
     findings.compare("heat", force @ (slips[1] - slips[0]), heat, scale or 1e-300, f"path[{at}].friction_heat")
-
-
-def _numbers(cell: DiscreteCell, states: States, points: Points) -> list[PointNumbers]:
-    """Return the numbers at every point, with the fields' energy, or without fields by Hill E.Sigma / 2.
-
-    The conjugate to a temperature follows from the stored energy.
-    """
-    of_state, numbers = {state.point: state for state in states}, []
-    for number, (point, load) in enumerate(zip(points, at_points(cell.files.case, points), strict=True)):
-        strain, stress = np.array(point["strain"]), np.array(point["stress"])
-        temperature, name = float(point.get(TEMPERATURE, 0.0)), f"path[{number}]"
-        if (state := of_state.get(number)) is not None:
-            name, strain, stress, temperature = state.name, state.strain, state.mean_stress, state.temperature
-            stored, heat = state.stored, state.heat
-        elif temperature:
-            stored = float(point["stored"])
-            heat = (2 * stored - float(strain @ stress)) / temperature
-        else:
-            stored, heat = float(strain @ stress) / 2, np.nan if cell.expansions.any() else 0.0
-        n, scales = len(load.values), cell.scales(strain, temperature)
-        pairs = np.array([*strain, temperature][:n]), np.array([*stress, heat][:n])
-        numbers.append(PointNumbers(name, *pairs, stored, load, scales.stress * scales.strain))
-    return numbers
 
 
 def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:
@@ -187,20 +177,24 @@ def _work(one: Float, other: Float) -> float:
     return float(one[one != 0.0] @ other[one != 0.0])
 
 
-def _check_losses(
-    findings: Findings, cell: DiscreteCell, numbers: Sequence[PointNumbers], points: Points, scale: float
-) -> None:
-    """Check the loss in breaks by (P): the old bonds' potential less the new bonds', at the load of the break.
+def check_losses(findings: Findings, cell: DiscreteCell, states: States) -> None:
+    """Check the work, and the loss in breaks by (P).
 
-    At events, bonds that break at a point lose the energy up to the next. In an increment, bonds break at its end;
-    bonded phases at the strain of the new bonds store no less than the old bonds would.
+    The loss is the old bonds' potential less the new bonds', at the load of the break.  At events, bonds that break at
+    a point lose the energy up to the next.  In an increment, bonds break at its end; bonded phases at the strain of the
+    new bonds store no less than the old bonds would.
     """
-    by_events = cell.files.case["path"]["method"] == "events"
+    points, by_events = cell.files.document["path"], cell.files.case["path"]["method"] == "events"
+    of_point, loads = {state.point: state for state in states}, at_points(cell.files.case, points)
+    numbers = [PointNumbers.of(cell, number, load, of_point.get(number)) for number, load in enumerate(loads)]
+    scale = max(each.stored for each in numbers) + cell.rounded_energy or 1e-300
     C: Float = np.einsum("p,pij->ij", cell.fractions, cell.stiffnesses)  # Voigt's, of strains and temperature
     thermal = np.einsum("p,pij,pj->i", cell.fractions, cell.stiffnesses, cell.expansions)
     square = np.einsum("p,pi,pij,pj->", cell.fractions, cell.expansions, cell.stiffnesses, cell.expansions)
     C = np.block([[C, -thermal[:, None]], [-thermal[None], square]])
     for number, (point, now) in enumerate(zip(points, numbers, strict=True)):
+        off, place = point["work"] - now.stored - point["dissipated"], f"{now.name}, work less stored and dissipated"
+        findings.record("energy", abs(off) / scale, place)
         state, before = (numbers[number - 1] if number else None), points[number - 1]
         lost, low, high = point["dissipated"] - (before["dissipated"] if number else 0.0), 0.0, 0.0
         if by_events and state:

@@ -6,6 +6,7 @@ import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from enum import IntEnum
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -66,6 +67,12 @@ class Fibres:
     strength: Float
 
 
+class Status(IntEnum):
+    """Status of an interface node in result.h5."""
+
+    BONDED, CLOSED, OPEN = range(3)
+
+
 @dataclass(frozen=True)
 class State:
     """The group /state/K.
@@ -79,7 +86,7 @@ class State:
         displacement, fluctuation: (n, c) u and u - E x.
         stress, stress_33: (m, v) and (m,) element means.
         traction, jump: (k, c) normal, tangential and axial.
-        status: (k,) 0 bonded, 1 closed, 2 open.
+        status: (k,) numbers of `Status`.
         damage: (k,) from 0, intact, to 1, broken.
         sliding: (k,) slip direction -1 or 1 of sliding nodes, else 0.
         mesh_error: (m,) element shares of the estimated energy error, NaN without an estimate.
@@ -130,7 +137,7 @@ class ResultFiles:
 
     @property
     def case(self) -> Mapping[str, Any]:
-        """The resolved case."""
+        """Return the resolved case."""
         case: Mapping[str, Any] = self.document["case"]
         return case
 
@@ -146,50 +153,49 @@ class ResultFiles:
 
     @property
     def interfaces(self) -> Sequence[Mapping[str, Any]]:
-        """The sections [[interface]]; none if all bonds are perfect."""
+        """Return the sections [[interface]]; none if all bonds are perfect."""
         sections: Any = self.case.get("interface", [])
         return sections if isinstance(sections, list) else [sections]
 
     @property
     def points(self) -> Points:
-        """The points of a path or an angle, or the load."""
+        """Return the points of a path or an angle, or the load."""
         document = self.document
         points: Points = document.get("path") or document.get("angle") or []
         return points or ([document["load"]] if "load" in document else [])
 
     def states(self) -> Iterator[State]:
         """Yield the states in order, one in memory at a time."""
+        n, m, k = len(self.mesh.points), len(self.mesh.triangles), len(self.interface.points)
+        shapes = {"displacement": (n, 2), "stress": (m, 3), "stress_33": (m,), "traction": (k, 2), "jump": (k, 2)}
         for number in sorted(map(int, self.file.get("state", ()))):
             with _reading(Path(self.file.filename)):
-                state = self._state(f"state/{number}", 6 if self.is_spatial else 3)
+                group = f"state/{number}"
+                attributes, table = self.file[group].attrs, partial(_table, self.file, group)
+                status = table("status", (k,))
+                # Older results have no damage, nothing that slides and no estimated errors.
+                older = {"damage": np.where(status != Status.BONDED, 1.0, 0.0), "sliding": np.zeros(k, int)}
+                older["mesh_error"] = np.full(m, np.nan)
+                arrays = {name: table(name, value.shape, value) for name, value in older.items()}
+                arrays |= {name: table(name, shape) for name, shape in shapes.items()}
+                if self.is_spatial:
+                    for name, rows in (("displacement", n), ("traction", k), ("jump", k)):
+                        arrays[name] = np.column_stack([arrays[name], table(f"axial_{name}", (rows,))])
+                    plane, axial = arrays["stress"], table("axial_stress", (m, 2))
+                    arrays["stress"] = np.column_stack([plane[:, :2], arrays["stress_33"], axial, plane[:, 2]])
+                strain, mean = (np.array(attributes[name], float) for name in ("strain", "stress"))
+                v = arrays["stress"].shape[1]
+                has_size = strain.shape == mean.shape == (v,)
+                _expect(has_size, f"/{group} has a strain or a stress of another size than {v}")
+                name, temperature = f"state {number} ({attributes['label']})", float(attributes.get("temperature", 0.0))
+                factor, point = float(attributes["load_factor"]), int(attributes["point"])
+                arrays["fluctuation"] = arrays["displacement"] - self.mesh.points @ gradient(strain).T
+                state = State(name, strain, mean, factor, point, status=status, temperature=temperature, **arrays)
             yield state
-
-    def _state(self, group: str, v: int) -> State:
-        """Read the state of a group, whose strain and stress have v components."""
-        attributes, table = self.file[group].attrs, partial(_table, self.file, group)
-        n, m, k = len(self.mesh.points), len(self.mesh.triangles), len(self.interface.points)
-        status = table("status", (k,))
-        # Older results have no damage, nothing that slides and no estimated errors.
-        older = {"damage": (status != 0).astype(float), "sliding": np.zeros(k, int), "mesh_error": np.full(m, np.nan)}
-        arrays = {name: table(name, value.shape, value) for name, value in older.items()}
-        shapes = {"displacement": (n, 2), "stress": (m, 3), "stress_33": (m,), "traction": (k, 2), "jump": (k, 2)}
-        arrays |= {name: table(name, shape) for name, shape in shapes.items()}
-        if v == 6:
-            for name, rows in (("displacement", n), ("traction", k), ("jump", k)):
-                arrays[name] = np.column_stack([arrays[name], table(f"axial_{name}", (rows,))])
-            plane, axial = arrays["stress"], table("axial_stress", (m, 2))
-            arrays["stress"] = np.column_stack([plane[:, :2], arrays["stress_33"], axial, plane[:, 2]])
-        strain, mean = (np.array(attributes[name], float) for name in ("strain", "stress"))
-        _expect(strain.shape == mean.shape == (v,), f"/{group} has a strain or a stress of another size than {v}")
-        name = f"{group.replace('/', ' ')} ({attributes['label']})"
-        factor, point = float(attributes["load_factor"]), int(attributes["point"])
-        arrays["fluctuation"] = arrays["displacement"] - self.mesh.points @ gradient(strain).T
-        temperature = float(attributes.get("temperature", 0.0))
-        return State(name, strain, mean, factor, point, status=status, temperature=temperature, **arrays)
 
 
 def altered(directory: Path) -> tuple[str, ...]:
-    """Names of files changed since the run. Raises CaseError, one line, if one is unreadable."""
+    """Name the files that have changed since the run. Raises CaseError, one line, if one is unreadable."""
     document, path = _document(directory / JSON), directory / FIELDS
     if not path.is_file():
         has_fields = document["case"].get("output", {}).get("fields", False)
@@ -200,9 +206,8 @@ def altered(directory: Path) -> tuple[str, ...]:
     unchanged = {JSON: document.get("checksum") == f"{zlib.crc32(text.encode('utf-8', 'surrogatepass')):08x}"}
     with _reading(path), input_files.opened(path) as stream:  # the CRC-32 of its blocks' CRC-32s
         size, seal = os.fstat(stream.fileno()).st_size, document.get("result_h5")
-        has_size = isinstance(seal, dict) and seal.get("bytes") == size
-        blocks = iter(partial(stream.read, CHECKSUM_BLOCK), b"") if has_size else ()
-        checksum = zlib.crc32(np.array([zlib.crc32(block) for block in blocks], "<u4").tobytes())
+        blocks = [zlib.crc32(block) for block in iter(partial(stream.read, CHECKSUM_BLOCK), b"")]
+        checksum = zlib.crc32(np.array(blocks, "<u4").tobytes())
     unchanged[FIELDS] = seal == {"bytes": size, "checksum": f"{checksum:08x}"}
     return tuple(name for name, is_unchanged in unchanged.items() if not is_unchanged)
 

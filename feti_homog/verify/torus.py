@@ -8,7 +8,6 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
 from feti_homog.typing import Bool, Float, Int
-from feti_homog.verify.elements import SIDES
 from feti_homog.verify.reading import COATING, Mesh
 
 # Points nearer than this share of the shortest side are at one place.
@@ -52,7 +51,7 @@ class TornNodes:
 def torn(mesh: Mesh, size: Float) -> tuple[TornSides, TornNodes, float]:
     """Return torn sides and nodes on the torus of a size (2,), and the radius of a place."""
     m, columns = mesh.triangles.shape
-    local = [(*side, 3 + number)[: columns // 3 + 1] for number, side in enumerate(SIDES)]
+    local = [(side, (side + 1) % 3, 3 + side)[: columns // 3 + 1] for side in range(3)]
     every = mesh.triangles[:, local].reshape(3 * m, -1)
     low, high = np.sort(every[:, :2], axis=1).T
     _, first, count = np.unique(low * len(mesh.points) + high, return_index=True, return_counts=True)

@@ -9,7 +9,7 @@ from results_page import results
 
 from feti_homog import errors
 from feti_homog.case import reference
-from feti_homog.cli import command_parser
+from feti_homog.commands.parser import command_parser
 from feti_homog.system.petsc.option_table import OPTIONS
 
 ERRORS = (errors.FetiHomogError, errors.CaseError, errors.MeshError, errors.ConvergenceError)
@@ -27,7 +27,7 @@ def command_line() -> str:
     parts = ["# Command line", _console(command_parser().format_help())]
     for name, parser in _commands():
         parts += [f"## feti-homog {name}", _console(parser.format_help())]
-    codes = [(str(errors.EXIT_DONE), "done; every check is within its tolerance")]
+    codes = [(str(errors.ExitCode.DONE), "done; every check is within its tolerance")]
     codes += [(str(error.exit_code), f"{error.__doc__}") for error in ERRORS]
     return page(*parts, "## Exit codes", table(["exit code", "meaning"], sorted(codes)))
 

@@ -15,11 +15,7 @@ SCATTERED = 0.2  # share of the cases whose bonds break, or of tables, with stre
 TEETH = {1: 0.3, 2: 0.5, 3: 0.2}  # and their shares of the cases: a path has as many events as its bonds have teeth
 BRITTLE = {"criterion", "growth", "toughness", "mode_sensitivity", "axial_strength", *STIFFNESSES, *COHESIVE[:2]}
 # Openings / that of the peak and tractions / the peak of tables: straight, with a plateau, with a tail.
-BRANCHES = (
-    ([1.0, 4.0], [1.0, 0.0]),
-    ([1.0, 2.0, 5.0], [1.0, 1.0, 0.0]),
-    ([1.0, 1.5, 4.0, 8.0], [1.0, 0.4, 0.1, 0.0]),
-)
+BRANCHES = (([1.0, 4.0], [1.0, 0.0]), ([1.0, 2.0, 5.0], [1.0, 1.0, 0.0]), ([1.0, 1.5, 4.0, 8.0], [1.0, 0.4, 0.1, 0.0]))
 
 
 def random_softening(rng: np.random.Generator, document: Document, length: float) -> None:

@@ -1,4 +1,4 @@
-"""The command line in processes of its own: run, check, plot, and their options."""
+"""The command line in processes of its own: run, check, plot, keys, and their options."""
 
 import json
 import math
@@ -203,3 +203,28 @@ def test_a_nearly_incompressible_phase_makes_elements_quadratic(tmp_path):
     path.write_text(path.read_text().replace("0.299", "0.4999999"))
     job = command_line(1, "run", path, "--out", tmp_path / "results")
     assert job.returncode == 0 and "remark: [material.matrix] poisson = 0.4999999: elements are" in job.stdout
+
+
+def test_keys_of_all_sections():
+    job = command_line(2, "keys")
+    assert job.returncode == 0, job.stderr
+    assert job.stdout.count("[cell]: ") == 1 and "  realisations\n" in job.stdout
+
+
+def test_keys_of_a_section():
+    job = command_line(1, "keys", "interface")
+    assert job.returncode == 0 and job.stdout.startswith("[interface]: ")
+    assert "an arc of [interface] debonded: " in job.stdout and "[cell]: " not in job.stdout
+
+
+def test_keys_of_no_section():
+    job = command_line(2, "keys", "cells")
+    assert job.returncode == 2 and job.stderr.count("cells: unknown section; expected one of name, cell") == 1
+
+
+@pytest.mark.parametrize("name", ["schema", "statistics"])
+def test_commands_that_are_gone_name_the_way(name):
+    job = command_line(0, name)
+    assert (job.returncode, job.stdout) == (2, "") and job.stderr.startswith(
+        f"error: command line: feti-homog {name} is "
+    )

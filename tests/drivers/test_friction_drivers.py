@@ -4,36 +4,18 @@ import json
 
 import numpy as np
 import pytest
+from support.base_case import with_lines
 from support.command_line import command_line
 from support.drivers import column, driven
 from support.hooks import WAIT, Hook, HookedJob
+from support.small_path import SHEET_PATH
 
-CYCLES = """\
-[cell]
-geometry = "square"
-fibre_fraction = 0.4
-mesh_size = 0.15
-refine = 0
-[material.matrix]
-young = 100.0
-poisson = 0.4
-[material.fibre]
-young = 500.0
-poisson = 0.2
-[analysis]
-type = "path"
-plane = "strain"
-[interface]
-normal_strength = 4.0
-tangential_strength = 3.0
-friction = 0.3
-debonded = [{fibre = "all", centre = 30.0, angle = 200.0}]
-[path]
-waypoints = [[-0.05, 0.0, 0.0], [-0.05, 0.0, 0.15], [-0.05, 0.0, -0.15], [-0.05, 0.0, 0.15]]
-[output]
-pictures = false
-fields = false
-"""
+CYCLES = with_lines(
+    SHEET_PATH.replace('"stress"', '"strain"').replace("strain = [0.2, 0.0, 0.05]\n", "").replace("states = 8\n", ""),
+    *("[cell] mesh_size = 0.15", "[interface] friction = 0.3", "[output] fields = false"),
+    '[interface] debonded = [{fibre = "all", centre = 30.0, angle = 200.0}]',
+    "[path] waypoints = [[-0.05, 0.0, 0.0], [-0.05, 0.0, 0.15], [-0.05, 0.0, -0.15], [-0.05, 0.0, 0.15]]",
+)
 
 
 def test_loops_scale_with_the_pressure(tmp_path):

@@ -10,77 +10,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support import events
+from support.base_case import with_lines
 from support.command_line import command_line
 from support.hooks import WAIT, Hook, HookedJob
+from support.small_path import SHEET_PATH
 
-CASE = """\
-[cell]
-geometry = "square"
-fibre_fraction = 0.4
-mesh_size = 0.06
-refine = 0
-
-[material.matrix]
-young = 100.0
-poisson = 0.4
-
-[material.fibre]
-young = 500.0
-poisson = 0.2
-
-[analysis]
-type = "path"
-plane = "stress"
-
-[interface]
-normal_strength = 4.0
-tangential_strength = 3.0
-
-[path]
-strain = [0.2, 0.0, 0.05]
-
-[output]
-pictures = false
-states = 8
-"""
-COOLED = """\
-[cell]
-geometry = "random"
-fibres = 2
-seed = 1
-min_gap = 0.1
-fibre_fraction = 0.4
-mesh_size = 0.15
-
-[material.matrix]
-young = 3.0
-poisson = 0.35
-expansion = 6e-5
-
-[material.fibre]
-young = 70.0
-poisson = 0.2
-expansion = 5e-6
-
-[analysis]
-type = "path"
-plane = "generalized"
-[interface]
-normal_stiffness = 60.0
-tangential_stiffness = 25.0
-criterion = "energy"
-toughness = 4e-6
-
-[path]
-waypoints = [{temperature = -100.0}, {S22 = 0.04, S13 = 0.01}, {S22 = -0.01}]
-
-[output]
-fields = false
-pictures = false
-states = "all"
-[petsc]
-feti_pc_type = "influence"
-"""
+COOLED = with_lines(
+    SHEET_PATH[: SHEET_PATH.index("[interface]")],
+    *('[cell] geometry = "random"', "[cell] fibres = 2", "[cell] seed = 1", "[cell] min_gap = 0.1"),
+    *("[cell] mesh_size = 0.15", '[analysis] plane = "generalized"'),
+    *("[material.matrix] young = 3.0", "[material.matrix] poisson = 0.35", "[material.matrix] expansion = 6e-5"),
+    *("[material.fibre] young = 70.0", "[material.fibre] expansion = 5e-6"),
+    *("[interface] normal_stiffness = 60.0", "[interface] tangential_stiffness = 25.0"),
+    *('[interface] criterion = "energy"', "[interface] toughness = 4e-6"),
+    "[path] waypoints = [{temperature = -100.0}, {S22 = 0.04, S13 = 0.01}, {S22 = -0.01}]",
+    *("[output] fields = false", "[output] pictures = false", '[output] states = "all"'),
+    '[petsc] feti_pc_type = "influence"',
+)
 INCREMENTS = 'waypoints = [[0.1, 0.0, 0.0], [-0.05, 0.02, 0.0]]\nmethod = "increments"\nincrements = 24'
 LATER_LEGS = "waypoints = [[0.02, 0.0, 0.0], [-0.05, 0.02, 0.0], [0.1, 0.0, 0.0]]"
 TEETH = """\
@@ -98,7 +44,7 @@ SOLVE = "feti_homog.feti.solver:FetiSolver.solve"
 
 
 def case_file(folder: Path, name: str = "case", **changes: str) -> Path:
-    text = CASE
+    text = SHEET_PATH
     for old, new in changes.items():
         text = re.sub(rf"^{old} = .*$", new, text, flags=re.MULTILINE)
     path = folder / f"{name}.toml"
@@ -248,7 +194,7 @@ def test_without_checkpoint_or_resume_a_run_begins_anew(tmp_path, interrupted):
 )
 def test_checkpoints_of_another_case_are_refused(tmp_path, interrupted, ranks, changes, message):
     shutil.copytree(interrupted, tmp_path / "out")
-    text = CASE
+    text = SHEET_PATH
     for old, new in changes.items():
         text, count = re.subn(rf"^{old}.*$", new, text, flags=re.MULTILINE)
         assert count == 1
@@ -263,7 +209,7 @@ def test_checkpoints_of_another_case_are_refused(tmp_path, interrupted, ranks, c
 def test_a_path_does_not_go_on_with_another_mesh(tmp_path):
     """A user's mesh whose file has changed since the run that left the checkpoint."""
     meshes, mesh = Path(__file__).parents[2] / "meshes", tmp_path / "cell.msh"
-    own = CASE.replace(
+    own = SHEET_PATH.replace(
         'geometry = "square"\nfibre_fraction = 0.4\nmesh_size = 0.06', 'geometry = "mesh"\nfile = "cell.msh"'
     )
     (tmp_path / "case.toml").write_text(own.replace("[path]\n", "[path]\nmax_events = 2\n"))

@@ -1,10 +1,11 @@
-"""Stiffness and onset of debonding over the porosity."""
+"""The drivers of voids, coated fibres and closed estimates meet theory, and their results obey every law."""
 
 import csv
 
 import numpy as np
 from matplotlib.image import imread
 from support.command_line import assert_verified
+from support.drivers import column, driven
 from support.jobs import ROOT, mpirun
 
 
@@ -21,3 +22,35 @@ def test_voids_soften_as_mori_and_tanaka_say(tmp_path):
     assert all(float(rows[1][name]) < float(rows[0][name]) for name in ("K", "G"))
     assert np.std(imread(tmp_path / "out/voids.png")[..., :3]) > 0.05
     assert_verified(*(path.parent for path in (tmp_path / "out").glob("*/result.h5")))
+
+
+def test_the_driver_meets_composite_cylinders(tmp_path):
+    job = mpirun(2, ROOT / "drivers/coated_fibres.py", "--out", tmp_path / "out", "--quick", "--fields")
+    assert job.returncode == 0, job.stderr
+    with (tmp_path / "out/coated_fibres.csv").open(newline="") as stream:
+        ratio, bulk, cylinders, shear, inner, outer = np.array(list(csv.reader(stream))[1:], float).T
+    assert np.abs(bulk / cylinders - 1).max() < 2e-3 and np.all(np.diff(shear) > 0)
+    # A soft coating shields both of its faces.
+    assert inner[0] > inner[1] and outer[0] > outer[1] and ratio[1] < 1 < ratio[2]
+    assert imread(tmp_path / "out/coated_fibres.png")[..., :3].std() > 0.05
+    assert_verified(tmp_path / "out/bonded-2.85", tmp_path / "out/fibre-2.85")
+
+
+def test_cells_lie_where_theory_wants_them(tmp_path):
+    rows = driven("micromechanics", tmp_path, "--fields")
+    for fraction in ("0.3", "0.5"):
+        found = {row["geometry or method"]: row for row in rows if row["fibre_fraction"] == fraction}
+        value = {name: {key: float(row[key]) for key in row if "_" in key} for name, row in found.items()}
+        hexagonal, cylinders, shear = value["hexagonal"], value["composite_cylinders"], "G_transverse"
+        # Mori and Tanaka's moduli are the lower bounds of stiff fibres; fractions of coarse meshes differ by 1e-5.
+        for name in ("E_axial", "G_axial", shear):
+            assert (1.0 - 1e-4) * value["mori_tanaka"][name] < hexagonal[name], name
+        # Hexagonal cells are next to composite cylinders where these are exact.
+        for name in ("E_axial", "nu_axial", "expansion_axial", "expansion_transverse"):
+            assert abs(hexagonal[name] / cylinders[name] - 1.0) < 2e-3, name
+        assert hexagonal[shear] < value["self_consistent"][shear] < 1.1 * hexagonal[shear]
+        # Uniform fields: Hill's relation holds between any two arrangements.
+        a, b = (value[name] for name in ("hexagonal", "random"))
+        assert abs(a["E_axial"] / b["E_axial"] - 1.0) < 1e-3
+    assert np.isnan(column([found["chamis"]], "G_axial")).sum() == 0
+    assert_verified(*(path.parent for path in tmp_path.glob("*/result.h5")))

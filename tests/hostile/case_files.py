@@ -37,10 +37,7 @@ FILES: dict[str, tuple[Content, str]] = {
         BASE + '[sweep]\n"cell.fibre_fraction" = {from = 1.0, to = 2.0, step = 1e-4}\n',
         "more faults",
     ),
-    "1e5 waypoints": (
-        changed(SMALL, PATH, end=f"[path]\nwaypoints = [{'[nan, 0, 0], ' * 100_000}]\n"),
-        "",
-    ),
+    "1e5 waypoints": (changed(SMALL, PATH, end=f"[path]\nwaypoints = [{'[nan, 0, 0], ' * 100_000}]\n"), ""),
 }
 
 

@@ -42,7 +42,7 @@ DOCUMENTS = (
     changed(
         end='[sweep]\n"cell.fibre_fraction" = {from = 0.1, to = 0.5, step = 0.1}\n"material.fibre.young" = [1, 2]\n'
     ),
-    *(content for content, _ in FAULTY_CASES.values()),
+    *FAULTY_CASES.values(),
 )
 
 

@@ -30,11 +30,7 @@ LIMITS: dict[str, tuple[str, str, tuple[int, ...]]] = {
     "no standard output": (f"{RUN} >&-", "", (0,)),
 }
 SURROUNDINGS: dict[str, tuple[str, str, tuple[int, ...]]] = {
-    "a .petscrc": (
-        f"cd out; echo -feti_ksp_rtol abc > .petscrc; echo -help > petscrc; {IN_OUT}",
-        "",
-        (0,),
-    ),
+    "a .petscrc": (f"cd out; echo -feti_ksp_rtol abc > .petscrc; echo -help > petscrc; {IN_OUT}", "", (0,)),
     "a matplotlibrc": (
         f"cd out; printf 'font.size : \\xff' > matplotlibrc; {IN_OUT.replace('c.toml', 'drawn.toml')}",
         "",

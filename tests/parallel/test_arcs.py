@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 from support.cases import FIBRE, MATRIX
-from support.ranks import parallel_assert
+from support.ranks import parallel_assert, write_once
 from support.whole_meshes import coarse_mesh
 from unit.mesh.faulty_meshes import ALL_SIDES, RIGHT_SIDE, grid
 
@@ -104,17 +104,6 @@ def test_several_arcs_debond_the_chosen_fibres_only(comm):
     parallel_assert(comm, not state[np.isin(number, [3, 5])].any())
 
 
-def test_every_opening_has_its_tips(comm):
-    openings = [0.0, 30.0, 75.0, 180.0, 359.0, 360.0]
-    case = case_of(CIRCULAR, [{"fibre": 2, "centre": 20.0}], angle={"values": openings})
-    cell, nodes = torn(case, comm)
-    for opening in openings[1:-1]:
-        check(comm, case, nodes, cell, {2: [(20.0, opening)]}, opening)
-    for opening in (0.0, 360.0):
-        number, _, state = nodes(opening)
-        parallel_assert(comm, bool(np.all(state == ((opening > 0) & (number == 2)))))
-
-
 def test_a_tip_beside_a_crossing_is_the_crossing(comm):
     """The side of the cell crosses the fibre at its corner at 90 degrees, which becomes the tip."""
     case = case_of(CIRCULAR, [{"fibre": 1, "centre": 60.0, "angle": 60.04}])
@@ -131,9 +120,7 @@ def test_a_tip_beside_a_crossing_is_the_crossing(comm):
 def test_the_debonded_curve_of_a_mesh_is_debonded(comm, shared_path, order, refine, bodies):
     cell = {"geometry": "mesh", "file": "grid.msh", "order": order, "refine": refine, "bodies": bodies}
     for lines, vertices in ((RIGHT_SIDE, 1), (ALL_SIDES, 8)):
-        if comm.rank == 0:
-            grid().with_curve(lines).write(shared_path / "grid.msh")
-        comm.barrier()
+        write_once(comm, grid().with_curve(lines), shared_path / "grid.msh")
         torn_cell, nodes = torn(case_of(cell, [], shared_path, 3), comm)
         _, direction, state = nodes()
         inner = len(lines) * (torn_cell.lattice.intervals - 1)
@@ -144,9 +131,7 @@ def test_the_debonded_curve_of_a_mesh_is_debonded(comm, shared_path, order, refi
 
 
 def test_a_debonded_curve_and_arcs_add_up(comm, shared_path):
-    if comm.rank == 0:
-        grid().with_curve(RIGHT_SIDE).write(shared_path / "grid.msh")
-    comm.barrier()
+    write_once(comm, grid().with_curve(RIGHT_SIDE), shared_path / "grid.msh")
     cell = {"geometry": "mesh", "file": "grid.msh"}
     _, nodes = torn(case_of(cell, [{"fibre": 1, "centre": 180.0, "angle": 10.0}], shared_path), comm)
     _, direction, state = nodes()
@@ -156,9 +141,7 @@ def test_a_debonded_curve_and_arcs_add_up(comm, shared_path):
 
 
 def test_without_an_interface_section_all_is_bonded(comm, shared_path):
-    if comm.rank == 0:
-        grid().with_curve(RIGHT_SIDE).write(shared_path / "grid.msh")
-    comm.barrier()
+    write_once(comm, grid().with_curve(RIGHT_SIDE), shared_path / "grid.msh")
     case = case_of({"geometry": "mesh", "file": "grid.msh"}, [], shared_path)
     document = {name: section for name, section in case.resolved().items() if name != "interface"}
     _, nodes = torn(cases.parse(document, shared_path), comm)
@@ -191,9 +174,7 @@ def test_arcs_of_fibres_without_an_interface_between_the_pair_are_refused(comm):
 
 
 def test_arcs_of_a_fibre_without_centre_are_refused(comm, shared_path):
-    if comm.rank == 0:
-        grid(lambda x, y: abs(y - 0.5) < 0.25).write(shared_path / "grid.msh")
-    comm.barrier()
+    write_once(comm, grid(lambda x, y: abs(y - 0.5) < 0.25), shared_path / "grid.msh")
     cell = {"geometry": "mesh", "file": "grid.msh"}
     with pytest.raises(CaseError, match=r'^\[interface\] debonded\[0\].fibre = "all": fibre 1 has no centre, for it'):
         tear(case_of(cell, [ARC], shared_path), comm, Progress(comm, quiet=True))

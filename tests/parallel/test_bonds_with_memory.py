@@ -12,9 +12,10 @@ from support.ranks import parallel_assert
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, BondState
+from feti_homog.interface.laws import UTILISATION_TIE
 from feti_homog.interface.laws.strength import MaxStrength
 from feti_homog.interface.path.path_following import events
-from feti_homog.interface.path.path_points import UTILISATION_TIE, unloaded
+from feti_homog.interface.path.path_points import unloaded
 
 pytestmark = pytest.mark.parallel
 STIFFNESS = np.array([400.0, 200.0])

@@ -12,10 +12,9 @@ from support.cases import make_case, relative_error, solve
 from feti_homog.case import sections
 from feti_homog.errors import CaseError
 from feti_homog.feti.factory import construct
-from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.one_subdomain import ExplicitInterfaceOperator, ImplicitInterfaceOperator
 from feti_homog.feti.solver_plan import BONDED, PRECONDITIONERS
-from feti_homog.feti.thresholds import DEFAULTS, Thresholds
+from feti_homog.feti.thresholds import Thresholds
 from feti_homog.homogenization import unit_cell
 from feti_homog.homogenization.partition_policy import PartitionPolicy, wanted_pieces
 from feti_homog.mesh.refinement import ReferenceLattice
@@ -116,21 +115,6 @@ def test_implicit_and_explicit_operators_give_the_same(comm):
         assert relative_error(first, second) < 1e-9
 
 
-def test_operators_are_explicit_where_they_pay(comm):
-    cell = torn_cells.tear(comm, geometry="hexagonal", petsc={"feti_coarse_space": "natural"})
-
-    def kinds(applications, soft, thresholds=DEFAULTS):
-        boundary = InterfaceOperators(
-            cell.solver.jump_operator, cell.subdomains, "auto", applications, soft, thresholds
-        )
-        return set().union(*comm.allgather({type(o) for o in boundary.operators}))
-
-    assert kinds(0, False) == {ImplicitInterfaceOperator}
-    assert kinds(10**6, False) == {ExplicitInterfaceOperator}
-    assert kinds(0, True) == {ExplicitInterfaceOperator}
-    assert kinds(10**6, True, SMALL_DENSE) == {ImplicitInterfaceOperator}
-
-
 def test_adaptive_space_is_refused_where_boundaries_are_too_large(comm):
     case = {"geometry": "hexagonal", "decomposition": {"subdomains": 8}}
     assert torn_cells.tear(comm, **case, thresholds=SMALL_DENSE).solver.adaptive is None
@@ -151,25 +135,16 @@ def wanted(load, edges, interface=None, n_ranks=1, refine=0, policy=SMALL_PIECES
     return wanted_pieces(case, np.array(load), np.array(edges), lattice, n_ranks, policy).tolist()
 
 
-def test_large_bodies_are_cut():
+def test_pieces_follow_loads_ranks_and_boundaries():
     assert wanted([240, 260, 30, 1000], [90, 10, 10, 10]) == [1, 3, 1, 10]
     # Four elements a triangle.
     assert wanted([60, 65], [10, 10], refine=1) == [1, 3]
-
-
-def test_pieces_do_not_grow_with_their_body():
     assert wanted([5000], [10]) == [50]
     assert wanted([20_000, 30], [10, 10]) == [200, 1]
-
-
-def test_bodies_that_can_be_shared_evenly_are_whole_up_to_a_larger_size():
     load, edges = [600] * 100 + [1700], [10] * 101
     assert wanted(load, edges) == [1] * 100 + [17]
     assert wanted(load, edges, n_ranks=16) == [6] * 100 + [17]
     assert wanted([600] * 2, [400, 800]) == [6, 6]
-
-
-def test_bodies_that_debond_are_whole_unless_their_boundary_is_wide():
     bonds_break = sections.InterfaceSection()
     assert wanted([260, 3000, 260], [10, 39, 41], bonds_break) == [1, 1, 3]
     assert wanted([70, 70], [19, 21], bonds_break, refine=1) == [1, 3]

@@ -12,7 +12,7 @@ from feti_homog.feti.operators.preconditioners import StiffnessScaled
 pytestmark = [pytest.mark.parallel, pytest.mark.quick]
 
 E11 = np.array([1.0, 0.0, 0.0])
-CALLBACKS = [(DualOperator, "apply"), (StiffnessScaled, "apply"), (PrimalTest, "_judge")]
+CALLBACKS = [(DualOperator, "apply"), (StiffnessScaled, "apply"), (PrimalTest, "__call__")]
 
 
 @pytest.mark.parametrize("method", ["cg", "gmres"])

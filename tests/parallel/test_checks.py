@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support import torn_cells
 from support.cases import make_case
-from support.ranks import parallel_assert
+from support.ranks import parallel_assert, write_once
 from unit.mesh.faulty_meshes import grid
 
 from feti_homog.analysis import path as load_path
@@ -39,9 +39,7 @@ def context_of(comm, cell, contact=True):
 @pytest.mark.parametrize("contact", [True, False])
 def test_hill_holds_where_a_debonded_cell_stores_nothing(comm, shared_path, contact):
     """A strip across the cell that has come off: no stress under tension across it, nor under shear."""
-    if comm.rank == 0:
-        grid(lambda x, y: abs(x - 0.5) < 0.25).write(shared_path / "strip.msh")
-    comm.barrier()
+    write_once(comm, grid(lambda x, y: abs(x - 0.5) < 0.25), shared_path / "strip.msh")
     cell = torn_cells.tear(comm, geometry="mesh", file="strip.msh", folder=shared_path)
     context = context_of(comm, cell, contact)
     status = np.full(len(cell.solver.jump_operator.nodes.row), OPEN, np.int8)

@@ -10,7 +10,6 @@ from support import torn_cells
 from support.cases import make_case, monolithic_stiffness, relative_error, solve
 from support.coarse_space_cells import BOUND, BREAKING, NARROW, STRAINS, of_all, solve_many
 
-from feti_homog.errors import CaseError
 from feti_homog.feti.thresholds import DEFAULTS
 
 pytestmark = pytest.mark.parallel
@@ -88,23 +87,6 @@ def test_iterations_stay_few_at_any_contrast(comm, contrast, pieces):
 def test_the_coarse_space_is_the_one_asked_for_or_that_pays(comm, case, space, adaptive):
     solver = torn_cells.tear(comm, **case, petsc={"feti_coarse_space": space}).solver
     assert (solver.adaptive is not None) == adaptive
-
-
-@pytest.mark.parametrize(
-    ("petsc", "words"),
-    [
-        ({"feti_coarse_space": "deluxe"}, "-feti_coarse_space deluxe: expected one of auto, natural, adaptive"),
-        ({"feti_dual_operator": "direct"}, "-feti_dual_operator direct: expected one of auto, implicit, explicit"),
-        ({"feti_coarse_space": "adaptive", "feti_dual_operator": "implicit"}, "-feti_coarse_space adaptive: needs"),
-        ({"feti_coarse_space": "adaptive", "feti_pc_type": "none"}, "-feti_coarse_space adaptive: needs"),
-        ({"feti_coarse_space": "adaptive", "feti_pc_type": "lumped"}, "-feti_coarse_space adaptive: needs"),
-    ],
-)
-def test_wrong_options_of_the_coarse_space_are_refused(comm, petsc, words):
-    with pytest.raises(CaseError) as caught:
-        torn_cells.tear(comm, **BREAKING, petsc=petsc)
-    (fault,) = caught.value.faults
-    assert fault.startswith(words)
 
 
 MULTIGRID = {

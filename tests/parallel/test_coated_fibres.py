@@ -4,10 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.ranks import parallel_assert
+from support.ranks import assert_certified
 
 from feti_homog import Case, run
-from feti_homog.verify.certificate import verify
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
@@ -101,8 +100,7 @@ def test_thin_coatings_obey_every_law(comm, shared_path, thickness):
         "output": {"pictures": False},
     }
     run(Case.parse(document, Path()), out=shared_path / "result", comm=comm)
-    certificate = verify(shared_path / "result") if comm.rank == 0 else None
-    parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)
+    assert_certified(comm, shared_path / "result")
 
 
 def test_stiff_coatings_that_float_are_in_equilibrium(comm, shared_path):
@@ -120,5 +118,4 @@ def test_stiff_coatings_that_float_are_in_equilibrium(comm, shared_path):
         "output": {"pictures": False, "states": "all"},
     }
     run(Case.parse(document), comm, out=shared_path / "out")
-    certificate = verify(shared_path / "out") if comm.rank == 0 else None
-    parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)
+    assert_certified(comm, shared_path / "out")

@@ -9,6 +9,7 @@ from mpi4py import MPI
 from reference.closed_forms import bulk_and_shear, cubic, dilute_slopes, hashin_shtrikman, lame, laminate
 from reference.references import BONDED, NEARLY_INCOMPRESSIBLE
 from support.cases import FIBRE, MATRIX, make_case, monolithic_stiffness, relative_error, solve
+from support.ranks import write_once
 from unit.mesh.faulty_meshes import grid
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
@@ -109,9 +110,7 @@ STIFFNESSES = {
 @pytest.mark.parametrize("phases", STIFFNESSES)
 def test_laminate_is_exact(comm, shared_path, phases, across, order):
     """Strips of a quarter fibre, normal to x1 or x2."""
-    if comm.rank == 0:
-        grid(lambda x, y: 0.25 < (x, y)[across] < 0.5).write(shared_path / "strips.msh")
-    comm.barrier()
+    write_once(comm, grid(lambda x, y: 0.25 < (x, y)[across] < 0.5), shared_path / "strips.msh")
     L = [np.array(s) for s in STIFFNESSES[phases]]
     materials = [{"stiffness": s.tolist()} for s in L]
     if phases == "isotropic":
@@ -150,9 +149,7 @@ def test_stiffness_of_a_users_mesh_reaches_the_reference(comm, geometry, order):
 
 @pytest.mark.parametrize("cell", [{"refine": 2}, {"order": 2}])
 def test_stiffness_with_a_square_fibre_is_the_monolithic_one(comm, shared_path, cell):
-    if comm.rank == 0:
-        grid().write(shared_path / "square_fibre.msh")
-    comm.barrier()
+    write_once(comm, grid(), shared_path / "square_fibre.msh")
     torn, L, _ = solve(make_case(geometry="mesh", file="square_fibre.msh", folder=shared_path, **cell), comm)
     assert torn.areas()["fibre"] == pytest.approx(0.25)
     assert relative_error(L, monolithic_stiffness(torn)) < 1e-9

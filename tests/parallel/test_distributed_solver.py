@@ -7,8 +7,8 @@ from petsc4py import PETSc
 from scipy.sparse import coo_matrix, csr_matrix, kronsum, spdiags
 
 from feti_homog.errors import CaseError
-from feti_homog.feti.linalg import distributed_solver
-from feti_homog.feti.linalg.distributed_solver import DistributedSolver
+from feti_homog.feti.linalg import sparse_matrices
+from feti_homog.feti.linalg.sparse_matrices import DistributedSolver
 from feti_homog.feti.thresholds import REPLICATED_UNKNOWNS
 from feti_homog.system.petsc.c_functions import option_was_used
 from feti_homog.system.petsc.options_database import case_options
@@ -130,7 +130,7 @@ def test_a_fault_of_one_rank_is_reported_on_every_rank(comm, monkeypatch):
     """The first rank alone finds the matrix singular, as rounding may cause."""
     A = grid(6)
     unknowns, part = share(comm, A, by_blocks(comm, A.shape[0]))
-    factored = distributed_solver.factored
+    factored = sparse_matrices.factored
 
     def singular_on_the_first(*arguments):
         factor = factored(*arguments)
@@ -138,7 +138,7 @@ def test_a_fault_of_one_rank_is_reported_on_every_rank(comm, monkeypatch):
             raise np.linalg.LinAlgError("zero pivot")
         return factor
 
-    monkeypatch.setattr(distributed_solver, "factored", singular_on_the_first)
+    monkeypatch.setattr(sparse_matrices, "factored", singular_on_the_first)
     with pytest.raises(np.linalg.LinAlgError, match="zero pivot" if comm.rank == 0 else "on another rank"):
         made(comm, A.shape[0], unknowns, part)
 

@@ -10,6 +10,7 @@ from reference.closed_forms import lame
 from support import torn_cells
 from support.cases import FIBRE, MATRIX
 from support.loads import strains
+from support.ranks import write_once
 from unit.mesh.faulty_meshes import grid
 
 from feti_homog import Case, run
@@ -29,9 +30,7 @@ FRACTION = 0.25
 @pytest.fixture
 def strip(comm, shared_path):
     """Provide a cell with a strip of fibre normal to x1, a quarter of it, at either order."""
-    if comm.rank == 0:
-        grid(lambda x, y: 0.25 < x < 0.5).write(shared_path / "strip.msh")
-    comm.barrier()
+    write_once(comm, grid(lambda x, y: 0.25 < x < 0.5), shared_path / "strip.msh")
     petsc = {"feti_pc_type": "influence"}
     cells = [
         torn_cells.tear(

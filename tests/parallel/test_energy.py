@@ -8,12 +8,7 @@ import numpy as np
 import pytest
 from reference.closed_forms import bulk_and_shear
 from reference.coated_fibre import onset_of_fibre
-from reference.references import (
-    GLASS_EPOXY_CURVES,
-    GLASS_EPOXY_DEBONDED,
-    GLASS_EPOXY_MULTIPLES,
-    GLASS_EPOXY_ONSET,
-)
+from reference.references import GLASS_EPOXY_CURVES, GLASS_EPOXY_DEBONDED, GLASS_EPOXY_MULTIPLES, GLASS_EPOXY_ONSET
 from support import torn_cells
 from support.loads import strains
 from support.ranks import PIECES, parallel_assert

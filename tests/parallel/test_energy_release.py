@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from reference.references import DEBONDED_FIBRE_BEM, DEBONDED_FIBRE_FEM, DEBONDED_FIBRE_TOTAL
 from support.cases import FIBRE, MATRIX, relative_error
-from support.ranks import parallel_assert
+from support.ranks import parallel_assert, write_once
 from support.void_cells import write_voids
 from unit.mesh.faulty_meshes import RIGHT_SIDE, grid
 
@@ -170,9 +170,7 @@ def test_stiffness_has_the_tips_of_all_its_loads(comm):
 
 def test_fibres_that_are_not_round_have_no_tips(comm, shared_path):
     """A square one, debonded on its right side."""
-    if comm.rank == 0:
-        grid().with_curve(RIGHT_SIDE).write(shared_path / "grid.msh")
-    comm.barrier()
+    write_once(comm, grid().with_curve(RIGHT_SIDE), shared_path / "grid.msh")
     document = {
         "cell": {"geometry": "mesh", "file": "grid.msh", "refine": 1},
         "material": {"matrix": MATRIX, "fibre": FIBRE},
@@ -250,21 +248,11 @@ INNER, OUTER = ["fibre", "coating"], ["coating", "matrix"]
 
 
 @pytest.mark.one_rank
-@pytest.mark.parametrize(
-    ("growing", "bond"),
-    [(OUTER, FREE), (INNER, TOUCHING)],
-    ids=["outer", "inner"],
-)
+@pytest.mark.parametrize(("growing", "bond"), [(OUTER, FREE), (INNER, TOUCHING)], ids=["outer", "inner"])
 def test_each_interface_of_a_coated_fibre_releases_what_the_energy_loses(comm, growing, bond):
     """While the arc on the other interface stays as long as it is."""
     radius, coating, strain = 0.25, 0.3, {"E11": 0.3, "E22": -0.5, "gamma12": 0.4}
-    cell = {
-        "fibre_fraction": np.pi * radius**2,
-        "coating": coating,
-        "mesh_size": 0.08,
-        "order": 2,
-        "refine": 1,
-    }
+    cell = {"fibre_fraction": np.pi * radius**2, "coating": coating, "mesh_size": 0.08, "order": 2, "refine": 1}
 
     def solved_with(opening):
         arcs = [{"fibre": 1, "centre": 20.0, "angle": opening if name == growing else 70.0} for name in (INNER, OUTER)]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support import torn_cells
 from support.envelopes import ENERGY, MAX, QUADRATIC, document, envelope, path_onset, torn
-from support.ranks import parallel_assert
+from support.ranks import parallel_assert, write_once
 from unit.mesh.faulty_meshes import RIGHT_SIDE, grid
 
 from feti_homog import Case, run
@@ -109,9 +109,7 @@ def test_compression_breaks_no_bond_that_only_tension_breaks(comm):
 @pytest.fixture
 def strip(comm, shared_path):
     """Provide a folder with the mesh of a strip of fibre normal to x1."""
-    if comm.rank == 0:
-        grid(lambda x, y: 0.25 < x < 0.5).write(shared_path / "strip.msh")
-    comm.barrier()
+    write_once(comm, grid(lambda x, y: 0.25 < x < 0.5), shared_path / "strip.msh")
     return shared_path
 
 
@@ -158,10 +156,7 @@ def test_bonds_of_a_laminate_bear_the_macroscopic_stress(comm, strip, bonds, tem
         parallel_assert(comm, abs(share(bonds, stress[[0, 5, 4]]) - 1) < 1e-9, f"{point}")
 
 
-SPATIAL = (
-    ["E11", "E22", "E33", "gamma23", "gamma13", "gamma12"],
-    ["S11", "S22", "S33", "S23", "S13", "S12"],
-)
+SPATIAL = (["E11", "E22", "E33", "gamma23", "gamma13", "gamma12"], ["S11", "S22", "S33", "S23", "S13", "S12"])
 
 
 @pytest.mark.parametrize("stiffness", [None, np.inf, 40.0])
@@ -279,8 +274,6 @@ def test_its_files_are_written_and_hold_what_they_say(comm, shared_path):
 
 
 def test_a_curve_of_the_mesh_that_may_close_is_refused(comm, shared_path):
-    if comm.rank == 0:
-        grid().with_curve(RIGHT_SIDE).write(shared_path / "strip.msh")
-    comm.barrier()
+    write_once(comm, grid().with_curve(RIGHT_SIDE), shared_path / "strip.msh")
     with pytest.raises(CaseError, match="contact: expected false with a debonded curve"):
         envelope(comm, "strain", MAX, ["S11", "S12"], STRIP, shared_path, directions=4)

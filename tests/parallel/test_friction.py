@@ -8,12 +8,11 @@ from reference.friction import RubbingFaces
 from reference.friction_path import FrictionPath
 from reference.references import RUBBING_HEATS, RUBBING_STRESSES, RUBBING_WAYPOINTS
 from support.loaded_twins import EPOXY_GLASS, LoadedTwin, document, is_end, solved
-from support.ranks import PIECES, parallel_assert
+from support.ranks import PIECES, assert_certified
 
 from feti_homog import Case, run
 from feti_homog.errors import ConvergenceError
 from feti_homog.system.parallel.mpi_errors import on_root
-from feti_homog.verify.certificate import verify
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 WHOLE = {"debonded": [{"fibre": "all", "angle": 360.0}]}
@@ -65,11 +64,7 @@ def test_paths_are_those_of_a_slow_twin(comm, waypoints, springs):
 
 @pytest.mark.parametrize(
     ("plane", "law"),
-    [
-        ("strain", {}),
-        ("strain", SOFTENING),
-        ("generalized", SOFTENING | {"friction_on_damage": True}),
-    ],
+    [("strain", {}), ("strain", SOFTENING), ("generalized", SOFTENING | {"friction_on_damage": True})],
     ids=["strength", "softening", "generalized"],
 )
 def test_breaks_with_friction_obey_every_law_resumed_too(comm, shared_path, plane, law):
@@ -87,8 +82,7 @@ def test_breaks_with_friction_obey_every_law_resumed_too(comm, shared_path, plan
         run(Case.parse(short), comm, out=shared_path / "out")
     result = run(Case.parse(asked), comm, out=shared_path / "out", resume=True)
     assert sum(point.broke for point in result.path) > 10 and result.path[-1].friction_heat > 0.0
-    certificate = verify(shared_path / "out") if comm.rank == 0 else None
-    parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)
+    assert_certified(comm, shared_path / "out")
 
 
 def test_an_unloaded_cell_keeps_slips_and_resumes_between_changes(comm, shared_path):
@@ -108,8 +102,7 @@ def test_an_unloaded_cell_keeps_slips_and_resumes_between_changes(comm, shared_p
     found = run(Case.parse(asked), comm, out=shared_path / "out", resume=True).path
     np.testing.assert_allclose([p.load_factor for p in found], [p.load_factor for p in whole], atol=1e-9)
     assert found[-1].friction_heat > 0.0
-    certificate = verify(shared_path / "out") if comm.rank == 0 else None
-    parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)
+    assert_certified(comm, shared_path / "out")
 
 
 @pytest.mark.parametrize(("friction", "under_pressure"), [({}, 1), ({"friction": 0.3}, 0)], ids=["smooth", "friction"])
@@ -137,7 +130,6 @@ def test_increments_tend_to_events_and_obey_every_law(comm, shared_path):
         asked = document(**case, path=path) | {"output": {"pictures": False, "states": 9}}
         found = run(Case.parse(asked), comm, out=shared_path / f"{steps}").path
         errors.append(np.abs(numbers_at_ends(found, 4) - known).max(axis=0) / np.abs(known).max(axis=0))
-        certificate = verify(shared_path / f"{steps}") if comm.rank == 0 else None
-        parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)
+        assert_certified(comm, shared_path / f"{steps}")
     assert (errors[1] < errors[0] / 2).all() and errors[0].max() < 0.15 and errors[1].max() < 0.03, errors
     assert sum(p.softened for p in exact) > 5

@@ -6,12 +6,11 @@ from reference.closed_forms import first_slip, lame, rubbing_bond, rubbing_lamin
 from reference.friction import RubbingFaces
 from reference.friction_path import FrictionPath
 from support.loaded_twins import EPOXY_GLASS, LoadedTwin, document, is_end, solved
-from support.ranks import parallel_assert
+from support.ranks import assert_certified, write_once
 from unit.mesh.faulty_meshes import grid
 
 from feti_homog import Case, run
 from feti_homog.system.parallel.mpi_errors import on_root
-from feti_homog.verify.certificate import verify
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 WHOLE = {"debonded": [{"fibre": "all", "angle": 360.0}]}
@@ -25,9 +24,7 @@ def at_ends(points, legs):
 
 def test_a_laminate_closes_its_parallelogram(comm, shared_path):
     """Bonds that nothing holds; ten cycles between the same stresses, with the heat of the area of each."""
-    if comm.rank == 0:
-        grid(lambda x, y: 0.25 < x < 0.5).write(shared_path / "strip.msh")
-    comm.barrier()
+    write_once(comm, grid(lambda x, y: 0.25 < x < 0.5), shared_path / "strip.msh")
     phases = ({"young": 2.0, "poisson": 0.299}, {"young": 5.0, "poisson": 0.222})
     moduli = np.array([[sum(np.array(lame(phase)) * (1, 2)), lame(phase)[1]] for phase in phases])
     across, shear = 1.0 / (np.array([0.75, 0.25]) @ (1.0 / moduli))
@@ -43,9 +40,7 @@ def test_a_laminate_closes_its_parallelogram(comm, shared_path):
 
 def test_bonds_of_a_laminate_rub_with_their_damaged_share(comm, shared_path):
     """The first of two teeth, cycles, and where the second breaks them: stress, heat and certificate."""
-    if comm.rank == 0:
-        grid(lambda x, y: 0.25 < x < 0.5).write(shared_path / "strip.msh")
-    comm.barrier()
+    write_once(comm, grid(lambda x, y: 0.25 < x < 0.5), shared_path / "strip.msh")
     phases = ({"young": 2.0, "poisson": 0.299}, {"young": 5.0, "poisson": 0.222})
     compliance = np.array([0.75, 0.25]) @ (1.0 / np.array([lame(phase)[1] for phase in phases]))
     K, first, rho = 2.0, 0.01, 4.0
@@ -70,8 +65,7 @@ def test_bonds_of_a_laminate_rub_with_their_damaged_share(comm, shared_path):
     slip, (broken,) = first * rho**0.75, [p for p in path if p.broke]
     held = compliance * ((1 - damage) * K * slip + damage * bound)
     assert broken.strain[2] == pytest.approx(held + 2 * slip, rel=1e-9) and last.stress[2] == pytest.approx(bound)
-    certificate = verify(shared_path / "out") if comm.rank == 0 else None
-    parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)
+    assert_certified(comm, shared_path / "out")
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ from mpi4py import MPI
 from reference.spatial_forms import IN_PLANE, rotated, rotated_strain
 from support.cases import make_case, solve
 from support.generalized_phases import CRYSTAL, WOOD
-from support.ranks import parallel_assert
+from support.ranks import parallel_assert, write_once
 from support.spatial_cells import EPOXY, GLASS, error, solved
 from unit.mesh.faulty_meshes import MshFile, grid
 
@@ -36,9 +36,7 @@ def result_of(comm, shared_path):
     """result_of(place, phases): that of the cell with the fibre `hook` whose nodes are moved.  Collective."""
 
     def made(place, phases):
-        if comm.rank == 0:
-            moved(grid(hook), place).write(shared_path / "cell.msh")
-        comm.barrier()
+        write_once(comm, moved(grid(hook), place), shared_path / "cell.msh")
         result = solved(comm, geometry="mesh", file="cell.msh", folder=shared_path, **phases)
         comm.barrier()
         return result

@@ -11,11 +11,7 @@ from support.spatial_cells import EPOXY, GLASS, solved
 
 pytestmark = [pytest.mark.parallel, pytest.mark.one_rank]
 
-PHASES = {
-    "boron/aluminium": (ALUMINIUM, BORON),
-    "AS4/3501-6": (CARBON_EPOXY, CARBON),
-    "glass/epoxy": (EPOXY, GLASS),
-}
+PHASES = {"boron/aluminium": (ALUMINIUM, BORON), "AS4/3501-6": (CARBON_EPOXY, CARBON), "glass/epoxy": (EPOXY, GLASS)}
 FINE = {"order": 2, "mesh_size": 0.1, "refine": 2, "petsc": {"feti_ksp_rtol": 1e-10}}
 POISSON = 0.25
 
@@ -66,9 +62,7 @@ def test_the_series_gives_the_table(key):
 
 
 @pytest.mark.parametrize(
-    ("key", "contrast"),
-    list(zip(AXIAL_SHEAR, [10.0, 1e-6, 1e6, 2.0, 50.0, 1e-3], strict=True)),
-    ids=str,
+    ("key", "contrast"), list(zip(AXIAL_SHEAR, [10.0, 1e-6, 1e6, 2.0, 50.0, 1e-3], strict=True)), ids=str
 )
 def test_axial_shear_moduli(comm, key, contrast):
     geometry, fraction = key

@@ -21,6 +21,7 @@ from reference.spatial_forms import (
     rotated_strain,
 )
 from support.generalized_phases import CARBON, CRYSTAL, WOOD
+from support.ranks import write_once
 from support.spatial_cells import EPOXY, GLASS, error, solved
 from unit.mesh.faulty_meshes import FIBRE, MATRIX, N, grid
 
@@ -112,9 +113,7 @@ def strips(where):
 
 def written(comm, folder, where):
     """Return the mesh file of `strips`, as keys of a cell. Collective."""
-    if comm.rank == 0:
-        strips(where).write(folder / "strips.msh")
-    comm.barrier()
+    write_once(comm, strips(where), folder / "strips.msh")
     return {"geometry": "mesh", "file": "strips.msh", "folder": folder}
 
 

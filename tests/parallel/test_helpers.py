@@ -22,12 +22,10 @@ def test_parts_are_dealt_to_their_ranks(comm):
     assert np.array_equal(threes, [comm.rank] * 3) and np.array_equal(backwards, [9, 7, 5, 3, 1])
 
 
-def test_on_root_gives_its_result_to_all(comm):
+def test_results_of_the_root_and_of_each_come_back(comm):
     assert on_root(comm, lambda: (comm.rank, "text")) == (0, "text")
-
-
-def test_on_root_passes_arguments(comm):
     assert on_root(comm, divmod, 17, 5) == (3, 2)
+    assert agree(comm, lambda: comm.rank) == comm.rank
 
 
 def test_on_root_raises_everywhere_with_faults(comm):
@@ -47,10 +45,6 @@ def test_on_root_only_keeps_its_result(comm):
     assert on_root_only(comm, lambda: 5) == (5 if comm.rank == 0 else None)
     with pytest.raises(CaseError):
         on_root_only(comm, fail, "one")
-
-
-def test_agree_gives_each_its_own(comm):
-    assert agree(comm, lambda: comm.rank) == comm.rank
 
 
 def test_agree_raises_the_first_ranks_error(comm):

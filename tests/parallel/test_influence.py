@@ -283,12 +283,9 @@ def test_more_ranks_than_subdomains(comm):
             assert solution.reason > 0 and solution.iterations == 0 and solution.residual < 1e-8
 
 
-def test_a_number_of_columns_that_is_none_is_refused(comm):
+def test_influence_columns_that_cannot_be_are_refused(comm):
     with pytest.raises(CaseError, match="-feti_influence_columns 0: expected a whole number above 0"):
         torn_cells.tear(comm, **BREAKING, petsc=INFLUENCE | {"feti_influence_columns": 0})
-
-
-def test_influence_columns_need_explicit_operators(comm):
     with pytest.raises(CaseError, match="-feti_pc_type influence: needs -feti_dual_operator explicit"):
         torn_cells.tear(comm, **BREAKING, petsc=INFLUENCE | {"feti_dual_operator": "implicit"})
 

@@ -9,16 +9,14 @@ import h5py
 import numpy as np
 import pytest
 from mpi4py import MPI
-from support.ranks import PIECES, parallel_assert
+from support.ranks import PIECES, assert_certified, parallel_assert
 
 from feti_homog import Case, run
-from feti_homog.analysis import runner
 from feti_homog.errors import ConvergenceError
 from feti_homog.materials.voigt import STRAINS, STRESSES
 from feti_homog.results import checkpoints, field_file
 from feti_homog.results.checkpoints import has_multipliers
 from feti_homog.system.parallel.mpi_errors import on_root
-from feti_homog.verify.certificate import verify
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
 
@@ -148,7 +146,7 @@ def test_kept_states_are_those_of_a_run_that_keeps_all(comm, shared_path, whole,
     assert len(result.states) == states if states != "peaks" else 2 <= len(result.states) < len(result.path)
     expected = whole(kind)
     on_root(comm, assert_kept_of, shared_path, expected)
-    parallel_assert(comm, verify(shared_path).holds if comm.rank == 0 else True)
+    assert_certified(comm, shared_path)
 
 
 @pytest.mark.parametrize("kind", ["straight", "legs", "energy"])
@@ -171,7 +169,7 @@ def test_an_interrupted_path_keeps_the_same_states(comm, shared_path, whole, kin
 def test_states_without_multipliers_are_solved_again(comm, shared_path, whole, kind, room):
     """There is room for the multipliers of no event, or of the first ones; the path is ended and goes on, too."""
     known, expected = len(document(whole(kind))["path"]) * 2 // 3, whole(kind)
-    with mock.patch.object(runner, "room_of", return_value=room):
+    with mock.patch.object(checkpoints, "room_of", return_value=room):
         with pytest.raises(ConvergenceError, match="max_events"):
             run(case(kind, 5, max_events=known), comm, out=shared_path, resume=False)
         found = on_root(comm, multipliers_of, shared_path / "checkpoint/events")
@@ -180,7 +178,7 @@ def test_states_without_multipliers_are_solved_again(comm, shared_path, whole, k
         in_memory = run(case(kind, 5), comm, fields=True)
     assert result.resumed == known and in_memory.states == result.states
     on_root(comm, assert_kept_of, shared_path, expected, SOLVED_AGAIN)
-    parallel_assert(comm, verify(shared_path).holds if comm.rank == 0 else True)
+    assert_certified(comm, shared_path)
     fields = in_memory.fields.gathered()
     if comm.rank == 0:
         for state, other in zip(fields.states, states_of(shared_path), strict=True):

@@ -102,11 +102,8 @@ def test_contact_has_errors_of_both_signs_of_the_load_and_of_no_constants(comm):
         assert entries.shape == (3, 3) and (entries > 0).all()
 
 
-def test_no_errors_of_constants_that_are_not_there(comm):
+def test_errors_may_be_forgone_and_constants_that_are_not_there_have_none(comm):
     assert not result(comm, interface=springs(1000, 250), cell={"mesh_size": 0.2}).mesh_error.constants
-
-
-def test_a_case_can_forgo_them(comm):
     assert result(comm, cell={"mesh_size": 0.2}, output={"mesh_error": False}).mesh_error is None
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support.loaded_twins import EPOXY_GLASS, LoadedTwin, compare_paths, relative, solved
+from support.ranks import write_once
 from unit.mesh.faulty_meshes import grid
 
 from feti_homog.errors import ConvergenceError
@@ -104,9 +105,7 @@ def test_a_longer_way_in_the_same_direction_has_the_same_events(comm, to):
 @pytest.fixture
 def strip(comm, shared_path):
     """Provide a folder with a laminate normal to x1."""
-    if comm.rank == 0:
-        grid(lambda x, y: 0.25 < x < 0.5).write(shared_path / "strip.msh")
-    comm.barrier()
+    write_once(comm, grid(lambda x, y: 0.25 < x < 0.5), shared_path / "strip.msh")
     return shared_path
 
 

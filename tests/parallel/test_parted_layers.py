@@ -5,7 +5,7 @@ import pytest
 from reference.parted_layers import PartedLayers
 from support.layered_meshes import layers
 from support.loaded_twins import EPOXY_GLASS, compare_paths, document
-from support.ranks import parallel_assert
+from support.ranks import assert_certified, parallel_assert, write_once
 from support.verified_results import falsified
 
 from feti_homog import Case, run
@@ -50,9 +50,7 @@ PATHS = {
 
 def solved(comm, folder, phases, across, plane, interface, petsc, materials=EPOXY_GLASS, pieces=None, **analysis):
     """Return the result of a case of layers, with its files in the folder. Collective."""
-    if comm.rank == 0:
-        layers(phases, across).write(folder / "layers.msh")
-    comm.barrier()
+    write_once(comm, layers(phases, across), folder / "layers.msh")
     cell = {"geometry": "mesh", "file": "layers.msh"}
     case = document(cell, materials, plane, interface, petsc, **analysis)
     case["output"]["fields"], case["decomposition"] = True, {} if pieces is None else {"subdomains": pieces}
@@ -88,8 +86,7 @@ def test_layers_part_close_and_part_again_exactly(comm, shared_path, name):
         assert np.abs(point.stress - np.pad(stress, (0, len(point.stress) - n))).max() < EXACT * largest[1]
         parted, touching = parted + (not touch), touching + touch
     assert result.status == "done" and parted and touching and result.path[-1].bonded == 0
-    certificate = verify(shared_path / "out") if comm.rank == 0 else None
-    parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)
+    assert_certified(comm, shared_path / "out")
 
 
 @pytest.mark.parametrize("phases", [TWO, NINE])

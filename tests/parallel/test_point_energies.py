@@ -9,7 +9,7 @@ from reference.closed_forms import bulk_and_shear
 from reference.references import GLASS_EPOXY_DISSIPATED, GLASS_EPOXY_ONSET
 from support import torn_cells
 from support.loads import strains
-from support.ranks import PIECES
+from support.ranks import PIECES, write_once
 from unit.mesh.faulty_meshes import grid
 
 from feti_homog import Case, run
@@ -125,9 +125,7 @@ def path_of(cell: dict[str, Any], interface: dict[str, Any], folder: Any = ".", 
 @pytest.mark.parametrize("growth", ["springs", "released"])
 def test_a_laminate_loses_all_that_it_stores_at_once(comm, shared_path, growth):
     """Two flat interfaces across the load: straight to sqrt(2 k_n G_Ic), then nothing."""
-    if comm.rank == 0:
-        grid(lambda x, y: 0.25 < x < 0.5).write(shared_path / "strip.msh")
-    comm.barrier()
+    write_once(comm, grid(lambda x, y: 0.25 < x < 0.5), shared_path / "strip.msh")
     bond, strain = BY_ENERGY | {"growth": growth}, 0.2
     result = run(path_of({"geometry": "mesh", "file": "strip.msh"}, bond, shared_path, strain=[strain, 0, 0]), comm)
     first, last = result.path

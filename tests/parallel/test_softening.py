@@ -8,6 +8,7 @@ import pytest
 from reference.closed_forms import lame
 from reference.softening_path import SofteningPath, Teeth, exact_stresses
 from support.loaded_twins import EPOXY_GLASS, LoadedTwin, document, solved
+from support.ranks import write_once
 from unit.mesh.faulty_meshes import grid
 
 from feti_homog import Case, run
@@ -180,9 +181,7 @@ STRETCH = (0.05 - 0.005) / 1.0
 @pytest.fixture
 def strip(comm, shared_path):
     """Provide a function that runs a strip of fibre, a quarter of a cell of width 1, to a strain; M* of the cell."""
-    if comm.rank == 0:
-        grid(lambda x, y: 0.25 < x < 0.5).write(shared_path / "strip.msh")
-    comm.barrier()
+    write_once(comm, grid(lambda x, y: 0.25 < x < 0.5), shared_path / "strip.msh")
     phases = ({"young": 2.0, "poisson": 0.299}, {"young": 5.0, "poisson": 0.222})
 
     def stretched(interface, to):

@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.ranks import PIECES, parallel_assert
+from support.ranks import PIECES, assert_certified
 from support.verified_results import LOADS, MIXED_PATHS, document
 
 from feti_homog import Case, run
-from feti_homog.verify.certificate import verify
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
 
@@ -21,5 +20,4 @@ def test_mixed_loads_obey_every_law(comm: Any, shared_path: Path, kind: str) -> 
     if comm.size == 1:
         pytest.skip("of one rank there")
     run(Case.parse(document(kind) | {"decomposition": PIECES}), comm, out=shared_path / "out")
-    certificate = verify(shared_path / "out") if comm.rank == 0 else None
-    parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)
+    assert_certified(comm, shared_path / "out")

@@ -63,11 +63,7 @@ def axisymmetric_stiffness(matrix, fibre, c, springs=BONDED):
         # u = A r in the fibre, B r + C/r in the matrix: traction, jump and the radius outside
         A, B, C = np.linalg.solve(
             [[2 * kf, -2 * km, shear], [-a - 2 * kf * springs[0], a, 1 / a], [0, 1, 1]],
-            [
-                (lm - lf) * length - (bm - bf) * heat,
-                springs[0] * (lf * length - bf * heat),
-                area / 2,
-            ],
+            [(lm - lf) * length - (bm - bf) * heat, springs[0] * (lf * length - bf * heat), area / 2],
         )
         pressure = 2 * km * B - 2 * matrix.G_transverse * C + lm * length - bm * heat
         in_fibre, in_matrix = 2 * lf * A + nf * length - gf * heat, 2 * lm * B + nm * length - gm * heat

@@ -169,7 +169,4 @@ RUBBING_HEATS = {
     0.21: Reference((5.75e-4, 0.05024, 0.13456, 0.21588), 6e-4, RUBBING_PROTOTYPE),
 }
 # friction: s / q and degrees of the first slip of a debonded fibre in a medium under -q + s, -q - s.
-FIRST_SLIP = {
-    0.25: Reference((0.20398428, 37.98), 5e-3, FORMULA),
-    0.5: Reference((0.37612843, 31.72), 5e-3, FORMULA),
-}
+FIRST_SLIP = {0.25: Reference((0.20398428, 37.98), 5e-3, FORMULA), 0.5: Reference((0.37612843, 31.72), 5e-3, FORMULA)}

@@ -7,40 +7,19 @@ from pathlib import Path
 
 import pytest
 from support import events
+from support.base_case import with_lines
 from support.jobs import ROOT
 from support.one_node_slurm import Job, wait
+from support.small_path import SHEET_PATH
 from support.sweep_files import BY_BODIES, CASE, FAILING, FAILING_POINTS, rows, sweep_file
 
 SCRIPTS = ROOT / "scripts/slurm"
 DONE, FAILED = Job("COMPLETED", 0), Job("FAILED", 3)
-PATH_CASE = """\
-[cell]
-geometry = "square"
-fibre_fraction = 0.4
-mesh_size = 0.03
-
-[material.matrix]
-young = 100.0
-poisson = 0.4
-
-[material.fibre]
-young = 500.0
-poisson = 0.2
-
-[analysis]
-type = "path"
-plane = "stress"
-
-[interface]
-normal_strength = 5.0
-tangential_strength = 5.0
-
-[path]
-strain = [0.2, 0.0, 0.0]
-
-[output]
-pictures = false
-"""
+PATH_CASE = with_lines(
+    SHEET_PATH,
+    *("[cell] mesh_size = 0.03", "[interface] normal_strength = 5.0", "[interface] tangential_strength = 5.0"),
+    *("[path] strain = [0.2, 0.0, 0.0]", '[output] states = "all"'),
+)
 
 
 @pytest.fixture

@@ -1,5 +1,7 @@
 """A right case file, and the same with some of its words exchanged."""
 
+import re
+
 BASE = """\
 [cell]
 geometry = "hexagonal"
@@ -30,10 +32,7 @@ SPATIAL = (
 )
 OUT_OF_PLANE = "E3 = 5.0\nnu13 = 0.3\nnu23 = 0.3\n"
 
-MESH_CELL = (
-    'geometry = "hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.05',
-    'geometry = "mesh"\nfile = "cell.msh"',
-)
+MESH_CELL = ('geometry = "hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.05', 'geometry = "mesh"\nfile = "cell.msh"')
 
 TABLE_CELL = (
     MESH_CELL[0],
@@ -64,3 +63,19 @@ def ended(text: str) -> str:
 
 def fraction(value: str) -> str:
     return cell("fibre_fraction = 0.4", f"fibre_fraction = {value}")
+
+
+def with_lines(case: str, *lines: str) -> str:
+    """Put lines "[section] key = value" into a case, each in place of the one that its key has."""
+    for line in lines:
+        section, key, value = re.fullmatch(r"\[(.+?)\] (\w+) = (.*)", line).groups()
+        before, head, rest = case.partition(f"[{section}]\n")
+        entries, bracket, after = rest.partition("\n[")
+        others = [entry for entry in entries.splitlines() if not entry.startswith(f"{key} = ")]
+        case = "\n".join([before + (head or f"[{section}]\n") + f"{key} = {value}", *others, ""]) + bracket + after
+    return case
+
+
+def faults(case: str, lines: dict[str, str]) -> dict[str, str]:
+    """Return the case with each line, below the fault that names the line and ends with these words."""
+    return {f"{line}: {words}": with_lines(case, line) for line, words in lines.items()}

@@ -1,6 +1,9 @@
 """Cells that ranks share, and assertions that all ranks agree on."""
 
+from pathlib import Path
 from typing import Any
+
+from feti_homog.verify.certificate import verify
 
 # Cuts small cells such that each of two ranks owns interface nodes; uncut, the matrix alone is on rank 0.
 PIECES = {"subdomains": 8}
@@ -10,3 +13,16 @@ def parallel_assert(comm: Any, condition: bool, message: str = "") -> None:
     """Fails on every rank if the condition is false on any. Collective."""
     failing = [rank for rank, holds in enumerate(comm.allgather(bool(condition))) if not holds]
     assert not failing, f"{message} (on ranks {failing})"
+
+
+def write_once(comm: Any, mesh: Any, path: Path) -> None:
+    """Write a mesh on rank 0, before any rank reads it. Collective."""
+    if comm.rank == 0:
+        mesh.write(path)
+    comm.barrier()
+
+
+def assert_certified(comm: Any, folder: Path) -> None:
+    """Check that the result in a folder obeys every law of `feti-homog verify`. Collective."""
+    certificate = verify(folder) if comm.rank == 0 else None
+    parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)

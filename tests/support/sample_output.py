@@ -51,11 +51,7 @@ def sample(cells: int = 8, refine: int = 0, order: int = 1) -> Sample:
     one = np.array([1])
     fibres = FibrePart(one, one, one, np.array([[0.5, 0.5]]), np.array([np.nan]), np.ones(1))
     return Sample(
-        header,
-        mesh,
-        fibres,
-        _interface(mesh),
-        tuple(_state(mesh, gradient, k) for k, gradient in enumerate(GRADIENTS)),
+        header, mesh, fibres, _interface(mesh), tuple(_state(mesh, gradient, k) for k, gradient in enumerate(GRADIENTS))
     )
 
 

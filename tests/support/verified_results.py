@@ -25,56 +25,51 @@ SPRINGS = {"normal_stiffness": 900.0, "tangential_stiffness": 300.0}
 STRENGTHS = {"normal_strength": 5.0, "tangential_strength": 5.0}
 WAYPOINTS = [[0.2, 0.0, 0.0], [0.1, 0.05, 0.05], [0.0, 0.0, 0.0], [-0.1, 0.0, 0.1]]
 
+IN_SPACE = {"matrix": WARM, "fibre": CARBON, "plane": "generalized"}
+BY_ENERGY = SPRINGS | {"criterion": "energy", "toughness": 0.02}
+LEGS = {"waypoints": WAYPOINTS}
+
+
+def debonded(angle: float) -> dict[str, Any]:
+    return {"debonded": [ARC | {"angle": angle}]}
+
+
+def stepped(path: dict[str, Any], increments: int, **more: Any) -> dict[str, Any]:
+    return path | {"method": "increments", "increments": increments} | more
+
+
 CASES: dict[str, dict[str, Any]] = {
     "bonded": {"cell": HEXAGONAL | {"order": 2}, "decomposition": {"subdomains": 6}},
     "rubber": {"cell": HEXAGONAL, "matrix": {"young": 0.1, "poisson": 0.49999999}},
     "plane": {"cell": HEXAGONAL | {"bodies": "plane", "refine": 1}, "plane": "stress"},
-    "contact": {"cell": SQUARE | {"order": 2}, "interface": {"debonded": [ARC | {"angle": 110.0}]}},
-    "overlap": {"cell": SQUARE, "interface": {"contact": False, "debonded": [ARC | {"angle": 200.0}]}},
+    "contact": {"cell": SQUARE | {"order": 2}, "interface": debonded(110.0)},
+    "overlap": {"cell": SQUARE, "interface": debonded(200.0) | {"contact": False}},
     "angle": {"cell": RANDOM, "fibre": TURNED, "interface": {"debonded": [ARC]}, "angle": {"values": [0, 120, 360]}},
-    "path": {"cell": SQUARE, "interface": STRENGTHS, "path": {"waypoints": WAYPOINTS}},
-    "thinned": {"cell": SQUARE, "interface": STRENGTHS, "path": {"waypoints": WAYPOINTS}, "states": 7},
+    "path": {"cell": SQUARE, "interface": STRENGTHS, "path": LEGS},
+    "thinned": {"cell": SQUARE, "interface": STRENGTHS, "path": LEGS, "states": 7},
     "peaks": {"cell": SQUARE, "interface": STRENGTHS, "path": {"strain": [0.2, 0.0, 0.1]}, "states": "peaks"},
-    "springs": {
-        "cell": SQUARE | {"order": 2},
-        "interface": {"normal_stiffness": 900.0, "tangential_stiffness": 300.0, "debonded": [ARC | {"angle": 110.0}]},
-    },
-    "energy": {
-        "cell": SQUARE,
-        "interface": {
-            "normal_stiffness": 900.0,
-            "tangential_stiffness": 300.0,
-            "criterion": "energy",
-            "toughness": 0.02,
-        },
-        "path": {"waypoints": WAYPOINTS},
-    },
+    "springs": {"cell": SQUARE | {"order": 2}, "interface": SPRINGS | debonded(110.0)},
+    "energy": {"cell": SQUARE, "interface": BY_ENERGY, "path": LEGS},
     "softening": {
         "cell": SQUARE,
-        "interface": {
-            "law": "bilinear",
-            "normal_stiffness": 900.0,
-            "tangential_stiffness": 300.0,
-            **STRENGTHS,
-            "normal_toughness": 0.06,
-            "tangential_toughness": 0.1,
-            "teeth": 3,
-        },
-        "path": {"waypoints": WAYPOINTS},
+        "interface": SPRINGS
+        | STRENGTHS
+        | {"law": "bilinear", "normal_toughness": 0.06, "tangential_toughness": 0.1, "teeth": 3},
+        "path": LEGS,
     },
     "pairs": {
         "cell": SQUARE | {"coating": 0.2},
         "material": {"matrix": MATRIX, "fibre": FIBRE, "coating": {"young": 120.0, "poisson": 0.25}},
         "interface": [
-            SPRINGS | {"between": ["coating", "matrix"], "criterion": "energy", "toughness": 0.02},
-            SPRINGS | {"between": ["fibre", "coating"], "criterion": "energy", "toughness": 0.018},
+            BY_ENERGY | {"between": ["coating", "matrix"]},
+            BY_ENERGY | {"between": ["fibre", "coating"], "toughness": 0.018},
         ],
         "path": {"strain": [0.15, 0.0, 0.05]},
     },
     "springs' energy": {
         "cell": RANDOM | {"order": 2},
-        "interface": SPRINGS | {"criterion": "energy", "toughness": 0.02, "growth": "springs"},
-        "path": {"strain": [0.1, 0.0, 0.05], "method": "increments", "increments": 10},
+        "interface": BY_ENERGY | {"growth": "springs"},
+        "path": stepped({"strain": [0.1, 0.0, 0.05]}, 10),
     },
     "loaded angle": {
         "cell": SQUARE,
@@ -88,59 +83,36 @@ CASES: dict[str, dict[str, Any]] = {
     },
     "envelope by energy": {
         "cell": SQUARE,
-        "interface": SPRINGS
-        | {"criterion": "energy", "toughness": 0.02, "contact": False, "debonded": [ARC | {"angle": 60}]},
+        "interface": BY_ENERGY | {"contact": False} | debonded(60),
         "envelope": {"plane": ["E22", "E11"], "directions": 6},
     },
-    "envelope in space": {
+    "envelope in space": IN_SPACE
+    | {
         "cell": RANDOM,
-        "matrix": WARM,
-        "fibre": CARBON,
-        "plane": "generalized",
         "interface": STRENGTHS | {"axial_strength": 3.0},
         "envelope": {"plane": ["S33", "S13"], "directions": 8, "temperature": -100.0},
     },
-    "spatial": {
-        "cell": HEXAGONAL | {"order": 2},
-        "matrix": WARM,
-        "fibre": TURNED_IN_SPACE,
-        "plane": "generalized",
-        "decomposition": {"subdomains": 6},
-    },
-    "spatial contact": {
-        "cell": SQUARE,
-        "matrix": WARM,
-        "fibre": CARBON,
-        "plane": "generalized",
-        "interface": {"debonded": [ARC | {"angle": 110.0}]},
-    },
-    "spatial springs": {
+    "spatial": IN_SPACE
+    | {"cell": HEXAGONAL | {"order": 2}, "fibre": TURNED_IN_SPACE, "decomposition": {"subdomains": 6}},
+    "spatial contact": IN_SPACE | {"cell": SQUARE, "interface": debonded(110.0)},
+    "spatial springs": IN_SPACE
+    | {
         "cell": SQUARE | {"order": 2, "width": 2.0},
-        "matrix": WARM,
-        "fibre": CARBON,
-        "plane": "generalized",
         "interface": SPRINGS | {"debonded": [ARC]},
         "angle": {"values": [0, 120]},
     },
-    "increments": {
-        "cell": SQUARE,
-        "interface": STRENGTHS | {"criterion": "quadratic"},
-        "path": {"waypoints": WAYPOINTS, "method": "increments", "increments": 12},
-    },
+    "increments": {"cell": SQUARE, "interface": STRENGTHS | {"criterion": "quadratic"}, "path": stepped(LEGS, 12)},
 }
 RUBBING = {
     "cell": SQUARE,
-    "interface": STRENGTHS | {"friction": 0.3, "debonded": [ARC | {"angle": 150.0}]},
+    "interface": STRENGTHS | {"friction": 0.3} | debonded(150.0),
     "path": {"waypoints": [{"E22": -0.05}, {"E22": -0.05, "gamma12": 0.08}, {"E22": -0.05, "gamma12": -0.02}]},
 }
-CASES |= {
-    "friction": RUBBING,
-    "friction by steps": RUBBING | {"path": RUBBING["path"] | {"method": "increments", "increments": 12}},
-}
+CASES |= {"friction": RUBBING, "friction by steps": RUBBING | {"path": stepped(RUBBING["path"], 12)}}
 
-IN_SPACE = {"cell": SQUARE, "matrix": WARM, "fibre": WARM_FIBRE, "plane": "generalized"}
+WARM_SQUARE = {"cell": SQUARE, "matrix": WARM, "fibre": WARM_FIBRE, "plane": "generalized"}
 COOLED = [{"temperature": -1000.0}, {"S22": 6.0}, {"S22": -1.0}, {"temperature": 0.0, "S22": 1.0}]
-BY_ENERGY = {"criterion": "energy", "toughness": 0.002}
+WEAK = BY_ENERGY | {"toughness": 0.002}
 MIXED_PATHS: dict[str, dict[str, Any]] = {
     "mixed": {
         "cell": SQUARE,
@@ -149,56 +121,42 @@ MIXED_PATHS: dict[str, dict[str, Any]] = {
     },
     "jump": {  # a face opens at point 8 and overloads the last bond, a tip
         "cell": {"geometry": "square", "fibre_fraction": 0.37, "mesh_size": 0.4},
-        "interface": SPRINGS
-        | {"criterion": "energy", "toughness": 0.001, "debonded": [{"fibre": "all", "centre": 140.0, "angle": 277.0}]},
+        "interface": BY_ENERGY | {"toughness": 0.001, "debonded": [{"fibre": "all", "centre": 140.0, "angle": 277.0}]},
         "path": {
-            "waypoints": [
-                {"S11": -1.22, "S22": 0.57, "S12": 0.84},
-                {"E11": -0.01, "E22": 0.035, "gamma12": 0.004},
-            ]
+            "waypoints": [{"S11": -1.22, "S22": 0.57, "S12": 0.84}, {"E11": -0.01, "E22": 0.035, "gamma12": 0.004}]
         },
     },
     "uneven steps": {  # no step meets the first waypoint, and contact changes within steps
         "cell": SQUARE,
         "interface": STRENGTHS,
-        "path": {
-            "waypoints": [{"E11": 0.1}, {"E11": -0.05}, {"S11": 2.0}],
-            "method": "increments",
-            "increments": 11,
-        },
+        "path": stepped({"waypoints": [{"E11": 0.1}, {"E11": -0.05}, {"S11": 2.0}]}, 11),
     },
-    "cooled": IN_SPACE | {"interface": STRENGTHS, "path": {"waypoints": COOLED}},
-    "cooled, thinned": IN_SPACE | {"interface": STRENGTHS, "path": {"waypoints": COOLED}, "states": 7},
-    "cooled by steps": IN_SPACE
-    | {"interface": STRENGTHS, "path": {"waypoints": COOLED[:2], "method": "increments", "increments": 8}},
-    "axial": IN_SPACE
+    "cooled": WARM_SQUARE | {"interface": STRENGTHS, "path": {"waypoints": COOLED}},
+    "cooled, thinned": WARM_SQUARE | {"interface": STRENGTHS, "path": {"waypoints": COOLED}, "states": 7},
+    "cooled by steps": WARM_SQUARE | {"interface": STRENGTHS, "path": stepped({"waypoints": COOLED[:2]}, 8)},
+    "axial": WARM_SQUARE
     | {
         "interface": STRENGTHS | {"axial_strength": 2.0, "criterion": "quadratic"},
         "path": {"to": {"S13": 3.0, "S11": 2.0}},
     },
-    "axial energy": IN_SPACE
-    | {"interface": SPRINGS | BY_ENERGY, "path": {"waypoints": [{"S13": 3.0, "S22": 1.0}, {"S13": -1.0}]}},
-    "axial springs": IN_SPACE
+    "axial energy": WARM_SQUARE | {"interface": WEAK, "path": {"waypoints": [{"S13": 3.0, "S22": 1.0}, {"S13": -1.0}]}},
+    "axial springs": WARM_SQUARE
     | {
-        "interface": SPRINGS | BY_ENERGY | {"growth": "springs"},
-        "path": {"to": {"S13": 3.0, "S22": 1.0}, "method": "increments", "increments": 8, "release": "worst"},
+        "interface": WEAK | {"growth": "springs"},
+        "path": stepped({"to": {"S13": 3.0, "S22": 1.0}}, 8, release="worst"),
     },
 }
 LOADS: dict[str, dict[str, Any]] = {
-    "load": IN_SPACE | {"load": {"to": {"E11": 0.02, "S13": 0.1, "temperature": -50.0}}},
-    "load with contact": {
-        "cell": SQUARE,
-        "interface": {"debonded": [ARC | {"angle": 110.0}]},
-        "load": {"to": {"E11": -0.02, "S22": 0.5}},
-    },
+    "load": WARM_SQUARE | {"load": {"to": {"E11": 0.02, "S13": 0.1, "temperature": -50.0}}},
+    "load with contact": {"cell": SQUARE, "interface": debonded(110.0), "load": {"to": {"E11": -0.02, "S22": 0.5}}},
 }
 # Derivatives of constants, and those of energies under contact.
 DERIVATIVES: dict[str, dict[str, Any]] = {
-    "derivatives": IN_SPACE
+    "derivatives": WARM_SQUARE
     | {"interface": SPRINGS, "output": {"sensitivities": True}, "petsc": {"feti_ksp_rtol": 1e-10}},
     "derivatives under contact": {
         "cell": SQUARE,
-        "interface": SPRINGS | {"debonded": [ARC | {"angle": 90.0}]},
+        "interface": SPRINGS | debonded(90.0),
         "output": {"sensitivities": True},
     },
 }

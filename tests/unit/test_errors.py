@@ -5,13 +5,10 @@ import pickle
 from feti_homog.errors import LONGEST_LINE, MOST_FAULTS, CaseError, escaped
 
 
-def test_characters_that_a_terminal_obeys_are_escaped():
+def test_texts_of_errors_are_escaped_and_cut():
     words = "red\x1b[31m bell\x07 line\nend \u202eturned \udcff \x9b"
     assert CaseError(words).faults == (r"red\x1b[31m bell\x07 line\nend \u202eturned \udcff \x9b",)
     assert escaped("größe\n\tα", "\n\t") == "größe\n\tα"
-
-
-def test_long_lines_are_cut():
     (line,) = CaseError(f"{'x' * 10**6}: too long").faults
     assert len(line) == LONGEST_LINE and "x...x" in line and line.endswith("x: too long")
 

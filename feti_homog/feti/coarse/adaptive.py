@@ -21,11 +21,10 @@ from scipy.sparse import csr_matrix, diags
 
 from feti_homog.feti.coarse import geneo
 from feti_homog.feti.decomposition.interface_neighbours import Neighbours
-from feti_homog.feti.linalg.distributed_solver import DistributedSolver
-from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, scaled
+from feti_homog.feti.linalg.sparse_matrices import DistributedSolver, scaled, sum_of_blocks
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.operators.preconditioners import Dirichlet, Preconditioner, StiffnessScaled, never_softens
-from feti_homog.feti.thresholds import COARSE_REGULARISATIONS, DEFAULTS, ROUNDED_MODE_ENERGY, ZERO_TOLERANCE, Thresholds
+from feti_homog.feti.operators.preconditioners import Dirichlet, Preconditioner, StiffnessScaled
+from feti_homog.feti.thresholds import COARSE_REGULARISATIONS, DEFAULTS, ROUNDING_MARGIN, ZERO_TOLERANCE, Thresholds
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.system.runtime import process_memory
 from feti_homog.typing import Float, Int
@@ -108,10 +107,8 @@ class AdaptiveCoarseSpace:
 
     def part(self) -> csr_matrix:
         """Sum this rank's part (u, u) of Z_0^T S Z_0."""
-        total = DenseBlockSum((len(self._modes.reaching),) * 2)
-        for columns, energy in zip(self._columns, self._energies, strict=True):
-            total.add(columns, columns, energy)
-        return total.matrix()
+        blocks = zip(self._columns, self._columns, self._energies, strict=True)
+        return sum_of_blocks((len(self._modes.reaching),) * 2, blocks)
 
     def factor(self, part: csr_matrix) -> None:
         """Factor Z_0^T S Z_0, the sum of all parts, scaled to a unit diagonal, plus a small multiple of I.
@@ -134,7 +131,9 @@ class AdaptiveCoarseSpace:
         energy = distributed_arrays.allreduce_sum(self.comm, energies)[self._modes.reaching]
         if self._free_energy is None:
             largest = self.comm.allreduce(energy.max(initial=0.0), MPI.MAX)
-            self._free_energy = ZERO_TOLERANCE * np.where(energy > ROUNDED_MODE_ENERGY * largest, energy, largest)
+            # Energies of displacements that are rounding are rounding squared.
+            rounded = (ROUNDING_MARGIN * np.finfo(float).eps) ** 2 * largest
+            self._free_energy = ZERO_TOLERANCE * np.where(energy > rounded, energy, largest)
         # The energy of a free motion is rounding, which the scale would increase beyond the added multiple.
         is_held = energy > self._free_energy
         root = np.sqrt(np.where(is_held, energy, 0.0))
@@ -187,8 +186,6 @@ class Balanced(Preconditioner):
         scaled: the preconditioner without coarse space.
         coarse: the coarse space.
     """
-
-    soften = never_softens
 
     def __init__(self, scaled: Dirichlet, coarse: AdaptiveCoarseSpace) -> None:
         self.scaled, self.coarse = scaled, coarse

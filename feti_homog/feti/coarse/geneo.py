@@ -147,7 +147,11 @@ def kernels_and_soft_modes(
     neighbours.exchange(messages(), lambda i, sender, share: received[i].append((sender, share)))
     V = []
     for block, problem, shares in zip(blocks, problems, received, strict=True):
-        V.append(np.hstack([block.R, problem.modes(shares, threshold)]))
+        modes = problem.modes(shares, threshold)
+        # Soft modes, too, are displacements of about 1, so that all energies have the unit of stress.  Powers of two
+        # change no digit.
+        exponent = np.frexp(np.abs(modes).max(axis=0, initial=0.0))[1]
+        V.append(np.hstack([block.R, np.ldexp(modes, -exponent)]))
         shares.clear()
     return V
 

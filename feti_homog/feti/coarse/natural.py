@@ -8,8 +8,7 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import block_diag, csc_matrix, csr_matrix, diags
 
-from feti_homog.feti.linalg.distributed_solver import DistributedSolver
-from feti_homog.feti.linalg.sparse_matrices import assemble_owned_rows
+from feti_homog.feti.linalg.sparse_matrices import DistributedSolver, assemble_owned_rows
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.thresholds import ZERO_TOLERANCE
 from feti_homog.mesh import periodic_topology
@@ -95,47 +94,15 @@ class NaturalCoarseSpace:
 
     @cached_property
     def _gram(self) -> GramMatrix:
-        """Products of G, set up when a row becomes inactive for the first time: 36 numbers a row.  Collective."""
-        return GramMatrix(self.comm, self.G)
+        """Products of G, set up when a row becomes inactive for the first time: 36 numbers a row.  Collective.
 
-    @cached_property
-    def _groups(self) -> list[tuple[Int, Int, Float, Float, Float]]:
-        """Groups of coupled modes (groups, size), and the positions of their blocks in the entries of G^T G.
-
-        Then blocks, eigenvalues and eigenvectors of the last call of `free_motions`.  The pieces of the pinned body are
-        glued to the pinned class and cannot move.  Other modes that G^T G couples have a common eigenproblem, which is
-        about as large as the kernel of a fibre.
+        The pieces of the pinned body are glued to the pinned class and cannot move.
         """
-        groups = []
-        for members in self._gram.groups(np.flatnonzero(self.body != self.pinned_body)):
-            places = self._gram.places(members)
-            nothing = np.full(places.shape, np.nan)
-            groups.append((members, places, nothing, nothing[..., 0].copy(), nothing.copy()))
-        return groups
+        return GramMatrix(self.comm, self.G, np.flatnonzero(self.body != self.pinned_body))
 
     def free_motions(self, active: Float) -> csc_matrix:
         """Compute the `unconstrained_modes` (m, z) for these active rows: the null space of G^T G.  Collective."""
-        padded, columns, none = np.append(self._gram.entries(active), 0.0), 0, np.zeros(0, np.int64)
-        rows, numbers, values = [none], [none], [np.zeros(0)]
-        for members, places, blocks, eigenvalues, vectors in self._groups:
-            now = padded[places]
-            # A broken bond changes one or two groups.
-            if len(other := np.flatnonzero((now != blocks).any(axis=(1, 2)))):
-                eigenvalues[other], vectors[other] = np.linalg.eigh(now[other])
-                blocks[other] = now[other]
-            tolerance = ZERO_TOLERANCE * self._diagonal[members].max(axis=1, keepdims=True)
-            which, mode = np.nonzero(eigenvalues <= tolerance)
-            if not len(which):
-                continue
-            rows.append(members[which].ravel())
-            numbers.append(np.repeat(columns + np.arange(len(which)), members.shape[1]))
-            values.append(vectors[which, :, mode].ravel())
-            columns += len(which)
-        entry = np.concatenate(values), (np.concatenate(rows), np.concatenate(numbers))
-        Z = csc_matrix(entry, shape=(self.kernel_dimension, columns))
-        Z.eliminate_zeros()
-        Z.sort_indices()
-        return Z
+        return self._gram.null_space(active, ZERO_TOLERANCE * self._diagonal)
 
     def amplitudes(self, x: Float) -> Float:
         """Compute (G^T G)^-1 G^T x on every rank, for owned rows x (rows,) or (rows, k).  Collective."""
@@ -168,8 +135,8 @@ class NaturalCoarseSpace:
 class GramMatrix:
     """Entries of G^T A G in the pattern of G^T G, for active rows A = diag(a), as sums of stored products."""
 
-    def __init__(self, comm: MPI.Intracomm, G: csr_matrix) -> None:
-        """Compute the products of G (owned rows, m).  Collective."""
+    def __init__(self, comm: MPI.Intracomm, G: csr_matrix, movable: Int) -> None:
+        """Compute the products of G (owned rows, m), and group the `movable` modes.  Collective."""
         self._comm, self._m = comm, G.shape[1]
         count = np.diff(G.indptr)
         # Pairs of entries of one row.
@@ -185,6 +152,14 @@ class GramMatrix:
         self._entry, self._product = entry, G.data[a] * G.data[b]
         self._active, self._own = np.zeros(G.shape[0]), np.zeros(len(self._keys))
         self._rows, self._columns = np.divmod(self._keys, self._m)
+        # Modes that G^T G couples have a common eigenproblem, which is about as large as the kernel of a fibre: modes
+        # (groups, size), positions of their blocks in the entries, and the blocks, eigenvalues and eigenvectors of the
+        # last call of `null_space`.
+        self._groups: list[tuple[Int, Int, Float, Float, Float]] = []
+        for members in self.groups(movable):
+            places = self.places(members)
+            nothing = np.full(places.shape, np.nan)
+            self._groups.append((members, places, nothing, nothing[..., 0].copy(), nothing.copy()))
 
     def entries(self, active: Float) -> Float:
         """Compute the entries of G^T A G, row by row, for owned rows where `active` is 1.  Collective.
@@ -198,6 +173,30 @@ class GramMatrix:
         self._own = self._own + np.bincount(self._entry[at], products, len(self._own))
         self._active = active.copy()
         return distributed_arrays.allreduce_sum(self._comm, self._own)
+
+    def null_space(self, active: Float, tolerance: Float) -> csc_matrix:
+        """Compute eigenvectors (m, z) of G^T A G with eigenvalues up to the largest `tolerance` (m,) of their modes.
+
+        Collective.
+        """
+        padded, columns, none = np.append(self.entries(active), 0.0), 0, np.zeros(0, np.int64)
+        rows, numbers, values = [none], [none], [np.zeros(0)]
+        for members, places, blocks, eigenvalues, vectors in self._groups:
+            now = padded[places]
+            # A broken bond changes one or two groups.
+            if len(other := np.flatnonzero((now != blocks).any(axis=(1, 2)))):
+                eigenvalues[other], vectors[other] = np.linalg.eigh(now[other])
+                blocks[other] = now[other]
+            which, mode = np.nonzero(eigenvalues <= tolerance[members].max(axis=1, keepdims=True))
+            rows.append(members[which].ravel())
+            numbers.append(np.repeat(columns + np.arange(len(which)), members.shape[1]))
+            values.append(vectors[which, :, mode].ravel())
+            columns += len(which)
+        entry = np.concatenate(values), (np.concatenate(rows), np.concatenate(numbers))
+        Z = csc_matrix(entry, shape=(self._m, columns))
+        Z.eliminate_zeros()
+        Z.sort_indices()
+        return Z
 
     def groups(self, some: Int) -> list[Int]:
         """Group the modes in `some` that G^T G couples: one array (groups, size) for each group size."""

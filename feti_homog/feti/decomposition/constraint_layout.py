@@ -91,48 +91,40 @@ class ConstraintLayout:
 
     def matrix(self) -> csr_matrix:
         """Assemble B (local rows, local dofs)."""
-        shared, entries = self.shared, []
-        # One group of entities for each number of copies in the bodies, with and without bonds that can break.
-        for k in np.unique(shared.copies):
-            some = np.flatnonzero(shared.copies == k)
-            body = shared.body[shared.pointer[some][:, None] + np.arange(k)]
-            starts = np.concatenate([np.ones((len(some), 1), bool), body[:, 1:] != body[:, :-1]], axis=1)
-            codes, which = np.unique(np.column_stack([starts, shared.fibre[some] >= 0]), axis=0, return_inverse=True)
-            for i, code in enumerate(codes):
-                sizes = np.diff(np.r_[np.flatnonzero(code[:-1]), k])
-                entries.append(self._entries(some[which.ravel() == i], sizes, bool(code[-1])))
-        rows, columns, values = (np.concatenate([e[i] for e in entries] or [np.zeros(0)]) for i in range(3))
-        shape = (len(self.rows), self.dofs[-1])
-        return coo_matrix((values, (rows.astype(np.int64), columns.astype(np.int64))), shape=shape).tocsr()
-
-    def _entries(self, entities: Int, sizes: Int, breakable: bool) -> tuple[Int, Int, Float]:
-        """Compute rows, columns and values of B on entities whose bodies have `sizes` copies each."""
         shared, c = self.shared, self.components
-        # (k - 1, k) orthonormal contrasts between the copies in each of two bodies, and between the body means.  One
-        # body, or more than two bodies, cannot part and count as one body.
-        contrasts = helmert(int(sizes.sum()))
-        if len(sizes) == 2:
-            contrasts = np.vstack([block_diag(*map(helmert, sizes)), np.repeat([1.0, -1.0] / sizes, sizes)])
-        k, component = len(contrasts) + 1, np.arange(c)
-        entity, p = expand(entities, shared.nodes[entities])
-        first = self.first[entity] + p * c * (k - 1)
-        identity = np.broadcast_to(np.eye(c), (len(entity), c, c))
-        frame = identity
-        if breakable and c == 2:
-            n = self._normals(entity, p)
-            frame = np.stack([n, np.stack([-n[:, 1], n[:, 0]], axis=1)], axis=1)
-        rows, columns, values = [], [], []
-        for j in range(k):
-            base = self.base[shared.pointer[entity] + j]
-            local = base >= 0
-            dof = c * (base + p)[local]
-            for r in np.flatnonzero(contrasts[:, j]):
-                turn = frame if r == k - 2 else identity
-                shape = len(dof), c, c
-                rows.append(np.broadcast_to((first[local] + c * r)[:, None, None] + component[:, None], shape).ravel())
-                columns.append(np.broadcast_to(dof[:, None, None] + component, shape).ravel())
-                values.append((contrasts[r, j] * turn[local]).ravel())
-        return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
+        component, identity = np.arange(c), np.eye(c)
+        none = np.zeros(0, np.int64)
+        rows, columns, values = [none], [none], [none.astype(float)]
+        # Groups of entities with equal numbers of copies in their bodies, with and without bonds that can break: where
+        # the copies of a body begin and where all end, and whether bonds can break.
+        entity, copy = expand(np.arange(len(shared.key)), shared.copies)
+        codes = np.zeros((len(shared.key), shared.copies.max(initial=0) + 2), bool)
+        codes[entity, copy] = (copy == 0) | (np.diff(shared.body, prepend=-1) != 0)
+        codes[np.arange(len(codes)), shared.copies], codes[:, -1] = True, shared.fibre >= 0
+        codes, group = np.unique(codes, axis=0, return_inverse=True)
+        for number, code in enumerate(codes):
+            # (k - 1, k) orthonormal contrasts between the copies in each of two bodies, and between the body means.
+            # One body, or more than two bodies, cannot part and count as one body.
+            sizes = np.diff(np.flatnonzero(code[:-1]))
+            k, contrasts = int(sizes.sum()), helmert(int(sizes.sum()))
+            if len(sizes) == 2:
+                contrasts = np.vstack([block_diag(*map(helmert, sizes)), np.repeat([1.0, -1.0] / sizes, sizes)])
+            some = np.flatnonzero(group.ravel() == number)
+            entity, p = expand(some, shared.nodes[some])
+            first, frame = self.first[entity] + p * c * (k - 1), np.tile(identity, (len(entity), 1, 1))
+            if code[-1] and c == 2:
+                n = self._normals(entity, p)
+                frame = np.stack([n, np.stack([-n[:, 1], n[:, 0]], axis=1)], axis=1)
+            for r, j in np.argwhere(contrasts):
+                base = self.base[shared.pointer[entity] + j]
+                local = base >= 0
+                dof = (c * (base + p)[local])[:, None, None] + component
+                row = (first[local] + c * r)[:, None, None] + component[:, None]
+                block = contrasts[r, j] * (frame[local] if r == k - 2 else identity)
+                for entries, part in ((rows, row), (columns, dof), (values, block)):
+                    entries.append(np.broadcast_to(part, (len(dof), c, c)).ravel())
+        parts = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
+        return coo_matrix(parts, shape=(len(self.rows), self.dofs[-1])).tocsr()
 
     def _places(self, entity: Int, p: Int) -> Float:
         """Compute positions (i,) of fine nodes p, in [0, 1] along edges; 0 at vertices."""

@@ -189,6 +189,13 @@ class SharedEntities(Sharers):
     owned: tuple[int, int]
     constraints: int
 
+    @property
+    def pieces(self) -> set[int]:
+        """Subdomains with a node that belongs to another subdomain of their body, or to several other bodies."""
+        body = self.body
+        between_two = (self.copies == 2) & (body[self.pointer[:-1]] != body[self.pointer[1:] - 1])
+        return set(self.sharer[~np.repeat(between_two, self.copies)].tolist())
+
 
 def share_entities(
     comm: MPI.Intracomm,

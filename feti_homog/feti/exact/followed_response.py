@@ -148,8 +148,10 @@ class FollowedResponse:
         # Rows come before others leave, so that fewer bodies are free meanwhile; half of the room is for pins.
         moves = np.flatnonzero(~stays)
         moves = moves[np.argsort(turned[moves], kind="stable")]
-        parts = np.array_split(moves, 2 * len(moves) // thresholds.WAITING_COLUMNS + 1)
-        return all(self._exchange(rows[some], turned[some], gained[some], pivot) for some in parts if len(some))
+        for some in np.array_split(moves, 2 * len(moves) // thresholds.WAITING_COLUMNS + 1) if len(moves) else []:
+            if not self._turn(rows[some], turned[some], gained[some], pivot):
+                return False
+        return True
 
     def soften(self, rows: Int, more: Float, pivot: float = 0.0) -> bool:
         """Let springs of global rows (k,) gain compliance (k,), of any sign; False as in `follow`.  Collective."""
@@ -164,7 +166,7 @@ class FollowedResponse:
             self._change(columns, B, values)
         return B is not None
 
-    def _exchange(self, rows: Int, sign: Float, gained: Float, pivot: float) -> bool:
+    def _turn(self, rows: Int, sign: Float, gained: Float, pivot: float) -> bool:
         """Let rows leave (sign 1) or come (-1), and pins leave with rows that come; False as in `follow`.
 
         Collective.
@@ -182,38 +184,32 @@ class FollowedResponse:
         inverse = self._comm.bcast(_regular(block, sign, self._stiffness[rows], pivot))
         if inverse is None:
             return False
+        self.answer = self.answer.copy()
         which, B = inverse
         if len(which):
             self._make_room(len(which))
+            s, difference, places = sign[which], np.take(columns, which, axis=1), rows[which] - self._first
+            mine = np.flatnonzero((places >= 0) & (places < len(columns)))
+            places = places[mine]
+            turned = difference @ (B * s)
+            turned[places] = -(s[:, None] * B * s + np.diag(np.where(s > 0.0, gained[which], 0.0)))[mine]
+            # The rows themselves become s B U_I and s B Gamma_I:, from nothing: of what they were, differences lose
+            # digits where a stiffness is far from 1.
+            self.answer[places], self._buffer[places], self._waiting[places, : self._count] = 0.0, 0.0, 0.0
+            difference[places] = -np.diag(s)[mine]
             some = np.concatenate([which, np.arange(k, len(values))])
-            values = np.hstack([values[some][:, which], values[some, k:]])
-            self._turn(rows[which], sign[which], gained[which], B, columns[:, which], values)
+            self._change(difference, B, np.hstack([values[some][:, which], values[some, k:]]))
+            at = self._slot[rows[which]]
+            self._buffer[:, at], self._factors[at] = turned, 0.0
         if len(moved) or len(which) < k or len(self.pins):
             loose = np.setdiff1d(np.arange(k), which)
-            self.pins, self.answer = np.union1d(np.setdiff1d(self.pins, moved), rows[loose]), self.answer.copy()
+            self.pins, self.had_pins = np.union1d(np.setdiff1d(self.pins, moved), rows[loose]), True
             places = self.pins - self._first
             self.answer[places[(places >= 0) & (places < len(self.answer))]] = 0.0
-            self.had_pins = True
             # Springs of pins have C_0, as of all rows that are not active.
             if len(loose := loose[gained[loose] != 0.0]):
                 return self.soften(rows[loose], gained[loose], pivot)
         return True
-
-    def _turn(self, rows: Int, sign: Float, gained: Float, B: Float, columns: Float, values: Float) -> None:
-        """Let rows leave (sign 1) or come (-1) whose block has the inverse B.  Collective."""
-        at = self._slot[rows]
-        mine = np.flatnonzero((rows >= self._first) & (rows < self._first + len(columns)))
-        places = rows[mine] - self._first
-        turned = columns @ (B * sign)
-        turned[places] = -(sign[:, None] * B * sign + np.diag(np.where(sign > 0.0, gained, 0.0)))[mine]
-        # The rows themselves become s B U_I and s B Gamma_I:, from nothing: of what they were, differences lose digits
-        # where a stiffness is far from 1.
-        self.answer = self.answer.copy()
-        self.answer[places], self._buffer[places], self._waiting[places, : self._count] = 0.0, 0.0, 0.0
-        difference = columns.copy()
-        difference[places] = -np.diag(sign)[mine]
-        self._change(difference, B, values)
-        self._buffer[:, at], self._factors[at] = turned, 0.0
 
     def _present(self, rows: Int) -> tuple[Float, Float]:
         """Return columns (owned rows, k), and rows (k + all columns, k + v) of them and U on all ranks.  Collective."""

@@ -9,17 +9,18 @@ the principal pivot transform of the dual operator, with F_AA^-1 the inverse on 
 positive semi-definite on A and negative definite on I.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csr_matrix, diags, hstack
 
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.exact.spring_update import SpringUpdate
 from feti_homog.feti.linalg.dense_matrices import DenseSolver
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
-from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, allreduce_sparse
+from feti_homog.feti.linalg.sparse_matrices import allreduce_sparse, sum_of_blocks
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.operators.preconditioners import Preconditioner, never_softens
+from feti_homog.feti.operators.preconditioners import Preconditioner, SpringUpdate
 from feti_homog.feti.operators.with_springs import is_dense
 from feti_homog.feti.thresholds import COLUMNS_AT_ONCE, DEFAULTS, STIFF_FIBRES
 from feti_homog.system.parallel import distributed_arrays
@@ -38,18 +39,48 @@ class AssembledSchur:
         size: columns of Z, on all ranks.
     """
 
-    def __init__(self, comm: MPI.Intracomm, Z: csr_matrix, stiffness: csr_matrix | Float) -> None:
-        """Factor, with the arguments of `assembled_stiffness`.
+    def __init__(self, operators: InterfaceOperators, active: Float) -> None:
+        """Assemble and factor for rows where `active` is 1, which must leave no rigid-body motion free.  Collective.
 
         Dense matrices by LAPACK; options of sparse ones have the prefix `feti_bonded_` (default: cholesky by CHOLMOD).
+
+        Raises:
+            TypeError: a boundary operator is not dense.
         """
-        self.comm, self.size = comm, Z.shape[1]
+        released, comm, jump_operator = active == 0, operators.comm, operators.jump_operator
+        starts, sizes = jump_operator.node_rows
+        first = comm.exscan(len(starts)) or 0
+        node = jump_operator.gather(np.repeat(first + np.arange(len(starts)), sizes[np.argsort(starts)]).astype(float))
+        # Each node copy has an entry in some row of the node, and its dofs are consecutive.
+        row = operators.BT.indices[operators.BT.indptr[:-1]]
+        n, c = len(row), jump_operator.components
+        shared = c * node[row].astype(np.int64) + np.arange(n) % c
+        together = csr_matrix((np.ones(n), (np.arange(n), shared)), shape=(n, jump_operator.shared_dofs))
+        # Along the direction e of each inactive row u_f = y - e (e . y) + e w, with an extra column for w.
+        counts = comm.allgather(int(released.sum()))
+        number = np.where(released, sum(counts[: comm.rank]) + np.cumsum(released), 0)
+        number = jump_operator.gather(number.astype(float)).astype(np.int64) - 1
+        rows = np.flatnonzero(number >= 0)
+        # A row has the mean of the inner copies, with a minus sign.
+        minus_copies, of_inner = -jump_operator.copies[rows, 1].astype(float), operators.of_inner.astype(float)
+        e = diags(minus_copies) @ operators.B[rows] @ diags(of_inner)
+        square = np.asarray(e.multiply(e).sum(axis=1)).ravel()
+        rows, e, square = rows[square > 0], e.tocsr()[square > 0], square[square > 0]
+        directions = csr_matrix(
+            (np.ones(len(rows)), (np.arange(len(rows)), number[rows])), shape=(len(rows), sum(counts))
+        )
+        common = (together - e.T @ (diags(1.0 / square) @ (e @ together))).tocsr()
+        common.eliminate_zeros()
+        apart = (e.T @ directions).tocsr()
+        apart.eliminate_zeros()
+        Z = hstack([common, apart]).tocsr()
+        self.comm, self.size, self._Z, self._ZT = comm, Z.shape[1], Z, Z.T.tocsr()
+        stiffness = assembled_stiffness(operators, Z)
         self._solver: DirectSolver | DenseSolver
         if isinstance(stiffness, np.ndarray):
             self._solver = DenseSolver(stiffness)
         else:
             self._solver = DirectSolver(stiffness, "feti_bonded_")
-        self._Z, self._ZT = Z, Z.T.tocsr()
 
     def relieving_displacement(self, forces: Float) -> Float:
         """Compute u = -Z (Z^T S Z)^-1 Z^T f, which balances boundary forces f (n,) or (n, k) on Z.
@@ -65,66 +96,32 @@ class AssembledSchur:
         self._solver.destroy()
 
 
-def assembled_stiffness(operators: InterfaceOperators, active: Float) -> tuple[csr_matrix, csr_matrix | Float]:
-    """Assemble Z (n, columns) and Z^T S Z over all ranks, for rows where `active` is 1.  Collective.
+def assembled_stiffness(operators: InterfaceOperators, Z: csr_matrix) -> csr_matrix | Float:
+    """Sum Z^T S Z over all ranks for Z (n, columns).  Collective.
 
-    The rows must leave no rigid-body motion free.  The sum is dense, in Fortran order, where all ranks' blocks have
-    as many entries as the whole matrix and there are no options `feti_bonded_`; sparse otherwise.
+    The sum is dense, in Fortran order, where all ranks' blocks have as many entries as the whole matrix and there are
+    no options `feti_bonded_`; sparse otherwise.
 
     Raises:
         TypeError: a boundary operator is not dense.
     """
-    comm, Z = operators.comm, _released(operators, active)
-    size, columns = Z.shape[1], [np.unique(Z[span].indices) for span in operators.slices]
+    comm, size, columns = operators.comm, Z.shape[1], [np.unique(Z[span].indices) for span in operators.slices]
+
+    def blocks() -> Iterator[tuple[Int, Int, Float]]:
+        for operator, span, of in zip(operators.with_springs, operators.slices, columns, strict=True):
+            if not is_dense(operator):
+                raise TypeError("the assembled Schur complement needs dense boundary operators")
+            T = Z[span][:, of].T.tocsr()
+            yield of, of, T @ (T @ operator.S).T
+
     entries = comm.allreduce(sum(len(of) ** 2 for of in columns))
-    is_full = (
-        entries >= size**2 and size <= DEFAULTS.dense_boundary_dofs and not options_database.choices("feti_bonded_")
-    )
-    dense, blocks = np.zeros((size, size) if is_full else (0, 0)), DenseBlockSum((size, size))
-    for operator, span, of in zip(operators.with_springs, operators.slices, columns, strict=True):
-        if not is_dense(operator):
-            raise TypeError("the assembled Schur complement needs dense boundary operators")
-        T = Z[span][:, of].T.tocsr()
-        block = T @ (T @ operator.S).T
-        if is_full:
-            dense[of[:, None], of] += block
-        else:
-            blocks.add(of, of, block)
-    if not is_full:
-        return Z, allreduce_sparse(comm, blocks.matrix())
+    if entries < size**2 or size > DEFAULTS.dense_boundary_dofs or options_database.choices("feti_bonded_"):
+        return allreduce_sparse(comm, sum_of_blocks((size, size), blocks()))
+    dense = np.zeros((size, size))
+    for of, _, block in blocks():
+        dense[of[:, None], of] += block
     comm.Allreduce(MPI.IN_PLACE, dense)
-    return Z, dense.T
-
-
-def _released(operators: InterfaceOperators, active: Float) -> csr_matrix:
-    """Build Z (n, columns) from the matrix Z with all rows active.  Collective.
-
-    u_f = y - e (e . y) + e w along the direction e of each inactive row, with an extra column for w.
-    """
-    released, comm, jump_operator = active == 0, operators.comm, operators.jump_operator
-    starts, sizes = jump_operator.node_rows
-    first = comm.exscan(len(starts)) or 0
-    node = jump_operator.gather(np.repeat(first + np.arange(len(starts)), sizes[np.argsort(starts)]).astype(float))
-    # Each node copy has an entry in some row of the node, and its dofs are consecutive.
-    row = operators.BT.indices[operators.BT.indptr[:-1]]
-    n, c = len(row), jump_operator.components
-    shared = c * node[row].astype(np.int64) + np.arange(n) % c
-    together = csr_matrix((np.ones(n), (np.arange(n), shared)), shape=(n, jump_operator.shared_dofs))
-    counts = comm.allgather(int(released.sum()))
-    number = np.where(released, sum(counts[: comm.rank]) + np.cumsum(released), 0)
-    number = jump_operator.gather(number.astype(float)).astype(np.int64) - 1
-    rows = np.flatnonzero(number >= 0)
-    # A row has the mean of the inner copies, with a minus sign.
-    minus_copies, of_inner = -jump_operator.copies[rows, 1].astype(float), operators.of_inner.astype(float)
-    e = diags(minus_copies) @ operators.B[rows] @ diags(of_inner)
-    square = np.asarray(e.multiply(e).sum(axis=1)).ravel()
-    rows, e, square = rows[square > 0], e.tocsr()[square > 0], square[square > 0]
-    directions = csr_matrix((np.ones(len(rows)), (np.arange(len(rows)), number[rows])), shape=(len(rows), sum(counts)))
-    common = (together - e.T @ (diags(1.0 / square) @ (e @ together))).tocsr()
-    common.eliminate_zeros()
-    apart = (e.T @ directions).tocsr()
-    apart.eliminate_zeros()
-    return hstack([common, apart]).tocsr()
+    return dense.T
 
 
 class BodyTies:
@@ -173,7 +170,7 @@ class ReferenceCell:
         self._BD, self._BDT = one_sided, one_sided.T.tocsr()
         reached = self._BDT.getnnz(axis=1) > 0
         self._reached = [bool(reached[span].any()) for span in operators.slices]
-        self.assembled = AssembledSchur(comm, *assembled_stiffness(operators, active))
+        self.assembled = AssembledSchur(operators, active)
         self._is_bonded = not comm.allreduce(bool((active == 0).any()), MPI.LOR)
         self._first = jump_operator.owned[0]
         self._springs = SpringUpdate(comm, self._first, active * operators.compliance, self._without_springs)
@@ -278,7 +275,7 @@ class BondedInverse(Preconditioner):
     Unlike `ExactInverse` it follows no rows: another set of active rows is factored anew.
     """
 
-    soften, is_exact = never_softens, True
+    is_exact = True
 
     def __init__(self, operators: InterfaceOperators) -> None:
         """Factor the cell with all bonds; all boundary operators must be dense.  Collective."""

@@ -1,5 +1,5 @@
 """Linear algebra that the FETI method needs beyond single library calls; PETSc factors the matrices.
 
-Imports `feti` and `system`.  Main entries: `sparse_direct.DirectSolver`, `distributed_solver.DistributedSolver`, and
+Imports `feti` and `system`.  Main entries: `sparse_direct.DirectSolver`, `sparse_matrices.DistributedSolver`, and
 the sums over ranks in `sparse_matrices`.
 """

@@ -11,7 +11,7 @@ from scipy.linalg.blas import dtrmm
 from scipy.linalg.lapack import dlauum, dpotrf, dpotrs, dtrtri
 from scipy.sparse import bmat, csr_matrix
 
-from feti_homog.feti.linalg.sparse_direct import check_factor, mumps_error, power_of_two
+from feti_homog.feti.linalg.sparse_direct import check_factor, mumps_error, power_of_two, sequential
 from feti_homog.feti.thresholds import BLOCK_ROWS, COLUMNS_AT_ONCE, COPIED_COLUMNS
 from feti_homog.system.petsc import c_functions, options_database
 from feti_homog.typing import Float, Int
@@ -38,12 +38,34 @@ def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) ->
     if order is not None and _can_be_ordered():
         return _by_cholmod(matrix, rows, np.zeros((matrix.shape[0], 0)), order, keep_factor=False).S
     scale = power_of_two(matrix.diagonal())
-    matrix.sort_indices()
     # Scale in place and back, which changes no digit: a copy would be as large as the matrix.
     matrix.data *= scale
+    A = sequential(matrix)
+    A.setOption(PETSc.Mat.Option.SPD, True)
+    some, pc = PETSc.IS().createGeneral(rows.astype(PETSc.IntType), comm=PETSc.COMM_SELF), PETSc.PC()
     try:
-        schur = _by_mumps(matrix, rows)
+        for workspace in MORE_WORKSPACE:
+            pc.destroy()
+            pc.create(PETSc.COMM_SELF)
+            pc.setOptionsPrefix("feti_schur_")
+            pc.setOperators(A)
+            pc.setType(PETSc.PC.Type.CHOLESKY)
+            pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
+            pc.setFromOptions()
+            pc.setFactorSetUpSolverType()
+            # MUMPS' own scaling loses digits of coarse matrices, which are scaled.
+            pc.getFactorMatrix().setMumpsIcntl(8, 0)
+            if workspace is not None:
+                pc.getFactorMatrix().setMumpsIcntl(14, workspace)
+            c_functions.set_schur(pc.getFactorMatrix(), some)
+            pc.setUp()
+            if mumps_error(pc.getFactorMatrix())[0] not in TOO_SMALL:
+                break
+        check_factor(pc)
+        schur = c_functions.schur_complement(pc.getFactorMatrix(), len(rows))
     finally:
+        for petsc_object in (pc, some, A):
+            petsc_object.destroy()
         matrix.data /= scale
     schur /= scale
     return schur
@@ -132,39 +154,6 @@ def _by_cholmod(matrix: csr_matrix, rows: Int, loads: Float, order: Int, keep_fa
     S = full_from_lower(U[::-1, ::-1]).T
     S[np.diag_indices(n)] -= shift
     return CondensedMatrix(S, q, -inner.T @ inner, shifted)
-
-
-def _by_mumps(matrix: csr_matrix, rows: Int) -> Float:
-    """Compute the Schur complement of a matrix whose largest entry is about 1."""
-    csr = matrix.indptr, matrix.indices, matrix.data
-    A = PETSc.Mat().createAIJWithArrays(matrix.shape, csr, comm=PETSc.COMM_SELF)
-    A.setOption(PETSc.Mat.Option.SPD, True)
-    some = PETSc.IS().createGeneral(rows.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
-    try:
-        for workspace in MORE_WORKSPACE:
-            pc = PETSc.PC().create(PETSc.COMM_SELF)
-            pc.setOptionsPrefix("feti_schur_")
-            pc.setOperators(A)
-            pc.setType(PETSc.PC.Type.CHOLESKY)
-            pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
-            pc.setFromOptions()
-            pc.setFactorSetUpSolverType()
-            # MUMPS' own scaling loses digits of coarse matrices, which are scaled.
-            pc.getFactorMatrix().setMumpsIcntl(8, 0)
-            if workspace is not None:
-                pc.getFactorMatrix().setMumpsIcntl(14, workspace)
-            c_functions.set_schur(pc.getFactorMatrix(), some)
-            pc.setUp()
-            if mumps_error(pc.getFactorMatrix())[0] not in TOO_SMALL or workspace == MORE_WORKSPACE[-1]:
-                break
-            pc.destroy()
-        try:
-            check_factor(pc)
-            return c_functions.schur_complement(pc.getFactorMatrix(), len(rows))
-        finally:
-            pc.destroy()
-    finally:
-        A.destroy()
 
 
 def cholesky(A: Float, lower: bool = True, clean: bool = True) -> Float:

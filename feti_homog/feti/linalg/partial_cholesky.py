@@ -8,6 +8,7 @@ import ctypes
 import weakref
 from contextlib import suppress
 from ctypes import POINTER, byref, c_double, c_int, c_size_t, c_void_p
+from enum import IntEnum
 from functools import cache
 from typing import Any
 
@@ -19,10 +20,20 @@ from feti_homog.typing import Array, Float, Int
 
 # Bytes for `cholmod_common`, which takes less than 4 KiB; this module reads none of its members.
 COMMON_BYTES = 2**16
-GIVEN = 1  # an order of rows
-WHOLE, FORWARD = 0, 4  # the solves with A, and with L
-LOWER, REAL, PATTERN = -1, 1, 0
+GIVEN, LOWER = 1, -1  # an order of rows, the triangle that is stored
 KNOWN_VERSIONS = range(2, 6)
+
+
+class System(IntEnum):
+    """The matrices that `cholmod_solve` solves with."""
+
+    A, L = 0, 4
+
+
+class XType(IntEnum):
+    """The entries of a CHOLMOD matrix: their positions alone, or their values too."""
+
+    PATTERN, REAL = 0, 1
 
 
 class _Sparse(ctypes.Structure):
@@ -90,18 +101,42 @@ class PartialFactor:
         # CHOLMOD reads these arrays directly.
         p, i = (indices.astype(np.int32, copy=False) for indices in (A.indptr, A.indices))
         x = np.asarray(A.data, np.float64)
-        matrix = _Sparse(n, n, A.nnz, _address(p), _address(i), None, _address(x), None, LOWER, 0, REAL, 0, 1, 1)
+        matrix = _Sparse(n, n, A.nnz, _address(p), _address(i), None, _address(x), None, LOWER, 0, XType.REAL, 0, 1, 1)
         # The requested order of rows; CHOLMOD eliminates row `_order[k]` at step `_place[k]`.
         self._order, self._m = np.r_[order[~is_last[order]], rows], len(rows)
-        self._common, library = ctypes.create_string_buffer(COMMON_BYTES), _library()
-        library.cholmod_start(self._common)
-        self._factor = library.cholmod_allocate_factor(c_size_t(n), self._common)
-        weakref.finalize(self, _free, self._factor, self._common)
-        self._place = _analyse(matrix, self._order.astype(np.int32), self._factor, self._common)
-        if not library.cholmod_factorize(byref(matrix), self._factor, self._common):
+        self._common = common = ctypes.create_string_buffer(COMMON_BYTES)
+        library = _library()
+        library.cholmod_start(common)
+        self._factor = library.cholmod_allocate_factor(c_size_t(n), common)
+        # The factor is freed before the workspace: the last callback is called first.
+        weakref.finalize(self, library.cholmod_finish, common)
+        weakref.finalize(self, library.cholmod_free_factor, byref(self._factor), common)
+        # Analyse the matrix in a postordering of the elimination tree, with the fill of the requested order.
+        requested = self._order.astype(np.int32)
+        parent, post, count, *work = np.empty((5, n), np.int32)
+        done = library.cholmod_analyze_ordering(
+            byref(matrix), GIVEN, _address(requested), None, c_size_t(0),
+            *map(_address, (parent, post, count, *work)), common,
+        )  # fmt: skip
+        if not (done and self._factor):
+            raise MemoryError("CHOLMOD could not analyse the matrix")
+        self._place = np.empty(n, np.int64)
+        self._place[post] = np.arange(n)
+        parent = np.where(parent[post] < 0, -1, self._place[parent[post]]).astype(np.int32)
+        permutation, factor = np.ascontiguousarray(requested[post]), self._factor.contents
+        _array(factor.Perm, n, c_int)[:], _array(factor.ColCount, n, c_int)[:] = permutation, count[post]
+        factor.ordering = GIVEN
+        upper = library.cholmod_ptranspose(
+            byref(matrix), XType.PATTERN, _address(permutation), None, c_size_t(0), common
+        )
+        done = upper and library.cholmod_super_symbolic(upper, None, _address(parent), self._factor, common)
+        library.cholmod_free_sparse(byref(upper), common)
+        if not done:
+            raise MemoryError("CHOLMOD could not analyse the matrix")
+        if not library.cholmod_factorize(byref(matrix), self._factor, common):
             raise MemoryError("CHOLMOD could not factor")
-        if self._factor.contents.minor < n:
-            raise np.linalg.LinAlgError(f"not positive definite (cholmod: pivot {self._factor.contents.minor})")
+        if factor.minor < n:
+            raise np.linalg.LinAlgError(f"not positive definite (cholmod: pivot {factor.minor})")
 
     def last_block(self) -> Float:
         """Return the block (m, m) of L on `rows` in reverse order: an upper triangle.
@@ -132,19 +167,19 @@ class PartialFactor:
             return B
         permuted = np.empty(B.shape, order="F")
         permuted[self._place] = B[self._order]
-        return self._solve(FORWARD, permuted)[self._place]
+        return self._solve(System.L, permuted)[self._place]
 
     def solve(self, B: Float) -> Float:
         """Compute A^-1 B for B (n,) or (n, k)."""
-        return self._solve(WHOLE, np.asfortranarray(B.reshape(len(B), -1), np.float64)).reshape(B.shape)
+        return self._solve(System.A, np.asfortranarray(B.reshape(len(B), -1), np.float64)).reshape(B.shape)
 
-    def _solve(self, system: int, B: Float) -> Float:
+    def _solve(self, system: System, B: Float) -> Float:
         """Solve one of CHOLMOD's systems for B (n, k) in Fortran order: (n, k).
 
         Raises:
             MemoryError: CHOLMOD could not solve, usually for lack of memory.
         """
-        right = _Dense(len(B), B.shape[1], B.size, len(B), _address(B), None, REAL, 0)
+        right = _Dense(len(B), B.shape[1], B.size, len(B), _address(B), None, XType.REAL, 0)
         solved = _library().cholmod_solve(system, self._factor, byref(right), self._common)
         if not solved:
             raise MemoryError("CHOLMOD could not solve")
@@ -152,40 +187,6 @@ class PartialFactor:
             return _array(solved.contents.x, B.size, c_double).reshape(B.shape[::-1]).T.copy(order="F")
         finally:
             _library().cholmod_free_dense(byref(solved), self._common)
-
-
-def _analyse(matrix: _Sparse, order: Int, factor: Any, common: Any) -> Int:
-    """Analyse the matrix in a postordering of the elimination tree, with the fill of `order` (n,).
-
-    Return the elimination step (n,) of each row of `order`.
-    """
-    n, library = len(order), _library()
-    parent, post, count, *work = np.empty((5, n), np.int32)
-    done = library.cholmod_analyze_ordering(
-        byref(matrix), GIVEN, _address(order), None, c_size_t(0),
-        *map(_address, (parent, post, count, *work)), common,
-    )  # fmt: skip
-    if not (done and factor):
-        raise MemoryError("CHOLMOD could not analyse the matrix")
-    place = np.empty(n, np.int64)
-    place[post] = np.arange(n)
-    parent = np.where(parent[post] < 0, -1, place[parent[post]]).astype(np.int32)
-    order = np.ascontiguousarray(order[post])
-    _array(factor.contents.Perm, n, c_int)[:] = order
-    _array(factor.contents.ColCount, n, c_int)[:] = count[post]
-    factor.contents.ordering = GIVEN
-    upper = library.cholmod_ptranspose(byref(matrix), PATTERN, _address(order), None, c_size_t(0), common)
-    done = upper and library.cholmod_super_symbolic(upper, None, _address(parent), factor, common)
-    library.cholmod_free_sparse(byref(upper), common)
-    if not done:
-        raise MemoryError("CHOLMOD could not analyse the matrix")
-    return place
-
-
-def _free(factor: Any, common: Any) -> None:
-    """Free a factor and CHOLMOD's workspace."""
-    _library().cholmod_free_factor(byref(factor), common)
-    _library().cholmod_finish(common)
 
 
 def _address(values: Array) -> c_void_p:

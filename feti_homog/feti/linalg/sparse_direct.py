@@ -16,7 +16,7 @@ from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
 from feti_homog.errors import CaseError
-from feti_homog.feti.thresholds import ITERATIVE_RTOL, MUMPS_EXTRA_WORKSPACE_PERCENT
+from feti_homog.feti.thresholds import MUMPS_EXTRA_WORKSPACE_PERCENT, ZERO_TOLERANCE
 from feti_homog.system.petsc import c_functions
 from feti_homog.typing import Float
 
@@ -145,36 +145,42 @@ def solve_columns(ksp: PETSc.KSP, x: PETSc.Vec, b: PETSc.Vec, B: Float) -> Float
     return X
 
 
-def factored(
-    A: PETSc.Mat, prefix: str, library: str, near_kernel: Float | None = None, is_ordered: bool = False
-) -> PETSc.KSP:
+def factored(A: PETSc.Mat, prefix: str, library: str, is_ordered: bool = False) -> PETSc.KSP:
     """Factor a symmetric definite matrix by Cholesky in a `library`; return the KSP.
 
     Options under `prefix` may choose another method.  If the matrix `is_ordered`, rows are eliminated one after the
     other.  Collective on the ranks of the matrix.
 
     Rows and columns should have similar size: MUMPS does not scale here, for its scaling loses all digits of coarse
-    problems with contrasts of 1e6.  Multigrid uses the `near_kernel` (n, k): orthonormal vectors with little energy,
-    equal on all ranks.
+    problems with contrasts of 1e6.
 
     Raises:
         LinAlgError: the matrix is not positive definite, or nearly singular.
         MemoryError: MUMPS could not factor, or CHOLMOD is out of memory.
         CaseError: the library in the options has no such factorization.
     """
-    if near_kernel is not None and near_kernel.shape[1]:
-        vectors = [A.createVecLeft() for _ in near_kernel.T]
-        for vector, values in zip(vectors, near_kernel.T, strict=True):
-            vector.setArray(values[slice(*vector.getOwnershipRange())])
-        space = PETSc.NullSpace().create(vectors=vectors, comm=A.comm)
-        A.setNearNullSpace(space)
-        # The matrix holds references, which its destructor frees.
-        for petsc_object in (space, *vectors):
-            petsc_object.destroy()
     A.setOption(PETSc.Mat.Option.SPD, True)
+    ksp = PETSc.KSP().create(A.comm)
+    ksp.setOptionsPrefix(prefix)
+    ksp.setOperators(A)
+    ksp.setType(PETSc.KSP.Type.PREONLY)
+    ksp.setErrorIfNotConverged(True)
+    ksp.setTolerances(rtol=ZERO_TOLERANCE)
+    pc = ksp.getPC()
+    pc.setType(PETSc.PC.Type.CHOLESKY)
+    pc.setFactorSolverType(library)
     with _unless_given({**DEFINITE, **(ORDERED if is_ordered else {})}, prefix):
-        ksp = _direct_ksp(A, prefix, library)
-        pc = ksp.getPC()
+        ksp.setFromOptions()
+        try:
+            pc.setFactorSetUpSolverType()
+        except PETSc.Error as error:
+            if error.ierr != MISSING_FACTOR:
+                raise
+            where = f"on {A.comm.size} ranks" if A.comm.size > 1 else "on one rank"
+            raise CaseError(
+                f"-{prefix}pc_factor_mat_solver_type {pc.getFactorSolverType()}: it has no {pc.getType()} "
+                f"factorization of a matrix {where}; mumps has"
+            ) from error
         if pc.getFactorSolverType() == PETSc.Mat.SolverType.MUMPS:
             pc.getFactorMatrix().setMumpsIcntl(8, 0)
             pc.getFactorMatrix().setMumpsIcntl(14, MUMPS_EXTRA_WORKSPACE_PERCENT)
@@ -185,7 +191,7 @@ def factored(
             if message.endswith(CHOLMOD_OUT_OF_MEMORY):
                 raise MemoryError(message) from error
             raise np.linalg.LinAlgError(f"not positive definite ({message})") from error
-    check_factor(ksp.getPC())
+    check_factor(pc)
     return ksp
 
 
@@ -201,31 +207,6 @@ def _unless_given(options: Options, prefix: str) -> Iterator[None]:
     finally:
         for name in added:
             database.delValue(name)
-
-
-def _direct_ksp(A: PETSc.Mat, prefix: str, library: str) -> PETSc.KSP:
-    """Create a KSP that applies a Cholesky factor of `library` once; options under `prefix` may change both."""
-    ksp = PETSc.KSP().create(A.comm)
-    ksp.setOptionsPrefix(prefix)
-    ksp.setOperators(A)
-    ksp.setType(PETSc.KSP.Type.PREONLY)
-    ksp.setErrorIfNotConverged(True)
-    ksp.setTolerances(rtol=ITERATIVE_RTOL)
-    pc = ksp.getPC()
-    pc.setType(PETSc.PC.Type.CHOLESKY)
-    pc.setFactorSolverType(library)
-    ksp.setFromOptions()
-    try:
-        pc.setFactorSetUpSolverType()
-    except PETSc.Error as error:
-        if error.ierr != MISSING_FACTOR:
-            raise
-        where = f"on {A.comm.size} ranks" if A.comm.size > 1 else "on one rank"
-        raise CaseError(
-            f"-{prefix}pc_factor_mat_solver_type {pc.getFactorSolverType()}: it has no {pc.getType()} factorization "
-            f"of a matrix {where}; mumps has"
-        ) from error
-    return ksp
 
 
 def _destroy(ksp: PETSc.KSP, *vectors: PETSc.Vec) -> None:

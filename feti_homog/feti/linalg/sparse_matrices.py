@@ -1,54 +1,45 @@
-"""Sparse matrices: sums of dense blocks, symmetric scaling, and sums over ranks."""
+"""Sparse matrices: sums of dense blocks, symmetric scaling, sums over ranks, and solvers with such sums."""
+
+from collections.abc import Iterable
 
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix, diags
 
-from feti_homog.feti.thresholds import MAX_BUFFERED_ENTRIES
+from feti_homog.feti.linalg.sparse_direct import factored, is_direct, power_of_two, sequential, solve_columns
+from feti_homog.feti.thresholds import MAX_BUFFERED_ENTRIES, REPLICATED_UNKNOWNS
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Bool, Float, Int, Int32
 
 
-class DenseBlockSum:
-    """A sparse sum of dense blocks.
+def sum_of_blocks(
+    shape: tuple[int, int], blocks: Iterable[tuple[Int, Int, Float]], max_buffered_entries: int = MAX_BUFFERED_ENTRIES
+) -> csr_matrix:
+    """Sum dense blocks: rows, columns, and values (rows, columns) of each.
 
     Blocks wait in a buffer until the buffer has more than `max_buffered_entries` entries and more entries than the sum.
     So the memory is at most about twice the sum, and each copy of the sum doubles its entries.
     """
+    total, buffer, buffered_entries = csr_matrix(shape), [], 0
+    for rows, columns, values in blocks:
+        wide = np.tile(columns.astype(np.int32), len(rows))
+        buffer.append((rows, np.full(len(rows), len(columns)), wide, values.ravel()))
+        buffered_entries += values.size
+        if buffered_entries > max(max_buffered_entries, total.nnz):
+            total, buffer, buffered_entries = _with_buffered(total, buffer), [], 0
+    return _with_buffered(total, buffer) if buffer else total
 
-    def __init__(self, shape: tuple[int, int], max_buffered_entries: int = MAX_BUFFERED_ENTRIES) -> None:
-        self._sum = csr_matrix(shape)
-        self._max_buffered_entries = max_buffered_entries
-        # Rows of each block, entry counts of the rows, columns and values.
-        self._buffer: list[tuple[Int, Int, Int32, Float]] = []
-        self._buffered_entries = 0
 
-    def add(self, rows: Int, columns: Int, values: Float) -> None:
-        """Add a dense block of `values` (rows, columns)."""
-        counts, wide = np.full(len(rows), len(columns)), np.tile(columns.astype(np.int32), len(rows))
-        self._buffer.append((rows, counts, wide, values.ravel()))
-        self._buffered_entries += values.size
-        if self._buffered_entries > max(self._max_buffered_entries, self._sum.nnz):
-            self._flush()
-
-    def matrix(self) -> csr_matrix:
-        """Return the sum of all blocks."""
-        self._flush()
-        return self._sum
-
-    def _flush(self) -> None:
-        """Add the buffered blocks to the sum."""
-        if not self._buffer:
-            return
-        rows, counts, columns, values = (np.concatenate(part) for part in zip(*self._buffer, strict=True))
-        self._buffer, self._buffered_entries = [], 0
-        m, n = self._sum.shape
-        # A product sums faster than a conversion from coordinates, which sorts.
-        stacked = csr_matrix((values, columns, np.r_[0, np.cumsum(counts)]), shape=(len(rows), n))
-        place = csr_matrix((np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=(m, len(rows)))
-        # A sum copies both terms, even if one is empty.
-        self._sum = self._sum + place @ stacked if self._sum.nnz else csr_matrix(place @ stacked)
+def _with_buffered(total: csr_matrix, buffer: list[tuple[Int, Int, Int32, Float]]) -> csr_matrix:
+    """Add blocks to a sum: rows of each block, entry counts of the rows, columns and values."""
+    rows, counts, columns, values = (np.concatenate(part) for part in zip(*buffer, strict=True))
+    m, n = total.shape
+    # A product sums faster than a conversion from coordinates, which sorts.
+    stacked = csr_matrix((values, columns, np.r_[0, np.cumsum(counts)]), shape=(len(rows), n))
+    place = csr_matrix((np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=(m, len(rows)))
+    # A sum copies both terms, even if one is empty.
+    return total + place @ stacked if total.nnz else csr_matrix(place @ stacked)
 
 
 def scaled(A: csr_matrix, weights: Float) -> csr_matrix:
@@ -162,3 +153,98 @@ def _assemble(comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, o
     for petsc_object in (A, part, *maps):
         petsc_object.destroy()
     return assembled
+
+
+class DistributedSolver:
+    """Solver X = A^-1 B for a definite matrix A (n, n), a sum over ranks that may be replaced.
+
+    Every rank factors a whole small matrix, by CHOLMOD; all ranks together factor a large matrix, by MUMPS.  Options
+    under the prefix choose other solvers; with `ksp_type` or `pc_type` all ranks solve together.
+    """
+
+    def __init__(self, comm: MPI.Intracomm, total: int, prefix: str, most_whole: int = REPLICATED_UNKNOWNS) -> None:
+        """Choose the solver for n = `total`: up to n = `most_whole`, every rank factors the whole matrix."""
+        self.comm, self.total, self._prefix = comm, total, prefix
+        self._ksp: PETSc.KSP | None = None
+        options = PETSc.Options(prefix)
+        together = total > most_whole or any(options.hasName(name) for name in ("ksp_type", "pc_type"))
+        self.is_distributed = comm.size > 1 and together
+
+    def factor(self, unknowns: Int, part: csr_matrix, near_kernel: Float | None = None) -> None:
+        """Assemble and factor A, and free the last factor.  Collective.
+
+        Args:
+            unknowns: (u,) numbers of the local unknowns, ascending; ranks may have unknowns in common.
+            part: (u, u) this rank's part of the sum.
+            near_kernel: (u, c) vectors with little energy, for multigrid.
+
+        Raises:
+            LinAlgError: A is not positive definite on some rank, for rounding may differ between processors; all
+                ranks raise the error.
+            MemoryError, CaseError: as `factored`.
+        """
+        self.destroy()
+        error = None
+        self._unknowns = unknowns
+        try:
+            if self.is_distributed:
+                matrix = assemble_distributed(self.comm, part, unknowns, self.total)
+            else:
+                matrix = sequential(gathered_sum(self.comm, part, unknowns, self.total))
+            self._scale = power_of_two(matrix.getDiagonal().getArray(readonly=True), self.comm)
+            matrix.scale(self._scale)
+            library = PETSc.Mat.SolverType.MUMPS if self.is_distributed else PETSc.Mat.SolverType.CHOLMOD
+            # Before a factor that may fail on one rank alone.
+            self._x, self._b = matrix.createVecs()
+            if near_kernel is not None:
+                # A basis (n, m), without zero columns and equal on all ranks.
+                mean = self._sum(near_kernel) / np.maximum(self._sum(np.ones((len(near_kernel), 1))), 1.0)
+                basis = np.linalg.qr(mean[:, mean.any(axis=0)])[0][slice(*matrix.getOwnershipRange())]
+                vectors = [matrix.createVecLeft() for _ in basis.T]
+                for vector, values in zip(vectors, basis.T, strict=True):
+                    vector.setArray(values)
+                space = PETSc.NullSpace().create(vectors=vectors, comm=matrix.comm)
+                if vectors:
+                    matrix.setNearNullSpace(space)
+                # The matrix holds references, which its destructor frees.
+                for petsc_object in (space, *vectors):
+                    petsc_object.destroy()
+            self._ksp = factored(matrix, self._prefix, library)
+        except np.linalg.LinAlgError as caught:
+            error = caught
+        if self.comm.allreduce(error is not None, MPI.LOR):
+            # Left to PETSc's garbage collection: a rank that failed alone could not take part in `destroy`.
+            self._ksp = None
+            raise np.linalg.LinAlgError(f"a coarse matrix is singular: {error or 'on another rank'}") from error
+
+    def solve(self, B: Float) -> Float:
+        """Solve for right-hand sides summed over ranks; return the local unknowns.  Collective.
+
+        Each rank passes its part B (u,) or (u, k) of the right-hand sides.
+        """
+        assert self._ksp is not None, "nothing is factored"
+        right = self._sum(B if B.ndim == 2 else B[:, None])[slice(*self._b.getOwnershipRange())]
+        X = solve_columns(self._ksp, self._x, self._b, right)
+        X *= self._scale
+        if self.is_distributed:
+            X = distributed_arrays.allgather_rows(self.comm, X, np.diff(self._b.getOwnershipRanges()))
+        return np.asarray(X[self._unknowns]).reshape(B.shape)
+
+    def _sum(self, B: Float) -> Float:
+        """Sum right-hand sides B (u, k) over ranks: (n, k)."""
+        part = np.zeros((self.total, B.shape[1]))
+        part[self._unknowns] = B
+        return distributed_arrays.allreduce_sum(self.comm, part)
+
+    @property
+    def iterations(self) -> int:
+        """Iterations of the last solve for one column by an iterative method; 1 for a direct method."""
+        assert self._ksp is not None, "nothing is factored"
+        return 1 if is_direct(self._ksp) else int(self._ksp.getIterationNumber())
+
+    def destroy(self) -> None:
+        """Free the factor.  Collective."""
+        if self._ksp is not None:
+            for petsc_object in (self._ksp.getOperators()[0], self._ksp, self._x, self._b):
+                petsc_object.destroy()
+            self._ksp = None

@@ -12,7 +12,6 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.errors import MeshError
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain, label
 from feti_homog.feti.operators import one_subdomain
 from feti_homog.feti.operators.choice import SubdomainSize, choose
@@ -58,7 +57,6 @@ class InterfaceOperators:
         with_springs: operators of bodies together with their springs, for preconditioner and coarse space.
         facewise: of each subdomain, whether soft modes are computed face by face.
         B: (local rows, n) the constraints on them, and `BT` its transpose.
-        of_inner: (n,) whether each boundary dof belongs to the inner of two bodies.
         body_diagonal: (n,) the diagonal of K.
         diagonal: (n,) its compressible share, in series with the springs of the body: it scales jumps.
         interiors: kept interior factors, by the position of the subdomain.
@@ -84,10 +82,13 @@ class InterfaceOperators:
         """
         self.comm, self.jump_operator, self.subdomains = jump_operator.comm, jump_operator, subdomains
         self._loads = len(jump_operator.problem.loads)
-        self.dofs = _constrained_dofs(jump_operator.B, subdomains)
-        self.offsets = np.cumsum([0, *(len(d) for d in self.dofs)])
         first = np.cumsum([0, *(s.n_dofs for s in subdomains)])
-        numbers = [o + d for o, d in zip(first, self.dofs, strict=False)]
+        # All degrees of freedom of nodes with a constraint.
+        constrained = np.split(jump_operator.B.getnnz(axis=0) > 0, first[1:])[:-1]
+        nodes = (s.problem.nodes(np.flatnonzero(mine)) for s, mine in zip(subdomains, constrained, strict=True))
+        self.dofs = [s.problem.dofs(np.unique(some)) for s, some in zip(subdomains, nodes, strict=True)]
+        self.offsets = np.cumsum([0, *(len(d) for d in self.dofs)])
+        numbers = (of + dofs for of, dofs in zip(first[:-1], self.dofs, strict=True))
         self.local_dofs = np.concatenate([np.zeros(0, np.int64), *numbers])
         self.B = jump_operator.B[:, self.local_dofs].tocsr()
         self.BT = self.B.T.tocsr()
@@ -96,17 +97,17 @@ class InterfaceOperators:
         owned = slice(at, at + last_row - first_row)
         self.springs = np.zeros(last_row - first_row) if compliance is None else compliance[owned]
         self.compliance = np.where((jump_operator.copies[owned] > 1).all(axis=1), self.springs, 0.0)
-        self.of_inner = self._inner_dofs(jump_operator)
-        roots = [
-            None
-            if compliance is None
-            else compliance_root(self.B[:, span], compliance, jump_operator.copies, self.of_inner[span])
-            for span in self.slices
+        roots: list[csr_matrix | None] = [None] * len(subdomains)
+        if compliance is not None:
+            parts = ((self.B[:, span], compliance, jump_operator.copies, self.of_inner[span]) for span in self.slices)
+            roots = [compliance_root(*part) for part in parts]
+        pieces = jump_operator.shared.pieces
+        sizes = [
+            SubdomainSize(s.n_dofs, len(dofs), s.submesh.index not in pieces, not s.is_outer and root is not None)
+            for s, dofs, root in zip(subdomains, self.dofs, roots, strict=True)
         ]
-        springs = [not s.is_outer and root is not None for s, root in zip(subdomains, roots, strict=True)]
-        sizes = _sizes(jump_operator.shared, subdomains, self.dofs, springs)
-        can_condense = bool(PETSc.Sys.hasExternalPackage("mumps"))
-        chosen = choose(sizes, kind, applications, soft_modes, can_condense, thresholds)
+        has_mumps = PETSc.Sys.hasExternalPackage("mumps")
+        chosen = choose(sizes, kind, applications, soft_modes, has_mumps, thresholds)
         self.facewise = [choice.facewise for choice in chosen]
         self.operators: list[InterfaceOperator] = []
         self.with_springs: list[BoundaryOperator] = []
@@ -128,14 +129,16 @@ class InterfaceOperators:
         """Slice of each subdomain in the n boundary dofs."""
         return [slice(a, b) for a, b in pairwise(self.offsets.tolist())]
 
-    def _inner_dofs(self, jump_operator: JumpOperator) -> Bool:
-        """Compute `of_inner`; where more than two bodies meet, all but the outermost are inner bodies."""
+    @cached_property
+    def of_inner(self) -> Bool:
+        """(n,) whether each boundary dof belongs to the inner of two bodies; of more, to any but the outermost."""
         sizes = np.diff(self.offsets)
         of_inner = np.repeat(np.array([not s.is_outer for s in self.subdomains], bool), sizes)
         body = np.repeat(np.array([s.submesh.body for s in self.subdomains], np.int64), sizes)
-        between = np.flatnonzero(jump_operator.inside >= 0)
+        inside = self.jump_operator.inside
+        between = np.flatnonzero(inside >= 0)
         entries = self.B[between].tocoo()
-        of_inner[entries.col] = body[entries.col] == jump_operator.inside[between][entries.row]
+        of_inner[entries.col] = body[entries.col] == inside[between][entries.row]
         return of_inner
 
     def apply_schur(self, x: Float) -> Float:
@@ -222,24 +225,3 @@ def _factor(subdomain: Subdomain, dofs: Int, explicit: bool, keep_factor: bool) 
         faults = f"its stiffness cannot be factored, {error}; its elements are degenerate"
         raise MeshError(f"{label(subdomain.submesh)}: {faults}") from error
     return operator, K.diagonal()[dofs]
-
-
-def _constrained_dofs(B: csr_matrix, subdomains: Sequence[Subdomain]) -> list[Int]:
-    """Find the constrained dofs of each subdomain, as sorted local numbers of whole nodes."""
-    constrained = np.split(B.getnnz(axis=0) > 0, np.cumsum([s.n_dofs for s in subdomains]))[:-1]
-    pairs = zip(subdomains, constrained, strict=True)
-    return [s.problem.dofs(np.unique(s.problem.nodes(np.flatnonzero(is_constrained)))) for s, is_constrained in pairs]
-
-
-def _sizes(
-    shared: SharedEntities, subdomains: Sequence[Subdomain], dofs: Sequence[Int], springs: Sequence[bool]
-) -> list[SubdomainSize]:
-    """Collect the subdomain sizes on which the choice of operators depends."""
-    entity = np.repeat(np.arange(len(shared.key)), shared.copies)
-    first, last = shared.pointer[:-1], shared.pointer[1:] - 1
-    between_two_bodies = (shared.copies == 2) & (shared.body[first] != shared.body[last])
-    cut = set(shared.sharer[~between_two_bodies[entity]].tolist())
-    return [
-        SubdomainSize(s.n_dofs, len(d), s.submesh.index not in cut, has_springs)
-        for s, d, has_springs in zip(subdomains, dofs, springs, strict=True)
-    ]

@@ -135,7 +135,7 @@ def compliance_root(B: csr_matrix, compliance: Float, copies: Int, of_inner: Boo
     """Compute T (n, r) of the springs on one body, None without springs.
 
     A spring softens one body alone: the inner of two bodies, or the outer one if the inner one is cut there.  If both
-    are cut, the spring belongs to neither; see `exact.spring_update`.
+    are cut, the spring belongs to neither; see `preconditioners.SpringUpdate`.
 
     Args:
         B: (rows, n) constraints of the body.

@@ -1,18 +1,13 @@
 """Open and closed nodes of debonded interfaces at one load.
 
-Imports `feti`, `interface`, `materials`, `mesh` and `system`.  Main entry: `contact_problem.ContactProblem`.
+Imports `feti`, `interface`, `materials`, `mesh` and `system`.  Main entries: `ContactProblem` and `CoupledInterfaces`.
 """
 
-from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status
+from feti_homog.interface.contact.contact_problem import ContactProblem
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
+from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Contact, Equilibrium, Status
 
 __all__ = [
-    "BONDED",
-    "CLOSED",
-    "OPEN",
-    "BondState",
-    "Equilibrium",
-    "Status",
-    "contact_problem",
-    "coupled_interfaces",
-    "load_scales",
+    "BONDED", "CLOSED", "OPEN", "BondState", "Contact", "ContactProblem", "CoupledInterfaces", "Equilibrium",
+    "Status", "coupled_interfaces", "load_scales",
 ]  # fmt: skip

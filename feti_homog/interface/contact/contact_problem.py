@@ -40,7 +40,7 @@ MAX_CONTACT_SOLVES = 500
 
 @dataclass(frozen=True)
 class ContactProblem:
-    """Contact problem of all interfaces in the torn cell; this rank owns k interface nodes.
+    """The contact problem of all interfaces; this rank owns k interface nodes.
 
     Attributes:
         solver: dual solver.
@@ -63,7 +63,7 @@ class ContactProblem:
         return self.solver.jump_operator.nodes
 
     def active(self, status: Status) -> Float:
-        """Mark the active multipliers (owned rows,) by 1: all of a bonded node, the normal one of a closed node."""
+        """Mark active multipliers (owned rows,) by 1: all at bonded nodes, the normal force at closed nodes."""
         mask = np.ones(self.solver.rows)
         mask[self._pairs] = (status == BONDED)[:, None]
         if self.contact:
@@ -86,7 +86,7 @@ class ContactProblem:
         return C
 
     def _factors(self, bonds: BondState) -> tuple[Float, Float] | None:
-        """Return C / C_0 (k, 3) of pulled and of pressed bonds, stored for the last call; None without softening."""
+        """Return C / C_0 (k, 3) for pulled and for pressed bonds, stored for the last call; None without softening."""
         if not (self._last and self._last[0][0] is bonds):
             pulled, soft, stiff = np.ones(len(bonds.status), bool), None, None
             if self.softening is not None:
@@ -95,7 +95,7 @@ class ContactProblem:
         return self._last[0][1]
 
     def _gained(self, bonds: BondState) -> Float:
-        """Return C - C_0 (k,) of the normal springs of damaged bonds; 0 at other nodes, and along fibres."""
+        """Return C - C_0 (k,) for normal springs of damaged bonds; 0 at other nodes, and along fibres."""
         factors = self._factors(bonds)
         if factors is None or self.solver.jump_operator.components != 2:
             return np.zeros(len(bonds.status))
@@ -107,7 +107,7 @@ class ContactProblem:
         return self._gained(bonds) > 0.0
 
     def debond(self, status: Status, which: Bool, lam: Float) -> Status:
-        """Return the status after the bonds `which` (k,) broke: open under tension, closed under compression."""
+        """Debond the bonds `which` (k,): return the statuses, open after tension and closed after compression."""
         force = lam[self.nodes.row]
         released = np.where((force < 0) & self.contact, CLOSED, OPEN).astype(np.int8)
         return np.where(which & (status == BONDED), released, status)
@@ -126,7 +126,7 @@ class ContactProblem:
 
     @cached_property
     def scales(self) -> LoadScales:
-        """Scales of load effects; its methods are collective, and so is the first use of its properties."""
+        """Scales of load effects, computed at the first read, which is collective."""
         return LoadScales(self.solver, self.size)
 
     @cached_property
@@ -210,7 +210,7 @@ class ContactProblem:
         return bool(self.solver.comm.allreduce(bool(which.any()), MPI.LOR))
 
     def _place_free_fibres(self, bonds: BondState, solution: DualSolution) -> tuple[DualSolution, Bool]:
-        """Move free fibres into their room, and mark the open nodes (k,) that squeeze a fibre.  Collective."""
+        """Move free fibres until their gaps open, and mark the open nodes (k,) that squeeze a fibre.  Collective."""
         coarse = self.solver.natural
         if not (self.contact and coarse.unconstrained_modes.shape[1]):
             return solution, np.zeros(len(bonds.status), bool)

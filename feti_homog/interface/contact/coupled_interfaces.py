@@ -13,10 +13,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from mpi4py import MPI
 
 from feti_homog.feti import DualSolution
-from feti_homog.feti.decomposition import constraint_layout
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.states import BONDED, BondState, Equilibrium
 from feti_homog.interface.loads import Load, Macroscopic, Multipliers
@@ -24,37 +22,22 @@ from feti_homog.typing import Float
 
 
 class CoupledInterfaces:
-    """Interfaces of a cell, which its plane and axial problems share.
+    """The interfaces of a cell, shared by its plane and axial problems.
 
     Strains and stresses (n,) have the plane components first, then the axial components.
 
     Attributes:
         plane: plane problem, with contact.
         problems: `plane` and, in generalized plane strain, the axial problem, without contact.
+        comm, nodes: all ranks, and the interface nodes of this rank.
+        area: cell area.
+        loads: names of the n strains.
     """
 
     def __init__(self, plane: ContactProblem, *axial: ContactProblem) -> None:
         self.plane, self.problems = plane, (plane, *axial)
-
-    @property
-    def comm(self) -> MPI.Intracomm:
-        """All ranks."""
-        return self.plane.solver.comm
-
-    @property
-    def nodes(self) -> constraint_layout.InterfaceNodes:
-        """Interface nodes of this rank."""
-        return self.plane.nodes
-
-    @property
-    def area(self) -> float:
-        """Cell area."""
-        return float(self.plane.size.prod())
-
-    @property
-    def loads(self) -> tuple[str, ...]:
-        """Names of the n strains."""
-        return tuple(name for problem in self.problems for name in problem.solver.problem.loads)
+        self.comm, self.nodes, self.area = plane.solver.comm, plane.nodes, float(plane.size.prod())
+        self.loads: tuple[str, ...] = sum((problem.solver.problem.loads for problem in self.problems), ())
 
     def no_multipliers(self) -> Multipliers:
         """Return the multipliers of an unloaded cell."""
@@ -133,7 +116,7 @@ def energy_beside_springs(interface: ContactProblem, state: Equilibrium) -> floa
 
 
 def held_traction(cell: CoupledInterfaces, state: Equilibrium) -> Float:
-    """Return the traction (k, c) at this rank's nodes; in damaged bonds s / C, of the intact fraction."""
+    """Return the traction (k, c) at this rank's nodes; the shear of a damaged bond is s / C, in its intact fraction."""
     traction, r = cell.traction(state.solutions), slipped(cell.plane, state)[cell.nodes.row + 1]
     nodes = np.flatnonzero(r)
     C = state.solution.compliance[cell.nodes.row[nodes] + 1]

@@ -54,10 +54,10 @@ class _Fibres:
     fibre: Array
 
     def nodes_and_motions(self, which: Bool) -> Iterator[tuple[Array, Float, Array, Float]]:
-        """Yield, for each fibre with an open node in `which` (k,), its open nodes and gap-opening motions.
+        """Yield the open nodes and gap-opening motions of each fibre with an open node in `which` (k,).
 
-        These are the nodes (n,), their gaps M (n, m) under m motions, the numbers (c,) of the free motions that move
-        the nodes, and the combinations (c, m) of free motions in M; m = 0 if no free motion opens a gap.
+        For each fibre: the nodes (n,), their gaps M (n, m) under m motions, the numbers (c,) of the free motions that
+        move the nodes, and the combinations (c, m) of free motions in M; m = 0 if no free motion opens a gap.
         """
         nodes = np.flatnonzero(self.is_open & np.isin(self.fibre, self.fibre[self.is_open & which]))
         nodes = nodes[np.argsort(self.fibre[nodes], kind="stable")]
@@ -89,7 +89,7 @@ class _Fibres:
         return amplitudes, squeezes
 
     def shares(self, before: Float, after: Float, noise: float) -> tuple[float, float]:
-        """Return the fractions of `FloatingBodies.admissible_share` for gaps (k,)."""
+        """Return the fractions of the way between gaps (k,), as `FloatingBodies.admissible_share`."""
         shares = [(1.0, 1.0)]
         for node, motion, *_ in self.nodes_and_motions(after < -2 * noise):
             a, b = before[node], after[node]
@@ -103,7 +103,7 @@ class _Fibres:
 
 @dataclass(frozen=True)
 class FloatingBodies:
-    """Free fibres, with this rank's open nodes (k,); gaps smaller than `noise` may be the solver's error."""
+    """The free fibres and this rank's open nodes (k,); gaps below `noise` may be the solver's error."""
 
     comm: MPI.Intracomm
     coarse: natural.NaturalCoarseSpace
@@ -165,7 +165,7 @@ class FloatingBodies:
 
 
 def shares_to_zero(before: Float, after: Float, noise: float | Float) -> tuple[float, float]:
-    """Return the fractions of the way between values (k,) at which the first is 0, and is -2 noise; else 1, 1.
+    """Return the fractions of the way at which the first value (k,) reaches 0 and -2 noise; 1, 1 if none does.
 
     Values that end above -2 noise, a number or (k,), may be the solver's error and do not count.
     """

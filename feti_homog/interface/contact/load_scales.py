@@ -1,7 +1,5 @@
 """Sizes of load effects in the bonded cell, which debonding does not change: scales for tolerances and errors."""
 
-from functools import cached_property
-
 import numpy as np
 from mpi4py import MPI
 
@@ -20,104 +18,66 @@ NEGLIGIBLE = 1e-6
 
 
 class LoadScales:
-    """Scales of the loads (v,) of one problem: its m strains, then other actions such as a temperature."""
+    """The scales of the loads (v,) of a problem: m strains, then actions such as a temperature.
+
+    Attributes:
+        mean_stiffness: (v, v) mean stiffness <L>, Voigt's bound for strains.
+        least_bonded_stiffness: (v, v) Reuss' bound <L^-1>^-1 for strains, <L> for other loads.
+        largest_stiffness: largest entry of Reuss' bound.
+        roots: (v,) square roots of the diagonal of `least_bonded_stiffness`, inf for loads without a stress; strains
+            times these roots, and stresses over them, are comparable.
+        longest: (k,) largest tributary length on the interface of each node.
+    """
 
     def __init__(self, solver: FetiSolver, size: Float) -> None:
-        """Take the dual solver and the cell size (2,)."""
+        """Compute the scales of a dual solver and the cell size (2,).  Collective."""
         self.solver, self.size = solver, size
-
-    @cached_property
-    def least_bonded_stiffness(self) -> Float:
-        """Reuss' bound <L^-1>^-1 for strains, <L> for other loads (v, v).  Collective."""
-        shares, stiffnesses = self._phases
-        m, bound = self.solver.problem.strains, self.mean_stiffness.copy()
-        bound[:m, m:] = bound[m:, :m] = 0.0
-        bound[:m, :m] = phase_bounds.reuss(shares, stiffnesses[:, :m, :m])
-        return bound
-
-    @cached_property
-    def mean_stiffness(self) -> Float:
-        """Mean stiffness <L> (v, v), Voigt's bound for strains.  Collective."""
-        return phase_bounds.voigt(*self._phases)
-
-    @cached_property
-    def _phases(self) -> tuple[Float, Float]:
-        """Area fractions (n,) and stiffnesses (n, v, v) of the phases in all subdomains.  Collective."""
+        m, stresses, nodes = solver.problem.strains, solver.problem.stresses, solver.jump_operator.nodes
         parts = self.solver.comm.allgather([(s.areas, s.laws) for s in self.solver.subdomains])
-        columns = zip(*(pair for pairs in parts for pair in pairs), strict=True)
-        areas, stiffnesses = map(np.concatenate, columns)
-        return areas / areas.sum(), stiffnesses
-
-    @cached_property
-    def roots(self) -> Float:
-        """Square roots (v,) of the diagonal of `least_bonded_stiffness`.  Collective.
-
-        Strains times these roots, and stresses over them, are comparable; inf for loads without a stress.
-        """
-        diagonal = np.full(len(self.least_bonded_stiffness), np.inf)
-        stresses = slice(self.solver.problem.stresses)
-        diagonal[stresses] = self.least_bonded_stiffness.diagonal()[stresses]
-        return np.asarray(np.sqrt(diagonal))
-
-    @cached_property
-    def largest_stiffness(self) -> float:
-        """Largest entry of Reuss' bound.  Collective."""
-        m = self.solver.problem.strains
-        return float(np.abs(self.least_bonded_stiffness[:m, :m]).max())
-
-    @cached_property
-    def _bond_stiffness(self) -> Float:
-        """Stress (k,) at bonds per cell strain, by the softer body in series with the springs.  Collective."""
-        solver, nodes = self.solver, self.solver.jump_operator.nodes
-        m, stiffness = solver.problem.strains, np.zeros(self._bodies)
+        areas, stiffnesses = map(np.concatenate, zip(*(pair for pairs in parts for pair in pairs), strict=True))
+        shares = areas / areas.sum()
+        self.mean_stiffness = phase_bounds.voigt(shares, stiffnesses)
+        self.least_bonded_stiffness = self.mean_stiffness.copy()
+        self.least_bonded_stiffness[:m, m:] = self.least_bonded_stiffness[m:, :m] = 0.0
+        self.least_bonded_stiffness[:m, :m] = phase_bounds.reuss(shares, stiffnesses[:, :m, :m])
+        self.largest_stiffness = float(np.abs(self.least_bonded_stiffness[:m, :m]).max())
+        self.roots = np.full(len(self.mean_stiffness), np.inf)
+        self.roots[:stresses] = np.sqrt(self.least_bonded_stiffness.diagonal()[:stresses])
+        # Actions other than strains cause the largest strains of free bodies: a soft body that expands hardly moves a
+        # stiff body, but the dual problem has to close its free expansion.
+        free = np.linalg.solve(stiffnesses[:, :m, :m], stiffnesses[:, :m, m:])
+        self._strains = np.hstack([np.eye(m), np.abs(free).max(axis=0)])
+        # The softer body in series with the springs: stress (k,) at bonds per cell strain.
+        last = solver.comm.allreduce(max((s.submesh.body for s in solver.subdomains), default=-1), MPI.MAX)
+        of_body = np.zeros(int(last) + 1)
         for s in solver.subdomains:
-            stiffness[s.submesh.body] = np.abs(s.L[:m, :m]).max()
-        solver.comm.Allreduce(MPI.IN_PLACE, stiffness, MPI.MAX)
+            of_body[s.submesh.body] = np.abs(s.L[:m, :m]).max()
+        solver.comm.Allreduce(MPI.IN_PLACE, of_body, MPI.MAX)
         rows = nodes.row[:, None] + np.arange(solver.jump_operator.components)
         give = solver.intact_compliance[rows].min(axis=1, initial=np.inf) * nodes.length / self.size.max()
-        return np.asarray(1.0 / (1.0 / stiffness[nodes.bodies].min(axis=1, initial=np.inf) + give))
-
-    @cached_property
-    def _bodies(self) -> int:
-        """Number of bodies.  Collective."""
-        last = max((s.submesh.body for s in self.solver.subdomains), default=-1)
-        return int(self.solver.comm.allreduce(last, MPI.MAX)) + 1
+        self._bond_stiffness = 1.0 / (1.0 / of_body[nodes.bodies].min(axis=1, initial=np.inf) + give)
+        self._bodies = len(of_body)
+        self.longest = self.over_interface(nodes.length)
 
     def over_interface(self, values: Float) -> Float:
-        """Return the largest of the values (k,) around each bond's inner body, at least 0.  Collective."""
+        """Return the largest of the values (k,) on the interface of each node, at least 0.  Collective."""
         inner, largest = self.solver.jump_operator.nodes.bodies[:, 1], np.zeros(self._bodies)
         np.maximum.at(largest, inner, values)
         self.solver.comm.Allreduce(MPI.IN_PLACE, largest, MPI.MAX)
         return np.asarray(largest[inner])
 
-    @cached_property
-    def longest(self) -> Float:
-        """Largest tributary length (k,) around each bond's inner body.  Collective."""
-        return self.over_interface(self.solver.jump_operator.nodes.length)
-
     def bond_stress(self, loads: Float) -> Float:
-        """Bound the stress at this rank's bonds, (k,) or (k, n), under loads (v,) or (v, n).  Collective."""
+        """Bound the stress at this rank's bonds, (k,) or (k, n), under loads (v,) or (v, n)."""
         largest: Float = np.multiply.outer(self._bond_stiffness, self.imposed_strain(loads).max(axis=0))
         return largest
 
-    @cached_property
-    def _free_strains(self) -> Float:
-        """Strains (m, v) that unit loads cause; actions other than strains cause the largest strains of free bodies.
-
-        A soft body that expands hardly moves a stiff body, but the dual problem has to close its free expansion.
-        Collective.
-        """
-        m, stiffnesses = self.solver.problem.strains, self._phases[1]
-        free = np.linalg.solve(stiffnesses[:, :m, :m], stiffnesses[:, :m, m:])
-        return np.hstack([np.eye(m), np.abs(free).max(axis=0)])
-
     def imposed(self, loads: Float) -> float:
-        """Return the largest displacement E y that loads (v,) impose on the cell.  Collective."""
+        """Return the largest displacement E y that loads (v,) impose on the cell."""
         corners = self.size * np.array([[1, 0], [0, 1], [1, 1]])
         return float(np.abs(corners @ self.solver.problem.gradient(self.imposed_strain(loads)).T).max())
 
     def stress_scale(self, loads: Float) -> float:
-        """Return a lower bound of the stress in the bonded cell under loads (v,) of any sign.  Collective."""
+        """Return a lower bound of the stress in the bonded cell under loads (v,) of any sign."""
         m = self.solver.problem.strains
         return float(np.abs(self.least_bonded_stiffness[:m, :m] @ self.imposed_strain(loads)).max())
 
@@ -127,7 +87,7 @@ class LoadScales:
         return SIGN_NOISE_PER_RTOL * self.solver.rtol
 
     def gap_noise(self, strain: Float) -> float:
-        """Return the size up to which a gap may be the solver's error.  Collective."""
+        """Return the size up to which a gap may be the solver's error."""
         return self.sign_noise * self.imposed(strain)
 
     def force_noise(self, solution: DualSolution) -> Float:
@@ -144,7 +104,7 @@ class LoadScales:
         return np.asarray(self.sign_noise * np.maximum(self.over_interface(forces), caused))
 
     def asked(self, load: Load) -> Float:
-        """Return the sizes (v,) of prescribed strains, plus strains of the bonded cell by stresses.  Collective."""
+        """Return the sizes (v,) of the strains that a load prescribes, or its stresses cause in the bonded cell."""
         k = self.solver.problem.stresses
         strain = np.abs(np.where(load.by_stress, 0.0, load.values))
         stress = np.abs(np.where(load.by_stress, load.values, 0.0))[:k]
@@ -152,15 +112,15 @@ class LoadScales:
         return np.asarray(strain)
 
     def acting(self, strain: Float, asked: Float) -> Float:
-        """Return the strain sizes (v,) of a state, at most ABSURD times `asked`, as error scales.  Collective."""
+        """Limit the strain sizes (v,) of a state to ABSURD times `asked`, for use as error scales."""
         limit = ABSURD * self.imposed_strain(asked).max()
         is_strain = np.arange(len(strain)) < self.solver.problem.strains
         return np.where(is_strain, np.minimum(np.abs(strain), limit), np.abs(strain))
 
     def excess(self, strain: Float, asked: Float) -> float:
-        """Return the ratio of the largest strain of a state (v,) to the largest one of `asked` (v,).  Collective."""
+        """Return the largest strain of a state (v,), relative to the largest strain of `asked` (v,)."""
         return float(self.imposed_strain(strain).max() / (self.imposed_strain(asked).max() or np.inf))
 
     def imposed_strain(self, loads: Float) -> Float:
-        """Return the strain sizes, (m,) or (m, n), under loads (v,) or (v, n) in the bonded cell.  Collective."""
-        return np.asarray(self._free_strains @ np.abs(loads))
+        """Return the strain sizes, (m,) or (m, n), that loads (v,) or (v, n) cause in the bonded cell."""
+        return np.asarray(self._strains @ np.abs(loads))

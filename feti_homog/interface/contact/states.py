@@ -7,6 +7,7 @@ friction, independent of the search that found the state.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import IntEnum
 
 import numpy as np
 from mpi4py import MPI
@@ -19,7 +20,16 @@ from feti_homog.typing import Bool, Float
 
 Status = NDArray[np.int8]
 
-BONDED, CLOSED, OPEN = 0, 1, 2
+
+class Contact(IntEnum):
+    """Contact state of an interface node: bonded, or debonded with faces that touch or are apart."""
+
+    BONDED = 0
+    CLOSED = 1
+    OPEN = 2
+
+
+BONDED, CLOSED, OPEN = Contact
 
 
 @dataclass(frozen=True)
@@ -51,7 +61,7 @@ class BondState:
         return replace(self, status=status)
 
     def flipped(self, which: Bool) -> BondState:
-        """Flip debonded nodes `which` (k,) between open and closed, and bonds between pulled and pressed."""
+        """Flip the nodes `which` (k,): debonded nodes open or close, pulled bonds become pressed or the reverse."""
         bonded = self.status == BONDED
         status = np.where(which & ~bonded, CLOSED + OPEN - self.status, self.status).astype(np.int8)
         return replace(self, status=status, pressed=self.pressed ^ (which & bonded))
@@ -148,7 +158,7 @@ def kkt_errors(
 
 
 def coulomb_errors(force: Float, friction: Float, sliding: Status) -> Float:
-    """Measure the violation (k,) of Coulomb's law: |t| <= mu p where faces stick, t = s mu p where they slide.
+    """Measure the violation (k,) of Coulomb's law: |t| <= mu p in stick, t = s mu p in slip.
 
     Shear along the fibres, where faces have no friction, is a violation too.
 

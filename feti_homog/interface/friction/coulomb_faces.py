@@ -22,17 +22,17 @@ from itertools import product
 import numpy as np
 
 from feti_homog.errors import NotCarriedError
+from feti_homog.interface.contact import Status
 from feti_homog.interface.contact.contact_problem import BLOCK_PIVOTS
-from feti_homog.interface.contact.states import Status
 from feti_homog.interface.friction.face_system import FaceSystem, Prescribed
-from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK
+from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK, FaceStatus
 from feti_homog.typing import Bool, Float
 
-# Pivots, and pivots per node, after which other searches take over; a continuation step takes at most SOLVES pivots.
-SOLVES, SOLVES_PER_NODE = 50, 4
+# Pivots, besides one for each status of each node, after which other searches take over; pivots of a continuation step.
+SOLVES = 50
 # Largest number of status sets to try, and of equal continuation steps of mu.
 MOST_TRIED = 256.0
-STATUSES = np.array([STICK, FORWARD, OPEN_FACE, BACKWARD], np.int8)
+STATUSES = np.array(list(FaceStatus), np.int8)
 Found = tuple[Status, Float] | None
 
 SEARCHED = "friction: no admissible statuses of the faces were found"
@@ -82,7 +82,7 @@ class StatusSearch:
         After some block pivots without progress, one random node changes at a time: a fixed order may end in a cycle.
         """
         fewest, pivots, random = self.faces.nodes + 1, 0, np.random.default_rng(0)
-        for _ in range(solves or SOLVES + SOLVES_PER_NODE * self.faces.nodes):
+        for _ in range(solves or SOLVES + self.allowed.size):
             x, balanced = self.faces.linear(status, self.load, self.start)
             better = self._improved(status, x)
             wrong = np.flatnonzero(better != status)
@@ -107,11 +107,11 @@ class StatusSearch:
         yield from self._tried(status)
 
     def by_trial(self, status: Status) -> Found:
-        """Return the admissible statuses closest to a guess, if few sets are to be tried."""
+        """Return the admissible statuses closest to a guess; None if there are too many sets to try."""
         return next(self._tried(status), None)
 
     def _tried(self, status: Status) -> Iterator[tuple[Status, Float]]:
-        """Yield all admissible statuses, the closest to a guess first; none if there are too many sets."""
+        """Yield all admissible statuses, from the closest to a guess; none if there are too many sets."""
         several = np.flatnonzero(self.allowed.sum(axis=1) > 1)
         if self.allowed[several].sum(axis=1).astype(float).prod() > MOST_TRIED:
             return
@@ -185,16 +185,16 @@ class CoulombFaces(FaceSystem):
         return np.where((self.friction == 0.0) & (status != OPEN_FACE), FORWARD, status).astype(np.int8)
 
     def rates(self, status: Status, x: Float, by_stress: Bool, rate: Float) -> tuple[Status, Float]:
-        """Return the next statuses (n,) of a state x, and the rate (m,) of x under a load rate (v,).
+        """Find the next statuses (n,) of a state x, and the rate (m,) of x under a load rate (v,).
 
         Raises:
-            StuckError: no such statuses exist, or the determinant of the sliding faces has lost its sign.
+            StuckError: no statuses are admissible, or the determinant of the sliding faces has lost its sign.
         """
         load, status = Prescribed(by_stress, rate, np.zeros(self.nodes)), self._known(status)
         return self._resisting(status, self._at_limits(status, x), load, np.zeros(len(x)))
 
     def step(self, status: Status, load: Prescribed, start: Float) -> tuple[Status, Float]:
-        """Return statuses (n,) and x (m,) after an implicit step to a load, from a first guess and a start.
+        """Take an implicit step to a load: return statuses (n,) and x (m,), from a guess and a start.
 
         Raises:
             StuckError: as `rates`.
@@ -227,7 +227,7 @@ class CoulombFaces(FaceSystem):
         raise StuckError(INDEFINITE)
 
     def _at_limits(self, status: Status, x: Float) -> Bool:
-        """Allow (n, 4) the present statuses and, at a limit of a status, the statuses beyond this limit."""
+        """Allow (n, 4) the present statuses and, at limits, the statuses beyond them."""
         closed, gap = status != OPEN_FACE, x[: 2 * self.nodes : 2]
         (normal, tangential), noise = self.forces(x), self.noise(x)
         allowed = np.zeros((self.nodes, 4), bool)
@@ -264,6 +264,6 @@ class CoulombFaces(FaceSystem):
         return float(forces @ (after - before)), self.heat_behind(status, before, after)
 
     def heat_behind(self, status: Status, before: Float, after: Float) -> float:
-        """Return the heat of an implicit step: the final friction forces times the slips of the sliding faces."""
+        """Return the heat of an implicit step: final friction forces times slips."""
         slips = (after - before)[1 : 2 * self.nodes : 2]
         return float((self.forces(after)[1] * slips)[np.abs(status) == 1].sum())

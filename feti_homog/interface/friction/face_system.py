@@ -7,11 +7,10 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
-from feti_homog.interface.contact.states import Status
+from feti_homog.interface.contact import Status
 from feti_homog.interface.friction import status_system
 from feti_homog.typing import Bool, Float, Float32, Int
 
@@ -46,30 +45,22 @@ class FaceSystem:
         friction: (n,) mu.
         S: (m, m) scaled stiffness, with 1 as the largest diagonal entry of each node.
         size: (m,) units: the stiffness is S_ij size_i size_j.
+        nodes, loads: the number n of nodes, and the indices of the loads in x.
     """
 
     def __init__(self, stiffness: Float, friction: Float) -> None:
         """Scale the stiffness (m, m) of n normal and n tangential jumps and v loads: m = 2n + v."""
         n, diagonal = len(friction), stiffness.diagonal()
-        self.friction = friction
+        self.friction, self.nodes, self.loads = friction, n, slice(2 * n, len(stiffness))
         nodes = np.repeat(diagonal[: 2 * n].reshape(n, 2).max(axis=1, initial=0.0), 2)
         size = np.sqrt(np.concatenate([nodes, np.maximum(diagonal[2 * n :], 0.0)]))
         self.size = np.where(size > 0.0, size, 1.0)
         self.S = stiffness / np.outer(self.size, self.size)
+        self._absolute: Float32 = np.abs(self.S).astype(np.float32)
         self._followed: status_system.FollowedStatuses | None = None
         self._last: tuple[bytes, status_system.StatusSystem] | None = None
         self._factored = 0
         self._products: deque[tuple[Float, Float]] = deque(maxlen=PRODUCTS)
-
-    @property
-    def nodes(self) -> int:
-        """The number n of nodes."""
-        return len(self.friction)
-
-    @property
-    def loads(self) -> slice:
-        """The indices of the loads in x."""
-        return slice(2 * self.nodes, len(self.S))
 
     def forces(self, x: Float) -> tuple[Float, Float]:
         """Return the scaled normal and tangential forces (n,)."""
@@ -77,25 +68,20 @@ class FaceSystem:
         return f[::2], f[1::2]
 
     def follow(self, before: FaceSystem, old: Int, other: Int) -> None:
-        """Take over the response of faces whose entries have the indices `old` (m',); see `FollowedStatuses.grow`."""
+        """Take over the response of the faces `before`; arguments as in `FollowedStatuses.grow`."""
         units = before.size / self.size[old]
         if before._followed is None:
             self._factored = before._factored
         elif before._followed.grow(self.S, old, other, units):
             self._followed = before._followed
 
-    @cached_property
-    def _absolute(self) -> Float32:
-        """The absolute values |S_ij| (m, m), in single precision."""
-        return np.asarray(np.abs(self.S), np.float32)
-
     def terms(self, x: Float) -> Float:
-        """Return sum_j |S_ij x_j| (m,), the scale of the rounding in S x."""
+        """Return sum_j |S_ij x_j| (m,), the scale of the rounding in S x, from sums in single precision."""
         largest = float(np.abs(x).max(initial=0.0)) or 1.0
         return np.asarray(largest * (self._absolute @ np.abs(x / largest).astype(np.float32)), float)
 
     def product(self, x: Float) -> Float:
-        """Return S x (m,) for an array that nothing changes later; the last products are stored."""
+        """Return S x (m,), and store it; the caller must not change x later."""
         for array, y in self._products:
             if array is x:
                 return y
@@ -107,7 +93,7 @@ class FaceSystem:
         return y
 
     def linear(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, bool]:
-        """Return the scaled x (m,) with these statuses, and whether x is a solution; see `StatusSystem.solve`."""
+        """Solve for the scaled x (m,) with these statuses; return x and whether it is a solution."""
         rows = status_system.free_rows(status, self.friction, load.by_stress)
         x, values = self.prescribed(status, load, start)
         followed = self._turned(*rows)
@@ -159,7 +145,7 @@ class FaceSystem:
         )
 
     def prescribed(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, Float]:
-        """Return x (m,) with its prescribed entries, and S x (m,) in the rows of the loads."""
+        """Return x (m,) with its prescribed entries, and the right-hand side S x (m,) in the load rows."""
         last, loads, x, rows = 2 * self.nodes, self.loads, start.copy(), np.zeros(len(start))
         x[:last:2] = np.where(status == status_system.OPEN_FACE, x[:last:2], 0.0)
         x[1:last:2] = np.where(status == status_system.STICK, load.slip, x[1:last:2])

@@ -18,11 +18,19 @@ from scipy.linalg import block_diag, lu_factor, lu_solve
 
 from feti_homog.errors import CaseError
 from feti_homog.feti import DualSolution, solver_plan
-from feti_homog.interface.contact.contact_problem import ContactProblem
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status, coulomb_errors
+from feti_homog.interface.contact import (
+    BONDED,
+    CLOSED,
+    OPEN,
+    BondState,
+    ContactProblem,
+    CoupledInterfaces,
+    Equilibrium,
+    Status,
+)
+from feti_homog.interface.contact.states import coulomb_errors
 from feti_homog.interface.friction.coulomb_faces import CoulombFaces
-from feti_homog.interface.friction.status_system import HELD, OPEN_FACE, REFINEMENTS, STICK, UNRESISTED
+from feti_homog.interface.friction.status_system import HELD, INVERSE_ITERATIONS, OPEN_FACE, STICK, UNRESISTED
 from feti_homog.interface.loads import Load, Macroscopic
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int
@@ -55,7 +63,7 @@ class CondensedProblem:
         self._some: tuple[Int, Float] | None = None
 
     def take(self, rows: Int, springs: Float) -> tuple[Float, Float, Float]:
-        """Return H_DD (n, n) plus springs (n,), b (n, v) and L (v, v) for rows D.  Collective."""
+        """Condense the problem to rows D: return H_DD (n, n) plus springs, b (n, v) and L (v, v).  Collective."""
         self.rows, self._some = rows, None
         self._columns, K = self._inverse.columns(rows)
         K[np.diag_indices(len(K))] += springs
@@ -76,7 +84,7 @@ class CondensedProblem:
         return np.asarray(self._response @ strain - self._columns @ jump)
 
     def some_multipliers(self, rows: Int, jump: Float, strain: Float) -> Float:
-        """Return lam (k, c) in owned rows (k, c); the columns of H are stored for the last array of rows."""
+        """Return lam (k, c) in owned rows (k, c); the last rows keep their columns of H."""
         if self._some is None or self._some[0] is not rows:
             self._some = rows, self._columns[rows.ravel()]
         return self._response[rows] @ strain - (self._some[1] @ jump).reshape(rows.shape)
@@ -100,9 +108,9 @@ class CondensedProblem:
 
 
 class AxialFaces:
-    """The axial problem in the matrix S of `coulomb_faces`, with its jumps g = K^-1 b E eliminated.
+    """The axial problem in the matrix S of `coulomb_faces`, with its jumps eliminated: g = K^-1 b E.
 
-    HELD times its diagonal entry holds a row without springs; the stiffest spring would dominate the largest entry.
+    HELD times its diagonal entry holds each row without springs: the largest entry may belong to a stiff spring.
 
     Attributes:
         problem: condensed axial problem.
@@ -114,7 +122,7 @@ class AxialFaces:
         self.problem, (K, b, L) = problem, problem.take(rows, springs)
         factor = lu_factor(K + HELD * np.diag(K.diagonal()))
         self.jumps = np.zeros_like(b)
-        for _ in range(1 + REFINEMENTS):
+        for _ in range(1 + INVERSE_ITERATIONS):
             self.jumps += lu_solve(factor, b - K @ self.jumps)
         # Rounding of the bonded stiffness would carry a load.
         diagonal, stiffness = L.diagonal(), L - b.T @ self.jumps
@@ -217,7 +225,7 @@ class SlidingCell:
         return np.asarray((x / self.faces.size)[: self.faces.loads.start])
 
     def traction(self, x: Float) -> Float:
-        """Return the traction (k, 2), or (k, 3) with the axial one, in the intact fraction of each bond."""
+        """Return the traction in the intact fraction of each bond, (k, 2), or (k, 3) with the axial traction."""
         force = np.zeros((len(self.friction), sum(rows.shape[1] for rows in self._held_rows)))
         parts = zip(self._held_rows, self._parts(x), strict=True)
         force[self._held] = np.hstack([problem.some_multipliers(rows, *answer) for rows, (problem, answer) in parts])
@@ -248,18 +256,25 @@ class SlidingCell:
         return np.where(load.by_stress, self.cell.area * load.values / size, load.values * size)
 
     def equilibrium(self, loads: Sequence[Load], bonds: BondState, x: Float) -> Equilibrium:
-        """Return the equilibrium under the last of `loads`, certified on the scale of all loads.  Collective."""
+        """Return the equilibrium under the last of `loads`, certified on the scale of all loads.  Collective.
+
+        `kkt_friction` is the largest of `coulomb_errors`, relative to the largest traction.
+        """
         states, of_problems = list[Equilibrium](), list(zip(*map(self.cell.parts, loads), strict=True))
         scales, asked = [problem.scales for problem in self.cell.problems], list[Float]()
         for scale, of in zip(scales, of_problems, strict=True):
             asked.append(np.max([scale.asked(load) for load in of], axis=0))
         # Rounding in an unloaded problem is as large as in the loaded problem.
         largest = max(scale.imposed_strain(strain).max() for scale, strain in zip(scales, asked, strict=True))
+        # The jumps in friction come from x: the jumps of F lambda would be divided by a vanishing compliance.
+        stresses, jumps = list[Float](), list[Float]()
         for of, strains, (problem, (jump, strain)) in zip(of_problems, asked, self._parts(x), strict=True):
             solution = problem.solution(bonds, jump, strain)
             strains[: problem.solver.problem.strains] = largest
             certificate = problem.interface.certificate(bonds, solution, strains)
             states.append(Equilibrium(of[-1], bonds, solution, 0, 1, 0, certificate, strains))
+            stresses.append(problem.interface.scales.bond_stress(problem.interface.acting(bonds, strain, strains)))
+            jumps.append(jump.reshape(-1, problem.solver.jump_operator.components))
         plane, *axial = states
         # Bonds, compressed faces and the friction on these faces resist rigid motions.
         row, is_closed = self.interface.nodes.row, bonds.status == CLOSED
@@ -267,23 +282,14 @@ class SlidingCell:
         active = self.interface.active(np.where(is_closed & ~is_pressed, OPEN, bonds.status).astype(np.int8))
         active[row[is_pressed & (self.friction > 0.0)] + 1] = 1.0
         plane = replace(plane, free_motions=int(self.solver.natural.free_motions(active).shape[1]))
-        excess = {"kkt_friction": self._excess(bonds, states, x)}
-        return replace(plane, certificate=plane.certificate | excess, axial=next(iter(axial), None))
-
-    def _excess(self, bonds: BondState, states: Sequence[Equilibrium], x: Float) -> float:
-        """Return the largest of `coulomb_errors`, relative to the largest traction.  Collective."""
-        traction = self.cell.traction([problem.solution for problem in states])
-        components = [problem.solver.jump_operator.components for problem in self.cell.problems]
-        # The jumps come from x: the jumps of F lambda would be divided by a vanishing compliance.
-        parts = zip(self._parts(x), components, strict=True)
-        jumps = np.hstack([jump.reshape(-1, c) for (_, (jump, _)), c in parts])
-        force, node = traction.copy(), self._face_nodes
-        force[node] -= jumps[self._position] * self._springs[node] / self.interface.nodes.length[node, None]
-        excess = coulomb_errors(force, self._mu, bonds.sliding_signs)
+        traction, node = self.cell.traction([state.solution for state in states]), self._face_nodes
         largest = self.interface.scales.over_interface(np.abs(traction).max(axis=1, initial=0.0))
-        for problem, state in zip(self.cell.problems, states, strict=True):
-            stress = problem.scales.bond_stress(problem.acting(bonds, state.solution.strain, state.asked))
-            largest = np.maximum(largest, stress)
+        largest = np.max([largest, *stresses], axis=0)
+        traction[node] -= (
+            np.hstack(jumps)[self._position] * self._springs[node] / self.interface.nodes.length[node, None]
+        )
+        excess = coulomb_errors(traction, self._mu, bonds.sliding_signs)
         excess = np.where((bonds.status == BONDED) & ~self._damaged, 0.0, excess)
         excess /= np.where(largest > 0.0, largest, 1.0)
-        return float(self.solver.comm.allreduce(excess.max(initial=0.0), MPI.MAX))
+        error = {"kkt_friction": float(self.solver.comm.allreduce(excess.max(initial=0.0), MPI.MAX))}
+        return replace(plane, certificate=plane.certificate | error, axial=next(iter(axial), None))

@@ -9,18 +9,29 @@ w a row of R itself.  Changes are collected, and added to R in blocks.
 """
 
 from collections.abc import Callable
+from enum import IntEnum
 from functools import cached_property
 
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
-from feti_homog.interface.contact.states import Status
+from feti_homog.interface.contact import Status
 from feti_homog.typing import Bool, Float, Int
 
-STICK, FORWARD, OPEN_FACE, BACKWARD = 0, 1, 2, -1
-"""Statuses of a debonded node: tied, sliding with a rising or a falling slip, apart."""
 
-# Stiffness, relative to the stiffness of a node, that holds free motions; iterative refinement removes its effect.
+class FaceStatus(IntEnum):
+    """Status of a debonded node: tied, sliding with the sign of its slip rate, or apart."""
+
+    STICK = 0
+    FORWARD = 1
+    OPEN_FACE = 2
+    BACKWARD = -1
+
+
+STICK, FORWARD, OPEN_FACE, BACKWARD = FaceStatus
+
+# Stiffness, relative to the stiffness of a node, that holds free motions; iterative refinement removes its effect.  A
+# residual up to this fraction of the terms of its row drives no free motion.
 HELD = 1e-9
 # A smaller pivot belongs to a free motion, and its sign is rounding.
 LEAST_PIVOT = 1e-6
@@ -29,14 +40,12 @@ LEAST_PIVOT = 1e-6
 SOFT_PIVOT, MORE_MOTIONS, INVERSE_ITERATIONS, UNRESISTED = 1e-3, 3, 3, 0.1 * HELD
 # Largest number of refinements, and the residual of each row, relative to its terms, at which refinement ends.
 MOST_REFINEMENTS, ROUNDED = 20, 1e-14
-# Largest residual of a row, relative to its terms, at which no force drives a free motion.
-BALANCED = 1e-9
 # Largest number of changes that wait for their addition to R.
 MOST_CHANGES = 32
 # Largest number of entries in a right-hand side for which only the columns of these entries are read.
 FEW = 8
-# Largest rounding in a row of S x, relative to its terms, that refinement may leave; largest number of refinements.
-NOISE, REFINEMENTS = 1e-11, 3
+# Largest rounding in a row of S x, relative to its terms, that refinement may leave.
+NOISE = 1e-11
 
 
 def free_rows(status: Status, friction: Float, by_stress: Bool) -> tuple[Bool, Float]:
@@ -48,7 +57,7 @@ def free_rows(status: Status, friction: Float, by_stress: Bool) -> tuple[Bool, F
 
 
 def residual(y: Float, rhs: Float, free: Bool, slope: Float) -> Float:
-    """Return the residual (m,) of y = S x (m,) in the free rows, 0 in prescribed rows."""
+    """Return the residual (m,) for y = S x (m,) in free rows, 0 in prescribed rows."""
     sliding = np.flatnonzero(slope)
     missing = rhs - y
     missing[sliding] -= slope[sliding] * y[sliding - 1]
@@ -56,14 +65,14 @@ def residual(y: Float, rhs: Float, free: Bool, slope: Float) -> Float:
 
 
 def largest_share(residuals: Float, terms: Float, slope: Float) -> float:
-    """Return the largest of residuals (m,), relative to the terms (m,) of its row."""
+    """Return the largest residual (m,), relative to the terms (m,) of its row."""
     size, sliding = terms.copy(), np.flatnonzero(slope)
     size[sliding] += np.abs(slope[sliding]) * terms[sliding - 1]
     return float((np.abs(residuals) / np.where(size > 0.0, size, 1.0)).max(initial=0.0))
 
 
 class StatusSystem:
-    """The factored system S x = 0 in the free rows, with prescribed x in all other rows.
+    """The factored system of the free rows, S x = rhs, with x prescribed in all other rows.
 
     Sliding nodes have the row S_t + s mu S_n: their traction is s mu times the pressure.
 
@@ -76,9 +85,9 @@ class StatusSystem:
         """Factor the rows from `free_rows` in S (m, m), as in `CoulombFaces`."""
         self.free = free
         sliding = np.flatnonzero(slope)
-        place = np.cumsum(self.free) - 1
+        position = np.cumsum(self.free) - 1
         self._rows = S[self.free]
-        self._rows[place[sliding]] += slope[sliding, None] * S[sliding - 1]
+        self._rows[position[sliding]] += slope[sliding, None] * S[sliding - 1]
         A = self._rows[:, self.free]
         A[np.diag_indices(len(A))] += HELD
         self._factor = lu_factor(A, overwrite_a=True, check_finite=False) if len(A) else None
@@ -118,7 +127,7 @@ class StatusSystem:
         stays[self.free] -= self._free_motions @ (self._free_motions.T @ (x - start)[self.free])
         # A row without any stiffness, such as shear along sliding fibres, has the rounding of other rows.
         missing = np.abs(rows - self._rows @ stays) - np.finfo(float).eps * np.abs(stays).max(initial=0.0)
-        balanced = bool((missing <= BALANCED * (terms @ np.abs(stays) + np.abs(rows))).all())
+        balanced = bool((missing <= HELD * (terms @ np.abs(stays) + np.abs(rows))).all())
         return stays if balanced else x, balanced
 
     @cached_property
@@ -161,31 +170,29 @@ class FollowedStatuses:
 
     def turn(self, free: Bool, slope: Float) -> bool:
         """Exchange all rows that differ; return False if a pivot is too small."""
-        pending = np.flatnonzero((free != self.free) | (slope != self.slope))
-        while len(pending):
-            failed = [j for j in pending if not self._exchange(j, bool(free[j]), float(slope[j]))]
+        pending, size = np.flatnonzero((free != self.free) | (slope != self.slope)).tolist(), self._size
+        while pending:
+            failed = []
+            for j in pending:
+                at, count = int(self._index[j]), self._count
+                w = self._row(int(free[j]), at)
+                if slope[j]:
+                    w += slope[j] * self._row(1, int(self._index[j - 1]))
+                pivot = w[at]
+                if abs(pivot) < LEAST_PIVOT:
+                    failed.append(j)
+                    continue
+                w[at] -= 1.0
+                column = self._R[:, :size, at] - self._U[:, :size, :count] @ self._V[:count, at]
+                self._U[:, :size, count], self._V[count, :size] = column, w / pivot
+                self._count += 1
+                if self._count == MOST_CHANGES:
+                    self._flush()
+                self.free[j], self.slope[j] = free[j], slope[j]
+                self.sign *= 1 if pivot > 0.0 else -1
             if len(failed) == len(pending):
                 return False
-            pending = np.array(failed, np.int64)
-        return True
-
-    def _exchange(self, j: int, free: bool, slope: float) -> bool:
-        """Exchange row j; return False if its pivot is too small."""
-        at = int(self._index[j])
-        w = self._row(int(free), at)
-        if slope:
-            w += slope * self._row(1, int(self._index[j - 1]))
-        pivot = w[at]
-        if abs(pivot) < LEAST_PIVOT:
-            return False
-        column = self._R[:, : self._size, at] - self._U[:, : self._size, : self._count] @ self._V[: self._count, at]
-        w[at] -= 1.0
-        self._U[:, : self._size, self._count], self._V[self._count, : self._size] = column, w / pivot
-        self._count += 1
-        if self._count == MOST_CHANGES:
-            self._flush()
-        self.free[j], self.slope[j] = free, slope
-        self.sign *= 1 if pivot > 0.0 else -1
+            pending = failed
         return True
 
     def _row(self, kind: int, at: int) -> Float:
@@ -209,25 +216,25 @@ class FollowedStatuses:
         return np.asarray((self._R[0, :size, :size][:, some] @ permuted[some] - change)[self._index])
 
     def solve(self, x: Float, rhs: Float, terms: Callable[[Float], Float]) -> tuple[Float, Float] | None:
-        """Return x and S x (m,) with the right-hand side (m,), from a start with the prescribed entries.
+        """Solve for x; return x and S x (m,), from a start with the prescribed entries.
 
-        None if R has lost too many digits, relative to the terms sum_j |S_ij x_j| of each row.
+        Return None if R has lost too many digits, relative to the terms sum_j |S_ij x_j| of each row.
         """
         prescribed = np.where(self.free, rhs, x)
         if np.count_nonzero(prescribed) <= FEW:
             x = np.where(self.free, self._inverse(prescribed), x)
         error = np.inf
-        for step in range(1 + REFINEMENTS):
+        for step in range(1 + MOST_REFINEMENTS):
             y = self.S @ x
             missing, before = residual(y, rhs, self.free, self.slope), error
             error = largest_share(missing, np.abs(rhs) + terms(x), self.slope)
-            if error <= ROUNDED or error > before / 2 or step == REFINEMENTS:
+            if error <= ROUNDED or error > before / 2 or step == MOST_REFINEMENTS:
                 break
             x = np.where(self.free, x + self._inverse(missing), x)
         return (x, y) if error <= NOISE else None
 
     def grow(self, S: Float, old: Int, other: Int, units: Float) -> bool:
-        """Add prescribed entries, so that the present entries have the indices `old` (m,) in S (m', m').
+        """Add prescribed entries; the present entries get the indices `old` (m,) in S (m', m').
 
         The present entries change to the units `units` (m,), and S changes between the entries with the indices
         `other`.  Return False if a pivot is too small; then R is worthless.

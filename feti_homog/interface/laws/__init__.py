@@ -3,6 +3,6 @@
 Imports `case`, `feti` and `interface.contact`.  Main entries: `bond_law.BondLaw`, `bond_law.law_class`.
 """
 
-from feti_homog.interface.laws.bond_law import BondLaw, law_class
+from feti_homog.interface.laws.bond_law import UTILISATION_TIE, BondLaw, law_class
 
-__all__ = ["BondLaw", "energy", "law_class"]
+__all__ = ["UTILISATION_TIE", "BondLaw", "energy", "law_class"]

@@ -14,16 +14,17 @@ from typing import Any, ClassVar, Protocol, Self
 import numpy as np
 
 from feti_homog.case import bond_laws
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import BondState
+from feti_homog.interface.contact import BondState, CoupledInterfaces
 from feti_homog.typing import Bool, Float, Int
 
+# Bonds whose utilisations differ relatively by less break together: in a symmetric cell the solver errs by less.
+UTILISATION_TIE = 1e-6
 # Number of halvings of a unit interval, or of steps of Newton's method, that exhausts double precision.
 MOST_STEPS = 60
 
 
 class KeyValues(Protocol):
-    """The values of a key of [interface] at nodes; a section without the key takes an alternative key, or inf."""
+    """The values of [interface] keys at nodes; without the key a section takes an alternative key, or inf."""
 
     def __call__(self, key: str, *alternatives: str) -> float | Float:
         """Return one value for all nodes, or values (k,)."""
@@ -61,7 +62,7 @@ class BondLaw(ABC):
 
     @abstractmethod
     def breaks(self, traction: Float) -> Float:
-        """Describe breaks under tractions (p, c) by (p, d) values for the first d of `break_names`."""
+        """Describe breaks under tractions (p, c) by values (p, d), named by the first d of `break_names`."""
 
     @classmethod
     @abstractmethod
@@ -93,11 +94,11 @@ class BondLaw(ABC):
         return bonds.history, which
 
     def softening(self, bonds: BondState, pulled: Bool) -> Float | None:
-        """Return C / C_0 (k, 3) of the springs in bonds `pulled` (k,) or pressed; None if C never changes."""
+        """Return C / C_0 (k, 3) for springs, `pulled` (k,) or pressed; None if C never changes."""
         return None
 
     def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
-        """Return the fracture energies per area (p,) of bonds `which` (k,) in the modes of tractions (k, c)."""
+        """Return fracture energies per area (p,) for bonds `which` (k,) in the modes of tractions (k, c)."""
         return np.zeros(int(which.sum()))
 
     def damage(self, bonds: BondState) -> Float | None:
@@ -106,7 +107,7 @@ class BondLaw(ABC):
 
     @property
     def overshoot(self) -> float:
-        """The excess of the traction at the first break over the peak of the law, relative to this peak."""
+        """The excess of the first break's traction over the peak of the law, relative to this peak."""
         return 0.0
 
     def onset(self) -> BondLaw:

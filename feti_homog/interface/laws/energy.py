@@ -19,10 +19,8 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 
 from feti_homog.errors import ConvergenceError
-from feti_homog.interface.contact.contact_problem import ContactProblem
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import BONDED, BondState
-from feti_homog.interface.laws.bond_law import KeyValues, SpringLaw
+from feti_homog.interface.contact import BONDED, BondState, ContactProblem, CoupledInterfaces
+from feti_homog.interface.laws.bond_law import UTILISATION_TIE, KeyValues, SpringLaw
 from feti_homog.typing import Bool, Float, Int
 
 if TYPE_CHECKING:
@@ -30,8 +28,6 @@ if TYPE_CHECKING:
 
 # Blocks of H are rounding below this fraction of the stiffness beside the bond.
 RIGID = 1e-9
-# Largest rounding of H for a comparison of energies: bonds whose utilisations differ by less break together.
-MOST_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -107,7 +103,7 @@ class TipEnergies:
 
 @dataclass(frozen=True, kw_only=True)
 class ReleasedEnergy(SpringEnergy):
-    """A bond of tributary length l at a tip breaks when the break releases G_c l.
+    """A bond at a tip breaks when its break releases G_c l, with its tributary length l.
 
     All other bonds break when the spring energy reaches G_c.
 
@@ -158,10 +154,10 @@ class ReleasedEnergy(SpringEnergy):
     def _activate(influence: exact_inverse.ExactInverse, interface: ContactProblem, bonds: BondState) -> None:
         """Update the inverse dual operator to a bond state.  Collective; raises as `in_state`."""
         interface.prepare(bonds)
-        if not influence.rounding <= MOST_ROUNDING:
+        if not influence.rounding <= UTILISATION_TIE:
             raise ConvergenceError(
                 f'[interface] growth = "released": rounding hides {influence.rounding:.1e} of what breaks release, '
-                f"expected at most {MOST_ROUNDING:g}: springs are too soft beside bodies that are cut or coated, or "
+                f"expected at most {UTILISATION_TIE:g}: springs are too soft beside bodies that are cut or coated, or "
                 'phases too far apart; growth = "springs" bears more'
             )
 
@@ -200,7 +196,7 @@ class SpringsAndTips(SpringEnergy):
 
 
 def released_energy(H: Float, lam: Float, stiffness: Float, contact: bool) -> Float:
-    """Return the energy (m,) that each break releases, with blocks H (m, 2, 2) and forces lam (m, 2).
+    """Return the released energy (m,) of each break, for blocks H (m, 2, 2) and forces (m, 2).
 
     `stiffness` (m, 2) bounds H: where H is rounding relative to this bound, as at the last bond of a fibre, no force
     can act.  With `contact` the faces that would overlap keep the normal force.

@@ -23,8 +23,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from feti_homog.errors import CaseError
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import BondState
+from feti_homog.interface.contact import BondState, CoupledInterfaces
 from feti_homog.interface.laws.bond_law import MOST_STEPS, KeyValues, SpringLaw
 from feti_homog.interface.laws.strength import QuadraticStrength
 from feti_homog.typing import Bool, Float, Int
@@ -83,7 +82,7 @@ class CohesiveLaw(SpringLaw):
         return {}
 
     def levels_for(self, teeth: int | None, tolerance: float) -> tuple[float, ...]:
-        """Return damage levels whose openings have a constant ratio in the pure mode with the largest G_c / W_0.
+        """Choose damage levels with a constant ratio of openings in the pure mode of the largest G_c / W_0.
 
         By default the number of teeth is the smallest one with which the first tooth exceeds the peak traction by at
         most the fraction `tolerance`.
@@ -115,7 +114,7 @@ class CohesiveLaw(SpringLaw):
 
     @property
     def overshoot(self) -> float:
-        """The largest excess of the first tooth over the peak traction in pure modes, relative to the peak."""
+        """The excess of the first tooth over the peak traction, relative to the peak: the largest in pure modes."""
         return float(np.sqrt(self._taken(self._damages[1:2], self._longest_branch)[0] / self.levels[1])) - 1.0
 
     @property
@@ -125,11 +124,11 @@ class CohesiveLaw(SpringLaw):
 
     @abstractmethod
     def shape(self, u: Float) -> Float:
-        """tau(u) for u >= 0: 1 at 0, falling."""
+        """Return tau(u) for u >= 0, which falls from 1."""
 
     @abstractmethod
     def area(self, u: Float | float) -> Float | float:
-        """int_0^u tau."""
+        """Return int_0^u tau."""
 
     @abstractmethod
     def opening(self, d: Float, s: Float | float) -> Float:
@@ -153,7 +152,7 @@ class CohesiveLaw(SpringLaw):
         return np.asarray(np.sqrt((first + second) / self._breaking(traction, tooth)) / (1.0 - self._damages[tooth]))
 
     def after(self, bonds: BondState, which: Bool, traction: Float) -> tuple[Float, Bool]:
-        """Add one broken tooth (k, 1) to the bonds `which`, and return the mask (k,) of bonds that lose the last."""
+        """Add a broken tooth (k, 1) to the bonds `which`; mark (k,) the bonds that lose their last tooth."""
         history = bonds.history + which[:, None]
         return history, which & (history[:, 0] >= len(self.levels) - 1)
 
@@ -163,7 +162,7 @@ class CohesiveLaw(SpringLaw):
         return np.asarray(np.where(bonds.status == 0, d, 1.0))
 
     def softening(self, bonds: BondState, pulled: Bool) -> Float:
-        """Return 1 / (1 - d) (k, 3); 1 for pressed normal springs, and for the pressed faces of parted bonds."""
+        """Return C / C_0 = 1 / (1 - d) (k, 3); 1 for pressed normal springs, and for parted bonds."""
         d = self._damages[bonds.history[:, 0].astype(np.int64)]
         factor = 1.0 / (1.0 - np.where(d < 1.0, d, 0.0))
         return np.column_stack([np.where(pulled, factor, 1.0), factor, factor])
@@ -225,11 +224,11 @@ class PiecewiseLinear(CohesiveLaw):
         return self.knots[self.heights.index(0.0)]
 
     def shape(self, u: Float) -> Float:
-        """tau(u) of u >= 0."""
+        """Return tau(u) for u >= 0."""
         return np.interp(u, self.knots, self.heights)
 
     def area(self, u: Float | float) -> Float | float:
-        """int_0^u tau."""
+        """Return int_0^u tau."""
         u = np.minimum(u, self.last)
         knots, heights = np.array(self.knots), np.array(self.heights)
         areas = np.concatenate([[0.0], np.cumsum(np.diff(knots) * (heights[1:] + heights[:-1]) / 2.0)])
@@ -256,7 +255,7 @@ class BilinearLaw(PiecewiseLinear):
 
 @dataclass(frozen=True)
 class TableLaw(PiecewiseLinear):
-    """A table gives the traction over the opening in mode I; all other modes stretch this branch to their toughness."""
+    """A table has the traction over the opening in mode I; other modes stretch it to their toughness."""
 
     @classmethod
     def branch(cls, value: KeyValues) -> dict[str, Any]:

@@ -37,7 +37,7 @@ class Strength(BondLaw):
 
     @abstractmethod
     def together(self, shares: Float) -> Float:
-        """Return the utilisation (p,) by `shares` (p, c), traction components relative to their strengths."""
+        """Combine the utilisations (p, c) of the traction components to one for each node (p,)."""
 
     def breaks(self, traction: Float) -> Float:
         """Return the traction components (p, c), relative to their strengths."""
@@ -55,7 +55,7 @@ class MaxStrength(Strength):
     """The paper's criterion: a bond breaks at max(<t_n> / R^n, |t_t| / R^t, |t_a| / R^a) = 1."""
 
     def together(self, shares: Float) -> Float:
-        """Return the largest (p,) of `shares` (p, c)."""
+        """Return the largest utilisation (p,) of the components (p, c)."""
         return np.asarray(shares.max(axis=1, initial=0.0))
 
     def first_factor(self, before: Float, direction: Float) -> Float:
@@ -72,11 +72,11 @@ class QuadraticStrength(Strength):
     """A bond breaks at (<t_n> / R^n)^2 + (t_t / R^t)^2 + (t_a / R^a)^2 = 1."""
 
     def together(self, shares: Float) -> Float:
-        """Return the root (p,) of the sum of squared `shares` (p, c)."""
+        """Return the root (p,) of the sum of squared utilisations (p, c)."""
         return np.asarray(np.hypot.reduce(shares, axis=1))
 
     def first_factor(self, before: Float, direction: Float) -> Float:
-        """Return the factors (p,) at which the sum of squares is 1; a compressive normal traction is left out."""
+        """Return the factors (p,) at which the sum of squares is 1, without a compressive normal traction."""
         limits = self.limits[..., : before.shape[1]]
         s, ds = before / limits, direction / limits
         opening, shear = _largest_root(s, ds), _largest_root(s[:, 1:], ds[:, 1:])

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.errors import NotCarriedError
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import Equilibrium, Status
+from feti_homog.interface.contact import CoupledInterfaces, Equilibrium, Status
 from feti_homog.interface.friction.coulomb_faces import StuckError
 from feti_homog.interface.friction.face_system import Prescribed
 from feti_homog.interface.friction.sliding_cell import SlidingCell
@@ -80,7 +79,7 @@ class CoulombLeg(Leg):
         return status, x
 
     def _given(self, share: float, x: Float) -> Prescribed:
-        """Prescribe the load at a fraction of the leg, and the slips of scaled x."""
+        """Prescribe the load at a fraction of the leg, and the slips in scaled x."""
         load = self._load_at(share)
         return Prescribed(load.by_stress, self.sliding.given(load), x[1 : 2 * len(self.sliding.rows) : 2])
 
@@ -91,7 +90,7 @@ class CoulombLeg(Leg):
         self._status, self._x, self._mean, self._state = status, x, mean, None
 
     def _settle(self, begin: PathState) -> None:
-        """Find the state at s with the bonds of `begin`, after its break if any.  Collective.
+        """Find the state at s with the bonds of `begin`, after a break if `begin` has one.  Collective.
 
         In a break faces lose the product of jumps and mean forces; slips turn a part into heat by the final forces, and
         the break has released the rest.
@@ -146,8 +145,7 @@ class CoulombLeg(Leg):
         self._go_straight(status, after, 0.0, faces.heat(status, x, after) / self.cell.area)
         self._share = 1.0 if breaks > 1.0 and change >= rest else share + way
         if breaks <= 1.0:
-            yield from self._break()
-            yield from self._break_overloaded()
+            yield from self._break_overloaded(is_due=True)
         elif self._share < 1.0 and (self._first or self._share - self._reported >= LEAST_SHARE):
             self._first = False
             yield self._point(0, 0, self._path_state())
@@ -156,33 +154,34 @@ class CoulombLeg(Leg):
             raise StuckError(CYCLE)
 
     def _go_to(self, share: float) -> None:
-        """Advance to a fraction of the leg in one step, or to the largest that the cell carries.  Collective.
+        """Advance in one step to a fraction of the leg, or as far as the cell carries the load.  Collective.
 
         Raises:
             NotCarriedError: the cell carries nothing beyond the last step.
         """
-        sliding, x = self.sliding, self._x
-        self._share, self.limit = mpi_errors.on_root(self.cell.comm, self._carried, share)
-        status, after = self._on_root(sliding.faces.step, self._status, self._given(self._share, x), x)
-        heat = sliding.faces.heat_behind(status, x, after) / self.cell.area
+        sliding, x, faces = self.sliding, self._x, self.sliding.faces
+
+        def carried() -> tuple[float, NotCarriedError | None]:
+            """Return the fraction of the leg that the cell carries, and the error that limits this fraction or None."""
+            low, high = self._share, share
+            try:
+                faces.step(self._status, self._given(share, x), x)
+            except StuckError:
+                return share, None
+            except NotCarriedError as error:
+                limit = error
+            else:
+                return share, None
+            while high - low > SAME_SHARE * share:
+                middle = (low + high) / 2
+                carries = faces.carries(self._status, self._given(middle, x), x)
+                low, high = (middle, high) if carries else (low, middle)
+            if low - self._share <= 10 * SAME_SHARE * share:
+                raise limit
+            return low, limit
+
+        self._share, self.limit = mpi_errors.on_root(self.cell.comm, carried)
+        status, after = self._on_root(faces.step, self._status, self._given(self._share, x), x)
+        heat = faces.heat_behind(status, x, after) / self.cell.area
         way = Energies(sliding.stored(after) - sliding.stored(x) + heat, 0.0, 0.0, heat)
         self._stand(status, after, sliding.macroscopic(after), way)
-
-    def _carried(self, share: float) -> tuple[float, NotCarriedError | None]:
-        """Return the largest fraction up to `share` that the cell carries, and the error that limits it or None."""
-        low, high, faces = self._share, share, self.sliding.faces
-        try:
-            faces.step(self._status, self._given(share, self._x), self._x)
-        except StuckError:
-            return share, None
-        except NotCarriedError as error:
-            limit = error
-        else:
-            return share, None
-        while high - low > SAME_SHARE * share:
-            middle = (low + high) / 2
-            carries = faces.carries(self._status, self._given(middle, self._x), self._x)
-            low, high = (middle, high) if carries else (low, middle)
-        if low - self._share <= 10 * SAME_SHARE * share:
-            raise limit
-        return low, limit

@@ -8,13 +8,12 @@ from mpi4py import MPI
 
 from feti_homog.errors import NotCarriedError
 from feti_homog.feti import DualSolution
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import BondState, Equilibrium
-from feti_homog.interface.laws.bond_law import BondLaw
+from feti_homog.interface.contact import BondState, CoupledInterfaces, Equilibrium
+from feti_homog.interface.laws.bond_law import UTILISATION_TIE, BondLaw
 from feti_homog.interface.loads import Load, Macroscopic, Multipliers
 from feti_homog.interface.path.leg import SAME_SHARE, Leg
 from feti_homog.interface.path.onsets import first_break, first_change
-from feti_homog.interface.path.path_points import UTILISATION_TIE, PathState, Point, most_utilised
+from feti_homog.interface.path.path_points import PathState, Point, most_utilised
 from feti_homog.typing import Float
 
 # A response is on a straight line within the solver's error, or within this rounding of the best solves, relative to
@@ -74,7 +73,7 @@ class FrictionlessLeg(Leg):
         return self.cell.equilibrium(self._load_at(share), bonds, lam)
 
     def _stand(self, share: float, state: Equilibrium) -> None:
-        """Set the state to the equilibrium at a fraction of the leg, and add the energies of the way."""
+        """Set the state to the equilibrium at a fraction of the leg, and add the energies of the way to it."""
         if share >= self._bends_before:
             self._bends_before = np.inf
         self._share, self._state, self._bonds = share, state, state.bonds
@@ -83,30 +82,23 @@ class FrictionlessLeg(Leg):
         self._from = self._path_state()
 
     def _advance(self) -> Iterator[Point]:
-        """Advance to the next event, or part of the way, and yield its points.  Collective.
+        """Advance past the next event, or as far as the response is straight.  Collective.
 
         Raises:
             NotCarriedError: neither open nor touching faces carry the load's stresses.
         """
-        state, share = self._state, self._share
+        cell, before, share = self.cell, self._state, self._share
         try:
-            end = self.cell.linear(self.end, state.bonds, state.multipliers)
+            # The solutions at the end of the leg with fixed contact states.
+            end = cell.linear(self.end, before.bonds, before.multipliers)
         except NotCarriedError:
             beyond = min(share + SAME_SHARE, 1.0)
-            touching = self._solve(beyond, state.bonds, state.multipliers)
+            touching = self._solve(beyond, before.bonds, before.multipliers)
             self._stand(share, self._solve(share, touching.bonds, touching.multipliers))
             yield self._turn(beyond)
             self._stand(beyond, touching)
             self._false_alarm = False
-        else:
-            yield from self._advance_towards(end)
-
-    def _advance_towards(self, end: Sequence[DualSolution]) -> Iterator[Point]:
-        """Advance to the next event, or as far as the response is straight, and past it.
-
-        `end` has the solutions at the end of the leg with fixed contact states.
-        """
-        cell, before, share = self.cell, self._state, self._share
+            return
         # Fractions of the leg at which a bond breaks, contact begins to change, and surely has; or inf.
         breaks = first_break(cell, self.law, before.bonds, cell.traction(before.solutions), cell.traction(end))
         begins, certain = (1.0, 1.0) if self._false_alarm else first_change(cell.plane, before, end[0])
@@ -115,22 +107,30 @@ class FrictionlessLeg(Leg):
         target = min(breaks, begins, 1.0)
         is_here = target - share <= SAME_SHARE and (target == begins or (target == breaks and self._is_due()))
         reached = is_here or self._approach(target, end)
-        if reached and target == breaks and self._is_due():
-            yield from self._break()
-        elif reached and target == begins:
-            yield from self._change(min(breaks, certain), before)
-        elif self._differs(before):
-            self._false_alarm = False
-            if self._share > self._reported + SAME_SHARE:
-                yield from self._turned()
-        yield from self._break_overloaded()
+        is_due = reached and target == breaks and self._is_due()
+        is_reported, turned = self._share <= self._reported + SAME_SHARE, False
+        if reached and target == begins and not is_due:
+            # Beyond the state in which contact begins to change, the change is beyond doubt; faces that touch without a
+            # force may have opened since `before`.
+            state, beyond = self._state, min(max(min(breaks, certain), self._share + SAME_SHARE), 1.0)
+            if not is_reported:
+                yield self._turn(beyond)
+            self._stand(beyond, self._solve(beyond, state.bonds, state.multipliers))
+            self._false_alarm = not self._differs(before)
+            turned = is_reported and not self._false_alarm
+        elif not is_due and self._differs(before):
+            self._false_alarm, turned = False, not is_reported
+        # The state after a change is a point, unless a break at this s is a point.
+        if turned and not self._is_overloaded():
+            yield self._turn(self._share)
+        yield from self._break_overloaded(is_due)
 
     def _is_due(self) -> bool:
         """Return whether the most utilised bonds are at their strength."""
         return self._used()[1] > 1.0 - UTILISATION_TIE
 
     def _approach(self, target: float, end: Sequence[DualSolution]) -> bool:
-        """Advance to the target if the response is straight, else halve the way; return whether it is reached."""
+        """Advance to the target, or as far as the response is straight; return whether the target is reached."""
         cell, start, begin, reached = self.cell, self._share, self._state, True
         nearest = min(start + SAME_SHARE, 1.0)
         target = max(target, nearest)
@@ -159,28 +159,8 @@ class FrictionlessLeg(Leg):
         return reached
 
     def _response(self, state: Macroscopic) -> Float:
-        """(n,) components that the load does not prescribe: stresses, and strains times a stiffness."""
+        """Return the components (n,) that the load does not prescribe: stresses, and strains times a stiffness."""
         return np.where(self.end.by_stress, self.cell.plane.scales.largest_stiffness * state.strain, state.stress)
-
-    def _change(self, beyond: float, from_state: Equilibrium) -> Iterator[Point]:
-        """Yield the state in which contact begins to change, and advance until the change is beyond doubt.
-
-        If a break or a waypoint is a point at this s, yield the state after the change instead.  Faces that touch
-        without a force may have opened since `from_state`.
-        """
-        before, beyond = self._state, min(max(beyond, self._share + SAME_SHARE), 1.0)
-        there_is_one = self._share <= self._reported + SAME_SHARE
-        if not there_is_one:
-            yield self._turn(beyond)
-        self._stand(beyond, self._solve(beyond, before.bonds, before.multipliers))
-        self._false_alarm = not self._differs(from_state)
-        if there_is_one and not self._false_alarm:
-            yield from self._turned()
-
-    def _turned(self) -> Iterator[Point]:
-        """Yield the state after a change of contact, unless a break at this s is a point."""
-        if not self._is_overloaded():
-            yield self._turn(self._share)
 
     def _turn(self, position: float) -> Point:
         """Return the state as a point without a break, from which the path goes on at `position`."""

@@ -8,9 +8,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from feti_homog.errors import NotCarriedError
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import BONDED, Equilibrium
-from feti_homog.interface.laws.bond_law import BondLaw
+from feti_homog.interface.contact import BONDED, CoupledInterfaces, Equilibrium
+from feti_homog.interface.laws.bond_law import UTILISATION_TIE, BondLaw
 from feti_homog.interface.loads import Load, Macroscopic
 from feti_homog.interface.path import path_points
 from feti_homog.typing import Bool, Float
@@ -20,7 +19,7 @@ SAME_SHARE = 1e-9
 
 
 class Leg(ABC):
-    """Leg `leg` between two loads of equal kinds, at its rising share s.
+    """Leg number `leg`, between two loads of the same kinds, at its rising fraction s.
 
     Bonds break at constant load: a point, then the state after the break at the same s.
 
@@ -50,7 +49,7 @@ class Leg(ABC):
 
     @abstractmethod
     def _settle(self, begin: path_points.PathState) -> None:
-        """Find the state at s with the bonds of `begin`, after its break if any.  Collective."""
+        """Find the state at s with the bonds of `begin`, after a break if `begin` has one.  Collective."""
 
     @abstractmethod
     def _advance(self) -> Iterator[path_points.Point]:
@@ -100,24 +99,22 @@ class Leg(ABC):
 
     def _is_overloaded(self) -> bool:
         """Return whether a break or a change of contact has overloaded bonds.  Collective."""
-        return self._used()[1] > 1.0 + path_points.UTILISATION_TIE and self.state.converged
+        return self._used()[1] > 1.0 + UTILISATION_TIE and self.state.converged
 
-    def _break_overloaded(self) -> Iterator[path_points.Point]:
-        while self._is_overloaded():
-            yield from self._break()
-
-    def _break(self) -> Iterator[path_points.Point]:
-        """Break the worst bonds at s, and find the state after the break.  Collective."""
-        broke, softened, broken = self._release(self._used()[2])
-        yield self._point(broke, softened, broken)
-        self._settle(broken)
+    def _break_overloaded(self, is_due: bool = False) -> Iterator[path_points.Point]:
+        """Break the worst bonds at s while they are overloaded, and first if a break is due.  Collective."""
+        while is_due or self._is_overloaded():
+            broke, softened, broken = self._release(self._used()[2])
+            yield self._point(broke, softened, broken)
+            self._settle(broken)
+            is_due = False
 
     def _release(self, which: Bool) -> tuple[int, int, path_points.PathState]:
-        """Break the bonds `which` (k,): numbers that part and that soften, and the path state.  Collective."""
+        """Break the bonds `which` (k,): return how many part and how many soften, and the path state.  Collective."""
         return path_points.break_bonds(self.cell, self.law, which, self.state, self._path_state())
 
     def _point(self, broke: int, softened: int, after: path_points.PathState) -> path_points.Point:
-        """Return the point at s, with the numbers of bonds that part and that soften.  Collective."""
+        """Return the point at s, at which `broke` bonds part and `softened` bonds soften.  Collective."""
         energies, self._energies, self._reported = self._energies, path_points.NO_ENERGIES, self._share
         load_factor = (self.leg + self._share) / len(self.waypoints)
         return path_points.Point(load_factor, 1.0, self.state, broke, softened, energies, self._used()[0], after)

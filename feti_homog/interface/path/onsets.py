@@ -17,12 +17,9 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.feti import DualSolution
-from feti_homog.interface.contact.contact_problem import ContactProblem
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
+from feti_homog.interface.contact import BONDED, CLOSED, OPEN, BondState, ContactProblem, CoupledInterfaces, Equilibrium
 from feti_homog.interface.contact.floating_bodies import FloatingBodies, shares_to_zero
-from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium
-from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.interface.path.path_points import UTILISATION_TIE
+from feti_homog.interface.laws.bond_law import UTILISATION_TIE, BondLaw
 from feti_homog.typing import Bool, Float, Int
 
 # Parts of a straight way at whose ends a utilisation without convexity is evaluated.
@@ -51,7 +48,7 @@ class Onset:
         return np.where(self.bonded[node], self.bonds.at(node).share(traction), 0.0)
 
     def factors(self, direction: Float, noise: Float, before: Float | None = None) -> Float:
-        """(n, k) factors f >= 0 at which bonds break under n rays of tractions, inf for bonds that are not the first.
+        """Return the factors f >= 0 (n, k) at which the first bonds break under n rays of tractions; inf for others.
 
         Tractions are `before` (k, c) + f `direction` (n, k, c); `before` alone breaks nothing.  Utilisations by
         `direction` up to `noise`, (n,) or (n, k), count as zero.
@@ -97,7 +94,7 @@ def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, before:
 
 
 def first_change(interface: ContactProblem, state: Equilibrium, end: DualSolution) -> tuple[float, float]:
-    """Return the fractions of the way to `end` at which contact begins to change, and surely has; or 1, 1.
+    """Return the fractions of the way at which contact begins to change, and surely has; or 1, 1.
 
     A tension or an overlap of twice the solver's error is sure.  A closed node opens when its force vanishes; open
     nodes of a fixed fibre close when their gap vanishes, open nodes of a free fibre when the fibre has no more room

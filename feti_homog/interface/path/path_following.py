@@ -11,7 +11,7 @@ between breaks no energy is lost.  The `energies` of a point belong to the way f
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
+from feti_homog.interface.contact import CoupledInterfaces
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.loads import Load
 from feti_homog.interface.path.frictionless_leg import FrictionlessLeg

@@ -8,14 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces, held_traction
-from feti_homog.interface.contact.states import BONDED, BondState, Equilibrium
-from feti_homog.interface.laws.bond_law import BondLaw
+from feti_homog.interface.contact import BONDED, BondState, CoupledInterfaces, Equilibrium
+from feti_homog.interface.contact.coupled_interfaces import held_traction
+from feti_homog.interface.laws.bond_law import UTILISATION_TIE, BondLaw
 from feti_homog.interface.loads import Macroscopic, Multipliers
 from feti_homog.typing import Bool, Float
-
-# Bonds whose utilisations differ relatively by less break together: in a symmetric cell the solver errs by less.
-UTILISATION_TIE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -23,8 +20,8 @@ class PathState:
     """State from which a path can continue.
 
     Attributes:
-        leg, position: the load is the share `position`, 0..1, of the way to waypoint `leg`; with increments, `leg` is
-            the number already done.
+        leg, position: the load is at the fraction `position`, 0..1, of the way to waypoint `leg`; with increments,
+            `leg` is the number of finished steps.
         bonds, lam: bond states and multipliers to begin with.
         origin: state at the leg's beginning.
         last: state at the last point.
@@ -43,13 +40,13 @@ class PathState:
     stretched: float = 0.0
 
     def energies_to(self, after: Macroscopic) -> Energies:
-        """Return the energies of the way from the last point to a state; changes of contact lose none."""
+        """Return the energies of the way from the last point to a state; a change of contact loses no energy."""
         lost = 0.0 if self.broken is None else self.last.released_to(after)
         return Energies(after.stored - self.last.stored + lost, lost, self.broken or 0.0)
 
 
 class Energies(NamedTuple):
-    """Work, energy released by breaks, their fracture energy, and heat of friction on a way, per cell area."""
+    """Energies per cell area on a way: work, released energy, fracture energy of breaks, heat of friction."""
 
     work: float
     released: float
@@ -69,7 +66,7 @@ class Point:
     """Path point.
 
     Attributes:
-        load_factor: position on the path, 0 to 1, with equal shares for all legs.
+        load_factor: position on the path, 0 to 1; all legs count alike.
         scale: factor from the equilibrium `state` to the point's state.
         state: equilibrium.
         broke: number of bonds that part after this state; with increments, in the step before it.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,11 +17,10 @@ from feti_homog.mesh.outline.lines import LineStations
 from feti_homog.mesh.outline.outline import Outline
 from feti_homog.mesh.sizes import element_estimate
 from feti_homog.mesh.sizes.graded_size import MeshSizes
-from feti_homog.mesh.tiles.tile_filling import Filling, Tile, arc_edges
-from feti_homog.mesh.tiles.tiling import Regions, TilePolicy, Tiling, cut, is_tiled, tiling
+from feti_homog.mesh.tiles.tile_filling import Filling, Tile
+from feti_homog.mesh.tiles.tiling import FilledTile, Regions, TilePolicy, Tiling, cut, is_tiled, tile_mesh, tiling
 from feti_homog.microstructure import Arrangement, arrangements, phase_names
 from feti_homog.microstructure.shapes import Conics
-from feti_homog.typing import Int32
 
 
 def begin(
@@ -50,7 +49,16 @@ def begin(
     estimate = element_estimate.ElementEstimate.of(cell, listed)
     tiled = estimate.fibres >= policy.least_discs if listed is None else is_tiled(listed, policy)
     limit = element_estimate.MAX_TRIANGLES_OF_TILES if tiled else element_estimate.MAX_TRIANGLES
-    _refuse_extremes(estimate, sizes, sum(map(len, marks.values())), limit)
+    around = min(sizes.interface, estimate.interface_size)
+    at_tips = sum(map(len, marks.values())) * element_estimate.triangles_of_a_tip(max(1.0, around / sizes.tip))
+    if (count := estimate.triangles + at_tips) > limit:
+        keys = ("mesh_size", "interface_size", *(["tip_size"] if at_tips else []))
+        values = [f"{name} = {value:.3g}" for name in keys if (value := getattr(cell, name)) is not None]
+        values += [] if cell.fibres is None else [f"fibres = {cell.fibres}"]
+        raise MeshError(
+            f"[cell] {', '.join(values)}: about {count:.2g} elements before refine; expected at most {limit}; "
+            "refine splits them on the ranks"
+        )
     arrangement = arrange(cell) if listed is None else listed
     smallest = int(arrangement.radii.argmin())
     if arrangement.radii[smallest] < arrangements.SMALLEST_RADIUS * arrangement.width:
@@ -76,21 +84,6 @@ def arrangement_scale(cell: cell_section.Cell, arrangement: Arrangement) -> floa
         return float(cell.fibre_radius / arrangement.radii[: arrangement.fibres].mean())
     width = cell_sizes.mixed_width(cell) if cell.table is None else cell.table.width
     return width or 1.0
-
-
-def _refuse_extremes(estimate: element_estimate.ElementEstimate, sizes: MeshSizes, tips: int, limit: int) -> None:
-    """Raise MeshError for a cell that would take hours to mesh."""
-    cell, around = estimate.cell, min(sizes.interface, estimate.interface_size)
-    at_tips = tips * element_estimate.triangles_of_a_tip(max(1.0, around / sizes.tip))
-    count = estimate.triangles + at_tips
-    if count > limit:
-        keys = ("mesh_size", "interface_size", "tip_size") if at_tips else ("mesh_size", "interface_size")
-        asked = [f"{name} = {value:.3g}" for name in keys if (value := getattr(cell, name)) is not None]
-        asked += [] if cell.fibres is None else [f"fibres = {cell.fibres}"]
-        raise MeshError(
-            f"[cell] {', '.join(asked)}: about {count:.2g} elements before refine; expected at most {limit}; "
-            "refine splits them on the ranks"
-        )
 
 
 @dataclass(frozen=True)
@@ -147,69 +140,33 @@ class NodedCell:
 
     def mesh(self, fillings: Sequence[Filling]) -> CoarseMesh:
         """Join the filled tiles, in the order of `parts`, to a mesh."""
-        arrangement, lines, scale = self.arrangement, self.lines, self.scale
-        # Nodes of the outline come first, and then of one tile after the other.
-        count, parts = len(lines.points), []
-        for tile, filling in zip(self.parts, fillings, strict=True):
-            inner = np.arange(count, count + len(filling.inner))
-            parts.append(np.concatenate([tile.nodes, inner]).astype(np.int32)[filling.triangles])
-            count += len(filling.inner)
-        points = np.concatenate([lines.points, *(filling.inner for filling in fillings)])
-        triangles, circle = np.concatenate(parts), np.concatenate([filling.circle for filling in fillings])
-        phase, precedence = self._within
-        solid = phase[circle] < len(arrangement.phases)
-        triangles, circle = triangles[solid], circle[solid]
-        # Nodes within voids are left out.
-        used = np.zeros(len(points), bool)
-        used[triangles] = True
-        number, points = (np.cumsum(used) - 1).astype(np.int32), points[used]
-        arcs, arc_circle = arc_edges(lines.curves)
-        return CoarseMesh(
-            width=scale * arrangement.width,
-            height=scale * arrangement.height,
-            points=scale * points,
-            triangles=number[triangles],
-            phase=phase[circle],
-            phases=arrangement.phases,
-            precedence=precedence[circle],
-            representative=representatives(points, arrangement.width, arrangement.height),
-            ellipses=lines.ellipses.scaled(scale),
-            arc_edges=number[arcs],
-            arc_circle=arc_circle,
-            debonded_edges=np.zeros((0, 2), np.int32),
-            centres=scale * arrangement.centres[: arrangement.fibres],
-            remarks=arrangement.remarks,
-        )
-
-    @cached_property
-    def _within(self) -> tuple[Int32, Int32]:
-        """The phase (k + 1,) next within each circle, and the precedence (k + 1,).
-
-        Voids have a phase number behind all others; the last entry is the matrix.
-        """
-        arrangement, lines = self.arrangement, self.lines
-        in_disc, in_ring = arrangement.within
-        within = [(in_ring if ring else in_disc)[disc] for disc, ring in zip(lines.disc, lines.is_coating, strict=True)]
-        place = {name: number for number, name in enumerate((*arrangement.phases, phase_names.VOID))}
-        phase = np.array([place[name] for name in (*within, arrangement.phases[0])], np.int32)
-        precedence = arrangement.precedence(lines.disc, lines.is_coating)
-        return phase, np.append(precedence, 0).astype(np.int32)
+        ends = self.regions.nodes + np.cumsum([0, *(len(filling.inner) for filling in fillings)])
+        filled = map(FilledTile, range(len(fillings)), self.parts, fillings, ends.tolist())
+        centres = self.scale * self.arrangement.centres[: self.arrangement.fibres]
+        return replace(tile_mesh(self.regions, list(filled))[0], centres=centres, remarks=self.arrangement.remarks)
 
     @cached_property
     def regions(self) -> Regions:
         """The cell's regions; the matrix around discs, which do not touch, is one region."""
-        phase, precedence = self._within
-        solid = phase < len(self.arrangement.phases)
-        _, first, constituent = np.unique(precedence[solid], return_index=True, return_inverse=True)
+        arrangement, lines = self.arrangement, self.lines
+        in_disc, in_ring = arrangement.within
+        within = [(in_ring if ring else in_disc)[disc] for disc, ring in zip(lines.disc, lines.is_coating, strict=True)]
+        # Voids have a phase number behind all others; the last entry is the matrix.
+        place = {name: number for number, name in enumerate((*arrangement.phases, phase_names.VOID))}
+        phase = np.array([place[name] for name in (*within, arrangement.phases[0])])
+        solid = phase < len(arrangement.phases)
+        precedence = np.append(arrangement.precedence(lines.disc, lines.is_coating), 0)[solid]
+        numbers, first, constituent = np.unique(precedence, return_index=True, return_inverse=True)
         of_circle = np.full(len(phase), -1)
         of_circle[solid] = constituent
         return Regions(
-            width=self.scale * self.arrangement.width,
-            height=self.scale * self.arrangement.height,
+            width=self.scale * arrangement.width,
+            height=self.scale * arrangement.height,
             scale=self.scale,
-            phases=self.arrangement.phases,
-            ellipses=self.lines.ellipses.scaled(self.scale),
+            phases=arrangement.phases,
+            ellipses=lines.ellipses.scaled(self.scale),
             constituent=of_circle,
-            phase=phase[solid][first].astype(np.int64),
-            nodes=len(self.lines.points),
+            phase=phase[solid][first],
+            precedence=numbers,
+            nodes=len(lines.points),
         )

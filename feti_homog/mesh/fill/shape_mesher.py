@@ -4,7 +4,7 @@ Middle nodes on second-order edges define the curves, as in users' meshes.
 """
 
 from dataclasses import replace
-from itertools import pairwise, product
+from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import ModuleType
@@ -13,19 +13,18 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.mesh.coarse_mesh import CoarseMesh
+from feti_homog.mesh.outline.outline import images
 from feti_homog.mesh.readers.gmsh_file import MshContent, raw_mesh
 from feti_homog.mesh.readers.msh_reader import made
 from feti_homog.mesh.sizes.element_estimate import refuse_many
 from feti_homog.mesh.sizes.graded_size import MAX_GROWTH, MIN_EDGES_AROUND, PASSAGE_EDGE, MeshSizes, SizeField, wrap
 from feti_homog.mesh.tiles.tile_filling import gmsh_session
-from feti_homog.microstructure import Arrangement, phase_names
+from feti_homog.microstructure import Arrangement, arrangements, phase_names
 from feti_homog.microstructure.shapes import convex_sums
 from feti_homog.typing import Float
 
-# Distance from a line / size of the cell within which curves lie on it.
-ON_SIDE = 1e-6
-# Core / frame of a polygon below which it is a circle.
-ROUND = 1e-9
+# Distance from a side / size of the cell within which curves lie on it; core / frame of a polygon that is a circle.
+SAME_PLACE = 1e-6
 # Cells of the grid of sizes along a side.
 FEWEST_CELLS, MOST_CELLS = 32, 1000
 
@@ -53,7 +52,7 @@ def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> C
         for axis, width in enumerate(arrangement.size):
             sides = []
             for level in (0.0, width):
-                on = np.flatnonzero(np.abs(boxes[:, :, axis] - level).max(axis=1) < ON_SIDE)
+                on = np.flatnonzero(np.abs(boxes[:, :, axis] - level).max(axis=1) < SAME_PLACE)
                 sides.append([curves[k] for k in on[np.argsort(boxes[on, :, 1 - axis].mean(axis=1))]])
             moved = np.eye(4)
             moved[axis, 3] = width
@@ -91,28 +90,18 @@ def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> C
 
 def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
     """Add the surfaces in the cell to groups by phase; return their precedence, 0 in the matrix."""
-    occ, size, outer, inner = gmsh.model.occ, arrangement.size, arrangement.outer, arrangement.outlines
-    assert isinstance(outer, convex_sums.ConvexSums) and isinstance(inner, convex_sums.ConvexSums)
-    rectangle = (2, occ.addRectangle(0.0, 0.0, 0.0, *size.tolist()))
-    steps = np.array(list(product((-1, 0, 1), repeat=2)))
-    image, shift = np.repeat(arrangement.order, len(steps)), np.tile(steps, (len(outer), 1)) * size
-    low, high = outer.centres - outer.extents[:, :, 0], outer.centres + outer.extents[:, :, 1]
-    inside = np.all((high[image] + shift > 0) & (low[image] + shift < size), axis=1)
-    # Images that reach into the cell, each from without.
-    added, disc, ring = [], list[int](), list[bool]()
-    for number, step in zip(image[inside].tolist(), shift[inside], strict=True):
-        for is_ring in (True, False) if arrangement.coated[number] else (False,):
-            added.append((2, _add_shape(gmsh, outer if is_ring else inner, number, step)))
-            disc.append(number)
-            ring.append(is_ring)
-    _, parts = occ.fragment([rectangle], added)
+    occ, (curves, disc, around) = gmsh.model.occ, images(arrangement)
+    assert isinstance(curves, convex_sums.ConvexSums)
+    rectangle = (2, occ.addRectangle(0.0, 0.0, 0.0, *arrangement.size.tolist()))
+    _, parts = occ.fragment([rectangle], [(2, _add_shape(gmsh, curves, number)) for number in range(len(curves))])
     occ.synchronize()
     number_of, phase = dict.fromkeys(parts[0], 0), dict.fromkeys(parts[0], phase_names.MATRIX)
-    numbers = arrangement.precedence(np.array(disc), np.array(ring))
+    ring = np.isin(np.arange(len(disc)), around)
+    numbers = arrangement.precedence(disc, ring)
     for pieces, entry, is_ring, precedence in zip(parts[1:], disc, ring, numbers, strict=True):
         within = set(pieces) & set(number_of)
         number_of |= dict.fromkeys(within, int(precedence))
-        phase |= dict.fromkeys(within, arrangement.within[is_ring][entry])
+        phase |= dict.fromkeys(within, arrangement.within[int(is_ring)][entry])
     outside = {piece for pieces in parts for piece in pieces} - set(number_of)
     voids = {piece for piece, name in phase.items() if name == phase_names.VOID}
     occ.remove(sorted(outside | voids), recursive=True)
@@ -122,39 +111,35 @@ def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
     return {tag: entry for (_, tag), entry in number_of.items()}
 
 
-def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int, shift: Float) -> int:
-    """Add the surface of a moved ellipse, or of a polygon with a margin; return its tag."""
-    occ, (x, y) = gmsh.model.occ, (shapes.centres[number] + shift).tolist()
+def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int) -> int:
+    """Add the surface of an ellipse, or of a polygon with a margin; return its tag."""
+    occ, centre = gmsh.model.occ, shapes.centres[number]
     frame, core = shapes.frames[number], shapes.cores[number]
-    rounding, b = np.linalg.norm(frame, axis=0).tolist()
-    if np.abs(core).max() <= ROUND * max(rounding, b):
-        longer = 0 if rounding >= b else 1
-        surface = occ.addDisk(x, y, 0.0, max(rounding, b), min(rounding, b))
-        turn = float(np.arctan2(frame[1, longer], frame[0, longer]))
-        occ.rotate([(2, surface)], x, y, 0.0, 0.0, 0.0, 1.0, turn)
+    semi_axes = np.linalg.norm(frame, axis=0)
+    a, b = semi_axes.max(), semi_axes.min()
+    if np.abs(core).max() <= SAME_PLACE * a:
+        surface, (x, y) = occ.addDisk(*centre.tolist(), 0.0, a, b), frame[:, semi_axes.argmax()]
+        occ.rotate([(2, surface)], *centre.tolist(), 0.0, 0.0, 0.0, 1.0, np.arctan2(y, x))
         return int(surface)
 
     def point(place: Float) -> int:
         return int(occ.addPoint(*place.tolist(), 0.0))
 
-    # Corners run counter-clockwise.
-    corners = core[np.sort(np.unique(core.round(14), axis=0, return_index=True)[1])] + [x, y]
+    # Corners run counter-clockwise, and so do lines and, around a margin, arcs.
+    corners = core[np.sort(np.unique(core.round(14), axis=0, return_index=True)[1])] + centre
     following = np.roll(corners, -1, axis=0)
     along = (following - corners) / np.linalg.norm(following - corners, axis=1, keepdims=True)
-    if rounding == 0.0:
-        tags = [point(corner) for corner in corners]
-        lines = [occ.addLine(*ends) for ends in zip(tags, tags[1:] + tags[:1], strict=True)]
-        return int(occ.addPlaneSurface([occ.addCurveLoop(lines)]))
-    outward = np.column_stack([along[:, 1], -along[:, 0]]) * rounding
-    starts, stops = ([point(place) for place in ends + outward] for ends in (corners, following))
+    outward = np.column_stack([along[:, 1], -along[:, 0]]) * a
+    starts = [point(corner) for corner in corners + outward]
+    stops = [point(corner) for corner in following + outward] if a else starts[1:] + starts[:1]
     lines = []
     for k, corner in enumerate(following):
-        onward = starts[(k + 1) % len(starts)]
         lines.append(occ.addLine(starts[k], stops[k]))
-        # Half a turn, of two corners, has no sense of its own.
-        middle = [] if len(corners) > 2 else [point(corner + rounding * along[k])]
-        centre, places = point(corner), [stops[k], *middle, onward]
-        lines += [occ.addCircleArc(begin, centre, end) for begin, end in pairwise(places)]
+        if a:
+            # Half a turn, of two corners, has no sense of its own.
+            middle = [point(corner + a * along[k])] if len(corners) == 2 else []
+            around, places = point(corner), [stops[k], *middle, starts[(k + 1) % len(starts)]]
+            lines += [occ.addCircleArc(begin, around, end) for begin, end in pairwise(places)]
     return int(occ.addPlaneSurface([occ.addCurveLoop(lines)]))
 
 
@@ -172,13 +157,12 @@ def _size_field(arrangement: Arrangement, sizes: MeshSizes) -> SizeField:
     thickness = np.where(arrangement.coated, arrangement.coating, np.inf)
     # The distance to the nearest point on another shape, or on an image.
     distance = np.full(len(places), np.inf)
-    steps = np.array(list(product((-1, 0, 1), repeat=2))) * size
     for label in np.unique(shape):
         mine, rest = places[shape == label], places[shape != label]
         if len(rest):
             distance[shape == label] = cKDTree(wrap(rest, size), boxsize=size).query(wrap(mine, size))[0]
-        images = np.concatenate([mine + step for step in steps if step.any()])
-        distance[shape == label] = np.minimum(distance[shape == label], cKDTree(images).query(mine)[0])
+        own_images = (mine + (arrangements.STEPS * size)[:, None]).reshape(-1, 2)
+        distance[shape == label] = np.minimum(distance[shape == label], cKDTree(own_images).query(mine)[0])
     length = np.minimum(sizes.interface, PASSAGE_EDGE * distance)
     length = np.minimum(length, np.minimum(2 * np.pi * rounds / MIN_EDGES_AROUND, COATING_EDGE * thickness)[shape])
     for axis in (0, 1):

@@ -56,6 +56,7 @@ class BareOutline:
         sampling, bridges = (lines.WHOLE, NO_BRIDGES) if bridges is None else (lines.IN_TILES, bridges)
         size = arrangement.size
         curves, disc, around = outline.images(arrangement)
+        assert isinstance(curves, Conics)
         sides = ((axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis]))
         border = np.concatenate(
             [outline.on_side(outline.crossings(curves, axis, size), axis, level) for axis, level in sides]
@@ -79,7 +80,13 @@ class BareOutline:
             first = np.unique(arrangement.shells[1], return_index=True)[1]
             caps = circle_size(arrangement, sizes.interface)[first[disc] + (around != MATRIX)]
             arcs = lines.Arcs(curves.circles[circle], start, stop - start, np.stack([caps[circle]] * 2, axis=1))
-            straight = _segments(curves, bridges, caps, field)
+            begin, end = (curves[bridges.ends[:, k]].points(bridges.angle + k * np.pi) for k in (0, 1))
+            longest = np.full((len(begin), 2), field.largest)
+            if field.graded is None:
+                # Interpolated between both ends, as in gmsh across the matrix.
+                at_ends = np.stack([field(begin), field(end)], axis=1)
+                longest = np.minimum(at_ends, caps[bridges.ends])
+            straight = Segments(begin, end - begin, longest)
         else:
             from feti_homog.mesh.outline import elliptic_outline  # discs, the common case, do without
 
@@ -103,9 +110,7 @@ class BareOutline:
         ):
             curves = Curves(np.arange(len(placed.share)), placed.first, *regions)
             parts.append((kind.points(placed.line, placed.share), curves))
-        begin = np.cumsum([0, *(len(points) for points, _ in parts)])
-        place = np.concatenate([curves.node + first for (_, curves), first in zip(parts, begin, strict=False)])
-        points, curves = np.concatenate([points for points, _ in parts]), Curves.joined([curves for _, curves in parts])
+        points, curves = Curves.joined(parts)
         # Vertices, found by position, have the first numbers, and then the nodes between.
         is_end = np.zeros(len(points), bool)
         is_end[curves.first[:-1]] = is_end[curves.first[1:] - 1] = True
@@ -113,7 +118,7 @@ class BareOutline:
         number[is_end] = cKDTree(self.vertices).query(points[is_end])[1]
         ellipses = Ellipses(self.curves.centres, self.curves.frames)
         nodes = np.concatenate([self.vertices, points[~is_end]])
-        return outline.Outline(nodes, replace(curves, node=number[place]), ellipses, self.disc, self.around)
+        return outline.Outline(nodes, replace(curves, node=number[curves.node]), ellipses, self.disc, self.around)
 
     def _sides(self, axis: int) -> Iterator[tuple[Float, Curves]]:
         """Yield the nodes (n, 2), the same on both sides along `axis`, and their curves."""
@@ -152,18 +157,3 @@ def _arcs(
     close = np.flatnonzero(~away)
     away[close] = cKDTree(border).query(ends[close])[0] > same
     return arcs, ends, away
-
-
-def _segments(curves: Discs, bridges: outline.Bridges, caps: Float, field: SizeField) -> Segments:
-    """Return the bridges as segments; edges on circles are at most `caps` (k,).
-
-    Where elements are not graded, edges are at most as long as the sizes at both ends, interpolated, as in gmsh across
-    the matrix.
-    """
-    begin, end = (curves[bridges.ends[:, k]].points(bridges.angle + k * np.pi) for k in (0, 1))
-    longest = np.full((len(begin), 2), field.largest)
-    if field.graded is None:
-        longest = np.stack(
-            [np.minimum(field(at), caps[bridges.ends[:, k]]) for k, at in enumerate((begin, end))], axis=1
-        )
-    return Segments(begin, end - begin, longest)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,8 +22,8 @@ class EllipticArcs(Lines):
     """Arcs of ellipses.
 
     Attributes:
-        ellipses: of each arc.
-        angle, way: (a, k) parameters of places on each arc, and the lengths up to there.
+        ellipses: (a,) the ellipse of each arc.
+        angle, way: (a, k) parameters of positions on each arc, and the arc lengths up to these positions.
     """
 
     ellipses: Ellipses
@@ -72,7 +71,7 @@ def size_field(
     size, largest, inner = arrangement.size, sizes.largest, arrangement.outlines
     assert isinstance(inner, Ellipses)
     shells, disc = arrangement.shells
-    # In mesh order: that of rows does not matter.
+    # Ellipses in meshing order make the mesh independent of the row order.
     order = np.argsort(np.argsort(arrangement.order)[disc], kind="stable")
     ellipses, disc = Ellipses(shells.centres, shells.frames)[order], disc[order]
     angle = np.tile(np.linspace(0, 2 * np.pi, convex_sums.POINTS, endpoint=False), len(ellipses))
@@ -92,44 +91,27 @@ def size_field(
     offset = (points + size / 2) % size - size / 2
     nearest = offset[np.argmin(np.linalg.norm(offset, axis=1))]
     to_corner = min(graded_size.PASSAGE_EDGE * float(np.linalg.norm(nearest)), largest)
-    sources = [
-        (points, caps, np.full(len(points), graded_size.MAX_GROWTH)),
-        _between(ellipses[np.sort(np.unique(disc, return_index=True)[1])], size, largest),
-        *_beside_sides(ellipses, size, largest),
+    # Between fibres.
+    outer = ellipses[np.diff(disc, prepend=-1) != 0]
+    first, second, vector = arrangements.neighbours(outer.centres, size, 2 * outer.longest.max() + largest)
+    one, other = outer[first], outer[second].at(outer.centres[first] + vector)
+    gap, direction = gaps(one, other)
+    normal = directions(direction)
+    curvature, faces = 1 / one.bend(normal) + 1 / other.bend(-normal), (one.facing(normal), other.facing(-normal))
+    sources = [(points, caps, np.full(len(points), graded_size.MAX_GROWTH))]
+    sources += graded_size.passages(gap, curvature, faces, (largest, largest))
+    # Between ellipses and sides.
+    for axis in graded_size.AXES:
+        normal = np.tile(axis, (len(ellipses), 1))
+        extreme = ellipses.facing(normal)
+        foot = np.where(normal == 0, extreme, np.round(extreme / size) * size)
+        width = np.abs(extreme - foot).max(axis=1)
+        sources += graded_size.passages(width, 1 / ellipses.bend(normal), (extreme, foot), (largest, largest))
+    sources += [
         (crossings, np.minimum(sharp, largest), np.full(len(crossings), graded_size.MAX_GROWTH)),
         (np.stack([nearest, np.zeros(2)]), np.full(2, to_corner), np.full(2, graded_size.MAX_GROWTH)),
         graded_size.at_vertices(vertices, size),
     ]
-    lines = None
-    if sizes.are_graded(arrangement):
-        lines = graded_size.FromLines(size, points, np.arange(len(points)), lengths, sizes.tip, tips)
+    is_graded = sizes.are_graded(arrangement)
+    lines = graded_size.FromLines(size, points, lengths, sizes.tip, tips) if is_graded else None
     return graded_size.SizeField(sources, size, largest, lines)
-
-
-def _between(ellipses: Ellipses, size: Float, largest: float) -> graded_size.Source:
-    """Return the facing points of near fibres as sources of sizes."""
-    first, second, vector = arrangements.neighbours(ellipses.centres, size, 2 * ellipses.longest.max() + largest)
-    one = ellipses[first]
-    other = Ellipses(one.centres + vector, ellipses.frames[second])
-    gap, direction = gaps(one, other)
-    normal = directions(direction)
-    length = graded_size.PASSAGE_EDGE * gap
-    growth = graded_size.passage_growth(gap, 1 / one.bend(normal) + 1 / other.bend(-normal))
-    narrow = length < largest
-    places = np.concatenate([one.facing(normal)[narrow], other.facing(-normal)[narrow]])
-    return places, np.tile(length[narrow], 2), np.tile(growth[narrow], 2)
-
-
-def _beside_sides(ellipses: Ellipses, size: Float, largest: float) -> Iterator[graded_size.Source]:
-    """Yield as sources where ellipses come near a side: extreme points and their feet."""
-    for axis, sign in ((0, -1.0), (0, 1.0), (1, -1.0), (1, 1.0)):
-        normal = np.zeros((len(ellipses), 2))
-        normal[:, axis] = sign
-        extreme = ellipses.facing(normal)
-        foot = extreme.copy()
-        foot[:, axis] = np.round(extreme[:, axis] / size[axis]) * size[axis]
-        width = np.abs(extreme - foot)[:, axis]
-        length = graded_size.PASSAGE_EDGE * width
-        narrow = length < largest
-        growth = graded_size.passage_growth(width, 1 / ellipses.bend(normal))
-        yield from ((places[narrow], length[narrow], growth[narrow]) for places in (extreme, foot))

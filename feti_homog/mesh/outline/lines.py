@@ -54,14 +54,16 @@ class Curves:
         return Curves(node, first, self.circle[some], self.inside[some], self.outside[some])
 
     @classmethod
-    def joined(cls, parts: Sequence[Curves]) -> Curves:
-        """Concatenate curves, part after part."""
-        counts = np.concatenate([np.diff(part.first) for part in parts])
-        return cls(
-            np.concatenate([part.node for part in parts]),
+    def joined(cls, parts: Sequence[tuple[Float, Curves]]) -> tuple[Float, Curves]:
+        """Concatenate curves, part after part, with their points (n, 2), which each part numbers from 0."""
+        begin = np.cumsum([0, *(len(points) for points, _ in parts)])
+        counts = np.concatenate([np.diff(curves.first) for _, curves in parts])
+        curves = cls(
+            np.concatenate([curves.node + k for (_, curves), k in zip(parts, begin, strict=False)]),
             np.concatenate([[0], np.cumsum(counts)]),
-            *(np.concatenate([getattr(part, name) for part in parts]) for name in ("circle", "inside", "outside")),
+            *(np.concatenate([getattr(curves, x) for _, curves in parts]) for x in ("circle", "inside", "outside")),
         )
+        return np.concatenate([points for points, _ in parts]), curves
 
 
 class Lines:
@@ -96,7 +98,7 @@ class Arcs(Lines):
 
     Attributes:
         circles: (a, 3) centre and radius.
-        start, span: (a,) angle in radians at which each begins, and how far it turns.
+        start, span: (a,) first angle of each arc, and the angle that the arc spans, in radians.
     """
 
     circles: Float
@@ -119,7 +121,7 @@ class Segments(Lines):
     """Straight lines.
 
     Attributes:
-        begin, way: (s, 2) where each begins, and where it goes from there.
+        begin, way: (s, 2) first ends, and vectors from these to the second ends.
     """
 
     begin: Float
@@ -151,7 +153,7 @@ class Sampling:
     most_nodes: int
 
 
-# Of a cell that one rank meshes in minutes, and of one that all ranks mesh: there an arc is a few edges long.
+# For cells that one rank meshes in minutes, and for cells that all ranks mesh, whose arcs are a few edges long.
 WHOLE, IN_TILES = Sampling(65, 513, 17, 120_000), Sampling(17, 129, 17, 3_000_000)
 
 
@@ -160,7 +162,7 @@ class Stations:
     """Nodes on c lines.
 
     Attributes:
-        share: (n,) part of the line's length, from 0 to 1.
+        share: (n,) fraction of the line's length, from 0 to 1.
         first: (c + 1,) line k has the nodes from first[k] up to first[k + 1].
         edges: int ds / h over all lines.
     """
@@ -195,8 +197,8 @@ def _refuse_many(edges: float, limit: int) -> None:
         )
 
 
-def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges: Int, limit: int) -> Stations:
-    """Place nodes equidistant in ds / h, with `least_edges` (c,) edges or more on each line.
+def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges: Int | int, limit: int) -> Stations:
+    """Place nodes equidistant in ds / h, with `least_edges`, () or (c,), edges or more on each line.
 
     The size h is sampled along each line by itself, at `least_samples` equidistant positions, and where it is graded,
     at SAMPLES_OF_AN_EDGE or more for each edge.
@@ -255,7 +257,7 @@ LineStations = tuple[Stations, Stations]
 
 @dataclass(frozen=True)
 class SizedLines:
-    """Lines whose nodes do not depend on other lines, so that ranks may share them."""
+    """Arcs and bridges, whose nodes depend on no other line, so that each rank can place some of them."""
 
     arcs: Lines
     bridges: Lines
@@ -275,17 +277,17 @@ class SizedLines:
         Raises:
             MeshError: there would be more than the sampling allows.
         """
-        sampling, (arcs, bridges) = self.sampling, (np.ones(len(x), np.int64) for x in (self.arcs, self.bridges))
+        sampling = self.sampling
         return (
-            place_nodes(field, self.arcs, sampling.arc, arcs, sampling.most_nodes),
-            place_nodes(field, self.bridges, sampling.bridge, bridges, sampling.most_nodes),
+            place_nodes(field, self.arcs, sampling.arc, 1, sampling.most_nodes),
+            place_nodes(field, self.bridges, sampling.bridge, 1, sampling.most_nodes),
         )
 
     def joined(self, parts: Sequence[LineStations]) -> LineStations:
         """Join the nodes of all parts.
 
         Raises:
-            MeshError: they are more than the sampling allows.
+            MeshError: the sampling allows fewer nodes.
         """
         arcs, bridges = (Stations.joined(stations, self.sampling.most_nodes) for stations in zip(*parts, strict=True))
         return arcs, bridges

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from feti_homog.mesh.outline.lines import MATRIX, Curves
 from feti_homog.microstructure import Arrangement
-from feti_homog.microstructure.shapes import Conics, Discs, Ellipses
+from feti_homog.microstructure.shapes import Conics, Discs, Ellipses, Outlines
 from feti_homog.typing import Bool, Float, Int
 
 TURN = 2 * np.pi
@@ -42,8 +42,8 @@ class Outline:
         points: (n, 2) nodes on all lines, exactly in place.
         curves: through the nodes.
         ellipses: k circles and ellipses in the plane, disc by disc and image by image, each from without.
-        disc: (k,) whose image each circle is.
-        around: (k,) the circle around each; MATRIX if there is none.
+        disc: (k,) disc or ellipse of each image.
+        around: (k,) circle around each circle; MATRIX without one.
     """
 
     points: Float
@@ -58,26 +58,25 @@ class Outline:
         return np.isin(np.arange(len(self.around)), self.around)
 
 
-def images(arrangement: Arrangement) -> tuple[Conics, Int, Int]:
+def images(arrangement: Arrangement) -> tuple[Outlines, Int, Int]:
     """Find the outlines (k,) in the cell, their fibres (k,), and the outlines around (k,).
 
     Periodic images are listed separately, fibre by fibre and image by image, each from without.
     """
     size, outlines, outer = arrangement.size, arrangement.outlines, arrangement.outer
-    steps = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)])
+    steps = np.array(list(np.ndindex(3, 3))) - 1
     fibre = np.repeat(arrangement.order, len(steps))
     centres = outlines.centres[fibre] + np.tile(steps, (len(outlines), 1)) * size
-    outside = np.abs(centres - np.clip(centres, 0, size))
-    if isinstance(outlines, Discs):
-        inside = (outside**2).sum(axis=1) < (outer.radii**2)[fibre]
+    if isinstance(outer, Discs):
+        inside = ((centres - np.clip(centres, 0, size)) ** 2).sum(axis=1) < (outer.radii**2)[fibre]
     else:
-        inside = np.all(outside < outer.extents.max(axis=2)[fibre], axis=1)
+        low, high = centres - outer.extents[fibre, :, 0], centres + outer.extents[fibre, :, 1]
+        inside = np.all((high > 0) & (low < size), axis=1)
     fibre, centres = fibre[inside], centres[inside]
     coated = arrangement.coated[fibre]
     place = np.arange(len(fibre)) + np.cumsum(coated) - coated
     order = np.argsort(np.concatenate([place, place[coated] + 1]))
     curves = outer[fibre].at(centres).joined(outlines[fibre[coated]].at(centres[coated]))[order]
-    assert isinstance(curves, Conics)
     around = np.concatenate([np.full(len(fibre), MATRIX), place[coated]])[order]
     return curves, np.concatenate([fibre, fibre[coated]])[order], around
 

@@ -22,6 +22,8 @@ SIZES: dict[str, tuple[int, ...]] = {
     r"(CPE|CPS|CPEG|DC2D|M3D|S|STRI|R3D)3[A-Z]*": (3,),
     r"(CPE|CPS|CPEG|DC2D|M3D|S|STRI|R3D)65?[A-Z]*": (6,),
 }
+# Real numbers; Fortran writes 1.0D+00.
+REAL = r"(?i)[+-]?(([0-9]+(\.[0-9]*)?|\.[0-9]+)([ed][+-]?[0-9]+)?|nan|inf|infinity)"
 # Members that sets may have together, in any file; in one with more characters as many as these.
 MOST_MEMBERS = 10**6
 # From which of its sets an element has its phase: those before come first.
@@ -45,8 +47,6 @@ def load(path: Path) -> RawMesh:
             content.take(block)
         except ValueError as error:
             raise MeshError(f"line {block.number}, *{block.word}: {error}") from None
-    if faults := content.faults():
-        raise MeshError(*faults)
     return content.raw_mesh()
 
 
@@ -70,9 +70,9 @@ class _Content:
     is_assembly: bool = False
 
     def take(self, block: KeywordBlock) -> None:
-        """Read one block."""
+        """Read one block; ValueError where it is refused or faulty."""
         if block.keyword in REFUSED:
-            raise ValueError("it makes or moves nodes or elements, and is not read: write them out")
+            raise ValueError(REFUSED[block.keyword])
         match block.keyword:
             case "PART" | "INSTANCE" | "END INSTANCE" | "ASSEMBLY" | "END ASSEMBLY" as keyword:
                 if keyword in self.seen:
@@ -82,12 +82,14 @@ class _Content:
                 self.is_assembly = keyword in ("ASSEMBLY", "END INSTANCE")
                 if keyword == "INSTANCE" and len(block.rows) > 1:
                     raise ValueError("its rotation is not read: rotate the part")
-            case "INCLUDE":
-                raise ValueError("other files are not read: expected all in one file")
             case "NODE" if not self.is_assembly:
-                self._take_nodes(block)
-            case "ELEMENT" if self.is_assembly:
-                raise ValueError("elements of the assembly are not read: expected all in the part")
+                if block.parameters.get("SYSTEM", "r") != "r":
+                    raise ValueError("its parameter SYSTEM is not read: expected Cartesian coordinates")
+                for tag, *place in block.rows:
+                    number, words = _integer(tag), [_checked(word, REAL, "a number") for word in place[:3]]
+                    if not place or number in self.nodes:
+                        raise ValueError(f"node {number} {'is there twice' if place else 'has no coordinates'}")
+                    self.nodes[number] = [*(float(word.upper().replace("D", "E")) for word in words), 0.0, 0.0][:3]
             case "ELEMENT":
                 self._take_elements(block)
             case "ELSET" if "INSTANCE" not in block.parameters:
@@ -96,19 +98,10 @@ class _Content:
                 name = block.parameter("ELSET")
                 self.materials[name] = block.parameters.get("MATERIAL", name)
 
-    def _take_nodes(self, block: KeywordBlock) -> None:
-        if block.parameters.get("SYSTEM", "r") != "r":
-            raise ValueError("its parameter SYSTEM is not read: expected Cartesian coordinates")
-        for tag, *place in block.rows:
-            number = _integer(tag)
-            if not place:
-                raise ValueError(f"node {number} has no coordinates")
-            if number in self.nodes:
-                raise ValueError(f"node {number} is there twice")
-            self.nodes[number] = [*map(_real, place[:3]), 0.0, 0.0][:3]
-
     def _take_elements(self, block: KeywordBlock) -> None:
         """Read elements and check their node counts against their type."""
+        if self.is_assembly:
+            raise ValueError("elements of the assembly are not read: expected all in the part")
         kind = block.parameters.get("TYPE", "").upper()
         counts = next((sizes for pattern, sizes in SIZES.items() if re.fullmatch(pattern, kind)), ())
         if not counts:
@@ -150,18 +143,21 @@ class _Content:
             raise ValueError(f'there is no element set "{name}"')
         return set().union(*levels)
 
-    def faults(self) -> list[str]:
-        """List missing triangles, unknown nodes and sections with unknown sets."""
+    def raw_mesh(self) -> RawMesh:
+        """Group the triangles by the names of their sets, and add the line sets.
+
+        Raises:
+            MeshError: there are no triangles, or nodes of elements or sets of sections are missing.
+        """
         faults = [] if self.triangles else ["no triangles in it"]
         elements = self.triangles | self.lines
         lost = ((tag, node) for tag, nodes in elements.items() for node in nodes if node not in self.nodes)
         faults += [f"element {tag}: there is no node {node}" for tag, node in islice(lost, 1)]
-        named = {name for _, name in self.sets}
-        unknown = (name for name in self.materials if name not in named)
-        return faults + [f'a section names the element set "{name}": there is none' for name in unknown]
-
-    def raw_mesh(self) -> RawMesh:
-        """Group the triangles by the names of their sets, and add the line sets."""
+        known = {name for _, name in self.sets}
+        unknown = [name for name in self.materials if name not in known]
+        faults += [f'a section names the element set "{name}": there is none' for name in unknown]
+        if faults:
+            raise MeshError(*faults)
         made_of = [(material, self.members(name)) for name, material in self.materials.items()]
         # Sets that sections name have the phases, unless only the materials of the sections have their names.
         by_material = "matrix" in self.materials.values() and "matrix" not in self.materials
@@ -202,16 +198,11 @@ def _names_of(sets: Iterable[tuple[str, set[int]]]) -> dict[int, tuple[str, ...]
 
 def _integer(word: str) -> int:
     """Convert a word into a whole number; ValueError for other words."""
-    if not re.fullmatch(r"[+-]?[0-9]{1,15}", word):
-        raise ValueError(f"{wording.toml_value(word)}: expected a whole number of at most 15 digits")
-    return int(word)
+    return int(_checked(word, "[+-]?[0-9]{1,15}", "a whole number of at most 15 digits"))
 
 
-def _real(word: str) -> float:
-    """Convert a word into a real number; ValueError for other words."""
-    try:
-        if "_" not in word and word.isascii():
-            return float(word.upper().replace("D", "E"))  # 1.0D+00 is Fortran's
-    except ValueError:
-        pass
-    raise ValueError(f"{wording.toml_value(word)}: expected a number")
+def _checked(word: str, pattern: str, expected: str) -> str:
+    """Return a word that has a pattern; ValueError for other words."""
+    if not re.fullmatch(pattern, word):
+        raise ValueError(f"{wording.toml_value(word)}: expected {expected}")
+    return word

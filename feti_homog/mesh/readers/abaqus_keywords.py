@@ -15,14 +15,16 @@ READ: dict[str, tuple[str, ...] | None] = {
     "ELEMENT": ("TYPE", "ELSET"),
     "ELSET": ("ELSET", "GENERATE", "INTERNAL", "INSTANCE", "UNSORTED"),
     **dict.fromkeys(("SOLID SECTION", "SHELL SECTION", "MEMBRANE SECTION")),
-    **dict.fromkeys(("PART", "END PART", "INSTANCE", "END INSTANCE", "ASSEMBLY", "END ASSEMBLY", "INCLUDE")),
+    **dict.fromkeys(("PART", "END PART", "INSTANCE", "END INSTANCE", "ASSEMBLY", "END ASSEMBLY")),
 }
 OF_SECTIONS = ("ELSET", "MATERIAL")
-# Keywords that make or move nodes and elements.
-REFUSED = (
+# Keywords that make or move nodes and elements, and why they are refused.
+GENERATORS = (
     *("SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "IMPERFECTION", "IMPORT", "PARAMETER"),
     *("SYMMETRIC MODEL GENERATION", "SUBSTRUCTURE GENERATE", "USER ELEMENT", "REFINE MESH", "MODEL CHANGE"),
 )
+REFUSED = dict.fromkeys(GENERATORS, "it makes or moves nodes or elements, and is not read: write them out")
+REFUSED["INCLUDE"] = "other files are not read: expected all in one file"
 WHOLE = {name.replace(" ", ""): name for name in (*READ, *REFUSED)}
 # How keywords without nodes and elements begin, without blanks.
 BEGINNINGS = """

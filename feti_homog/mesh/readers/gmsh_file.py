@@ -10,7 +10,6 @@ import codecs
 import io
 import re
 from collections import defaultdict
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -25,9 +24,10 @@ from feti_homog.schema import wording
 from feti_homog.system.runtime import input_files
 from feti_homog.typing import Float, Int
 
-# Types of points, lines and triangles, which quadrilaterals are cut into.
-POINT, LINES, TRIANGLES = 15, (1, 8), (2, 9, 3, 10, 16)
-VERSIONS = (2.0, 2.1, 2.2, 4.0, 4.1)
+# Names that gmsh gives to lines, and to triangles and what is cut into triangles.
+LINES = ("Line 2", "Line 3")
+TRIANGLES = ("Triangle 3", "Triangle 6", "Quadrilateral 4", "Quadrilateral 9", "Quadrilateral 8")
+VERSION = re.compile(rb"2(\.[0-2]?0*)?|4(\.[01]?0*)?")
 # Sections that gmsh is given, and others without nodes or elements.
 GIVEN = ("MeshFormat", "Entities", "PartitionedEntities", "Nodes", "ParametricNodes", "Elements")
 OTHERS = {"Comments", "Periodic", "GhostElements", "Parametrizations", "NodeData", "ElementData", "ElementNodeData"}
@@ -47,37 +47,35 @@ class MshContent:
 
     Attributes:
         tags, points: (n,) and (n, 3) numbers and positions of the nodes.
-        elements: by gmsh's types, entity by entity.
+        elements: by gmsh's names of their types, entity by entity.
         groups: physical groups of each entity (dimension, number).
         names: names of physical groups (dimension, number) that have one.
-        kinds: names of the types.
     """
 
     tags: Int
     points: Float
-    elements: dict[int, Elements]
+    elements: dict[str, Elements]
     groups: dict[tuple[int, int], tuple[int, ...]]
     names: dict[tuple[int, int], str] = field(default_factory=dict)
-    kinds: dict[int, str] = field(default_factory=dict)
 
     @classmethod
     def of(cls, gmsh: ModuleType) -> MshContent:
         """Copy the mesh of gmsh's current model."""
         model = gmsh.model
         tags, points, _ = model.mesh.getNodes()
-        groups, blocks = {}, defaultdict[int, list[Elements]](list)
+        groups, blocks = {}, defaultdict[str, list[Elements]](list)
         for dimension, entity in model.getEntities():
             physical = np.abs(model.getPhysicalGroupsForEntity(dimension, entity))  # negative where turned
             groups[dimension, entity] = tuple(physical.tolist())
             for kind, numbers, nodes in zip(*model.mesh.getElements(dimension, entity), strict=True):
                 rows = nodes.astype(np.int64).reshape(len(numbers), -1)
-                blocks[int(kind)].append((numbers.astype(np.int64), rows, np.full(len(numbers), entity)))
+                name = model.mesh.getElementProperties(kind)[0]
+                blocks[name].append((numbers.astype(np.int64), rows, np.full(len(numbers), entity)))
         elements = {
             kind: tuple(np.concatenate(parts) for parts in zip(*rows, strict=True)) for kind, rows in blocks.items()
         }
         names = {group: model.getPhysicalName(*group) for group in model.getPhysicalGroups()}
-        kinds = {kind: model.mesh.getElementProperties(kind)[0] for kind in elements}
-        return cls(tags.astype(np.int64), points.reshape(-1, 3), elements, groups, names, kinds)
+        return cls(tags.astype(np.int64), points.reshape(-1, 3), elements, groups, names)
 
     def name(self, dimension: int, group: int) -> str:
         """Return the name of a physical group, or its number."""
@@ -93,7 +91,27 @@ def load(path: Path) -> RawMesh:
     """
     data = input_files.read(path)
     sections = _sections(data.removeprefix(codecs.BOM_UTF8))
-    count = _announced(sections)
+    version, *form = sections["MeshFormat"].split()[:3] or [b""]
+    if not VERSION.fullmatch(version):
+        word = wording.toml_value(version.decode(errors="replace"))
+        raise MeshError(f"format {word} of gmsh: expected 2.2, 4.0 or 4.1")
+    if form not in ([b"0", b"8"], [b"1", b"8"]):
+        raise MeshError("$MeshFormat: expected 0 8 behind the version of text and 1 8 of binary files")
+    text, has_blocks, is_binary = sections.get("Elements", b""), version[:1] == b"4", form[0] == b"1"
+    if "Elements" not in sections:
+        count = 0
+    elif is_binary and has_blocks:
+        order = ">" if b"\n\0\0\0\1" in sections["MeshFormat"] else "<"
+        count = int(np.frombuffer(text[1:17].ljust(16, b"\0"), f"{order}u8")[1])
+    else:
+        head = re.match(rb"\s*(\d{1,15})\s+(\d{1,15})" if has_blocks else rb"\s*(\d{1,15})(?=\s)", text + b"\n")
+        if head is None:
+            raise MeshError("$Elements: expected the number of elements at its beginning")
+        *_, count = counts = [*map(int, head.groups())]
+        expected = 1 + sum(counts)
+        if not is_binary and (lines := sum(not line.isspace() for line in io.BytesIO(text))) != expected:
+            # gmsh would skip some of them.
+            raise MeshError(f"$Elements: {lines} lines, and its counts announce {expected}, one for each element")
     with TemporaryDirectory() as folder:
         copy = Path(folder, "mesh.msh")
         copy.write_bytes(
@@ -116,11 +134,86 @@ def load(path: Path) -> RawMesh:
     return raw_mesh(replace(content, names=names))
 
 
+def _sections(content: bytes) -> dict[str, bytes]:
+    """Split a file into sections: their text behind the first line, by name."""
+    start = content[:4096].lstrip()
+    if start.startswith(b"$NOD"):
+        raise MeshError("format 1 of gmsh: save it in format 2.2 or 4.1")
+    if not start.startswith((b"$MeshFormat", b"$Comments", b"$PhysicalNames")):
+        raise MeshError("not a gmsh mesh file: it does not begin with $MeshFormat")
+    sections, place, end = dict[str, bytes](), 0, len(content.rstrip())
+    while place < end:
+        header = SECTION.match(content, place)
+        name = "" if header is None else header[1].decode(errors="replace")
+        if header is None or name not in {*GIVEN, *OTHERS, "PhysicalNames"}:
+            rest = content[place:end].lstrip()
+            line, text = content.count(b"\n", 0, end - len(rest)) + 1, rest[:80].partition(b"\n")[0]
+            word = wording.toml_value(text.decode(errors="replace").strip())
+            raise MeshError(f"line {line}: {word}: expected a section of a mesh, such as $Nodes, or $Comments")
+        if name in sections:
+            raise MeshError(f"${name}: it is there twice")
+        stop = content.find(b"\n$End%b" % header[1], header.end())
+        if stop < 0:
+            raise MeshError(f"${name}: there is no $End{name}: the file is damaged or broken off")
+        if name not in OTHERS:
+            sections[name] = content[header.end() : stop]
+        place = stop + len(f"\n$End{name}")
+    if "MeshFormat" not in sections:
+        raise MeshError("there is no $MeshFormat")
+    return sections
+
+
+def _read_by_gmsh(path: Path) -> MshContent:
+    # Wrong extreme numbers in the head of a section do no harm; "Error loading" says no more than the last one.
+    passed = ("Info", "Progress", "Warning: Min/Max", "Error: Error loading")
+    with gmsh_session() as gmsh:
+        gmsh.option.setNumber("Mesh.PartitionCreateTopology", 0)  # which adds elements between partitions
+        for only_groups in (False, True):
+            gmsh.clear()
+            gmsh.option.setNumber("Mesh.SwitchElementTags", only_groups)
+            gmsh.logger.start()
+            try:
+                gmsh.merge(str(path))
+                refusals = []
+            except Exception:  # gmsh raises nothing more special
+                refusals = ["Error: the file is damaged"]
+            if faults := [line for line in gmsh.logger.get() if not line.startswith(passed)] + refusals:
+                raise MeshError(f"gmsh cannot read it: {faults[0].partition(': ')[2]}")
+            gmsh.logger.stop()
+            content = MshContent.of(gmsh)
+            if all(entity or not dimension for dimension, entity in content.groups):
+                break
+    if not only_groups:
+        return content
+    # Other programs write physical groups alone: each stands for an entity.
+    return replace(content, groups={key: (key[1],) if key[1] else () for key in content.groups})
+
+
 def raw_mesh(content: MshContent) -> RawMesh:
-    """Convert content into triangles and curves; MeshError if it has other elements."""
-    if faults := _faults(content):
+    """Convert content into triangles and curves.
+
+    Raises:
+        MeshError: numbers are there twice, or elements are not of LINES and TRIANGLES.
+    """
+    elements, none, faults = content.elements, np.zeros((0, 2), np.int64), list[str]()
+    tags = np.concatenate([none[:, 0], *(numbers for numbers, *_ in elements.values())])
+    for name, ordered in (("node", np.sort(content.tags)), ("element", np.sort(tags))):
+        twice = np.unique(ordered[1:][ordered[1:] == ordered[:-1]])
+        if len(twice):
+            faults.append(f"{name} {first_of(map(str, twice), len(twice))}: the number is there twice")
+    kinds = elements.keys() - {"Point", *LINES}
+    if not faults and not kinds:
+        faults.append("no triangles in it: mesh the surfaces and put them in physical surfaces before saving")
+    for kind in [] if faults else [kind for kind in elements if kind in kinds - {*TRIANGLES}]:
+        numbers, nodes, _ = elements[kind]
+        centre = content.points[np.isin(content.tags, nodes[0])].mean(axis=0)
+        faults.append(
+            f"element {numbers[0]} at {at(centre)}, the first of {len(numbers)}, is a {kind}: only "
+            "triangles of three or six nodes, quadrilaterals of four, eight or nine and lines of two or three can be "
+            "used (mesh the surfaces only, with Mesh.ElementOrder = 1 or 2)"
+        )
+    if faults:
         raise MeshError(*faults)
-    elements, none = content.elements, np.zeros((0, 2), np.int64)
     lines = [elements[kind] for kind in LINES if kind in elements]
     named = {name for (dimension, _), name in content.names.items() if dimension == 1}
     curves = dict.fromkeys(named & {DEBONDED}, none)  # refused below if it has no lines
@@ -139,108 +232,3 @@ def raw_mesh(content: MshContent) -> RawMesh:
     names = [tuple(content.name(2, number) for number in group) for group in groups]
     aliases = [tuple(map("number {}".format, group)) for group in groups]
     return assembled(content.tags, content.points, blocks, names, curves, aliases=aliases)
-
-
-def _sections(content: bytes) -> dict[str, bytes]:
-    """Split a file into sections: their text behind the first line, by name."""
-    start = content[:4096].lstrip()
-    if start.startswith(b"$NOD"):
-        raise MeshError("format 1 of gmsh: save it in format 2.2 or 4.1")
-    if not start.startswith((b"$MeshFormat", b"$Comments", b"$PhysicalNames")):
-        raise MeshError("not a gmsh mesh file: it does not begin with $MeshFormat")
-    sections, place, end = dict[str, bytes](), 0, len(content.rstrip())
-    while place < end:
-        header = SECTION.match(content, place)
-        name = "" if header is None else header[1].decode(errors="replace")
-        if header is None or name not in {*GIVEN, *OTHERS, "PhysicalNames"}:
-            place += len(content[place:end]) - len(content[place:end].lstrip())
-            line, text = content.count(b"\n", 0, place) + 1, content[place : place + 80].partition(b"\n")[0]
-            word = wording.toml_value(text.decode(errors="replace").strip())
-            raise MeshError(f"line {line}: {word}: expected a section of a mesh, such as $Nodes, or $Comments")
-        if name in sections:
-            raise MeshError(f"${name}: it is there twice")
-        stop = content.find(b"\n$End%b" % header[1], header.end())
-        if stop < 0:
-            raise MeshError(f"${name}: there is no $End{name}: the file is damaged or broken off")
-        if name not in OTHERS:
-            sections[name] = content[header.end() : stop]
-        place = stop + len(f"\n$End{name}")
-    if "MeshFormat" not in sections:
-        raise MeshError("there is no $MeshFormat")
-    return sections
-
-
-def _announced(sections: Mapping[str, bytes]) -> int:
-    """Return the announced number of elements, and check the lines, of which gmsh would skip some."""
-    head = sections["MeshFormat"]
-    version, *rest = head.split()[:3]
-    number = float(version) if re.fullmatch(rb"[0-9]\.?[0-9]{0,9}", version) else 0.0
-    if number not in VERSIONS:
-        raise MeshError(
-            f"format {wording.toml_value(version.decode(errors='replace'))} of gmsh: expected 2.2, 4.0 or 4.1"
-        )
-    if rest not in ([b"0", b"8"], [b"1", b"8"]):
-        raise MeshError("$MeshFormat: expected 0 8 behind the version of text and 1 8 of binary files")
-    if "Elements" not in sections:
-        return 0
-    text, has_blocks, is_binary = sections["Elements"], number >= 4, rest[0] == b"1"
-    if is_binary and has_blocks:
-        order = ">" if b"\n\0\0\0\1" in head else "<"
-        return int(np.frombuffer(text[1:17].ljust(16, b"\0"), f"{order}u8")[1])
-    counts = re.match(rb"\s*(\d{1,15})\s+(\d{1,15})" if has_blocks else rb"\s*(\d{1,15})(?=\s)", text + b"\n")
-    if counts is None:
-        raise MeshError("$Elements: expected the number of elements at its beginning")
-    expected = 1 + sum(map(int, counts.groups()))
-    lines = expected if is_binary else sum(not line.isspace() for line in io.BytesIO(text))
-    if lines != expected:
-        raise MeshError(f"$Elements: {lines} lines, and its counts announce {expected}, one for each element")
-    return int(counts.groups()[-1])
-
-
-def _read_by_gmsh(path: Path) -> MshContent:
-    with gmsh_session() as gmsh:
-        content = _merged(gmsh, path)
-        if not any(dimension and entity == 0 for dimension, entity in content.groups):
-            return content
-        # Other programs write physical groups alone: each stands for an entity.
-        gmsh.clear()
-        gmsh.option.setNumber("Mesh.SwitchElementTags", 1)
-        content = _merged(gmsh, path)
-        return replace(content, groups={key: (key[1],) if key[1] else () for key in content.groups})
-
-
-def _merged(gmsh: ModuleType, path: Path) -> MshContent:
-    gmsh.logger.start()
-    gmsh.option.setNumber("Mesh.PartitionCreateTopology", 0)  # which adds elements between partitions
-    try:
-        gmsh.merge(str(path))
-        refusals = []
-    except Exception:  # gmsh raises nothing more special
-        refusals = ["Error: the file is damaged"]
-    # Wrong extreme numbers in the head of a section do no harm; "Error loading" says no more than the last one.
-    passed = ("Info", "Progress", "Warning: Min/Max", "Error: Error loading")
-    if faults := [line for line in gmsh.logger.get() if not line.startswith(passed)] + refusals:
-        raise MeshError(f"gmsh cannot read it: {faults[0].partition(': ')[2]}")
-    gmsh.logger.stop()
-    return MshContent.of(gmsh)
-
-
-def _faults(content: MshContent) -> list[str]:
-    """List repeated numbers; if there are none, unusable elements and missing triangles."""
-    numbers, faults = np.concatenate([np.zeros(0, np.int64), *(tags for tags, *_ in content.elements.values())]), []
-    for name, ordered in (("node", np.sort(content.tags)), ("element", np.sort(numbers))):
-        twice = np.unique(ordered[1:][ordered[1:] == ordered[:-1]])
-        if len(twice):
-            faults.append(f"{name} {first_of(map(str, twice), len(twice))}: the number is there twice")
-    kinds = {*content.elements} - {POINT, *LINES}
-    for kind in [] if faults else sorted(kinds - {*TRIANGLES}):
-        numbers, nodes, _ = content.elements[kind]
-        centre = content.points[np.isin(content.tags, nodes[0])].mean(axis=0)
-        faults.append(
-            f"element {numbers[0]} at {at(centre)}, the first of {len(numbers)}, is a {content.kinds[kind]}: only "
-            "triangles of three or six nodes, quadrilaterals of four, eight or nine and lines of two or three can be "
-            "used (mesh the surfaces only, with Mesh.ElementOrder = 1 or 2)"
-        )
-    if not kinds and not faults:
-        faults.append("no triangles in it: mesh the surfaces and put them in physical surfaces before saving")
-    return faults

@@ -1,7 +1,8 @@
 """Curves along users' interfaces: circles and ellipses, closed on the torus, and arcs through middle nodes."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import reduce
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -15,16 +16,14 @@ from feti_homog.typing import Float, Int, Int32
 
 # Largest distance of a node from its circle, relative to the radius: files may round coordinates to seven digits.
 ROUNDNESS_TOLERANCE = 1e-6
-# A circle has at least so many edges, none longer than the radius: other regular polygons are meant as such.
+# A circle has at least so many edges or, with middle nodes on it, halves of edges: other regular polygons are meant as
+# such.
 MIN_CIRCLE_EDGES = 8
-# With middle nodes on the circle the same of halves of edges.
-MIN_BENT_EDGES, LONGEST_BENT_EDGE = 4, 1.5
-# More edges than a circle: an ellipse has more freedom to go through the corners of a polygon.
+# An ellipse has more freedom to go through the corners of a polygon.
 MIN_ELLIPSE_EDGES = MIN_CIRCLE_EDGES + 2
-# As the longest edges of circles: bent more, elements beside the tips of thin ellipses could turn over.
-MOST_BENT = 0.14
-# Ratio of semi-axes below which a conic may be a parabola but for rounding.
-THINNEST = 1e-4
+# Rise / length of an edge on a circle that is as long as the radius.  If edges were bent more, elements beside the tips
+# of thin ellipses could turn over.
+MOST_BENT = 1 - np.sqrt(3) / 2
 # Distance of a middle node from its edge / length of the edge up to which the edge is straight.
 STRAIGHT = 1e-5
 
@@ -34,28 +33,21 @@ def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
 
     A closed interface between two phases is a circle if all its nodes are within ROUNDNESS_TOLERANCE radii of one,
     there are at least MIN_CIRCLE_EDGES edges, none on a side of the cell or longer than the radius, and no corner of
-    the cell is on it. Where its edges have middle nodes these must lie on it too, and MIN_BENT_EDGES edges are enough.
-    Others stay polygons.
+    the cell is on it. Middle nodes, where there are any, cut edges in two. Others stay polygons.
     """
-    pairs, has_middles = interface_edges(mesh), len(middles.tags) > 0
-    fewest, longest = (MIN_BENT_EDGES, LONGEST_BENT_EDGE) if has_middles else (MIN_CIRCLE_EDGES, 1.0)
-    bends = middles.between(pairs)
-    points, circles, arcs = mesh.points.copy(), [], []
-    for classes, places, loop in _closed_loops(mesh, pairs, fewest):
-        circle = _fit_circle(places, longest)
-        moved = None if circle is None else _moved(mesh.points[classes], places, circle, mesh.period)
+    pairs = interface_edges(mesh)
+    points, circles, arcs = mesh.points.copy(), list[Ellipses](), list[Int32]()
+    for classes, places, chain, loop in _closed_loops(mesh, pairs, middles, MIN_CIRCLE_EDGES):
+        circle = fit_ellipse(chain, is_round=True)
+        moved = None if circle is None else _moved(mesh.points[classes], places, circle.circles[0], mesh.period)
         if circle is None or moved is None:
             continue
-        images = [(np.append(circle[:2] - step, circle[2]), edges) for step, edges in loop]
-        away = [np.hypot(*(bends[edges] - image[:2]).T) / image[2] - 1 for image, edges in images]
-        if has_middles and not np.all(np.abs(np.concatenate(away)) <= ROUNDNESS_TOLERANCE):
-            continue
         points[classes] = moved
-        circles += [image for image, _ in images]
-        arcs += [pairs[edges] for _, edges in images]
+        circles += [circle.at(circle.centres - step) for step, _ in loop]
+        arcs += [pairs[edges] for _, edges in loop]
     # Copies follow their representatives; those on high sides stay there.
     mesh = replace(mesh, points=np.where(mesh.points == mesh.period, mesh.period, points[mesh.representative]))
-    mesh = _with_arcs(mesh, Ellipses.round(np.array(circles).reshape(-1, 3)), arcs)
+    mesh = _with_arcs(mesh, circles, arcs)
     # Edges are flipped where a triangle has two on one circle; if this fails, the circle stays a polygon.
     nodes = len(mesh.points)
     triangles = flip_double_arcs(mesh.triangles, mesh.phase, mesh.arc_edges, mesh.arc_circle, nodes)
@@ -77,24 +69,23 @@ def with_ellipses(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
 
     A closed interface between two phases is an ellipse if all its nodes are within ROUNDNESS_TOLERANCE of one, and it
     has at least MIN_ELLIPSE_EDGES edges, none on a side of the cell, none that spans more than one radian of its
-    parameter or that the ellipse leaves by more than MOST_BENT of its length. Where its edges have middle nodes these
-    must lie on it too. Others stay as they are. Edges are flipped where a triangle has two on one ellipse.
+    parameter or that the ellipse leaves by more than MOST_BENT of its length. Middle nodes, where there are any, cut
+    edges in two. Others stay as they are. Edges are flipped where a triangle has two on one ellipse.
     """
     pairs, nodes = interface_edges(mesh), len(mesh.points)
     pairs = pairs[~np.isin(edge_keys(pairs, nodes), edge_keys(mesh.arc_edges, nodes))]
-    bends, ellipses, arcs = middles.between(pairs), list[Ellipses](), list[Int32]()
-    for _, places, loop in _closed_loops(mesh, pairs, MIN_ELLIPSE_EDGES):
-        ellipse = fit_ellipse(places)
+    ellipses, arcs = list[Ellipses](), list[Int32]()
+    for _, places, chain, loop in _closed_loops(mesh, pairs, middles, MIN_ELLIPSE_EDGES):
+        ellipse, onward = fit_ellipse(chain), np.roll(places, -1, axis=0)
         if ellipse is None:
             continue
-        images = [(ellipse.at(ellipse.centres - step), edges) for step, edges in loop]
-        if all(_follow(image, mesh.points[pairs[edges]], bends[edges]) for image, edges in images):
-            ellipses += [image for image, _ in images]
-            arcs += [pairs[edges] for _, edges in images]
-    if not arcs:
-        return mesh
-    frames = np.concatenate([curve.frames for curve in ellipses])
-    added = _with_arcs(mesh, Ellipses(np.concatenate([curve.centres for curve in ellipses]), frames), arcs)
+        # The ray to m, the middle of an edge, leaves the ellipse at m / |F^-1 m|.
+        m = (places + onward) / 2 - ellipse.centres
+        rise = np.hypot(*m.T) * (1 / np.hypot(*np.linalg.solve(ellipse.frames[0], m.T)) - 1)
+        if np.all(rise <= MOST_BENT * np.hypot(*(onward - places).T)):
+            ellipses += [ellipse.at(ellipse.centres - step) for step, _ in loop]
+            arcs += [pairs[edges] for _, edges in loop]
+    added = _with_arcs(mesh, ellipses, arcs)
     ends, number = (curve[len(mesh.arc_edges) :] for curve in (added.arc_edges, added.arc_circle))
     return replace(added, triangles=flip_double_arcs(mesh.triangles, mesh.phase, ends, number, nodes))
 
@@ -122,30 +113,32 @@ def with_bent_edges(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     ends = mesh.representative[arcs].T
     curves = np.asarray(components(nodes, *ends)[ends[0]], np.int32)
     triangles = flip_double_arcs(mesh.triangles, mesh.phase, arcs, curves, nodes)
-    return _with_arcs(replace(mesh, triangles=triangles), Ellipses.round(circles), list(arcs[:, None]))
+    return _with_arcs(replace(mesh, triangles=triangles), [Ellipses.round(circles)], [*arcs[:, None]])
 
 
-def _with_arcs(mesh: CoarseMesh, ellipses: Ellipses, arcs: list[Int32]) -> CoarseMesh:
+def _with_arcs(mesh: CoarseMesh, curves: Sequence[Ellipses], arcs: Sequence[Int32]) -> CoarseMesh:
     """Add ellipses, and the edges (a, 2) on each, to the mesh."""
     number = np.repeat(np.arange(len(arcs)), np.array([len(pairs) for pairs in arcs], np.intp))
     return replace(
         mesh,
-        ellipses=mesh.ellipses.joined(ellipses),
+        ellipses=reduce(Ellipses.joined, curves, mesh.ellipses),
         arc_edges=np.concatenate([mesh.arc_edges, *arcs]),
         arc_circle=np.concatenate([mesh.arc_circle, len(mesh.ellipses) + number]).astype(np.int32),
     )
 
 
-def _closed_loops(mesh: CoarseMesh, pairs: Int32, fewest: int) -> Iterator[tuple[Int, Float, list[tuple[Float, Int]]]]:
-    """Yield closed interfaces with `fewest` edges or more, none on a cell side, that are contractible on the torus.
+def _closed_loops(
+    mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes, fewest: int
+) -> Iterator[tuple[Int, Float, Float, list[tuple[Float, Int]]]]:
+    """Yield closed interfaces of `fewest` edges or halves, none on a cell side, that are contractible on the torus.
 
     Yields:
-        Node classes (k,) in order, their unwrapped positions (k, 2), and the distance (2,) from each image in the
-        plane with the numbers of the interface edges there.
+        Node classes (k,) in order, their unwrapped positions (k, 2), these with those of middle nodes between them, and
+        the distance (2,) from each image in the plane with the numbers of the interface edges there.
     """
     if len(pairs) == 0:
         return
-    size = mesh.period
+    size, bends = mesh.period, middles.between(pairs)
     classes, ends = np.unique(mesh.representative[pairs], return_inverse=True)
     ends = ends.reshape(-1, 2)
     vector = mesh.points[pairs[:, 1]] - mesh.points[pairs[:, 0]]
@@ -158,37 +151,23 @@ def _closed_loops(mesh: CoarseMesh, pairs: Int32, fewest: int) -> Iterator[tuple
     on_side = np.any(np.all(mesh.points[pairs] == 0, axis=1) | np.all(mesh.points[pairs] == size, axis=1), axis=1)
     branching |= np.bincount(part[ends[:, 0]], on_side, len(branching)) > 0
     _, first, number = np.unique(part, return_index=True, return_counts=True)
-    for start in first[~branching & (number >= fewest)].tolist():
+    for start in first[~branching & (2 * number >= fewest)].tolist():
         order, _ = depth_first_order(graph, start, directed=False)
         hops = np.stack([np.asarray(step[order, np.roll(order, -1)]).ravel() for step in steps], axis=1)
         if np.all(np.abs(hops.sum(axis=0)) < size / 2):
             places = mesh.points[classes[order[0]]] + np.cumsum(hops, axis=0) - hops
             members = np.flatnonzero(part[ends[:, 0]] == part[start])
-            place = np.argsort(order)[np.searchsorted(np.sort(order), ends[members, 0])]
-            away = np.round((places[place] - mesh.points[pairs[members, 0]]) / size)
+            place = np.argsort(order)[np.searchsorted(np.sort(order), ends[members])]
+            away = np.round((places[place[:, 0]] - mesh.points[pairs[members, 0]]) / size)
+            # A middle node is between the places of its edge's ends, behind the last place if these are far apart.
+            between = np.where(np.ptp(place, axis=1) == 1, place.mean(axis=1), len(order))
+            along = np.argsort(np.append(np.arange(len(order)), between), kind="stable")
+            chain = np.concatenate([places, bends[members] + away * size])[along]
+            chain = chain[~np.isnan(chain[:, 0])]
             distinct, which = np.unique(away, axis=0, return_inverse=True)
             images = [(step * size, members[which.ravel() == k]) for k, step in enumerate(distinct)]
-            yield classes[order], places, images
-
-
-def _fit_circle(places: Float, longest: float) -> Float | None:
-    """Fit a circle, centre and radius (3,), to a closed chain of positions (k, 2).
-
-    None if not round, or with edges longer than `longest` radii.
-    """
-    middle = places.mean(axis=0)
-    offset = places - middle
-    scale = np.abs(offset).max()
-    scaled = offset / scale
-    matrix = np.column_stack([2 * scaled, np.ones(len(places))])
-    (x, y, rest), *_ = np.linalg.lstsq(matrix, (scaled**2).sum(axis=1), rcond=None)
-    radius = np.sqrt(max(rest + x * x + y * y, 0.0))
-    spokes = scaled - (x, y)
-    away = np.abs(np.linalg.norm(spokes, axis=1) - radius).max()
-    chord = np.linalg.norm(np.roll(scaled, -1, axis=0) - scaled, axis=1).max()
-    if away > ROUNDNESS_TOLERANCE * radius or chord > longest * radius:
-        return None
-    return np.array([*(middle + scale * np.array([x, y])), scale * radius])
+            if len(chain) >= fewest:
+                yield classes[order], places, chain, images
 
 
 def _moved(points: Float, places: Float, circle: Float, size: Float) -> Float | None:
@@ -211,22 +190,8 @@ def _moved(points: Float, places: Float, circle: Float, size: Float) -> Float | 
     return moved
 
 
-def _follow(ellipse: Ellipses, ends: Float, bends: Float) -> bool:
-    """Return whether edges may follow the single ellipse.
-
-    Their ends are (k, 2, 2) and their middle nodes (k, 2), NaN if there are none.
-    """
-    many, middle = ellipse[np.zeros(len(ends), int)], ends.mean(axis=1)
-    bulge = np.hypot(*(many.points(many.parameter(middle - many.centres)) - middle).T)
-    distance = np.abs(np.hypot(*many.unit(bends - many.centres).T) - 1)
-    return bool(
-        np.all(bulge <= MOST_BENT * np.hypot(*(ends[:, 1] - ends[:, 0]).T))
-        and not np.any(distance > ROUNDNESS_TOLERANCE)
-    )
-
-
-def fit_ellipse(places: Float) -> Ellipses | None:
-    """Fit an ellipse to a closed chain of positions (k, 2) in order.
+def fit_ellipse(places: Float, is_round: bool = False) -> Ellipses | None:
+    """Fit an ellipse, or a circle, to a closed chain of positions (k, 2) in order.
 
     None if they are on none or too far apart.
 
@@ -235,12 +200,12 @@ def fit_ellipse(places: Float) -> Ellipses | None:
     mean = places.mean(axis=0)
     scale = np.abs(places - mean).max()
     x, y = ((places - mean) / scale).T
-    (xx, xy, yy, bx, by), *_ = np.linalg.lstsq(
-        np.column_stack([x * x, x * y, y * y, x, y]), np.ones(len(x)), rcond=None
-    )
+    squares = [x * x + y * y] if is_round else [x * x, x * y, y * y]
+    (*coefficients, bx, by), *_ = np.linalg.lstsq(np.column_stack([*squares, x, y]), np.ones(len(x)), rcond=None)
+    xx, xy, yy = coefficients if not is_round else (coefficients[0], 0.0, coefficients[0])
     A = np.array([[xx, xy / 2], [xy / 2, yy]])
     values, axes = np.linalg.eigh(A)
-    if values[0] <= THINNEST**2 * values[1]:
+    if values[0] <= np.sqrt(np.finfo(float).eps) * values[1]:  # it may be a parabola but for rounding
         return None
     centre = -np.linalg.solve(A, [bx, by]) / 2
     level = 1 + centre @ A @ centre
@@ -248,6 +213,6 @@ def fit_ellipse(places: Float) -> Ellipses | None:
     on_circle = np.linalg.solve(frame, np.stack([x, y]) - centre[:, None])
     chord = np.hypot(*(np.roll(on_circle, -1, axis=1) - on_circle))
     away = np.abs(np.hypot(*on_circle) - 1)
-    if away.max() > ROUNDNESS_TOLERANCE or chord.max() > 2 * np.sin(0.5):
+    if away.max() > ROUNDNESS_TOLERANCE or chord.max() > (1.0 if is_round else 2 * np.sin(0.5)):
         return None
     return Ellipses((mean + scale * centre)[None], scale * frame[None])

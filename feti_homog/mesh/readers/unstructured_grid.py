@@ -39,7 +39,7 @@ MOST_PHASES = 10**9
 
 @dataclass(frozen=True)
 class Grid:
-    """Points and m cells.
+    """Points and m cells; MeshError where the arrays do not belong together.
 
     Attributes:
         points: (n, 3) their coordinates.
@@ -57,6 +57,19 @@ class Grid:
     data: Mapping[str, Numbers]
     first: int = 0
 
+    def __post_init__(self) -> None:
+        m, counts, nodes = len(self.types), self.counts, self.nodes
+        if len(counts) != m or np.any(counts < 0) or counts.sum() != len(nodes):
+            raise MeshError("the cells and their nodes do not belong together: the file is damaged")
+        bad = np.flatnonzero((nodes < 0) | (nodes >= len(self.points)))
+        if len(bad):
+            cell, node = self.first + np.searchsorted(np.cumsum(counts), bad[0], side="right"), nodes[bad[0]]
+            expected = f"expected {self.first} to {self.first + len(self.points) - 1}"
+            raise MeshError(f"cell {cell} has the node {self.first + node}: {expected}")
+        sizes = {name: len(values) for name, values in self.data.items() if len(values) != m}
+        if sizes:
+            raise MeshError(*(f"cell data {name}: {size} values for {m} cells" for name, size in sizes.items()))
+
     def nodes_of(self, cells: Int, count: int) -> Int:
         """Return the file's numbers (k, count) of the first `count` nodes in cells (k,)."""
         starts = (np.cumsum(self.counts) - self.counts)[cells]
@@ -72,27 +85,41 @@ def mesh_of(grid: Grid) -> RawMesh:
     beside phases, a single curve `line`.
 
     Raises:
-        MeshError: the grid has other cells or no phases, or is damaged.
+        MeshError: the grid has other cells or no phases.
     """
-    if faults := _misfits(grid):
-        raise MeshError(*faults)
-    grid, data = _in_common_types(grid), grid.data
+    # Pixels, and polygons of three or four nodes, are triangles and quadrilaterals.
+    counts, types, nodes, data = grid.counts, grid.types.copy(), grid.nodes.copy(), grid.data
+    pixels = np.flatnonzero((types == PIXEL) & (counts == 4))
+    last = np.cumsum(counts)[pixels] - 1
+    nodes[last], nodes[last - 1] = nodes[last - 1], nodes[last]
+    types[(types == POLYGON) & (counts == 3)] = 5
+    types[((types == POLYGON) | (types == PIXEL)) & (counts == 4)] = 9
+    grid, faults = replace(grid, types=types, nodes=nodes), _other_cells(types, counts, grid.first)
     whole = [k for k, values in data.items() if k != DEBONDED and values.ndim == 1 and values.dtype.kind in "iu"]
     name = next((name for name in (PHASE, *NUMBERS) if name in data), whole[0] if len(whole) == 1 else "")
-    if faults := _other_cells(grid) + _unnumbered(grid, name):
+    if not name:
+        expected = "expected 0 in the matrix, 1 in phase fibre, 2 in fibre:2, ..."
+        faults.append(f"no cell data named {PHASE}, but {', '.join(data) or 'none'}: {expected}")
+    elif np.size(data[name]) != len(types):
+        faults.append(f"cell data {name}: expected one value for each of {len(types)} cells")
+    else:
+        values = np.ravel(data[name])
+        bad = values[~((values == np.round(values)) & (values >= 0) & (values < MOST_PHASES))]
+        faults += [f"cell data {name} = {k:g}: expected 0, 1, 2, ... below {MOST_PHASES}" for k in bad[:1]]
+    if faults:
         raise MeshError(*faults)
-    has_phases, groups, blocks = name == PHASE, np.ravel(data[name]).astype(np.int64), []
-    values = np.unique(groups[np.isin(grid.types, [*TRIANGLES])])
+    has_phases, groups, blocks = name == PHASE, values.astype(np.int64), []
+    values = np.unique(groups[np.isin(types, [*TRIANGLES])])
     for kind, count in TRIANGLES.items():
-        cells = np.flatnonzero(grid.types == kind)
+        cells = np.flatnonzero(types == kind)
         if len(cells):
             group = np.searchsorted(values, groups[cells])
             blocks.append(Block(grid.first + cells, grid.nodes_of(cells, count), group))
     aliases = [(f"number {k}",) for k in values.tolist()]
     phases = [({0: "matrix", 1: "fibre"}.get(k, f"fibre:{k}"),) for k in values.tolist()]
     names, containers = (phases if has_phases else aliases), (f"value of {name}", "cells")
-    lines = np.flatnonzero(np.isin(grid.types, [*LINES]))
-    marks = np.ravel(data.get(DEBONDED, np.zeros(len(grid.types))))[lines]
+    lines = np.flatnonzero(np.isin(types, [*LINES]))
+    marks = np.ravel(data.get(DEBONDED, np.zeros(len(types))))[lines]
     number, ends = np.where(marks != 0, -1, 0 if has_phases else groups[lines]), grid.nodes_of(lines, 2)
     titles = {k: "line" if has_phases else f"number {k}" for k in np.unique(number).tolist()} | {-1: DEBONDED}
     curves = {titles[k]: ends[number == k] for k in np.unique(number).tolist()}
@@ -100,59 +127,22 @@ def mesh_of(grid: Grid) -> RawMesh:
     return assembled(tags, grid.points, blocks, names, curves, containers, aliases)
 
 
-def _misfits(grid: Grid) -> list[str]:
-    """List arrays with wrong lengths, and nodes that do not exist."""
-    count, last = len(grid.types), len(grid.points) + grid.first - 1
-    if len(grid.counts) != count or np.any(grid.counts < 0) or grid.counts.sum() != len(grid.nodes):
-        return ["the cells and their nodes do not belong together: the file is damaged"]
-    bad = np.flatnonzero((grid.nodes < 0) | (grid.nodes >= len(grid.points)))
-    if len(bad):
-        cell, node = np.searchsorted(np.cumsum(grid.counts), bad[0], side="right"), grid.nodes[bad[0]] + grid.first
-        return [f"cell {cell + grid.first} has the node {node}: expected {grid.first} to {last}"]
-    sizes = {name: len(values) for name, values in grid.data.items()}
-    return [f"cell data {name}: {size} values for {count} cells" for name, size in sizes.items() if size != count]
-
-
-def _in_common_types(grid: Grid) -> Grid:
-    """Convert pixels and polygons with three or four nodes into triangles and quadrilaterals."""
-    counts, types, nodes = grid.counts, grid.types.copy(), grid.nodes.copy()
-    for count, kind in ((3, 5), (4, 9)):
-        types[(types == POLYGON) & (counts == count)] = kind
-    pixels = np.flatnonzero((types == PIXEL) & (counts == 4))
-    last = np.cumsum(counts)[pixels] - 1
-    nodes[last], nodes[last - 1] = nodes[last - 1], nodes[last]
-    types[pixels] = 9
-    return replace(grid, types=types, nodes=nodes)
-
-
-def _other_cells(grid: Grid) -> list[str]:
-    """List unusable cell types, wrong node counts, and missing triangles."""
-    usable, counts, faults = TRIANGLES | LINES, grid.counts, []
-    for kind in np.unique(grid.types).tolist():
-        cells = np.flatnonzero(grid.types == kind)
+def _other_cells(types: Int, counts: Int, first: int) -> list[str]:
+    """List unusable cell types, wrong node counts, and missing triangles; `first` is the first cell's number."""
+    usable, faults = TRIANGLES | LINES, []
+    for kind in np.unique(types).tolist():
+        cells = np.flatnonzero(types == kind)
         wrong = cells[counts[cells] != usable.get(kind, 0)]
         if kind not in usable and kind not in POINTS:
             cells_of_type = f"{len(cells)} cells are {NAMES.get(kind, f'of type {kind}')}, the first is number"
             expected = "only triangles of three or six nodes and quadrilaterals of four, eight or nine can be used"
-            faults.append(f"{cells_of_type} {cells[0] + grid.first}: {expected}")
+            faults.append(f"{cells_of_type} {cells[0] + first}: {expected}")
         elif kind in usable and len(wrong):
-            cell = f"cell {wrong[0] + grid.first}, of type {kind}, has {counts[wrong[0]]} nodes"
+            cell = f"cell {wrong[0] + first}, of type {kind}, has {counts[wrong[0]]} nodes"
             faults.append(f"{cell}: expected {usable[kind]}")
-    if not faults and not np.isin(grid.types, [*TRIANGLES]).any():
+    if not faults and not np.isin(types, [*TRIANGLES]).any():
         faults.append("no triangles in it")
     return faults
-
-
-def _unnumbered(grid: Grid, name: str) -> list[str]:
-    """List missing phases, and values of the cell data `name` that are no phase numbers."""
-    if not name:
-        expected = "expected 0 in the matrix, 1 in phase fibre, 2 in fibre:2, ..."
-        return [f"no cell data named {PHASE}, but {', '.join(grid.data) or 'none'}: {expected}"]
-    values = grid.data[name]
-    if np.size(values) != len(grid.types):
-        return [f"cell data {name}: expected one value for each of {len(grid.types)} cells"]
-    bad = np.ravel(values)[~np.ravel((values == np.round(values)) & (values >= 0) & (values < MOST_PHASES))]
-    return [f"cell data {name} = {bad[0]:g}: expected 0, 1, 2, ... below {MOST_PHASES}"] if len(bad) else []
 
 
 class NotANumber(ValueError):

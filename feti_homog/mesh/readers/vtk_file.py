@@ -9,7 +9,6 @@ import codecs
 import re
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import NoReturn
@@ -54,9 +53,16 @@ def load(path: Path) -> RawMesh:
         OSError: the file cannot be read.
         MeshError: it is damaged, or has other cells or no phases.
     """
-    file = _behind_header(input_files.read(path))
-    none, data, sections, are_of_cells, length = np.zeros(0, np.int64), dict[str, Numbers](), set[str](), False, 0
-    grid = Grid(np.zeros((0, 3)), none, none, none, data)
+    file = Scanner(input_files.read(path))
+    if file.line()[:4] != ["#", "vtk", "DataFile", "Version"]:
+        file.refuse("expected # vtk DataFile Version, with which a file of VTK begins")
+    file.place = file.content.find(b"\n", file.place) + 1 or len(file.content)  # the title, which may be empty
+    form = " ".join(file.line()).upper()
+    if form not in ("ASCII", "BINARY"):
+        file.refuse(f"{wording.toml_value(form)}: expected ASCII or BINARY")
+    file.is_binary = form == "BINARY"
+    points, none, sections = np.zeros((0, 3)), np.zeros(0, np.int64), set[str]()
+    types, nodes, counts, cell_data, arrays, length = none, none, none, dict[str, Numbers](), dict[str, Numbers](), 0
     while words := file.line():
         section, words = words[0].upper(), [*words[1:], *[""] * 4]
         if section in sections & {"DATASET", "POINTS", "CELLS", "CELL_TYPES"}:
@@ -67,32 +73,17 @@ def load(path: Path) -> RawMesh:
                 if words[0].upper() != "UNSTRUCTURED_GRID":
                     file.refuse(f"DATASET {words[0]}: expected UNSTRUCTURED_GRID")
             case "POINTS":
-                grid = replace(grid, points=file.take(3 * file.count(words[0]), words[1]).reshape(-1, 3).astype(float))
+                points = file.take(3 * file.count(words[0]), words[1]).reshape(-1, 3).astype(float)
             case "CELLS":
                 nodes, counts = _cells(file, *map(file.count, words[:2]))
-                grid = replace(grid, nodes=nodes, counts=counts)
             case "CELL_TYPES":
-                grid = replace(grid, types=file.take(file.count(words[0]), "int").astype(np.int64))
+                types = file.take(file.count(words[0]), "int").astype(np.int64)
             case "CELL_DATA" | "POINT_DATA":
-                are_of_cells, length = section == "CELL_DATA", file.count(words[0])
+                arrays, length = cell_data if section == "CELL_DATA" else {}, file.count(words[0])
             case _:
                 for name, values, width in _arrays(file, section, words, length):
-                    if are_of_cells:
-                        data[unquote(name)] = values if width == 1 else values.reshape(-1, max(width, 1))
-    return mesh_of(grid)
-
-
-def _behind_header(content: bytes) -> Scanner:
-    """Return the scanner of a VTK file, behind its version, title and form."""
-    file = Scanner(content)
-    if file.line()[:4] != ["#", "vtk", "DataFile", "Version"]:
-        file.refuse("expected # vtk DataFile Version, with which a file of VTK begins")
-    file.place = file.content.find(b"\n", file.place) + 1 or len(file.content)  # the title, which may be empty
-    form = " ".join(file.line()).upper()
-    if form not in ("ASCII", "BINARY"):
-        file.refuse(f"{wording.toml_value(form)}: expected ASCII or BINARY")
-    file.is_binary = form == "BINARY"
-    return file
+                    arrays[unquote(name)] = values if width == 1 else values.reshape(-1, max(width, 1))
+    return mesh_of(Grid(points, types, nodes, counts, cell_data))
 
 
 def _cells(file: Scanner, count: int, size: int) -> tuple[Int, Int]:

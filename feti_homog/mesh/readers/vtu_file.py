@@ -48,13 +48,30 @@ def load(path: Path) -> RawMesh:
         raise MeshError(f"not XML: {error}") from None
     (grid,) = _children(root, "VTKFile", {"UnstructuredGrid": 1, "AppendedData": 0})["UnstructuredGrid"]
     arrays = _Arrays(root, appended, max(MOST_BYTES, MOST_RATIO * size))
-    pieces = [_piece(piece, arrays) for piece in _children(grid, grid.tag, {"Piece": 1, "FieldData": 0})["Piece"]]
-    first = np.cumsum([0, *(len(piece.points) for piece in pieces)])
-    nodes = np.concatenate([piece.nodes + before for piece, before in zip(pieces, first, strict=False)])
-    points, types, counts = (
-        np.concatenate([getattr(piece, name) for piece in pieces]) for name in ("points", "types", "counts")
-    )
-    tables = [piece.data for piece in pieces if len(piece.types)] or [{}]
+    pieces, tables, before = [], list[dict[str, Numbers]](), 0
+    for piece in _children(grid, grid.tag, {"Piece": 1, "FieldData": 0})["Piece"]:
+        sections = _children(piece, "Piece", {"Points": 1, "Cells": 1, "CellData": 0, "PointData": 0})
+        sizes = []
+        for name in ("NumberOfPoints", "NumberOfCells"):
+            word = piece.get(name, "").strip()
+            if not re.fullmatch("[0-9]{1,15}", word):
+                raise MeshError(f"{name} is {wording.toml_value(word)}: expected a whole number")
+            sizes.append(int(word))
+        points = next(iter(arrays.of(sections["Points"][0]).values()), np.zeros(0))
+        cells = arrays.of(sections["Cells"][0])
+        if sizes[1] and (missing := [name for name in ARRAYS if name not in cells]):
+            raise MeshError(f"no array {missing[0]} of the cells")
+        nodes, ends, types = (np.ravel(cells.get(name, np.zeros(0))).astype(np.int64) for name in ARRAYS)
+        if np.size(points) != 3 * sizes[0]:
+            raise MeshError(f"{np.size(points)} coordinates of points: expected {3 * sizes[0]}")
+        if len(types) != sizes[1]:
+            raise MeshError(f"{len(types)} types of cells: expected {sizes[1]}")
+        data = arrays.of(sections["CellData"][0]) if sections["CellData"] else {}
+        tables += [data] if sizes[1] else []
+        pieces.append((points.reshape(-1, 3).astype(float), types, nodes + before, np.diff(ends, prepend=0)))
+        before += sizes[0]
+    points, types, nodes, counts = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+    tables = tables or [{}]
     if lost := set[str]().union(*tables) - set(tables[0]).intersection(*tables):
         raise MeshError(f"cell data {min(lost)}: missing in one of {len(tables)} pieces")
     data = {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
@@ -73,29 +90,6 @@ def _children(element: ElementTree.Element, name: str, tags: Mapping[str, int]) 
     if name != "UnstructuredGrid" and (several := [tag for tag in tags if len(children[tag]) > 1]):
         raise MeshError(f"<{several[0]}> is there twice in <{name}>: expected it once")
     return children
-
-
-def _piece(piece: ElementTree.Element, arrays: _Arrays) -> Grid:
-    """Read the points, cells and cell data of a piece."""
-    children = _children(piece, "Piece", {"Points": 1, "Cells": 1, "CellData": 0, "PointData": 0})
-    counts = []
-    for name in ("NumberOfPoints", "NumberOfCells"):
-        word = piece.get(name, "").strip()
-        if not re.fullmatch("[0-9]{1,15}", word):
-            raise MeshError(f"{name} is {wording.toml_value(word)}: expected a whole number")
-        counts.append(int(word))
-    points = next(iter(arrays.of(children["Points"][0]).values()), np.zeros(0))
-    cells = arrays.of(children["Cells"][0])
-    lost = [name for name in ARRAYS if name not in cells]
-    if lost and counts[1]:
-        raise MeshError(f"no array {lost[0]} of the cells")
-    nodes, ends, types = (np.ravel(cells.get(name, np.zeros(0))).astype(np.int64) for name in ARRAYS)
-    if np.size(points) != 3 * counts[0]:
-        raise MeshError(f"{np.size(points)} coordinates of points: expected {3 * counts[0]}")
-    if len(types) != counts[1]:
-        raise MeshError(f"{len(types)} types of cells: expected {counts[1]}")
-    data = arrays.of(children["CellData"][0]) if children["CellData"] else {}
-    return Grid(points.reshape(-1, 3).astype(float), types, nodes, np.diff(ends, prepend=0), data)
 
 
 class _Arrays:
@@ -128,29 +122,28 @@ class _Arrays:
             name, kind = array.get("Name") or "Points", TYPES.get(array.get("type", ""))
             if kind is None:
                 continue  # texts and bits
+            form, data = array.get("format", "ascii"), (array.text or "").encode()
             try:
-                values, width = self._values(array, kind), int(array.get("NumberOfComponents") or 1)
+                if form == "ascii":
+                    values = numbers(data, "f8" if kind[0] == "f" else "i8")
+                elif form in ("binary", "appended"):
+                    if form == "appended":
+                        start = self._offset(array)
+                        data = self.appended[start : next((other for other in self.starts if other > start), start)]
+                    if not (self.is_raw and form == "appended"):
+                        # Header and data may be encoded separately, each with its own padding.
+                        parts = SEGMENT.findall(b"".join(data.split()))
+                        data = b"".join(base64.b64decode(part, validate=True) for part in parts)
+                    values = np.frombuffer(self._unpacked(data), f"{self.order}{kind}")
+                else:
+                    raise MeshError(f"format is {wording.toml_value(form)}: expected ascii, binary or appended")
+                width = int(array.get("NumberOfComponents") or 1)
                 arrays[name] = values if width == 1 else values.reshape(-1, width)
             except NotANumber as error:
                 raise MeshError(f"array {wording.toml_value(name)}: {error}") from None
             except (ValueError, IndexError, zlib.error, lzma.LZMAError):
                 raise MeshError(f"array {wording.toml_value(name)}: its data are damaged or broken off") from None
         return arrays
-
-    def _values(self, array: ElementTree.Element, kind: str) -> Numbers:
-        form, text = array.get("format", "ascii"), (array.text or "").encode()
-        if form == "ascii":
-            return numbers(text, "f8" if kind[0] == "f" else "i8")
-        if form == "appended":
-            start = self._offset(array)
-            text = self.appended[start : next((other for other in self.starts if other > start), start)]
-        elif form != "binary":
-            raise MeshError(f"format is {wording.toml_value(form)}: expected ascii, binary or appended")
-        if not (self.is_raw and form == "appended"):
-            # Header and data may be encoded separately, each with its own padding.
-            parts = SEGMENT.findall(b"".join(text.split()))
-            text = b"".join(base64.b64decode(part, validate=True) for part in parts)
-        return np.frombuffer(self._unpacked(text), f"{self.order}{kind}")
 
     def _offset(self, array: ElementTree.Element) -> int:
         word = array.get("offset", "").strip()
@@ -162,23 +155,20 @@ class _Arrays:
 
     def _unpacked(self, data: bytes) -> bytes:
         """Unpack data behind a header with their length or block lengths; ValueError or IndexError if cut off."""
-        size = self.header.itemsize
-        header = np.frombuffer(data, self.header, len(data) // size)
-        count = int(header[0])
-        if not self.decompressor:
-            if size + count > len(data):
-                raise ValueError
-            return data[size : size + count]
-        if count and len(header) < 3 + count:
+        header = np.frombuffer(data, self.header, len(data) // self.header.itemsize)
+        count, first = (int(header[0]), 3) if self.decompressor else (1, 0)
+        lengths, start, unpacked = header[first : first + count].tolist(), (first + count) * self.header.itemsize, []
+        if len(lengths) < count:
             raise ValueError
-        start, unpacked = (3 + count) * size, []
-        for length in header[3 : 3 + count].tolist():
-            decompressor = self.decompressor()
-            unpacked.append(decompressor.decompress(data[start : start + length], self.budget + 1))
-            self.budget -= len(unpacked[-1])
-            start += length
-            if self.budget < 0:
-                raise MeshError("its compressed data are too large for a file of its length")
-            if not decompressor.eof:
+        for length in lengths:
+            block, start = data[start : start + length], start + length
+            if self.decompressor:
+                decompressor = self.decompressor()
+                block = decompressor.decompress(block, self.budget + 1)
+                self.budget -= len(block)
+                if self.budget < 0:
+                    raise MeshError("its compressed data are too large for a file of its length")
+            if len(block) < length if self.decompressor is None else not decompressor.eof:
                 raise ValueError
+            unpacked.append(block)
         return b"".join(unpacked)

@@ -69,7 +69,9 @@ class ElementEstimate:
 
     @property
     def triangles(self) -> float:
-        """Count triangles without debonded arcs: alike, about fibres, at ends of ellipses, beside fine interfaces.
+        """Estimate the number of triangles in a cell without debonded arcs.
+
+        Triangles of one size fill the cell; others are added about fibres, at ends of ellipses, and beside interfaces.
 
         On both sides of interfaces with length P there are 2 P int dx / (A (h + g x)^2) = 2 P / (A g h) triangles.
         """

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from feti_homog.case import cell_section
 from feti_homog.microstructure import Arrangement, arrangements
 from feti_homog.microstructure.shapes import on_circle
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Float
 
 # Growth of the edge length per distance, at most.
 MAX_GROWTH = 0.4
@@ -25,6 +25,9 @@ PASSAGE_EDGE = 1.5
 # Angle between a circle and a side that it crosses, relative to the turn of the circle along an edge there.
 WEDGE = 3
 
+
+# Outward normals of the sides of a cell.
+AXES = np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]])
 
 # Places (k, 2), edge lengths (k,) and growths (k,).
 Source = tuple[Float, Float, Float]
@@ -52,46 +55,19 @@ def coating_size(arrangement: Arrangement) -> Float:
     return np.where(arrangement.coated, np.sqrt(arrangement.coating * arrangement.radii), np.inf)
 
 
-def _between_fibres(circles: Float, size: Float, caps: Float, largest: float) -> Iterator[Source]:
-    """Yield facing points of fibres as sources, by the gap and the other fibre's edges."""
-    centres, radii = circles[:, :2], circles[:, 2]
-    first, second, vector = arrangements.neighbours(centres, size, 2 * radii.max() + largest)
-    distance = np.linalg.norm(vector, axis=1)
-    gap = distance - radii[first] - radii[second]
-    normal = vector / distance[:, None]
-    growth = passage_growth(gap, 1 / radii[first] + 1 / radii[second])
-    for one, other, sign in ((first, second, 1.0), (second, first, -1.0)):
-        length = np.minimum(PASSAGE_EDGE * gap, caps[other] + MAX_GROWTH * gap)
-        narrow = length < caps[one]
-        places = centres[one] + sign * radii[one, None] * normal
-        yield places[narrow], length[narrow], growth[narrow]
+def passages(width: Float, curvature: Float, faces: tuple[Float, Float], caps: Sequence[Float | float]) -> list[Source]:
+    """Return both faces (k, 2) of passages as sources, where they make edges shorter than `caps` (k,).
 
-
-def passage_growth(width: Float, curvature: Float) -> Float:
-    """Return the growth of edges below twice the width w + c s^2 / 2 of a passage."""
-    return np.asarray(np.minimum(MAX_GROWTH, np.sqrt((4 - 2 * PASSAGE_EDGE) * 2 * width * curvature)))
-
-
-def _at_sides(circles: Float, size: Float, caps: Float, largest: float) -> Iterator[Source]:
-    """Yield as sources where circles come near a side: extreme points, feet, crossings."""
-    centres, radii = circles[:, :2] % size, circles[:, 2]
-    for axis, sign in ((0, -1.0), (0, 1.0), (1, -1.0), (1, 1.0)):
-        distance = centres[:, axis] if sign < 0 else size[axis] - centres[:, axis]
-        extreme, foot = centres.copy(), centres.copy()
-        extreme[:, axis] += sign * radii
-        foot[:, axis] += sign * distance
-        width = np.abs(distance - radii)
-        growth = passage_growth(width, 1 / radii)
-        length = np.minimum(PASSAGE_EDGE * width, caps + MAX_GROWTH * width)
-        for places, narrow in ((extreme, length < caps), (foot, length < largest)):
-            yield places[narrow], length[narrow], growth[narrow]
-        angle = np.arccos(np.minimum(distance / radii, 1.0))
-        length = angle * radii / WEDGE
-        sharp = (length < caps) & (angle > 0)
-        for turn in (-1.0, 1.0):
-            crossing = foot[sharp]
-            crossing[:, 1 - axis] += (turn * radii * np.sin(angle))[sharp]
-            yield crossing, length[sharp], np.full(len(crossing), MAX_GROWTH)
+    Edges are PASSAGE_EDGE times the width long, or as long as those of the other face let them grow. Their growth stays
+    below that of twice the width w + c s^2 / 2 at the distance s along a passage.
+    """
+    growth = np.minimum(MAX_GROWTH, np.sqrt((4 - 2 * PASSAGE_EDGE) * 2 * width * curvature))
+    sources = []
+    for places, cap, beyond in zip(faces, caps, caps[::-1], strict=True):
+        length = np.minimum(PASSAGE_EDGE * width, beyond + MAX_GROWTH * width)
+        narrow = length < cap
+        sources.append((places[narrow], length[narrow], growth[narrow]))
+    return sources
 
 
 def at_vertices(vertices: Float, size: Float) -> Source:
@@ -200,29 +176,46 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
     """
     size, largest, (shells, disc) = arrangement.size, sizes.largest, arrangement.shells
     circles, caps = np.column_stack([shells.centres, shells.radii]), circle_size(arrangement, largest)
-    first = np.unique(disc, return_index=True)[1]
+    # Between fibres.
+    is_outer = np.diff(disc, prepend=-1) > 0
+    outer, longest = circles[is_outer], caps[is_outer]
+    first, second, vector = arrangements.neighbours(outer[:, :2], size, 2 * outer[:, 2].max() + largest)
+    distance, (one, other) = np.linalg.norm(vector, axis=1), (outer[first], outer[second])
+    gap, normal = distance - one[:, 2] - other[:, 2], vector / distance[:, None]
+    faces = one[:, :2] + one[:, 2:] * normal, other[:, :2] - other[:, 2:] * normal
+    sources = passages(gap, 1 / one[:, 2] + 1 / other[:, 2], faces, (longest[first], longest[second]))
+    # Between circles and sides, and where they cross.
+    centres, radii = circles[:, :2] % size, circles[:, 2]
+    for axis in AXES:
+        distance = np.where(axis > 0, size - centres, centres)[:, axis != 0][:, 0]
+        extreme, foot = (centres + along[:, None] * axis for along in (radii, distance))
+        sources += passages(np.abs(distance - radii), 1 / radii, (extreme, foot), (caps, largest))
+        angle = np.arccos(np.minimum(distance / radii, 1.0))
+        length = angle * radii / WEDGE
+        sharp = (length < caps) & (angle > 0)
+        half = (radii * np.sin(angle))[sharp, None] * np.abs(axis[::-1])
+        for crossing in (foot[sharp] - half, foot[sharp] + half):
+            sources.append((crossing, length[sharp], np.full(len(crossing), MAX_GROWTH)))
     # Where a circle passes near the corner: the corner and the nearest point on the circle.
     offset = (circles[:, :2] + size / 2) % size - size / 2
     distance = np.linalg.norm(offset, axis=1)
-    length = PASSAGE_EDGE * np.abs(distance - circles[:, 2])
-    close = length < caps
+    to_corner = PASSAGE_EDGE * np.abs(distance - circles[:, 2])
+    close = to_corner < caps
     facing = offset[close] * (1 - circles[close, 2] / distance[close])[:, None]
     corners = np.concatenate([facing, np.zeros_like(facing)])
-    sources = [
-        *_between_fibres(circles[first], size, caps[first], largest),
-        *_at_sides(circles, size, caps, largest),
-        (corners, np.tile(length[close], 2), np.full(len(corners), MAX_GROWTH)),
+    sources += [
+        (corners, np.tile(to_corner[close], 2), np.full(len(corners), MAX_GROWTH)),
         at_vertices(vertices, size),
     ]
     if not sizes.are_graded(arrangement):
         return SizeField(sources, size, largest)
     # Points h_i apart on the outer circles find the nearest disc.
-    lengths, outer = sizes.on_circles(arrangement), circles[first]
+    lengths = sizes.on_circles(arrangement)
     counts = np.ceil(2 * np.pi * outer[:, 2] / lengths).astype(int)
     disc = np.repeat(np.arange(len(counts)), counts)
     angle = 2 * np.pi * (np.arange(len(disc)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[disc]
-    points = on_circle(outer[disc], angle)
-    return SizeField(sources, size, largest, FromLines(size, points, disc, lengths, sizes.tip, tips, outer))
+    lines = FromLines(size, on_circle(outer[disc], angle), lengths[disc], sizes.tip, tips, outer[disc])
+    return SizeField(sources, size, largest, lines)
 
 
 class FromLines:
@@ -233,20 +226,13 @@ class FromLines:
     """
 
     def __init__(
-        self,
-        size: Float,
-        points: Float,
-        curve: Int,
-        lengths: Float,
-        tip: float,
-        tips: Float,
-        circles: Float | None = None,
+        self, size: Float, points: Float, lengths: Float, tip: float, tips: Float, circles: Float | None = None
     ) -> None:
-        """Take the lengths h_i (k,) of curves, their `points` (s, 2), and h_t with the `tips` (t, 2).
+        """Take `points` (s, 2) on lines with their lengths h_i (s,), and h_t with the `tips` (t, 2).
 
-        d is measured from the circles (k, 3) of the curves (s,) of points, or without circles from the points.
+        d is measured from the circles (s, 3) on which the points lie, or without circles from the points.
         """
-        self._size, self._curve, self._lengths, self._tip, self._circles = size, curve, lengths, tip, circles
+        self._size, self._lengths, self._tip, self._circles = size, lengths, tip, circles
         self._points, self._tips = (cKDTree(wrap(x.reshape(-1, 2), size), boxsize=size) for x in (points, tips))
         self.least = min(tip, float(lengths.min()))
 
@@ -254,11 +240,10 @@ class FromLines:
         """Return the sizes (n,) at positions (n, 2) on the torus."""
         places = wrap(points, self._size)
         distance, nearest = self._points.query(places)
-        curve = self._curve[nearest]
         if self._circles is not None:
-            circles = self._circles[curve]
+            circles = self._circles[nearest]
             offset = (points - circles[:, :2] + self._size / 2) % self._size - self._size / 2
             distance = np.abs(np.linalg.norm(offset, axis=1) - circles[:, 2])
         # Without tips the distance is infinite.
         at_tips = self._tip + MAX_GROWTH * np.maximum(0.0, self._tips.query(places)[0] - self._tip)
-        return np.asarray(np.minimum(self._lengths[curve] + MAX_GROWTH * distance, at_tips))
+        return np.asarray(np.minimum(self._lengths[nearest] + MAX_GROWTH * distance, at_tips))

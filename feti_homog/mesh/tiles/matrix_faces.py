@@ -17,16 +17,14 @@ from scipy.spatial import Delaunay, cKDTree
 from feti_homog.mesh.outline.outline import TURN, Bridges, OnCircles
 from feti_homog.mesh.periodic_topology import components
 from feti_homog.mesh.sizes.graded_size import CHUNK, wrap
+from feti_homog.microstructure import arrangements
 from feti_homog.microstructure.shapes import on_circle
 from feti_homog.typing import Float, Int
 
-NOWHERE = -1
-# Bridges stay away from third discs by this part of their radii, and their ends from sides by that of the mean radius.
+# Distance of bridges from third discs / their radius, and of bridge ends from cell sides / mean radius, at least.
 CLEAR = 0.3
 # Between two bridges on one disc, at least.
 LEAST_ANGLE = np.radians(25)
-# Decimals in which gaps and centroids are compared, relative to the cell; ties are broken by place.
-PLACE_DECIMALS = 9
 
 
 @dataclass(frozen=True)
@@ -95,7 +93,7 @@ def bridges(lines: CentreLines, size: Float, margin: float, largest: float, vert
     away, ends_away = (np.minimum(points, size - points) for points in (middle, lines.facing))
     inside = (ends_away.min(axis=(1, 2)) > margin) & (away.min(axis=1) > np.minimum(largest, lines.gap))
     clear = np.flatnonzero(inside & (lines.clearance > 1 + CLEAR))
-    order = np.lexsort((clear, (lines.gap[clear] / size.max()).round(PLACE_DECIMALS)))
+    order = np.lexsort((clear, (lines.gap[clear] / size.max()).round(arrangements.DECIMALS)))
     candidates = Bridges(lines.ends[clear[order]], lines.angle[clear[order]])
     circle, angle = (np.concatenate(parts) for parts in zip(candidates.on_circles, vertices, strict=True))
     # Vertices come before all bridges.
@@ -168,7 +166,7 @@ class MatrixTiles:
     Attributes:
         lines: half-lines that divide the matrix: side pieces, then bridges.
         tile: (h,) tile on the left of each half-line.
-        alone: (n,) tile around each disc without half-lines; NOWHERE for all other discs.
+        alone: (n,) tile around each disc without half-lines; -1 for all other discs.
     """
 
     lines: HalfLines
@@ -187,7 +185,7 @@ def beside(lines: HalfLines, label: Int, alone: Int, disc: Int, angle: Float) ->
     place = np.searchsorted(node * 2 * TURN + at, disc * 2 * TURN + angle % TURN, side="right") - 1
     first, last = np.searchsorted(node, disc), np.searchsorted(node, disc, side="right") - 1
     around = label[order[np.where(place < first, last, place)]]
-    return np.where(alone[disc] == NOWHERE, around, alone[disc])
+    return np.where(alone[disc] < 0, around, alone[disc])
 
 
 def matrix_tiles(
@@ -208,59 +206,40 @@ def matrix_tiles(
         outer: (n,) circles that bound the matrix.
         sides: nodes (s, 2) and ends (s, 2, 2) of side pieces in the matrix, counter-clockwise around the cell.
     """
-    nodes, starts = sides
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]) * size
     centres = np.concatenate([circles[:, :2], corners])
-    ends = [on_circle(circles[bridges.ends[:, end]], bridges.angle + end * np.pi) for end in (0, 1)]
-    facing = np.stack(ends, axis=1)
-    half = HalfLines.of(np.concatenate([nodes, bridges.ends]), centres, np.concatenate([starts, facing]))
+    ends = np.stack([on_circle(circles[bridges.ends[:, k]], bridges.angle + k * np.pi) for k in (0, 1)], axis=1)
+    half = HalfLines.of(np.concatenate([sides[0], bridges.ends]), centres, np.concatenate([sides[1], ends]))
     after, loop = half.faces()
     lone = np.setdiff1d(outer, half.node)
     count = loop.max() + 1
-    alone = np.full(len(circles), NOWHERE)
+    alone = np.full(len(circles), -1)
     alone[lone] = count + np.arange(len(lone))
-    face = _faces_of_loops(half, loop, alone, lines, count + len(lone), size)
-    area, moment = _areas_and_moments(half, after, loop)
-    areas = np.bincount(face[:count], area, face.max() + 1)
+    # A centre line crosses no bridge, for both are edges in one triangulation. So, in the cell and away from third
+    # discs, there is one face along it.
+    free = (lines.clearance > 1) & np.all((lines.facing > 0) & (lines.facing < size), axis=(1, 2))
+    n = half.node.max() + 1
+    free &= ~np.isin(lines.ends @ [n, 1], half.node * n + half.node[half.twin])
+    pairs = (beside(half, loop, alone, lines.ends[free, k], lines.angle[free] + k * np.pi) for k in (0, 1))
+    face = components(count + len(lone), *pairs)
+    # Lines, and chords along circles between them.
+    end, which = half.start[half.twin], np.tile(loop, 2)
+    a, b = np.concatenate([half.start, end]), np.concatenate([end, half.start[after]])
+    cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     # A face has one loop around it, and others in it, which are negative. The one beyond the sides has none around it.
     # Loops around trees, which have both halves of all their lines, have no area but for rounding.
     is_tree = np.bincount(loop, loop[half.twin] != loop) == 0
-    around = np.bincount(face[:count], (area > 0) & ~is_tree, face.max() + 1)
+    around = np.bincount(face[:count], (np.bincount(which, cross) > 0) & ~is_tree, face.max() + 1)
     beyond = face[loop[half.twin[0]]]
     if (np.delete(around, beyond) != 1).any():
         return None
-    moments = np.stack([np.bincount(face[:count], moment[:, k], face.max() + 1) for k in (0, 1)], axis=1)
-    tile = grid_cell(moments / areas[:, None], size, grid)
-    return MatrixTiles(half, tile[face[loop]], np.where(alone == NOWHERE, NOWHERE, tile[face[alone]]))
+    centroids = [np.bincount(face[which], (a + b)[:, k] * cross) / np.bincount(face[which], cross) / 3 for k in (0, 1)]
+    tile = grid_cell(np.stack(centroids, axis=1), size, grid)
+    return MatrixTiles(half, tile[face[loop]], np.where(alone < 0, alone, tile[face[alone]]))
 
 
 def grid_cell(points: Float, size: Float, grid: Int) -> Int:
     """Find the cell (k,) of a grid (2,) over [0, size] that contains each point."""
-    share = (points / size).round(PLACE_DECIMALS)
+    share = (points / size).round(arrangements.DECIMALS)
     column, row = np.clip((share * grid).astype(np.int64), 0, grid - 1).T
     return np.asarray(column * grid[1] + row)
-
-
-def _areas_and_moments(half: HalfLines, after: Int, loop: Int) -> tuple[Float, Float]:
-    """Compute the areas (l,) and first moments (l, 2) of loops of half-lines."""
-    end = half.start[half.twin]
-    a, b = np.concatenate([half.start, end]), np.concatenate([end, half.start[after]])
-    cross, loop = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], np.concatenate([loop, loop])
-    return np.bincount(loop, cross) / 2, np.stack(
-        [np.bincount(loop, (a + b)[:, k] * cross) for k in (0, 1)], axis=1
-    ) / 6
-
-
-def _faces_of_loops(half: HalfLines, loop: Int, alone: Int, lines: CentreLines, count: int, size: Float) -> Int:
-    """Return the face (count,) of each loop, and then of each lone disc.
-
-    A centre line crosses no bridge, for both are edges in one triangulation. So, in the cell and away from third
-    discs, there is one face along it.
-    """
-    free = (lines.clearance > 1) & np.all((lines.facing > 0) & (lines.facing < size), axis=(1, 2))
-    ends, angle = lines.ends[free], lines.angle[free]
-    n = half.node.max() + 1
-    is_bridge = np.isin(ends[:, 0] * n + ends[:, 1], half.node * n + half.node[half.twin])
-    ends, angle = ends[~is_bridge], angle[~is_bridge]
-    one, other = (beside(half, loop, alone, ends[:, end], angle + end * np.pi) for end in (0, 1))
-    return components(count, one, other)

@@ -1,10 +1,10 @@
 """The regions of an outline filled with triangles by gmsh."""
 
-from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
+from math import isclose
 from types import ModuleType
 
 import numpy as np
@@ -13,19 +13,16 @@ from feti_homog.errors import MeshError
 from feti_homog.mesh.coarse_mesh import areas, flip_double_arcs
 from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE, Curves
 from feti_homog.mesh.sizes.graded_size import MAX_GROWTH
-from feti_homog.typing import Float, Int, Int32
+from feti_homog.microstructure import arrangements
+from feti_homog.typing import Array, Float, Int, Int32
 
-# gmsh's algorithms. The first makes the better triangles of one size, but leaves a disc with thousands of nodes on its
-# circle unfilled.
-FRONTAL_DELAUNAY, DELAUNAY = 6, 5
-# Decimals of the coordinates that gmsh is given. The last bits of the outline's differ from machine to machine, and
-# with them gmsh would make other triangles.
-DECIMALS = 12
-# Of the area of triangles against that of the part of the cell that they fill, relative.
-AREA_TOLERANCE = 1e-9
+# An algorithm of gmsh. The default makes the better triangles of one size, but leaves a disc with thousands of nodes on
+# its circle unfilled.
+DELAUNAY = 5
 
-# Corners (k, 2) of a closed line, and the tags of its gmsh lines, negative for lines run backwards.
-Loop = tuple[Float, list[int]]
+# Area within a closed line, negative if that runs clockwise, its corners x + i y (k,), and the tags of its gmsh lines,
+# negative for lines run backwards.
+Loop = tuple[float, Array, list[int]]
 
 
 @dataclass(frozen=True)
@@ -73,7 +70,6 @@ def gmsh_session() -> Iterator[ModuleType]:
         for option, value in {
             "General.Terminal": 0,
             "General.NumThreads": 1,
-            "Mesh.Algorithm": FRONTAL_DELAUNAY,
             "Mesh.RandomSeed": 1,
             "Mesh.Renumber": 0,
         }.items():
@@ -92,7 +88,7 @@ def fill(tile: Tile) -> Filling:
     """
     with gmsh_session() as gmsh:
         gmsh.option.setNumber("Mesh.MeshSizeMax", tile.largest)
-        surfaces, circle = _add_surfaces(gmsh, tile)
+        surfaces, circle, within = _add_surfaces(gmsh, tile)
         if tile.is_graded:
             # Elements have the nearest outline edge's size h, h + g d at the distance d from it. Otherwise gmsh would
             # interpolate between the lines: a disc would be as fine within as on its circle.
@@ -117,13 +113,7 @@ def fill(tile: Tile) -> Filling:
     points[: len(tile.points)] = tile.points
     triangles = np.searchsorted(tags[order], np.concatenate(elements)).astype(np.int32).reshape(-1, 3)
     area = areas(points, triangles)
-    # 1/2 of the integral of x dy - y dx along curves with the tile on their left, less along those with it on their
-    # right, is the area within.
-    pairs, curve = tile.curves.edges
-    sign = (tile.curves.inside != OUTSIDE).astype(float) - (tile.curves.outside != OUTSIDE)
-    a, b = tile.points[pairs[:, 0]], tile.points[pairs[:, 1]]
-    within = float(sign[curve] @ (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2)
-    if abs(np.abs(area).sum() / within - 1) > AREA_TOLERANCE:
+    if not isclose(np.abs(area).sum(), within):
         raise _unfilled(tile, "triangles are missing")
     triangles[area < 0] = triangles[area < 0][:, ::-1]
     circle_of = np.repeat(circle, [len(nodes) // 3 for nodes in elements])
@@ -151,13 +141,13 @@ def arc_edges(curves: Curves) -> tuple[Int32, Int32]:
     return pairs[circle != MATRIX].astype(np.int32), circle[circle != MATRIX].astype(np.int32)
 
 
-def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int]]:
-    """Add the surfaces of all regions; return their tags, and the circle around each or MATRIX.
+def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int], float]:
+    """Add the surfaces of all regions; return their tags, the circle around each or MATRIX, and their area.
 
     Each outline edge is a line with one element, and node n is point n + 1.
     """
     curves, geo = tile.curves, gmsh.model.geo
-    for tag, (x, y) in enumerate(tile.points.round(DECIMALS).tolist(), 1):
+    for tag, (x, y) in enumerate(tile.points.round(arrangements.GMSH_DECIMALS).tolist(), 1):
         geo.addPoint(x, y, 0.0, tag=tag)
     nodes = np.split(curves.node, curves.first[1:-1])
     lines = [np.array([geo.addLine(*ends) for ends in pairwise((curve + 1).tolist())]) for curve in nodes]
@@ -169,42 +159,30 @@ def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int]]:
         directed.append((region, curve[::-1], -tags[::-1]))
     # At each vertex one curve of a region starts.
     after = {(region, int(curve[0])): (curve, tags) for region, curve, tags in directed if region != OUTSIDE}
-    regions: dict[int, list[Loop]] = defaultdict(list)
+    regions: dict[int, list[Loop]] = {}
     while after:
         loop, (region, node) = [], next(iter(after))
         while (region, node) in after:
             loop.append(after.pop((region, node)))
             node = int(loop[-1][0][-1])
-        polygon = tile.points[np.concatenate([curve[:-1] for curve, _ in loop])]
-        regions[region].append((polygon, np.concatenate([tags for _, tags in loop]).tolist()))
+        polygon = tile.points[np.concatenate([curve[:-1] for curve, _ in loop])] @ [1, 1j]
+        away = polygon - polygon[0]
+        area = float((away.conj() * np.roll(away, -1)).imag.sum() / 2)
+        tags = np.concatenate([tags for _, tags in loop])
+        regions.setdefault(region, []).append((area, polygon, tags.tolist()))
     surfaces, circle = [], []
     # The matrix is last.
     for region in sorted(regions, key=lambda inside: inside == MATRIX):
-        for outer_and_holes in _with_holes(regions[region]):
-            surfaces.append(geo.addPlaneSurface([geo.addCurveLoop(tags) for tags in outer_and_holes]))
+        loops = regions[region]
+        outer_and_holes = {k: [line_tags] for k, (area, _, line_tags) in enumerate(loops) if area >= 0}
+        for polygon, line_tags in (loop[1:] for loop in loops if loop[0] < 0):
+            # A polygon turns once around a point within. Of one within the other the inner is meant, the smaller.
+            away = [loops[k][1] - polygon[0] for k in outer_and_holes]
+            turns = [np.angle(np.roll(vectors, -1) / vectors).sum() for vectors in away]
+            _, around = min((loops[k][0], k) for k, turn in zip(outer_and_holes, turns, strict=True) if turn > np.pi)
+            outer_and_holes[around].append(line_tags)
+        for group in outer_and_holes.values():
+            surfaces.append(geo.addPlaneSurface([geo.addCurveLoop(line_tags) for line_tags in group]))
             circle.append(region)
     geo.synchronize()
-    return surfaces, circle
-
-
-def _with_holes(loops: list[Loop]) -> list[list[list[int]]]:
-    """Group the tags of loops: an outer loop, then its holes, which run clockwise."""
-    areas = []
-    for polygon, _ in loops:
-        a, b = polygon - polygon[0], np.roll(polygon, -1, axis=0) - polygon[0]
-        areas.append(float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() / 2))
-    groups = {k: [tags] for k, (_, tags) in enumerate(loops) if areas[k] >= 0}
-    for hole in (k for k in range(len(loops)) if areas[k] < 0):
-        polygon, tags = loops[hole]
-        # Of one within the other the inner is meant, which is the smaller.
-        around = groups if len(groups) == 1 else (k for k in groups if _contains(loops[k][0], polygon[0]))
-        groups[min(around, key=areas.__getitem__)].append(tags)
-    return list(groups.values())
-
-
-def _contains(polygon: Float, point: Float) -> bool:
-    """Return whether a polygon (k, 2) contains a point, by counting crossings."""
-    a, b = polygon - point, np.roll(polygon, -1, axis=0) - point
-    crossing = (a[:, 1] > 0) != (b[:, 1] > 0)
-    rise = np.where(crossing, b[:, 1] - a[:, 1], 1.0)
-    return bool(np.count_nonzero(crossing & (a[:, 0] - a[:, 1] * (b[:, 0] - a[:, 0]) / rise > 0)) % 2)
+    return surfaces, circle, sum(area for loops in regions.values() for area, *_ in loops)

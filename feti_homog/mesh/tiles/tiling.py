@@ -7,12 +7,11 @@ after the other; a torus edge has the number that its two classes make.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 from scipy.spatial import QhullError
 
-from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, edges
+from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys
 from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE
 from feti_homog.mesh.outline.outline import Bridges, Outline, crossings, curve_at, images, on_side
 from feti_homog.mesh.periodic_topology import Torus, plane_edges_of
@@ -28,7 +27,7 @@ from feti_homog.mesh.tiles.matrix_faces import (
 from feti_homog.mesh.tiles.tile_filling import Filling, Tile, arc_edges
 from feti_homog.microstructure import Arrangement
 from feti_homog.microstructure.shapes import Discs, Ellipses
-from feti_homog.typing import Array, Float, Int, Int32
+from feti_homog.typing import Array, Int
 
 
 @dataclass(frozen=True)
@@ -91,7 +90,20 @@ def tiling(
     marked = [(k, np.radians(angle)) for k in outer.tolist() for angle in marks.get(int(disc[k]), ())]
     vertices = np.array([k for k, _ in marked], np.int64), np.array([angle for _, angle in marked])
     candidates = bridges(lines, size, CLEAR * arrangement.outer_radii.mean(), largest, vertices)
-    sides = _side_pieces(discs, outer, size)
+    # Side pieces in the matrix: the nodes, discs or corners, and the points at their ends.
+    nodes, ends = [], []
+    for axis, is_far in np.ndindex(2, 2):
+        level, places = is_far * size[1 - axis], crossings(discs[outer], axis, size)
+        points, middles = (on_side(along, axis, level) for along in (places, (places[:-1] + places[1:]) / 2))
+        circle = curve_at(discs[outer], middles)
+        corner = len(discs) + (points[[0, -1]] > 0) @ [1, 2]
+        around = np.concatenate([corner[:1], outer[circle], corner[1:]])
+        piece = np.flatnonzero(circle == MATRIX)
+        # Counter-clockwise around the cell.
+        way = slice(None, None, 1 if is_far == axis else -1)
+        nodes.append(around[piece[:, None] + [0, 2]][:, way])
+        ends.append(points[piece[:, None] + [0, 1]][:, way])
+    sides = np.concatenate(nodes), np.concatenate(ends)
     grid = np.maximum(1, np.round(size * np.sqrt(len(arrangement.radii) / policy.discs / size.prod()))).astype(int)
     matrix = matrix_tiles(circles, outer, sides, candidates, lines, size, grid)
     if matrix is None:
@@ -105,27 +117,6 @@ def tiling(
         matrix=matrix,
         within=grid_cell(np.mod(arrangement.centres, size), size, grid)[disc],
     )
-
-
-def _side_pieces(discs: Discs, outer: Int, size: Float) -> tuple[Int, Float]:
-    """Return the side pieces in the matrix, for `matrix_tiles`.
-
-    `outer` (n,) are the discs that bound the matrix.
-    """
-    nodes, ends = [], []
-    for axis, (level, low) in product((0, 1), ((0.0, True), (1.0, False))):
-        places = crossings(discs[outer], axis, size)
-        points = on_side(places, axis, level * size[1 - axis])
-        circle = curve_at(discs[outer], on_side((places[:-1] + places[1:]) / 2, axis, level * size[1 - axis]))
-        node = np.where(circle == MATRIX, MATRIX, outer[circle])
-        corner = len(discs) + (points[[0, -1]] > 0) @ [1, 2]
-        piece = np.flatnonzero(circle == MATRIX)
-        around = np.concatenate([corner[:1], node, corner[1:]])
-        both, where = np.stack([around[piece], around[piece + 2]], axis=1), points[piece[:, None] + [0, 1]]
-        forward = low == (axis == 0)
-        nodes.append(both if forward else both[:, ::-1])
-        ends.append(where if forward else where[:, ::-1])
-    return np.concatenate(nodes), np.concatenate(ends)
 
 
 def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[Tile]:
@@ -175,7 +166,7 @@ class Regions:
         phases: names, the matrix first.
         ellipses: the k circles, as in `CoarseMesh`.
         constituent: (k + 1,) the constituent next within each circle, -1 in a void; the last is the matrix.
-        phase: (constituents,) phase number of each.
+        phase, precedence: (constituents,) phase number of each; ascending numbers, as in `CoarseMesh`.
         nodes: on the lines.
     """
 
@@ -186,6 +177,7 @@ class Regions:
     ellipses: Ellipses
     constituent: Int
     phase: Int
+    precedence: Int
     nodes: int
 
 
@@ -194,9 +186,9 @@ class FilledTile:
     """A tile with its triangles.
 
     Attributes:
-        number: among all tiles.
-        tile, filling: nodes on its lines; triangles and nodes within.
-        first: number of its first node off the lines.
+        number: the tile's index among all tiles.
+        tile, filling: nodes on the lines; triangles and nodes within.
+        first: number of the first node off the lines.
     """
 
     number: int
@@ -204,10 +196,52 @@ class FilledTile:
     filling: Filling
     first: int
 
-    @property
-    def inner(self) -> Int:
-        """(k,) numbers of the nodes off the lines."""
-        return self.first + np.arange(len(self.filling.inner))
+
+def tile_mesh(regions: Regions, tiles: Sequence[FilledTile]) -> tuple[CoarseMesh, Int, Int]:
+    """Join filled tiles to a mesh without voids.
+
+    Also returns the class (n,) of each node, numbered in the cell, and the tile (m,) of each triangle.
+    """
+    scalars, pairs, triples = (np.zeros((0, *shape), np.int64) for shape in ((), (2,), (3,)))
+    parts: list[tuple[Array, ...]] = [(scalars, scalars, 0.0 * pairs, triples, scalars, scalars, pairs, scalars)]
+    for filled in tiles:
+        tile, filling, curves = filled.tile, filled.filling, filled.tile.curves
+        inner = filled.first + np.arange(len(filling.inner))
+        numbers, classes = (np.concatenate([nodes, inner]) for nodes in (tile.nodes, tile.classes))
+        constituent = regions.constituent[filling.circle]
+        solid = np.flatnonzero(constituent >= 0)
+        # A tile has arcs of its voids, too.
+        sides = np.stack([curves.inside, curves.outside])
+        is_solid = (sides != OUTSIDE) & (regions.constituent[sides] >= 0)
+        arcs, circle = arc_edges(curves.chosen(np.flatnonzero(is_solid.any(axis=0))))
+        elements = numbers[filling.triangles[solid]], constituent[solid], np.full(len(solid), filled.number)
+        points = np.concatenate([tile.points, filling.inner])
+        parts.append((numbers, classes, points, *elements, tile.nodes[arcs], circle))
+    numbers, classes, points, triangles, constituent, tile_of, arcs, circle = (
+        np.concatenate(arrays) for arrays in zip(*parts, strict=True)
+    )
+    number, triangles = np.unique(triangles, return_inverse=True)
+    everywhere, first = np.unique(numbers, return_index=True)
+    place = first[np.searchsorted(everywhere, number)]
+    _, first, inverse = np.unique(classes[place], return_index=True, return_inverse=True)
+    arcs = np.searchsorted(number, arcs).astype(np.int32)
+    # An arc between two tiles is in both.
+    once = np.sort(np.unique(edge_keys(arcs, len(number)), return_index=True)[1])
+    mesh = CoarseMesh(
+        width=regions.width,
+        height=regions.height,
+        points=regions.scale * points[place],
+        triangles=triangles.reshape(-1, 3).astype(np.int32),
+        phase=regions.phase[constituent].astype(np.int32),
+        phases=regions.phases,
+        precedence=regions.precedence[constituent].astype(np.int32),
+        representative=first[inverse].astype(np.int32),
+        ellipses=regions.ellipses,
+        arc_edges=arcs[once],
+        arc_circle=circle[once].astype(np.int32),
+        debonded_edges=np.zeros((0, 2), np.int32),
+    )
+    return mesh, classes[place], tile_of
 
 
 def tile_torus(regions: Regions, tiles: Sequence[FilledTile], all_nodes: int) -> tuple[Torus, Int]:
@@ -215,57 +249,21 @@ def tile_torus(regions: Regions, tiles: Sequence[FilledTile], all_nodes: int) ->
 
     `all_nodes` counts the nodes in the cell.
     """
-    numbers = [np.concatenate([filled.tile.nodes, filled.inner]) for filled in tiles]
-    classes = [np.concatenate([filled.tile.classes, filled.inner]) for filled in tiles]
-    points = [np.concatenate([filled.tile.points, filled.filling.inner]) for filled in tiles]
-    constituent = _all([regions.constituent[filled.filling.circle] for filled in tiles])
-    solid = constituent >= 0
-    triangles = _all([n[filled.filling.triangles] for n, filled in zip(numbers, tiles, strict=True)], 3)[solid]
-    number, triangles = np.unique(triangles, return_inverse=True)
-    everywhere, first = np.unique(_all(numbers), return_index=True)
-    place = first[np.searchsorted(everywhere, number)]
-    class_keys, node_class = np.unique(_all(classes)[place], return_inverse=True)
-    triangles = triangles.reshape(-1, 3).astype(np.int32)
-    arcs, arc_circle = _arcs(tiles, number, triangles)
-    constituent = constituent[solid]
-    mesh = CoarseMesh(
-        width=regions.width,
-        height=regions.height,
-        points=regions.scale * _all(points, 2, float)[place],
-        triangles=triangles,
-        phase=regions.phase[constituent].astype(np.int32),
-        phases=regions.phases,
-        precedence=constituent.astype(np.int32),
-        representative=np.unique(node_class, return_index=True)[1][node_class].astype(np.int32),
-        ellipses=regions.ellipses,
-        arc_edges=arcs,
-        arc_circle=arc_circle.astype(np.int32),
-        debonded_edges=np.zeros((0, 2), np.int32),
-    )
+    mesh, classes, tile = tile_mesh(regions, tiles)
     plane, triangle_edges = plane_edges_of(mesh)
-    ends = np.sort(class_keys[node_class[plane]], axis=1)
-    keys, torus_edge = np.unique(ends @ [all_nodes, 1], return_inverse=True)
-    torus = Torus(mesh, node_class, plane, triangle_edges, torus_edge, constituent, class_keys, keys, np.zeros(0, bool))
-    at_void = np.zeros(len(keys), bool)
-    at_void[torus_edge[torus.plane_edges(mesh.arc_edges[regions.constituent[arc_circle] < 0])]] = True
-    tile = np.repeat([filled.number for filled in tiles], [len(filled.filling.triangles) for filled in tiles])
-    return replace(torus, at_void=at_void, is_whole=False), tile[solid]
-
-
-def _arcs(tiles: Sequence[FilledTile], number: Int, triangles: Int32) -> tuple[Int32, Int]:
-    """Find the edges (a, 2) of triangles on circles, and their circles; node k is number[k]."""
-    arcs = [arc_edges(filled.tile.curves) for filled in tiles]
-    circle = _all([circles for _, circles in arcs])
-    ends = _all([filled.tile.nodes[pairs] for filled, (pairs, _) in zip(tiles, arcs, strict=True)], 2)
-    n = max(len(number), 1)
-    pairs = np.searchsorted(number, ends).clip(max=n - 1).astype(np.int32)
-    # A tile has arcs of its voids, too; an arc between two tiles is in both.
-    keys = edge_keys(pairs, n)
-    exists = (number[pairs] == ends).all(axis=1) & np.isin(keys, edge_keys(edges(triangles), n))
-    first = np.flatnonzero(exists)[np.unique(keys[exists], return_index=True)[1]]
-    return pairs[first], circle[first]
-
-
-def _all(parts: Sequence[Array], width: int | None = None, kind: type = int) -> Array:
-    """Concatenate rows; without parts there are no rows of `width` numbers."""
-    return np.concatenate([np.zeros((0,) if width is None else (0, width), kind), *parts])
+    class_keys, node_class = np.unique(classes, return_inverse=True)
+    keys, torus_edge = np.unique(np.sort(classes[plane], axis=1) @ [all_nodes, 1], return_inverse=True)
+    void_arcs = mesh.arc_edges[regions.constituent[mesh.arc_circle] < 0]
+    torus = Torus(
+        mesh=mesh,
+        node_class=node_class,
+        edges=plane,
+        triangle_edges=triangle_edges,
+        torus_edge=torus_edge,
+        constituent=np.searchsorted(regions.precedence, mesh.precedence),
+        class_keys=class_keys,
+        edge_keys=keys,
+        at_void=np.isin(keys, np.sort(classes[void_arcs], axis=1) @ [all_nodes, 1]),
+        is_whole=False,
+    )
+    return torus, tile

@@ -15,7 +15,7 @@ from feti_homog.typing import Document, Float
 
 FIBRE_FIRST = (2, 0, 1)
 """The axes of the cell along which axes 1, 2, 3 of a card lie: x3, x1, x2, a right-handed turn."""
-PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
+PAIRS: list[tuple[int, ...]] = [(int(name[1]) - 1, int(name[2]) - 1) for name in voigt.SPATIAL_STRESSES]
 """The pairs of axes of Voigt's order [11, 22, 33, 23, 13, 12]."""
 ORDER = [PAIRS.index(tuple(sorted((FIBRE_FIRST[i], FIBRE_FIRST[j])))) for i, j in PAIRS]
 """Where in the order of the cell the components of a card stand: C_card = C_cell[ORDER][:, ORDER]."""

@@ -24,27 +24,27 @@ from pathlib import Path
 import numpy as np
 
 from feti_homog.errors import CaseError
-from feti_homog.materials import engineering_constants
+from feti_homog.materials import engineering_constants, voigt
 from feti_homog.report.cards import effective_material
 from feti_homog.results import result_json
 from feti_homog.typing import Document, Float
 
 FIELD, FIELDS = 20, 8  # characters of a number and numbers of a line, of Abaqus
 TENSOR_SHEARS = np.array([1.0, 1.0, 1.0, 0.5, 0.5, 0.5])
-ABAQUS_ORDER = (0, 1, 2, 5, 4, 3)
-"""Where in [11, 22, 33, 23, 13, 12] the components of Abaqus' order [11, 22, 33, 12, 13, 23] stand."""
+ABAQUS_ORDER = [voigt.SPATIAL_STRESSES.index(name) for name in ("S11", "S22", "S33", "S12", "S13", "S23")]
+"""Where in [11, 22, 33, 23, 13, 12] the components of Abaqus' order stand."""
 ABAQUS_ENTRIES = tuple((ABAQUS_ORDER[row], ABAQUS_ORDER[column]) for column in range(6) for row in range(column + 1))
 """Rows and columns of D1111, D1122, D2222, D1133, ..., D2323: the upper triangle by columns."""
-ANSYS_ORDER = (0, 1, 2, 5, 3, 4)
-"""Where in [11, 22, 33, 23, 13, 12] the components of [x, y, z, xy, yz, xz] stand."""
+ANSYS_ORDER = [voigt.SPATIAL_STRESSES.index(name) for name in ("S11", "S22", "S33", "S12", "S23", "S13")]
+"""Where in [11, 22, 33, 23, 13, 12] the components of ANSYS' order [x, y, z, xy, yz, xz] stand."""
 ANSYS_ENTRIES = tuple((ANSYS_ORDER[row], ANSYS_ORDER[column]) for column in range(6) for row in range(column, 6))
 """Rows and columns of D11, D21, ..., D61, D22, ..., D66."""
 ANSYS_LABELS = {
     "EX": "E1", "EY": "E2", "EZ": "E3", "PRXY": "nu12", "PRYZ": "nu23", "PRXZ": "nu13",
     "GXY": "G12", "GYZ": "G23", "GXZ": "G13",
 }  # fmt: skip
-SYMMETRIC9 = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2), (3, 3), (4, 4), (5, 5))
 SYMMETRIC21 = tuple((row, column) for row in range(6) for column in range(row, 6))
+SYMMETRIC9 = tuple((row, column) for row, column in SYMMETRIC21 if column < 3 or row == column)
 CSV_COLUMNS = ("name", "value", "unit", "meaning")
 FIBRE_AXES = ("the fibre (x3 of the cell)", "x1 of the cell", "x2 of the cell")
 COMPONENTS = ("11", "22", "33", "gamma23", "gamma13", "gamma12")
@@ -99,7 +99,7 @@ def calculix(material: effective_material.EffectiveMaterial) -> str:
     if material.expansion is not None and material.is_orthotropic:
         lines += expansion("ORTHO", material.expansion[:3])
     elif material.expansion is not None:
-        lines += expansion("ANISO", (material.expansion * TENSOR_SHEARS)[list(ABAQUS_ORDER)])
+        lines += expansion("ANISO", (material.expansion * TENSOR_SHEARS)[ABAQUS_ORDER])
     return "\n".join(lines)
 
 

@@ -1,4 +1,4 @@
-"""Pictures of the undeformed cell: cell.png, partition.png and mesh_error.png.
+"""Pictures of the cell: cell.png, partition.png and mesh_error.png; deformed under each load.
 
 Fibres have the numbers N of `fibre = N` in case files.
 """
@@ -12,17 +12,21 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+from matplotlib.tri import Triangulation
 from scipy.spatial import cKDTree
 
-from feti_homog.report.plots import drawn_cell, plot_helpers
-from feti_homog.report.plots.decimation import outline_edges, triangle_means
-from feti_homog.typing import Array
+from feti_homog.report.plots import decimation, drawn_cell, plot_helpers
+from feti_homog.typing import Array, Document
 
 IN_LEGEND = 12  # phases of the legend, which would cover the cell
 MATRIX = "#ece8df"
 FIBRES = ("Blues", "Oranges", "Greens", "Purples", "Reds", "Greys")  # one colour map for each phase
 LEAST_SIZE = 3.0  # of the letters, in points
+LEVEL_INK, LEVEL_WIDTH = "0.15", 0.6  # of lines of equal displacement along the fibres
+UNDEFORMED = "0.5"
 
 
 def figure(cell: drawn_cell.DrawnCell) -> Figure:
@@ -55,7 +59,7 @@ def partition(cell: drawn_cell.DrawnCell) -> Figure:
     colours: Array = mpl.colormaps["tab20"](np.arange(parts) * 7 % 20)
     colours[:, :3] = 0.3 + 0.7 * colours[:, :3]
     picture, axes = _outlined(cell, colours[drawn.subdomain])
-    plot_helpers.draw_segments(axes, drawn.points[outline_edges(drawn, drawn.subdomain)], "black", 0.5)
+    plot_helpers.draw_segments(axes, drawn.points[decimation.outline_edges(drawn, drawn.subdomain)], "black", 0.5)
     text = f"{_count(drawn.body.max() + 1, 'body', 'bodies')} in {_count(parts, 'part', 'parts')}"
     axes.set_title(_title(cell.file.attrs, text))
     return picture
@@ -75,11 +79,13 @@ def mesh_error(cell: drawn_cell.DrawnCell) -> Figure | None:
     (x, y), (u, v) = (second - first).T, (third - first).T
     area = np.abs(x * v - y * u) / 2 / (file.attrs["width"] * file.attrs["height"])
     elements = drawn.group / drawn.pieces
-    density: Array = np.max([triangle_means(table, None, drawn) for table in tables], axis=0) * elements / area
+    density: Array = (
+        np.max([decimation.triangle_means(table, None, drawn) for table in tables], axis=0) * elements / area
+    )
     highest = float(density.max(initial=0.0))
     if not 0.0 < highest < np.inf:
         return None
-    picture, (axes,) = drawn_cell.figure_of(file.attrs, panels=1, beside=drawn_cell.BAR_INCHES)
+    picture, axes = drawn_cell.figure_of(file.attrs)
     top = float(plot_helpers.value_range(density, area)[0].vmax or highest)
     lowest = top / 10.0**4  # less, on hardly any area, is one colour
     colours = ScalarMappable(LogNorm(lowest, top), "magma_r")
@@ -87,8 +93,8 @@ def mesh_error(cell: drawn_cell.DrawnCell) -> Figure | None:
         axes, drawn, drawn.points, np.asarray(colours.to_rgba(np.maximum(density, lowest))), edges=False
     )
     extend = "both" if highest > top else "min"
-    bar = drawn_cell.bar_beside(axes, colours, extend, drawn_cell.cell_size(file.attrs))
-    letters = int(max(drawn_cell.cell_size(file.attrs)[1], drawn_cell.LEAST_BAR[1]) / 0.075)
+    bar = drawn_cell.bar_beside(axes, colours, extend)
+    letters = int((picture.get_figheight() - 1.2) / 0.075)
     bar.set_label(fill("error of the strain energy / energy, per share of the area", letters))
     plot_helpers.draw_segments(axes, drawn.points[cell.borders], "black", 0.7)
     drawn_cell.label_cell_axes(axes, file.attrs)
@@ -98,7 +104,7 @@ def mesh_error(cell: drawn_cell.DrawnCell) -> Figure | None:
 
 def _outlined(cell: drawn_cell.DrawnCell, colours: Array) -> tuple[Figure, Axes]:
     """Return the cell with triangle colours (q, 4) and body outlines."""
-    picture, (axes,) = drawn_cell.figure_of(cell.file.attrs, panels=1)
+    picture, axes = drawn_cell.figure_of(cell.file.attrs)
     plot_helpers.fill_triangles(axes, cell.drawn, cell.drawn.points, colours, len(cell.drawn.triangles) <= 6000)
     plot_helpers.draw_segments(axes, cell.drawn.points[cell.borders], "black", 0.9)
     drawn_cell.label_cell_axes(axes, cell.file.attrs)
@@ -142,3 +148,64 @@ def write_fibre_numbers(axes: Axes, cell: drawn_cell.DrawnCell, inches: float, f
             text, size = f"{number}\n{factors[k]:.2f}", max(0.75 * size, LEAST_SIZE)
         for x, y in places:
             axes.text(x, y, text, fontsize=size, ha="center", va="center", clip_on=True)
+
+
+def deformed(cell: drawn_cell.DrawnCell, state: Any, document: Document) -> Figure:
+    """Return the cell in a state with a stress component in colour, and the states of its interface.
+
+    In the plane it is magnified, with its undeformed outline.  A shear along the fibres moves nothing in the plane:
+    lines of equal axial displacement u_3 show it.
+    """
+    drawn, attributes, output = cell.drawn, cell.file.attrs, document.get("case", {}).get("output", {})
+    displacement, load = decimation.drawn_displacement(state, drawn), drawn_cell.LoadLabels.of(document)
+    title, scale = load.label(state.attrs), 0.0
+    if not is_axial(state):
+        largest = decimation.largest_scale(displacement, drawn)
+        size, length = float(np.ptp(drawn.points, axis=0).min()), plot_helpers.largest_length(displacement)
+        chosen = output.get("deformation_scale")
+        scale = plot_helpers.magnification(length, size, largest=largest) if chosen is None else chosen
+        title += f", displacement × {scale:g}"
+    moved = drawn.points + scale * displacement
+    figure, axes = drawn_cell.figure_of(attributes)
+    component = plot_helpers.stress_component(output.get("stress", "auto"), [state])
+    stress = plot_helpers.nodal_stress(state, component, drawn)
+    norm, colours, extend = plot_helpers.colour_range(stress, drawn.node_areas)
+    shapes = plot_helpers.shade_triangles(axes, drawn, moved, stress, norm, colours)
+    bar = drawn_cell.bar_beside(axes, shapes, extend)
+    bar.ax.ticklabel_format(axis="y", scilimits=(-2, 4))
+    bar.set_label(f"${plot_helpers.STRESS_SYMBOLS[component]}$ {plot_helpers.stress_label(attributes['stress_unit'])}")
+    if is_axial(state):
+        step = draw_levels(axes, state, drawn)
+        caption = f"$u_3$ every {step:g} {plot_helpers.plain(attributes['length_unit'])}".rstrip()
+        line = Line2D([], [], color=LEVEL_INK, linewidth=LEVEL_WIDTH, label=caption)
+    else:
+        outline: Array = drawn.points[cell.borders]
+        if drawn.body.max() >= 8:  # the cell alone
+            corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [attributes["width"], attributes["height"]]
+            outline = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+        plot_helpers.draw_segments(axes, outline, UNDEFORMED, 0.7)
+        line = Line2D([], [], color=UNDEFORMED, linewidth=0.7, label="undeformed")
+    plot_helpers.draw_segments(axes, moved[cell.borders], "black", 0.8)
+    marks = cell.interface.mark(axes, moved, drawn_cell.states_of_nodes(state))
+    drawn_cell.label_cell_axes(axes, attributes)
+    handles = [*(marks if len(marks) > 1 else ()), line]
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 2), frameon=False)
+    axes.set_title(_title(attributes, title))
+    return figure
+
+
+def is_axial(state: Any) -> bool:
+    """Return whether a state shears the cell along the fibres alone."""
+    strain = state.attrs["strain"]
+    components = [*strain[[0, 1, -1]], strain[2], state.attrs["temperature"]] if len(strain) > 3 else strain
+    return not np.any(components) and bool(np.any(strain))
+
+
+def draw_levels(axes: Axes, state: Any, drawn: decimation.DrawnMesh) -> float:
+    """Draw about twelve lines of equal axial displacement; returns the step between them."""
+    displacement: Array = decimation.nodal_values(state["axial_displacement"], drawn)
+    levels = MaxNLocator(12, steps=(1, 2, 5, 10)).tick_values(displacement.min(), displacement.max())
+    x, y = drawn.points.T
+    mesh = Triangulation(x, y, drawn.triangles)
+    axes.tricontour(mesh, displacement, levels=levels, colors=LEVEL_INK, linewidths=LEVEL_WIDTH, linestyles="solid")
+    return float(levels[1] - levels[0])

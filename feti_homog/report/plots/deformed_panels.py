@@ -11,6 +11,7 @@ from typing import Any
 import h5py
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -25,9 +26,8 @@ from feti_homog.typing import Array, Document
 MAX_PANELS = 6
 MAX_FRAMES, FRAME_TIME = 24, 250  # of the animation; milliseconds
 PANEL_LIMIT = 30_000  # triangles in a panel
-INCHES, BAR = 8.0, 0.55  # of all panels of a row, and of the colour bar in each
-FRAME, MOST_HEIGHT = 3.6, 6.0  # width of a cell in the animation; largest height of a cell in it and in a panel; inches
-LOADS_IN_PANEL, LINE = 2, 0.15  # in a line of its title; inches of a line
+WIDTH, FRAME, MOST_HEIGHT = 8.0, 3.6, 6.0  # of panels, of a cell in the animation, of a cell in either; inches
+LOADS_IN_PANEL = 2  # in a line of its title
 
 
 @dataclass(frozen=True)
@@ -78,15 +78,11 @@ class DeformedCell(drawn_cell.DrawnCell):
         axes.set_title(f"{title}\n{self.labels.label(attributes, LOADS_IN_PANEL)}", fontsize=9, y=1.0)
         return shapes
 
-    def bar(self, axes: Axes, shapes: Any, size: tuple[float, float] | None = None) -> None:
-        """Draw the common colour bar beside axes; `size` is the drawn cell size (inches), if known."""
-        bar = drawn_cell.bar_beside(axes, shapes, self.colours[2], size)
+    def bar(self, axes: Axes, shapes: Any) -> None:
+        """Draw the common colour bar beside axes."""
+        bar = drawn_cell.bar_beside(axes, shapes, self.colours[2])
         bar.ax.tick_params(labelsize=8)
         bar.locator = MaxNLocator(6)
-
-    def lines(self, number: int) -> int:
-        """Count the lines in the load label of a state."""
-        return 1 + self.labels.label(self.state(number).attrs, LOADS_IN_PANEL).count("\n")
 
     @property
     def caption(self) -> str:
@@ -128,25 +124,6 @@ def draw_state(
     return caption
 
 
-def plot(directory: Path, file: Any, document: Document) -> list[Path]:
-    """`angle_states.png`, or `path_states.png` and `path.gif`."""
-    count, analysis = len(file.get("state", ())), reported(document)
-    if not count:
-        return []
-    scale = shown_scale(file, document)
-    if analysis.is_followed:
-        numbers = landmarks.landmark_states(document, MAX_PANELS, count)
-    else:  # the first of the unit cases, if there are three an angle
-        every = range(0, count, count // len(document[analysis.name]) or 1)
-        numbers = [every[k] for k in analysis.states(document, MAX_PANELS, len(every))]
-    panels = _side_by_side(file, numbers, document, scale)
-    paths = [plot_helpers.save(panels, directory / f"{analysis.name}_states.png")]
-    if analysis.is_followed:
-        frames = landmarks.chosen_states(document, MAX_FRAMES, count)
-        paths.append(_animation(file, frames, document, scale, directory / "path.gif"))
-    return paths
-
-
 def shown_scale(file: Any, document: Document) -> float:
     """Return the displacement factor for all pictures of an angle or a path.
 
@@ -159,7 +136,7 @@ def shown_scale(file: Any, document: Document) -> float:
     drawn = decimation.drawn_mesh(file, PANEL_LIMIT)
     displacement = opening = 0.0
     largest = math.inf
-    for number in reported(document).states(document, MAX_FRAMES, len(file["state"])):
+    for number in shown_states(document, MAX_FRAMES, len(file["state"])):
         state = file[f"state/{number}"]
         u = decimation.drawn_displacement(state, drawn)
         displacement = max(displacement, plot_helpers.largest_length(u))
@@ -167,17 +144,31 @@ def shown_scale(file: Any, document: Document) -> float:
         opening = max(opening, float(state["jump"][:, 0].max(initial=0.0)))
     size = float(min(file.attrs["width"], file.attrs["height"]))
     scale = plot_helpers.magnification(displacement, size, opening, largest)
-    return max(scale, 1.0) if reported(document).is_load_given(document) else scale
+    is_load_given = reported(document).is_followed or document["case"].get("angle", {}).get("strain") is not None
+    return max(scale, 1.0) if is_load_given else scale
 
 
-def _side_by_side(file: Any, numbers: Sequence[int], document: Document, scale: float) -> Figure:
+def shown_states(document: Document, most: int, count: int) -> list[int]:
+    """Return the numbers of at most `most` states among `count`: by the landmarks of a path, or evenly spaced."""
+    if reported(document).is_followed:
+        return landmarks.chosen_states(document, most, count)
+    return sorted({round(k) for k in np.linspace(0, count - 1, min(most, count))})
+
+
+def panels(file: Any, document: Document, scale: float) -> Figure:
+    """Draw states beside each other: those at the landmarks of a path, or some angles."""
+    count, analysis = len(file["state"]), reported(document)
+    if analysis.is_followed:
+        numbers = landmarks.landmark_states(document, MAX_PANELS, count)
+    else:  # the first of the unit loads, if there are several an angle
+        every = range(0, count, count // len(document[analysis.name]) or 1)
+        numbers = [every[k] for k in shown_states(document, MAX_PANELS, len(every))]
     cell = DeformedCell.of_states(file, numbers, document, scale, PANEL_LIMIT)
     places = [cell.moved(number) for number in numbers]
     size = np.subtract(*_corners(places)[::-1])
     rows, columns = _grid(len(numbers), size[0] / size[1])
-    height = _inches(size, (INCHES - BAR) / columns)[1]
-    title = 0.2 + LINE * (1 + max(cell.lines(number) for number in numbers))
-    figure = Figure(figsize=(INCHES, rows * (height + title) + 0.7), layout="constrained")
+    height = _inches(size, (WIDTH - 0.5) / columns)[1] + 0.55  # beside a colour bar, with a title
+    figure = Figure(figsize=(WIDTH, rows * height + 0.7), layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     shapes = [cell.draw(axes, number, moved) for axes, number, moved in zip(grid, numbers, places, strict=False)]
     bar: Any = figure.colorbar(shapes[0], ax=grid.tolist(), extend=cell.colours[2], shrink=0.7, aspect=30, pad=0.01)
@@ -208,25 +199,25 @@ def _grid(panels: int, ratio: float) -> tuple[int, int]:
     return min(grids, key=lambda grid: (grid[0] * grid[1] - panels, abs(grid[0] - ideal)))
 
 
-def _animation(file: Any, numbers: Sequence[int], document: Document, scale: float, path: Path) -> Path:
-    """Write the animation; all frames have the layout for the last state."""
+def animation(file: Any, document: Document, scale: float, path: Path) -> Path:
+    """Write states along the path as a film, whose frames have the layout for the last state."""
+    numbers = shown_states(document, MAX_FRAMES, len(file["state"]))
     cell = DeformedCell.of_states(file, numbers, document, scale, 8000)
     places = [cell.moved(number) for number in numbers]
     low, high = _corners(places)
-    size = high - low
-    title = 0.75 + LINE * max(cell.lines(number) for number in numbers)
-    width, height = _inches(size, FRAME)
-    figure = Figure(figsize=(FRAME + BAR, height + title), dpi=100, layout="constrained")
-    axes = figure.subplots()
+    figure = Figure(figsize=(FRAME + 0.55, _inches(high - low, FRAME)[1] + 1.05), dpi=100, layout="constrained")
+    canvas: Any = FigureCanvasAgg(figure)
+    axes, frames = figure.subplots(), list[Image.Image]()
     figure.suptitle(cell.caption, fontsize=10)
-    frames: list[Image.Image] = []
     for number, moved in zip(reversed(numbers), reversed(places), strict=True):
         for artist in [*axes.collections, *axes.patches, *axes.child_axes]:
             artist.remove()
-        cell.bar(axes, cell.draw(axes, number, moved), (width, height))
+        cell.bar(axes, cell.draw(axes, number, moved))
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        picture = Image.fromarray(plot_helpers.pixels_of(figure))
+        with plot_helpers.missing_letters_as_boxes():
+            canvas.draw()
         figure.set_layout_engine("none")
+        picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
         frames.insert(0, picture.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE))
     times = [FRAME_TIME] * (len(frames) - 1) + [6 * FRAME_TIME]
     film = {"save_all": True, "append_images": frames[1:], "duration": times, "loop": 0}

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Any, Literal
 
 import numpy as np
@@ -19,9 +20,17 @@ from feti_homog.report.text.summary import reported
 from feti_homog.results import path_curves
 from feti_homog.typing import Array, Document
 
-BAR_INCHES = 1.1  # room for a colour bar beside the cell
-BAR, LEAST_BAR = (0.04, 1.0), (0.15, 1.2)  # width and height of a bar: shares of the cell's, and least inches
-BONDED, CLOSED, OPEN, DAMAGED = 0, 1, 2, 3
+
+class NodeState(IntEnum):
+    """State of an interface node: its status in result.h5, or damaged if its bond is, but holds."""
+
+    BONDED = 0
+    CLOSED = 1
+    OPEN = 2
+    DAMAGED = 3
+
+
+BONDED, CLOSED, OPEN, DAMAGED = NodeState
 STATE_NAMES = {BONDED: "bonded", DAMAGED: "damaged", CLOSED: "in contact", OPEN: "open"}
 STATE_COLOURS = {BONDED: "black", CLOSED: "#ff7f0e", OPEN: "#00a14b", DAMAGED: "#9467bd"}
 STATE_WIDTHS = {BONDED: 0.8, CLOSED: 2.6, OPEN: 2.0, DAMAGED: 2.0}
@@ -91,7 +100,7 @@ def states_of_nodes(state: Any) -> Array:
     return np.asarray(np.where((status == BONDED) & (damage > 0.0), DAMAGED, status))
 
 
-def state_legend(kinds: list[int]) -> list[Line2D]:
+def state_legend(kinds: Iterable[NodeState]) -> list[Line2D]:
     return [Line2D([], [], color=STATE_COLOURS[k], linewidth=STATE_WIDTHS[k], label=STATE_NAMES[k]) for k in kinds]
 
 
@@ -102,12 +111,11 @@ def _wrapped(points: Array, period: Array, tolerance: float) -> Array:
     return np.asarray(inside)
 
 
-def figure_of(attributes: Any, panels: int, beside: float = 0.0) -> tuple[Figure, Sequence[Axes]]:
-    """Return a figure with cell panels and `beside` inches for a colour bar."""
+def figure_of(attributes: Any) -> tuple[Figure, Axes]:
+    """Return a figure with axes for the cell, and room for words, a legend and a colour bar."""
     width, height = cell_size(attributes)
-    size = panels * (width + 0.7) + 0.1 + beside, max(height, LEAST_BAR[1]) + 1.2
-    figure = Figure(figsize=size, layout="compressed")
-    return figure, figure.subplots(1, panels, squeeze=False)[0]
+    figure = Figure(figsize=(width + 1.9, max(height, width / 4) + 1.2), layout="compressed")
+    return figure, figure.subplots()
 
 
 def cell_scale(attributes: Any) -> float:
@@ -131,16 +139,16 @@ def label_cell_axes(axes: Axes, attributes: Any) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def bar_beside(axes: Axes, shapes: Any, extend: str, size: tuple[float, float] | None = None) -> Any:
+def bar_beside(axes: Axes, shapes: Any, extend: str) -> Any:
     """Return a colour bar for `shapes`, at the right of their axes.
 
-    `size`: drawn cell size (inches); beside a narrow cell the bar is wider, beside a flat one higher.
+    The bar is 1/25 of the longer side of the cell wide, as high as the cell, and at least 1/4 of the longer side high.
     """
     figure: Any = axes.figure
-    width, height = BAR if size is None else np.maximum(np.divide(LEAST_BAR, size), BAR).tolist()
-    return figure.colorbar(
-        shapes, cax=axes.inset_axes((1.0 + 0.75 * width, 0.5 * (1.0 - height), width, height)), extend=extend
-    )
+    sides: Any = axes.dataLim.size
+    width, height = np.maximum(sides.max() / sides * (0.04, 0.25), (0.0, 1.0)).tolist()
+    place = axes.inset_axes((1.0 + 0.75 * width, 0.5 * (1.0 - height), width, height))
+    return figure.colorbar(shapes, cax=place, extend=extend)
 
 
 @dataclass(frozen=True)

@@ -2,21 +2,19 @@
 
 import math
 import warnings
-from collections.abc import Sequence
-from io import BytesIO
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Path2D
 from matplotlib.tri import Triangulation
-from PIL import Image
 
 from feti_homog.case import bond_laws
 from feti_homog.materials import voigt
@@ -40,39 +38,24 @@ STRESS_TABLES: dict[str, tuple[str, int | None]] = {
 OUTLIERS = 0.005  # fraction of the area that may lie outside of a colour range, at either end
 INK = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d", "#8a6d00", "#0f7c8c", "#8c1d40")  # of curves
 STYLE = {"font.size": 10, "axes.titlesize": 11, "axes.linewidth": 0.8}
-DPI, PADDING, CUT = 200, 0.08, 0.02  # dots per inch; inches, the last of what may lie beyond the sides of a figure
+DPI = 200
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write the figure as PNG without white margins; a figure with words beyond its sides is drawn twice.
+    """Write the figure as PNG without white margins.
 
     Raises FetiHomogError if it cannot be written.
     """
-    figure.set_dpi(DPI)
-    pixels = pixels_of(figure)
-    drawn: Any = figure.get_tightbbox()
-    low, high = drawn.min, drawn.max
-    if (low < -CUT).any() or (high > figure.get_size_inches() + CUT).any():
-        figure.set_layout_engine("none")  # which is done
-        with BytesIO() as stream:
-            figure.savefig(stream, format="png", dpi=DPI, bbox_inches=drawn.padded(PADDING))
-            pixels = np.asarray(Image.open(stream).convert("RGB"))
-    is_inked, padding, places = (pixels != 255).any(axis=2), round(PADDING * DPI), list[slice]()
-    for axis in (1, 0):
-        inked = np.flatnonzero(is_inked.any(axis=axis))
-        first, last = (inked[0], inked[-1] + 1) if len(inked) else (0, is_inked.shape[1 - axis])
-        places.append(slice(max(first - padding, 0), last + padding))
-    picture = Image.fromarray(np.ascontiguousarray(pixels[tuple(places)]))
-    return atomic.replace(path, lambda part: picture.save(part, format="PNG"))
+    with missing_letters_as_boxes():
+        return atomic.replace(path, lambda part: figure.savefig(part, format="png", dpi=DPI, bbox_inches="tight"))
 
 
-def pixels_of(figure: Figure) -> Array:
-    """Return the drawn figure (rows, columns, 3); letters missing in the font are boxes, without warnings."""
-    canvas: Any = FigureCanvasAgg(figure)
+@contextmanager
+def missing_letters_as_boxes() -> Iterator[None]:
+    """Draw letters that the font lacks as boxes, without warnings."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"Glyph \d+")
-        canvas.draw()
-    return np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3])
+        yield
 
 
 def finish_curves(axes: Axes) -> None:

@@ -6,20 +6,20 @@ import numpy as np
 
 from feti_homog.case import load_sections
 from feti_homog.materials import voigt
-from feti_homog.report.text.point_tables import COUNTS, WIDTH, columns_without_noise, counts, debonded, energies
-from feti_homog.report.text.tables import Column, Table, stress_label, without_noise
+from feti_homog.report.text.point_tables import COUNTS, columns_without_noise, counts, debonded, energies
+from feti_homog.report.text.tables import WIDTH, Column, Table, stress_label, without_noise
 from feti_homog.results import landmarks, path_curves
 from feti_homog.typing import Document
 
 ROWS = 15  # of the table
 
 
-def path_table(document: Document, limit: int = ROWS) -> Table:
-    """Return totals of the path above at most `limit` rows of points.
+def path_table(document: Document, limit: int | None = None) -> Table:
+    """Return totals of the path above at most `limit` rows of points, by default `ROWS`.
 
     Columns: leading strain, stresses that waypoints name or that act, temperature, strains under prescribed stresses.
     """
-    points, numbers = document["path"], landmarks.chosen(document, limit)
+    points, numbers = document["path"], landmarks.chosen(document, limit or ROWS)
     strain, stress = (columns_without_noise([point[name] for point in points]) for name in ("strain", "stress"))
     strains, stresses = voigt.voigt_names(strain.shape[1])
     leading = path_curves.leading_component(document)

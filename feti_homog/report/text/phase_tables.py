@@ -6,12 +6,21 @@ from typing import Any
 from feti_homog.report.text.tables import Column, Table, stress_label, without_noise
 from feti_homog.typing import Document
 
+STATES = 4  # of a curve
 STRESSES = {"principal": "principal", "von_mises": "von Mises", "hydrostatic": "hydrostatic"}
 
 
-def phase_tables(document: Document, states: Sequence[int]) -> list[Table]:
-    """Return the stresses and the utilisations in some states; nothing without them."""
+def phase_tables(document: Document) -> list[Table]:
+    """Return the stresses and the utilisations under all loads, or in some states of a curve; nothing without them."""
     phases = document.get("phase_stresses", ())
+    count = max((len(phase["state"]) for phase in phases), default=0)
+    states: Sequence[int] = range(count)
+    if "path" in document and "states" in document:
+        from feti_homog.results import landmarks  # of paths alone
+
+        states = landmarks.chosen_states(document, STATES, count)
+    elif "path" in document or "angle" in document:
+        states = states[:: -(-count // STATES) or 1]
     rows = [
         [_label(phase, k), *(value for name in STRESSES for value in _entry(phase, name, k))]
         for k in states

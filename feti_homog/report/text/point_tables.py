@@ -1,6 +1,6 @@
 """Tables of an angle, a load or an envelope, and of energy release rates at tips."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import cos, radians, sin
 from textwrap import wrap
@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 
 from feti_homog.materials import voigt
-from feti_homog.report.text.tables import Column, Table, stress_label, toughness_label, without_noise
+from feti_homog.report.text.tables import WIDTH, Column, Table, stress_label, toughness_label, without_noise
 from feti_homog.results import path_curves
 from feti_homog.typing import Document
 
-WIDTH = 79
 ENVELOPE_ROWS = 12  # of its table
 ENTRIES = {"C11": (0, 0), "C22": (1, 1), "C12": (0, 1), "C33": (2, 2)}
 SPATIAL_ENTRIES = {f"C{i}{i}": (i - 1, i - 1) for i in range(1, 7)} | {"C12": (0, 1)}
@@ -102,7 +101,7 @@ def counts(point: Point) -> list[int]:
     return [point[state] for state in STATES]
 
 
-def envelope_table(document: Document, limit: int = ENVELOPE_ROWS) -> Table:
+def envelope_table(document: Document, limit: int | None = None) -> Table:
     """Return least and largest onset load, and the first bond to break in at most `limit` directions."""
     section, points = document["case"]["envelope"], document["envelope"]
     axes, temperature = section["plane"], section.get("temperature")
@@ -121,7 +120,7 @@ def envelope_table(document: Document, limit: int = ENVELOPE_ROWS) -> Table:
     used = "traction / strength" if "normal" in names else "psi of its traction"
     above.append(f"  first bond: its fibre, its direction there (degrees), {used}")
     columns = [Column("angle", 8), *(Column(axis, 12, ".6g") for axis in axes), *map(ONSET.__getitem__, names)]
-    step = max(1, -(-len(points) // limit))
+    step = max(1, -(-len(points) // (limit or ENVELOPE_ROWS)))
     while len(points) % step:  # directions are evenly spaced
         step += 1
     rows = [
@@ -139,12 +138,11 @@ def components(point: Point) -> tuple[float, float]:
     return without_noise(load * cos(angle), load), without_noise(load * sin(angle), load)
 
 
-def tip_table(document: Document, tips: Document | None) -> list[Table]:
-    """Return the tip with the largest G for each load; nothing without tips."""
+def tip_table(document: Document, tips: Document) -> Table:
+    """Return the tip with the largest G for each load."""
     largest = _largest(tips)
     rows = [list(tip.values()) for tip in largest.values()]
-    columns = [Column("load", 9), *_rate_columns(largest)]
-    return [Table(f"{TIP_TITLE}{toughness_label(document)}", columns, rows)] if rows else []
+    return Table(f"{TIP_TITLE}{toughness_label(document)}", [Column("load", 9), *_rate_columns(largest)], rows)
 
 
 def angle_tip_table(document: Document) -> list[Table]:
@@ -173,3 +171,11 @@ def _largest(tips: Document | None) -> dict[str, Document]:
 def _rate_columns(tips: Mapping[str, Document]) -> list[Column]:
     rate_columns = [replace(column, name="at") if column.name == "angle" else column for column in RATES]
     return [*rate_columns, *([SECTION] if any(SECTION.name in tip for tip in tips.values()) else [])]
+
+
+TABLES: dict[str, Callable[[Document, int | None], list[Table]]] = {
+    "angle": lambda document, limit: [angle_table(document, limit), *angle_tip_table(document)],
+    "load": lambda document, limit: [load_table(document)],
+    "envelope": lambda document, limit: [envelope_table(document, limit)],
+}
+"""Tables of an analysis, with at most `limit` rows of points; None for the rows of the summary."""

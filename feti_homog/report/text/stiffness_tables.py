@@ -125,59 +125,48 @@ def bounds(document: Document) -> Table:
 def constants(document: Document) -> list[Table]:
     """Return engineering constants in space; constants about the fibres with estimates and bounds."""
     tables, values = list[Table](), document.get("constants")
+    errors, label = _errors(document).get("constants", {}), stress_label(document)
     if values is not None:
-        title = f"Engineering constants, {engineering_constants.CELL_AXES}{stress_label(document)}"
-        values = {name: values[name] for name in ENGINEERING if name in values}
-        tables.append(with_errors(title, values, _errors(document).get("constants", {}), 3))
-    return [*tables, *([_estimates(document)] if document.get("transversely_isotropic") is not None else [])]
-
-
-def _estimates(document: Document) -> Table:
-    """Return constants about the fibres: a row per source, a column per constant known from any source."""
-    sources = _sources(document)
-    names = [name for name in engineering_constants.ABOUT_FIBRES if any(name in row for row in sources.values())]
+        title = f"Engineering constants, {engineering_constants.CELL_AXES}{label}"
+        tables.append(with_errors(title, {name: values[name] for name in ENGINEERING if name in values}, errors, 3))
+    if (cell := document.get("transversely_isotropic")) is None:
+        return tables
+    # A row for each source, a column for each constant that any source knows.
+    limits, estimates = _known(document.get("fibre_bounds") or {}), document.get("estimates")
+    sources: dict[str, Document] = {THIS_CELL: cell, ITS_ERROR: errors}
+    sources |= {name.replace("_", " "): row for name, row in (estimates or {}).items()}
+    sources |= {name: {key: limits[key][k] for key in limits} for k, name in enumerate((LOWER, UPPER))}
+    numbers = {
+        title: _known({n: row.get(n) for n in engineering_constants.ABOUT_FIBRES}) for title, row in sources.items()
+    }
+    names = [name for name in engineering_constants.ABOUT_FIBRES if any(name in row for row in numbers.values())]
     rows = [
         [title, *(_short(row.get(name), ".1e" if title == ITS_ERROR else ".5g") for name in names)]
-        for title, row in sources.items()
+        for title, row in numbers.items()
+        if row
     ]
     columns = [Column("", -22), *(Column(name, max(13, len(name) + 2)) for name in names)]
     below = [f"  {UNKNOWN}: not available from this method"] if any(UNKNOWN in row for row in rows) else []
-    below += [f"  closed-form estimates exist for {why} only" for why in _why_no_estimates(document)]
-    deviation = 100 * document["transversely_isotropic"]["deviation"]
-    title = f"Along the fibres and across them{stress_label(document)}; {deviation:.2g} % from transversely isotropic"
+    if estimates is None:
+        below.append(f"  closed-form estimates exist for {_with_estimates(document)} only")
+    title = f"Along the fibres and across them{label}; {100 * cell['deviation']:.2g} % from transversely isotropic"
     above = []
     if (across := document.get("transverse_moduli")) is not None:
         ranges = (f"{n} from {_short(across[f'{n}_least'])} to {_short(across[f'{n}_largest'])}" for n in ("E", "G"))
         above.append(f"  over all directions across: {', '.join(ranges)}")
-    return Table(title, columns, rows, above, below, most_columns=5)
+    return [*tables, Table(title, columns, rows, above, below, most_columns=5)]
 
 
-def _sources(document: Document) -> dict[str, Document]:
-    """Return known constants about the fibres by source: this cell, its errors, estimates, bounds."""
-    limits = _known(document.get("fibre_bounds") or {})
-    errors, sources = _errors(document).get("constants", {}), {THIS_CELL: document["transversely_isotropic"]}
-    sources |= (
-        {ITS_ERROR: {name: errors[name] for name in engineering_constants.ABOUT_FIBRES if name in errors}}
-        if errors
-        else {}
-    )
-    sources |= {name.replace("_", " "): row for name, row in (document.get("estimates") or {}).items()}
-    sources |= {name: {key: limits[key][k] for key in limits} for k, name in enumerate((LOWER, UPPER))}
-    return {title: present for title, row in sources.items() if (present := _known(row))}
-
-
-def _why_no_estimates(document: Document) -> list[str]:
-    """Return the kind of cell that has estimates, if this cell has none."""
+def _with_estimates(document: Document) -> str:
+    """Return the kind of cell that has estimates, unlike this cell."""
     case, cell = document.get("case", {}), document.get("cell", {})
-    if document.get("estimates") is not None:
-        return []
     if len(cell.get("fractions", ())) == 1:
-        return ["composites"]
+        return "composites"
     if cell.get("porosity"):
-        return ["cells without voids"]
+        return "cells without voids"
     if phase_names.COATING in case.get("material", {}):
-        return ["fibres without coatings"]
-    return ["round fibres that are bonded, all alike" if case.get("interface") else "round fibres"]
+        return "fibres without coatings"
+    return "round fibres that are bonded, all alike" if case.get("interface") else "round fibres"
 
 
 def _known(row: Document) -> dict[str, Any]:

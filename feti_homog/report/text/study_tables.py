@@ -1,6 +1,5 @@
 """Text of studies: the tables of a fit from fit.json, and of scatter from uncertainty.json."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,6 @@ from feti_homog.typing import Document
 
 FIRST, NUMBERS = tables.Column("", -38), ("value", "std", "computed", "residual")
 LEAST_SHARE, MOST_DEVIATIONS = 0.01, 3.0
-NOISY = 0.5  # of a slope: a larger standard error over random cells is worth a line
 
 
 def fit_text(document: Document) -> str:
@@ -39,23 +37,18 @@ def fit_text(document: Document) -> str:
     chance = "" if document["chance"] is None else f", as large or larger with a chance of {document['chance']:.2g}"
     squares = document["sum_of_squares"]
     total = "beyond all numbers" if squares is None else f"{squares:.4g}"
-    last = f"Sum of squares {total}{chance}; {document['evaluations']} evaluations"
-    return "\n\n".join(["", *("\n".join(table.lines) for table in printed), last, *_remarks(document, data)])
+    last = [f"Sum of squares {total}{chance}; {document['evaluations']} evaluations"]
+    ends = [f"{name} at its {row['at_bound']}" for name, row in document["unknowns"].items() if row["at_bound"]]
+    label, worst = max(zip(data, (abs(d["residual"]) for d in measured), strict=True), key=lambda pair: pair[1])
+    if ends and worst > MOST_DEVIATIONS:
+        last.append(
+            f"Remark: the fit ends with {', '.join(ends)} bound, and {label} is {worst:.3g} standard deviations off"
+        )
+    return "\n\n".join(["", *("\n".join(table.lines) for table in printed), *last])
 
 
 def _dash(value: float | None) -> float | str:
     return "-" if value is None else value
-
-
-def _remarks(document: Document, data: Sequence[str]) -> list[str]:
-    """Return a remark where unknowns end at their bounds and a measured value is off by MOST_DEVIATIONS or more."""
-    bound = [f"{name} at its {row['at_bound']}" for name, row in document["unknowns"].items() if row["at_bound"]]
-    residuals = [datum["residual"] for datum in document["measured"]]
-    worst = int(np.argmax(np.abs(residuals)))
-    if not bound or abs(residuals[worst]) <= MOST_DEVIATIONS:
-        return []
-    deviation = f"{data[worst]} is {abs(residuals[worst]):.3g} standard deviations off"
-    return [f"Remark: the fit ends with {', '.join(bound)} bound, and {deviation}"]
 
 
 def scatter_text(document: Document) -> str:
@@ -63,7 +56,16 @@ def scatter_text(document: Document) -> str:
     inputs, of_cells = document["parameters"], {"+- cells": "std_cells", "+- both": "std"}
     heads = {"value": "value", "+- inputs": "std_inputs", **(of_cells if document["cells"] > 1 else {})}
     heads["+- mesh"] = "mesh_error"
-    results, labels = _scattered(document), [number["name"].removeprefix("material.") for number in inputs]
+    labels = [number["name"].removeprefix("material.") for number in inputs]
+    names = [result["name"] for result in document["results"]]
+    listed = constant_tables.shown(names) if "C11" in names else names
+    kinds, sizes, results = [name.rstrip("0123456789") for name in names], dict[str, float](), list[Document]()
+    for kind, result in zip(kinds, document["results"], strict=True):
+        sizes[kind] = max(sizes.get(kind, 0.0), abs(result["value"]), result["std"])
+    # More scatter than solver noise beside the largest of their kind.
+    for kind, result in zip(kinds, document["results"], strict=True):
+        if result["name"] in listed and tables.without_noise(result["std"], sizes[kind]) > 0:
+            results.append(result)
     rows = list[list[Any]]()
     for result in results:
         numbers = ["-" if result[key] is None else result[key] for key in heads.values()]
@@ -79,26 +81,10 @@ def scatter_text(document: Document) -> str:
         noisy = [
             result["name"]
             for result in results
-            if (errors := result["derivative_errors"]) and errors[k] > NOISY * abs(result["derivatives"][k])
+            if (errors := result["derivative_errors"]) and 2 * errors[k] > abs(result["derivatives"][k])
         ]
         if noisy:
             lines.append(
                 f"Standard error over the cells above half of the slope by {number['name']}: {', '.join(noisy)}"
             )
     return "\n".join(lines)
-
-
-def _scattered(document: Document) -> list[Document]:
-    """Return results with more scatter than solver noise beside the largest of their kind."""
-    results = document["results"]
-    names = [result["name"] for result in results]
-    listed, sizes = {*(constant_tables.shown(names) if "C11" in names else names)}, dict[str, float]()
-    for result in results:
-        kind = result["name"].rstrip("0123456789")
-        sizes[kind] = max(sizes.get(kind, 0.0), abs(result["value"]), result["std"])
-    return [
-        result
-        for result in results
-        if result["name"] in listed
-        and tables.without_noise(result["std"], sizes[result["name"].rstrip("0123456789")]) > 0
-    ]

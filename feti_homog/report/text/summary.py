@@ -3,40 +3,24 @@
 Modules of pictures find an analysis by its name: `response_curves.CURVES`.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
-import numpy as np
-
 from feti_homog.materials import voigt
-from feti_homog.report.text import phase_tables, point_tables
+from feti_homog.report.text import phase_tables
 from feti_homog.report.text.constant_tables import sensitivities, table
-from feti_homog.report.text.path_table import ROWS, path_table
 from feti_homog.report.text.stiffness_tables import bounds, constants, moduli, stiffnesses, thermal
-from feti_homog.report.text.tables import ERROR, Column, Table
-from feti_homog.results import landmarks
+from feti_homog.report.text.tables import ERROR, WIDTH, Column, Table
 from feti_homog.typing import Document
 
 LABEL = 12  # columns of the labels at the left
 NAME = 28  # columns of the names of checks
-STATES = 4  # of a curve whose largest stresses are shown
 GLUE = "\N{NO-BREAK SPACE}"  # at which no line is broken
 REMARKS = ("Remark", "Warning", "Fault")
-
-
-def _stiffness_tables(document: Document) -> list[Table]:
-    """Return effective stiffness, constants and bounds."""
-    last = [*point_tables.tip_table(document, document.get("tips")), *sensitivities(document)]
-    if voigt.plane_state_of(document).is_spatial:
-        first = [table(document)] if document.get("constants") else []
-        return [*first, *stiffnesses(document), *thermal(document), *constants(document), *last]
-    if document["case"].get("interface"):  # moduli and bounds are of bonded, linear composites
-        return [*stiffnesses(document), *last]
-    return [*stiffnesses(document), moduli(document), bounds(document), *last]
 
 
 @dataclass(frozen=True)
@@ -45,62 +29,23 @@ class ReportedAnalysis:
 
     Attributes:
         title: the name in words.
-        tables: tables for a result with at most `limit` rows of points; None for the rows of the summary.
         is_curve: whether its states are points of a curve, shown side by side.
         is_followed: whether first and last states matter most.
         picture: picture name of a state, "" for the name of its unit load.
-        is_load_given: whether states are under a load of the case, not under unit strains.
-        states: numbers of at most `limit` states among the first `count`.
     """
 
     name: str
     title: str
-    tables: Callable[[Document, int | None], list[Table]]
     is_curve: bool = False
     is_followed: bool = False
     picture: str = ""
-    is_load_given: Callable[[Document], bool] = lambda document: False
-    states: Callable[[Document, int, int], list[int]] = lambda document, limit, count: sorted(
-        {round(k) for k in np.linspace(0, count - 1, min(limit, count))}
-    )
 
 
-STIFFNESS = ReportedAnalysis("stiffness", "effective stiffness", lambda document, limit: _stiffness_tables(document))
-ANGLE = ReportedAnalysis(
-    "angle",
-    "debonding angle",
-    lambda document, limit: [point_tables.angle_table(document, limit), *point_tables.angle_tip_table(document)],
-    is_curve=True,
-    is_load_given=lambda document: document.get("case", {}).get("angle", {}).get("strain") is not None,
-)
-PATH = ReportedAnalysis(
-    "path",
-    "load path",
-    lambda document, limit: [path_table(document, limit or ROWS)],
-    is_curve=True,
-    is_followed=True,
-    is_load_given=lambda document: True,
-    states=landmarks.chosen_states,
-)
-LOAD = ReportedAnalysis(
-    "load",
-    "equilibrium under a load",
-    lambda document, limit: [
-        point_tables.load_table(document),
-        *point_tables.tip_table(document, document["load"].get("tips")),
-        *sensitivities(document),
-    ],
-    picture="load",
-    is_load_given=lambda document: True,
-)
-ENVELOPE = ReportedAnalysis(
-    "envelope",
-    "onset of debonding",
-    lambda document, limit: [
-        point_tables.envelope_table(document, limit or point_tables.ENVELOPE_ROWS),
-        *_stiffness_tables(document),
-    ],
-)
+STIFFNESS = ReportedAnalysis("stiffness", "effective stiffness")
+ANGLE = ReportedAnalysis("angle", "debonding angle", is_curve=True)
+PATH = ReportedAnalysis("path", "load path", is_curve=True, is_followed=True)
+LOAD = ReportedAnalysis("load", "equilibrium under a load", picture="load")
+ENVELOPE = ReportedAnalysis("envelope", "onset of debonding")
 ANALYSES = {entry.name: entry for entry in (ANGLE, PATH, LOAD, ENVELOPE, STIFFNESS)}
 
 
@@ -117,12 +62,27 @@ def summary(document: Document) -> str:
     Raises:
         KeyError: a key of these is missing.
     """
-    size = document["memory"]
+    size, solver = document["memory"], document["solver"]
+    names = {"ranks": "rank", "subdomains": "subdomain", "dofs": "dof"}
+    dual = [_number(solver["multipliers"], "multiplier"), f"kernel {solver['kernel_dim']}"]
+    settings = _cell(document) + _field("Solver", [_number(solver[key], name) for key, name in names.items()])
+    settings += _field("Dual", [*dual, f"coarse problem {solver['coarse_dim']}"])
+    if (count := solver.get("factorizations")) is not None:  # of the axial problem too
+        coarse = f"coarse problem {_number(solver.get('coarse_factorizations', 0), 'time')}"
+        settings += _field("Factorized", [f"{count} {'matrix' if count == 1 else 'matrices'} of subdomains", coarse])
+    counts = solver["iterations"]
+    if not any(counts):
+        settings += _field("Iterations", [f"none in {_number(len(counts), 'state')}"])
+    elif len(counts) <= 12:
+        settings += _field("Iterations", map(str, counts))
+    else:
+        a_state = f"{min(counts)} to {max(counts)} a state"
+        settings += _field("Iterations", [a_state, f"{sum(counts)} for {len(counts)} states"])
     memory = f"{size / 2**20:.0f} MiB" if size < 2**30 else f"{size / 2**30:.2f} GiB"
     remarks = [(label, str(text)) for label in REMARKS for text in document.get(f"{label.lower()}s", ())]
     blocks = [
         _heading(document),
-        [*_cell(document), *_solver(document["solver"])],
+        settings,
         *(table.lines for table in answers(document)),
         checks(document).lines,
         [
@@ -155,11 +115,29 @@ def notebook(document: Document) -> str:
 
 
 def answers(document: Document, most: int | None = None) -> list[Table]:
-    """Return the tables of a result, with at most `most` rows of points."""
-    analysis = reported(document)
-    count = max((len(phase["state"]) for phase in document.get("phase_stresses", ())), default=0)
-    states = analysis.states(document, STATES, count) if analysis.is_curve else range(count)
-    return [*analysis.tables(document, most), *phase_tables.phase_tables(document, states)]
+    """Return the tables of a result, with at most `most` rows of points; None for the rows of the summary."""
+    name, tables = reported(document).name, list[Table]()
+    if name == "path":
+        from feti_homog.report.text.path_table import path_table  # with the landmarks of a path
+
+        tables.append(path_table(document, most))
+    elif name != "stiffness":
+        from feti_homog.report.text import point_tables
+
+        tables += point_tables.TABLES[name](document, most)
+    if name in ("stiffness", "envelope"):
+        is_spatial, has_interface = voigt.plane_state_of(document).is_spatial, document["case"].get("interface")
+        tables += [table(document)] if is_spatial and document.get("constants") else []
+        tables += stiffnesses(document)
+        if is_spatial:
+            tables += [*thermal(document), *constants(document)]
+        elif not has_interface:  # moduli and bounds are of bonded, linear composites
+            tables += [moduli(document), bounds(document)]
+    if (tips := document.get("load", document).get("tips")) and tips["load"]:
+        from feti_homog.report.text.point_tables import tip_table  # bonded cells have no tips
+
+        tables.append(tip_table(document, tips))
+    return [*tables, *sensitivities(document), *phase_tables.phase_tables(document)]
 
 
 def title_of(document: Document) -> str:
@@ -171,7 +149,7 @@ def title_of(document: Document) -> str:
 
 def _heading(document: Document) -> list[str]:
     title = title_of(document)
-    return [title, "=" * min(len(title), point_tables.WIDTH)]
+    return [title, "=" * min(len(title), WIDTH)]
 
 
 def _joined(blocks: Iterable[Sequence[str]]) -> str:
@@ -204,24 +182,6 @@ def _cell(document: Document) -> list[str]:
     return lines + _field("Mesh", mesh)
 
 
-def _solver(solver: Document) -> list[str]:
-    names = {"ranks": "rank", "subdomains": "subdomain", "dofs": "dof"}
-    lines = _field("Solver", [_number(solver[key], name) for key, name in names.items()])
-    dual = [_number(solver["multipliers"], "multiplier"), f"kernel {solver['kernel_dim']}"]
-    lines += _field("Dual", [*dual, f"coarse problem {solver['coarse_dim']}"])
-    if (count := solver.get("factorizations")) is not None:  # of the axial problem too
-        coarse = f"coarse problem {_number(solver.get('coarse_factorizations', 0), 'time')}"
-        lines += _field("Factorized", [f"{count} {'matrix' if count == 1 else 'matrices'} of subdomains", coarse])
-    counts = solver["iterations"]
-    if not any(counts):
-        iterations = [f"none in {_number(len(counts), 'state')}"]
-    elif len(counts) <= 12:
-        iterations = [str(count) for count in counts]
-    else:
-        iterations = [f"{min(counts)} to {max(counts)} a state", f"{sum(counts)} for {len(counts)} states"]
-    return lines + _field("Iterations", iterations)
-
-
 def checks(document: Document) -> Table:
     """Return the largest relative error of each law; laws of contact need an interface."""
     limit, has_interface = document.get("check_tolerance"), bool(document["case"].get("interface"))
@@ -239,12 +199,12 @@ def checks(document: Document) -> Table:
     return Table(title, columns, rows, abreast=1)
 
 
-def _field(label: str, phrases: Sequence[str]) -> list[str]:
+def _field(label: str, phrases: Iterable[str]) -> list[str]:
     """Return a label and its words, joined by commas and wrapped to WIDTH columns."""
     text = ", ".join(phrases).replace(", (", " (")
     return wrap(
         text,
-        point_tables.WIDTH,
+        WIDTH,
         initial_indent=f"{label:<{LABEL}}",
         subsequent_indent=" " * LABEL,
         break_long_words=False,

@@ -17,6 +17,7 @@ MODULI = re.compile(
 FIXED = {"angle": "degrees", "centre": "degrees", "values": "degrees", "memory": "bytes"}
 ERROR = ".1e"
 SAME_IN_HTML = re.compile(rf"\.\d+f|{re.escape(ERROR)}")
+WIDTH = 79  # of text
 NOISE = 1e-12  # what the solver leaves of a zero
 UNKNOWN = "-"
 

@@ -9,15 +9,15 @@ from array import array
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
-from feti_homog.errors import EXIT_DEFECT, FetiHomogError, NoMemoryError
-from feti_homog.system.runtime.standard_streams import complain
+from feti_homog.errors import ExitCode, FetiHomogError, NoMemoryError
+from feti_homog.system.runtime.standard_streams import SILENT_SECONDS, complain
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Comm, Request
 
 T = TypeVar("T")
-# Seconds that a rank with an error waits for the others to come with theirs, before it ends the job.
-ARRIVAL_TIMEOUT_S = 5.0
+# A rank with an error waits so long for the others to come with theirs, before it ends the job.
+ARRIVAL_TIMEOUT_S = SILENT_SECONDS
 
 
 class RemoteError(RuntimeError):
@@ -65,12 +65,11 @@ def _agreed(comm: Comm, result: T | None, error: Exception | None) -> T:
 def agree_after(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
     """Return function(...) of all ranks, a library's collective call.
 
-    If any raises a FetiHomogError, every rank does.
-
-    Any other exception is raised by its rank alone, without a word to the others, which may be waiting for it within
-    `function`: it must end the job, as does a FetiHomogError for which the others do not come in time.  Collective.
+    If any raises a FetiHomogError, every rank does.  Any other exception is raised by its rank alone, without a word
+    to the others, which may be waiting for it within `function`: it must end the job, as does a FetiHomogError for
+    which the others do not come in time.  Collective.
     """
-    result, error = None, None
+    result = error = None
     try:
         result = function(*args, **kwargs)
     except FetiHomogError as met:
@@ -108,7 +107,7 @@ def end_job(comm: Comm, error: BaseException) -> NoReturn:
     if isinstance(ending, FetiHomogError):
         code, lines = ending.exit_code, _lines(ending)
     else:
-        code = EXIT_DEFECT
+        code = ExitCode.DEFECT
         lines = f"rank {comm.rank} of {comm.size}:\n{''.join(traceback.format_exception(error))}"
     complain(lines)
     sys.stdout.flush()

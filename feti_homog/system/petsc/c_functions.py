@@ -3,24 +3,20 @@
 petsc4py's extension module resolves PETSc's symbols, so no library has to be found.
 """
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
+from mpi4py.MPI import Comm
 from petsc4py import PETSc
 
 from feti_homog.system.parallel.mpi_errors import all_raise, end_job
 from feti_homog.typing import Float
 
 Pointer = ctypes.c_void_p
-if TYPE_CHECKING:
-    from mpi4py.MPI import Comm
-
 T = TypeVar("T")
 
 

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from feti_homog.errors import EXIT_DEFECT, LibraryError
+from feti_homog.errors import ExitCode, LibraryError
 from feti_homog.system.runtime.standard_streams import complain
 from feti_homog.typing import Intracomm
 
@@ -65,7 +65,7 @@ def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
         code = 0 if PETSc.Sys.isFinalized() else c_functions.finalize()  # each start asks for its end
         if code:
             complain(f"error: PETSc cannot end (error code {code}); results are written")
-            comm.Abort(EXIT_DEFECT)
+            comm.Abort(ExitCode.DEFECT)
 
     atexit.register(end)
     if resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY:

@@ -113,12 +113,6 @@ def _is_place(text: str) -> bool:
     return _is_switch(text) or (match is not None and (not match["file"] or can_be_written(match["file"])))
 
 
-def _is_new_file(text: str) -> bool:
-    """Return whether the text is a switch, or up to its first colon a file that can be written."""
-    file = text.partition(":")[0]
-    return _is_switch(file) or can_be_written(file)
-
-
 def _has_options(file: str) -> bool:
     """Return whether a file can be read, and its lines are options, comments or aliases."""
     try:
@@ -152,7 +146,10 @@ RULES: dict[str, OptionRule] = {
     "feti_schur_pc_factor_mat_solver_type": ("mumps, which alone makes Schur complements", "mumps".__eq__),
     "feti_ksp_error_if_not_converged": ("nothing: the run reports it and keeps its results", _is_false),
     "fp_trap": ("nothing: numbers that are not finite are checked where they may occur", _is_false),
-    **dict.fromkeys(("info", "malloc_dump", "malloc_view"), (NEW_FILE, _is_new_file)),
+    **dict.fromkeys(
+        ("info", "malloc_dump", "malloc_view"),  # up to its first colon the text is a switch or a file
+        (NEW_FILE, lambda text: _is_switch(file := text.partition(":")[0]) or can_be_written(file)),
+    ),
     "options_file": ("a file with an option of PETSc in each line", _has_options),
     "log_trace": (NEW_FILE, lambda text: not text or can_be_written(text)),
 }
@@ -198,9 +195,7 @@ def named_values(words: Sequence[str]) -> dict[str, str]:
 def petsc_words(options: Mapping[str, str]) -> list[str]:
     """Return the words of options by name without dash, for PETSc's start.
 
-    Its own flags are there or not, true or false.
-
-    False flags of the solver stay, for a case may have them true.
+    Its own flags are there or not, true or false.  False flags of the solver stay, for a case may have them true.
     """
     settled = {name: flag_value(text) if is_own_flag(name) else text for name, text in options.items()}
     pairs = [(f"-{name}", text) for name, text in settled.items() if text is not None]

@@ -98,28 +98,6 @@ SOLVERS = {"feti_": ("feti_ksp_", "feti_pc_")} | {prefix: (prefix,) for prefix i
 NO_SUCH_METHOD = "requested KSP type"
 
 
-def faults_of_solvers(options: Mapping[str, str]) -> list[str]:
-    """Return the faults of options in the database with which PETSc's solvers cannot be made.
-
-    `options` has their names without dash.  Each solver is made for a 1 x 1 matrix and applied once: some methods fail
-    only then.  PETSc marks the options that the solvers read, and prints all readable ones with -help.  Options that
-    print are hidden meanwhile.
-    """
-    faults, viewers, database = [], [*filter(values.is_viewer, options)], PETSc.Options()
-    for name in viewers:
-        database.delValue(name)
-    try:
-        for prefix, prefixes in SOLVERS.items():
-            names = [name for name in options if table.solver_prefix(name) in prefixes and name not in (*OWN, *viewers)]
-            if (names or "help" in options) and (fault := _complaint(prefix)):
-                names.sort(key=lambda name: not name.endswith("_type"))  # types first: they decide what others mean
-                faults.append(f"{' '.join(values.in_words(name, options[name]) for name in names)}: {fault}")
-    finally:
-        for name in viewers:
-            _set(database, name, options[name])
-    return faults
-
-
 class _Identity:
     """A 1 x 1 matrix and preconditioner in Python alone, as the dual problem has."""
 
@@ -130,38 +108,52 @@ class _Identity:
         x.copy(y)
 
 
-def _complaint(prefix: str) -> str:
-    """Return PETSc's complaint about the options of a solver of a 1 x 1 matrix; empty without one."""
-    is_krylov, comm = prefix == "feti_", PETSc.COMM_SELF
-    if is_krylov:
-        A = PETSc.Mat().createPython((1, 1), _Identity(), comm=comm)
-    else:
-        A = PETSc.Mat().createAIJ((1, 1), csr=([0, 1], [0], [1.0]), comm=comm)
-    A.setOption(PETSc.Mat.Option.SYMMETRIC if is_krylov else PETSc.Mat.Option.SPD, True)
-    A.setUp()
-    ksp, (x, b) = PETSc.KSP().create(comm), A.createVecs()
-    ksp.setOptionsPrefix(prefix)
-    ksp.setOperators(A)
-    try:
-        ksp.setType(PETSc.KSP.Type.CG if is_krylov else PETSc.KSP.Type.PREONLY)
-        pc = ksp.getPC()
+def faults_of_solvers(options: Mapping[str, str]) -> list[str]:
+    """Return the faults of options in the database with which PETSc's solvers cannot be made.
+
+    `options` has their names without dash.  Each solver is made for a 1 x 1 matrix and applied once: some methods fail
+    only then.  PETSc marks the options that the solvers read, and prints all readable ones with -help.  Options that
+    print are hidden meanwhile.
+    """
+    faults, viewers, database, comm = [], [*filter(values.is_viewer, options)], PETSc.Options(), PETSc.COMM_SELF
+    for name in viewers:
+        database.delValue(name)
+    for prefix, prefixes in SOLVERS.items():
+        names = [name for name in options if table.solver_prefix(name) in prefixes and name not in (*OWN, *viewers)]
+        if not names and "help" not in options:
+            continue
+        is_krylov, A = prefix == "feti_", PETSc.Mat()
         if is_krylov:
-            ksp.setNormType(PETSc.KSP.NormType.PRECONDITIONED)
-            pc.setType(PETSc.PC.Type.PYTHON)
-            pc.setOptionsPrefix("feti_projected_")
-            pc.setPythonContext(_Identity())
+            A.createPython((1, 1), _Identity(), comm=comm)
         else:
-            pc.setType(PETSc.PC.Type.CHOLESKY)
-        if prefix in table.MUMPS_PREFIXES:
-            pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
-        ksp.setFromOptions()
-        ksp.setUp()
-        b.set(1.0)
-        ksp.solve(b, x)
-    except PETSc.Error as error:
-        words = error_words(error)
-        return "PETSc has no such Krylov method" if NO_SUCH_METHOD in words else words
-    finally:
-        for petsc_object in (ksp, A, x, b):
-            petsc_object.destroy()
-    return ""
+            A.createAIJ((1, 1), csr=([0, 1], [0], [1.0]), comm=comm)
+        A.setOption(PETSc.Mat.Option.SYMMETRIC if is_krylov else PETSc.Mat.Option.SPD, True)
+        A.setUp()
+        ksp, (x, b) = PETSc.KSP().create(comm), A.createVecs()
+        ksp.setOptionsPrefix(prefix)
+        ksp.setOperators(A)
+        try:
+            ksp.setType(PETSc.KSP.Type.CG if is_krylov else PETSc.KSP.Type.PREONLY)
+            pc = ksp.getPC()
+            pc.setType(PETSc.PC.Type.PYTHON if is_krylov else PETSc.PC.Type.CHOLESKY)
+            if is_krylov:
+                ksp.setNormType(PETSc.KSP.NormType.PRECONDITIONED)
+                pc.setOptionsPrefix("feti_projected_")
+                pc.setPythonContext(_Identity())
+            if prefix in table.MUMPS_PREFIXES:
+                pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
+            ksp.setFromOptions()
+            ksp.setUp()
+            b.set(1.0)
+            ksp.solve(b, x)
+        except PETSc.Error as error:
+            fault = error_words(error)
+            names.sort(key=lambda name: not name.endswith("_type"))  # types first: they decide what others mean
+            words = " ".join(values.in_words(name, options[name]) for name in names)
+            faults.append(f"{words}: {'PETSc has no such Krylov method' if NO_SUCH_METHOD in fault else fault}")
+        finally:
+            for petsc_object in (ksp, A, x, b):
+                petsc_object.destroy()
+    for name in viewers:
+        _set(database, name, options[name])
+    return faults

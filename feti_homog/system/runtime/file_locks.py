@@ -3,8 +3,6 @@
 The system takes a lock back when its process ends, however that ends: none is left behind by a kill.
 """
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import fcntl
@@ -13,6 +11,7 @@ import re
 import socket
 import time
 from pathlib import Path
+from typing import Self
 
 from feti_homog.errors import FetiHomogError
 
@@ -69,7 +68,7 @@ class Lock:
         files.discard(self.path)
         self._close()
 
-    def __enter__(self) -> Lock:
+    def __enter__(self) -> Self:
         self.acquire()
         return self
 
@@ -88,13 +87,12 @@ class Lock:
                 with contextlib.suppress(OSError):  # it holds on a full disk too, without the name of its holder
                     os.truncate(self._file, 0)
                     os.pwrite(self._file, this_process().encode(), 0)
-        except OSError as error:
+        except (OSError, LockHeld) as error:
             self._close()
+            if isinstance(error, LockHeld):
+                raise
             failure = LocksUnsupported if error.errno in UNSUPPORTED else FetiHomogError
             raise failure(f"cannot lock {self.path}: {error.strerror}") from error
-        except LockHeld:
-            self._close()
-            raise
 
     def _close(self) -> None:
         if self._file >= 0:

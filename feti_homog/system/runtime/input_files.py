@@ -10,7 +10,6 @@ import resource
 import signal
 import stat
 from collections.abc import Callable
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import BinaryIO, TypeVar
 
@@ -71,7 +70,25 @@ def in_own_process(
     """
     context = multiprocessing.get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_send, args=(sender, function, path, memory), daemon=True)
+
+    def send() -> None:
+        # The parent's thread listens for signals; Ctrl-C ends both processes.  Handlers of PETSc, in a program that has
+        # started it, would not come to an end here.
+        for number in (signal.SIGINT, signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT):
+            signal.signal(number, signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_SETMASK, ())
+        if memory is not None:
+            limits, used = resource.getrlimit(resource.RLIMIT_AS), int(STATM.read_text().split()[0])
+            most = used * resource.getpagesize() + memory
+            resource.setrlimit(resource.RLIMIT_AS, (min({most, *limits} - {resource.RLIM_INFINITY}), limits[1]))
+        try:
+            sender.send(function(path))
+        except FetiHomogError as error:
+            sender.send(error)
+        except MemoryError as error:
+            sender.send(CaseError(f"{path}: its files are damaged: {error}"))
+
+    process = context.Process(target=send, daemon=True)
     process.start()
     sender.close()
     try:
@@ -87,22 +104,3 @@ def in_own_process(
         raise answer
     result: T = answer
     return result
-
-
-def _send(end: Connection, function: Callable[[Path], T], path: Path, memory: int | None) -> None:
-    # The parent's thread listens for signals; Ctrl-C ends both processes.
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-    # Handlers of PETSc, in a program that has started it, would not come to an end here.
-    for crash in (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT):
-        signal.signal(crash, signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_SETMASK, ())
-    if memory is not None:
-        limits, used = resource.getrlimit(resource.RLIMIT_AS), int(STATM.read_text().split()[0])
-        most = used * resource.getpagesize() + memory
-        resource.setrlimit(resource.RLIMIT_AS, (min({most, *limits} - {resource.RLIM_INFINITY}), limits[1]))
-    try:
-        end.send(function(path))
-    except FetiHomogError as error:
-        end.send(error)
-    except MemoryError as error:
-        end.send(CaseError(f"{path}: its files are damaged: {error}"))

@@ -88,9 +88,8 @@ def restored(kind: type[T], document: Mapping[str, Any]) -> T:
     _require(document, Mapping)
     hints, values = typing.get_type_hints(kind), {}
     for field in dataclasses.fields(kind):  # type: ignore[arg-type]
-        if DESCRIPTION not in field.metadata or (
-            field.name not in document and field.default is not dataclasses.MISSING
-        ):
+        has_default = field.name not in document and field.default is not dataclasses.MISSING
+        if DESCRIPTION not in field.metadata or has_default:
             continue
         value = values[field.name] = _restored_value(hints[field.name], document[field.name])
         shape = field.metadata[DESCRIPTION].shape

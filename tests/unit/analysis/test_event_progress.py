@@ -36,15 +36,9 @@ def shown_lines(steps, urgent=(), count=10):
     return progress.lines
 
 
-def test_events_of_more_than_a_second_each_have_a_line():
+def test_events_have_at_most_a_line_a_second():
     assert shown_lines(1.5) == [f"event {number}" for number in range(10)]
-
-
-def test_of_quick_events_the_first_and_the_last_are_reported():
     assert shown_lines(0.01) == ["event 0", "event 9", "  8 more events are in the log"]
-
-
-def test_a_line_a_second():
     assert shown_lines(0.26) == ["event 0", "event 4", "event 8", "event 9", "  6 more events are in the log"]
 
 

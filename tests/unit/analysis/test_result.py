@@ -25,11 +25,7 @@ TIPS = TipRates(
     load=("E11", "E11"), fibre=(1, 1), angle=np.array([-45.0, 45.0]), G=np.array([3.0, 3.0]), G_I=np.array([1.0, 1.0]),
     G_II=np.array([2.0, 2.0]), psi=np.array([54.7, 54.7]), length=np.array([1e-3, 1e-3]),
 )  # fmt: skip
-DEBONDING = {
-    "debonded_share": 0.5,
-    "debonded_length": np.array([0.5, 0.0]),
-    "debonding_angle": np.array([90.0, 0.0]),
-}
+DEBONDING = {"debonded_share": 0.5, "debonded_length": np.array([0.5, 0.0]), "debonding_angle": np.array([90.0, 0.0])}
 COUNTS = {"bonded": 5, "open": 3, "closed": 1, "iterations": 7}
 
 

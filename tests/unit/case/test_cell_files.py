@@ -1,8 +1,9 @@
-"""Sizes that the case and its table give."""
+"""Files of a cell: the size that it or the case gives, links in a circle and folders."""
 
 import pytest
 from support.base_case import BASE, MESH_CELL
 
+from feti_homog import Case
 from feti_homog.case.cases import load
 from feti_homog.errors import CaseError
 
@@ -47,3 +48,27 @@ def test_the_digest_is_that_of_the_table(tmp_path):
     digests = [case_of(tmp_path, keys, table).digest() for table in (TABLE, TABLE, TABLE.replace("0.5", "0.6"))]
     assert digests[0] == digests[1] != digests[2]
     assert case_of(tmp_path, keys + '\nwindow = "cut"').digest() != digests[0]
+
+
+CELLS = {"file": {"geometry": "table", "file": "loop.csv"}, "match": {"geometry": "random", "match": "loop.csv"}}
+MATERIAL = {"matrix": {"young": 3.0, "poisson": 0.35}, "fibre": {"young": 70.0, "poisson": 0.2}}
+
+
+def parse(key):
+    Case.parse({"cell": CELLS[key], "material": MATERIAL, "analysis": {"type": "stiffness", "plane": "strain"}})
+
+
+@pytest.mark.parametrize("key", CELLS)
+def test_links_in_a_circle_are_no_file(key, tmp_path, monkeypatch):
+    (tmp_path / "loop.csv").symlink_to("loop.csv")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(CaseError, match=rf'^\[cell\] {key} = "loop.csv": no such file'):
+        parse(key)
+
+
+@pytest.mark.parametrize("key", CELLS)
+def test_a_folder_is_no_file(key, tmp_path, monkeypatch):
+    (tmp_path / "loop.csv").mkdir()
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(CaseError, match=rf'^\[cell\] {key} = "loop.csv": a folder; expected a file at /'):
+        parse(key)

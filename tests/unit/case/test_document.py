@@ -74,22 +74,16 @@ def test_numpy_values_are_stored_as_pythons():
     json.dumps(case.resolved())
 
 
-def test_arrays_of_openings_and_of_fibres():
+def test_arrays_and_paths_stand_for_lists_and_texts(tmp_path):
     document = document_of(of_type("angle", ANGLE, BARE_ARC))
     document["angle"] = {"values": np.linspace(0, 90, 4), "strain": np.array([0, 0, 1])}
     document["interface"] = {"debonded": ({"fibre": np.arange(1, 3)}, {"fibre": np.int64(4)})}
     case = Case.parse(document)
     assert case.angle is not None and case.angle.values == (0.0, 30.0, 60.0, 90.0)
     assert [arc.fibre for arc in case.arcs] == [(1, 2), (4,)]
-
-
-def test_a_stiffness_may_be_an_array():
     document = document_of(BASE)
     document["material"]["fibre"] = {"stiffness": np.diag([3.0, 3.0, 1.0])}
     assert Case.parse(document).resolved()["material"]["fibre"]["stiffness"][0] == [3.0, 0.0, 0.0]
-
-
-def test_a_file_may_be_a_path(tmp_path):
     (tmp_path / "cell.msh").touch()
     document = document_of(MESH)
     document["cell"]["file"] = Path("cell.msh")

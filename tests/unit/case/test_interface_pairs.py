@@ -27,13 +27,10 @@ def document(interface, kind="path"):
     } | path
 
 
-def test_a_list_of_one_is_the_section():
+def test_lists_of_sections_are_resolved_to_themselves():
     one, listed = (Case.parse(document(interface)) for interface in (STRONG, [STRONG]))
     assert one == listed and one.resolved()["interface"] == listed.resolved()["interface"]
     assert one.digest() == listed.digest() and "between" not in one.resolved()["interface"]
-
-
-def test_several_are_resolved_to_themselves():
     case = Case.parse(document([STRONG | {"between": OUTER}, {"normal_strength": 3.0, "between": INNER}]))
     assert [interface.between for interface in case.interfaces] == [("coating", "matrix"), ("fibre", "coating")]
     assert [interface.normal_strength for interface in case.interfaces] == [1.0, 3.0]

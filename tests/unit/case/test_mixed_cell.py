@@ -45,12 +45,9 @@ def test_numbers_are_the_whole_ones_next_to_those_that_fractions_and_radii_make(
     assert fibre_counts(cell_of(fibres=fibres, mix=mix, radii=radii)) == dict(zip(density, best, strict=True))
 
 
-def test_one_phase_has_all_fibres():
+def test_numbers_of_one_phase_and_of_equal_radii():
     assert fibre_counts(cell_of(fibres=9, fibre_fraction=0.4)) == {"fibre": 9}
     assert fibre_counts(cell_of(fibres=1, mix={"glass": 0.4})) == {"glass": 1}
-
-
-def test_equal_radii_are_the_default_and_their_unit_does_not_matter():
     own = fibre_counts(cell_of(fibres=30, mix=MIX))
     assert own == fibre_counts(cell_of(fibres=30, mix=MIX, radii={"glass": 1e-6, "carbon": 1e-6}))
     assert own == {"carbon": 14, "glass": 16}
@@ -145,8 +142,3 @@ def test_each_phase_of_a_mix_has_its_material(phases, fault):
     with pytest.raises(CaseError) as caught:
         case_of(*phases, fibres=9, mix=MIX)
     assert any(fault in line for line in caught.value.faults), caught.value.faults
-
-
-@pytest.mark.parametrize("keys", [{"fibres": 9}, {"fibres": 9, "radii": RADII}, {"width": 90.0, "radii": RADII}])
-def test_a_mix_has_a_number_of_fibres_or_a_width(keys):
-    case_of(mix=MIX, **keys)

@@ -10,7 +10,7 @@ from unit.case.documents import documents, loads
 from unit.case.faulty_bonding import of_type
 from unit.case.valid_cases import VALID_CASES, in_space
 
-from feti_homog.case.cases import Case, load
+from feti_homog.case.cases import Case
 from feti_homog.case.load_sections import MixedLoad, completed
 from feti_homog.materials.voigt import STRAINS
 
@@ -47,17 +47,6 @@ def test_every_component_is_as_it_was_named_last(plane, data):
         if plane == "generalized":
             expected.append(last_named(so_far, ("temperature",), ("temperature", 0.0)))
         assert list(found.items()) == expected
-
-
-def test_a_component_changes_its_kind_and_others_stay():
-    targets = path("[{S11 = 60}, {S11 = -20}, {E11 = 0.1, S12 = 2}, [0, 0, 0], {S22 = 3}]").targets
-    assert [list(each.items()) for each in targets] == [
-        [("S11", 60.0), ("S22", 0.0), ("S12", 0.0)],
-        [("S11", -20.0), ("S22", 0.0), ("S12", 0.0)],
-        [("E11", 0.1), ("S22", 0.0), ("S12", 2.0)],
-        [("E11", 0.0), ("E22", 0.0), ("gamma12", 0.0)],
-        [("E11", 0.0), ("S22", 3.0), ("gamma12", 0.0)],
-    ]
 
 
 def test_cooling_comes_first_and_stays():
@@ -119,19 +108,6 @@ def test_names_that_a_ply_has_the_other_way_are_reported_in_one_line():
     phase = "E1 = 9.0\nE2 = 5.0\nE3 = 5.0\nnu12 = 0.3\nnu13 = 0.3\nnu23 = 0.3\nG12 = 2.0\nG13 = 2.0\nG23 = 2.0\n"
     of_phase = "[material.fibre] E1 and E2 are across the fibres; along them E3"
     assert parsed(fibre(phase, "generalized")).remarks() == (of_phase,)
-
-
-def test_the_section_load_and_the_method_that_reads_a_file(tmp_path):
-    file = tmp_path / "cell.toml"
-    file.write_text(VALID_CASES["load"], encoding="utf-8")
-    case = Case.load(file)
-    assert case == load(file)
-    assert case.single_load is not None
-    assert case.single_load.to == MixedLoad(E11=0.02, S22=0.0, S12=1.0)
-    assert case.targets == ({"E11": 0.02, "S22": 0.0, "S12": 1.0},)
-    assert case.resolved()["load"] == {"to": {"E11": 0.02, "S22": 0.0, "S12": 1.0}}
-    assert case.digest() == parsed(VALID_CASES["load"].replace("S12 = 1}", "S12 = 1.0}")).digest()
-    assert case.digest() != parsed(VALID_CASES["load"].replace("S12 = 1}", "S12 = 2}")).digest()
 
 
 def test_round_trip_keeps_tables_and_strains():

@@ -11,7 +11,7 @@ ROWS = [(table, row) for table in reference.tables() for row in table.rows]
 
 
 def rows(section: str) -> dict[str, reference.KeyRow]:
-    return {row.key: row for table in reference.tables_of(section) for row in table.rows}
+    return {row.key: row for table in reference.tables(section) for row in table.rows}
 
 
 def test_all_keys_of_all_tables_are_there():
@@ -67,4 +67,4 @@ def test_the_text_has_every_key_and_no_long_line():
 
 def test_an_unknown_section():
     with pytest.raises(CaseError, match=r"^cells: unknown section; expected one of name, cell, material, "):
-        reference.tables_of("cells")
+        reference.tables("cells")

@@ -6,7 +6,7 @@ from typing import Any
 
 from hypothesis import given, settings
 from unit.case.documents import changed_documents
-from unit.case.faulty_cases import FAULTY_CASES
+from unit.case.faulty_cases import FAULTY_CASES, NOT_TOML
 from unit.case.valid_cases import VALID_CASES
 
 from feti_homog.case.cases import parse
@@ -14,9 +14,8 @@ from feti_homog.case.rules import ITEMS, Rule, exclusive, needed
 from feti_homog.errors import CaseError
 from feti_homog.schema.keys import Selector
 
-NO_TOML = {"syntax", "syntax_unclosed", "key_twice", "section_twice", "number_too_long"}
 SOURCES = [tomllib.loads(text) for text in VALID_CASES.values()]
-SOURCES += [tomllib.loads(text) for name, (text, _) in FAULTY_CASES.items() if name not in NO_TOML]
+SOURCES += [tomllib.loads(text) for words, text in FAULTY_CASES.items() if words not in NOT_TOML]
 SOURCES += [{**each, "interface": [each["interface"]]} for each in SOURCES if "interface" in each]
 
 
@@ -42,18 +41,12 @@ def test_faults_name_the_section_and_the_place_in_it():
     assert faults(Rule(("a", "x"), lambda value: value != 1, "no"), {"a": {"x": 1}}) == ["[a] x = 1: no"]
 
 
-def test_sections_of_one_name_are_numbered():
+def test_rules_number_sections_and_have_conditions():
     rule = needed(("a",), "x", "missing")
     assert faults(rule, {"a": [{"x": 1}, {}]}) == ["[a 2] x: missing"]
     assert faults(rule, {"a": [{}]}) == faults(rule, {"a": {}}) == ["[a] x: missing"]
     assert not faults(rule, {})
-
-
-def test_rules_have_conditions():
     rule = needed(("a",), "x", "missing", Selector("a", "kind").among("one", "two"))
     assert faults(rule, {"a": {}}, kind="one") and not faults(rule, {"a": {}}, kind="three")
     assert not faults(rule, {"a": {}})
-
-
-def test_what_is_no_table_is_faulty_elsewhere():
     assert not faults(exclusive(("a",), "x", "y"), {"a": 3}) and not faults(needed(("a",), "x", "missing"), {"a": 3})

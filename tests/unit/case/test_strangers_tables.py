@@ -114,12 +114,9 @@ def test_small_overlaps_are_repaired_where_that_is_asked_for(tmp_path):
     assert found.remarks == ('[cell] repair = "overlaps": rows 3, 4 are smaller by up to 0.26 %',)
 
 
-def test_larger_overlaps_are_not_repaired(tmp_path):
+def test_overlaps_that_no_repair_is_for_are_refused(tmp_path):
     text = SIZE + TOUCHING.replace("3.995", "3.95")
     with pytest.raises(MeshError, match=r"rows 3 and 4: overlap by 0\.05$"):
         arrange(case(tmp_path / "t.csv", text, repair="overlaps").cell)
-
-
-def test_each_geometry_has_its_repair(tmp_path):
     with pytest.raises(CaseError, match='expected "none" or "overlaps" for geometry = "table"'):
         case(tmp_path / "t.csv", SIZE + TOUCHING, repair="snap")

@@ -1,4 +1,4 @@
-"""Case files without faults, of all kinds, and tables [sweep]."""
+"""Case files without faults, of all kinds."""
 
 from support.base_case import (
     AXIAL,
@@ -29,6 +29,7 @@ def in_space(case: str, bonds: str = "") -> str:
 
 VALID_CASES = {
     "base": BASE,
+    "accuracy": BASE.replace("mesh_size = 0.05", "accuracy = 1e-3"),
     "named, with options": "name = 'Zelle'\n"
     + BASE
     + "[decomposition]\nmax_dofs = 5000\n[petsc]\nfeti_ksp_rtol = 1e-8\nfeti_view = true\n",
@@ -46,8 +47,7 @@ VALID_CASES = {
     "mesh of three phases": MESH + '[material."fibre:2"]\nstiffness = [[3, 1, 0], [1, 3, 0], [0, 0, 1]]\n',
     "orthotropic": fibre("E1 = 10.0\nE2 = 5.0\nE3 = 5.0\nnu12 = 0.3\nnu13 = 0.3\nnu23 = 0.2\nG12 = 2.0\nangle = 30\n"),
     "orthotropic in space": fibre(
-        ORTHOTROPIC + OUT_OF_PLANE + "G13 = 2.0\nG23 = 1.5\nangle = 30\nexpansion = [1e-6, 2e-6, 3e-6]\n",
-        "generalized",
+        ORTHOTROPIC + OUT_OF_PLANE + "G13 = 2.0\nG23 = 1.5\nangle = 30\nexpansion = [1e-6, 2e-6, 3e-6]\n", "generalized"
     ),
     "transversely isotropic": fibre(
         TRANSVERSE + AXIAL + "G_axial = 28.0\nexpansion_axial = -0.9e-6\nexpansion_transverse = 9e-6\n", "generalized"
@@ -112,19 +112,4 @@ VALID_CASES = {
     "increments": of_type("path", PATH, 'method = "increments"\nincrements = 50\nrelease = "worst"'),
     "strengths": debonded("{fibre = [1, 2], angle = 360}", "normal_strength = inf\ntangential_strength = 3"),
     "criterion": debonded(f'{ARC}, {{fibre = "all", angle = 0}}', 'normal_strength = 1\ncriterion = "quadratic"'),
-}
-
-WITHOUT_GEOMETRY = BASE.replace('geometry = "hexagonal"\n', "")
-
-VALID_SWEEPS = {
-    "nested and quoted": f"{BASE}[sweep]\ncell.fibre_fraction = [0.1, 0.2]\n'material.fibre.young' = [100, 200]\n",
-    "zip": f"{BASE}[sweep]\nmode = 'zip'\ncell.order = [1, 2]\ncell.refine = [0, 1]\n",
-    "step": f"{BASE}[sweep]\ncell.fibre_fraction = {{from = 0.1, to = 0.3, step = 0.1}}\n",
-    "count": f"{BASE}[sweep]\ncell.fibre_fraction = {{from = 0.01, to = 0.16, count = 3, scale = 'log'}}\n",
-    "loads": f"{BASE}[sweep]\npath.to.S11 = [1, 2]\npath.to.S22 = {{from = 1, to = 2, count = 2}}\n"
-    "'load.to.E11' = [1]\n'load.to' = {S22 = [1]}\n",
-    "samples": f"{BASE}[sweep]\nsamples = 3\nsampling = 'random'\nseed = 1\n"
-    "cell.fibre_fraction = {from = 0.1, to = 0.3}\n",
-    "tables": f"{WITHOUT_GEOMETRY}[sweep]\ncell = [{{geometry = 'square'}}, {{geometry = 'random', fibres = 3}}]\n"
-    "realisations = 2\n'cell.refine' = [0, 1]\n",
 }

@@ -7,15 +7,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from support.base_case import BASE
-from support.users_meshes import polar_cell
 from unit.mesh.faulty_meshes import grid
 
 from feti_homog.analysis.runner import run
 from feti_homog.case.cases import load
 from feti_homog.commands import listed_fibres
-from feti_homog.errors import CaseError, MeshError
+from feti_homog.errors import CaseError
 from feti_homog.mesh.arrange import arrange
-from feti_homog.mesh.tiles.tile_filling import gmsh_session
 from feti_homog.microstructure.fibre_table import read_table
 
 CELL = 'geometry = "hexagonal"\nfibre_fraction = 0.4\n'
@@ -104,27 +102,6 @@ def test_the_table_of_a_users_mesh_has_its_round_fibres(tmp_path):
     source.write_text(source.read_text().replace("mesh_size = 0.05\n", ""))
     with pytest.raises(CaseError, match=r"case.toml: fibres that are neither round nor ellipses have no radius: 1$"):
         listed_fibres.table(source)
-
-
-def test_sides_of_a_users_mesh_are_snapped(tmp_path):
-    """The table is that of the mesh whose sides match, once the case asks for it."""
-    polar_cell((0.5, 0.5), 0.3, tmp_path / "cell.msh")
-    source = case_of(tmp_path / "case.toml", 'geometry = "mesh"\nfile = "cell.msh"\n')
-    source.write_text(source.read_text().replace("mesh_size = 0.05\n", ""))
-    expected = listed_fibres.table(source)
-    with gmsh_session() as gmsh:
-        gmsh.open(str(tmp_path / "cell.msh"))
-        tags, places, _ = gmsh.model.mesh.getNodes()
-        x, y, _ = places.reshape(-1, 3).T
-        node = np.flatnonzero((x == 1.0) & (np.abs(y - 0.5) < 0.4))[0]
-        gmsh.model.mesh.setNode(tags[node], [1.0, y[node] + 2e-4, 0.0], [])
-        gmsh.write(str(tmp_path / "cell.msh"))
-    # Periodic curves of gmsh would move the node back.
-    (tmp_path / "cell.msh").write_text((tmp_path / "cell.msh").read_text().partition("$Periodic")[0])
-    with pytest.raises(MeshError, match="not periodic"):
-        listed_fibres.table(source)
-    source.write_text(source.read_text().replace('file = "cell.msh"\n', 'file = "cell.msh"\nrepair = "snap"\n'))
-    assert listed_fibres.table(source) == expected
 
 
 def test_units_and_names(tmp_path):

@@ -8,13 +8,7 @@ from feti_homog.errors import CaseError
 from feti_homog.feti.solver_plan import BONDED, PRECONDITIONERS, ProblemSizes, SolverOptions, SolverPlan, choose
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 
-PATH = ProblemSizes(
-    applications=6000,
-    bodies_are_cut=True,
-    all_dense=True,
-    all_searchable=True,
-    shared_dofs=5000,
-)
+PATH = ProblemSizes(applications=6000, bodies_are_cut=True, all_dense=True, all_searchable=True, shared_dofs=5000)
 STIFFNESS = replace(PATH, applications=60)
 INFLUENCE, ADAPTIVE, NATURAL = (
     SolverPlan("influence", False), SolverPlan("dirichlet", True), SolverPlan("dirichlet", False),

@@ -11,17 +11,11 @@ def stalls_at(norms) -> int | None:
     return next((iteration for iteration, norm in enumerate(norms) if stall.is_reached(iteration, norm)), None)
 
 
-def test_norms_that_halve_in_time_do_not_stall():
+def test_norms_stall_if_they_do_not_halve_in_time():
     assert stalls_at(0.8 ** np.arange(100)) is None
     assert stalls_at([1.0, 3.0, 5.0, 0.4, 2.0, 9.0, 0.1]) is None
-
-
-def test_norms_that_stay_do():
     assert stalls_at([1.0, 0.1, 0.09, 0.08, 0.07, 0.06]) == 5
     assert stalls_at(np.ones(9)) == 4
-
-
-def test_after_a_reset_it_begins_anew():
     stall = Stall(4)
     assert [stall.is_reached(iteration, 1.0) for iteration in range(5)][-1]
     stall.reset()

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 from support.layered_meshes import layers
 from support.loaded_twins import document
 
@@ -17,11 +18,17 @@ STIFFNESS = np.diag([4.0, 4.0, 1.0])
 
 @pytest.fixture
 def scales():
-    """Provide scales of a plane problem of one phase."""
-    solver = SimpleNamespace(problem=SimpleNamespace(strains=3, stresses=3))
-    scales = LoadScales(solver, np.ones(2))
-    scales.least_bonded_stiffness, scales._free_strains = STIFFNESS, np.eye(3)
-    return scales
+    """Provide scales of a plane problem of one phase without interfaces."""
+    subdomain = SimpleNamespace(areas=[1.0], laws=[STIFFNESS], L=STIFFNESS, submesh=SimpleNamespace(body=0))
+    nodes = SimpleNamespace(row=np.zeros(0, int), bodies=np.zeros((0, 2), int), length=np.zeros(0))
+    solver = SimpleNamespace(
+        comm=MPI.COMM_SELF,
+        problem=SimpleNamespace(strains=3, stresses=3),
+        subdomains=[subdomain],
+        jump_operator=SimpleNamespace(nodes=nodes, components=2),
+        intact_compliance=np.zeros(0),
+    )
+    return LoadScales(solver, np.ones(2))
 
 
 def test_loads_ask_for_strains_of_the_bonded_cell(scales):

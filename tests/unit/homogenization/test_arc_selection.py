@@ -37,22 +37,13 @@ def test_the_size_falls_as_the_error_of_the_rest(order, refine):
     assert found == pytest.approx(max(expected, 1e-5))
 
 
-def test_small_fibres_have_coarser_tips():
+def test_tips_have_the_size_of_their_fibre_and_interface():
     found = size_of(case_of(geometry="random", fibres=16, order=2))
     radius = RADIUS / 4
     edge = 2 * np.pi * radius / 16
     assert found == pytest.approx(radius * (edge / radius) ** 4 / 2) and found > 8 * size_of(case_of(order=2))
-
-
-def test_a_fine_interface_has_finer_tips():
     assert size_of(case_of(interface_size=0.01)) == pytest.approx(size_of(case_of(mesh_size=0.01)))
-
-
-def test_what_the_case_says_counts():
     assert size_of(case_of(tip_size=0.02)) == 0.02 and size_of(case_of("path", tip_size=0.02)) == 0.02
-
-
-def test_tips_that_move_and_arcs_without_tips_are_not_graded():
     assert size_of(case_of("path")) is None and size_of(case_of(arcs=())) is None
     assert size_of(case_of(arcs=({"fibre": 1, "angle": 360.0},))) is None
 

@@ -15,21 +15,6 @@ from feti_homog.case.cases import Case
 from feti_homog.homogenization.cell_remarks import table_remarks
 
 
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [
-        ("path to a load", ["remark     [path] S12: never named: stress-free"]),
-        ("load on a sheet", ["remark     [load] S11, S22: never named: stress-free"]),
-        ("path there and back", []),
-        ("base", []),
-    ],
-)
-def test_check_tells_what_is_free_of_stress(name, expected):
-    content = VALID_CASES[name].replace("mesh_size = 0.05", "mesh_size = 0.3")
-    lines = describe(Case.parse(tomllib.loads(content)), MPI.COMM_SELF).splitlines()
-    assert [line for line in lines if line.startswith("remark")] == expected
-
-
 @pytest.mark.parametrize("fraction", [None, 0.3])
 def test_another_fraction_than_that_of_a_matched_table_is_reported(fraction):
     content = tomllib.loads((ROOT / "drivers/matched.toml").read_text(encoding="utf-8"))

@@ -16,18 +16,12 @@ def open_at(*arcs, opening=None, fibre=1):
     return ROUND[debonded(arcs, opening, np.full(36, fibre), ROUND)].tolist()
 
 
-def test_tips_are_half_an_opening_off_the_centre():
+def test_tips_are_half_an_opening_off_the_centre_and_one_where_they_coincide():
     arcs = [Arc(fibre="all", centre=0.0, angle=60.0), Arc(fibre=(2,), centre=180.0, angle=90.0)]
     assert tips(arcs, (), 3) == {0: [30.0, 330.0], 1: [30.0, 135.0, 225.0, 330.0], 2: [30.0, 330.0]}
-
-
-def test_every_value_of_the_opening_has_its_tips():
     arcs = [Arc(fibre=(1, 3), centre=-90.0)]
     marks = [180.0, 225.0, 315.0, 0.0]
     assert tips(arcs, (0.0, 90.0, 180.0, 360.0), 3) == {0: sorted(marks), 2: sorted(marks)}
-
-
-def test_coinciding_tips_are_one():
     arcs = [Arc(fibre="all", centre=10.0, angle=20.0), Arc(fibre="all", centre=-350.0 + 20.0, angle=20.0)]
     assert tips(arcs, (), 1) == {0: [0.0, 20.0, 40.0]}
     assert tips([Arc(fibre="all", centre=0.1 + 0.2, angle=0.2)], (), 1) == {0: [0.2, 0.4]}
@@ -38,9 +32,17 @@ def test_nothing_and_everything_have_no_tips(angle):
     assert tips([Arc(fibre="all", angle=angle)], (), 4) == {}
 
 
-def test_tips_stay_bonded():
+def test_nodes_within_arcs_debond_and_tips_stay_bonded():
     assert open_at(Arc(fibre="all", angle=60.0)) == [0, 10, 20, 340, 350]
     assert open_at(Arc(fibre="all", angle=60.1)) == [0, 10, 20, 30, 330, 340, 350]
+    assert open_at() == []
+    assert open_at(Arc(fibre="all", centre=0.0, angle=359.0)) == [a for a in ROUND if a != 180]
+    arc = Arc(fibre=(2, 4), angle=30.0)
+    assert [open_at(arc, fibre=f) for f in (1, 2, 3, 4)] == [[], [0, 10, 350], [], [0, 10, 350]]
+    assert open_at(Arc(fibre="all", centre=10.0, angle=20.0), Arc(fibre="all", centre=30.0, angle=20.0)) == [10, 30]
+    near = 30.0 + np.array([-1e-3, -1e-7, 0.0, 1e-7])
+    arcs, fibre = [Arc(fibre="all", angle=60.0)], np.ones(4, int)
+    assert debonded(arcs, None, fibre, near).tolist() == [True, False, False, False]
 
 
 @pytest.mark.parametrize("turns", [-360.0, 0.0, 360.0])
@@ -60,21 +62,6 @@ def test_opening_takes_the_place_of_the_angle():
         open_at(arc)
 
 
-def test_nearly_everything_leaves_one_node():
-    assert open_at(Arc(fibre="all", centre=0.0, angle=359.0)) == [a for a in ROUND if a != 180]
-
-
-def test_arcs_belong_to_their_fibres():
-    arc = Arc(fibre=(2, 4), angle=30.0)
-    assert [open_at(arc, fibre=f) for f in (1, 2, 3, 4)] == [[], [0, 10, 350], [], [0, 10, 350]]
-
-
-def test_a_node_near_a_tip_is_the_tip():
-    near = 30.0 + np.array([-1e-3, -1e-7, 0.0, 1e-7])
-    arcs, fibre = [Arc(fibre="all", angle=60.0)], np.ones(4, int)
-    assert debonded(arcs, None, fibre, near).tolist() == [True, False, False, False]
-
-
 def test_an_arc_ends_where_the_mesh_has_its_tips():
     """Vertices at 29.99 and -30.02 in place of 30 and -30 of fibre 1; those of fibre 2 are where they should be."""
     fibre = np.array([1, 1, 1, 1, 2, 2])
@@ -85,14 +72,6 @@ def test_an_arc_ends_where_the_mesh_has_its_tips():
     inside = debonded([Arc(fibre="all", angle=60.0)], None, fibre, direction, moved)
     assert inside.tolist() == [False, False, True, False, False, False]
     assert moved_tips(marks, fibre, direction, 0.005) == {}
-
-
-def test_no_arcs_no_debonding():
-    assert open_at() == []
-
-
-def test_adjacent_arcs_leave_the_common_tip():
-    assert open_at(Arc(fibre="all", centre=10.0, angle=20.0), Arc(fibre="all", centre=30.0, angle=20.0)) == [10, 30]
 
 
 def test_a_fibre_without_a_centre_opens_as_a_whole_only():

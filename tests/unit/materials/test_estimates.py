@@ -256,25 +256,16 @@ def test_equal_families_are_one():
         assert given(two[name]) == pytest.approx(given(one[name]), rel=1e-12)
 
 
-def test_methods_of_one_kind_of_fibres_say_nothing_of_two():
+def test_methods_say_nothing_of_what_they_do_not_know():
     found = vars(estimates(EPOXY, [Fibres(0.3, CARBON), Fibres(0.2, GLASS)]))
     assert [name for name, estimate in found.items() if estimate != NOTHING] == ["rule_of_mixtures", "mori_tanaka"]
     assert given(found["mori_tanaka"]).keys() == set(CONSTANTS)
-
-
-def test_rules_of_engineers_say_nothing_of_springs():
     found = vars(estimates(EPOXY, [Fibres(0.3, CARBON, Springs(100.0, 50.0, 20.0, 0.3))]))
     spoken = [name for name, estimate in found.items() if estimate != NOTHING]
     assert spoken == ["mori_tanaka", "composite_cylinders", "self_consistent"]
-
-
-def test_nothing_is_said_of_phases_that_are_not_transversely_isotropic():
     skew = transversely_isotropic_part(np.diag([5.0, 4.0, 9.0, 1.0, 1.0, 1.0]))
     assert set(vars(estimates(skew, [Fibres(0.3, GLASS)])).values()) == {NOTHING}
     assert set(vars(estimates(GLASS, [Fibres(0.3, skew)])).values()) == {NOTHING}
-
-
-def test_nothing_is_said_of_expansions_if_a_phase_has_none():
     bare = dataclasses.replace(CARBON, expansion_axial=None, expansion_transverse=None)
     for found in vars(estimates(EPOXY, [Fibres(0.3, bare)])).values():
         assert (found.expansion_axial, found.expansion_transverse) == (None, None)

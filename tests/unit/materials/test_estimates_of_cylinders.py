@@ -5,12 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from reference.coated_fibre import (
-    axial_shear,
-    axisymmetric_stiffness,
-    self_consistent_shear,
-    shear_of_fibre,
-)
+from reference.coated_fibre import axial_shear, axisymmetric_stiffness, self_consistent_shear, shear_of_fibre
 from reference.fibre_composites import (
     ALUMINIUM,
     BORON,

@@ -50,13 +50,10 @@ def test_orthotropic_with_isotropic_constants_is_isotropic(plane):
     np.testing.assert_allclose(plane_stiffness(material, plane), expected, rtol=1e-12, atol=1e-12 * young)
 
 
-def test_orthotropic_plane_strain_is_a_block_of_the_three_dimensional_law():
+def test_orthotropic_plane_laws_follow_from_the_three_dimensional_one():
     whole = three_dimensional_stiffness(**CONSTANTS)
     expected = whole[np.ix_([0, 1, 5], [0, 1, 5])]
     np.testing.assert_allclose(plane_stiffness(Orthotropic(**CONSTANTS), "strain"), expected, rtol=1e-12, atol=1e-12)
-
-
-def test_orthotropic_plane_stress_condenses_the_three_dimensional_law():
     whole = three_dimensional_stiffness(**CONSTANTS)
     out = whole[[0, 1, 5], 2]
     expected = whole[np.ix_([0, 1, 5], [0, 1, 5])] - np.outer(out, out) / whole[2, 2]

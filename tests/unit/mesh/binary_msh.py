@@ -31,10 +31,7 @@ def _version_2(mesh, whole, reals):
         whole(kind, 1, 2, tag, physical, entity, *corners)
         for tag, (kind, physical, entity, corners) in mesh.elements.items()
     )
-    return {
-        "Nodes": f"{len(mesh.nodes)}\n".encode() + nodes,
-        "Elements": f"{len(mesh.elements)}\n".encode() + elements,
-    }
+    return {"Nodes": f"{len(mesh.nodes)}\n".encode() + nodes, "Elements": f"{len(mesh.elements)}\n".encode() + elements}
 
 
 def _version_4(mesh, whole, reals):

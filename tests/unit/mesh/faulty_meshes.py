@@ -1,4 +1,4 @@
-"""Meshes that cannot be used: name -> (function writing the file, part of the message)."""
+"""Small meshes of squares, and those that cannot be used."""
 
 from __future__ import annotations
 
@@ -154,23 +154,10 @@ def _two_islands() -> MshFile:
     return MshFile(nodes, {1: (2, 1, 1, (1, 2, 3)), 2: (2, 1, 1, (4, 5, 6))})
 
 
-def _cut_corner() -> MshFile:
-    """Return the last corner node moved inwards along the upper side: the corner is cut off."""
-    return grid().moved(n25=(0.875, 1.0))
-
-
 def _unbalanced() -> MshFile:
     """Return the lowest left square in three triangles, with a node on the lower side that the upper one lacks."""
     mesh = replace(grid(), nodes={**grid().nodes, 99: (0.125, 0.0, 0.0)})
     return mesh.without(1).with_element(51, 2, 1, (1, 99, 7)).with_element(52, 2, 1, (99, 2, 7))
-
-
-def _text(content: str) -> Callable[[Path], None]:
-    return lambda path: path.write_text(content) and None
-
-
-def _mesh(build: Callable[[], MshFile]) -> Callable[[Path], None]:
-    return lambda path: build().write(path)
 
 
 def _broken(path: Path) -> None:
@@ -178,10 +165,6 @@ def _broken(path: Path) -> None:
     grid().write(path)
     text = path.read_text()
     path.write_text(text[: text.index("$EndNodes") - 40])
-
-
-def _unknown_node(path: Path) -> None:
-    grid().with_element(1, 2, 1, (1, 2, 77)).write(path)
 
 
 def _line_twice(path: Path) -> None:
@@ -193,106 +176,63 @@ def _line_twice(path: Path) -> None:
     path.write_text("\n".join([*lines, ""]))
 
 
-def _missing(path: Path) -> None:
-    path.unlink(missing_ok=True)
+def write_faulty(mesh: MshFile | str | Callable[[Path], object], path: Path) -> None:
+    """Write a mesh of the table below, or its text."""
+    if isinstance(mesh, MshFile):
+        mesh.write(path)
+    elif isinstance(mesh, str):
+        path.write_text(mesh)
+    else:
+        mesh(path)
 
 
-FAULTY_MESHES: dict[str, tuple[Callable[[Path], None], str]] = {
-    "missing file": (_missing, "cannot be read"),
-    "empty file": (_text(""), "not a gmsh mesh file"),
-    "geometry": (_text("Point(1) = {0, 0, 0};\n"), "not a gmsh mesh file"),
-    "other text": (_text("Dear gmsh,\n"), "not a gmsh mesh file"),
-    "header only": (_text("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"), "no triangles"),
-    "broken off": (_broken, "$Nodes: there is no $EndNodes: the file is damaged or broken off"),
-    "unknown node": (_unknown_node, "gmsh cannot read it: Wrong node index 77"),
-    "a line twice": (_line_twice, "32 elements are announced, and 31 are there, each with its own number"),
-    "no elements": (_mesh(lambda: grid().without(*range(1, 33))), "no triangles"),
-    "only lines": (_mesh(lambda: MshFile(grid().nodes, {1: (1, 1, 1, (1, 2))})), "no triangles"),
-    "quadrilaterals of second order": (
-        _mesh(_quadrilaterals),
-        "farther from the middle than half the edge's length",
-    ),
-    "third order": (
-        _mesh(_third_order),
-        "lines of two or three can be used (mesh the surfaces only, with Mesh.ElementOrder",
-    ),
-    "lines of third order": (
-        _mesh(lambda: grid().with_element(60, 26, 0, (9, 14, 9, 14))),
-        "element 60 at (0.75, 0.375), the first of 1, is a Line 4: only triangles of three or six nodes,",
-    ),
-    "a curve without lines": (
-        _mesh(lambda: grid().with_curve(())),
-        'no lines in the physical curve "debonded"',
-    ),
-    "tetrahedra": (
-        _mesh(lambda: grid().moved(n13=(0.5, 0.5, 1)).with_element(60, 4, 1, (1, 2, 7, 13))),
-        "Tetrahedron",
-    ),
-    "unlabelled": (
-        _mesh(lambda: grid().with_element(5, 2, 0, (3, 4, 9))),
-        "element 5 at (0.666666667, 0.0833333333): not in any physical surface",
-    ),
-    "no name": (_mesh(lambda: replace(grid(), names={MATRIX: "matrix"})), '"number 2" is not a phase'),
-    "two words": (_mesh(lambda: replace(grid(), names={1: "matrix", 2: "my glass"})), '"my glass" is not a phase'),
-    "meshed void": (_mesh(lambda: replace(grid(), names={1: "matrix", 2: "void"})), "expected no elements in a void"),
-    "empty variant": (
-        _mesh(lambda: replace(grid(), names={1: "matrix", 2: "fibre:"})),
-        '"fibre:" is not a phase',
-    ),
-    **{
-        f"variant {number}": (
-            _mesh(lambda number=number: replace(grid(), names={1: "matrix", 2: f"fibre:{number}"})),
-            f'physical surface "fibre:{number}" is not a phase',
-        )
-        for number in ("0", "02", "9" * 20)
-    },
-    "no matrix": (_mesh(lambda: replace(grid(), names={1: "fibre:2", 2: "fibre"})), 'named "matrix"'),
-    "nan": (
-        _mesh(lambda: grid().moved(n7=(float("nan"), 0.25))),
-        "node 7 (nan, 0.25): coordinates are not finite",
-    ),
-    "infinite": (_mesh(lambda: grid().moved(n7=(0.25, float("inf")))), "coordinates are not finite"),
-    "not planar": (_mesh(lambda: grid().moved(n7=(0.25, 0.25, 0.1))), "node 7 (0.25, 0.25) has z = 0.1"),
-    "tangled": (
-        _mesh(lambda: grid().moved(n7=(0.6, 0.25))),
-        "overlapping elements on the same side of an edge: the edge between node 2 (0.25, 0) and node 7",
-    ),
-    "zero area": (_mesh(lambda: grid().moved(n7=(0.25, 0.0))), "zero area"),
-    "repeated corner": (_mesh(lambda: grid().with_element(1, 2, 1, (1, 2, 2))), "element 1 at"),
-    "duplicate nodes": (
-        _mesh(lambda: _split_node(13, [11, 12])),
-        "nodes at the same place: node 13 (0.5, 0.5) and node 99 (0.5, 0.5)",
-    ),
-    "nearly duplicate nodes": (
-        _mesh(lambda: _split_node(13, [11, 12]).moved(n99=(0.5 + 9e-8, 0.5))),
-        "nodes at the same place: node 13 (0.5, 0.5) and node 99 (0.50000009, 0.5)",
-    ),
-    "repeated element": (
-        _mesh(lambda: grid().with_element(77, 2, 1, (1, 2, 7))),
-        "overlapping elements",
-    ),
-    "folded": (
-        _mesh(lambda: grid().without(12).with_element(77, 2, 1, (13, 7, 9))),
-        "overlapping elements",
-    ),
-    "folded, clockwise": (
-        _mesh(lambda: turned(grid().without(12).with_element(77, 2, 1, (13, 7, 9)), 77)),
-        "overlapping elements",
-    ),
-    "hanging": (
-        _mesh(_hanging),
-        "hanging nodes: node 99 (0.375, 0.375) on the edge between node 7 (0.25, 0.25)",
-    ),
-    "nearly hanging": (_mesh(lambda: _hanging(1e-4)), "hanging nodes: node 99"),
-    "sheared": (_mesh(_sheared), "the cell is a parallelogram, expected a rectangle"),
-    "dent": (_mesh(lambda: grid().moved(n11=(0.1, 0.5))), "node 15 (1, 0.5), expected at (0, 0.5)"),
-    "lost corner": (_mesh(lambda: grid().without(31, 32)), "no node at the corner (1, 1) of the cell"),
-    "cut corner": (_mesh(_cut_corner), "no node at the corner"),
-    "islands": (_mesh(_two_islands), "no node at the corner"),
-    "two layers": (_mesh(_doubled), "overlap"),
-    "not periodic, right": (
-        _mesh(lambda: grid().moved(n10=(1.0, 0.3))),
-        "node 10 (1, 0.3), expected at (0, 0.3)",
-    ),
-    "not periodic, lower": (_mesh(_unbalanced), "node 99 (0.125, 0), expected at (0.125, 1)"),
-}
+# Part of the message, and what is wrong.
+FAULTY_MESHES: list[tuple[str, MshFile | str | Callable[[Path], object]]] = [
+    ("cannot be read", lambda path: path.unlink(missing_ok=True)),
+    ("not a gmsh mesh file", ""),
+    ("not a gmsh mesh file", "Point(1) = {0, 0, 0};\n"),
+    ("not a gmsh mesh file", "Dear gmsh,\n"),
+    ("no triangles", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"),
+    ("$Nodes: there is no $EndNodes: the file is damaged or broken off", _broken),
+    ("gmsh cannot read it: Wrong node index 77", grid().with_element(1, 2, 1, (1, 2, 77))),
+    ("32 elements are announced, and 31 are there, each with its own number", _line_twice),
+    ("no triangles", grid().without(*range(1, 33))),
+    ("no triangles", MshFile(grid().nodes, {1: (1, 1, 1, (1, 2))})),
+    ("farther from the middle than half the edge's length", _quadrilaterals()),
+    ("lines of two or three can be used (mesh the surfaces only, with Mesh.ElementOrder", _third_order()),
+    ("element 60 at (0.75, 0.375), the first of 1, is a Line 4: only triangles of three or six nodes,",
+     grid().with_element(60, 26, 0, (9, 14, 9, 14))),
+    ('no lines in the physical curve "debonded"', grid().with_curve(())),
+    ("Tetrahedron", grid().moved(n13=(0.5, 0.5, 1)).with_element(60, 4, 1, (1, 2, 7, 13))),
+    ("element 5 at (0.666666667, 0.0833333333): not in any physical surface", grid().with_element(5, 2, 0, (3, 4, 9))),
+    ('"number 2" is not a phase', replace(grid(), names={MATRIX: "matrix"})),
+    ('"my glass" is not a phase', replace(grid(), names={1: "matrix", 2: "my glass"})),
+    ("expected no elements in a void", replace(grid(), names={1: "matrix", 2: "void"})),
+    ('"fibre:" is not a phase', replace(grid(), names={1: "matrix", 2: "fibre:"})),
+    *((f'physical surface "fibre:{number}" is not a phase', replace(grid(), names={1: "matrix", 2: f"fibre:{number}"}))
+      for number in ("0", "02", "9" * 20)),
+    ('named "matrix"', replace(grid(), names={1: "fibre:2", 2: "fibre"})),
+    ("node 7 (nan, 0.25): coordinates are not finite", grid().moved(n7=(float("nan"), 0.25))),
+    ("coordinates are not finite", grid().moved(n7=(0.25, float("inf")))),
+    ("node 7 (0.25, 0.25) has z = 0.1", grid().moved(n7=(0.25, 0.25, 0.1))),
+    ("overlapping elements on the same side of an edge: the edge between node 2 (0.25, 0) and node 7",
+     grid().moved(n7=(0.6, 0.25))),
+    ("zero area", grid().moved(n7=(0.25, 0.0))),
+    ("element 1 at", grid().with_element(1, 2, 1, (1, 2, 2))),
+    ("nodes at the same place: node 13 (0.5, 0.5) and node 99 (0.5, 0.5)", _split_node(13, [11, 12])),
+    ("nodes at the same place: node 13 (0.5, 0.5) and node 99 (0.50000009, 0.5)",
+     _split_node(13, [11, 12]).moved(n99=(0.5 + 9e-8, 0.5))),
+    ("overlapping elements", grid().with_element(77, 2, 1, (1, 2, 7))),
+    ("overlapping elements", grid().without(12).with_element(77, 2, 1, (13, 7, 9))),
+    ("overlapping elements", turned(grid().without(12).with_element(77, 2, 1, (13, 7, 9)), 77)),
+    ("hanging nodes: node 99 (0.375, 0.375) on the edge between node 7 (0.25, 0.25)", _hanging()),
+    ("hanging nodes: node 99", _hanging(1e-4)),
+    ("the cell is a parallelogram, expected a rectangle", _sheared()),
+    ("node 15 (1, 0.5), expected at (0, 0.5)", grid().moved(n11=(0.1, 0.5))),
+    ("no node at the corner (1, 1) of the cell", grid().without(31, 32)),
+    ("no node at the corner", grid().moved(n25=(0.875, 1.0))),
+    ("no node at the corner", _two_islands()),
+    ("overlap", _doubled()),
+    ("node 10 (1, 0.3), expected at (0, 0.3)", grid().moved(n10=(1.0, 0.3))),
+    ("node 99 (0.125, 0), expected at (0.125, 1)", _unbalanced()),
+]  # fmt: skip

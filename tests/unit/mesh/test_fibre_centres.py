@@ -65,10 +65,13 @@ def test_numbers_do_not_depend_on_marks():
     assert np.array_equal(plain, marked, equal_nan=True)
 
 
-def test_centre_of_a_polygon_is_that_of_its_area(tmp_path):
+def test_polygons_have_the_centre_of_their_area_and_layers_none(tmp_path):
     grid().write(tmp_path / "good.msh")
     _, circles = circles_of(read(tmp_path / "good.msh"))
     assert circles[1, :2] == pytest.approx([0.5, 0.5]) and np.isnan(circles[1, 2])
+    grid(lambda x, y: abs(y - 0.5) < 0.25).write(tmp_path / "good.msh")
+    _, centres = centres_of(read(tmp_path / "good.msh"))
+    assert np.isnan(centres).all()
 
 
 def test_a_fibre_around_the_corner_has_its_centre_at_the_corner(tmp_path):
@@ -77,12 +80,6 @@ def test_a_fibre_around_the_corner_has_its_centre_at_the_corner(tmp_path):
     grid(inside).write(tmp_path / "good.msh")
     _, centres = centres_of(read(tmp_path / "good.msh"))
     assert centres[1] % 1.0 == pytest.approx([1 - 1 / 24, 1 - 1 / 24])
-
-
-def test_a_fibre_that_winds_around_has_no_centre(tmp_path):
-    grid(lambda x, y: abs(y - 0.5) < 0.25).write(tmp_path / "good.msh")
-    _, centres = centres_of(read(tmp_path / "good.msh"))
-    assert np.isnan(centres).all()
 
 
 @pytest.mark.parametrize("lines", [RIGHT_SIDE, ALL_SIDES], ids=["open", "closed"])

@@ -120,9 +120,11 @@ def test_faults_of_keys(tmp_path, cell, fault):
     assert fault in caught.value.faults
 
 
-def test_a_void_has_no_material(tmp_path):
+def test_voids_with_a_material_or_without_room_are_refused(tmp_path):
     with pytest.raises(CaseError, match=r"\[material.void\]: unknown phase"):
         case_of(tmp_path, table(ROWS), "fibre", "void")
+    with pytest.raises(MeshError, match=r"fibre_fraction = 0.5, voids = 0.4 with min_gap = 0.05 and fibres = 16"):
+        arrange(circular(fraction=0.5, gap=0.05, voids=0.4))
 
 
 @pytest.mark.parametrize(("rows", "fault"), [
@@ -137,11 +139,6 @@ def test_faults_of_places(tmp_path, rows, fault):
     with pytest.raises(MeshError) as caught:
         arrange(case_of(tmp_path, table(rows)).cell)
     assert any(fault in line for line in caught.value.faults)
-
-
-def test_too_many_voids_are_reported():
-    with pytest.raises(MeshError, match=r"fibre_fraction = 0.5, voids = 0.4 with min_gap = 0.05 and fibres = 16"):
-        arrange(circular(fraction=0.5, gap=0.05, voids=0.4))
 
 
 @pytest.mark.slow

@@ -7,7 +7,6 @@ from unit.microstructure.test_arrangement import smallest_gap
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.cell_sizes import fibre_counts
-from feti_homog.commands.listed_fibres import table
 from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.fill.gmsh_mesher import arrangement_scale
@@ -76,21 +75,6 @@ def test_the_mesh_has_the_areas_of_each_phase():
     areas = np.bincount(mesh.phase, (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / 2)
     found = dict(zip(mesh.phases, areas / areas.sum(), strict=True))
     assert found == pytest.approx(MIX | {"matrix": 0.45}, rel=0.02)
-
-
-def test_the_table_of_a_mix_gives_its_fibres_again(tmp_path):
-    case = tmp_path / "case.toml"
-    case.write_text(
-        '[cell]\ngeometry = "random"\nmix = {glass = 0.3, carbon = 0.25}\nradii = {glass = 6.0, carbon = 3.5}\n'
-        "fibres = 9\n"
-        + "".join(f"[material.{name}]\nyoung = 1.0\npoisson = 0.3\n" for name in ("matrix", *MIX))
-        + '[analysis]\ntype = "stiffness"\nplane = "strain"\n'
-    )
-    (tmp_path / "f.csv").write_text(table(case))
-    case.write_text(
-        '[cell]\ngeometry = "table"\nfile = "f.csv"\n' + case.read_text().partition("fibres = 9\n")[2], encoding="utf-8"
-    )
-    assert table(case) == (tmp_path / "f.csv").read_text()
 
 
 def test_what_cannot_be_arranged_names_the_mix():

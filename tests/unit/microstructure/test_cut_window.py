@@ -93,21 +93,15 @@ def test_no_smaller_moves_are_near(seed):
         assert gap(np.where(np.arange(len(radii))[:, None] == k, 0.5 * moved, moved)) < gap(moved)
 
 
-def test_no_room_is_reported():
-    """In a cell of 0.62 x 0.43 two discs are at most 0.38 apart; they need 0.42."""
+def test_faults_of_cut_windows():
+    # In a cell of 0.62 x 0.43 two discs are at most 0.38 apart; they need 0.42.
     fibres = table([[0.1, 0.2], [0.53, 0.2]], [0.21, 0.21], (0.62, 0.43), (0.0, 0.0))
     with pytest.raises(MeshError, match=r'window = "cut": fibres overlap across the border, and there is no room'):
         arrange(Cell(geometry="table", table=fibres, window="cut"))
-
-
-def test_overlaps_within_are_faults_still():
     fibres = table([[0.3, 0.5], [0.45, 0.5], [0.95, 0.5]], [0.1] * 3, (1.0, 1.0), (0.0, 0.0))
     with pytest.raises(MeshError) as error:
         arrange(Cell(geometry="table", table=fibres, window="cut"))
     assert error.value.faults == ("[cell] t.csv: rows 1 and 2: overlap by 0.05",)
-
-
-def test_centres_outside_the_window_are_faults():
     fibres = table([[0.3, 0.5], [1.05, 0.5]], [0.1] * 2, (1.0, 1.0), (0.0, 0.0))
     with pytest.raises(MeshError, match=r"row 2: x = 1.05: lies outside the cell, of width 1"):
         arrange(Cell(geometry="table", table=fibres, window="cut"))

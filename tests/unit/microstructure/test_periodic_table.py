@@ -85,17 +85,9 @@ FAULTY = {
     "one in the other": (([[0.5, 0.5], [0.45, 0.5]], [0.3, 0.1]), {}, "rows 1 and 2: overlap by 0.35"),
     "over the side": (([[0.05, 0.5], [0.9, 0.5]], [0.1, 0.1]), {}, "rows 1 and 2: overlap by 0.05 across the border"),
     "over the corner": (([[0.05, 0.05], [0.95, 0.95]], [0.1, 0.1]), {}, "rows 1 and 2: overlap by 0.0586 across"),
-    "one place": (
-        ([[0.3, 0.5], [0.3, 0.5]], [0.1, 0.1]),
-        {},
-        "rows 1 and 2: are at one place",
-    ),
+    "one place": (([[0.3, 0.5], [0.3, 0.5]], [0.1, 0.1]), {}, "rows 1 and 2: are at one place"),
     "nearly one place": (([[0.3, 0.5], [0.3005, 0.5]], [0.1, 0.1]), {}, "rows 1 and 2: are at one place"),
-    "images of two radii": (
-        ([[0.0, 0.5], [1.0, 0.5]], [0.1, 0.12]),
-        {},
-        "rows 1 and 2: are images of one fibre",
-    ),
+    "images of two radii": (([[0.0, 0.5], [1.0, 0.5]], [0.1, 0.12]), {}, "rows 1 and 2: are images of one fibre"),
     "images of two phases": (
         ([[0.0, 0.5], [1.0, 0.5]], [0.1, 0.1]),
         {"phases": ["a", "b"]},

@@ -86,10 +86,14 @@ def test_an_event_takes_the_place_of_all_from_its_number_on(tmp_path, count):
     assert checkpoint.count() == count + 1 and same(map(checkpoint.read, range(count + 1)))
 
 
-def test_the_checkpoint_of_another_run_is_refused(tmp_path):
+def test_other_files_are_refused(tmp_path):
     written(tmp_path)
     with pytest.raises(CaseError, match=r"--resume: .*events is of another run: expected that; found this run"):
         Checkpoint(tmp_path, MPI.COMM_SELF, "that").count()
+    checkpoint = written(tmp_path)
+    checkpoint.path.write_bytes(b"nothing")
+    with pytest.raises(CaseError, match=r"--resume: .*events is damaged: it does not begin as an event file"):
+        checkpoint.count()
 
 
 def test_an_unfinished_record_does_not_count(tmp_path):
@@ -124,13 +128,6 @@ def test_files_of_a_former_format_are_refused(tmp_path):
     with pytest.raises(CaseError, match=r"000000\.h5 has the checkpoints' format 10 or less, this program reads"):
         checkpoint.count()
     assert checkpoint.clear() == 1 and list(tmp_path.iterdir()) == []
-
-
-def test_a_file_of_something_else_is_refused(tmp_path):
-    checkpoint = written(tmp_path)
-    checkpoint.path.write_bytes(b"nothing")
-    with pytest.raises(CaseError, match=r"--resume: .*events is damaged: it does not begin as an event file"):
-        checkpoint.count()
 
 
 @pytest.mark.parametrize("bit", range(8))

@@ -56,14 +56,14 @@ def test_as_many_as_asked_for_with_both_ends(seed: int, states: int) -> None:
     assert numbers == sorted(numbers) and (numbers[0], numbers[-1]) == (0, 499)
 
 
-def test_all_of_them() -> None:
+def test_without_drops_states_are_even() -> None:
     assert kept(random_walk(0), "all", 1) == list(range(500))
     assert kept([], 5, 1) == [] and kept(path([1.0]), "peaks", 1) == [0] == kept(path([1.0]), 2, 1)
-
-
-def test_without_a_drop_they_are_even() -> None:
     assert kept(path(np.linspace(0.1, 1.0, 101)), 11, 1) == list(range(0, 101, 10))
     assert kept(path(np.linspace(0.1, 1.0, 101)), "peaks", 1) == [0, 100]
+    rising = np.linspace(0.5, 1.0, 200) + 0.004 * (np.arange(200) % 2)
+    assert kept(path(rising), "peaks", 1) == [0, 199]
+    assert drops(path(rising), 1) == []
 
 
 def test_the_deepest_drops_come_first() -> None:
@@ -76,12 +76,6 @@ def test_the_deepest_drops_come_first() -> None:
     assert {19, 20, 49, 50, 79, 80} <= set(kept(points, 20, 0))
     gaps = np.diff(kept(points, 20, 0))
     assert gaps.max() <= 10
-
-
-def test_saw_teeth_are_no_drops() -> None:
-    rising = np.linspace(0.5, 1.0, 200) + 0.004 * (np.arange(200) % 2)
-    assert kept(path(rising), "peaks", 1) == [0, 199]
-    assert drops(path(rising), 1) == []
 
 
 def test_what_a_rising_load_comes_to_after_a_snap_back_is_kept() -> None:

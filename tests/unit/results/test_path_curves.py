@@ -27,24 +27,22 @@ def point(load: float, stiffness: float, broke: int = 1) -> dict[str, Any]:
     return {"load_factor": load, "strain": [strain, 0.0, 0.0], "stress": stress, "broke": broke, "dissipated": 0.0}
 
 
-def test_snap_back_becomes_a_drop() -> None:
+def test_snap_back_becomes_a_drop_to_the_next_branch_that_holds() -> None:
     # Rays of falling stiffness; the second and third break below the load of the first.
     points = [point(0.5, 10.0), point(0.3, 8.0), point(0.4, 6.0), point(0.8, 4.0), point(1.0, 2.0, 0)]
     found = load_controlled(points)[:, [3, 0]]
     expected = [[0, 0], [0.05, 0.5], [0.05, 0.2], [0.08, 0.32], [0.08, 0.16], [0.1, 0.2]]
     np.testing.assert_allclose(found, expected, atol=1e-15)
+    points = [point(0.5, 10.0), point(0.3, 8.0), point(0.4, 6.0), point(0.8, 4.0), point(1.0, 2.0, 0)]
+    stress, number = first_drop(points)
+    assert number == 3 and stress.tolist() == pytest.approx([0.05 * 4.0, 0.0, 0.0])
+    np.testing.assert_allclose(load_controlled([point(1.0, 3.0, 0)])[:, [3, 0]], [[0, 0], [0.1, 0.3]])
 
 
 def document(method: str, waypoints: int, points: list[dict[str, Any]]) -> dict[str, Any]:
     given = {"waypoints": [[1.0, 0, 0]] * waypoints} if waypoints > 1 else {"strain": [1.0, 0, 0]}
     case = {"analysis": {"plane": "strain"}, "path": {"method": method} | given}
     return {"case": case, "path": points}
-
-
-def test_the_first_drop_ends_on_the_next_branch_that_holds() -> None:
-    points = [point(0.5, 10.0), point(0.3, 8.0), point(0.4, 6.0), point(0.8, 4.0), point(1.0, 2.0, 0)]
-    stress, number = first_drop(points)
-    assert number == 3 and stress.tolist() == pytest.approx([0.05 * 4.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -84,20 +82,16 @@ def test_the_peak_is_before_the_deepest_fall_in_which_bonds_break() -> None:
     assert (found["event"], found["event_left"], found["stress"]) == (0, 3, pytest.approx(2.0))
 
 
-def test_first_legs() -> None:
+def test_rising_strain_is_that_of_the_first_leg() -> None:
     points = [point(load, 1.0) for load in (0.2, 0.5, 0.6, 1.0)]
     assert [first_leg(document("events", n, points)) for n in (1, 2, 3)] == [4, 2, 1]
     assert first_leg(document("increments", 2, points)) == 4
-
-
-def test_rising_strain_of_increments_is_the_points_from_zero() -> None:
     found = rising_strain(document("increments", 1, [point(0.5, 4.0), point(1.0, 2.0)]))
     np.testing.assert_allclose(found[:, [3, 0]], [[0, 0], [0.05, 0.2], [0.1, 0.2]])
     assert rising_strain(document("events", 2, [point(1.0, 2.0)])) is None
-
-
-def test_no_break_is_a_straight_line() -> None:
-    np.testing.assert_allclose(load_controlled([point(1.0, 3.0, 0)])[:, [3, 0]], [[0, 0], [0.1, 0.3]])
+    path = mixed({"S11": 1.0}, [[t, 0, 0] for t in (0.5, 1.0)], "strain")
+    path["path"][0]["strain"][0] = 5.0
+    assert rising_strain(path) is None
 
 
 @pytest.mark.parametrize(("count", "rows"), [(1, 6), (6, 6), (7, 6), (500, 15), (3, 2)])
@@ -176,8 +170,7 @@ def test_the_strain_that_leads_is_among_those_that_are_named() -> None:
 
 
 @pytest.mark.parametrize(
-    ("load", "word"),
-    [({"E11": 0.1, "S22": 0.0}, "strain"), ({"S11": 5.0}, "load"), ({"E11": 0.1, "S22": 5.0}, "load")],
+    ("load", "word"), [({"E11": 0.1, "S22": 0.0}, "strain"), ({"S11": 5.0}, "load"), ({"E11": 0.1, "S22": 5.0}, "load")]
 )
 def test_what_rises_is_the_strain_if_no_stress_is_given(load: dict[str, float], word: str) -> None:
     assert what_rises(mixed(load, [[1.0, 0, 0]], "strain")) == word
@@ -196,9 +189,3 @@ def test_under_a_given_stress_the_strain_jumps_at_a_rising_load() -> None:
     np.testing.assert_allclose(found[:, [6, 4]], expected, atol=1e-12)
     stress, number = first_drop(path["path"])
     assert number == 2 and stress.tolist() == pytest.approx([0, 0, 0, 0, 1.0, 0])
-
-
-def test_a_strain_that_goes_back_has_no_rising_curve() -> None:
-    path = mixed({"S11": 1.0}, [[t, 0, 0] for t in (0.5, 1.0)], "strain")
-    path["path"][0]["strain"][0] = 5.0
-    assert rising_strain(path) is None

@@ -17,13 +17,7 @@ def test_modules_have_the_names_of_imports(path, name):
     assert module_name(path) == name
 
 
-def test_a_module_selects_what_imports_it():
+def test_tests_are_selected_through_their_modules():
     assert touched({"scripts/changed_tests.py"}) == ["tests/unit/scripts/test_changed_tests.py"]
-
-
-def test_modules_of_the_tests_pass_a_change_on():
     assert touched({"tests/differential/finer_meshes.py"}) == ["tests/unit/test_differential.py"]
-
-
-def test_documents_and_new_tests():
     assert touched({"README.md", "tests/unit/test_differential.py"}) == ["tests/unit/test_differential.py"]

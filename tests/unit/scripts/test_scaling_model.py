@@ -55,14 +55,11 @@ def test_shares_of_amdahl():
     assert found.seconds(100, 8) == pytest.approx(300 * (0.2 + 0.1))
 
 
-def test_shares_are_not_negative():
-    """Work that gets slower with ranks has no parallel share; the serial one is the geometric mean."""
+def test_shares_and_powers_are_fitted():
+    # Work that gets slower with ranks has no parallel share; the serial one is the geometric mean.
     found = fit_shares([1, 1], [1, 2], [1.0, 2.0])
     assert found.parallel == pytest.approx(0.0, abs=1e-4)
     assert found.serial == pytest.approx(2**0.5, rel=1e-4)
-
-
-def test_power():
     found = fit_power([10, 100, 1000], [2e-3 * n**1.4 for n in (10, 100, 1000)])
     assert (found.factor, found.exponent) == pytest.approx((2e-3, 1.4))
 

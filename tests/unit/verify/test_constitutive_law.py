@@ -59,12 +59,9 @@ def test_both_ways_to_the_law_in_space_agree(tmp_path, fibre):
         np.testing.assert_allclose(strain, expansion(case.material_of(phase)), rtol=1e-12, atol=1e-20)
 
 
-def test_a_phase_that_does_not_say_how_it_expands_leaves_all_unknown():
+def test_phases_without_material_are_reported_and_without_expansion_leave_all_unknown():
     case = {"material": {"matrix": MATRIX, "fibre": WARM_CARBON}, "analysis": {"plane": "generalized"}}
     assert not laws(case, ["matrix", "fibre"])[1].any()
-
-
-def test_a_phase_without_material_is_reported():
     case = {"material": {"matrix": MATRIX}, "analysis": {"plane": "strain"}}
     with pytest.raises(CaseError, match="no material for the phase fibre"):
         laws(case, ["matrix", "fibre"])

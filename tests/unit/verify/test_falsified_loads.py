@@ -1,16 +1,7 @@
 """A copy of a result of mixed loads in which one thing is false breaks the laws that it must break."""
 
 import pytest
-from support.falsifications import (
-    attribute,
-    both,
-    broken,
-    document,
-    entry,
-    free_axial_traction,
-    raised,
-    scale,
-)
+from support.falsifications import attribute, both, broken, document, entry, free_axial_traction, raised, scale
 from support.verified_results import falsified
 
 pytestmark = pytest.mark.slow

@@ -19,7 +19,7 @@ from support.falsifications import (
 from support.verified_results import CASES, LOADS, MIXED_PATHS, falsified
 
 from feti_homog.verify.certificate import verify
-from feti_homog.verify.check_state import check_state
+from feti_homog.verify.check_state import check_gluing
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Findings, checks
 from feti_homog.verify.reading import gradient, opened
@@ -253,10 +253,7 @@ def test_displacements_that_fit_their_stresses_break_equilibrium_alone(results, 
         file["state/0/displacement"][()] = displacement
         file["state/0/stress"][()] = cell.elements.fields(displacement, displacement, 0.0, cell.expansions).stress
 
-    assert broken(falsified(results("bonded"), tmp_path / "copy", edit)) - {"stress 33"} == {
-        "equilibrium",
-        "files",
-    }
+    assert broken(falsified(results("bonded"), tmp_path / "copy", edit)) - {"stress 33"} == {"equilibrium", "files"}
 
 
 def test_the_held_place_may_collect_the_rounding_of_all_others_and_no_more(results):
@@ -275,6 +272,6 @@ def test_the_held_place_may_collect_the_rounding_of_all_others_and_no_more(resul
         assert np.abs(noise[held]).max() > 4 * np.abs(noise[inner]).max()
         for added in (noise, 10 * noise, np.roll(noise, inner[0] - held, axis=0)):
             findings = Findings(checks(1e-8, users_mesh=False, has_coatings=False))
-            check_state(findings, cell, state, replace(fields, force=fields.force + added))
+            check_gluing(findings, cell, state, replace(fields, force=fields.force + added))
             limits.append(next(found.holds for found in findings.worst() if found.name == "equilibrium"))
     assert limits == [True, False, False]

@@ -1,11 +1,14 @@
-"""Verification reads the loads of a case that the program goes through."""
+"""Verification reads the loads that the program goes through, and measures stresses by what the case asks for."""
+
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from support.verified_results import LOADS, MIXED_PATHS, document
 
 from feti_homog import Case
-from feti_homog.verify.check_loads import NAMES, at_points, targets
+from feti_homog.verify.check_loads import NAMES, Prescribed, at_points, check_loads, targets
+from feti_homog.verify.findings import Findings, checks
 
 TWO_LEGS = {"path": {"waypoints": [{"E11": 0.4, "S22": 2.0}, {"S11": 3.0, "S22": 6.0}]}}
 
@@ -48,3 +51,19 @@ def test_steps_that_pass_a_waypoint_go_round_its_corner():
     loads = at_points({"analysis": {"plane": "strain"}, "path": path}, points)
     expected = [[0.2, 0.0, 0.0], [0.3, 0.1, 0.0], [0.3, 0.3, 0.0]]
     np.testing.assert_allclose([load.values for load in loads], expected, rtol=1e-14, atol=1e-16)
+
+
+@pytest.mark.parametrize(("strain", "missed", "holds"), [(0.01, 0.0, True), (1e7, 0.0, True), (1e7, 5e-4, False)])
+def test_a_stress_that_is_missed_is_measured_by_the_load(strain, missed, holds):
+    load = Prescribed(np.array([-0.001, 0.0, 0.008]), np.array([False, True, True]))
+    strains, stresses = np.array([-0.001, 0.0, strain]), np.array([-0.004, 0.0, 0.008 - missed])
+    state = SimpleNamespace(name="a state", point=0, strain=strains, mean_stress=stresses, temperature=0.0)
+    cell = SimpleNamespace(
+        files=SimpleNamespace(document={}),
+        reuss=np.diag([4.0, 4.0, 1.0]),
+        largest_strain=strain,
+        loads=lambda strain, temperature: strain,
+    )
+    findings = Findings(checks(1e-8, False, has_coatings=False))
+    check_loads(findings, cell, [state], [(load, {})])
+    assert all(finding.holds for finding in findings.worst()) is holds

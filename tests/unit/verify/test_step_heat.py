@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from feti_homog.verify.discrete_cell import BONDED, CLOSED, OPEN
 from feti_homog.verify.findings import Findings, checks
 from feti_homog.verify.path_energies import check_step_heat
+from feti_homog.verify.reading import Status
 
 
 def state(point, status):
@@ -38,7 +38,7 @@ def test_heat_of_an_increment_is_that_of_its_slips(heat, method, broke, holds):
     section, strength = {"criterion": "max", "friction": 0.3}, SimpleNamespace(strength=np.ones(1))
     files = SimpleNamespace(interfaces=[section], interface=place, fibres=strength, **written)
     findings = Findings(checks(1e-8, False, has_coatings=False))
-    before, behind = (state(point, [BONDED, CLOSED, OPEN]) for point in (2, 3))
+    before, behind = (state(point, [Status.BONDED, Status.CLOSED, Status.OPEN]) for point in (2, 3))
     behind.jump[:, 1], behind.traction[:, 1] = [0.0, 0.1, 0.5], [5.0, 3.0, 0.0]
     check_step_heat(findings, SimpleNamespace(files=files, area=2.0), before, behind)
     assert all(finding.holds for finding in findings.worst()) is holds

@@ -24,7 +24,7 @@ def whole(gram, modes, active):
 
 def test_the_entries_are_linear_in_the_active_rows():
     G = coupled()
-    gram = GramMatrix(MPI.COMM_SELF, csr_matrix(G))
+    gram = GramMatrix(MPI.COMM_SELF, csr_matrix(G), np.arange(15))
     for seed in range(3):
         active = np.random.default_rng(seed).integers(0, 2, len(G)).astype(float)
         found = whole(gram, G.shape[1], active)
@@ -33,7 +33,7 @@ def test_the_entries_are_linear_in_the_active_rows():
 
 def test_groups_are_what_is_coupled_without_the_others():
     G = coupled()
-    gram = GramMatrix(MPI.COMM_SELF, csr_matrix(G))
+    gram = GramMatrix(MPI.COMM_SELF, csr_matrix(G), np.arange(15))
     (groups,) = gram.groups(np.arange(3, 15))
     assert sorted(map(tuple, np.sort(groups, axis=1))) == [tuple(range(3 * b, 3 * b + 3)) for b in range(1, 5)]
     dense = np.append(gram.entries(np.ones(len(G))), 0.0)[gram.places(groups)]
@@ -44,6 +44,6 @@ def test_groups_are_what_is_coupled_without_the_others():
 
 
 def test_a_mode_that_no_row_sees_has_a_diagonal_entry():
-    gram = GramMatrix(MPI.COMM_SELF, csr_matrix((4, 2)))
+    gram = GramMatrix(MPI.COMM_SELF, csr_matrix((4, 2)), np.arange(2))
     np.testing.assert_array_equal(whole(gram, 2, np.ones(4)), np.zeros((2, 2)))
     assert [g.tolist() for g in gram.groups(np.arange(2))] == [[[0], [1]]]

@@ -73,14 +73,11 @@ def test_ranks_are_balanced_and_their_subdomains_together(torus, n_ranks):
     assert remote.sum() < 0.5 * (1 - 1 / n_ranks) * between.sum()
 
 
-def test_few_subdomains_are_assigned_by_size(torus):
+def test_few_subdomains_are_assigned_by_size_to_as_many_ranks(torus):
     whole = decompose(torus, torus.constituent, np.ones(17, np.int64), 2)
     load = np.bincount(whole.subdomain)
     largest = np.bincount(whole.rank, load).max()
     assert largest <= 1.05 * max(load.max(), load.sum() / 2)
-
-
-def test_ranks_beyond_the_subdomains_have_nothing(torus):
     whole = decompose(torus, torus.constituent, np.ones(17, np.int64), 40)
     assert len(np.unique(whole.rank)) == 17
 

@@ -23,27 +23,18 @@ def test_the_user_decides(applications, soft_modes):
         assert not choice(n, "implicit", applications, soft_modes).explicit
 
 
-def test_dense_matrices_where_many_applications_pay_for_them():
+def test_dense_matrices_are_made_where_they_pay_and_fit():
     assert not choice(500, applications=0).explicit
     assert choice(500, applications=MANY).explicit
-
-
-def test_dense_matrices_for_soft_modes_but_of_large_whole_bodies():
     assert choice(500, soft_modes=True).explicit
     assert choice(100, soft_modes=True, is_whole_body=True) == OperatorChoice(explicit=True, facewise=False)
     assert choice(500, soft_modes=True, is_whole_body=True) == OperatorChoice(explicit=False, facewise=True)
-
-
-def test_no_dense_matrices_that_are_too_large_or_cannot_be_made():
     assert not choice(601, applications=MANY, soft_modes=True).explicit
     assert not choice(500, applications=MANY, soft_modes=True, can_condense=False).explicit
+    sizes = [SubdomainSize(5000, n, False) for n in (100, 700, 300)]
+    assert [c.explicit for c in choose(sizes, "auto", 0, True, True, LIMITS)] == [True, False, True]
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_subdomain_without_boundary_has_no_dense_matrix(kind):
     assert choice(0, kind, MANY, soft_modes=True) == OperatorChoice(explicit=False, facewise=False)
-
-
-def test_each_subdomain_has_its_own_choice():
-    sizes = [SubdomainSize(5000, n, False) for n in (100, 700, 300)]
-    assert [c.explicit for c in choose(sizes, "auto", 0, True, True, LIMITS)] == [True, False, True]

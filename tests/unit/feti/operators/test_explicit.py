@@ -126,12 +126,9 @@ def test_dense_matrices_are_those_that_are_applied(parts):
         assert np.abs(regularised @ inverse - np.eye(len(dofs))).max() < 1e-8
 
 
-def test_schur_complement_without_an_interior_is_the_matrix():
+def test_schur_complements_are_those_of_dense_algebra():
     A = csr_matrix(np.diag([2.0, 3.0]) + 1.0)
     assert (schur_complement(A, np.arange(2)) == A.toarray()).all()
-
-
-def test_schur_complement_of_any_definite_matrix_is_the_dense_one():
     n, dofs = 30, np.array([1, 4, 5, 17, 29])
     A = csr_matrix(diags([np.arange(n) + 4.0, np.full(n - 1, -1.5), np.full(n - 1, -1.5)], [0, 1, -1]))
     expected = np.linalg.inv(np.linalg.inv(A.toarray())[np.ix_(dofs, dofs)])

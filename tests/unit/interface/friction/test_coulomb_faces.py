@@ -249,10 +249,7 @@ def test_what_holds_a_free_motion_carries_no_force(force):
 
 def test_faces_that_slide_freely_are_told_from_those_for_which_nothing_is_found():
     """One node under a pressure of 1 and a shear: it sticks up to mu, and beyond nothing carries it."""
-    faces, by_stress = (
-        CoulombFaces(np.eye(4) - np.eye(4)[[2, 3, 0, 1]], np.array([0.5])),
-        [True] * 2,
-    )
+    faces, by_stress = (CoulombFaces(np.eye(4) - np.eye(4)[[2, 3, 0, 1]], np.array([0.5])), [True] * 2)
     for shear, carried in ((0.4, True), (0.6, False)):
         given = Prescribed(np.array(by_stress), np.array([-1.0, shear]), np.zeros(1))
         if carried:

@@ -13,18 +13,17 @@ def criterion(mode_sensitivity=0.25):
     return SpringEnergy(2025.0, 506.25, 2.0, mode_sensitivity)
 
 
-def test_pure_modes_break_at_their_strength():
+def test_modes_break_at_their_toughness():
     # sigma_c = sqrt(2 k_n G_Ic) = 90 in opening; in shear G_c = G_Ic [1 + tan^2((1 - lambda) 90 degrees)].
     shear = np.sqrt(2 * 506.25 * 2.0 * (1 + np.tan(np.radians(0.75 * 90)) ** 2))
     used = criterion().share(np.array([[90.0, 0.0], [0.0, shear], [0.0, -shear], [-50.0, shear], [-90.0, 0.0]]))
     assert used == pytest.approx([1.0, 1.0, 1.0, 1.0, 0.0])
-
-
-def test_a_mixed_mode_breaks_at_its_toughness():
     t_n, t_t = 40.0, 30.0
     first, second = t_n**2 / (2 * 2025.0), t_t**2 / (2 * 506.25)
     toughness = 2.0 * (1 + np.tan(0.75 * np.arctan(np.sqrt(second / first))) ** 2)
     assert criterion().share(np.array([[t_n, t_t]])) == pytest.approx(np.sqrt((first + second) / toughness))
+    assert criterion(0.0).share(np.array([[0.0, 1e6]])) == pytest.approx(0.0, abs=1e-8)
+    assert criterion(1.0).share(np.array([[0.0, 45.0]])) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("mode_sensitivity", [0.0, 0.25, 1.0])
@@ -34,11 +33,6 @@ def test_utilisation_is_homogeneous_and_convex(mode_sensitivity):
     assert law(3.0 * a) == pytest.approx(3.0 * law(a))
     for share in (0.2, 0.5, 0.9):
         assert (law(share * a + (1 - share) * b) <= share * law(a) + (1 - share) * law(b) + 1e-12).all()
-
-
-def test_no_sensitivity_lets_shear_alone_break_nothing():
-    assert criterion(0.0).share(np.array([[0.0, 1e6]])) == pytest.approx(0.0, abs=1e-8)
-    assert criterion(1.0).share(np.array([[0.0, 45.0]])) == pytest.approx(1.0)
 
 
 def test_what_a_break_releases_is_continuous_where_its_faces_begin_to_overlap():
@@ -51,14 +45,11 @@ def test_what_a_break_releases_is_continuous_where_its_faces_begin_to_overlap():
     assert released_energy(H, np.array([[3.0, 0.0]]), STIFF, True) == pytest.approx(9.0 * np.linalg.inv(H[0])[0, 0] / 2)
 
 
-def test_the_last_bond_of_a_fibre_releases_nothing():
+def test_breaks_release_both_parts_and_those_of_free_fibres_nothing():
     forces = np.array([[1e-12, -1e-12]])
     assert released_energy(np.zeros((1, 2, 2)), forces, STIFF, True) == 0.0
     rigid_across = np.array([[[1e-17, 0.0], [0.0, 2.0]]])
     assert released_energy(rigid_across, np.array([[1e-12, 3.0]]), STIFF, True) == pytest.approx(9.0 / 2.0 / 2)
-
-
-def test_without_contact_a_break_under_compression_releases_both_parts():
     H, lam = np.array([[[2.0, 0.7], [0.7, 1.5]]]), np.array([[-5.0, 1.5]])
     expected = lam[0] @ np.linalg.solve(H[0], lam[0]) / 2
     assert released_energy(H, lam, STIFF, False) == pytest.approx(expected)

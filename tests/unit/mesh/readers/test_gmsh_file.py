@@ -140,6 +140,7 @@ ELEMENTS_4 = "$Elements\n1 1 1 1\n2 1 2 1\n1 1 2 3\n$EndElements\n"
 FILE_2, FILE_4 = HEAD_2 + NODES_2 + ELEMENTS_2, HEAD_4 + NODES_4 + ELEMENTS_4
 FAULTS = {
     "format 3": (FILE_2.replace("2.2", "3"), 'format "3" of gmsh: expected 2.2, 4.0 or 4.1'),
+    "no version": ("$MeshFormat\n$EndMeshFormat\n", 'format "" of gmsh: expected 2.2, 4.0 or 4.1'),
     "format 1": ("$NOD\n0\n$ENDNOD\n", "format 1 of gmsh: save it in format 2.2 or 4.1"),
     "short numbers": (
         FILE_2.replace("0 8", "0 4", 1),

@@ -1,4 +1,4 @@
-"""Numbers of triangles, estimated before a cell of ellipses is meshed."""
+"""Numbers of triangles before a cell is meshed, and edge lengths that grow from sources."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from unit.mesh.test_table_ellipses import cell_of, table
 from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.sizes.element_estimate import ElementEstimate, refuse_many
-from feti_homog.mesh.sizes.graded_size import MeshSizes, size_field
+from feti_homog.mesh.sizes.graded_size import MAX_GROWTH, MeshSizes, SizeField, size_field
 from feti_homog.microstructure.shapes.ellipses import Ellipses
 
 
@@ -39,3 +39,32 @@ def test_no_size_is_below_the_least(coating):
         refuse_many(lambda _: pytest.fail("sizes are summed"), field.least, arrangement.size, 10**9)
         with pytest.raises(MeshError, match="elements before refine"):
             refuse_many(field, field.least, arrangement.size, 100)
+
+
+SIZE = np.array([1.0, 0.8])
+LARGEST = 0.04
+
+
+def sources(count, seed=1):
+    """Return some of any length and growth, near enough to each other that several matter everywhere."""
+    rng = np.random.default_rng(seed)
+    return rng.random((count, 2)) * SIZE, 0.05 * rng.random(count), MAX_GROWTH * rng.random(count)
+
+
+def brute_force(some, points):
+    """Return the formula, with every source within its reach."""
+    places, lengths, growths = some
+    way = points[:, None] - places
+    away = np.sqrt(((way - SIZE * np.round(way / SIZE)) ** 2).sum(axis=2))
+    sizes = np.where(away < LARGEST / MAX_GROWTH, lengths + growths * away, LARGEST)
+    return np.minimum(LARGEST, sizes.min(axis=1))
+
+
+@pytest.mark.parametrize("count", [1, 20, 150])
+def test_sizes_are_those_of_the_formula(count):
+    """In several parts."""
+    some = sources(count)
+    points = 2 * np.random.default_rng(2).random((500, 2)) - 0.5
+    expected = brute_force(some, points)
+    assert expected.min() < 0.9 * LARGEST or count == 1
+    np.testing.assert_allclose(SizeField([some], SIZE, LARGEST, chunk=200)(points), expected, rtol=1e-13)

@@ -161,8 +161,8 @@ def test_a_tile_that_gmsh_leaves_unfilled_is_reported(monkeypatch):
     add = tile_filling._add_surfaces
 
     def without_last(gmsh, own):
-        surfaces, circle = add(gmsh, own)
-        return surfaces[:-1], circle[:-1]
+        surfaces, circle, area = add(gmsh, own)
+        return surfaces[:-1], circle[:-1], area
 
     monkeypatch.setattr(tile_filling, "_add_surfaces", without_last)
     with pytest.raises(MeshError, match=r"gmsh cannot fill the part from \(0, 0\) to .*: triangles are missing"):

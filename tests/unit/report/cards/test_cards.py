@@ -18,7 +18,7 @@ from support.effective_results import (
     turned_stiffness,
 )
 
-from feti_homog import cli
+from feti_homog.commands.parser import command_parser
 from feti_homog.errors import CaseError
 from feti_homog.materials.engineering_constants import engineering_constants
 from feti_homog.report.cards import effective_material
@@ -166,14 +166,14 @@ def test_names_are_those_that_programs_accept(name, identifier):
 
 
 def test_the_command_line_offers_every_format():
-    arguments = cli.command_parser().parse_args(["export", "DIR", "--format", "csv"])
+    arguments = command_parser().parse_args(["export", "DIR", "--format", "csv"])
     assert arguments.symmetry == "orthotropic" and arguments.out is None
     (words,) = [a.help for a in _export_actions() if a.dest == "format"]
     assert words.endswith(f": {', '.join(FORMATS)}")
 
 
 def _export_actions():
-    commands = next(a.choices for a in cli.command_parser()._actions if isinstance(a.choices, dict))
+    commands = next(a.choices for a in command_parser()._actions if isinstance(a.choices, dict))
     return commands["export"]._actions
 
 

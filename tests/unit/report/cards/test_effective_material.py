@@ -24,13 +24,10 @@ def coupled(size):
     return C
 
 
-def test_order_is_that_of_the_turned_tensor():
+def test_order_and_axes_of_cards_are_those_of_the_turned_tensor():
     C = DISTINCT.stiffness_in_the_cell
     assert np.array_equal(C[np.ix_(ORDER, ORDER)], turned_stiffness(C, COSINES.T))
     assert ORDER == [2, 0, 1, 5, 3, 4]
-
-
-def test_axes_of_cards_are_right_handed():
     assert np.linalg.det(COSINES) == 1.0
 
 

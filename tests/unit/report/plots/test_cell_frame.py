@@ -9,20 +9,20 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from feti_homog.report.plots import deformed_panels
-from feti_homog.report.plots.drawn_cell import BAR_INCHES, LEAST_BAR, bar_beside, cell_size, figure_of, label_cell_axes
-from feti_homog.report.plots.plot_helpers import DPI, pixels_of, save
+from feti_homog.report.plots.drawn_cell import bar_beside, figure_of, label_cell_axes
+from feti_homog.report.plots.plot_helpers import DPI, save
 
 
 @pytest.mark.parametrize("size", [(8.0, 80.0), (240.0, 10.0), (1.0, 1.0)])
 def test_bars_beside_narrow_and_flat_cells_are_wide_and_high_enough(size: tuple[float, float]) -> None:
     attributes = {"width": size[0], "height": size[1], "length_unit": "um"}
-    figure, (axes,) = figure_of(attributes, panels=1, beside=BAR_INCHES)
+    figure, axes = figure_of(attributes)
     axes.plot([0.0, size[0]], [0.0, size[1]])
-    bar = bar_beside(axes, ScalarMappable(), "both", cell_size(attributes))
+    bar = bar_beside(axes, ScalarMappable(), "both")
     label_cell_axes(axes, attributes)
-    pixels_of(figure)
+    figure.draw_without_rendering()
     drawn = bar.ax.get_window_extent().size / figure.dpi
-    assert (drawn > 0.8 * np.array(LEAST_BAR)).all()
+    assert drawn[0] > 0.12 and drawn[1] > 0.96  # inches
 
 
 @pytest.mark.parametrize("letters", [10, 200])
@@ -31,7 +31,7 @@ def test_titles_wider_than_the_figure_are_drawn_whole(tmp_path: Path, letters: i
     title = figure.subplots().set_title("M" * letters)
     with Image.open(save(figure, tmp_path / "long.png")) as picture:
         assert picture.width >= title.get_window_extent().width
-        assert (picture.width > 3.0 * DPI) == (letters == 200)
+        assert (picture.width > 3.2 * DPI) == (letters == 200)
         edges = np.asarray(picture)[:, [0, -1]]
     assert (edges == 255).all()
 

@@ -53,12 +53,9 @@ def test_parts_are_stacked_to_the_work(fracture: dict[str, list[float]], parts: 
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("leg of the path", "energy per area (MPa)")
 
 
-def test_a_load_that_falls_leaves_numbers_of_points() -> None:
+def test_energies_against_points_and_results_without_energies() -> None:
     figure = path_picture.energies(path([0.5, 0.25, 1.0], **ENERGIES))
     assert figure is not None
     place = figure.axes[0].lines[0].get_xdata()
     assert list(place[-3:]) == [0.0, 1.0, 2.0] and place[0] == -1.0 and "number" in figure.axes[0].get_xlabel()
-
-
-def test_results_without_energies_have_no_stack() -> None:
     assert path_picture.energies(path([0.5, 0.6, 1.0])) is None

@@ -190,7 +190,7 @@ def test_lines_of_displacement_are_at_round_steps(extent: float, step: float) ->
     label, corners = np.zeros(1, int), np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     drawn = decimation.DrawnMesh(8, 1, 1, np.arange(3), corners, np.arange(3)[None], label, label, label)
     state = {"axial_displacement": extent * np.array([0.0, 1.0, 0.5])}
-    assert figures.draw_levels(Figure().subplots(), state, drawn) == pytest.approx(step)
+    assert cell_picture.draw_levels(Figure().subplots(), state, drawn) == pytest.approx(step)
 
 
 @pytest.mark.slow

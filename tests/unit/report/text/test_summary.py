@@ -106,10 +106,13 @@ def test_a_value_out_of_its_bounds_is_marked() -> None:
     assert line(summary(changed(effective_stiffness=stiffness)), "C11").endswith("170           160  outside")
 
 
-def test_warnings_and_faults_are_reported() -> None:
+def test_remarks_warnings_and_faults_are_reported_in_this_order() -> None:
     text = summary(changed(faults=["check jump: 3e-06"], status="not converged"))
     assert "Warning     the matrix" in text and "Fault       check jump: 3e-06" in text
     assert "Warning" not in summary(changed(warnings=[]))
+    text = summary(changed(remarks=["a stress is free"], warnings=["it locks"], faults=["no convergence"]))
+    places = [text.index(word) for word in ("a stress is free", "it locks", "no convergence")]
+    assert places == sorted(places)
 
 
 def test_what_is_unknown_is_left_out() -> None:
@@ -273,12 +276,6 @@ def test_energy_release_rates_against_the_angle() -> None:
     lines = summary(bonding(angle=given)).splitlines()
     where = lines.index("Largest energy release rate (GPa mm)")
     assert lines[where + 2].split() == ["60", "5", "1.6667", "3.3333", "54.7", "2", "60"]
-
-
-def test_remarks_stand_before_warnings_and_faults() -> None:
-    text = summary(changed(remarks=["a stress is free"], warnings=["it locks"], faults=["no convergence"]))
-    places = [text.index(word) for word in ("a stress is free", "it locks", "no convergence")]
-    assert places == sorted(places)
 
 
 def test_checks_of_contact_are_those_of_interfaces() -> None:

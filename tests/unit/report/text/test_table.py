@@ -1,13 +1,20 @@
-"""Tables as HTML: the decimals of text, and errors however small."""
+"""Tables as text and HTML: of points, envelopes and angles, and of constants in space."""
 
-from feti_homog.report.text.stiffness_tables import moduli, stiffnesses
+from typing import Any
+
+import pytest
+
+from feti_homog.report.text.point_tables import angle_table, components, envelope_table
+from feti_homog.report.text.stiffness_tables import constants, moduli, stiffnesses
 from feti_homog.report.text.tables import Column, Table
 
 
-def test_html_has_the_decimals_of_text_and_small_errors():
+def test_html_has_the_decimals_of_text_small_errors_and_notes():
     columns = [Column(""), Column("stiffness", 12, ".3f"), Column("value"), Column("error", 12, ".1e")]
     table = Table("t", columns, [["S11", 12.34567, 12.34567891, 4.6e-13], ["S12", 1e-6, 1e-15, 0.0], ["n", 3]])
     assert table.cells == [["S11", "12.346", "12.34568", "4.6e-13"], ["S12", "0.000", "0", "0.0e+00"], ["n", "3"]]
+    html = Table("t", [Column("x")], [[1]], ["a < b"], ["c"]).html
+    assert "<caption>t<small>a &lt; b</small><small>c</small></caption>" in html
 
 
 def test_the_error_of_the_mesh_gives_the_digits_of_a_constant():
@@ -33,6 +40,98 @@ def test_rows_abreast_and_columns_in_blocks():
     assert table.cells == [["p", "1", "2", "-"], ["q", "-", "-", "3"]] and table.html.count("<tr>") == 3
 
 
-def test_notes_stand_in_the_caption():
-    html = Table("t", [Column("x")], [[1]], ["a < b"], ["c"]).html
-    assert "<caption>t<small>a &lt; b</small><small>c</small></caption>" in html
+def document(count: int, names: tuple[str, ...], without: tuple[int, ...] = (), **section: Any) -> dict[str, Any]:
+    """Return an envelope of so many directions, some of them without an onset."""
+    points: list[dict[str, Any]] = []
+    for number in range(count):
+        point: dict[str, Any] = {"angle": 360.0 * number / count}
+        if number not in without:
+            point |= {"factor": 10.0 + number, "fibre": 2, "bond_angle": -12.5} | dict.fromkeys(names, 0.25)
+        points.append(point)
+    return {
+        "case": {"envelope": {"plane": ["S22", "S12"]} | section, "output": {"stress_unit": "MPa"}},
+        "envelope": points,
+    }
+
+
+def test_the_least_and_the_largest_load_and_some_directions():
+    whole = document(72, ("normal", "tangential", "axial"))
+    lines = envelope_table(whole).lines
+    assert lines[0] == "Onset of debonding in the plane S22, S12 (MPa): 72 directions"
+    assert lines[1].split() == ["least", "10", "at", "0", "degrees"]
+    assert lines[2].strip() == "largest  81 at 355 degrees"
+    assert len(lines) == 5 + 12 and max(map(len, lines)) < 80
+    assert lines[3].endswith(" (degrees), traction / strength")
+    assert lines[4].split() == ["angle", "S22", "S12", "fibre", "at", "normal", "tangent", "axial"]
+    assert lines[5].split() == ["0", "10", "0", "2", "-12.50", "0.25", "0.25", "0.25"]
+
+
+def test_directions_without_an_onset_are_counted():
+    lines = envelope_table(document(8, ("psi",), without=(0, 3), temperature=-50.0)).lines
+    assert lines[0].endswith("8 directions, after a temperature of -50")
+    assert lines[1].strip() == "no load breaks a bond in 2 of them"
+    assert lines[6].split() == ["0", "none", "none"] and lines[5].split()[-1] == "psi"
+    assert lines[4].endswith(" (degrees), psi of its traction")
+
+
+def test_strains_have_no_unit_and_nothing_may_break():
+    lines = envelope_table(document(4, (), without=(0, 1, 2, 3))).lines
+    assert len(lines) == 2
+    whole = document(4, ("psi",))
+    whole["case"]["envelope"]["plane"] = ["E11", "gamma12"]
+    assert envelope_table(whole).lines[0] == "Onset of debonding in the plane E11, gamma12: 4 directions"
+
+
+@pytest.mark.parametrize(("angle", "expected"), [(0.0, (3.0, 0.0)), (90.0, (0.0, 3.0)), (180.0, (-3.0, 0.0))])
+def test_what_rounding_leaves_of_zero_is_zero(angle, expected):
+    assert components({"angle": angle, "factor": 3.0}) == pytest.approx(expected, abs=1e-300)
+
+
+def test_counts_of_nodes_of_an_angle_name_their_unit_strain():
+    """Each of the three unit strains opens and closes other nodes."""
+    counts = {"angle": 90.0, "bonded": 9, "open": 2, "closed": 1}
+    words = "bonded, open, closed: interface nodes under the unit strain gamma12"
+    stiffness, stress = {"stiffness": [[9.0, 2, 0], [2, 8, 0], [0, 0, 3]]}, {"stress": [1.0, 2.0, 3.0]}
+    assert words in angle_table({"case": {}, "angle": [counts | stiffness]}).lines
+    assert words not in angle_table({"case": {}, "angle": [counts | stress]}).lines
+
+
+CELL = {"E_axial": 41.7, "G_transverse": 3.7, "expansion_axial": None, "deviation": 0.002}
+AXES = dict.fromkeys(("E1", "E2", "E3", "nu12", "nu13", "nu23", "G12", "G13", "G23"), 1.5)
+
+
+def test_the_range_over_directions_stands_above_the_table_if_there_is_one():
+    assert constants({"case": {}}) == []
+    across = {"E_least": 9.81, "E_largest": 10.93, "G_least": 3.3, "G_largest": 3.82}
+    (table,) = constants({"case": {}, "transversely_isotropic": CELL, "transverse_moduli": across})
+    assert table.lines[1] == "  over all directions across: E from 9.81 to 10.93, G from 3.3 to 3.82"
+
+
+def test_a_row_for_each_source_and_a_column_for_each_constant_that_one_knows():
+    estimates = {"halpin_tsai": {"E_axial": 41.6, "G_transverse": None}, "chamis": {"E_axial": None}}
+    document = {"constants": AXES, "transversely_isotropic": CELL, "estimates": estimates}
+    document["fibre_bounds"] = {"E_axial": [40.0, 43.0], "nu_axial": None}
+    document["case"] = {"output": {"stress_unit": "GPa"}}
+    axes, table = (each.lines for each in constants(document))
+    assert len(axes) == 4 and axes[0].endswith("(GPa)")
+    assert "0.2 %" in table[0] and table[1].split() == ["E_axial", "G_transverse"]
+    assert [line.split()[-2:] for line in table[2:-1]] == [
+        ["41.7", "3.7"], ["41.6", "-"], ["40", "-"], ["43", "-"],
+    ]  # fmt: skip
+    assert len({len(line) for line in table[1:-1]}) == 1
+    assert table[-1].strip().startswith("-: not available from this method")
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"case": {"material": {"coating": {}}}}, "fibres without coatings"),
+        ({"cell": {"porosity": 0.1}}, "cells without voids"),
+        ({"case": {"interface": [{}, {}]}}, "round fibres that are bonded, all alike"),
+        ({"cell": {"fractions": {"matrix": 1.0}}}, "composites"),
+        ({}, "round fibres"),
+    ],
+)
+def test_a_cell_without_estimates_is_reported_of_what_they_are(more, words):
+    (table,) = constants({"case": {}, "transversely_isotropic": CELL, **more})
+    assert table.lines[-1] == f"  closed-form estimates exist for {words} only"

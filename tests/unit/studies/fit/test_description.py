@@ -127,6 +127,17 @@ def test_curves_may_have_decimal_commas_between_semicolons(tmp_path):
     assert (point.strain_name, point.strain, point.name, point.value) == ("E11", 0.01, "S11", 3.5)
 
 
+def test_expansions_can_be_measured_where_all_phases_have_them(tmp_path):
+    document = tomllib.loads(BASE.replace('"strain"', '"generalized"') + UNKNOWN)
+    document |= {"measured": {"expansion_x1": {"value": 2e-5, "std": 1e-6}}}
+    with pytest.raises(CaseError, match="expansion_x1: the analysis does not give it"):
+        parse(document, tmp_path)
+    for material in document["material"].values():
+        material["expansion"] = 1e-5
+    (datum,) = parse(document, tmp_path).data
+    assert datum.name == "expansion_x1"
+
+
 def test_a_fit_whose_output_asks_for_more_is_another():
     """So is a study of scatter."""
     text = BASE + UNKNOWN + MEASURED

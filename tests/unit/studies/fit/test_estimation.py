@@ -25,10 +25,12 @@ def fitted(y, std=0.01, start=(1.5, 1.0), model=decay, jacobian=slopes, bounds=B
     return estimate(model, jacobian, (y, np.full(len(y), std)), np.array(start), bounds)
 
 
-def test_values_without_noise_return_the_truth():
+def test_noise_free_values_return_the_truth_and_estimates_at_a_bound_are_marked():
     found = fitted(decay(TRUTH))
     assert found.x == pytest.approx(TRUTH, rel=1e-9) and found.converged and found.evaluations <= 8
     assert found.at_bound.tolist() == [0, 0] and found.rank == 2 and found.undetermined == []
+    found = fitted(decay(TRUTH), bounds=(BOUNDS[0], np.array([1.5, 5.0])))
+    assert found.at_bound.tolist() == [1, 0] and found.x[0] == pytest.approx(1.5)
 
 
 @pytest.mark.slow
@@ -79,11 +81,6 @@ def test_directions_without_data_are_named_and_not_followed():
         "[unknown] a, b: the measured values do not determine them together",
         "[unknown] c: no measured value depends on it",
     ]
-
-
-def test_an_estimate_at_its_bound_is_marked():
-    found = fitted(decay(TRUTH), bounds=(BOUNDS[0], np.array([1.5, 5.0])))
-    assert found.at_bound.tolist() == [1, 0] and found.x[0] == pytest.approx(1.5)
 
 
 def test_units_do_not_decide_where_the_search_ends():

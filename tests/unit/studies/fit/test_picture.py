@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from scipy.stats import norm
 
 from feti_homog.studies import pictures
@@ -15,8 +14,7 @@ ROWS = [
 
 
 def test_residuals_stand_in_the_rows_of_their_values_beside_the_band_of_95_percent():
-    axes = Figure().subplots()
-    pictures._draw_residuals(axes, ROWS)
+    (axes,) = pictures.fit_figure({"name": "fit", "measured": ROWS}).axes
     (band,) = axes.patches
     assert band.get_extents().transformed(axes.transData.inverted()).intervalx == pytest.approx(
         norm.ppf([0.025, 0.975]), abs=5e-3
@@ -34,11 +32,11 @@ def test_residuals_stand_in_the_rows_of_their_values_beside_the_band_of_95_perce
 
 
 def test_curves_have_points_with_deviations_and_lines_through_what_is_computed():
-    axes, common = Figure().subplots(), {"test": 3, "name": "S22", "strain_name": "E11", "residual": 0.0}
+    common = {"test": 3, "name": "S22", "strain_name": "E11", "residual": 0.0}
     rows = [
         common | {"strain": 0.1 * k, "value": 5.0 * k, "std": 1.0 + k, "computed": 6.0 * k} for k in (1.0, 2.0, 3.0)
     ]
-    pictures._draw_curves(axes, rows)
+    (axes,) = pictures.fit_figure({"name": "fit", "measured": rows}).axes
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("E11", "S22")
     named = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
     np.testing.assert_allclose(named["test 3, computed"].get_xydata(), [[0.1, 6.0], [0.2, 12.0], [0.3, 18.0]])

@@ -4,8 +4,7 @@ from types import SimpleNamespace
 
 from mpi4py import MPI
 
-from feti_homog.studies import case_runs
-from feti_homog.studies.case_runs import Outcome
+from feti_homog.studies.case_runs import CaseRunner, Outcome
 from feti_homog.system.runtime.file_locks import LOCK_TIMEOUT_S
 
 
@@ -13,7 +12,7 @@ def test_cases_of_others_are_passed_over_at_once_and_tried_again_at_last():
     """The first case is computed elsewhere, somebody looks at the lock of the second."""
     calls, done = [], set()
 
-    def run(entry, case, total, timeout):
+    def run(entry, timeout):
         calls.append((entry, timeout))
         if entry == 1 or (entry == 2 and timeout == 0.0):
             return Outcome.HELD_ELSEWHERE, "another"
@@ -22,7 +21,7 @@ def test_cases_of_others_are_passed_over_at_once_and_tried_again_at_last():
         done.add(entry)
         return Outcome.COMPUTED, ""
 
-    sweep = SimpleNamespace(entries=(1, 2, 3), cases=(None,) * 3)
-    assert case_runs._run_free_cases(SimpleNamespace(run=run, comm=MPI.COMM_SELF), sweep) is None
+    runner = SimpleNamespace(run=run, comm=MPI.COMM_SELF, sweep=SimpleNamespace(entries=(1, 2, 3)))
+    assert CaseRunner.run_free(runner) is None
     assert done == {2, 3}
     assert calls == [(entry, timeout) for timeout in (0.0, 0.0, LOCK_TIMEOUT_S, LOCK_TIMEOUT_S) for entry in (1, 2, 3)]

@@ -38,10 +38,14 @@ def test_the_state_under_a_load_has_columns():
     assert unit("load_S11", "GPa") == "GPa" == unit("load_stored", "GPa") and unit("load_E11", "GPa") == ""
 
 
-def test_the_first_axis_the_least_and_the_largest():
+def test_columns_of_envelopes_are_the_first_axis_the_least_and_the_largest():
     found = of_envelope([5.0, 2.0, 9.0, 3.0])
     assert found == {"envelope_S22": 5.0, "envelope_least_S22_S12": 2.0, "envelope_largest_S22_S12": 9.0}
     assert {unit(name, "MPa") for name in found} == {"MPa"}
+    found = of_envelope([5.0, 2.0, 9.0, 3.0], ("E11", "gamma12"))
+    assert len(found) == 3 and {unit(name, "MPa") for name in found} == {""}
+    assert of_envelope([None, 2.0, 9.0, 3.0]) == {"envelope_least_S22_S12": 2.0}
+    assert of_envelope([None] * 4) == {}
 
 
 def test_every_column_has_the_unit_of_its_reference():
@@ -67,13 +71,3 @@ def test_every_key_of_a_case_that_is_a_stress_has_its_unit():
     keys = {f"{table.section}.name.{row.key}": row.unit for table in tables for row in table.rows}
     found = {name: unit(name, "GPa") for name in keys}
     assert found == {name: given.get(own, "") for name, own in keys.items()} and "GPa" in found.values()
-
-
-def test_strains_have_no_unit():
-    found = of_envelope([5.0, 2.0, 9.0, 3.0], ("E11", "gamma12"))
-    assert len(found) == 3 and {unit(name, "MPa") for name in found} == {""}
-
-
-def test_without_an_onset_there_is_no_largest():
-    assert of_envelope([None, 2.0, 9.0, 3.0]) == {"envelope_least_S22_S12": 2.0}
-    assert of_envelope([None] * 4) == {}

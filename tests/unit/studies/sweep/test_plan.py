@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.base_case import FIBRE, SPATIAL, TRANSVERSE
 from support.sweep_files import CASE, RANDOM
 
 from feti_homog.errors import CaseError
@@ -36,22 +35,6 @@ def test_values_arrive_in_the_cases():
     assert [case.name for case in sweep.cases] == ["s-0001", "s-0002"]
     assert [entry.folder for entry in sweep.entries] == ["case-0001", "case-0002"]
     assert len({entry.identity for entry in sweep.entries}) == 2
-
-
-def test_constants_in_space_are_varied_as_any_others():
-    across = CASE.replace("young = 200.0\npoisson = 0.222", f"{TRANSVERSE}nu_axial = 0.2")
-    sweep = expanded(
-        "material.fibre.E_axial = [100, 200]\nmaterial.matrix.expansion = {from = 1e-6, to = 3e-6, step = 1e-6}\n"
-        "analysis.plane = ['strain', 'generalized']\nmaterial.fibre.G_axial = [7.0]\n",
-        across,
-    )
-    fibres = {(case.analysis.plane, case.materials["fibre"].E_axial) for case in sweep.cases}
-    assert fibres == {(plane, E) for plane in ("strain", "generalized") for E in (100.0, 200.0)}
-    assert sorted({case.materials["matrix"].expansion for case in sweep.cases}) == pytest.approx([1e-6, 2e-6, 3e-6])
-    assert len({entry.identity for entry in sweep.entries}) == 12
-    general = CASE.replace(FIBRE, f"[material.fibre]\n{SPATIAL}")
-    by_axes = expanded("material.fibre.expansion = [1e-6, [1e-6, 2e-6, 3e-6]]", general)
-    assert [case.materials["fibre"].expansion for case in by_axes.cases] == [1e-6, (1e-6, 2e-6, 3e-6)]
 
 
 def test_loads_by_name_are_varied_as_any_keys():
@@ -103,10 +86,12 @@ def test_samples_fill_their_ranges_and_repeat_with_the_seed(sampling):
     assert np.mean(decades) == pytest.approx(1.5, abs=0.4)
 
 
-def test_samples_are_repeated_at_every_point_of_a_grid():
+def test_samples_differ_and_are_repeated_at_every_point_of_a_grid():
     found = inputs("samples = 3\ncell.order = [1, 2]\ncell.fibre_fraction = {from = 0.1, to = 0.6}")
     assert [row["cell.order"] for row in found] == [1, 1, 1, 2, 2, 2]
     assert [row["cell.fibre_fraction"] for row in found[:3]] == [row["cell.fibre_fraction"] for row in found[3:]]
+    found = values("samples = 20\ncell.fibre_fraction = {from = 0.1, to = 0.6}")
+    assert all(a != b for a, b in pairwise(sorted(found)))
 
 
 def test_realisations_are_seeds_and_come_last():
@@ -183,21 +168,15 @@ def test_faults_of_a_sweep_are_reported(name):
     assert all(any(words in fault for fault in caught.value.faults) for words in expected), caught.value.faults
 
 
-def test_realisations_exclude_seeds_that_vary():
+def test_sweeps_that_contradict_their_case_are_refused(tmp_path):
     with pytest.raises(CaseError, match=r"excludes cell\.seed"):
         expanded("realisations = 2\ncell.seed = [1, 2]", RANDOM)
-
-
-def test_a_file_without_a_sweep_points_at_run(tmp_path):
     path = tmp_path / "case.toml"
     path.write_text(CASE)
     with pytest.raises(CaseError, match="feti-homog run"):
         sweep_cases.load(path)
-
-
-def test_all_sampled_points_differ():
-    found = values("samples = 20\ncell.fibre_fraction = {from = 0.1, to = 0.6}")
-    assert all(a != b for a, b in pairwise(sorted(found)))
+    with pytest.raises(CaseError, match=r"cell\.order: \"cell\" is no section"):
+        sweep_cases.expand({"cell": 3, "sweep": {"cell.order": [1]}}, Path())
 
 
 def test_values_may_be_numpys():
@@ -206,11 +185,6 @@ def test_values_may_be_numpys():
     same = sweep_cases.expand(base | {"sweep": {"cell": {"fibre_fraction": np.linspace(0.1, 0.3, 3).tolist()}}}, Path())
     assert sweep == same and len(sweep.cases) == 3
     assert all(type(entry.inputs["cell.fibre_fraction"]) is float for entry in sweep.entries)
-
-
-def test_a_base_that_is_no_section():
-    with pytest.raises(CaseError, match=r"cell\.order: \"cell\" is no section"):
-        sweep_cases.expand({"cell": 3, "sweep": {"cell.order": [1]}}, Path())
 
 
 def test_options_that_print_make_no_other_sweep():

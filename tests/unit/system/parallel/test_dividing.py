@@ -14,13 +14,10 @@ def test_loads_are_balanced():
     assert len(balanced(np.zeros(0, np.int64), 2)) == 0
 
 
-def test_even_ranges():
+def test_ranges_are_even_and_follow_each_other():
     for count, parts in ((10, 3), (2, 5), (0, 2), (7, 1)):
         ends = even(count, parts)
         assert len(ends) == parts + 1 and ends[0] == 0 and ends[-1] == count
         assert np.diff(ends).min() >= 0 and np.ptp(np.diff(ends)) <= 1
-
-
-def test_ranges_follow_each_other():
     assert ranges(np.array([3, 10, 7]), np.array([2, 0, 3])).tolist() == [3, 4, 7, 8, 9]
     assert len(ranges(np.zeros(0, np.int64), np.zeros(0, np.int64))) == 0

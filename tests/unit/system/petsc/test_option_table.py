@@ -37,9 +37,13 @@ def test_words_with_one_dash_are_petscs_and_the_others_ours(line, ours, petsc, t
     assert split_argv(line.split()) == (ours.split(), petsc.split())
 
 
-def test_every_option_of_the_table_is_known():
+def test_every_option_of_the_table_is_known_and_has_help():
     assert unknown_options(option.name for option in OPTIONS) == []
     assert unknown_options(["feti_ksp_gmres_restart", "feti_sub_mat_mumps_icntl_14", "log_view"]) == []
+    assert len({option.name for option in OPTIONS}) == len(OPTIONS)
+    lines = help_text().splitlines()
+    assert len(lines) == len(OPTIONS) + 1
+    assert all(f"-{option.name} " in text for option, text in zip(OPTIONS, lines[1:], strict=True))
 
 
 def test_defaults_are_the_solvers():
@@ -47,10 +51,6 @@ def test_defaults_are_the_solvers():
     assert float(defaults["feti_ksp_rtol"]) == thresholds.RTOL
     assert int(defaults["feti_ksp_max_it"]) == thresholds.MAX_ITERATIONS
     assert float(defaults["feti_coarse_threshold"]) == thresholds.DEFAULTS.soft_mode
-
-
-def test_names_are_unique():
-    assert len({option.name for option in OPTIONS}) == len(OPTIONS)
 
 
 @pytest.mark.parametrize(
@@ -78,12 +78,6 @@ def test_values_are_the_solvers(name, value, default):
 def test_misspelt_options_are_reported_with_the_nearest(name, words):
     (fault,) = unknown_options([name, "feti_ksp_rtol"])
     assert words in fault
-
-
-def test_help_names_every_option():
-    lines = help_text().splitlines()
-    assert len(lines) == len(OPTIONS) + 1
-    assert all(f"-{option.name} " in text for option, text in zip(OPTIONS, lines[1:], strict=True))
 
 
 # Options of PETSc itself pass; misspelt ones, and such as nothing would read, do not.

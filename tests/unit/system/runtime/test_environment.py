@@ -9,13 +9,10 @@ import pytest
 from feti_homog.system.runtime import environment
 
 
-def test_settings_of_the_user_stay():
+def test_settings_and_threads_of_the_user_stay():
     variables = {"OMP_THREAD_LIMIT": "2"}
     environment.prepare(variables)
     assert variables == environment.SETTINGS | {"OMP_THREAD_LIMIT": "2"}
-
-
-def test_threads_that_the_user_asks_for_are_not_limited():
     variables = {"OMP_NUM_THREADS": "4"}
     environment.prepare(variables)
     assert variables.pop("OMP_NUM_THREADS") == "4" and "OMP_THREAD_LIMIT" not in variables

@@ -8,9 +8,11 @@ from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.system.runtime import input_files
 
 
-def test_a_file_is_read(tmp_path):
+def test_files_are_read_and_pipes_to_the_limit(tmp_path):
     (tmp_path / "a").write_bytes(b"abc")
     assert input_files.read(tmp_path / "a", 3) == input_files.read(tmp_path / "a", pipes=True) == b"abc"
+    with pytest.raises(OSError, match="more than 1 MiB"):
+        input_files.read(type(tmp_path)("/dev/zero"), 1 << 20, pipes=True)
 
 
 @pytest.mark.parametrize("name", ["folder", "pipe", "device", "long", "sparse", "circle", "none"])
@@ -26,11 +28,6 @@ def test_what_is_no_file_is_refused(tmp_path, name):
     with pytest.raises(OSError) as error:
         input_files.read(path, 3)
     assert error.value.strerror and input_files.unreadable(path, error.value).exit_code == 2
-
-
-def test_a_device_that_may_be_a_pipe_is_read_to_the_limit(tmp_path):
-    with pytest.raises(OSError, match="more than 1 MiB"):
-        input_files.read(type(tmp_path)("/dev/zero"), 1 << 20, pipes=True)
 
 
 def test_files_without_rights_are_a_failure(tmp_path):

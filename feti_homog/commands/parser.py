@@ -1,0 +1,164 @@
+"""The parser of the command line: the commands with their options, and the function of each as "module.name"."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from pathlib import Path
+from typing import NoReturn
+
+from feti_homog.api import folder
+from feti_homog.errors import CaseError
+from feti_homog.system.petsc import option_table
+from feti_homog.version import __version__
+
+LAUNCHER_HELP = "Switches of Open MPI go to mpirun: --allow-run-as-root, --oversubscribe (more ranks than cores)."
+FIBRES_HELP = (
+    'Print a row for each fibre, with centre, radius or semi-axes, and phase: the file of [cell] geometry = "table". '
+    "The table of a cell gives that cell again."
+)
+EXPORT_HELP = (
+    'Print the effective constants of a stiffness or an envelope in plane = "generalized" as a card of a material. Its '
+    "axis 1 is the fibre, x3 of the cell; axes 2 and 3 are x1 and x2 of the cell. No unit is converted."
+)
+VERIFY_HELP = (
+    "Recompute stresses, equilibrium, periodicity, averages, contact, strengths and energies from result.json and "
+    "result.h5, with elements of its own: a line per law, with its largest violation and limit. Exit code 3 if a law "
+    "is broken. Needs neither MPI nor PETSc; on several ranks each does all of it, and the first one prints."
+)
+SWEEP_HELP = (
+    "Expand the file into numbered cases, check all of them, and run them one after the other. Finished cases are "
+    "skipped: the same command resumes. Failed cases are kept and reported at the end, with exit code 3."
+)
+COLLECT_HELP = (
+    "Write cases.csv, the inputs and outputs of all cases, statistics.csv, those over realisations, and a "
+    "picture of moduli over the fibre fraction. The sweep may still be running: finished cases are collected."
+)
+FIT_HELP = (
+    "Fit the unknowns of a file to measured values by least squares, with exact derivatives where there are some. "
+    "Every evaluation is kept: the same command resumes. Prints estimates with confidence intervals, their "
+    "correlation, and measured beside computed values; unknowns that the data do not determine are named, with exit "
+    "code 3."
+)
+SCATTER_HELP = (
+    "Find the scatter of the constants, onsets and peaks of a case whose numbers are {mean, std} or {mean, cv}, with "
+    "each number's share, beside that between the realisations of a random cell and the error of the mesh. Where a "
+    "result has no exact derivative, the case runs with the number one standard deviation less and more. The same "
+    "command resumes."
+)
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose errors are reported once, with exit code 2, as errors of the case."""
+
+    def error(self, message: str) -> NoReturn:
+        raise CaseError(f"command line: {message} (see --help)")
+
+
+def command_parser() -> Parser:
+    """Return the parser of all commands."""
+    parser = Parser(
+        prog="feti-homog",
+        description="Effective stiffness of fibre composites by FETI, on any number of MPI ranks.",
+        epilog=f"{option_table.help_text()}\n\n{LAUNCHER_HELP}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"feti-homog {__version__}")
+    commands = parser.add_subparsers(dest="command", required=True, parser_class=Parser)
+    run = _command(commands, "run.run", "run a case file and write its results to a folder")
+    run.add_argument("case", type=Path, metavar="CASE.toml")
+    run.add_argument("--out", type=folder, required=True, metavar="DIR", help="folder of the results")
+    run.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    run.add_argument("--resume", action="store_true", help="go on from where a path to the same folder was ended")
+    check = _command(commands, "run.check", "validate a case file, mesh its cell and describe the run")
+    check.add_argument("case", type=Path, metavar="CASE.toml", help="a file of run, sweep, fit or uncertainty")
+    _add_products(commands)
+    _add_studies(commands)
+    keys = _command(commands, "run.keys", "print the keys of a case file and their meaning")
+    keys.add_argument("section", nargs="?", metavar="SECTION", help="cell, material, ...; by default all of them")
+    _command(commands, "run.options", "print PETSc's options that the solver takes")
+    return parser
+
+
+def _add_products(commands: argparse._SubParsersAction[Parser]) -> None:
+    """Add the commands for results to a parser."""
+    of_result = [
+        _command(commands, "products.plot", "make the pictures of a results folder again"),
+        _command(commands, "products.report", "write report.html of a results folder: one page with all there is"),
+        _command(
+            commands,
+            "products.fields",
+            "write the states of a result, with strains, von Mises and principal stresses, for VTK",
+        ),
+        _command(commands, "products.export", "print a result as a material card", EXPORT_HELP),
+        _command(commands, "verify.verify", "check from its files alone that a result obeys its laws", VERIFY_HELP),
+    ]
+    for parser in of_result:
+        parser.add_argument("directory", type=folder, metavar="DIR")
+    *_, fields, export, verify = of_result
+    fields.add_argument(
+        "--format",
+        choices=("vtkhdf", "vtu"),
+        default="vtkhdf",
+        help="vtkhdf: one file with all states, for ParaView from 5.12 on; vtu: a file for each state and a .pvd",
+    )
+    words = "program that reads the card, needed: abaqus, calculix, ansys, moose, csv"
+    export.add_argument("--format", default="", metavar="PROGRAM", help=words)
+    export.add_argument("--out", type=Path, metavar="FILE", help="write the card to a file instead of printing it")
+    export.add_argument(
+        "--transversely-isotropic",
+        dest="symmetry",
+        action="store_const",
+        const="transversely isotropic",
+        default="orthotropic",
+        help="the nearest transversely isotropic material, not the one in the axes of the cell",
+    )
+    verify.add_argument("--json", action="store_true", help="print the certificate as JSON")
+    fibres = _command(commands, "products.fibres", "print the fibres of a cell as a table", FIBRES_HELP)
+    fibres.add_argument("source", type=folder, metavar="CASE.toml|DIR", help="a case file, or a folder of results")
+    fibres.add_argument("--out", type=Path, metavar="FILE.csv", help="write the table to a file instead of printing it")
+
+
+def _add_studies(commands: argparse._SubParsersAction[Parser]) -> None:
+    """Add the commands for many cases to a parser."""
+    sweep = _command(commands, "studies.sweep", "run the cases of a file with [sweep]", SWEEP_HELP)
+    sweep.add_argument("case", type=Path, metavar="CASE.toml", help="a case file with a section [sweep]")
+    sweep.add_argument("--out", type=folder, metavar="DIR", help="folder of the sweep, in which each case has its own")
+    one = sweep.add_mutually_exclusive_group()
+    one.add_argument("--list", action="store_true", help="print the cases, with --out also their status; run none")
+    one.add_argument("--index", type=integer, metavar="K", help="run case K alone, counted from 1, as a job array does")
+    words = "make one table and a picture of the cases of a sweep's folder"
+    collect = _command(commands, "studies.collect", words, COLLECT_HELP)
+    collect.add_argument("directory", type=folder, metavar="DIR", help="--out of the sweep")
+    collect.add_argument("--no-pictures", action="store_true", help="make the tables alone")
+    fit = _command(commands, "studies.fit", "fit constants of cases to measured values", FIT_HELP)
+    fit.add_argument("case", type=Path, metavar="FIT.toml", help="a case file with unknown and measured constants")
+    fit.add_argument("--out", type=folder, metavar="DIR", required=True, help="folder of the fit")
+    scatter = _command(commands, "studies.uncertainty", "pass scatter of numbers on to results", SCATTER_HELP)
+    scatter.add_argument("case", type=Path, metavar="CASE.toml", help="a case file with uncertain numbers")
+    scatter.add_argument("--out", type=folder, metavar="DIR", required=True, help="folder of the runs")
+    for parser in (sweep, fit, scatter):
+        parser.add_argument("--retry", action="store_true", help="compute failed cases again")
+        parser.add_argument(
+            "--ranks-per-case",
+            type=integer,
+            metavar="R",
+            help="run as many cases at once as there are groups of R ranks (by default one, on all ranks)",
+        )
+        parser.add_argument("--quiet", action="store_true", help="print errors and failed cases only")
+
+
+def _command(
+    commands: argparse._SubParsersAction[Parser], action: str, summary: str, description: str | None = None
+) -> Parser:
+    """Add the command of the function `action`, "module.name", and return its parser."""
+    parser = commands.add_parser(action.partition(".")[2], help=summary, description=description)
+    parser.set_defaults(action=action)
+    return parser
+
+
+def integer(word: str) -> int:
+    """Return the integer in a word without the underscores that Python allows. Raises ValueError."""
+    if not re.fullmatch(r"[+-]?[0-9]{1,9}", word):
+        raise ValueError
+    return int(word)
