@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from feti_homog.analysis.cell_records import PhaseStresses
 from feti_homog.analysis.result import Fields
-from feti_homog.analysis.result_records import PhaseStresses
 from feti_homog.errors import FetiHomogError
-from feti_homog.homogenization import averaging, phase_stresses, unit_cell
+from feti_homog.homogenization import averaging, recovered_fields, unit_cell
 from feti_homog.materials import strength
 from feti_homog.results import field_file, field_layout, field_parts, result_json
 from feti_homog.system.parallel import mpi_errors
@@ -102,7 +102,7 @@ class StateRecorder:
     ) -> None:
         self._cell, self._file, self._keep = cell, file, keep
         self._number, self._states, self._say = 0, list[field_layout.StatePart](), say
-        self._largest, self._labels = list[dict[str, phase_stresses.Largest]](), list[str]()
+        self._largest, self._labels = list[dict[str, recovered_fields.Largest]](), list[str]()
         self.has_place = keep or file is not None
         self.has_use = self.has_place or any(material.strength for material in cell.case.materials.values())
         self.error: FetiHomogError | None = None
@@ -114,9 +114,9 @@ class StateRecorder:
         """Record the next state from its response in each problem, or None.  Collective."""
         plane, axial = (*responses, None)[:2]
         if self.has_use or self._cell.case.output.mesh_error:
-            self._largest.append(phase_stresses.largest(self._cell, plane, axial))
+            self._largest.append(recovered_fields.largest_stresses(self._cell, plane, axial))
             self._labels.append(label)
-            self.singularities |= phase_stresses.singularities(self._cell, plane)
+            self.singularities |= recovered_fields.singularities(self._cell, plane)
         if self._file is None and not self._keep:
             return
         state: field_layout.StatePart
@@ -150,7 +150,7 @@ class StateRecorder:
 
     def _of_phase(self, phase: str) -> PhaseStresses:
         material, columns = self._cell.case.material_of(phase), dict[str, Any]()
-        for k, name in enumerate(phase_stresses.MEASURES):
+        for k, name in enumerate(recovered_fields.MEASURES):
             if name != "utilisation" or material.strength is not None:
                 columns[name] = np.array([state[phase].value[k] for state in self._largest])
                 columns[f"{name}_at"] = np.array([state[phase].position[k] for state in self._largest])

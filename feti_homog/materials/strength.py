@@ -47,14 +47,14 @@ def utilisation(strength: PhaseStrength, stress: Float, principal: Float, von_mi
     """
     limits = {name: float(limit) for name, limit in vars(strength).items() if limit is not None}
     if "principal" in limits:
-        used = principal / limits["principal"]
+        share = principal / limits["principal"]
     elif "von_mises" in limits:
-        used = von_mises / limits["von_mises"]
+        share = von_mises / limits["von_mises"]
     elif "tension" in limits:
-        used = _drucker_prager(limits, stress[:, :3].sum(axis=1), von_mises)
+        share = _drucker_prager(limits, stress[:, :3].sum(axis=1), von_mises)
     else:
-        used = _hashin(limits, stress)
-    return np.maximum(used, 0.0)
+        share = _hashin(limits, stress)
+    return np.maximum(share, 0.0)
 
 
 def _drucker_prager(limits: Mapping[str, float], trace: Float, von_mises: Float) -> Float:

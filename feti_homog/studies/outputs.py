@@ -192,8 +192,15 @@ OUTPUT_COLUMNS = (
     Column("envelope_AXIS", "that of the axis", "load at onset along the first axis of an envelope"),
     Column("envelope_least_AXIS_AXIS", "that of the axes", "least load at onset of all directions"),
     Column("envelope_largest_AXIS_AXIS", "that of the axes", "largest, if every direction has one"),
-    Column("LOAD_PHASE_MEASURE", records.STRESS, "largest principal, von_mises or hydrostatic stress of a phase"),
-    Column("LOAD_PHASE_utilisation", "", "largest utilisation of its strength; of angles and paths without LOAD"),
+    *(
+        Column(f"PHASE_{name}", unit, f"largest {words} of a phase; LOAD_PHASE_{name} of each load that has a name")
+        for name, unit, words in (
+            ("principal", records.STRESS, "principal stress"),
+            ("von_mises", records.STRESS, "von Mises stress"),
+            ("hydrostatic", records.STRESS, "hydrostatic stress"),
+            ("utilisation", "", "utilisation of the strength"),
+        )
+    ),
     Column("check_LAW", "", "largest relative error of a law, as in result.json"),
     Column("seconds_STAGE", "s", "wall time of a stage, the largest over ranks"),
     Column("memory", "bytes", "peak resident memory, the largest over ranks"),

@@ -1,4 +1,4 @@
-"""Laws of the largest stresses of the phases, and of the utilisation of their strengths, by own invariants."""
+"""Laws of the largest stresses of the phases, and of their strengths, by invariants of the stress tensor."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -29,18 +29,22 @@ def check_phases(findings: Findings, cell: DiscreteCell, state: State, number: i
         return
     stress, points = _stresses(cell, state)
     phase_of = np.repeat(cell.files.mesh.phase, len(stress) // len(cell.files.mesh.phase))
+    known = [name for k, name in enumerate(cell.files.phases) if not np.isnan(stress[phase_of == k]).any()]
+    findings.require(LAW, sorted(entry["phase"] for entry in table) == sorted(known), "names of the phases")
     for entry in table:
         name = entry["phase"]
+        if name not in known:
+            continue
         findings.require(LAW, state.name.endswith(f"({entry['state'][number]})"), f"{state.name}: its label")
-        own = phase_of == cell.files.phases.index(name)
+        rows = phase_of == cell.files.phases.index(name)
         strength = phase_constants(cell.files.case, name).get("strength")
-        values, scale = _measures(stress[own], strength), float(np.abs(stress[own]).max())
+        values, scale = _measures(stress[rows], strength), float(np.abs(stress[rows]).max())
         for measure, column in values.items():
             place = f"{state.name}, {measure} of {name}"
             reported = float(entry[measure][number])
             size = 1.0 if measure == "utilisation" else scale
             findings.compare(LAW, reported, column.max(), max(size, cell.scales_of(state).stress), place)
-            away = from_centre(points[own], np.array(entry[f"{measure}_at"][number]), cell.files.size)
+            away = from_centre(points[rows], np.array(entry[f"{measure}_at"][number]), cell.files.size)
             at = np.hypot(*away.T) < SAME_PLACE * cell.files.size.max()
             least = column.max() - SAME_VALUE * max(abs(column.max()), cell.scales_of(state).stress)
             findings.require(LAW, bool((column[at] >= least).any()), f"{place}: another position")
