@@ -186,3 +186,22 @@ class Sensitivities:
         """(n, p) d ln constant / d ln parameter; NaN if zero."""
         values = np.where(self.constant_values == 0.0, np.nan, self.constant_values)
         return np.asarray(self.derivatives * self.parameter_values / values[:, None])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PhaseStresses:
+    """The largest stresses of one phase in s states, at the integration points of its elements."""
+
+    phase: str = described("name of the phase")
+    state: tuple[str, ...] = described("labels of the states, as in result.h5: `E11`, `load`, `event 12`, ...")
+    principal: Float = described("largest principal stress, tension positive", records.STRESS, "(s,)")
+    principal_at: Float = described("its position in the cell", records.LENGTH, "(s, 2)")
+    von_mises: Float = described("largest von Mises stress", records.STRESS, "(s,)")
+    von_mises_at: Float = described("its position in the cell", records.LENGTH, "(s, 2)")
+    hydrostatic: Float = described("largest hydrostatic stress, a third of the trace", records.STRESS, "(s,)")
+    hydrostatic_at: Float = described("its position in the cell", records.LENGTH, "(s, 2)")
+    criterion: str | None = described("criterion of the phase's `strength`", default=None)
+    utilisation: Float | None = described(
+        "largest utilisation of the strength: 1 at failure, proportional to the stress", "", "(s,)", default=None
+    )
+    utilisation_at: Float | None = described("its position in the cell", records.LENGTH, "(s, 2)", default=None)

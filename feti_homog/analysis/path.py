@@ -177,7 +177,7 @@ def _completed(
     """
     document = {"case": context.case.resolved(), "path": entries}
     marks, states = landmarks.marks(document), dict[str, Any]()
-    if law.has_tips or context.states.has_place:
+    if law.has_tips or context.states.has_use:
         legs = len(context.case.targets) if path.method == "events" else 0
         numbers = landmarks.kept(entries, context.case.output.states, legs, marks)
         with context.progress.stage("states") as line:
@@ -186,7 +186,7 @@ def _completed(
                 point, responses = _checked(context, point, _label(path, number))
                 if law.has_tips:
                     entries[number]["tips"] = tips(context, law, point)
-                if context.states.has_place:
+                if context.states.has_use:
                     error, responses = state_error(context, responses)
                     entries[number] |= error
                     context.states.record(responses, point.load_factor, _label(path, number), number)

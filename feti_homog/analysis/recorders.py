@@ -2,10 +2,15 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
+import numpy as np
+
+from feti_homog.analysis.cell_records import PhaseStresses
 from feti_homog.analysis.result import Fields
 from feti_homog.errors import FetiHomogError
-from feti_homog.homogenization import averaging, unit_cell
+from feti_homog.homogenization import averaging, recovered_fields, unit_cell
+from feti_homog.materials import strength
 from feti_homog.results import field_file, field_layout, field_parts, result_json
 from feti_homog.system.parallel import mpi_errors
 
@@ -83,10 +88,12 @@ class CheckRecorder:
 
 
 class StateRecorder:
-    """Recorder of states in a file, in memory, or nowhere.
+    """Recorder of states: their fields in a file, in memory, or nowhere, and the largest stresses of the phases.
 
     Attributes:
-        has_place: whether states are recorded.
+        has_place: whether fields are recorded.
+        has_use: whether states of a path are recorded: for fields, or for the utilisation of strengths.
+        singularities: places beside which the largest stresses have no limit.
         error: the error at which the file was given up; the run goes on without the file.
     """
 
@@ -95,16 +102,23 @@ class StateRecorder:
     ) -> None:
         self._cell, self._file, self._keep = cell, file, keep
         self._number, self._states, self._say = 0, list[field_layout.StatePart](), say
+        self._largest, self._labels = list[dict[str, recovered_fields.Largest]](), list[str]()
         self.has_place = keep or file is not None
+        self.has_use = self.has_place or any(material.strength for material in cell.case.materials.values())
         self.error: FetiHomogError | None = None
+        self.singularities = set[str]()
 
     def record(
         self, responses: Sequence[averaging.Response | None], load_factor: float, label: str, point: int
     ) -> None:
         """Record the next state from its response in each problem, or None.  Collective."""
+        plane, axial = (*responses, None)[:2]
+        if self.has_use or self._cell.case.output.mesh_error:
+            self._largest.append(recovered_fields.largest_stresses(self._cell, plane, axial))
+            self._labels.append(label)
+            self.singularities |= recovered_fields.singularities(self._cell, plane)
         if self._file is None and not self._keep:
             return
-        plane, axial = (*responses, None)[:2]
         state: field_layout.StatePart
         if plane is None or len(self._cell.problems) > 1:
             state = field_parts.spatial_state_part(self._cell, plane, axial, load_factor, label, point)
@@ -128,6 +142,20 @@ class StateRecorder:
             except FetiHomogError as error:
                 self._file, self.error = None, error
                 self._say(f"warning: {error}; the remaining results are computed without it")
+
+    def phase_stresses(self) -> tuple[PhaseStresses, ...] | None:
+        """Return the largest stresses of each phase in all states; None without any."""
+        phases = dict.fromkeys(phase for state in self._largest for phase in state)
+        return tuple(map(self._of_phase, phases)) or None
+
+    def _of_phase(self, phase: str) -> PhaseStresses:
+        material, columns = self._cell.case.material_of(phase), dict[str, Any]()
+        for k, name in enumerate(recovered_fields.MEASURES):
+            if name != "utilisation" or material.strength is not None:
+                columns[name] = np.array([state[phase].value[k] for state in self._largest])
+                columns[f"{name}_at"] = np.array([state[phase].position[k] for state in self._largest])
+        criterion = None if material.strength is None else strength.criterion(material.strength)
+        return PhaseStresses(phase=phase, state=tuple(self._labels), criterion=criterion, **columns)
 
     def fields(self) -> Fields | None:
         """Return this rank's fields; None unless the run keeps fields in memory."""

@@ -170,6 +170,9 @@ class Result:
     states: tuple[int, ...] | None = described(
         "of a path: the numbers, from 0, of the points whose fields are kept; /state/K is that of entry K", default=None
     )
+    phase_stresses: tuple[cell_records.PhaseStresses, ...] | None = described(
+        "largest stresses of each phase under each load and at each kept point", default=None
+    )
     resumed: int | None = described("points of a path that were taken from a checkpoint", default=None)
     result_h5: result_json.FileSeal | None = described(
         "size and checksum of result.h5, if the run wrote it", default=None

@@ -218,6 +218,7 @@ def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Field
         timings=progress.timings(),
         memory=progress.memory(),
         fields=fields,
+        phase_stresses=context.states.phase_stresses(),
         **analysis,
     )
 

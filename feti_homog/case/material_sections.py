@@ -7,7 +7,7 @@ from typing import Any
 
 from feti_homog.case.cell_section import CIRCULAR, GEOMETRY, Cell
 from feti_homog.case.section_values import FRACTIONS
-from feti_homog.materials import laws, material_forms
+from feti_homog.materials import laws, material_forms, strength
 from feti_homog.microstructure import phase_names
 from feti_homog.schema import TableReader, keys, wording
 
@@ -95,6 +95,7 @@ def _read_material(
     material: material_forms.Material | None = reader.read(material_forms.MATERIAL_FORMS[forms[0]], table, section)
     if material is not None:
         checks: list[Callable[[Any], object]] = [] if plane is None else [partial(laws.stiffness_of, plane=plane)]
+        checks += [] if material.strength is None else [lambda material: strength.criterion(material.strength)]
         for check in (*checks, laws.expansion):
             try:
                 check(material)

@@ -247,6 +247,7 @@ TABLES = (
         SectionTable("material", f"[material.PHASE], {form}", contents)
         for form, contents in material_forms.MATERIAL_FORMS.items()
     ),
+    SectionTable("material", "[material.PHASE] strength", material_forms.PhaseStrength),
     SectionTable("interface", "an arc of [interface] debonded", Arc),
     SectionTable("interface", "[interface] scatter", Scatter),
     SectionTable("path", "a load of [path] to or waypoints", MixedLoad),

@@ -5,5 +5,6 @@ Imports `schema` and `system`.  Main entries: `material_forms`, `laws`, `enginee
 """
 
 __all__ = [
-    "engineering_constants", "estimates", "laws", "material_derivatives", "material_forms", "phase_bounds", "voigt",
+    "engineering_constants", "estimates", "laws", "material_derivatives", "material_forms", "phase_bounds", "strength",
+    "voigt",
 ]  # fmt: skip

@@ -69,7 +69,7 @@ def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawCh
 
 def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:
     """Yield the derivatives by engineering constants: dC = -C dS C with the plane state's compliance S."""
-    skipped = ("angle", "expansion", *material_forms.EXPANSION_PAIR)
+    skipped = ("angle", "expansion", "strength", *material_forms.EXPANSION_PAIR)
     names = [field.name for field in fields(material) if field.name not in skipped]
     values = {name: value for name in names if (value := getattr(material, name)) is not None}
     turn = strain_rotation(-getattr(material, "angle", 0.0))

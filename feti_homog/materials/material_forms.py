@@ -18,6 +18,30 @@ EXPANSION_PAIR = ("expansion_axial", "expansion_transverse")
 """Keys that are given together, in place of one expansion."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class PhaseStrength:
+    """Strength of a phase, by the keys of one criterion (`materials.strength`)."""
+
+    principal: float | None = key(POSITIVE, "Largest principal stress.", unit="stress", default=None)
+    von_mises: float | None = key(POSITIVE, "Von Mises stress.", unit="stress", default=None)
+    tension: float | None = key(
+        POSITIVE, "Uniaxial tension, with compression: Drucker and Prager's criterion.", unit="stress", default=None
+    )
+    compression: float | None = key(POSITIVE, "Uniaxial compression, with tension.", unit="stress", default=None)
+    axial_tension: float | None = key(
+        POSITIVE, "Tension along x3, with the next five: Hashin's criterion.", unit="stress", default=None
+    )
+    axial_compression: float | None = key(POSITIVE, "Compression along x3.", unit="stress", default=None)
+    axial_shear: float | None = key(POSITIVE, "Shear between x3 and the plane.", unit="stress", default=None)
+    transverse_tension: float | None = key(POSITIVE, "Tension in the plane.", unit="stress", default=None)
+    transverse_compression: float | None = key(POSITIVE, "Compression in the plane.", unit="stress", default=None)
+    transverse_shear: float | None = key(POSITIVE, "Shear in the plane.", unit="stress", default=None)
+
+
+STRENGTH = types.table_of(PhaseStrength, "a table such as {principal = 80.0}", least=1)
+UTILISATION = "Strength of the phase, whose utilisation is computed with its largest stresses."
+
+
 @dataclass(frozen=True)
 class Isotropic:
     """Young's modulus and Poisson's ratio."""
@@ -25,6 +49,7 @@ class Isotropic:
     young: float = key(POSITIVE, "Young's modulus.", unit="stress")
     poisson: float = key(types.real(above=-1.0, most=0.5), "Poisson's ratio; 0.5 in plane stress alone.")
     expansion: float | None = key(types.real(), "Thermal expansion.", unit=PER_TEMPERATURE, default=None)
+    strength: PhaseStrength | None = key(STRENGTH, UTILISATION, default=None)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +82,7 @@ class Orthotropic:
         unit=PER_TEMPERATURE,
         default=None,
     )
+    strength: PhaseStrength | None = key(STRENGTH, UTILISATION, default=None)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,6 +119,7 @@ class TransverselyIsotropic:
     expansion_transverse: float | None = key(
         types.real(), "Thermal expansion in the plane; with expansion_axial.", unit=PER_TEMPERATURE, default=None
     )
+    strength: PhaseStrength | None = key(STRENGTH, UTILISATION, default=None)
 
 
 @dataclass(frozen=True)
@@ -113,6 +140,7 @@ class General:
         unit=PER_TEMPERATURE,
         default=None,
     )
+    strength: PhaseStrength | None = key(STRENGTH, UTILISATION, default=None)
 
 
 Material = Isotropic | Orthotropic | TransverselyIsotropic | General

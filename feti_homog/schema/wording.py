@@ -22,7 +22,6 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
 }
 # Names without a key, each with an explanation.
 ABSENT = {
-    "strength": "phases do not break; bonds do, see normal_strength and tangential_strength in [interface]",
     "g": "it follows from young and poisson",
     "cone": "Coulomb's cone of both shears is round, so no path is straight between changes",
     "axial_friction": "leave it out: debonded faces slip freely along the fibres",

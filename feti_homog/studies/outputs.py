@@ -12,6 +12,7 @@ from feti_homog.system.runtime import records
 from feti_homog.typing import Document
 
 PHASES_OF_ONE_FIBRE = 2
+MEASURES = ("principal", "von_mises", "hydrostatic", "utilisation")  # of the stresses in a phase
 Column = result_json.DescribedColumn
 
 
@@ -60,6 +61,7 @@ def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numb
         values |= {f"envelope_largest_{first}_{second}": factors[-1]} if is_closed else {}
     if (load := document.get("load")) is not None:
         values |= _at_point("load", load) | {f"load_{name}": load[name] for name in ("stored", *point_tables.STATES)}
+    values |= _phases(document)
     values |= {f"check_{name}": error for name, error in document["checks"].items()}
     values |= {f"seconds_{stage}": seconds for stage, seconds in document["timings"].items()}
     return {name: float(value) for name, value in (values | {"memory": document["memory"]}).items()}
@@ -101,6 +103,17 @@ def _entries(stiffness: Any, numbers: Sequence[int], suffix: str = "") -> dict[s
     """C11, C12, ... for a stiffness (6, 6), or (3, 3) with the `numbers`; none without entries."""
     rows = range(1, 7) if len(stiffness) == len(voigt.SPATIAL_STRESSES) else numbers
     return _named((f"C{i}{j}{suffix}" for i in rows for j in rows), np.ravel(stiffness).tolist())
+
+
+def _phases(document: Document) -> dict[str, float]:
+    """Return the largest stresses of the phases under each load; of angles and paths those of all states."""
+    values, is_curve = dict[str, float](), "angle" in document or "path" in document
+    for phase in document.get("phase_stresses", ()):
+        for measure in (name for name in MEASURES if name in phase):
+            named = dict(zip(phase["state"], phase[measure], strict=True))
+            columns = {"": max(named.values())} if is_curve else {f"{label}_": value for label, value in named.items()}
+            values |= {f"{place}{phase['phase']}_{measure}": value for place, value in columns.items()}
+    return values
 
 
 def _at_point(place: str, point: Document) -> dict[str, float]:
@@ -179,6 +192,15 @@ OUTPUT_COLUMNS = (
     Column("envelope_AXIS", "that of the axis", "load at onset along the first axis of an envelope"),
     Column("envelope_least_AXIS_AXIS", "that of the axes", "least load at onset of all directions"),
     Column("envelope_largest_AXIS_AXIS", "that of the axes", "largest, if every direction has one"),
+    *(
+        Column(f"PHASE_{name}", unit, f"largest {words} of a phase; LOAD_PHASE_{name} of each load that has a name")
+        for name, unit, words in (
+            ("principal", records.STRESS, "principal stress"),
+            ("von_mises", records.STRESS, "von Mises stress"),
+            ("hydrostatic", records.STRESS, "hydrostatic stress"),
+            ("utilisation", "", "utilisation of the strength"),
+        )
+    ),
     Column("check_LAW", "", "largest relative error of a law, as in result.json"),
     Column("seconds_STAGE", "s", "wall time of a stage, the largest over ranks"),
     Column("memory", "bytes", "peak resident memory, the largest over ranks"),

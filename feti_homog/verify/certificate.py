@@ -13,6 +13,7 @@ from feti_homog.verify.check_constants import check_constants, check_reciprocity
 from feti_homog.verify.check_loads import StateNumbers, States, check_loads, check_tables, rows_of
 from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh, check_mesh_error, check_rates
 from feti_homog.verify.check_path import check_breaks, check_envelope, check_strength
+from feti_homog.verify.check_phases import check_phases
 from feti_homog.verify.check_sensitivities import check_sensitivities
 from feti_homog.verify.check_state import check_bonds, check_gluing, check_state
 from feti_homog.verify.discrete_cell import DiscreteCell
@@ -103,6 +104,7 @@ def laws_of_fields(findings: Findings, cell: DiscreteCell) -> list[StateNumbers]
         check_gluing(findings, cell, state, fields)
         check_bonds(findings, cell, state)
         check_mesh_error(findings, cell, state)
+        check_phases(findings, cell, state, len(states))
         states.append(StateNumbers.of(cell, state, fields))
     return states
 

@@ -23,7 +23,7 @@ def laws(case: Mapping[str, Any], phases: Sequence[str]) -> tuple[Float, Float]:
     CaseError for a phase of the mesh without a material.
     """
     plane, stiffnesses, expansions = case["analysis"]["plane"], list[Float](), list[Float]()
-    for constants in (_constants(case, phase) for phase in phases):
+    for constants in (phase_constants(case, phase) for phase in phases):
         angle, law = float(constants.get("angle", 0.0)), _given_stiffness(constants)
         if len(law) != 3:
             law = law if len(law) else np.asarray(np.linalg.inv(_compliance(constants)), float)
@@ -50,7 +50,7 @@ def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
     have another `element`.  Raises CaseError as `laws` does.
     """
     mixed = []
-    for constants in (_constants(case, phase) for phase in phases):
+    for constants in (phase_constants(case, phase) for phase in phases):
         is_isotropic = "young" in constants
         if constants.get("E_axial") is not None and constants.get("nu_axial") is not None:
             isotropic = {"young": constants["E_transverse"], "poisson": constants["nu_transverse"]}
@@ -69,7 +69,7 @@ def out_of_plane(case: Mapping[str, Any], phases: Sequence[str]) -> Float:
     plane, rules = case["analysis"]["plane"], []
     needed = {"young": ["poisson"], "E_transverse": ["E_axial", "nu_axial"],
               "E1": ["nu13", "nu23", *["E3"] * (plane == "strain")]}  # fmt: skip
-    for constants in (_constants(case, phase) for phase in phases):
+    for constants in (phase_constants(case, phase) for phase in phases):
         rule, zero = np.full(3, np.nan), np.zeros(3)
         names = next((names for form, names in needed.items() if form in constants), [])
         if all(constants.get(name) is not None for name in names) and len(constants.get("stiffness", ())) != 3:
@@ -81,7 +81,7 @@ def out_of_plane(case: Mapping[str, Any], phases: Sequence[str]) -> Float:
     return np.array(rules)
 
 
-def _constants(case: Mapping[str, Any], phase: str) -> Constants:
+def phase_constants(case: Mapping[str, Any], phase: str) -> Constants:
     materials = case["material"]
     constants = materials.get(phase, materials.get(phase.partition(":")[0]))
     if not isinstance(constants, Mapping):

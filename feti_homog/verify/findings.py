@@ -138,6 +138,7 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool, mixed: tuple[float
         ("arcs", "the initially debonded nodes are those of the case, in numbers of nodes", 0.0),
         ("stress", "stresses of the elements follow from u and the case's materials", 1e-13 * of_pressure),
         ("stress 33", "stresses out of the plane follow from those in it and the case's materials", 1e-13),
+        ("phases", "largest stresses of the phases follow from u, relative to the largest", 1e-7),
         ("mesh error", "errors of the elements add up to those of averaged stresses, by a factor less 1", 1.5),
         ("periodicity", "u* is the same at the copies of a node in its subdomain, relative to the largest u", 1e-13),
         ("continuity", "u* is the same where subdomains are glued, relative to the largest u", solver),

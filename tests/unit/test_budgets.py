@@ -13,31 +13,31 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "feti_homog"
 MODULES = sorted(PACKAGE.rglob("*.py"))
-# Lines, of the modules beside the packages under ".".
+# Lines, of the modules beside the packages under "."; the second numbers are for the largest stresses of the phases.
 LINES = {
-    ".": 467,
-    "analysis": 2998,
-    "case": 2815,
-    "commands": 542,
+    ".": 470,
+    "analysis": 3000 + 30,
+    "case": 2880,
+    "commands": 560,
     "fem": 1150,
-    "feti": 6395,
-    "homogenization": 3215,
-    "interface": 4005,
-    "materials": 1429,
-    "mesh": 5825,
-    "microstructure": 2103,
-    "report": 3419,
-    "results": 2379,
-    "schema": 432,
-    "studies": 2925,
-    "system": 1803,
-    "verify": 3223,
+    "feti": 6300,
+    "homogenization": 3230 + 55,
+    "interface": 4000,
+    "materials": 1430 + 90,
+    "mesh": 5600,
+    "microstructure": 2140,
+    "report": 3420,
+    "results": 2430,
+    "schema": 430,
+    "studies": 2950,
+    "system": 1780,
+    "verify": 3120 + 140,
 }
-FILES, TOTAL = 290, 45125
+FILES, TOTAL = 310, 45000
 # Percent of all lines: private functions that are called once, and imports.
-CALLED_ONCE, IMPORTS = 10.2, 6.0
+CALLED_ONCE, IMPORTS = 6.0, 6.1
 # Numbers at the level of modules; pairs of module and name that other packages import.
-CONSTANTS, SHARED = 417, 210
+CONSTANTS, SHARED = 335, 215
 # Of 1 000 words of docstrings: "those", "what", "that of"; "of".  Percent of bound names that are pronouns or adverbs.
 VAGUE, OF, PRONOUNS = 1.0, 42.0, 1.0
 NO_NOUNS = {

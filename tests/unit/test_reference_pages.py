@@ -50,11 +50,12 @@ MATCHED = {"geometry": "random", "match": str(TABLE), "fibres": 10}
 VOIDS = {"geometry": "random", "fibre_fraction": 0.3, "fibres": 2, "voids": 0.05}
 OPENINGS, PATH, LOAD = {"values": [0, 60]}, {"strain": STRAIN}, {"to": {"E11": 0.01}}
 WEAK = {"normal_strength": 1.0}
+LIMITED = {name: phase | {"strength": {"principal": 1.0}} for name, phase in BASE["material"].items()}
 CASES = {
     "bonded": {"output": BASE["output"] | {"sensitivities": True}},
     "debonded": {"interface": HALF_OPEN},
     "matched": {"cell": MATCHED | {"mesh_size": 0.1}},
-    "voids": {"cell": VOIDS | {"mesh_size": 0.1}},
+    "voids": {"cell": VOIDS | {"mesh_size": 0.1}, "material": LIMITED},
     "ellipse": {"cell": ELLIPSE | {"mesh_size": 0.2}},
     "coated": COATED,
     "stiffness of two interfaces": COATED | {"interface": [OUTER | HALF_OPEN, INNER]},

@@ -1,6 +1,7 @@
 """Open and closed nodes of debonded interfaces at one load.
 
-Imports `feti`, `interface`, `materials`, `mesh` and `system`.  Main entries: `ContactProblem` and `CoupledInterfaces`.
+Imports `feti`, `interface`, `materials`, `mesh` and `system`.  Main entries: `contact_problem.ContactProblem` and
+`coupled_interfaces.CoupledInterfaces`.
 """
 
 from feti_homog.interface.contact.contact_problem import ContactProblem

@@ -11,6 +11,7 @@ from textwrap import wrap
 from typing import Any
 
 from feti_homog.materials import voigt
+from feti_homog.report.text import phase_tables
 from feti_homog.report.text.constant_tables import sensitivities, table
 from feti_homog.report.text.stiffness_tables import bounds, constants, moduli, stiffnesses, thermal
 from feti_homog.report.text.tables import ERROR, WIDTH, Column, Table
@@ -136,7 +137,7 @@ def answers(document: Document, most: int | None = None) -> list[Table]:
         from feti_homog.report.text.point_tables import tip_table  # bonded cells have no tips
 
         tables.append(tip_table(document, tips))
-    return [*tables, *sensitivities(document)]
+    return [*tables, *sensitivities(document), *phase_tables.phase_tables(document)]
 
 
 def title_of(document: Document) -> str:

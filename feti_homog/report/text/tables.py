@@ -12,6 +12,7 @@ STRESSES = ("young", "stiffness", "normal_strength", "tangential_strength", "axi
            "dissipated", "dissipated_strain_controlled", "work", "load_stored")  # fmt: skip
 MODULI = re.compile(
     r"E[123]|G\d\d|[EGK]_(axial|transverse)|(C\d\d|S\d\d|bulk|shear)(_\w+)?|anisotropy_\w+|\w+_(C|S)\d\d"
+    r"|(.+_)?(principal|von_mises|hydrostatic)|((axial|transverse)_)?(tension|compression)|(axial|transverse)_shear"
 )
 FIXED = {"angle": "degrees", "centre": "degrees", "values": "degrees", "memory": "bytes"}
 ERROR = ".1e"

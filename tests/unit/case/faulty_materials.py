@@ -20,7 +20,7 @@ GIVEN = "young = 1.0\npoisson = 0.2\n"
 FAULTY_MATERIALS: dict[str, str] = {
     **faults(BASE, {
         "[material.fibre] young = -200.0": "expected a number above 0",
-        "[material.fibre] strength = 3.0": "unknown key; phases do not break; bonds do, see normal_strength",
+        "[material.fibre] strength = 3.0": "expected a table such as {principal = 80.0}",
         "[material.matrix] poisson = 0.5": "expected less than 0.5 in plane strain",
         "[material.matrix] poisson = -1": "expected a number above -1",
     }),

@@ -18,14 +18,16 @@ def another_component(content, _):
     content["case"]["load"]["to"]["S12"] = 0.1
 
 
+WARMER = {"load", "stress", "phases", "equilibrium", "mean stress"}
+
 FALSE = {
     "a temperature of the fields": (
-        "cooled", attribute("temperature", state=3), {"load", "tables", "stress", "equilibrium", "mean stress"},
+        "cooled", attribute("temperature", state=3), WARMER | {"tables"},
     ),
     "a temperature of a point": ("cooled", document("path", 3, "temperature"), {"load", "tables"}),
     "a temperature of both": (
         "cooled", both(attribute("temperature", state=3), document("path", 3, "temperature")),
-        {"load", "stress", "equilibrium", "mean stress"},
+        WARMER,
     ),
     "a temperature of a point without fields": ("cooled, thinned", document("path", 2, "temperature"), {"load"}),
     "a temperature that stays": ("cooled", document(*waypoint(0), "temperature"), {"load"}),

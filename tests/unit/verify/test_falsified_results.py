@@ -26,7 +26,7 @@ from feti_homog.verify.reading import gradient, opened
 
 pytestmark = pytest.mark.slow
 
-MATERIAL = {"stress", "stress 33", "equilibrium", "mean stress", "Hill"}
+MATERIAL = {"stress", "phases", "stress 33", "equilibrium", "mean stress", "Hill"}
 SPRINGS = {"bond", "penetration", "complementarity"}
 PATHS = (
     "path",
@@ -96,6 +96,8 @@ def delete_state(_, file):
 
 
 FALSE = {
+    "a largest stress": ("bonded", document("phase_stresses", 0, "principal", 1), {"phases"}),
+    "a position": ("path", document("phase_stresses", 1, "von_mises_at", 0, 0, factor=1.01), {"phases"}),
     "one stress": ("bonded", scale("stress"), {"stress", "stress 33"}),
     "errors of the mesh": ("plane", errors_of_the_mesh, {"mesh error"}),
     "errors of mixed elements": ("bonded", errors_of_the_mesh, {"mesh error"}),

@@ -6,13 +6,14 @@ from support.verified_results import falsified
 
 pytestmark = pytest.mark.slow
 
-MATERIAL = {"stress", "equilibrium", "mean stress", "Hill"}
+MATERIAL = {"stress", "phases", "equilibrium", "mean stress", "Hill"}
 
 
 def warmer(_, file):
     file["state/0"].attrs["temperature"] = 1e-2
 
 
+WARMER = {"load", "stress", "phases", "equilibrium", "mean stress"}
 FALSE = {
     "a stress along the fibres": ("spatial", scale("stress_33", state=3), {"stress"}),
     "an axial stress": ("spatial", scale("axial_stress", state=5), {"stress"}),
@@ -29,16 +30,16 @@ FALSE = {
     "an axial jump": ("spatial contact", scale("axial_jump", state=5), {"jump"}),
     "an expansion": (
         "spatial", document("case", *MATRIX, "expansion", factor=1.01),
-        {"stress", "equilibrium", "mean stress", "Hill", "Levin"},
+        {"stress", "phases", "equilibrium", "mean stress", "Hill", "Levin"},
     ),
     "an axial shear modulus": (
         "spatial", document("case", "material", "fibre", "G13", factor=1.01), MATERIAL,
     ),
     "axial springs": ("spatial springs", document("case", "interface", "tangential_stiffness", factor=1.01), {"bond"}),
     "a temperature": (
-        "spatial", attribute("temperature", state=4), {"load", "stress", "equilibrium", "mean stress"},
+        "spatial", attribute("temperature", state=4), WARMER,
     ),
-    "a temperature that there is none of": ("spatial", warmer, {"load", "stress", "equilibrium", "mean stress"}),
+    "a temperature that there is none of": ("spatial", warmer, WARMER),
     "an entry of a spatial stiffness": (
         "spatial", document("effective_stiffness", 3, 3), {"tables", "moduli", "compliance"},
     ),

@@ -1,0 +1,120 @@
+"""Laws of the largest stresses of the phases, and of their strengths, by invariants of the stress tensor."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from feti_homog.typing import Float
+from feti_homog.verify.constitutive_law import PLANE, VOIGT, out_of_plane, phase_constants
+from feti_homog.verify.discrete_cell import DiscreteCell
+from feti_homog.verify.elements import quadrature_points
+from feti_homog.verify.findings import Findings
+from feti_homog.verify.reading import State
+from feti_homog.verify.torus import from_centre
+
+LAW = "phases"
+# Criteria by a key that they have alone.
+CRITERIA = {
+    "principal": "maximum principal", "von_mises": "von Mises", "tension": "Drucker-Prager", "axial_shear": "Hashin",
+}  # fmt: skip
+# Values within this of the largest are at its position, too; positions are those of quadrature points, to rounding.
+SAME_VALUE, SAME_PLACE = 1e-5, 1e-9
+
+
+def check_phases(findings: Findings, cell: DiscreteCell, state: State, number: int) -> None:
+    """Check the largest stresses that result.json has for the phases in state `number`, and their positions."""
+    table = cell.files.document.get("phase_stresses", [])
+    if not table:
+        return
+    stress, points = _stresses(cell, state)
+    phase_of = np.repeat(cell.files.mesh.phase, len(stress) // len(cell.files.mesh.phase))
+    known = [name for k, name in enumerate(cell.files.phases) if not np.isnan(stress[phase_of == k]).any()]
+    findings.require(LAW, sorted(entry["phase"] for entry in table) == sorted(known), "names of the phases")
+    for entry in table:
+        name = entry["phase"]
+        if name not in known:
+            continue
+        findings.require(LAW, state.name.endswith(f"({entry['state'][number]})"), f"{state.name}: its label")
+        rows = phase_of == cell.files.phases.index(name)
+        strength = phase_constants(cell.files.case, name).get("strength")
+        values, scale = _measures(stress[rows], strength), float(np.abs(stress[rows]).max())
+        for measure, column in values.items():
+            place = f"{state.name}, {measure} of {name}"
+            reported = float(entry[measure][number])
+            size = 1.0 if measure == "utilisation" else scale
+            findings.compare(LAW, reported, column.max(), max(size, cell.scales_of(state).stress), place)
+            away = from_centre(points[rows], np.array(entry[f"{measure}_at"][number]), cell.files.size)
+            at = np.hypot(*away.T) < SAME_PLACE * cell.files.size.max()
+            least = column.max() - SAME_VALUE * max(abs(column.max()), cell.scales_of(state).stress)
+            findings.require(LAW, bool((column[at] >= least).any()), f"{place}: another position")
+        key = next((key for key in CRITERIA if key in (strength or ())), None)
+        findings.require(LAW, entry.get("criterion") == CRITERIA.get(key or ""), f"{name}: its criterion")
+
+
+def _stresses(cell: DiscreteCell, state: State) -> tuple[Float, Float]:
+    """Return tensors (n, 3, 3) and points (n, 2) at the quadrature points of all elements."""
+    mesh, v = cell.files.mesh, len(state.strain)
+    free = state.temperature * cell.expansions
+    answers = [answer for *_, answer in cell.elements.responses(state.displacement, state.along, free)]
+    stress = np.concatenate(answers)
+    tensors = np.zeros((*stress.shape[:2], 3, 3))
+    size = len(VOIGT[v])
+    tensors[..., :size, :size] = stress[..., VOIGT[v]]
+    # S33 from the stresses in the plane, also where elements have a pressure of their own.
+    if v == 3:
+        rules, along = out_of_plane(cell.files.case, cell.files.phases)[:, 0], np.zeros(len(free))
+    else:
+        L, out = cell.stiffnesses, cell.stiffnesses[:, 2, PLANE]
+        rules = np.linalg.solve(L[:, PLANE][:, :, PLANE], out[..., None])[..., 0]
+        along = (L[:, 2, 2] - (rules * out).sum(axis=1)) * (state.along - free[:, 2])
+    in_plane = stress[..., PLANE if v == 6 else slice(None)]
+    tensors[..., 2, 2] = np.einsum("ei,eqi->eq", rules[mesh.phase], in_plane) + along[mesh.phase, None]
+    r = quadrature_points() if mesh.triangles.shape[1] == 6 else np.full((1, 3), 1 / 3)
+    functions = r if len(r) == 1 else np.hstack([r * (2 * r - 1), 4 * r * np.roll(r, -1, axis=1)])
+    points = np.einsum("qa,ead->eqd", functions, mesh.points[mesh.triangles])
+    return tensors.reshape(-1, 3, 3), points.reshape(-1, 2)
+
+
+def _measures(stress: Float, strength: Mapping[str, Any] | None) -> dict[str, Float]:
+    """Return principal, von Mises and hydrostatic stress (n,) by invariants, and the utilisation of a strength.
+
+    s1 = p + 2/3 q cos(arccos(27 J3 / (2 q^3)) / 3) with q = sqrt(3/2 s : s) and J3 = det s of the deviator s.
+    """
+    p = np.trace(stress, axis1=1, axis2=2) / 3
+    deviator = stress - p[:, None, None] * np.eye(3)
+    q = np.sqrt(1.5 * np.einsum("nij,nij->n", deviator, deviator))
+    third = np.divide(13.5 * np.linalg.det(deviator), q**3, out=np.zeros_like(q), where=q > 0)
+    first = p + 2 / 3 * q * np.cos(np.arccos(np.clip(third, -1.0, 1.0)) / 3)
+    values = {"principal": first, "von_mises": q, "hydrostatic": p}
+    if strength is None:
+        return values
+    limit = {name: float(value) for name, value in strength.items()}
+    if "principal" in limit:
+        used = first / limit["principal"]
+    elif "von_mises" in limit:
+        used = q / limit["von_mises"]
+    elif "tension" in limit:  # the cone through both uniaxial strengths: a I1 + sqrt(J2) = k
+        T, C = limit["tension"], limit["compression"]
+        used = ((C - T) * 3 * p + (C + T) * q) / (2 * C * T)
+    else:
+        used = _hashin(stress, limit)
+    return values | {"utilisation": np.maximum(used, 0.0)}
+
+
+def _hashin(stress: Float, limit: Mapping[str, float]) -> Float:
+    """Return the largest of the four modes; of a mode with a linear term 1 / the root of a f^2 + b f = 1."""
+    shear = (stress[:, 0, 2] ** 2 + stress[:, 1, 2] ** 2) / limit["axial_shear"] ** 2
+    along, across = stress[:, 2, 2], stress[:, 0, 0] + stress[:, 1, 1]
+    turned = shear - np.linalg.det(stress[:, :2, :2]) / limit["transverse_shear"] ** 2
+    modes = [
+        np.where(along > 0, np.sqrt((along / limit["axial_tension"]) ** 2 + shear), 0.0),
+        np.where(along < 0, -along / limit["axial_compression"], 0.0),
+        np.where(across > 0, np.sqrt(np.maximum((across / limit["transverse_tension"]) ** 2 + turned, 0.0)), 0.0),
+    ]
+    ratio = limit["transverse_compression"] / (2 * limit["transverse_shear"])
+    b = (ratio**2 - 1) / limit["transverse_compression"] * across
+    a = np.maximum((across / (2 * limit["transverse_shear"])) ** 2 + turned, 0.0)
+    root = np.sqrt(b**2 + 4 * a)
+    modes.append(np.where(across <= 0, (b + root) / 2, 0.0))
+    return np.asarray(np.max(modes, axis=0))

@@ -1,0 +1,82 @@
+"""Largest stresses of the phases: uniform cells have the macroscopic stress, and any number of ranks finds the same."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from support.cases import FIBRE, MATRIX
+
+from feti_homog import Case, run
+from feti_homog.materials import voigt
+
+pytestmark = pytest.mark.parallel
+
+CELL = {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.15, "refine": 1}
+LOAD = {"S11": 30.0, "S22": -12.0, "S33": 5.0, "S23": 7.0, "S13": -9.0, "S12": 11.0}
+AXES = {"axial_tension": 40.0, "axial_compression": 25.0, "axial_shear": 20.0, "transverse_tension": 50.0,
+        "transverse_compression": 90.0, "transverse_shear": 30.0}  # fmt: skip
+
+
+def phases_of(comm, load, order=1, plane="generalized", fibre=FIBRE, strengths=(None, None), **more):
+    materials = {
+        name: material if limit is None else material | {"strength": limit}
+        for (name, material), limit in zip({"matrix": MATRIX, "fibre": fibre}.items(), strengths, strict=True)
+    }
+    document = {
+        "cell": CELL | {"order": order},
+        "material": materials,
+        "analysis": {"type": "load", "plane": plane},
+        "load": {"to": load},
+    }
+    return {phase.phase: phase for phase in run(Case.parse(document | more), comm).phase_stresses}
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_uniform_cell_has_the_macroscopic_stress(comm, order):
+    found = phases_of(comm, LOAD, order, fibre=MATRIX, strengths=({"principal": 100.0}, AXES))
+    S11, S22, S33, S23, S13, S12 = LOAD.values()
+    tensor = np.array([[S11, S12, S13], [S12, S22, S23], [S13, S23, S33]])
+    deviator = tensor - np.trace(tensor) / 3 * np.eye(3)
+    assert set(found) == {"matrix", "fibre"}
+    for phase in found.values():
+        np.testing.assert_allclose(phase.principal, np.linalg.eigvalsh(tensor)[-1:], rtol=1e-8)
+        np.testing.assert_allclose(phase.von_mises, [np.sqrt(1.5 * (deviator**2).sum())], rtol=1e-8)
+        np.testing.assert_allclose(phase.hydrostatic, [np.trace(tensor) / 3], rtol=1e-8)
+    np.testing.assert_allclose(found["matrix"].utilisation, found["matrix"].principal / 100.0)
+    axial = (S13**2 + S23**2) / 20.0**2
+    modes = (S33 / 40.0) ** 2 + axial, ((S11 + S22) / 50.0) ** 2 + (S12**2 - S11 * S22) / 30.0**2 + axial
+    np.testing.assert_allclose(found["fibre"].utilisation, [np.sqrt(max(modes))], rtol=1e-8)
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+def test_stresses_out_of_the_plane_count(comm, plane):
+    found = phases_of(comm, {"S11": 30.0, "S22": -12.0}, plane=plane, fibre=MATRIX)["matrix"]
+    S33 = MATRIX["poisson"] * 18.0 if plane == "strain" else 0.0
+    np.testing.assert_allclose(found.hydrostatic, [(18.0 + S33) / 3], rtol=1e-8)
+    np.testing.assert_allclose(found.von_mises, voigt.von_mises(np.array([[30.0, -12.0, 0.0]]), S33), rtol=1e-8)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_all_ranks_find_values_and_positions_of_one(comm, order):
+    """Interfaces keep the fibre a subdomain of its own; the load is skew, so that no two positions are alike."""
+    load, interface = {"E11": 0.01, "gamma12": 0.004}, {"normal_stiffness": 2000.0, "tangential_stiffness": 900.0}
+    together = phases_of(comm, load, order, interface=interface)
+    alone = phases_of(MPI.COMM_SELF, load, order, interface=interface)
+    for phase, one in zip(together.values(), alone.values(), strict=True):
+        for name in ("principal", "von_mises", "hydrostatic"):
+            np.testing.assert_allclose(getattr(phase, name), getattr(one, name), rtol=1e-6)
+            offset = getattr(phase, f"{name}_at") - getattr(one, f"{name}_at")
+            np.testing.assert_allclose(offset - np.round(offset), 0.0, atol=1e-9)
+
+
+def test_stresses_rise_beside_tips_and_corners(comm):
+    def remarks(cell, **more):
+        document = {
+            "cell": cell,
+            "material": {"matrix": MATRIX, "fibre": FIBRE},
+            "analysis": {"type": "stiffness", "plane": "strain"},
+        }
+        return " ".join(run(Case.parse(document | more), comm).remarks)
+
+    arc = {"interface": {"debonded": [{"fibre": "all", "centre": 0.0, "angle": 90.0}]}}
+    assert "beside tips of debonding they rise with finer elements" in remarks(CELL, **arc)
+    assert "they rise" not in remarks(CELL)
