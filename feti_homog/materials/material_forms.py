@@ -20,7 +20,10 @@ EXPANSION_PAIR = ("expansion_axial", "expansion_transverse")
 
 @dataclass(frozen=True, kw_only=True)
 class PhaseStrength:
-    """Strength of a phase, by the keys of one criterion (`materials.strength`)."""
+    """Strength of a phase by one criterion.
+
+    Its keys are principal; von_mises; tension and compression; or the six of Hashin for fibres along x3.
+    """
 
     principal: float | None = key(POSITIVE, "Largest principal stress.", unit="stress", default=None)
     von_mises: float | None = key(POSITIVE, "Von Mises stress.", unit="stress", default=None)
