@@ -86,7 +86,7 @@ class FibreInfo:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SolverInfo:
     """Sizes, iterations and convergence of the dual problem."""
 
@@ -100,6 +100,11 @@ class SolverInfo:
     coarse_dim: int = described("vectors of the coarse space, rigid-body motions included")
     factorizations: int = described("subdomains that were factored, each once")
     coarse_factorizations: int = described("factorizations of the coarse problem")
+    method: str | None = described("how the cell is cut, and by which preconditioner it is solved", default=None)
+    condition: float | None = described(
+        "largest condition number of the projected, preconditioned dual operator, estimated by the iterations",
+        default=None,
+    )
     rtol: float = described("relative tolerance of the dual problem")
     solves: int = described("dual problems solved")
     iterations: tuple[int, ...] = described("Krylov iterations of each state")
@@ -120,11 +125,21 @@ class SolverInfo:
             coarse_dim=sum(s.coarse_dimension for s in solvers),
             factorizations=cell.sum_over_ranks(sum(len(s.interface_operators.operators) for s in solvers)),
             coarse_factorizations=sum(s.natural.factorizations for s in solvers),
+            method=_method(cell),
+            condition=max(s.condition for s in solvers) or None,
             rtol=cell.solver.rtol,
             solves=sum(s.solves for s in solvers),
             iterations=tuple(iterations),
             converged_reason=tuple(reasons),
         )
+
+
+def _method(cell: unit_cell.TornCell) -> str:
+    """Describe how the cell is cut and solved."""
+    if not cell.solver.jump_operator.global_rows:
+        return "one subdomain, for nothing can part: one factor of the whole cell"
+    cut = "pieces across the materials, for nothing can part" if cell.summary.across else "bodies and pieces of bodies"
+    return f"{cut}: {cell.solver.method}"
 
 
 @dataclass(frozen=True)

@@ -48,6 +48,7 @@ class SolverParts:
     Attributes:
         adaptive: the coarse space of the preconditioner, if it has one.
         exact_inverse: the preconditioner, if it leaves nothing to iterate.
+        method: the choice in words.
     """
 
     operators: InterfaceOperators
@@ -55,6 +56,7 @@ class SolverParts:
     natural: NaturalCoarseSpace
     adaptive: AdaptiveCoarseSpace | None
     exact_inverse: ExactInverse | None
+    method: str
 
     @property
     def coarse_dimension(self) -> int:
@@ -156,4 +158,4 @@ def build(
     if not followed or comm.allreduce(bool(left_out.any()), MPI.LOR):
         preconditioner = SpringUpdated(comm, preconditioner, jump_operator.owned[0], left_out)
     inverse = cast("ExactInverse", preconditioner) if plan.preconditioner == "influence" else None
-    return SolverParts(operators, preconditioner, natural, adaptive, inverse)
+    return SolverParts(operators, preconditioner, natural, adaptive, inverse, plan.in_words)

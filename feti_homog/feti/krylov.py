@@ -161,6 +161,7 @@ class Krylov:
         self.ksp.setType(PETSc.KSP.Type.CG)
         self.ksp.setNormType(PETSc.KSP.NormType.PRECONDITIONED)
         self.ksp.setTolerances(rtol=RTOL, atol=0.0, max_it=MAX_ITERATIONS)
+        self.ksp.setComputeSingularValues(True)
         self.ksp.setConvergenceTest(lambda *iteration: errors.call(lambda: test(*iteration), REASON.DIVERGED_NANORINF))
         pc = self.ksp.getPC()
         pc.setType(PETSc.PC.Type.PYTHON)
@@ -208,12 +209,19 @@ class Krylov:
 
     def describe(self, iterations: int) -> str:
         """Describe the last solve for -feti_view: iterations and estimated condition number."""
-        ksp, load_cases = self.ksp, self._columns
-        line = f"FETI: {load_cases} load case{'s' * (load_cases > 1)}, {iterations} iterations"
-        if not iterations or ksp.getType() not in ESTIMATES_SINGULAR_VALUES:
+        line = f"FETI: {self._columns} load case{'s' * (self._columns > 1)}, {iterations} iterations"
+        if self.extreme_values is None:
             return line
-        largest, smallest = ksp.computeExtremeSingularValues()
+        smallest, largest = self.extreme_values
         return f"{line}, condition number about {largest / smallest:.3g} ({smallest:.3g} to {largest:.3g})"
+
+    @property
+    def extreme_values(self) -> tuple[float, float] | None:
+        """The extreme singular values of P H P F in the last solve; None without an estimate."""
+        if not self.ksp.getIterationNumber() or self.ksp.getType() not in ESTIMATES_SINGULAR_VALUES:
+            return None
+        largest, smallest = self.ksp.computeExtremeSingularValues()
+        return (smallest, largest) if smallest > 0.0 else None
 
     def destroy(self) -> None:
         """Free the shell matrix and the Krylov method; collective."""

@@ -49,6 +49,8 @@ class FetiSolver:
         coarse_dimension: number of coarse displacements, or of rigid-body motions without `adaptive`.
         active: the rows that carry multipliers.
         solves: number of dual problems so far, one for each load.
+        condition: largest condition number of P H P F so far, estimated by the iterations; 0 without any.
+        method: the preconditioner and the coarse space in words.
     """
 
     def __init__(
@@ -76,7 +78,7 @@ class FetiSolver:
         options = applications, compliance, springs.soften, thresholds, recovers
         parts = factory.build(comm, self.jump_operator, subdomains, *options)
         self.interface_operators, self.preconditioner = parts.operators, parts.preconditioner
-        self.exact_inverse = parts.exact_inverse
+        self.exact_inverse, self.method = parts.exact_inverse, parts.method
         self.natural, self.adaptive, self.coarse_dimension = parts.natural, parts.adaptive, parts.coarse_dimension
         self.operator = DualOperator(self.interface_operators, compliance)
         if sum(s.n_dofs for s in subdomains) > MOST_DOFS_UNTRIMMED:
@@ -93,9 +95,10 @@ class FetiSolver:
         # interpreter has already shut down.
         self._krylov: dict[int, Krylov] = {}
         self._shells = ExitStack()
+        self._shells.callback(self._krylov.clear)
         self._destroy_krylov = weakref.finalize(self, self._shells.close)
         self._krylov_for(1)
-        self.solves = 0
+        self.solves, self.condition = 0, 0.0
         if self._view:
             PETSc.Sys.Print(parts.describe(comm), comm=comm)
 
@@ -196,6 +199,8 @@ class FetiSolver:
         applied, iterations, reason = np.zeros_like(lam), 0, int(PETSc.KSP.ConvergedReason.CONVERGED_ATOL)
         if is_seen.any():
             lam, applied, iterations, reason = krylov.solve(lam, right)
+            smallest, largest = krylov.extreme_values or (1.0, self.condition)
+            self.condition = max(self.condition, largest / smallest)
             if self._view:
                 PETSc.Sys.Print(krylov.describe(iterations), comm=self.comm)
         parts = lam * scale, torn_jump - applied * scale, iterations, reason, np.maximum(jump, rounding)
@@ -241,6 +246,4 @@ class FetiSolver:
             parts = self.jump_operator.vector, self.preconditioner, self._jumps, columns
             self._krylov[columns] = Krylov(*parts, restarts=self.adaptive is not None)
             self._shells.callback(self._krylov[columns].destroy)
-            if self._view:
-                self._krylov[columns].ksp.setComputeSingularValues(True)
         return self._krylov[columns]

@@ -1,5 +1,8 @@
 """Errors that the solver's Python code raises while PETSc calls it leave the solve after PETSc has returned."""
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 from support.torn_cells import tear
@@ -35,3 +38,13 @@ def test_the_solve_raises_it_and_the_next_one_works(comm, monkeypatch, method, c
     assert len(calls) == 3
     again = solver.solve(E11, start)
     assert again.iterations == expected.iterations and np.array_equal(again.lam, expected.lam)
+
+
+def test_a_destroyed_solver_keeps_no_vector_of_petsc(comm):
+    """Vectors that only the end of Python frees would make the ranks end PETSc unlike."""
+    solver = tear(comm, geometry="square").solver
+    solver.solve(np.array([1.0, 0.0, 0.0]), np.zeros(solver.rows))
+    krylov = weakref.ref(solver._krylov_for(1))
+    solver.destroy()
+    gc.collect()
+    assert krylov() is None

@@ -162,6 +162,7 @@ def test_view_shows_the_adaptive_space_and_the_condition_number(comm, narrow, ca
     assert f"{cell.summary.subdomains} subdomains, {cell.summary.subdomains} with dense boundary operators" in text
     least, largest = dense_feti.extreme_eigenvalues(narrow.dense.F, narrow.H)
     assert 0.7 * largest / least < number("condition number about", text) < 1.01 * largest / least
+    assert cell.solver.condition == pytest.approx(number("condition number about", text), rel=5e-3)
 
 
 def test_view_shows_the_natural_space_without_soft_modes(comm, narrow, capfd):

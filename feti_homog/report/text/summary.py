@@ -70,14 +70,16 @@ def summary(document: Document) -> str:
     if (count := solver.get("factorizations")) is not None:  # of the axial problem too
         coarse = f"coarse problem {_number(solver.get('coarse_factorizations', 0), 'time')}"
         settings += _field("Factorized", [f"{count} {'matrix' if count == 1 else 'matrices'} of subdomains", coarse])
+    settings += _field("Method", [solver["method"]]) if "method" in solver else []
+    condition = [f"condition number about {solver['condition']:.3g}"] if "condition" in solver else []
     counts = solver["iterations"]
     if not any(counts):
         settings += _field("Iterations", [f"none in {_number(len(counts), 'state')}"])
     elif len(counts) <= 12:
-        settings += _field("Iterations", map(str, counts))
+        settings += _field("Iterations", [*map(str, counts), *condition])
     else:
         a_state = f"{min(counts)} to {max(counts)} a state"
-        settings += _field("Iterations", [a_state, f"{sum(counts)} for {len(counts)} states"])
+        settings += _field("Iterations", [a_state, f"{sum(counts)} for {len(counts)} states", *condition])
     memory = f"{size / 2**20:.0f} MiB" if size < 2**30 else f"{size / 2**30:.2f} GiB"
     remarks = [(label, str(text)) for label in REMARKS for text in document.get(f"{label.lower()}s", ())]
     blocks = [
