@@ -129,9 +129,7 @@ def flip_double_arcs(triangles: Int32, phase: Int32, arc_edges: Int32, arc_circl
         opposite[one], opposite[twin] = twin, one
         other = opposite[3 * bad + corner]
         flippable = (other >= 0) & (phase[other // 3] == phase[bad])
-        _, unique = np.unique(other // 3, return_index=True)
-        once = np.zeros(len(bad), dtype=bool)
-        once[unique] = True
+        once = np.isin(np.arange(len(bad)), np.unique(other // 3, return_index=True)[1])
         chosen = flippable & once & ~np.isin(other // 3, bad)
         if not chosen.any():
             break
@@ -172,10 +170,8 @@ def void_edges(mesh: CoarseMesh) -> Int32:
 
 def voids(mesh: CoarseMesh) -> int:
     """Count the connected boundaries of voids on the torus."""
-    pairs = mesh.representative[void_edges(mesh)]
-    classes, ends = np.unique(pairs, return_inverse=True)
-    ends = ends.reshape(-1, 2)
-    graph = coo_matrix((np.ones(len(ends)), tuple(ends.T)), shape=(len(classes),) * 2)
+    classes, ends = np.unique(mesh.representative[void_edges(mesh)], return_inverse=True)
+    graph = coo_matrix((np.ones(ends.size // 2), tuple(ends.reshape(-1, 2).T)), shape=(len(classes),) * 2)
     return int(connected_components(graph, directed=False)[0])
 
 
@@ -183,8 +179,7 @@ def can_debond(mesh: CoarseMesh, pairs: Int32) -> Bool:
     """Return whether edges (k, 2), on sides either copy, lie between fibre and matrix."""
     low_copies, order, _ = _neighbours(mesh)
     in_matrix = mesh.phase[order // 3] == 0
-    between = low_copies[order[in_matrix[:, 0] != in_matrix[:, 1], 0]]
-    n = len(mesh.points)
+    between, n = low_copies[order[in_matrix[:, 0] != in_matrix[:, 1], 0]], len(mesh.points)
     return np.isin(edge_keys(_low_copies(mesh, pairs), n), edge_keys(between, n))
 
 

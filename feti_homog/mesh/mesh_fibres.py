@@ -3,8 +3,6 @@
 Directions on interfaces are measured about the centres.
 """
 
-from collections import deque
-
 import numpy as np
 
 from feti_homog.mesh.coarse_mesh import areas, twins
@@ -13,10 +11,9 @@ from feti_homog.mesh.submeshes import Submesh, cut_bodies
 from feti_homog.microstructure import phase_names
 from feti_homog.typing import Bool, Float, Int
 
-# Largest distance between the centres of nested curves, or of images of one curve / longer semi-axis.
-SAME_CENTRE = 1e-9
-# Largest difference of a coating's thicknesses along both semi-axes / longer semi-axis.
-SAME_LENGTH = 1e-6
+# Distance between centres of nested curves, and difference of a coating's thicknesses on both semi-axes, at most /
+# longer semi-axis.
+SAME_CENTRE, SAME_LENGTH = 1e-9, 1e-6
 
 
 def unwrap(submesh: Submesh) -> tuple[Float, bool]:
@@ -44,9 +41,8 @@ def unwrap(submesh: Submesh) -> tuple[Float, bool]:
         neighbours[q].append((p, -step[k]))
     shifts = np.full((part.max() + 1, 2), np.nan)
     shifts[0] = 0.0
-    queue = deque([0])
-    while queue:
-        p = queue.popleft()
+    queue = [0]
+    for p in queue:
         for q, jump in neighbours[p]:
             if np.isnan(shifts[q, 0]):
                 shifts[q] = np.round((shifts[p] + jump) / submesh.period) * submesh.period

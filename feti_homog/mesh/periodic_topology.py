@@ -138,10 +138,8 @@ class Torus:
             return np.zeros(len(self.class_keys), bool)
         one, other, edge = self.sides
         between = edge[self.constituent[one] != self.constituent[other]]
-        shared, free = (
-            np.bincount(self.edge_ends[some].ravel(), minlength=len(self.class_keys))
-            for some in (between, np.flatnonzero(self.at_void))
-        )
+        ends = (self.edge_ends[some].ravel() for some in (between, self.at_void))
+        shared, free = (np.bincount(classes, minlength=len(self.class_keys)) for classes in ends)
         # Each edge between constituents ends a sector, and so do both sides of a void together.
         sectors = shared + free // 2
         return np.asarray((self.meeting == 2) & ((sectors != 2) | (shared == 0)))
@@ -233,9 +231,7 @@ def present(numbers: Int | Int32, size: int) -> tuple[Int, Int]:
 def renumber(label: Int, order: Int) -> Int:
     """Assign numbers to the labels by their first appearance in `order`."""
     first = np.unique(label[order], return_index=True)[1]
-    rank = np.empty_like(first)
-    rank[np.argsort(first)] = np.arange(len(first))
-    return np.asarray(rank[label])
+    return np.asarray(np.argsort(np.argsort(first))[label])
 
 
 def plane_edges_of(mesh: CoarseMesh) -> tuple[Int, Int]:

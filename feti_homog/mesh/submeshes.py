@@ -130,13 +130,8 @@ def cut_for_ranks(
         members = np.flatnonzero(table.rank[subdomain] == r)
         index, member = np.unique(subdomain[members], return_inverse=True)
         body = table.body[index]
-        yield SubmeshesOfRank(
-            whole=part(everything, members),
-            member=member,
-            index=index,
-            body=body,
-            phase=tuple("" if table.across else torus.mesh.phases[k] for k in table.phase[body].tolist()),
-        )
+        phase = tuple("" if table.across else torus.mesh.phases[k] for k in table.phase[body].tolist())
+        yield SubmeshesOfRank(part(everything, members), member, index, body, phase)
 
 
 def cut_bodies(torus: Torus, members: Int) -> Iterator[Submesh]:

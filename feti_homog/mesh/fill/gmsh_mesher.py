@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -14,7 +14,7 @@ from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import CoarseMesh, representatives
 from feti_homog.mesh.outline.bare_outline import BareOutline
 from feti_homog.mesh.outline.lines import LineStations
-from feti_homog.mesh.outline.outline import Outline
+from feti_homog.mesh.outline.outline import Marks, Outline
 from feti_homog.mesh.sizes import element_estimate
 from feti_homog.mesh.sizes.graded_size import MeshSizes
 from feti_homog.mesh.tiles.tile_filling import Filling, Tile
@@ -24,10 +24,7 @@ from feti_homog.microstructure.shapes import Conics
 
 
 def begin(
-    cell: cell_section.Cell,
-    listed: Arrangement | None,
-    marks: Mapping[int, Sequence[float]],
-    policy: TilePolicy,
+    cell: cell_section.Cell, listed: Arrangement | None, marks: Marks, policy: TilePolicy
 ) -> UnmeshedCell | CoarseMesh:
     """Begin the periodic coarse mesh for a square, hexagonal or random cell, or a table.
 
@@ -55,18 +52,15 @@ def begin(
         keys = ("mesh_size", "interface_size", *(["tip_size"] if at_tips else []))
         values = [f"{name} = {value:.3g}" for name in keys if (value := getattr(cell, name)) is not None]
         values += [] if cell.fibres is None else [f"fibres = {cell.fibres}"]
-        raise MeshError(
-            f"[cell] {', '.join(values)}: about {count:.2g} elements before refine; expected at most {limit}; "
-            "refine splits them on the ranks"
-        )
+        elements = f"{count:.2g} elements before refine; expected at most {limit}; refine splits them on the ranks"
+        raise MeshError(f"[cell] {', '.join(values)}: about {elements}")
     arrangement = arrange(cell) if listed is None else listed
     smallest = int(arrangement.radii.argmin())
     if arrangement.radii[smallest] < arrangements.SMALLEST_RADIUS * arrangement.width:
         asked = cell_sizes.fractions_in_words(cell) if cell.fractions else 'geometry = "table"'
-        raise MeshError(
-            f"[cell] {asked}: a {'void' if arrangement.is_void[smallest] else 'fibre'} has a radius of "
-            f"{arrangement.radii.min():.2g}; expected at least {arrangements.SMALLEST_RADIUS} of the width of the cell"
-        )
+        kind = "void" if arrangement.is_void[smallest] else "fibre"
+        expected = f"expected at least {arrangements.SMALLEST_RADIUS} of the width of the cell"
+        raise MeshError(f"[cell] {asked}: a {kind} has a radius of {arrangement.radii.min():.2g}; {expected}")
     scale = arrangement_scale(cell, arrangement)
     if not isinstance(arrangement.outlines, Conics):
         from feti_homog.mesh.fill.shape_mesher import mesh_outlines  # with a reader of meshes

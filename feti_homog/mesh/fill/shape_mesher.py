@@ -27,7 +27,6 @@ from feti_homog.typing import Float
 SAME_PLACE = 1e-6
 # Cells of the grid of sizes along a side.
 FEWEST_CELLS, MOST_CELLS = 32, 1000
-
 # Edges of coatings / thickness; cosine of the angle between normals of outlines and sides that face each other.
 COATING_EDGE, FACING = 2.0, 0.9
 # Sources of sizes that count at a position.

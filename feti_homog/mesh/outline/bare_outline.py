@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -42,25 +42,19 @@ class BareOutline:
 
     @classmethod
     def of(
-        cls,
-        arrangement: Arrangement,
-        sizes: MeshSizes,
-        marks: Mapping[int, Sequence[float]],
-        bridges: outline.Bridges | None = None,
+        cls, arrangement: Arrangement, sizes: MeshSizes, marks: outline.Marks, bridges: outline.Bridges | None = None
     ) -> BareOutline:
         """Divide the outlines and cell sides into lines, for edges of at most `sizes`.
 
-        `marks` maps a curve to angles in degrees, measured at its centre, that become nodes: curve k is the outer curve
-        of fibre k, and ~k the curve within its coating. Bridges, between discs in a cell of tiles, are the last curves.
+        The `marks` become nodes. Bridges, between discs in a cell of tiles, are the last curves.
         """
         sampling, bridges = (lines.WHOLE, NO_BRIDGES) if bridges is None else (lines.IN_TILES, bridges)
         size = arrangement.size
         curves, disc, around = outline.images(arrangement)
         assert isinstance(curves, Conics)
-        sides = ((axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis]))
-        border = np.concatenate(
-            [outline.on_side(outline.crossings(curves, axis, size), axis, level) for axis, level in sides]
-        )
+        levels = ((axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis]))
+        sides = [outline.on_side(outline.crossings(curves, axis, size), axis, level) for axis, level in levels]
+        border = np.concatenate(sides)
         name = np.where(around == MATRIX, disc, ~disc)
         crossing = outline.on_curves(curves, border)
         angles = outline.vertex_angles(curves, name, crossing, marks)

@@ -191,10 +191,8 @@ class Stations:
 
 def _refuse_many(edges: float, limit: int) -> None:
     if edges > limit:
-        raise MeshError(
-            f"[cell] the lines of the cell need about {edges:.2g} nodes; expected at most "
-            f"{limit}: make mesh_size and interface_size larger, or fibre_fraction or fibres smaller"
-        )
+        hint = "make mesh_size and interface_size larger, or fibre_fraction or fibres smaller"
+        raise MeshError(f"[cell] the lines of the cell need about {edges:.2g} nodes; expected at most {limit}: {hint}")
 
 
 def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges: Int | int, limit: int) -> Stations:
@@ -265,11 +263,8 @@ class SizedLines:
 
     def parts(self, count: int) -> list[SizedLines]:
         """Divide the lines, in order, into `count` parts of equal numbers."""
-        arcs, bridges = (
-            [lines.chosen(slice(*ends)) for ends in pairwise(dividing.even(len(lines), count))]
-            for lines in (self.arcs, self.bridges)
-        )
-        return [SizedLines(*lines, self.sampling) for lines in zip(arcs, bridges, strict=True)]
+        ends = zip(*(pairwise(dividing.even(len(lines), count)) for lines in (self.arcs, self.bridges)), strict=True)
+        return [SizedLines(self.arcs.chosen(slice(*a)), self.bridges.chosen(slice(*b)), self.sampling) for a, b in ends]
 
     def stations(self, field: SizeField) -> LineStations:
         """Place the nodes on these lines.
@@ -278,10 +273,8 @@ class SizedLines:
             MeshError: there would be more than the sampling allows.
         """
         sampling = self.sampling
-        return (
-            place_nodes(field, self.arcs, sampling.arc, 1, sampling.most_nodes),
-            place_nodes(field, self.bridges, sampling.bridge, 1, sampling.most_nodes),
-        )
+        arcs = place_nodes(field, self.arcs, sampling.arc, 1, sampling.most_nodes)
+        return arcs, place_nodes(field, self.bridges, sampling.bridge, 1, sampling.most_nodes)
 
     def joined(self, parts: Sequence[LineStations]) -> LineStations:
         """Join the nodes of all parts.

@@ -19,6 +19,8 @@ MERGED = np.radians(0.05)
 
 # Circle (v,) and angle (v,) in radians of points on circles.
 OnCircles = tuple[Int, Float]
+# Angles in degrees, measured at the centre, by curve: k is the outer curve of fibre k, ~k the curve within its coating.
+Marks = Mapping[int, Sequence[float]]
 
 
 @dataclass(frozen=True)
@@ -117,9 +119,7 @@ def on_curves(curves: Conics, points: Float) -> tuple[Int, Float]:
     return number[on_it], points[on_it]
 
 
-def vertex_angles(
-    curves: Conics, name: Int, crossing: tuple[Int, Float], marks: Mapping[int, Sequence[float]]
-) -> OnCircles:
+def vertex_angles(curves: Conics, name: Int, crossing: tuple[Int, Float], marks: Marks) -> OnCircles:
     """Return the curves (v,) and parameters (v,) in [0, 2 pi) of crossings and marks.
 
     `marks` have angles in degrees by the names (k,) of the curves.
@@ -157,12 +157,8 @@ def arcs_within(curves: Conics, vertices: OnCircles, size: Float) -> tuple[Int, 
     return whose[within], first[within], last[within]
 
 
-def tip_vertices(arrangement: Arrangement, marks: Mapping[int, Sequence[float]], vertices: Float) -> Float:
-    """Find the vertices (t, 2) at the marked angles on fibre curves.
-
-    `marks` has angles in degrees by curve: k is the outer curve of fibre k, ~k the curve within its coating.  Marks on
-    curves that do not exist are left out.
-    """
+def tip_vertices(arrangement: Arrangement, marks: Marks, vertices: Float) -> Float:
+    """Find the vertices (t, 2) at the marked angles on fibre curves, and ignore marks on missing curves."""
     names = {*range(len(arrangement.radii)), *(~np.flatnonzero(arrangement.coated)).tolist()}
     pairs = [(name, mark) for name, angles in marks.items() if name in names for mark in angles]
     name, mark = np.array([k for k, _ in pairs], np.int64), np.array([mark for _, mark in pairs])

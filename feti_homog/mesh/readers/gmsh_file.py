@@ -71,9 +71,7 @@ class MshContent:
                 rows = nodes.astype(np.int64).reshape(len(numbers), -1)
                 name = model.mesh.getElementProperties(kind)[0]
                 blocks[name].append((numbers.astype(np.int64), rows, np.full(len(numbers), entity)))
-        elements = {
-            kind: tuple(np.concatenate(parts) for parts in zip(*rows, strict=True)) for kind, rows in blocks.items()
-        }
+        elements = {kind: tuple(np.concatenate(k) for k in zip(*rows, strict=True)) for kind, rows in blocks.items()}
         names = {group: model.getPhysicalName(*group) for group in model.getPhysicalGroups()}
         return cls(tags.astype(np.int64), points.reshape(-1, 3), elements, groups, names)
 
@@ -114,9 +112,8 @@ def load(path: Path) -> RawMesh:
             raise MeshError(f"$Elements: {lines} lines, and its counts announce {expected}, one for each element")
     with TemporaryDirectory() as folder:
         copy = Path(folder, "mesh.msh")
-        copy.write_bytes(
-            b"".join(b"$%b%b\n$End%b\n" % (k.encode(), sections[k], k.encode()) for k in GIVEN if k in sections)
-        )
+        given = (b"$%b%b\n$End%b\n" % (k.encode(), sections[k], k.encode()) for k in GIVEN if k in sections)
+        copy.write_bytes(b"".join(given))
         try:
             content = input_files.in_own_process(copy, _read_by_gmsh, memory=max(MOST_BYTES, MOST_RATIO * len(data)))
         except CaseError:

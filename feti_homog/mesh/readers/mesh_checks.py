@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, edge_keys, edges, twins, void_edges
 from feti_homog.mesh.periodic_topology import Torus, components, edge_pairs
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, at, first_of
+from feti_homog.schema.types import LARGEST, SMALLEST
 from feti_homog.typing import Bool, Float, Int, Int32
 
 # Nodes nearer than this, relative to the cell, are at the same place: files may round coordinates.
@@ -21,9 +22,8 @@ MOST_CANDIDATES = 10**7
 HANGING_DISTANCE = 1e-2
 # Area of a triangle, relative to its longest edge squared, up to which it is zero but for rounding of coordinates.
 FLAT_AREA = 1e-9
-# Lengths that can be computed with, as of the numbers in a case file.
-SMALLEST, LARGEST = 1e-100, 1e100
 SIDES = {(0, 0): "left", (0, 1): "right", (1, 0): "lower", (1, 1): "upper"}
+NO_PARTNER = {(k, i): f"{name} side have no partner on the {SIDES[k, 1 - i]} side: " for (k, i), name in SIDES.items()}
 # Share of the cell that rounding of coordinates may leave uncovered.
 ROUNDING = 1e-6
 
@@ -127,9 +127,8 @@ def middle_nodes(mesh: RawMesh) -> list[str]:
 def overlapping(mesh: RawMesh) -> list[str]:
     """List edges with more than two triangles, or with two on the same side."""
     pairs = edges(mesh.triangles)
-    _, first, where, number = np.unique(
-        edge_keys(pairs, len(mesh.points)), return_index=True, return_inverse=True, return_counts=True
-    )
+    keys = edge_keys(pairs, len(mesh.points))
+    _, first, where, number = np.unique(keys, return_index=True, return_inverse=True, return_counts=True)
     forward = np.bincount(where, pairs[:, 0] < pairs[:, 1], len(first))
     crowded, folded = np.flatnonzero(number > 2), np.flatnonzero((number == 2) & (forward != 1))
     before = "overlapping elements, more than two share an edge: "
@@ -183,8 +182,7 @@ def too_large(plane: Float, triangles: Int32, size: Float) -> list[str]:
 
 def unrefined_sides(plane: Float, size: Float) -> list[str]:
     """Name sides without inner nodes, where an element would be its own neighbour."""
-    levels = {SIDES[axis, side]: (axis, side * size[axis]) for axis, side in SIDES}
-    bare = [name for name, (axis, level) in levels.items() if np.count_nonzero(plane[:, axis] == level) < 3]
+    bare = [name for (axis, side), name in SIDES.items() if np.count_nonzero(plane[:, axis] == side * size[axis]) < 3]
     return [f"no node between the corners of the {', '.join(bare)} side: expected one at least"] if bare else []
 
 
@@ -217,16 +215,9 @@ def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
         after = np.clip(np.searchsorted(other, along), 1, len(other) - 1)
         away = np.minimum(np.abs(other[after] - along), np.abs(other[after - 1] - along))
         shift = np.where(np.arange(3) == axis, (1 - 2 * side) * size[axis], 0.0)
-        faults += _listed(
-            f"not periodic, nodes of the {_no_partner(axis, side)}",
-            nodes[away > SAME_PLACE * size.max()],
-            lambda k, shift=shift: f"{mesh.node(k)}, expected at {at(mesh.points[k] + shift)}",
-        )
+        before, alone = f"not periodic, nodes of the {NO_PARTNER[axis, side]}", nodes[away > SAME_PLACE * size.max()]
+        faults += _listed(before, alone, lambda k, s=shift: f"{mesh.node(k)}, expected at {at(mesh.points[k] + s)}")
     return faults
-
-
-def _no_partner(axis: int, side: int) -> str:
-    return f"{SIDES[axis, side]} side have no partner on the {SIDES[axis, 1 - side]} side: "
 
 
 def unmatched_sides(raw: RawMesh, mesh: CoarseMesh) -> list[str]:
@@ -235,12 +226,9 @@ def unmatched_sides(raw: RawMesh, mesh: CoarseMesh) -> list[str]:
     for axis, side in SIDES:
         levels = (k * mesh.period[axis] for k in (side, 1 - side))
         sides, opposite = (pairs[np.all(mesh.points[pairs, axis] == level, axis=1)] for level in levels)
-        keys, images = (
-            edge_keys(mesh.representative[some].astype(np.int32), len(mesh.points)) for some in (sides, opposite)
-        )
-        faults += _listed(
-            f"not periodic, edges of the {_no_partner(axis, side)}", sides[~np.isin(keys, images)], raw.edge
-        )
+        keys, images = (edge_keys(mesh.representative[some], len(mesh.points)) for some in (sides, opposite))
+        before = f"not periodic, edges of the {NO_PARTNER[axis, side]}"
+        faults += _listed(before, sides[~np.isin(keys, images)], raw.edge)
     return faults
 
 

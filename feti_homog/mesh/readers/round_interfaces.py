@@ -209,9 +209,8 @@ def fit_ellipse(places: Float) -> Ellipses | None:
     mean = places.mean(axis=0)
     scale = np.abs(places - mean).max()
     x, y = ((places - mean) / scale).T
-    (xx, xy, yy, bx, by), *_ = np.linalg.lstsq(
-        np.column_stack([x * x, x * y, y * y, x, y]), np.ones(len(x)), rcond=None
-    )
+    matrix = np.column_stack([x * x, x * y, y * y, x, y])
+    (xx, xy, yy, bx, by), *_ = np.linalg.lstsq(matrix, np.ones(len(x)), rcond=None)
     A = np.array([[xx, xy / 2], [xy / 2, yy]])
     values, axes = np.linalg.eigh(A)
     if values[0] <= np.sqrt(np.finfo(float).eps) * values[1]:  # it may be a parabola but for rounding

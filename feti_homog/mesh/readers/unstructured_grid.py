@@ -14,13 +14,11 @@ from feti_homog.schema import wording
 from feti_homog.typing import Float, Int
 
 Numbers = np.ndarray[Any, Any]
-
 # The first word that is no number, where whole or real numbers are read.
 WRONG_WORD = {
     "i8": re.compile(rb"(?<!\S)(?![-+]?\d+(?!\S))\S+"),
     "f8": re.compile(rb"(?i)(?<!\S)(?![-+]?((\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?|nan|inf)(?!\S))\S+"),
 }
-
 # Numbers of nodes by VTK's type of cell; quadrilaterals are cut in two triangles.
 TRIANGLES = {5: 3, 9: 4, 22: 6, 23: 8, 28: 9}
 LINES = {3: 2, 21: 3}

@@ -32,7 +32,6 @@ TYPES |= {f"vtktype{name.lower()}": kind for name, kind in XML_TYPES.items() if 
 TYPES |= {"signed_char": "i1", "vtkidtype": "i4", "float": "f4", "double": "f8"}
 # Numbers of a cell or a point in the sections that name their type; that of SCALARS stands behind it.
 WIDTHS = {"SCALARS": 1, "VECTORS": 3, "NORMALS": 3, "TENSORS": 9, "TENSORS6": 6, "GLOBAL_IDS": 1, "PEDIGREE_IDS": 1}
-
 # Medit's sections of cells: VTK's type, number of nodes.
 CELLS = {"EDGES": (3, 2), "TRIANGLES": (5, 3), "QUADRILATERALS": (9, 4)}
 # Numbers per entry of sections, nodes and reference of cells; vectors have as many as coordinates.

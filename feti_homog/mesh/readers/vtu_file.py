@@ -148,9 +148,8 @@ class _Arrays:
     def _offset(self, array: ElementTree.Element) -> int:
         word = array.get("offset", "").strip()
         if not re.fullmatch("[0-9]{1,15}", word) or int(word) > len(self.appended):
-            raise MeshError(
-                f"offset is {wording.toml_value(word)}: expected one in {len(self.appended)} appended bytes"
-            )
+            expected = f"expected one in {len(self.appended)} appended bytes"
+            raise MeshError(f"offset is {wording.toml_value(word)}: {expected}")
         return int(word)
 
     def _unpacked(self, data: bytes) -> bytes:

@@ -102,10 +102,8 @@ def refuse_many(size_at: Callable[[Float], Float], smallest: float, period: Floa
     places = np.stack(np.meshgrid(share, share), axis=-1).reshape(-1, 2) * period
     count = float((1 / size_at(places) ** 2).mean() * period.prod() / TRIANGLE_AREA)
     if count > limit:
-        raise MeshError(
-            f"[cell] narrow gaps, thin coatings or small fibres need about {count:.2g} elements before refine; "
-            f"expected at most {limit}"
-        )
+        elements = f"{count:.2g} elements before refine; expected at most {limit}"
+        raise MeshError(f"[cell] narrow gaps, thin coatings or small fibres need about {elements}")
 
 
 def triangles_of_a_tip(ratio: np.float64 | float) -> float:

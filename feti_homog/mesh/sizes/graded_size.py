@@ -24,11 +24,11 @@ MIN_EDGES_AROUND = 16
 PASSAGE_EDGE = 1.5
 # Angle between a circle and a side that it crosses, relative to the turn of the circle along an edge there.
 WEDGE = 3
-
-
+# Size of edges on a circle / largest size, below which elements grow from it: between tiny discs far apart, gmsh would
+# interpolate the sizes on their circles.
+FINE_CIRCLE = 0.1
 # Outward normals of the sides of a cell.
 AXES = np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]])
-
 # Places (k, 2), edge lengths (k,) and growths (k,).
 Source = tuple[Float, Float, Float]
 
@@ -79,11 +79,6 @@ def at_vertices(vertices: Float, size: Float) -> Source:
     # A single vertex is infinitely far from the next.
     distance, _ = cKDTree(places, boxsize=size).query(places, k=2)
     return places, distance[:, 1], np.full(len(places), MAX_GROWTH)
-
-
-# Size of edges on a circle / largest size, below which elements grow from it: between tiny discs far apart, gmsh would
-# interpolate the sizes on their circles.
-FINE_CIRCLE = 0.1
 
 
 @dataclass(frozen=True)
@@ -203,10 +198,7 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
     close = to_corner < caps
     facing = offset[close] * (1 - circles[close, 2] / distance[close])[:, None]
     corners = np.concatenate([facing, np.zeros_like(facing)])
-    sources += [
-        (corners, np.tile(to_corner[close], 2), np.full(len(corners), MAX_GROWTH)),
-        at_vertices(vertices, size),
-    ]
+    sources += [(corners, np.tile(to_corner[close], 2), np.full(len(corners), MAX_GROWTH)), at_vertices(vertices, size)]
     if not sizes.are_graded(arrangement):
         return SizeField(sources, size, largest)
     # Points h_i apart on the outer circles find the nearest disc.

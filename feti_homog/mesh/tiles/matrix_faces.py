@@ -72,13 +72,8 @@ def centre_lines(circles: Float, which: Int) -> CentreLines:
             away = np.linalg.norm(offset - share[:, None] * vector[line], axis=1)
             np.minimum.at(clearance, line, away / radii[disc])
     facing = centres[ends] + radii[ends][:, :, None] * np.stack([normal, -normal], axis=1)
-    return CentreLines(
-        ends=which[ends],
-        angle=np.arctan2(normal[:, 1], normal[:, 0]),
-        gap=length - radii[ends].sum(axis=1),
-        facing=facing,
-        clearance=clearance,
-    )
+    angle, gap = np.arctan2(normal[:, 1], normal[:, 0]), length - radii[ends].sum(axis=1)
+    return CentreLines(which[ends], angle, gap, facing, clearance)
 
 
 def bridges(lines: CentreLines, size: Float, margin: float, largest: float, vertices: OnCircles) -> Bridges:
@@ -149,8 +144,7 @@ class HalfLines:
     def faces(self) -> tuple[Int, Int]:
         """Return the half-line (h,) after each one around the face on its left, and that face (h,)."""
         order = np.lexsort((self.angle, self.node))
-        place = np.empty_like(order)
-        place[order] = np.arange(len(order))
+        place = np.argsort(order)
         first = np.searchsorted(self.node[order], self.node[order])
         last = np.searchsorted(self.node[order], self.node[order], side="right") - 1
         # Clockwise the next from where one came.
@@ -189,13 +183,7 @@ def beside(lines: HalfLines, label: Int, alone: Int, disc: Int, angle: Float) ->
 
 
 def matrix_tiles(
-    circles: Float,
-    outer: Int,
-    sides: tuple[Int, Float],
-    bridges: Bridges,
-    lines: CentreLines,
-    size: Float,
-    grid: Int,
+    circles: Float, outer: Int, sides: tuple[Int, Float], bridges: Bridges, lines: CentreLines, size: Float, grid: Int
 ) -> MatrixTiles | None:
     """Deal the matrix faces to the cells of a grid (2,) by their centroids.
 

@@ -67,12 +67,8 @@ def gmsh_session() -> Iterator[ModuleType]:
 
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
-        for option, value in {
-            "General.Terminal": 0,
-            "General.NumThreads": 1,
-            "Mesh.RandomSeed": 1,
-            "Mesh.Renumber": 0,
-        }.items():
+        options = {"General.Terminal": 0, "General.NumThreads": 1, "Mesh.RandomSeed": 1, "Mesh.Renumber": 0}
+        for option, value in options.items():
             gmsh.option.setNumber(option, value)
         gmsh.model.add("cell")
         yield gmsh
@@ -128,10 +124,8 @@ def _unfilled(tile: Tile, why: str) -> MeshError:
     in_matrix = np.flatnonzero((curves.inside == MATRIX) | (curves.outside == MATRIX))
     points = tile.points[curves.chosen(in_matrix).node] if len(in_matrix) else tile.points
     (x, y), (right, top) = points.min(axis=0), points.max(axis=0)
-    return MeshError(
-        f"[cell] gmsh cannot fill the part from ({x:.4g}, {y:.4g}) to ({right:.4g}, {top:.4g}) of the cell of width 1: "
-        f"{why}; expected another seed, mesh_size or interface_size"
-    )
+    part = f"the part from ({x:.4g}, {y:.4g}) to ({right:.4g}, {top:.4g}) of the cell of width 1"
+    return MeshError(f"[cell] gmsh cannot fill {part}: {why}; expected another seed, mesh_size or interface_size")
 
 
 def arc_edges(curves: Curves) -> tuple[Int32, Int32]:

@@ -5,7 +5,7 @@ that it has filled: nodes on lines have their numbers in the outline, nodes with
 after the other; a torus edge has the number that its two classes make.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,17 +13,9 @@ from scipy.spatial import QhullError
 
 from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys
 from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE
-from feti_homog.mesh.outline.outline import Bridges, Outline, crossings, curve_at, images, on_side
+from feti_homog.mesh.outline.outline import Bridges, Marks, Outline, crossings, curve_at, images, on_side
 from feti_homog.mesh.periodic_topology import Torus, plane_edges_of
-from feti_homog.mesh.tiles.matrix_faces import (
-    CLEAR,
-    MatrixTiles,
-    beside,
-    bridges,
-    centre_lines,
-    grid_cell,
-    matrix_tiles,
-)
+from feti_homog.mesh.tiles import matrix_faces
 from feti_homog.mesh.tiles.tile_filling import Filling, Tile, arc_edges
 from feti_homog.microstructure import Arrangement
 from feti_homog.microstructure.shapes import Discs, Ellipses
@@ -60,7 +52,7 @@ class Tiling:
 
     bridges: Bridges
     beside: Int
-    matrix: MatrixTiles
+    matrix: matrix_faces.MatrixTiles
     within: Int
 
 
@@ -69,9 +61,7 @@ def is_tiled(arrangement: Arrangement, policy: TilePolicy) -> bool:
     return len(arrangement.phase) >= policy.least_discs and isinstance(arrangement.outlines, Discs)
 
 
-def tiling(
-    arrangement: Arrangement, largest: float, marks: Mapping[int, Sequence[float]], policy: TilePolicy
-) -> Tiling | None:
+def tiling(arrangement: Arrangement, largest: float, marks: Marks, policy: TilePolicy) -> Tiling | None:
     """Tile a large cell with round fibres; None for others, or without room for bridges.
 
     `largest` is the element size, and `marks` are as in `BareOutline.of`.
@@ -84,12 +74,13 @@ def tiling(
     circles = discs.circles
     outer = np.flatnonzero(around == MATRIX)
     try:
-        lines = centre_lines(circles, outer)
+        lines = matrix_faces.centre_lines(circles, outer)
     except QhullError:  # all centres on one line
         return None
     marked = [(k, np.radians(angle)) for k in outer.tolist() for angle in marks.get(int(disc[k]), ())]
     vertices = np.array([k for k, _ in marked], np.int64), np.array([angle for _, angle in marked])
-    candidates = bridges(lines, size, CLEAR * arrangement.outer_radii.mean(), largest, vertices)
+    margin = matrix_faces.CLEAR * arrangement.outer_radii.mean()
+    candidates = matrix_faces.bridges(lines, size, margin, largest, vertices)
     # Side pieces in the matrix: the nodes, discs or corners, and the points at their ends.
     nodes, ends = [], []
     for axis, is_far in np.ndindex(2, 2):
@@ -105,7 +96,7 @@ def tiling(
         ends.append(points[piece[:, None] + [0, 1]][:, way])
     sides = np.concatenate(nodes), np.concatenate(ends)
     grid = np.maximum(1, np.round(size * np.sqrt(len(arrangement.radii) / policy.discs / size.prod()))).astype(int)
-    matrix = matrix_tiles(circles, outer, sides, candidates, lines, size, grid)
+    matrix = matrix_faces.matrix_tiles(circles, outer, sides, candidates, lines, size, grid)
     if matrix is None:
         return None
     half = matrix.lines
@@ -115,7 +106,7 @@ def tiling(
         bridges=Bridges(np.stack([half.node[bridge], half.node[half.twin[bridge]]], axis=1), half.angle[bridge]),
         beside=np.stack([matrix.tile[bridge], matrix.tile[half.twin[bridge]]], axis=1),
         matrix=matrix,
-        within=grid_cell(np.mod(arrangement.centres, size), size, grid)[disc],
+        within=matrix_faces.grid_cell(np.mod(arrangement.centres, size), size, grid)[disc],
     )
 
 
@@ -138,7 +129,7 @@ def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[Tile]:
     middle = (lines.points[curves.node[begin]] + lines.points[curves.node[begin + 1]]) / 2
     offset = middle - lines.ellipses.centres[curves.circle[arc]]
     angle = np.arctan2(offset[:, 1], offset[:, 0])
-    right[arc] = beside(matrix.lines, matrix.tile, matrix.alone, curves.circle[arc], angle)
+    right[arc] = matrix_faces.beside(matrix.lines, matrix.tile, matrix.alone, curves.circle[arc], angle)
     n = len(tiles.bridges.angle)
     left[len(curves) - n :], right[len(curves) - n :] = tiles.beside.T
     tile = np.concatenate([left, right[right != left]])
@@ -217,9 +208,8 @@ def tile_mesh(regions: Regions, tiles: Sequence[FilledTile]) -> tuple[CoarseMesh
         elements = numbers[filling.triangles[solid]], constituent[solid], np.full(len(solid), filled.number)
         points = np.concatenate([tile.points, filling.inner])
         parts.append((numbers, classes, points, *elements, tile.nodes[arcs], circle))
-    numbers, classes, points, triangles, constituent, tile_of, arcs, circle = (
-        np.concatenate(arrays) for arrays in zip(*parts, strict=True)
-    )
+    arrays = map(np.concatenate, zip(*parts, strict=True))
+    numbers, classes, points, triangles, constituent, tile_of, arcs, circle = arrays
     number, triangles = np.unique(triangles, return_inverse=True)
     everywhere, first = np.unique(numbers, return_index=True)
     place = first[np.searchsorted(everywhere, number)]
