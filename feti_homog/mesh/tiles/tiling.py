@@ -1,8 +1,8 @@
-"""Tiles in a large cell: parts of its outline that ranks fill by themselves, with the same nodes on common borders.
+"""Tiles of a large cell: parts of the outline that ranks fill independently, with common nodes on common borders.
 
-They depend on the cell alone, so that its mesh is the same on any number of ranks.  A rank has the torus for the tiles
-that it has filled: nodes on lines have their numbers in the outline, nodes within tiles the numbers behind, one tile
-after the other; a torus edge has the number that its two classes make.
+Tiles depend on the cell alone, so that the mesh is the same on any number of ranks.  A rank has the torus of the tiles
+that the rank has filled: outline numbers identify nodes on lines, the following numbers identify nodes within tiles,
+tile by tile, and the two classes of a torus edge determine the number of the edge.
 """
 
 from collections.abc import Sequence
@@ -24,12 +24,12 @@ from feti_homog.typing import Array, Int
 
 @dataclass(frozen=True)
 class TilePolicy:
-    """The cells that are cut into tiles, and the number of tiles.
+    """The size from which cells are cut into tiles, and the size of tiles.
 
     Attributes:
-        least_discs: cells with fewer are filled at once.
-        discs: in a tile. Smaller tiles put more nodes on borders, where bridges fix their places; larger ones leave too
-            few tiles for many ranks.
+        least_discs: cells with fewer discs are filled at once.
+        discs: discs in a tile. Small tiles put many nodes on borders, where bridges fix the positions; large tiles are
+            too few for many ranks.
     """
 
     least_discs: int = 400
@@ -41,13 +41,13 @@ DEFAULT_TILES = TilePolicy()
 
 @dataclass(frozen=True)
 class Tiling:
-    """Tiles for all parts of a cell.
+    """The assignment of all parts of a cell to tiles.
 
     Attributes:
-        bridges: on tile borders.
+        bridges: bridges on tile borders.
         beside: (b, 2) the tiles to the left and right of each bridge.
-        matrix: its faces with their tiles.
-        within: (k,) the tile within each circle; all images of a disc are in one.
+        matrix: the tiles of the matrix faces.
+        within: (k,) the tile within each circle; all images of a disc have the same tile.
     """
 
     bridges: Bridges
@@ -57,14 +57,14 @@ class Tiling:
 
 
 def is_tiled(arrangement: Arrangement, policy: TilePolicy) -> bool:
-    """Return whether an arrangement is large and has round discs only."""
+    """Return whether an arrangement is large and consists of round discs."""
     return len(arrangement.phase) >= policy.least_discs and isinstance(arrangement.outlines, Discs)
 
 
 def tiling(arrangement: Arrangement, largest: float, marks: Marks, policy: TilePolicy) -> Tiling | None:
-    """Tile a large cell with round fibres; None for others, or without room for bridges.
+    """Tile a large cell with round fibres; None for other cells, or without room for bridges.
 
-    `largest` is the element size, and `marks` are as in `BareOutline.of`.
+    `largest` is the element size; `marks` become nodes, which bridges avoid.
     """
     if not is_tiled(arrangement, policy):
         return None
@@ -81,7 +81,7 @@ def tiling(arrangement: Arrangement, largest: float, marks: Marks, policy: TileP
     vertices = np.array([k for k, _ in marked], np.int64), np.array([angle for _, angle in marked])
     margin = matrix_faces.CLEAR * arrangement.outer_radii.mean()
     candidates = matrix_faces.bridges(lines, size, margin, largest, vertices)
-    # Side pieces in the matrix: the nodes, discs or corners, and the points at their ends.
+    # Side pieces in the matrix: the discs or corners at both ends, and the end points.
     nodes, ends = [], []
     for axis, is_far in np.ndindex(2, 2):
         level, places = is_far * size[1 - axis], crossings(discs[outer], axis, size)
@@ -113,7 +113,7 @@ def tiling(arrangement: Arrangement, largest: float, marks: Marks, policy: TileP
 def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[Tile]:
     """Cut a cell with the outline `lines` into tiles.
 
-    Without a tiling the cell is one tile.
+    Without a tiling, the cell is one tile.
     """
     if tiles is None:
         return [cell]
@@ -124,7 +124,7 @@ def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[Tile]:
     pieces = np.flatnonzero(is_side & (curves.inside == MATRIX))
     left[pieces], right[is_side] = matrix.tile[: len(pieces)], OUTSIDE
     arc = np.flatnonzero((curves.circle != MATRIX) & (curves.outside == MATRIX))
-    # The middle of the first edge shows where on the circle an arc is.
+    # The middle of the first edge gives the direction of an arc.
     begin = curves.first[arc]
     middle = (lines.points[curves.node[begin]] + lines.points[curves.node[begin + 1]]) / 2
     offset = middle - lines.ellipses.centres[curves.circle[arc]]
@@ -150,15 +150,15 @@ def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[Tile]:
 
 @dataclass(frozen=True)
 class Regions:
-    """Regions in a generated cell, known to every rank.
+    """The regions of a generated cell, which every rank has.
 
     Attributes:
-        width, height, scale: of the mesh, and its lengths / lengths in tiles.
-        phases: names, the matrix first.
+        width, height, scale: size of the mesh, and mesh lengths / lengths in tiles.
+        phases: phase names, the matrix first.
         ellipses: the k circles, as in `CoarseMesh`.
-        constituent: (k + 1,) the constituent next within each circle, -1 in a void; the last is the matrix.
-        phase, precedence: (constituents,) phase number of each; ascending numbers, as in `CoarseMesh`.
-        nodes: on the lines.
+        constituent: (k + 1,) the constituent directly within each circle, -1 in a void; the last entry is the matrix.
+        phase, precedence: (constituents,) phase number and ascending precedence, as in `CoarseMesh`.
+        nodes: number of nodes on the lines.
     """
 
     width: float
@@ -177,9 +177,9 @@ class FilledTile:
     """A tile with its triangles.
 
     Attributes:
-        number: the tile's index among all tiles.
-        tile, filling: nodes on the lines; triangles and nodes within.
-        first: number of the first node off the lines.
+        number: index of the tile among all tiles.
+        tile, filling: the lines with nodes; the triangles and inner nodes.
+        first: number of the first inner node.
     """
 
     number: int
@@ -189,7 +189,7 @@ class FilledTile:
 
 
 def tile_mesh(regions: Regions, tiles: Sequence[FilledTile]) -> tuple[CoarseMesh, Int, Int]:
-    """Join filled tiles to a mesh without voids.
+    """Join filled tiles to one mesh, without the triangles in voids.
 
     Also returns the class (n,) of each node, numbered in the cell, and the tile (m,) of each triangle.
     """
@@ -201,7 +201,7 @@ def tile_mesh(regions: Regions, tiles: Sequence[FilledTile]) -> tuple[CoarseMesh
         numbers, classes = (np.concatenate([nodes, inner]) for nodes in (tile.nodes, tile.classes))
         constituent = regions.constituent[filling.circle]
         solid = np.flatnonzero(constituent >= 0)
-        # A tile has arcs of its voids, too.
+        # A tile also has arcs with only a void on the side of the tile.
         sides = np.stack([curves.inside, curves.outside])
         is_solid = (sides != OUTSIDE) & (regions.constituent[sides] >= 0)
         arcs, circle = arc_edges(curves.chosen(np.flatnonzero(is_solid.any(axis=0))))
@@ -215,7 +215,7 @@ def tile_mesh(regions: Regions, tiles: Sequence[FilledTile]) -> tuple[CoarseMesh
     place = first[np.searchsorted(everywhere, number)]
     _, first, inverse = np.unique(classes[place], return_index=True, return_inverse=True)
     arcs = np.searchsorted(number, arcs).astype(np.int32)
-    # An arc between two tiles is in both.
+    # Two adjacent tiles both have the arcs between them.
     once = np.sort(np.unique(edge_keys(arcs, len(number)), return_index=True)[1])
     mesh = CoarseMesh(
         width=regions.width,
@@ -235,9 +235,9 @@ def tile_mesh(regions: Regions, tiles: Sequence[FilledTile]) -> tuple[CoarseMesh
 
 
 def tile_torus(regions: Regions, tiles: Sequence[FilledTile], all_nodes: int) -> tuple[Torus, Int]:
-    """Return the torus of filled tiles, without voids, and the tile (m,) of each triangle.
+    """Make the torus of filled tiles, without voids; also return the tile (m,) of each triangle.
 
-    `all_nodes` counts the nodes in the cell.
+    `all_nodes` is the number of nodes in the cell.
     """
     mesh, classes, tile = tile_mesh(regions, tiles)
     plane, triangle_edges = plane_edges_of(mesh)
