@@ -64,8 +64,8 @@ def random_arrangement(
     coating, clear = (cell.coating or 0.0) * radii, gap * fsum(radii) / fibres
     if voids := cell_sizes.void_count(cell, float(radii.mean())):
         if voids > cell_section.MOST_FIBRES:
-            most = f"expected at most {cell_section.MOST_FIBRES}; make void_radius larger"
-            raise MeshError(f"[cell] {cell_sizes.fractions_in_words(cell)}: makes {voids:.2g} voids; {most}")
+            bound = f"expected at most {cell_section.MOST_FIBRES}; make void_radius larger"
+            raise MeshError(f"[cell] {cell_sizes.fractions_in_words(cell)}: makes {voids:.2g} voids; {bound}")
         void_radii = np.full(voids, sqrt((cell.voids or 0.0) / (pi * voids)))
         radii, coating = np.append(radii, void_radii), np.append(coating, np.zeros(voids))
     count, phase = len(radii), phase + (phase_names.VOID,) * voids
@@ -73,8 +73,8 @@ def random_arrangement(
     ask = f"[cell] {cell_sizes.fractions_in_words(cell)} with min_gap = {gap:g} and fibres = {fibres}"
     of_all = "fraction of fibres and voids" if cell.voids else "fibre fraction"
     if pi * np.sum(grown**2) > random_fibres.DENSEST:
-        most = f"a {of_all} of at most about {JAMMED / (1 + (cell.coating or 0.0) + gap) ** 2:.2f}"
-        raise MeshError(f"{ask}: random arrangements with this gap exist up to {most}; lower one of them")
+        bound = f"a {of_all} of at most about {JAMMED / (1 + (cell.coating or 0.0) + gap) ** 2:.2f}"
+        raise MeshError(f"{ask}: random arrangements with this gap exist up to {bound}; lower one of them")
     attempts, best = max_attempts or max(3, min(10, 100 // count)), 0.0
     for _ in range(attempts):
         start = generator.random((count, 2))
@@ -82,8 +82,8 @@ def random_arrangement(
         if reached >= 1:
             return arrangements.clear_shift(Arrangement.of_discs(1.0, 1.0, centres, radii, phase, coating))
         best = max(best, reached)
-    most = f"they reached a fibre fraction of at most about {fraction * best**2:.2f} with this gap"
-    raise MeshError(f"{ask}: no arrangement found in {attempts} attempts; {most}; lower one of them, or change seed")
+    bound = f"they reached a fibre fraction of at most about {fraction * best**2:.2f} with this gap"
+    raise MeshError(f"{ask}: no arrangement found in {attempts} attempts; {bound}; lower one of them, or change seed")
 
 
 def matched_arrangement(cell: cell_section.Cell) -> Arrangement:

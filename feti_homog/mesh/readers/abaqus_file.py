@@ -153,8 +153,8 @@ class _Content:
         elements = self.triangles | self.lines
         lost = ((tag, node) for tag, nodes in elements.items() for node in nodes if node not in self.nodes)
         faults += [f"element {tag}: there is no node {node}" for tag, node in islice(lost, 1)]
-        known = {name for _, name in self.sets}
-        unknown = [name for name in self.materials if name not in known]
+        set_names = {name for _, name in self.sets}
+        unknown = [name for name in self.materials if name not in set_names]
         faults += [f'a section names the element set "{name}": there is none' for name in unknown]
         if faults:
             raise MeshError(*faults)

@@ -112,8 +112,8 @@ def load(path: Path) -> RawMesh:
             raise MeshError(f"$Elements: {lines} lines, and its counts announce {expected}, one for each element")
     with TemporaryDirectory() as folder:
         copy = Path(folder, "mesh.msh")
-        given = (b"$%b%b\n$End%b\n" % (k.encode(), sections[k], k.encode()) for k in GIVEN if k in sections)
-        copy.write_bytes(b"".join(given))
+        copies = (b"$%b%b\n$End%b\n" % (k.encode(), sections[k], k.encode()) for k in GIVEN if k in sections)
+        copy.write_bytes(b"".join(copies))
         try:
             content = input_files.in_own_process(copy, _read_by_gmsh, memory=max(MOST_BYTES, MOST_RATIO * len(data)))
         except CaseError:

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, edge_keys, edges, twins, void_edges
 from feti_homog.mesh.periodic_topology import Torus, components, edge_pairs
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, at, first_of
-from feti_homog.schema.types import LARGEST, SMALLEST
+from feti_homog.schema import types
 from feti_homog.typing import Bool, Float, Int, Int32
 
 # Distance / cell size below which two nodes coincide: files may round coordinates.
@@ -51,9 +51,9 @@ def not_finite(mesh: RawMesh) -> list[str]:
     if len(bad):
         return _listed("", bad, mesh.node, ": coordinates are not finite")
     size = np.ptp(mesh.points[:, :2], axis=0)
-    if np.abs(mesh.points).max() <= LARGEST and size.min() >= SMALLEST:
+    if np.abs(mesh.points).max() <= types.LARGEST and size.min() >= types.SMALLEST:
         return []
-    expected = f"expected lengths and coordinates from {SMALLEST} to {LARGEST}"
+    expected = f"expected lengths and coordinates from {types.SMALLEST} to {types.LARGEST}"
     return [f"the cell is {size[0]:.3g} x {size[1]:.3g}: {expected}"]
 
 

@@ -96,8 +96,8 @@ def bridges(lines: CentreLines, size: Float, margin: float, largest: float, vert
     rank = np.concatenate([first + np.arange(count), first + np.arange(count), np.arange(first)])
     # Pairs of points on one circle within LEAST_ANGLE; circle numbers differ by more.
     places = wrap(np.column_stack([circle, angle]), np.array([np.inf, TURN]))
-    near = cKDTree(places, boxsize=[0, TURN]).query_pairs(LEAST_ANGLE, output_type="ndarray")
-    better, worse = np.sort(rank[near], axis=1).T
+    close = cKDTree(places, boxsize=[0, TURN]).query_pairs(LEAST_ANGLE, output_type="ndarray")
+    better, worse = np.sort(rank[close], axis=1).T
     # All vertices stay, even close vertices; ranks that stay, best first, exclude worse ranks nearby.
     better, worse = better[worse >= first], worse[worse >= first]
     stays, open_ = np.zeros(first + count, bool), np.ones(first + count, bool)

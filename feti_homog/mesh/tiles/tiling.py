@@ -117,23 +117,23 @@ def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[Tile]:
     """
     if tiles is None:
         return [cell]
-    # The tiles to the left and right of each curve, OUTSIDE beyond the sides.
+    # The tiles on both sides of each curve, OUTSIDE beyond the sides.
     curves, matrix = cell.curves, tiles.matrix
-    left, right = tiles.within[curves.inside], tiles.within[curves.outside]
+    on_left, on_right = tiles.within[curves.inside], tiles.within[curves.outside]
     is_side = curves.outside == OUTSIDE
     pieces = np.flatnonzero(is_side & (curves.inside == MATRIX))
-    left[pieces], right[is_side] = matrix.tile[: len(pieces)], OUTSIDE
+    on_left[pieces], on_right[is_side] = matrix.tile[: len(pieces)], OUTSIDE
     arc = np.flatnonzero((curves.circle != MATRIX) & (curves.outside == MATRIX))
     # The middle of the first edge gives the direction of an arc.
     begin = curves.first[arc]
     middle = (lines.points[curves.node[begin]] + lines.points[curves.node[begin + 1]]) / 2
     offset = middle - lines.ellipses.centres[curves.circle[arc]]
     angle = np.arctan2(offset[:, 1], offset[:, 0])
-    right[arc] = matrix_faces.beside(matrix.lines, matrix.tile, matrix.alone, curves.circle[arc], angle)
+    on_right[arc] = matrix_faces.beside(matrix.lines, matrix.tile, matrix.alone, curves.circle[arc], angle)
     n = len(tiles.bridges.angle)
-    left[len(curves) - n :], right[len(curves) - n :] = tiles.beside.T
-    tile = np.concatenate([left, right[right != left]])
-    curve = np.concatenate([np.arange(len(curves)), np.flatnonzero(right != left)])
+    on_left[len(curves) - n :], on_right[len(curves) - n :] = tiles.beside.T
+    tile = np.concatenate([on_left, on_right[on_right != on_left]])
+    curve = np.concatenate([np.arange(len(curves)), np.flatnonzero(on_right != on_left)])
     order = np.lexsort((curve, tile))
     tile, curve = tile[order], curve[order]
     parts = []
@@ -141,8 +141,8 @@ def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[Tile]:
         some = curve[np.searchsorted(tile, name) : np.searchsorted(tile, name, side="right")]
         mine = curves.chosen(some)
         nodes, node = np.unique(mine.node, return_inverse=True)
-        inside = np.where(left[some] == name, mine.inside, OUTSIDE)
-        outside = np.where(right[some] == name, mine.outside, OUTSIDE)
+        inside = np.where(on_left[some] == name, mine.inside, OUTSIDE)
+        outside = np.where(on_right[some] == name, mine.outside, OUTSIDE)
         bounded = replace(mine, node=node, inside=inside, outside=outside)
         parts.append(replace(cell, points=cell.points[nodes], nodes=nodes, classes=cell.classes[nodes], curves=bounded))
     return parts
