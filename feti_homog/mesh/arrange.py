@@ -13,13 +13,13 @@ JAMMED = 0.84
 
 
 def arrange(cell: cell_section.Cell) -> Arrangement:
-    """Arrange fibres in a cell of width 1, with exact fractions `cell.fractions`.
+    """Arrange fibres in a cell of width 1, with the exact fractions `cell.fractions`.
 
     A lattice comes from `cell_section.LATTICES`, a random cell from `random_arrangement` or, with `cell.match`, from
     `matched_arrangement`, and a table from `periodic_table.table_arrangement`.
 
     Raises:
-        MeshError: discs touch, no arrangement is found, or the table is faulty.
+        MeshError: discs touch, the search for an arrangement fails, or the table is faulty.
     """
     if cell.geometry == "random":
         return random_arrangement(cell) if cell.match is None else matched_arrangement(cell)
@@ -41,16 +41,16 @@ def arrange(cell: cell_section.Cell) -> Arrangement:
 def random_arrangement(
     cell: cell_section.Cell, max_steps: int | None = None, max_attempts: int | None = None
 ) -> Arrangement:
-    """Place discs at random on the unit torus, alike on every machine.
+    """Place discs at random on the unit torus, in the same way on every machine.
 
-    Radii are uniform in mean * (1 - s, 1 + s), s = `radius_spread`, and scaled to the phase fractions; all voids are
-    alike. Any two discs, with their coatings and images, are at least `min_gap` mean fibre diameters apart. For discs
-    grown by half the gap, a descent from random centres makes the overlap energy
-    1/2 sum max(0, R_i + R_j - |x_i - x_j|)^2 zero. After `max_steps` it starts again from other centres, up to
-    `max_attempts` times (default: 10 for few fibres, 3 for many). Last, `clear_shift` moves the arrangement.
+    Radii are uniform in mean * (1 - s, 1 + s), s = `radius_spread`, and scaled to the phase fractions; all voids have
+    one radius. The gap between any two discs, with coatings and images, is at least `min_gap` mean fibre diameters. For
+    discs grown by half the gap, a descent from random centres reduces the overlap energy
+    1/2 sum max(0, R_i + R_j - |x_i - x_j|)^2 to zero. After `max_steps`, the descent restarts from other centres, in up
+    to `max_attempts` attempts (default: 10 for few fibres, 3 for many). Finally, `clear_shift` moves the arrangement.
 
     Raises:
-        MeshError: no arrangement is found.
+        MeshError: the search for an arrangement fails.
     """
     from feti_homog.microstructure import random_fibres  # other cells do without
 
@@ -89,12 +89,12 @@ def random_arrangement(
 def matched_arrangement(cell: cell_section.Cell) -> Arrangement:
     """Place discs at random, with the neighbour distances of a measured window.
 
-    The radii are quantiles of the window `cell.matched`, dealt at random and scaled to the fraction. The first centres
-    are random and `min_gap` mean diameters apart, between coatings if there are any. `random_fibres.matched` then moves
-    one fibre after the other, until the distances of the two nearest neighbours are distributed as in the table.
+    The radii are quantiles of the window `cell.matched`, in random order and scaled to the fraction. The first centres
+    are random, with gaps of at least `min_gap` mean diameters between discs or coatings. Then `random_fibres.matched`
+    moves fibres one by one, until the distances of the two nearest neighbours have the distribution of the table.
 
     Raises:
-        MeshError: no arrangement is found.
+        MeshError: the search for an arrangement fails.
     """
     from feti_homog.microstructure import fibre_pattern, random_fibres
 

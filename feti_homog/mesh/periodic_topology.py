@@ -25,10 +25,10 @@ FEW = 1 / 16
 
 @dataclass(frozen=True)
 class Torus:
-    """The node classes, edges and constituents of a `CoarseMesh` with m triangles, or of some tiles in a larger mesh.
+    """The node classes, torus edges and constituents of a coarse mesh.
 
     Attributes:
-        mesh: the plane mesh.
+        mesh: the plane mesh of m triangles, or some tiles of a larger mesh.
         node_class: (n,) class of each plane node.
         edges: (e, 2) plane edges in ascending order of nodes, from the lexicographically lower to the upper end.
         triangle_edges: (m, 3) plane edge from vertex k to vertex k + 1 (mod 3).
@@ -195,7 +195,7 @@ class Torus:
 
 
 def places_by_depth(depth: Float | Int, phase: Int, phases: tuple[str, ...]) -> Int:
-    """Return the positions (n,) of constituents, from the outermost to the innermost, by depths (n,) in the matrix.
+    """Return the nesting position (n,) of constituents with depths (n,) in the matrix, the outermost first.
 
     At equal depth, coatings precede fibres, and lower numbers precede higher numbers; `phase` (n,) has phase numbers.
     """
@@ -204,7 +204,7 @@ def places_by_depth(depth: Float | Int, phase: Int, phases: tuple[str, ...]) -> 
 
 
 def edge_pairs(triangle_edges: Int) -> tuple[Int, Int]:
-    """Find the two triangles beside each shared edge: two arrays in the order of the edges."""
+    """Find the two triangles beside each shared edge, in the order of the edges."""
     one, other = twins(triangle_edges.ravel())
     return one // 3, other // 3
 

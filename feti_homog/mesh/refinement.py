@@ -77,11 +77,11 @@ class ReferenceLattice:
         return (self.intervals // self.order).bit_length() - 1
 
     def coarser(self, fewer: int = 1) -> ReferenceLattice:
-        """Return the lattice with `fewer` fewer halvings."""
+        """Return the lattice without the last `fewer` halvings."""
         return ReferenceLattice.of(self.halvings - fewer, self.order)
 
     def within(self, finer: ReferenceLattice) -> Int:
-        """Return the index (q,) of each lattice node in a finer lattice."""
+        """Return the index (q,) in a finer lattice of each node of this lattice."""
         number = np.empty((finer.intervals + 1,) * 2, np.int64)
         number[finer.nodes[:, 1], finer.nodes[:, 2]] = np.arange(len(finer.nodes))
         _, i, j = (finer.intervals // self.intervals * self.nodes).T
@@ -100,7 +100,7 @@ class ReferenceLattice:
 
 @dataclass(frozen=True)
 class FineMesh:
-    """The refined mesh of a subdomain: n plane nodes in c classes, t coarse triangles with m elements in all.
+    """The refined subdomain mesh: n plane nodes in c classes, m elements in t coarse triangles.
 
     Attributes:
         points: (n, 2) plane positions.

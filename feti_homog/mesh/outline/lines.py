@@ -108,11 +108,11 @@ class Arcs(Lines):
 
     @property
     def lengths(self) -> Float:
-        """See `Lines`."""
+        """The length (a,) of each arc."""
         return np.asarray(self.span * self.circles[:, 2])
 
     def points(self, line: Int, share: Float) -> Float:
-        """See `Lines`."""
+        """Return the points (n, 2) at the fractions `share` (n,) of the arcs `line` (n,)."""
         return on_circle(self.circles[line], self.start[line] + self.span[line] * share)
 
 
@@ -130,11 +130,11 @@ class Segments(Lines):
 
     @property
     def lengths(self) -> Float:
-        """See `Lines`."""
+        """The length (s,) of each segment."""
         return np.asarray(np.linalg.norm(self.way, axis=1))
 
     def points(self, line: Int, share: Float) -> Float:
-        """See `Lines`."""
+        """Return the points (n, 2) at the fractions `share` (n,) of the segments `line` (n,)."""
         return np.asarray(self.begin[line] + share[:, None] * self.way[line])
 
 

@@ -29,7 +29,7 @@ ROUNDING = 1e-6
 
 
 def _listed(before: str, items: Sequence[Any] | Int | Int32, name: Callable[..., str], after: str = "") -> list[str]:
-    """Make a list of one fault, with the first few items; empty without items."""
+    """List one fault that names the first few items; no fault without items."""
     return [f"{before}{first_of(map(name, items), len(items))}{after}"] if len(items) else []
 
 

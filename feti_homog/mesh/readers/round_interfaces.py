@@ -204,9 +204,9 @@ def _fit_circle(places: Float) -> Ellipses:
 
 
 def fit_ellipse(places: Float) -> Ellipses | None:
-    """Fit an ellipse to a closed chain of positions (k, 2) in order; None if `_holds` is false.
+    """Fit an ellipse to an ordered closed chain of positions (k, 2).
 
-    The best conic d.A.d + b.d = 1, with offsets d from the mean position, is |F^-1 (d - c)| = 1.
+    The best conic d.A.d + b.d = 1, with offsets d from the mean, is |F^-1 (d - c)| = 1; None if `_holds` is false.
     """
     mean = places.mean(axis=0)
     scale = np.abs(places - mean).max()
@@ -225,7 +225,7 @@ def fit_ellipse(places: Float) -> Ellipses | None:
 
 
 def _holds(ellipse: Ellipses, chain: Float) -> bool:
-    """Return whether positions (k, 2) are on an ellipse F, with |F^-1 d| <= 1 for all steps d along the chain."""
+    """Return whether a chain of positions (k, 2) is on an ellipse F, with steps |F^-1 d| <= 1."""
     on_circle = np.linalg.solve(ellipse.frames[0], (chain - ellipse.centres).T)
     chord = np.hypot(*(np.roll(on_circle, -1, axis=1) - on_circle))
     return bool(chord.max() <= 1 and np.all(np.abs(np.hypot(*on_circle) - 1) <= ROUNDNESS_TOLERANCE))

@@ -86,17 +86,14 @@ def load(path: Path) -> RawMesh:
 
 
 def _cells(file: Scanner, count: int, size: int) -> tuple[Int, Int]:
-    """Read the nodes of all cells, and the node count of each cell.
-
-    The nodes follow all offsets; before version 5, a row has a node count and the nodes of a cell.
-    """
+    """Read the nodes of all cells, and the node count of each cell."""
     if file.follows("OFFSETS"):
         offsets = file.take(count, "".join(file.line()[1:2])).astype(np.int64)
         if not file.follows("CONNECTIVITY"):
             file.refuse("CELLS: expected CONNECTIVITY behind OFFSETS")
         return file.take(size, "".join(file.line()[1:2])).astype(np.int64), np.diff(offsets)
     rows = file.take(size, "int").astype(np.int64)
-    # A row begins behind the nodes of the previous row: follow these links from entry 0.
+    # Before version 5, a row has a node count and nodes: follow the links from row to row, from entry 0.
     onward = np.clip(np.arange(size) + 1 + rows, 0, size)
     graph = csr_array((np.ones(size), onward, np.append(np.arange(size + 1), size)), shape=(size + 1, size + 1))
     starts = breadth_first_order(graph, 0, return_predecessors=False)
@@ -129,7 +126,7 @@ def _arrays(file: Scanner, section: str, words: list[str], length: int) -> Itera
 
 
 def load_medit(path: Path) -> RawMesh:
-    """Read triangles and lines from a Medit file, which numbers nodes and, section by section, cells from 1.
+    """Read triangles and lines from a Medit file, with numbers from 1 through all sections of cells.
 
     Raises:
         OSError: the file cannot be read.
@@ -165,7 +162,7 @@ def load_medit(path: Path) -> RawMesh:
 
 
 class Scanner:
-    """A reader of the lines, words and arrays of a file, with binary arrays in big-endian order."""
+    """A reader of lines, words and arrays in a file, with big-endian binary arrays."""
 
     def __init__(self, content: bytes) -> None:
         self.content, self.place, self.is_binary = content.removeprefix(codecs.BOM_UTF8), 0, False

@@ -1,4 +1,4 @@
-"""Read triangles and lines from VTK's XML files (.vtu): text, base64 or raw, compressed or not."""
+"""Read triangles and lines from XML files of VTK (.vtu): text, base64 or raw, compressed or not."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ TYPES = {f"{sign}Int{8 * size}": f"{kind}{size}" for sign, kind in (("", "i"), (
 TYPES |= {"Float32": "f4", "Float64": "f8"}
 ORDERS = {"LittleEndian": "<", "BigEndian": ">"}
 COMPRESSORS = {"vtkZLibDataCompressor": zlib.decompressobj, "vtkLZMADataCompressor": lzma.LZMADecompressor}
-# Bytes that compressed data may have: so many in any file, or so many for each of the file's.
+# Limit for decompressed data: bytes for any file, and bytes for each byte of the file; the larger limit counts.
 MOST_BYTES, MOST_RATIO = 2**26, 50
 ARRAYS = ("connectivity", "offsets", "types")
 SEGMENT = re.compile(rb"[^=]+={0,2}")
 
 
 def load(path: Path) -> RawMesh:
-    """Read triangles and lines; nodes and cells have the file's numbers, from 0, piece after piece.
+    """Read triangles and lines, with numbers from 0 through all pieces of a file.
 
     Raises:
         OSError: the file cannot be read.
-        MeshError: it is damaged, or has other cells or no phases.
+        MeshError: the file is damaged, or has other cells or no phases.
     """
     content = input_files.read(path)
     size, start, stop, appended = len(content), content.find(b"<AppendedData"), content.rfind(b"</AppendedData>"), b""
@@ -79,7 +79,7 @@ def load(path: Path) -> RawMesh:
 
 
 def _children(element: ElementTree.Element, name: str, tags: Mapping[str, int]) -> dict[str, list[Any]]:
-    """Return an element's children by tag; MeshError for unknown and missing children."""
+    """Group the children of an XML element by tag; MeshError for unknown and missing children."""
     children: dict[str, list[Any]] = {tag: element.findall(tag) for tag in tags}
     other = [child.tag for child in element if child.tag not in tags]
     expected = f"expected {' and '.join(tags)}"
@@ -93,7 +93,7 @@ def _children(element: ElementTree.Element, name: str, tags: Mapping[str, int]) 
 
 
 class _Arrays:
-    """Decode arrays in the form that the root declares; at most `budget` bytes are decompressed."""
+    """A decoder of arrays in the format of an XML root, up to `budget` decompressed bytes."""
 
     def __init__(self, root: ElementTree.Element, appended: bytes, budget: int) -> None:
         kind, compressor = root.get("type"), root.get("compressor", "")
@@ -116,7 +116,7 @@ class _Arrays:
         self.starts = [*sorted(starts), len(appended)]
 
     def of(self, section: ElementTree.Element) -> dict[str, Numbers]:
-        """Read the numeric arrays of a section by name: (k,), or a row for each tuple."""
+        """Read the numeric arrays (k,) or (k, width) of a section by name."""
         arrays = {}
         for array in section.iter("DataArray"):
             name, kind = array.get("Name") or "Points", TYPES.get(array.get("type", ""))
@@ -153,7 +153,7 @@ class _Arrays:
         return int(word)
 
     def _unpacked(self, data: bytes) -> bytes:
-        """Unpack data behind a header with their length or block lengths; ValueError or IndexError if cut off."""
+        """Unpack data behind a header with one or more lengths; ValueError or IndexError for missing data."""
         header = np.frombuffer(data, self.header, len(data) // self.header.itemsize)
         count, first = (int(header[0]), 3) if self.decompressor else (1, 0)
         lengths, start, unpacked = header[first : first + count].tolist(), (first + count) * self.header.itemsize, []

@@ -142,7 +142,7 @@ class HalfLines:
         return cls(node, angle, start, (np.arange(len(node)) + len(nodes)) % len(node))
 
     def faces(self) -> tuple[Int, Int]:
-        """Return the next half-line (h,) around the face on the left of each half-line, and the face (h,)."""
+        """Return the next half-line (h,) around the face on the left, and the face (h,)."""
         order = np.lexsort((self.angle, self.node))
         place = np.argsort(order)
         first = np.searchsorted(self.node[order], self.node[order])
