@@ -52,7 +52,7 @@ def random_arrangement(
     Raises:
         MeshError: the search for an arrangement fails.
     """
-    from feti_homog.microstructure import random_fibres  # other cells do without
+    from feti_homog.microstructure import random_fibres  # other cells do not need the module
 
     phase = tuple(name for name, members in cell_sizes.fibre_counts(cell).items() for _ in range(members))
     fibres, gap, fraction = len(phase), cell.min_gap, fsum(cell.fractions.values())

@@ -41,7 +41,7 @@ class CoarseMesh:
             fibres have no number.
         representative: (n,) representative node of each node class on the torus: x = width -> x = 0,
             y = height -> y = 0; idempotent.
-        ellipses: k circles and ellipses in the plane; periodic images are listed separately.
+        ellipses: k circles and ellipses in the plane; periodic images have separate entries.
         arc_edges: (a, 2) edges with both ends on an ellipse, to rounding.
         arc_circle: (a,) the ellipse of each such edge.
         debonded_edges: (d, 2) edges between a fibre and the matrix that are debonded from the start.
@@ -184,7 +184,7 @@ def can_debond(mesh: CoarseMesh, pairs: Int32) -> Bool:
 
 
 def _neighbours(mesh: CoarseMesh) -> tuple[Int32, Index, Bool]:
-    """Return triangle edges (3m, 2), pairs (e, 2) of equal edges, and a mask (3m,) of single edges."""
+    """Return triangle edges (3m, 2) as lower copies, pairs (e, 2) of equal edges, and a mask (3m,) of others."""
     pairs = _low_copies(mesh, edges(mesh.triangles))
     order, alone = np.stack(twins(edge_keys(pairs, len(mesh.points))), axis=1), np.ones(len(pairs), bool)
     alone[order] = False

@@ -177,7 +177,7 @@ class Torus:
     def nesting(self) -> Int:
         """The position (constituents,) of each constituent in the order from the outermost to the innermost.
 
-        The order follows the number of constituents up to the matrix, then coatings come before fibres, then numbers.
+        The order follows the distance from the matrix in constituents, then coatings before fibres, then numbers.
         """
         one, other, _ = self.sides
         a, b = self.constituent[one], self.constituent[other]
@@ -216,7 +216,7 @@ def components(n: int, one: Int, other: Int) -> Int:
 
 
 def present(numbers: Int | Int32, size: int) -> tuple[Int, Int]:
-    """Return the distinct numbers (k,) below `size`, ascending, and the index of each entry among these."""
+    """Compress numbers below `size` to distinct ascending numbers (k,); also return the index of each entry."""
     if numbers.size < FEW * size:
         members, place = np.unique(numbers, return_inverse=True)
         return np.asarray(members), np.asarray(place.reshape(numbers.shape))

@@ -81,7 +81,7 @@ class ReferenceLattice:
         return ReferenceLattice.of(self.halvings - fewer, self.order)
 
     def within(self, finer: ReferenceLattice) -> Int:
-        """Return the index (q,) in a finer lattice of each node of this lattice."""
+        """Find the indices (q,) of the nodes of this lattice in a finer lattice."""
         number = np.empty((finer.intervals + 1,) * 2, np.int64)
         number[finer.nodes[:, 1], finer.nodes[:, 2]] = np.arange(len(finer.nodes))
         _, i, j = (finer.intervals // self.intervals * self.nodes).T

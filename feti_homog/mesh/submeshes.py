@@ -90,7 +90,7 @@ class SubdomainTable:
 
 @dataclass(frozen=True)
 class SubmeshesOfRank:
-    """The subdomains of a rank, before the rank cuts them apart.
+    """The subdomains of a rank as one submesh, before `cut`.
 
     Attributes:
         whole: all triangles of the rank as one submesh.
@@ -186,7 +186,7 @@ def pinned_class(torus: Torus) -> int:
 
 
 def pinning(torus: Torus, unfit: Int) -> list[tuple[int, float, int]]:
-    """Find the class that is fittest to be pinned.
+    """Find the most suitable class for the pin.
 
     Returns:
         The least triple of unfitness `unfit` (classes,), distance from the nearest cell corner, and key; [] without

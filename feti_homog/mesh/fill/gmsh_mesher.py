@@ -63,7 +63,7 @@ def begin(
         raise MeshError(f"[cell] {asked}: a {kind} has a radius of {arrangement.radii.min():.2g}; {expected}")
     scale = arrangement_scale(cell, arrangement)
     if not isinstance(arrangement.outlines, Conics):
-        from feti_homog.mesh.fill.shape_mesher import mesh_outlines  # with a reader of meshes
+        from feti_homog.mesh.fill.shape_mesher import mesh_outlines  # imports a mesh reader
 
         return mesh_outlines(arrangement, sizes, scale)
     tiles = tiling(arrangement, sizes.largest, marks, policy)

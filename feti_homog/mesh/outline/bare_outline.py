@@ -20,7 +20,7 @@ NO_BRIDGES = outline.Bridges(np.zeros((0, 2), np.int64), np.zeros(0))
 
 @dataclass(frozen=True)
 class BareOutline:
-    """The lines of a cell before they have nodes.
+    """The lines of a cell before the placement of nodes.
 
     Attributes:
         size: (2,) width and height of the cell.
@@ -82,7 +82,7 @@ class BareOutline:
                 longest = np.minimum(at_ends, caps[bridges.ends])
             straight = Segments(begin, end - begin, longest)
         else:
-            from feti_homog.mesh.outline import elliptic_outline  # discs, the common case, do without
+            from feti_homog.mesh.outline import elliptic_outline  # discs do not need the module
 
             field = elliptic_outline.size_field(arrangement, sizes, outer, tips, curves[crossing[0]], crossing[1])
             arcs = elliptic_outline.EllipticArcs.of(curves[circle], start, stop, sizes.interface)
@@ -90,7 +90,7 @@ class BareOutline:
         return cls(size, curves, disc, around, vertices, circle, SizedLines(arcs, straight, sampling), field)
 
     def outline(self, stations: LineStations) -> outline.Outline:
-        """Place the nodes of all lines; opposite sides get the same nodes.
+        """Make the outline from nodes on arcs and bridges, and place equal nodes on opposite sides.
 
         Raises:
             MeshError: the sides would have more nodes than the sampling allows.

@@ -22,7 +22,7 @@ SAMPLES_OF_AN_EDGE = 3
 
 @dataclass(frozen=True)
 class Curves:
-    """Bridges, and pieces of sides or circles, counter-clockwise around cell or disc.
+    """Lines of a cell: bridges, and pieces of sides or circles, counter-clockwise around cell or disc.
 
     Attributes:
         node, first: curve k has the nodes node[first[k] : first[k + 1]], from end to end.
@@ -255,7 +255,7 @@ LineStations = tuple[Stations, Stations]
 
 @dataclass(frozen=True)
 class SizedLines:
-    """Arcs and bridges, whose nodes ranks place line by line, without knowledge of other lines."""
+    """Arcs and bridges, with independent nodes on each line, so that ranks can divide the work."""
 
     arcs: Lines
     bridges: Lines

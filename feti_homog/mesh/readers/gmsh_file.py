@@ -60,7 +60,7 @@ class MshContent:
 
     @classmethod
     def of(cls, gmsh: ModuleType) -> MshContent:
-        """Copy the mesh of the current model of gmsh."""
+        """Copy the current mesh from gmsh."""
         model = gmsh.model
         tags, points, _ = model.mesh.getNodes()
         groups, blocks = {}, defaultdict[str, list[Elements]](list)

@@ -18,9 +18,9 @@ SAME_PLACE = 1e-7
 MOST_PAIRS = 1000
 # Limit for pairs of an edge and a nearby node, whose number may grow with the square, too.
 MOST_CANDIDATES = 10**7
-# Distance / edge length below which a node hangs on an edge; an element as flat would be of no use.
+# Distance / edge length below which a node hangs on an edge; a flatter element would be of no use.
 HANGING_DISTANCE = 1e-2
-# Triangle area / square of the longest edge that rounding of coordinates may leave of zero.
+# Triangle area / square of the longest edge, up to which the area is zero but for rounding.
 FLAT_AREA = 1e-9
 SIDES = {(0, 0): "left", (0, 1): "right", (1, 0): "lower", (1, 1): "upper"}
 NO_PARTNER = {(k, i): f"{name} side have no partner on the {SIDES[k, 1 - i]} side: " for (k, i), name in SIDES.items()}
@@ -194,7 +194,7 @@ def stray_lines(mesh: RawMesh) -> list[str]:
 
 
 def cannot_debond(mesh: RawMesh, pairs: Int32, fit: Bool) -> list[str]:
-    """List the debonded lines (d, 2) that are not fibre-matrix edges, by the mask `fit` (d,) of these."""
+    """List the debonded lines (d, 2) that are not fibre-matrix edges, by the mask `fit` (d,) of fibre-matrix edges."""
     fault = f'lines in the {mesh.curve_container} "{DEBONDED}" that are not between a fibre and the matrix: '
     return _listed(fault, pairs[~fit], mesh.edge)
 

@@ -132,8 +132,8 @@ def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
 
     A side lies at the median of all nodes within `tolerance`, relative to the width, of the outermost node. Two nodes
     on opposite sides are partners if each is the nearest to the other, within the tolerance along the side; both move
-    to the mean of their coordinates, except corners. Middle nodes on sides move midway between the ends of their edges.
-    Nodes beyond the tolerance stay, and the checks report them.
+    to the mean position along the side, except corners. Middle nodes on sides move midway between the edge ends. Nodes
+    beyond the tolerance stay, and the checks report such nodes.
     """
     plane = raw.points[:, :2].copy()
     pairs = edges(raw.triangles)

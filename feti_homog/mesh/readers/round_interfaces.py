@@ -19,7 +19,7 @@ ROUNDNESS_TOLERANCE = 1e-6
 # Least number of edges on a circle or, with middle nodes, of edge halves: regular polygons with fewer edges stay
 # polygons.
 MIN_CIRCLE_EDGES = 8
-# An ellipse can go through more corners of any polygon than a circle.
+# An ellipse, with more parameters than a circle, can pass through the corners of more polygons.
 MIN_ELLIPSE_EDGES = MIN_CIRCLE_EDGES + 2
 # Rise / length of a circle edge as long as the radius, which spans 60 degrees.  With larger ratios, elements beside the
 # tips of thin ellipses could turn over.
@@ -193,7 +193,7 @@ def _moved(points: Float, places: Float, circle: Ellipses, size: Float) -> Float
 
 
 def _fit_circle(places: Float) -> Ellipses:
-    """Fit a circle |d|^2 = 2 c.d + r^2 - |c|^2 to offsets d from the mean position (k, 2)."""
+    """Fit a circle |d|^2 = 2 c.d + r^2 - |c|^2 to positions (k, 2) at offsets d from the mean."""
     mean = places.mean(axis=0)
     scale = np.abs(places - mean).max()
     scaled = (places - mean) / scale

@@ -126,7 +126,7 @@ def _arrays(file: Scanner, section: str, words: list[str], length: int) -> Itera
 
 
 def load_medit(path: Path) -> RawMesh:
-    """Read triangles and lines from a Medit file, with numbers from 1 through all sections of cells.
+    """Read triangles and lines from a Medit file, which numbers nodes and cells from 1.
 
     Raises:
         OSError: the file cannot be read.
@@ -190,7 +190,7 @@ class Scanner:
         return match is not None and match[0].upper() == word.encode()
 
     def count(self, word: str) -> int:
-        """Convert a word into a count."""
+        """Convert a word into a number of values."""
         if not re.fullmatch("[0-9]{1,15}", word):
             self.refuse(f"{wording.toml_value(word)}: expected a number of values")
         return int(word)

@@ -98,7 +98,7 @@ def bridges(lines: CentreLines, size: Float, margin: float, largest: float, vert
     places = wrap(np.column_stack([circle, angle]), np.array([np.inf, TURN]))
     close = cKDTree(places, boxsize=[0, TURN]).query_pairs(LEAST_ANGLE, output_type="ndarray")
     better, worse = np.sort(rank[close], axis=1).T
-    # All vertices stay, even close vertices; ranks that stay, best first, exclude worse ranks nearby.
+    # All vertices stay, even close vertices; points that stay, best first, exclude worse points nearby.
     better, worse = better[worse >= first], worse[worse >= first]
     stays, open_ = np.zeros(first + count, bool), np.ones(first + count, bool)
     while open_.any():

@@ -24,10 +24,10 @@ from feti_homog.typing import Array, Int
 
 @dataclass(frozen=True)
 class TilePolicy:
-    """The size from which cells are cut into tiles, and the size of tiles.
+    """The least size of cells with tiles, and the size of tiles.
 
     Attributes:
-        least_discs: cells with fewer discs are filled at once.
+        least_discs: cells with fewer discs are one tile.
         discs: discs in a tile. Small tiles put many nodes on borders, where bridges fix the positions; large tiles are
             too few for many ranks.
     """
