@@ -147,9 +147,9 @@ def double_arcs(triangles: Int32, arc_edges: Int32, arc_circle: Int32, nodes: in
         return np.zeros(0, np.int32), np.zeros(0, np.int32)
     keys = edge_keys(arc_edges, nodes)
     order = np.argsort(keys)
-    mine = edge_keys(edges(triangles), nodes)
-    place = order[np.minimum(np.searchsorted(keys[order], mine), len(keys) - 1)]
-    circle = np.where(keys[place] == mine, arc_circle[place], -1).reshape(-1, 3)
+    edge_key = edge_keys(edges(triangles), nodes)
+    place = order[np.minimum(np.searchsorted(keys[order], edge_key), len(keys) - 1)]
+    circle = np.where(keys[place] == edge_key, arc_circle[place], -1).reshape(-1, 3)
     shared = (np.roll(circle, -1, axis=1) == np.roll(circle, 1, axis=1)) & (np.roll(circle, 1, axis=1) >= 0)
     bad = np.flatnonzero(shared.any(axis=1))
     return bad.astype(np.int32), np.argmax(shared[bad], axis=1).astype(np.int32)

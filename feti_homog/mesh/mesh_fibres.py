@@ -107,10 +107,10 @@ def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
     bodies, first, place = np.unique(body[order], return_index=True, return_inverse=True)
     outer, period = ellipses[edge[first]], torus.mesh.period
     offset = (ellipses.centres[edge] - outer.centres[place] + period / 2) % period - period / 2
-    away = (area[edge] == 0) | (np.linalg.norm(offset, axis=1) > SAME_CENTRE * outer.longest[place])
+    is_off_centre = (area[edge] == 0) | (np.linalg.norm(offset, axis=1) > SAME_CENTRE * outer.longest[place])
     is_round = np.bincount(place, np.isnan(torus.edge_circles[edge, 2]), len(bodies)) == 0
-    some = (np.bincount(place, away, len(bodies)) == 0) & (torus.constituent_phase[bodies] > 0)
-    return bodies[some], edge[first][some], is_round[some]
+    is_concentric = (np.bincount(place, is_off_centre, len(bodies)) == 0) & (torus.constituent_phase[bodies] > 0)
+    return bodies[is_concentric], edge[first][is_concentric], is_round[is_concentric]
 
 
 def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:

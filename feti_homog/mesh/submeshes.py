@@ -193,9 +193,9 @@ def pinning(torus: Torus, unfit: Int) -> list[tuple[int, float, int]]:
         classes.
     """
     mesh = torus.mesh
-    away = mesh.points - np.round(mesh.points / mesh.period) * mesh.period
+    offset = mesh.points - np.round(mesh.points / mesh.period) * mesh.period
     distance = np.full(len(torus.class_keys), np.inf)
-    np.minimum.at(distance, torus.node_class, np.hypot(*away.T))
+    np.minimum.at(distance, torus.node_class, np.hypot(*offset.T))
     best = np.lexsort((distance, unfit))[:1].tolist()
     return [(int(unfit[k]), float(distance[k]), int(torus.class_keys[k])) for k in best]
 

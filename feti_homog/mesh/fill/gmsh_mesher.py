@@ -57,10 +57,10 @@ def begin(
     arrangement = arrange(cell) if listed is None else listed
     smallest = int(arrangement.radii.argmin())
     if arrangement.radii[smallest] < arrangements.SMALLEST_RADIUS * arrangement.width:
-        asked = cell_sizes.fractions_in_words(cell) if cell.fractions else 'geometry = "table"'
+        request = cell_sizes.fractions_in_words(cell) if cell.fractions else 'geometry = "table"'
         kind = "void" if arrangement.is_void[smallest] else "fibre"
         expected = f"expected at least {arrangements.SMALLEST_RADIUS} of the width of the cell"
-        raise MeshError(f"[cell] {asked}: a {kind} has a radius of {arrangement.radii.min():.2g}; {expected}")
+        raise MeshError(f"[cell] {request}: a {kind} has a radius of {arrangement.radii.min():.2g}; {expected}")
     scale = arrangement_scale(cell, arrangement)
     if not isinstance(arrangement.outlines, Conics):
         from feti_homog.mesh.fill.shape_mesher import mesh_outlines  # imports a mesh reader

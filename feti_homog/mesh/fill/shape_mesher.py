@@ -51,8 +51,8 @@ def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> C
         for axis, width in enumerate(arrangement.size):
             sides = []
             for level in (0.0, width):
-                on = np.flatnonzero(np.abs(boxes[:, :, axis] - level).max(axis=1) < SAME_PLACE)
-                sides.append([curves[k] for k in on[np.argsort(boxes[on, :, 1 - axis].mean(axis=1))]])
+                indices = np.flatnonzero(np.abs(boxes[:, :, axis] - level).max(axis=1) < SAME_PLACE)
+                sides.append([curves[k] for k in indices[np.argsort(boxes[indices, :, 1 - axis].mean(axis=1))]])
             moved = np.eye(4)
             moved[axis, 3] = width
             gmsh.model.mesh.setPeriodic(1, sides[1], sides[0], moved.ravel().tolist())
@@ -157,17 +157,17 @@ def _size_field(arrangement: Arrangement, sizes: MeshSizes) -> SizeField:
     # The distance to the nearest point on another shape, or on an image.
     distance = np.full(len(places), np.inf)
     for label in np.unique(shape):
-        mine, rest = places[shape == label], places[shape != label]
-        if len(rest):
-            distance[shape == label] = cKDTree(wrap(rest, size), boxsize=size).query(wrap(mine, size))[0]
-        own_images = (mine + (arrangements.STEPS * size)[:, None]).reshape(-1, 2)
-        distance[shape == label] = np.minimum(distance[shape == label], cKDTree(own_images).query(mine)[0])
+        points, other_points = places[shape == label], places[shape != label]
+        if len(other_points):
+            distance[shape == label] = cKDTree(wrap(other_points, size), boxsize=size).query(wrap(points, size))[0]
+        image_points = (points + (arrangements.STEPS * size)[:, None]).reshape(-1, 2)
+        distance[shape == label] = np.minimum(distance[shape == label], cKDTree(image_points).query(points)[0])
     length = np.minimum(sizes.interface, PASSAGE_EDGE * distance)
     length = np.minimum(length, np.minimum(2 * np.pi * rounds / MIN_EDGES_AROUND, COATING_EDGE * thickness)[shape])
     for axis in (0, 1):
-        away = np.abs(places[:, axis] - np.round(places[:, axis] / size[axis]) * size[axis])
+        to_side = np.abs(places[:, axis] - np.round(places[:, axis] / size[axis]) * size[axis])
         faces = np.abs(normal[:, axis]) > FACING
-        length = np.where(faces, np.minimum(length, PASSAGE_EDGE * away), length)
+        length = np.where(faces, np.minimum(length, PASSAGE_EDGE * to_side), length)
     length = np.maximum(length, LEAST * size.max())
     growth = np.full(len(places), MAX_GROWTH)
     return SizeField([(places, length, growth)], size, sizes.largest, nearest=NEAREST)

@@ -218,9 +218,9 @@ def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges:
         wide = (np.diff(line) == 0) & (way > 1 / SAMPLES_OF_AN_EDGE * np.minimum(sizes[:-1], sizes[1:]))
         if not wide.any():
             break
-        at = np.flatnonzero(wide) + 1
-        middle, of = (samples[at - 1] + samples[at]) / 2, line[at]
-        inserted = (line, at, of), (samples, at, middle), (sizes, at, size_at(of, middle))
+        index = np.flatnonzero(wide) + 1
+        middle, owner = (samples[index - 1] + samples[index]) / 2, line[index]
+        inserted = (line, index, owner), (samples, index, middle), (sizes, index, size_at(owner, middle))
         line, samples, sizes = (np.insert(*values) for values in inserted)
     density, begin = lengths[line] / sizes, np.searchsorted(line, np.arange(len(lengths) + 1))
     # int ds / h from the beginning of each line, by the trapezoidal rule.

@@ -100,13 +100,13 @@ def on_side(places: Float, axis: int, level: float) -> Float:
 def curve_at(curves: Conics, points: Float) -> Int:
     """Find the smallest closed curve (k,) around each point on a line, or MATRIX."""
     beyond = curves.centres - np.clip(curves.centres, points.min(axis=0), points.max(axis=0))
-    close = np.flatnonzero(np.linalg.norm(beyond, axis=1) < curves.longest)
-    if not len(close):
+    numbers = np.flatnonzero(np.linalg.norm(beyond, axis=1) < curves.longest)
+    if not len(numbers):
         return np.full(len(points), MATRIX)
-    offsets = (points[:, None] - curves.centres[close]).reshape(-1, 2)
-    levels = np.linalg.norm(curves[np.tile(close, len(points))].unit(offsets), axis=1)
-    holds = levels.reshape(len(points), len(close)) < 1
-    return np.where(holds.any(axis=1), close[np.where(holds, curves.radii[close], np.inf).argmin(axis=1)], MATRIX)
+    offsets = (points[:, None] - curves.centres[numbers]).reshape(-1, 2)
+    levels = np.linalg.norm(curves[np.tile(numbers, len(points))].unit(offsets), axis=1)
+    holds = levels.reshape(len(points), len(numbers)) < 1
+    return np.where(holds.any(axis=1), numbers[np.where(holds, curves.radii[numbers], np.inf).argmin(axis=1)], MATRIX)
 
 
 def on_curves(curves: Conics, points: Float) -> tuple[Int, Float]:
@@ -115,8 +115,8 @@ def on_curves(curves: Conics, points: Float) -> tuple[Int, Float]:
     number = np.repeat(np.arange(len(curves)), [len(candidates) for candidates in close])
     points = points[np.concatenate([np.zeros(0, np.int64), *filter(len, close)]).astype(int)]
     unit = curves[number].unit(points - curves.centres[number])
-    on_it = np.abs(np.linalg.norm(unit, axis=1) - 1) < SAME_PLACE
-    return number[on_it], points[on_it]
+    is_on_curve = np.abs(np.linalg.norm(unit, axis=1) - 1) < SAME_PLACE
+    return number[is_on_curve], points[is_on_curve]
 
 
 def vertex_angles(curves: Conics, name: Int, crossing: tuple[Int, Float], marks: Marks) -> OnCircles:
@@ -140,8 +140,8 @@ def arcs_within(curves: Conics, vertices: OnCircles, size: Float) -> tuple[Int, 
 
     Returns the curve, start and stop (a,) of each arc. The arcs of a curve without vertices begin at 0.
     """
-    without = np.setdiff1d(np.arange(len(curves)), vertices[0])
-    curve, angle = np.append(vertices[0], without), np.append(vertices[1], np.zeros(len(without)))
+    bare_curves = np.setdiff1d(np.arange(len(curves)), vertices[0])
+    curve, angle = np.append(vertices[0], bare_curves), np.append(vertices[1], np.zeros(len(bare_curves)))
     order = np.lexsort((angle, curve))
     curve, angle = curve[order], angle[order]
     is_first = np.diff(curve, prepend=-1) != 0
@@ -151,10 +151,10 @@ def arcs_within(curves: Conics, vertices: OnCircles, size: Float) -> tuple[Int, 
     parts = np.maximum(1, np.ceil(span / (TURN / 4) - SAME_PLACE)).astype(int)
     begin = np.repeat(np.arange(len(parts)), parts)
     part = np.arange(len(begin)) - np.repeat(np.cumsum(parts) - parts, parts)
-    whose, first, last = curve[begin], *(angle[begin] + (span[begin] * k / parts[begin]) for k in (part, part + 1))
-    middle = curves[whose].points((first + last) / 2)
+    arc_curve, first, last = curve[begin], *(angle[begin] + (span[begin] * k / parts[begin]) for k in (part, part + 1))
+    middle = curves[arc_curve].points((first + last) / 2)
     within = np.all((middle > 0) & (middle < size), axis=1)
-    return whose[within], first[within], last[within]
+    return arc_curve[within], first[within], last[within]
 
 
 def tip_vertices(arrangement: Arrangement, marks: Marks, vertices: Float) -> Float:

@@ -143,8 +143,8 @@ def _sections(content: bytes) -> dict[str, bytes]:
         header = SECTION.match(content, place)
         name = "" if header is None else header[1].decode(errors="replace")
         if header is None or name not in {*GIVEN, *OTHERS, "PhysicalNames"}:
-            rest = content[place:end].lstrip()
-            line, text = content.count(b"\n", 0, end - len(rest)) + 1, rest[:80].partition(b"\n")[0]
+            remainder = content[place:end].lstrip()
+            line, text = content.count(b"\n", 0, end - len(remainder)) + 1, remainder[:80].partition(b"\n")[0]
             word = wording.toml_value(text.decode(errors="replace").strip())
             raise MeshError(f"line {line}: {word}: expected a section of a mesh, such as $Nodes, or $Comments")
         if name in sections:

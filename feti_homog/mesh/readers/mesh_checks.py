@@ -110,8 +110,8 @@ def middle_nodes(mesh: RawMesh) -> list[str]:
         "farther from the middle than half the edge's length": far,
     }
     faults = []
-    for fault, bad in kinds.items():
-        first = np.flatnonzero(bad)
+    for fault, is_faulty in kinds.items():
+        first = np.flatnonzero(is_faulty)
         first = first[np.unique(middles.tags[first], return_index=True)[1]]
         faults += _listed("", first, lambda k: f"middle node {middles.tags[k]} {at(middles.points[k])}", f": {fault}")
     # Both triangles of an edge share one middle node.
@@ -157,11 +157,11 @@ def hanging_nodes(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
     if some.step * tree.query_ball_point(middle[some], reach[some], return_length=True).sum() > MOST_CANDIDATES:
         return [f"{len(inner)} edges within the cell have one triangle only, and long ones cross: no mesh of a cell"]
     hanging = []
-    for candidates, pair, way in zip(tree.query_ball_point(middle, reach), inner, along, strict=True):
-        within = np.setdiff1d(nodes[candidates], pair)
-        away = plane[within] - plane[pair[0]]
-        distance = np.abs(way[0] * away[:, 1] - way[1] * away[:, 0])
-        hanging += [(node, pair) for node in within[distance < HANGING_DISTANCE * (way @ way)]]
+    for candidates, pair, vector in zip(tree.query_ball_point(middle, reach), inner, along, strict=True):
+        inner_nodes = np.setdiff1d(nodes[candidates], pair)
+        offset = plane[inner_nodes] - plane[pair[0]]
+        distance = np.abs(vector[0] * offset[:, 1] - vector[1] * offset[:, 0])
+        hanging += [(node, pair) for node in inner_nodes[distance < HANGING_DISTANCE * (vector @ vector)]]
     return _listed("hanging nodes: ", hanging, lambda hung: f"{mesh.node(hung[0])} on {mesh.edge(hung[1])}")
 
 
@@ -213,10 +213,10 @@ def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
         nodes, partners = (np.flatnonzero(plane[:, axis] == k * size[axis]) for k in (side, 1 - side))
         along, other = plane[nodes, 1 - axis], np.sort(plane[partners, 1 - axis])
         after = np.clip(np.searchsorted(other, along), 1, len(other) - 1)
-        away = np.minimum(np.abs(other[after] - along), np.abs(other[after - 1] - along))
+        gap = np.minimum(np.abs(other[after] - along), np.abs(other[after - 1] - along))
         shift = np.where(np.arange(3) == axis, (1 - 2 * side) * size[axis], 0.0)
-        before, alone = f"not periodic, nodes of the {NO_PARTNER[axis, side]}", nodes[away > SAME_PLACE * size.max()]
-        faults += _listed(before, alone, lambda k, s=shift: f"{mesh.node(k)}, expected at {at(mesh.points[k] + s)}")
+        before, single = f"not periodic, nodes of the {NO_PARTNER[axis, side]}", nodes[gap > SAME_PLACE * size.max()]
+        faults += _listed(before, single, lambda k, s=shift: f"{mesh.node(k)}, expected at {at(mesh.points[k] + s)}")
     return faults
 
 

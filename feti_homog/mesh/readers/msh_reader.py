@@ -151,9 +151,9 @@ def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
             sides[axis, extreme is np.max] = side
     for axis in (0, 1):
         low, high, along = sides[axis, False], sides[axis, True], plane[:, 1 - axis]
-        away, to_high = cKDTree(along[high, None]).query(along[low, None])
+        distance, to_high = cKDTree(along[high, None]).query(along[low, None])
         to_low = cKDTree(along[low, None]).query(along[high, None])[1]
-        mutual = (to_low[to_high] == np.arange(len(low))) & (away <= reach)
+        mutual = (to_low[to_high] == np.arange(len(low))) & (distance <= reach)
         corners = along.min(), along.max()
         mutual &= ~np.isin(along[low], corners) & ~np.isin(along[high[to_high]], corners)
         a, b = low[mutual], high[to_high[mutual]]
@@ -205,8 +205,8 @@ def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
     phase_of = {_key(name): phase for phase, name in pairs if phase != DEBONDED}
     lines = set(map(_key, phases.get(DEBONDED, ())))
     curves = {DEBONDED if _key(name) in lines else name: ends for name, ends in mesh.curves.items()}
-    both = zip(mesh.groups, mesh.aliases or ((),) * len(mesh.groups), strict=True)
-    groups = tuple(_selecting(names, phase_of) or _selecting(aliases, phase_of) or names for names, aliases in both)
+    labels = zip(mesh.groups, mesh.aliases or ((),) * len(mesh.groups), strict=True)
+    groups = tuple(_selecting(names, phase_of) or _selecting(aliases, phase_of) or names for names, aliases in labels)
     return replace(mesh, groups=groups, curves=curves)
 
 

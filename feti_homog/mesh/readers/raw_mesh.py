@@ -190,8 +190,8 @@ def in_triangles(corners: Int, points: Float) -> Int:
     order = np.lexsort(points[used, :2].T)
     part = connected_components(sides, directed=False)[1]
     start = order[np.unique(part[order], return_index=True)[1]]
-    away = dijkstra(sides, directed=False, indices=start, unweighted=True, min_only=True)
-    even = np.asarray(away % 2 == 0)[inner]
+    steps = dijkstra(sides, directed=False, indices=start, unweighted=True, min_only=True)
+    even = np.asarray(steps % 2 == 0)[inner]
     preferred = np.where((even != np.roll(even, 1, axis=1)).all(axis=1), np.where(even[:, 0], 1, -1), 0)
     limit = np.where(preferred == 0, 1.0, MUCH_LARGER**preferred)
     return np.take_along_axis(corners[:, None], HALVES[(second > limit * first).astype(int)], axis=2)

@@ -160,14 +160,14 @@ def _closed_loops(
             places = mesh.points[classes[order[0]]] + np.cumsum(hops, axis=0) - hops
             members = np.flatnonzero(part[ends[:, 0]] == part[start])
             place = np.argsort(order)[np.searchsorted(np.sort(order), ends[members])]
-            away = np.round((places[place[:, 0]] - mesh.points[pairs[members, 0]]) / size)
+            periods = np.round((places[place[:, 0]] - mesh.points[pairs[members, 0]]) / size)
             # A middle node follows the first end of its edge, or the last node if the edge closes the loop.
             between = np.where(np.ptp(place, axis=1) == 1, place.mean(axis=1), len(order))
             along = np.argsort(np.append(np.arange(len(order)), between), kind="stable")
-            chain = np.concatenate([places, bends[members] + away * size])[along]
+            chain = np.concatenate([places, bends[members] + periods * size])[along]
             chain = chain[~np.isnan(chain[:, 0])]
-            distinct, which = np.unique(away, axis=0, return_inverse=True)
-            images = [(step * size, members[which.ravel() == k]) for k, step in enumerate(distinct)]
+            distinct, image_number = np.unique(periods, axis=0, return_inverse=True)
+            images = [(step * size, members[image_number.ravel() == k]) for k, step in enumerate(distinct)]
             if len(chain) >= fewest:
                 yield classes[order], places, chain, images
 

@@ -102,8 +102,8 @@ def mesh_of(grid: Grid) -> RawMesh:
         faults.append(f"cell data {name}: expected one value for each of {len(types)} cells")
     else:
         values = np.ravel(data[name])
-        bad = values[~((values == np.round(values)) & (values >= 0) & (values < MOST_PHASES))]
-        faults += [f"cell data {name} = {k:g}: expected 0, 1, 2, ... below {MOST_PHASES}" for k in bad[:1]]
+        faulty = values[~((values == np.round(values)) & (values >= 0) & (values < MOST_PHASES))]
+        faults += [f"cell data {name} = {k:g}: expected 0, 1, 2, ... below {MOST_PHASES}" for k in faulty[:1]]
     if faults:
         raise MeshError(*faults)
     has_phases, groups, blocks = name == PHASE, values.astype(np.int64), []

@@ -48,7 +48,7 @@ def load(path: Path) -> RawMesh:
         raise MeshError(f"not XML: {error}") from None
     (grid,) = _children(root, "VTKFile", {"UnstructuredGrid": 1, "AppendedData": 0})["UnstructuredGrid"]
     arrays = _Arrays(root, appended, max(MOST_BYTES, MOST_RATIO * size))
-    pieces, tables, before = [], list[dict[str, Numbers]](), 0
+    pieces, tables, first_node = [], list[dict[str, Numbers]](), 0
     for piece in _children(grid, grid.tag, {"Piece": 1, "FieldData": 0})["Piece"]:
         sections = _children(piece, "Piece", {"Points": 1, "Cells": 1, "CellData": 0, "PointData": 0})
         sizes = []
@@ -68,12 +68,12 @@ def load(path: Path) -> RawMesh:
             raise MeshError(f"{len(types)} types of cells: expected {sizes[1]}")
         data = arrays.of(sections["CellData"][0]) if sections["CellData"] else {}
         tables += [data] if sizes[1] else []
-        pieces.append((points.reshape(-1, 3).astype(float), types, nodes + before, np.diff(ends, prepend=0)))
-        before += sizes[0]
+        pieces.append((points.reshape(-1, 3).astype(float), types, nodes + first_node, np.diff(ends, prepend=0)))
+        first_node += sizes[0]
     points, types, nodes, counts = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
     tables = tables or [{}]
-    if lost := set[str]().union(*tables) - set(tables[0]).intersection(*tables):
-        raise MeshError(f"cell data {min(lost)}: missing in one of {len(tables)} pieces")
+    if missing_names := set[str]().union(*tables) - set(tables[0]).intersection(*tables):
+        raise MeshError(f"cell data {min(missing_names)}: missing in one of {len(tables)} pieces")
     data = {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
     return mesh_of(Grid(points, types, nodes, counts, data))
 

@@ -61,16 +61,16 @@ def centre_lines(circles: Float, which: Int) -> CentreLines:
     for members in (np.flatnonzero(classes == level) for level in np.unique(classes)):
         tree, reach = cKDTree(centres[members]), (1 + CLEAR) * radii[members].max()
         for begin in range(0, len(ends), CHUNK):
-            some = slice(begin, begin + CHUNK)
-            close = tree.query_ball_point(centres[ends[some, 0]] + vector[some] / 2, length[some] / 2 + reach)
+            batch = slice(begin, begin + CHUNK)
+            close = tree.query_ball_point(centres[ends[batch, 0]] + vector[batch] / 2, length[batch] / 2 + reach)
             line = begin + np.repeat(np.arange(len(close)), [len(candidates) for candidates in close])
             disc = members[np.concatenate([np.zeros(0, np.int64), *filter(len, close)]).astype(int)]
-            third = (disc[:, None] != ends[line]).all(axis=1)
-            line, disc = line[third], disc[third]
+            is_third = (disc[:, None] != ends[line]).all(axis=1)
+            line, disc = line[is_third], disc[is_third]
             offset = centres[disc] - centres[ends[line, 0]]
             share = np.clip((offset * vector[line]).sum(axis=1) / length[line] ** 2, 0, 1)
-            away = np.linalg.norm(offset - share[:, None] * vector[line], axis=1)
-            np.minimum.at(clearance, line, away / radii[disc])
+            distance = np.linalg.norm(offset - share[:, None] * vector[line], axis=1)
+            np.minimum.at(clearance, line, distance / radii[disc])
     facing = centres[ends] + radii[ends][:, :, None] * np.stack([normal, -normal], axis=1)
     angle, gap = np.arctan2(normal[:, 1], normal[:, 0]), length - radii[ends].sum(axis=1)
     return CentreLines(which[ends], angle, gap, facing, clearance)
@@ -100,16 +100,16 @@ def bridges(lines: CentreLines, size: Float, margin: float, largest: float, vert
     better, worse = np.sort(rank[close], axis=1).T
     # All vertices stay, even close vertices; points that stay, best first, exclude worse points nearby.
     better, worse = better[worse >= first], worse[worse >= first]
-    stays, open_ = np.zeros(first + count, bool), np.ones(first + count, bool)
-    while open_.any():
-        between = open_[better] & open_[worse]
+    chosen, undecided = np.zeros(first + count, bool), np.ones(first + count, bool)
+    while undecided.any():
+        between = undecided[better] & undecided[worse]
         better, worse = better[between], worse[between]
-        free = open_.copy()
+        free = undecided.copy()
         free[worse] = False
-        stays |= free
-        open_ &= ~free
-        open_[worse[free[better]]] = False
-    return Bridges(candidates.ends[stays[first:]], candidates.angle[stays[first:]])
+        chosen |= free
+        undecided &= ~free
+        undecided[worse[free[better]]] = False
+    return Bridges(candidates.ends[chosen[first:]], candidates.angle[chosen[first:]])
 
 
 @dataclass(frozen=True)
@@ -174,9 +174,9 @@ def beside(lines: HalfLines, label: Int, alone: Int, disc: Int, angle: Float) ->
     The next half-line clockwise has the label among `label` (h,), a disc without half-lines among `alone` (n,).
     """
     order = np.lexsort((lines.angle, lines.node))
-    node, at = lines.node[order], lines.angle[order]
+    node, line_angle = lines.node[order], lines.angle[order]
     # Keys of discs differ by two turns, so that the half-lines of a disc stay together.
-    place = np.searchsorted(node * 2 * TURN + at, disc * 2 * TURN + angle % TURN, side="right") - 1
+    place = np.searchsorted(node * 2 * TURN + line_angle, disc * 2 * TURN + angle % TURN, side="right") - 1
     first, last = np.searchsorted(node, disc), np.searchsorted(node, disc, side="right") - 1
     around = label[order[np.where(place < first, last, place)]]
     return np.where(alone[disc] < 0, around, alone[disc])

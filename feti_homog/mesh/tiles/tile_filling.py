@@ -161,8 +161,8 @@ def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int], f
             loop.append(after.pop((region, node)))
             node = int(loop[-1][0][-1])
         polygon = tile.points[np.concatenate([curve[:-1] for curve, _ in loop])] @ [1, 1j]
-        away = polygon - polygon[0]
-        area = float((away.conj() * np.roll(away, -1)).imag.sum() / 2)
+        offset = polygon - polygon[0]
+        area = float((offset.conj() * np.roll(offset, -1)).imag.sum() / 2)
         tags = np.concatenate([tags for _, tags in loop])
         regions.setdefault(region, []).append((area, polygon, tags.tolist()))
     surfaces, circle = [], []
@@ -172,8 +172,8 @@ def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int], f
         outer_and_holes = {k: [line_tags] for k, (area, _, line_tags) in enumerate(loops) if area >= 0}
         for polygon, line_tags in (loop[1:] for loop in loops if loop[0] < 0):
             # A polygon turns once around an inner point. Of nested polygons, the smallest surrounds the hole.
-            away = [loops[k][1] - polygon[0] for k in outer_and_holes]
-            turns = [np.angle(np.roll(vectors, -1) / vectors).sum() for vectors in away]
+            offsets = [loops[k][1] - polygon[0] for k in outer_and_holes]
+            turns = [np.angle(np.roll(vectors, -1) / vectors).sum() for vectors in offsets]
             _, around = min((loops[k][0], k) for k, turn in zip(outer_and_holes, turns, strict=True) if turn > np.pi)
             outer_and_holes[around].append(line_tags)
         for group in outer_and_holes.values():

@@ -138,12 +138,12 @@ def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[Tile]:
     tile, curve = tile[order], curve[order]
     parts = []
     for name in np.unique(tile[tile != OUTSIDE]).tolist():
-        some = curve[np.searchsorted(tile, name) : np.searchsorted(tile, name, side="right")]
-        mine = curves.chosen(some)
-        nodes, node = np.unique(mine.node, return_inverse=True)
-        inside = np.where(on_left[some] == name, mine.inside, OUTSIDE)
-        outside = np.where(on_right[some] == name, mine.outside, OUTSIDE)
-        bounded = replace(mine, node=node, inside=inside, outside=outside)
+        numbers = curve[np.searchsorted(tile, name) : np.searchsorted(tile, name, side="right")]
+        tile_curves = curves.chosen(numbers)
+        nodes, node = np.unique(tile_curves.node, return_inverse=True)
+        inside = np.where(on_left[numbers] == name, tile_curves.inside, OUTSIDE)
+        outside = np.where(on_right[numbers] == name, tile_curves.outside, OUTSIDE)
+        bounded = replace(tile_curves, node=node, inside=inside, outside=outside)
         parts.append(replace(cell, points=cell.points[nodes], nodes=nodes, classes=cell.classes[nodes], curves=bounded))
     return parts
 
