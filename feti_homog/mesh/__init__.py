@@ -1,7 +1,7 @@
 """The coarse periodic mesh, its topology on the torus, submeshes and their refinement.
 
 Imports `case` and `microstructure`.  Main entries: `fill.gmsh_mesher.begin`, `readers.msh_reader.read`,
-`periodic_topology.Torus` and `refinement.refine`. gmsh is loaded where there is something to fill.
+`periodic_topology.Torus` and `refinement.refine`. Only gmsh sessions import the module gmsh.
 """
 
 from feti_homog.mesh.coarse_mesh import CoarseMesh

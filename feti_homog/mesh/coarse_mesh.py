@@ -1,4 +1,4 @@
-"""The coarse periodic mesh of a rectangular cell, as rank 0 makes it, and its interface edges."""
+"""The coarse periodic mesh of a rectangular cell on rank 0, with interface edges and void edges."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,12 +15,12 @@ def paired_sides(points: Float, period: Float) -> Iterator[tuple[int, Int, Int]]
     """Yield the pairs of points that differ by one period.
 
     Args:
-        points: (n, 2) nodes or edge middles; on sides they are exactly at 0 or at the period.
+        points: (n, 2) nodes or edge middles; coordinates on sides are exactly 0 or the period.
         period: (2,) width and height.
 
     Yields:
-        For each axis across which sides are paired: the axis, points (k,) on the side at 0 and their partners (k,) on
-        the side at the period, both in ascending order along the side.
+        The axis normal to a pair of sides, the points (k,) on the side at 0, and the partners (k,) on the side at the
+        period, both in ascending order along the side.
     """
     for axis in (0, 1):
         along = points[:, 1 - axis]
@@ -35,20 +35,20 @@ class CoarseMesh:
     Attributes:
         width, height: cell periods.
         points: (n, 2) nodes in the plane.
-        triangles: (m, 3) counter-clockwise; none has two edges on the same circle.
+        triangles: (m, 3) counter-clockwise nodes; a triangle has at most one edge on a circle.
         phase: (m,) index into `phases`, whose first name is "matrix".
-        precedence: (m,) order in which constituents are numbered, 0 in the matrix: the fibre's number, or the
-            phase where fibres have none.
-        representative: (n,) node that stands for a node class on the torus: x = width -> x = 0,
+        precedence: (m,) order for the numbers of constituents, 0 in the matrix: the fibre number, or the phase where
+            fibres have no number.
+        representative: (n,) representative node of each node class on the torus: x = width -> x = 0,
             y = height -> y = 0; idempotent.
-        ellipses: k circles and ellipses in the plane; periodic images are listed separately.
-        arc_edges: (a, 2) edges whose ends lie on an ellipse, to rounding.
-        arc_circle: (a,) that ellipse.
+        ellipses: k circles and ellipses in the plane; periodic images have separate entries.
+        arc_edges: (a, 2) edges with both ends on an ellipse, to rounding.
+        arc_circle: (a,) the ellipse of each such edge.
         debonded_edges: (d, 2) edges between a fibre and the matrix that are debonded from the start.
-        snapped: how far nodes in a user's mesh were moved to make sides match, at most.
-        remarks: how a cell differs from its table, and unused curves in a user's mesh, a line each.
-        centres: (fibres, 2) fibre centres, if precedence is the fibre number from 1, coatings behind in the same
-            order; else None.
+        snapped: largest move of a node in a user's mesh to make opposite sides match.
+        remarks: differences of a cell from the fibre table, and unused curves in a user's mesh, in a line each.
+        centres: (fibres, 2) fibre centres, if the precedence is the fibre number from 1, with the numbers of coatings
+            behind in the same order; else None.
     """
 
     width: float
@@ -69,12 +69,12 @@ class CoarseMesh:
 
     @property
     def period(self) -> Float:
-        """(2,) width and height."""
+        """The width and height (2,) of the cell."""
         return np.array([self.width, self.height])
 
     @property
     def circles(self) -> Float:
-        """(k, 3) centre and radius of the ellipses, NaN where these are not round."""
+        """The centre and radius (k, 3) of each ellipse, NaN for ellipses that are not round."""
         return self.ellipses.circles
 
 
@@ -91,23 +91,23 @@ def edges(triangles: Int32) -> Int32:
 
 
 def edge_keys(pairs: Int32, nodes: int) -> Int:
-    """Give each undirected edge (k, 2) of a mesh with `nodes` nodes an integer."""
+    """Map undirected edges (k, 2) of a mesh with `nodes` nodes to unique integers (k,)."""
     ordered = np.sort(pairs, axis=1).astype(np.int64)
     return ordered[:, 0] * nodes + ordered[:, 1]
 
 
 def twins(keys: Int) -> tuple[Int, Int]:
-    """Find pairs of equal keys (n,), each with the next: two index arrays, by key."""
+    """Pair successive equal keys (n,): two index arrays in the order of keys."""
     order = np.argsort(keys, kind="stable")
     same = np.flatnonzero(keys[order][1:] == keys[order][:-1])
     return order[same], order[same + 1]
 
 
 def representatives(points: Float, width: float, height: float) -> Int32:
-    """Return the node (n,) that represents each node's class; sides match exactly.
+    """Return the representative (n,) of each node, for sides that match exactly.
 
-    Nodes at x = width are represented by their partners at x = 0, at y = height by partners at y = 0, and all four
-    corners by the origin.
+    The representative is the partner at x = 0 for nodes at x = width, the partner at y = 0 for nodes at y = height, and
+    the origin for all four corners.
     """
     result = np.arange(len(points), dtype=np.int32)
     for _, low, high in paired_sides(points, np.array([width, height])):
@@ -116,10 +116,10 @@ def representatives(points: Float, width: float, height: float) -> Int32:
 
 
 def flip_double_arcs(triangles: Int32, phase: Int32, arc_edges: Int32, arc_circle: Int32, nodes: int) -> Int32:
-    """Flip edges until as few triangles (m, 3) as possible have two edges on one circle.
+    """Flip edges of triangles (m, 3) with two edges on one circle.
 
-    Such a triangle would have an angle of 180 degrees once its edges follow the circle. A few rounds exchange its third
-    edge, a chord, for the other diagonal of the two triangles beside the chord.
+    Curved edges would give such a triangle an angle of 180 degrees. A few rounds exchange the third edge, a chord, for
+    the other diagonal of the two triangles beside the chord.
     """
     triangles = triangles.copy()
     for _ in range(8):
@@ -129,9 +129,7 @@ def flip_double_arcs(triangles: Int32, phase: Int32, arc_edges: Int32, arc_circl
         opposite[one], opposite[twin] = twin, one
         other = opposite[3 * bad + corner]
         flippable = (other >= 0) & (phase[other // 3] == phase[bad])
-        _, unique = np.unique(other // 3, return_index=True)
-        once = np.zeros(len(bad), dtype=bool)
-        once[unique] = True
+        once = np.isin(np.arange(len(bad)), np.unique(other // 3, return_index=True)[1])
         chosen = flippable & once & ~np.isin(other // 3, bad)
         if not chosen.any():
             break
@@ -144,52 +142,49 @@ def flip_double_arcs(triangles: Int32, phase: Int32, arc_edges: Int32, arc_circl
 
 
 def double_arcs(triangles: Int32, arc_edges: Int32, arc_circle: Int32, nodes: int) -> tuple[Int32, Int32]:
-    """Find triangles with two edges on one circle, and the corner between these."""
+    """Find triangles with two edges on one circle, and the corner between both edges."""
     if len(arc_edges) == 0:
         return np.zeros(0, np.int32), np.zeros(0, np.int32)
     keys = edge_keys(arc_edges, nodes)
     order = np.argsort(keys)
-    mine = edge_keys(edges(triangles), nodes)
-    place = order[np.minimum(np.searchsorted(keys[order], mine), len(keys) - 1)]
-    circle = np.where(keys[place] == mine, arc_circle[place], -1).reshape(-1, 3)
+    edge_key = edge_keys(edges(triangles), nodes)
+    place = order[np.minimum(np.searchsorted(keys[order], edge_key), len(keys) - 1)]
+    circle = np.where(keys[place] == edge_key, arc_circle[place], -1).reshape(-1, 3)
     shared = (np.roll(circle, -1, axis=1) == np.roll(circle, 1, axis=1)) & (np.roll(circle, 1, axis=1) >= 0)
     bad = np.flatnonzero(shared.any(axis=1))
     return bad.astype(np.int32), np.argmax(shared[bad], axis=1).astype(np.int32)
 
 
 def interface_edges(mesh: CoarseMesh) -> Int32:
-    """Find the edges (k, 2) between phases or beside voids; on sides the lower copy."""
+    """Find the edges (k, 2) between phases or beside voids, on sides the left or lower copy."""
     pairs, order, alone = _neighbours(mesh)
     between = mesh.phase[order[:, 0] // 3] != mesh.phase[order[:, 1] // 3]
     return np.concatenate([pairs[order[between, 0]], pairs[alone]])
 
 
 def void_edges(mesh: CoarseMesh) -> Int32:
-    """Find the edges (k, 2) beside voids, with one triangle; on sides the lower copy."""
+    """Find the edges (k, 2) beside voids, on sides the left or lower copy."""
     pairs, _, alone = _neighbours(mesh)
     return np.asarray(pairs[alone])
 
 
 def voids(mesh: CoarseMesh) -> int:
     """Count the connected boundaries of voids on the torus."""
-    pairs = mesh.representative[void_edges(mesh)]
-    classes, ends = np.unique(pairs, return_inverse=True)
-    ends = ends.reshape(-1, 2)
-    graph = coo_matrix((np.ones(len(ends)), tuple(ends.T)), shape=(len(classes),) * 2)
+    classes, ends = np.unique(mesh.representative[void_edges(mesh)], return_inverse=True)
+    graph = coo_matrix((np.ones(ends.size // 2), tuple(ends.reshape(-1, 2).T)), shape=(len(classes),) * 2)
     return int(connected_components(graph, directed=False)[0])
 
 
 def can_debond(mesh: CoarseMesh, pairs: Int32) -> Bool:
-    """Return whether edges (k, 2), on sides either copy, lie between fibre and matrix."""
+    """Return whether edges (k, 2), on sides of either copy, lie between fibre and matrix."""
     low_copies, order, _ = _neighbours(mesh)
     in_matrix = mesh.phase[order // 3] == 0
-    between = low_copies[order[in_matrix[:, 0] != in_matrix[:, 1], 0]]
-    n = len(mesh.points)
+    between, n = low_copies[order[in_matrix[:, 0] != in_matrix[:, 1], 0]], len(mesh.points)
     return np.isin(edge_keys(_low_copies(mesh, pairs), n), edge_keys(between, n))
 
 
 def _neighbours(mesh: CoarseMesh) -> tuple[Int32, Index, Bool]:
-    """Return triangle edges (3m, 2), on sides the lower copy, their pairs (e, 2), and which are alone (3m,)."""
+    """Return triangle edges (3m, 2) as lower copies, pairs (e, 2) of equal edges, and a mask (3m,) of others."""
     pairs = _low_copies(mesh, edges(mesh.triangles))
     order, alone = np.stack(twins(edge_keys(pairs, len(mesh.points))), axis=1), np.ones(len(pairs), bool)
     alone[order] = False

@@ -1,9 +1,7 @@
-"""Fibres of a mesh: numbers, centres, radii, semi-axes, thickness of coatings; unwrapped positions on the torus.
+"""The fibres in a mesh: numbers, centres, radii, semi-axes and coating thickness; unwrapped positions on the torus.
 
-Directions on interfaces are measured about the centres.
+The centres are the origins of the directions on interfaces.
 """
-
-from collections import deque
 
 import numpy as np
 
@@ -13,26 +11,25 @@ from feti_homog.mesh.submeshes import Submesh, cut_bodies
 from feti_homog.microstructure import phase_names
 from feti_homog.typing import Bool, Float, Int
 
-# Largest distance between the centres of nested curves, or of images of one curve / longer semi-axis.
-SAME_CENTRE = 1e-9
-# Largest difference of a coating's thicknesses along both semi-axes / longer semi-axis.
-SAME_LENGTH = 1e-6
+# Largest distance between centres of nested curves, and largest difference of the coating thickness on both semi-axes /
+# longer semi-axis.
+SAME_CENTRE, SAME_LENGTH = 1e-9, 1e-6
 
 
 def unwrap(submesh: Submesh) -> tuple[Float, bool]:
-    """Unwrap a submesh from the torus by walking through its triangles.
+    """Unwrap a submesh from the torus by a walk through the triangles.
 
-    The walk closes if every class has one unwrapped position. Then, and only then, the subdomain can rotate; a piece
-    that winds around the torus cannot.
+    The walk closes if every class has a unique unwrapped position. Only then, the submesh can rotate; a submesh that
+    winds around the torus cannot rotate.
 
     Returns:
-        (t, 2) shifts, whole periods; true if the subdomain is contractible.
+        Shifts (t, 2) of the triangles by whole periods; true if the submesh is contractible.
     """
     if len(submesh.class_keys) == len(submesh.points):
         # No two vertices are images of each other: the plane positions are unwrapped.
         return np.zeros((len(submesh.triangles), 2)), True
     part = components(len(submesh.triangles), *edge_pairs(submesh.triangle_edges))
-    # The shift of each plane-connected part, along a spanning tree of their contacts across the cell's boundary.
+    # The shift of each plane-connected part, along a spanning tree of contacts across the cell boundary.
     part_of_edge = np.empty(len(submesh.edges), np.int64)
     part_of_edge[submesh.triangle_edges] = part[:, None]
     a, b = twins(submesh.edge_class)
@@ -44,9 +41,8 @@ def unwrap(submesh: Submesh) -> tuple[Float, bool]:
         neighbours[q].append((p, -step[k]))
     shifts = np.full((part.max() + 1, 2), np.nan)
     shifts[0] = 0.0
-    queue = deque([0])
-    while queue:
-        p = queue.popleft()
+    queue = [0]
+    for p in queue:
         for q, jump in neighbours[p]:
             if np.isnan(shifts[q, 0]):
                 shifts[q] = np.round((shifts[p] + jump) / submesh.period) * submesh.period
@@ -61,10 +57,10 @@ def unwrap(submesh: Submesh) -> tuple[Float, bool]:
 
 
 def fibre_circles(torus: Torus) -> Float:
-    """Return the centre, any image, and radius (constituents, 3) of each outer circle.
+    """Return the centre, in any image, and the radius (constituents, 3) of each outer circle.
 
-    A fibre that is not round has the radius NaN, and the centre of the mesh's list or else of its area. The matrix, and
-    a fibre that winds around the torus, have no centre: NaN.
+    Fibres that are not round have the radius NaN, and the centre in `CoarseMesh.centres` or else the area centroid. The
+    centre is NaN for the matrix, and for fibres that wind around the torus.
     """
     bodies, edge, is_round = _outer_edges(torus)
     circles = np.full((len(torus.constituent_phase), 3), np.nan)
@@ -87,7 +83,7 @@ def fibre_circles(torus: Torus) -> Float:
 def fibre_frames(torus: Torus) -> Float:
     """Return the frame F (constituents, 2, 2) of the outer ellipse c + F p, |p| = 1, of each fibre.
 
-    NaN for the matrix, and for fibres whose boundary is not on ellipses about one centre.
+    The frame is NaN for the matrix, and for fibres with a boundary that is not on concentric ellipses.
     """
     bodies, edge, _ = _outer_edges(torus)
     frames = np.full((len(torus.constituent_phase), 2, 2), np.nan)
@@ -96,9 +92,9 @@ def fibre_frames(torus: Torus) -> Float:
 
 
 def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
-    """Find the fibres (k,) whose boundaries are ellipses about one centre.
+    """Find the fibres (k,) with boundaries on concentric ellipses.
 
-    Also returns an edge (k,) on the largest ellipse of each, and whether all of them are round (k,).
+    Also returns an edge (k,) on the largest ellipse of each fibre, and whether all ellipses of a fibre are round (k,).
     """
     one, other, between = torus.sides
     border = torus.at_void.copy()
@@ -111,16 +107,16 @@ def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
     bodies, first, place = np.unique(body[order], return_index=True, return_inverse=True)
     outer, period = ellipses[edge[first]], torus.mesh.period
     offset = (ellipses.centres[edge] - outer.centres[place] + period / 2) % period - period / 2
-    away = (area[edge] == 0) | (np.linalg.norm(offset, axis=1) > SAME_CENTRE * outer.longest[place])
+    is_off_centre = (area[edge] == 0) | (np.linalg.norm(offset, axis=1) > SAME_CENTRE * outer.longest[place])
     is_round = np.bincount(place, np.isnan(torus.edge_circles[edge, 2]), len(bodies)) == 0
-    some = (np.bincount(place, away, len(bodies)) == 0) & (torus.constituent_phase[bodies] > 0)
-    return bodies[some], edge[first][some], is_round[some]
+    is_concentric = (np.bincount(place, is_off_centre, len(bodies)) == 0) & (torus.constituent_phase[bodies] > 0)
+    return bodies[is_concentric], edge[first][is_concentric], is_round[is_concentric]
 
 
 def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
-    """Assign numbers (constituents,) from 1 to fibres and coatings, 0 to the matrix; tell which are fibres.
+    """Assign numbers (constituents,) from 1 to fibres and coatings, 0 to the matrix; also mark fibres.
 
-    A coating around several fibres has their lowest number; one that coats none is a fibre itself.
+    A coating has the lowest number of the coated fibres; a coating without a fibre counts as a fibre.
     """
     phase, n = torus.constituent_phase, len(torus.constituent_phase)
     coats = np.array([name == phase_names.COATING for name in torus.mesh.phases])[phase]
@@ -136,10 +132,10 @@ def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
 
 
 def coating_thickness(numbers: Int, is_fibre: Bool, semi_axes: Float) -> Float:
-    """Return the coating thickness (fibres,), which both semi-axes gain, 0 without one.
+    """Return the coating thickness (fibres,), 0 for fibres without a coating.
 
-    Arguments are the results of `fibre_numbers`, and semi-axes (constituents, 2). The thickness is NaN where a fibre or
-    coating is neither round nor an ellipse, and where both semi-axes gain different lengths.
+    Arguments are the results of `fibre_numbers`, and semi-axes (constituents, 2). The thickness is the difference of
+    the semi-axes: NaN without semi-axes, and if both axes differ by different lengths.
     """
     coats, fibres = np.flatnonzero((numbers > 0) & ~is_fibre), np.flatnonzero(is_fibre)
     thickness, coated = np.zeros(len(fibres)), numbers[coats] - 1

@@ -1,13 +1,12 @@
-"""Refine one subdomain uniformly, on its rank without communication, and order its nodes for elimination.
+"""Refine a subdomain uniformly, without communication, and order the nodes for elimination.
 
-Each coarse triangle carries a lattice with M = order * 2**refine intervals a side.  A fine node is a coarse
-vertex, the p-th lattice node of a coarse edge, or interior to a coarse triangle; so its identity (on the
-torus and among subdomains) is arithmetic on coarse numbers.
+Each coarse triangle carries a lattice with M = order * 2**refine intervals a side.  A fine node is a coarse vertex,
+the p-th lattice node of a coarse edge, or an inner node of a coarse triangle; arithmetic on coarse numbers
+identifies fine nodes on the torus and between subdomains.
 
-A factorization eliminates nodes by nested dissection (George, SIAM J. Numer. Anal. 10 (1973) 345): nodes on
-a cut follow the nodes on both sides, so that fill stays within.  Coarse triangles are halved again and again
-along x or y, each time about the middle where the cut crosses fewest sides; their refined nodes follow.  The
-fill is less than by minimum degree.
+The elimination order is a nested dissection (George, SIAM J. Numer. Anal. 10 (1973) 345): nodes on a cut follow the
+nodes on both sides, which limits the fill.  Cuts along x or y halve the coarse triangles recursively, near the middle
+and across the fewest sides; fine nodes follow the coarse triangles.  The fill is less than with minimum degree.
 """
 
 from __future__ import annotations
@@ -22,9 +21,9 @@ from feti_homog.mesh.periodic_topology import edge_pairs
 from feti_homog.mesh.submeshes import Submesh
 from feti_homog.typing import Bool, Float, Int, Int32
 
-# Fraction of a part's triangles by which a cut may be off the middle.
+# Offset of a cut from the middle / triangles of the part, at most.
 OFF_THE_MIDDLE = 0.1
-# Intervals a side from which on the nodes inside a coarse triangle are ordered likewise: below, they are few.
+# Intervals a side from which dissection orders the inner nodes of a coarse triangle, too: below, these are few.
 MANY_INTERVALS = 8
 
 
@@ -32,10 +31,10 @@ MANY_INTERVALS = 8
 class ReferenceLattice:
     """The reference triangle with corners (0,0), (M,0), (0,M), cut into 4**refine triangles.
 
-    Compared by identity, so that a cache may be keyed with it.
+    Lattices compare by identity, so that a lattice can be a cache key.
 
     Attributes:
-        intervals: M.
+        intervals: M, the number of intervals a side.
         nodes: (q, 3) integer barycentric coordinates, summing to M: corners, then edges, then interior.
         triangles: (4**refine, 3 or 6) lattice nodes; members 4k..4k+3 make up one triangle a level coarser.
     """
@@ -69,27 +68,27 @@ class ReferenceLattice:
 
     @property
     def order(self) -> int:
-        """Order of the elements: 1 or 2."""
+        """The order of the elements, 1 or 2."""
         return 1 if self.triangles.shape[1] == 3 else 2
 
     @property
     def halvings(self) -> int:
-        """Number of times that each triangle is split in four."""
+        """The number of halvings, each of which splits a triangle in four."""
         return (self.intervals // self.order).bit_length() - 1
 
     def coarser(self, fewer: int = 1) -> ReferenceLattice:
-        """Return the lattice that is halved `fewer` times less often."""
+        """Return the lattice without the last `fewer` halvings."""
         return ReferenceLattice.of(self.halvings - fewer, self.order)
 
     def within(self, finer: ReferenceLattice) -> Int:
-        """Positions (q,) of the nodes of this lattice in a finer lattice."""
+        """Find the indices (q,) of the nodes of this lattice in a finer lattice."""
         number = np.empty((finer.intervals + 1,) * 2, np.int64)
         number[finer.nodes[:, 1], finer.nodes[:, 2]] = np.arange(len(finer.nodes))
         _, i, j = (finer.intervals // self.intervals * self.nodes).T
         return np.asarray(number[i, j])
 
     def number(self, vertices: Int, edges: Int, backwards: Bool, n_vertices: int, n_edges: int) -> Int:
-        """Node numbers (t, q): vertices, then M - 1 nodes per edge along its direction, then interiors."""
+        """Assign numbers (t, q) to the nodes: vertices, then M - 1 nodes along each edge, then inner nodes."""
         inner = self.intervals - 1
         p = np.arange(inner)
         along = np.where(backwards[..., None], inner - 1 - p, p)
@@ -101,15 +100,15 @@ class ReferenceLattice:
 
 @dataclass(frozen=True)
 class FineMesh:
-    """The refined subdomain: n plane nodes in c classes, t coarse triangles with m elements in all.
+    """The refined subdomain mesh: n plane nodes in c classes, m elements in t coarse triangles.
 
     Attributes:
         points: (n, 2) plane positions.
-        nodes: (t, q) plane nodes by coarse triangle and lattice node.
+        nodes: (t, q) plane node at each lattice node of each coarse triangle.
         curved: (t,) whether an edge of the coarse triangle lies on an ellipse; other triangles are affine images.
         node_class: (n,) class of each plane node; degrees of freedom belong to classes.
-        n_classes: c.
-        lattice: in every coarse triangle.
+        n_classes: c, the number of classes.
+        lattice: the lattice in every coarse triangle.
     """
 
     points: Float
@@ -121,17 +120,17 @@ class FineMesh:
 
     @property
     def triangles(self) -> Int32:
-        """Plane nodes (m, 3 or 6) of the elements: vertices, then mid-edge nodes 01, 12, 20."""
+        """The plane nodes (m, 3 or 6) of the elements: vertices, then mid-edge nodes 01, 12, 20."""
         elements = self.lattice.triangles
         return self.nodes[:, elements].reshape(-1, elements.shape[1])
 
 
 def refine(submesh: Submesh, lattice: ReferenceLattice) -> FineMesh:
-    """Refine the subdomain; new nodes on circles and ellipses lie on them.
+    """Refine a subdomain, with new nodes of curved edges on the circles and ellipses.
 
-    x = sum_k b_k x_k + sum_edges (1 - b_o)^2 delta(s): delta is the arc's distance from its chord at
-    s = b_b / (b_a + b_b), b_o the coordinate of the vertex opposite.  Mid-edge nodes of quadratic
-    elements are midpoints except on the arcs, so only elements at an arc are curved.
+    x = sum_k b_k x_k + sum_edges (1 - b_o)^2 delta(s): delta is the offset of the arc from the chord at
+    s = b_b / (b_a + b_b), and b_o is the coordinate of the opposite vertex.  Mid-edge nodes of quadratic
+    elements are midpoints except on arcs, so that only elements at an arc are curved.
     """
     edges, back, inner = submesh.triangle_edges, submesh.backwards, lattice.intervals - 1
     plane = lattice.number(submesh.triangles, edges, back, len(submesh.points), len(submesh.edges)).astype(np.int32)
@@ -150,7 +149,7 @@ def refine(submesh: Submesh, lattice: ReferenceLattice) -> FineMesh:
         span = 1 - b[:, (k + 2) % 3]
         s = np.divide(b[:, (k + 1) % 3], span, out=np.zeros_like(span), where=span > 0)
         centre, turn = submesh.circles[edge, None, :2], submesh.turns[edge, None]
-        # Points that cut the arc in the ratio s of its parameters: an affine map takes the arc of a circle, where
+        # These points cut the arc in the ratio s of the parameters: an affine map takes the arc of a circle, where
         # spokes have these weights, to the arc of an ellipse.
         weight_a, weight_c = np.sin((1 - s) * turn)[..., None], np.sin(s * turn)[..., None]
         arc = centre + (weight_a * (a - centre) + weight_c * (c - centre)) / np.sin(turn)[..., None]
@@ -166,7 +165,7 @@ def refine(submesh: Submesh, lattice: ReferenceLattice) -> FineMesh:
 
 
 def joined(meshes: Sequence[FineMesh]) -> FineMesh:
-    """Concatenate meshes with the same lattice; they share no nodes."""
+    """Concatenate meshes of one lattice, without common nodes."""
     nodes = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
     classes = np.cumsum([0, *(mesh.n_classes for mesh in meshes)])
     return FineMesh(
@@ -180,7 +179,7 @@ def joined(meshes: Sequence[FineMesh]) -> FineMesh:
 
 
 def edge_node(n_classes: int, edge: Int, position: Int, lattice: ReferenceLattice) -> Int:
-    """Class of the lattice node at `position` (1..M-1) of local torus edge `edge`."""
+    """Return the class of the lattice node at `position` (1..M-1) on the local torus edge `edge`."""
     return n_classes + edge * (lattice.intervals - 1) + position - 1
 
 
@@ -195,9 +194,9 @@ def elimination_order(mesh: FineMesh) -> Int:
 
 
 def _dissected(centres: Float, nodes: Int | Int32, inside: Int) -> Int:
-    """Return nodes (n,) in order, for triangles with `centres` (t, 2) and `nodes` (t, q), corners first.
+    """Order the nodes (n,) of triangles by nested dissection.
 
-    Nodes in a single triangle are ordered by `inside` (q,).
+    Triangles have `centres` (t, 2) and `nodes` (t, q), corners first; `inside` (q,) orders the nodes of one triangle.
     """
     size = int(nodes.max()) + 1
     leaf = _halved(centres, edge_pairs(edge_keys(edges(np.asarray(nodes[:, :3], np.int32)), size)))
@@ -205,15 +204,15 @@ def _dissected(centres: Float, nodes: Int | Int32, inside: Int) -> Int:
     of_leaf, node = np.repeat(leaf[by_leaf], nodes.shape[1]), nodes[by_leaf].ravel()
     first, last, place = np.empty((3, size), np.int64)
     last[node], first[node[::-1]], place[nodes] = of_leaf, of_leaf[::-1], inside
-    height = np.frexp((first ^ last).astype(float))[1]  # above the leaves, of the smallest part with all its triangles
+    height = np.frexp((first ^ last).astype(float))[1]  # above the leaves, of the smallest part around a node
     end = (last >> height) + 1 << height
     return np.asarray(np.lexsort((place, height, end)))
 
 
 def _halved(centres: Float, neighbours: tuple[Int, Int]) -> Int:
-    """Bisect the triangles recursively; return leaf numbers (t,) of a binary tree, some of which are empty.
+    """Bisect the triangles recursively; return leaf numbers (t,) of a binary tree with some empty leaves.
 
-    A part is cut along x or y where fewer sides between `neighbours` are crossed, nearly in its middle.
+    A cut runs along x or y, near the middle of a part, and crosses the fewest sides between `neighbours`.
     """
     t, first = len(centres), np.array([0, len(centres)])
     by_coordinate = [np.argsort(x, kind="stable") for x in centres.T]
@@ -226,7 +225,7 @@ def _halved(centres: Float, neighbours: tuple[Int, Int]) -> Int:
         middle = np.flatnonzero(offset <= np.repeat(np.maximum(OFF_THE_MIDDLE * size, 0.5), size))
         cuts = []
         for along in by_coordinate:
-            # One part after the other; sides are crossed at the places between their two triangles.
+            # One part after the other; a cut crosses a side at all positions between both triangles of the side.
             along = along[np.argsort(part[along], kind="stable")]
             rank[along] = np.arange(t)
             one, other = (rank[side][within] for side in neighbours)

@@ -1,4 +1,4 @@
-"""Cut the coarse mesh into subdomains, with all data that a rank needs to refine them by itself."""
+"""Cut the coarse mesh into submeshes of subdomains, which ranks refine without communication."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ from feti_homog.typing import Array, Bool, Float, Int
 
 @dataclass(frozen=True)
 class Submesh:
-    """One subdomain: v plane vertices, e plane edges, t coarse triangles.
+    """The coarse mesh of a subdomain: v plane vertices, e plane edges and t triangles.
 
-    A plane vertex belongs to a class, a plane edge to a torus edge; both are numbered locally, in
-    ascending order of their global numbers `class_keys` and `edge_keys`.
+    Plane vertices belong to node classes, and plane edges to torus edges. The local numbers of classes and torus edges
+    ascend with the global numbers `class_keys` and `edge_keys`.
 
     Attributes:
-        index: the subdomain's number.
-        body: constituent that it is a piece of; 0 for a piece across materials.
-        phase: name of its material phase; empty for a piece across materials.
-        constituent: (t,) that each triangle is in.
-        points: (v, 2) vertices, in plane position.
+        index: number of the subdomain.
+        body: constituent that contains the subdomain; 0 for a subdomain across materials.
+        phase: name of the material phase; empty for a subdomain across materials.
+        constituent: (t,) constituent of each triangle.
+        points: (v, 2) positions of the vertices in the plane.
         triangles: (t, 3) vertices, counter-clockwise.
         triangle_edges: (t, 3) edge from vertex k to vertex k + 1 (mod 3).
-        backwards: (t, 3) true where the triangle runs along the edge against its direction.
-        edges: (e, 2) vertices from start to end.
-        circles: (e, 3) centre and radius of the circle that the edge lies on; radius NaN on ellipses, 0 if straight.
-        turns: (e,) how far the parameter turns on it along the edge; 0 where the edge is straight.
-        vertex_class: (v,) class by vertex.
-        edge_class: (e,) torus edge by edge.
-        at_void: (torus edges,) whether only one triangle in the whole cell has it, beside a void.
-        debonded: (torus edges,) whether it is from the start.
+        backwards: (t, 3) true where the triangle traverses an edge from the end to the start.
+        edges: (e, 2) start and end vertices.
+        circles: (e, 3) centre and radius of the circle of each edge; radius NaN on ellipses, 0 for straight edges.
+        turns: (e,) increment of the ellipse parameter along each edge; 0 for straight edges.
+        vertex_class: (v,) class of each vertex.
+        edge_class: (e,) torus edge of each plane edge.
+        at_void: (torus edges,) whether a torus edge bounds a void, with only one triangle in the whole cell.
+        debonded: (torus edges,) whether a torus edge is debonded from the start.
         touching: (classes,) as `Torus.touching`.
-        class_keys, edge_keys: global numbers for classes and torus edges.
-        period: (2,) width and height.
-        pinned: local class that is pinned against translating the whole cell, Eq. (15), or -1.
+        class_keys, edge_keys: global numbers of classes and torus edges.
+        period: (2,) width and height of the cell.
+        pinned: local number of the class that is pinned against translations of the cell, Eq. (15), or -1.
     """
 
     index: int
@@ -64,14 +64,14 @@ class Submesh:
 
 @dataclass(frozen=True)
 class SubdomainTable:
-    """All s subdomains, known to every rank.
+    """The table of all s subdomains, which every rank has.
 
     Attributes:
-        body: (s,) constituent that each is a piece of; 0 for pieces across materials.
-        rank: (s,) that has it.
-        nesting: (constituents,) places from the outermost to the innermost, as `Torus.nesting`.
-        phase: (constituents,) number of its material phase.
-        across: whether pieces are across materials.
+        body: (s,) constituent that contains each subdomain; 0 for subdomains across materials.
+        rank: (s,) rank of each subdomain.
+        nesting: (constituents,) position in the order from the outermost to the innermost, as `Torus.nesting`.
+        phase: (constituents,) number of the material phase.
+        across: whether subdomains extend across materials.
     """
 
     body: Int
@@ -82,7 +82,7 @@ class SubdomainTable:
 
     @classmethod
     def of(cls, torus: Torus, subdomain: Int, rank: Int, across: bool = False) -> SubdomainTable:
-        """Make the table for a whole cell whose triangles are in subdomains (m,), numbered from 0 without gaps."""
+        """Make the table of a cell from the subdomain (m,) of each triangle, numbered without gaps."""
         first = np.unique(subdomain, return_index=True)[1]
         body = np.zeros(len(first), np.int64) if across else torus.constituent[first]
         return cls(body, rank, torus.nesting, torus.constituent_phase, across)
@@ -90,12 +90,12 @@ class SubdomainTable:
 
 @dataclass(frozen=True)
 class SubmeshesOfRank:
-    """One rank's subdomains before it cuts them apart.
+    """The subdomains of a rank as one submesh, before `cut`.
 
     Attributes:
-        whole: all their triangles as one submesh.
-        member: (t,) subdomain that each triangle is in.
-        index, body, phase: by subdomain, as in `Submesh`.
+        whole: all triangles of the rank as one submesh.
+        member: (t,) subdomain of each triangle, counted on this rank.
+        index, body, phase: attributes of each subdomain, as in `Submesh`.
     """
 
     whole: Submesh
@@ -106,46 +106,41 @@ class SubmeshesOfRank:
 
     @property
     def loads(self) -> Int:
-        """Number of coarse triangles in each subdomain."""
+        """The number of coarse triangles in each subdomain."""
         return np.bincount(self.member, minlength=len(self.index))
 
     def cut(self) -> list[Submesh]:
-        """Cut the subdomains apart."""
+        """Cut the triangles of the rank into one submesh for each subdomain."""
         order = np.argsort(self.member, kind="stable")
         members = np.split(order, np.cumsum(self.loads))[:-1]
         pieces = [part(self.whole, triangles) for triangles in members]
-        rank = zip(pieces, self.index.tolist(), self.body.tolist(), self.phase, strict=True)
-        return [replace(piece, index=index, body=body, phase=phase) for piece, index, body, phase in rank]
+        table = zip(pieces, self.index.tolist(), self.body.tolist(), self.phase, strict=True)
+        return [replace(piece, index=index, body=body, phase=phase) for piece, index, body, phase in table]
 
 
 def cut_for_ranks(
     torus: Torus, subdomain: Int, table: SubdomainTable, n_ranks: int, pinned: int
 ) -> Iterator[SubmeshesOfRank]:
-    """Yield the submeshes of each rank; `subdomain` (m,) is the subdomain of each triangle.
+    """Yield the submeshes of each rank.
 
-    `pinned` is the key of the pinned class.
+    `subdomain` (m,) has the subdomain of each triangle, and `pinned` is the key of the pinned class.
     """
     everything = _whole(torus, pinned)
     for r in range(n_ranks):
         members = np.flatnonzero(table.rank[subdomain] == r)
         index, member = np.unique(subdomain[members], return_inverse=True)
         body = table.body[index]
-        yield SubmeshesOfRank(
-            whole=part(everything, members),
-            member=member,
-            index=index,
-            body=body,
-            phase=tuple("" if table.across else torus.mesh.phases[k] for k in table.phase[body].tolist()),
-        )
+        phase = tuple("" if table.across else torus.mesh.phases[k] for k in table.phase[body].tolist())
+        yield SubmeshesOfRank(part(everything, members), member, index, body, phase)
 
 
 def cut_bodies(torus: Torus, members: Int) -> Iterator[Submesh]:
-    """Yield the triangles `members` (m,) as one submesh per constituent; none is pinned."""
+    """Yield one submesh without a pinned class for each constituent of triangles `members` (m,)."""
     order = members[np.argsort(torus.constituent[members], kind="stable")]
     ends = np.flatnonzero(np.diff(torus.constituent[order])) + 1
     everything = _whole(torus, -1)
-    for some in np.split(order, ends) if len(order) else ():
-        yield replace(part(everything, some), body=int(torus.constituent[some[0]]))
+    for triangles in np.split(order, ends) if len(order) else ():
+        yield replace(part(everything, triangles), body=int(torus.constituent[triangles[0]]))
 
 
 def part(submesh: Submesh, members: Int) -> Submesh:
@@ -177,10 +172,11 @@ def part(submesh: Submesh, members: Int) -> Submesh:
 
 
 def pinned_class(torus: Torus) -> int:
-    """Return the pinned class, Eq. (15): inside the matrix, nearest to the cell's corner.
+    """Return the key of the pinned class, Eq. (15).
 
-    A pinned class on an interface would hold faces together that must be able to part, and one in a fibre would keep
-    that from moving when all of its bonds are broken.  u* is the same up to a constant.
+    The class lies inside the matrix, nearest to a corner of the cell. On an interface, a pinned class would join faces
+    that must be able to part; in a fibre, it would hold the fibre when all bonds are broken.  The choice changes u* by
+    a constant only.
     """
     outside = np.zeros(len(torus.class_keys), bool)
     outside[torus.node_class[torus.mesh.triangles[torus.constituent_phase[torus.constituent] > 0]]] = True
@@ -190,20 +186,22 @@ def pinned_class(torus: Torus) -> int:
 
 
 def pinning(torus: Torus, unfit: Int) -> list[tuple[int, float, int]]:
-    """Find the class that is best pinned: its unfitness, its distance from the cell's corner, its key.
+    """Find the most suitable class for the pin.
 
-    The least triple is best; `unfit` (classes,) is larger for classes that are less fit. Nothing without classes.
+    Returns:
+        The least triple of unfitness `unfit` (classes,), distance from the nearest cell corner, and key; [] without
+        classes.
     """
     mesh = torus.mesh
-    away = mesh.points - np.round(mesh.points / mesh.period) * mesh.period
+    offset = mesh.points - np.round(mesh.points / mesh.period) * mesh.period
     distance = np.full(len(torus.class_keys), np.inf)
-    np.minimum.at(distance, torus.node_class, np.hypot(*away.T))
+    np.minimum.at(distance, torus.node_class, np.hypot(*offset.T))
     best = np.lexsort((distance, unfit))[:1].tolist()
     return [(int(unfit[k]), float(distance[k]), int(torus.class_keys[k])) for k in best]
 
 
 def _whole(torus: Torus, pinned: int) -> Submesh:
-    """Make one submesh of all triangles, without body and phase; `pinned` is the pinned class key."""
+    """Make one submesh of all triangles; `pinned` is the key of the pinned class."""
     mesh = torus.mesh
     pinned_here = np.flatnonzero(torus.class_keys == pinned)
     return Submesh(
@@ -231,7 +229,7 @@ def _whole(torus: Torus, pinned: int) -> Submesh:
 
 
 def joined(parts: Sequence[SubmeshesOfRank]) -> SubmeshesOfRank:
-    """Join the subdomains of all parts, in ascending order."""
+    """Join the subdomains of all parts in ascending order of `index`."""
     index = _all(parts, "index")
     order = np.argsort(index)
     phase = [name for part in parts for name in part.phase]
@@ -245,7 +243,7 @@ def joined(parts: Sequence[SubmeshesOfRank]) -> SubmeshesOfRank:
 
 
 def joined_meshes(meshes: list[Submesh]) -> Submesh:
-    """Join all triangles; classes and torus edges are identified, plane vertices and edges are not."""
+    """Join submeshes; identify classes and torus edges, but no plane vertices and plane edges."""
     class_keys, first_class, class_of = np.unique(_all(meshes, "class_keys"), return_index=True, return_inverse=True)
     edge_keys, first, edge_of = np.unique(_all(meshes, "edge_keys"), return_index=True, return_inverse=True)
     pinned = [np.searchsorted(class_keys, mesh.class_keys[mesh.pinned]) for mesh in meshes if mesh.pinned >= 0]
@@ -276,6 +274,6 @@ def _all(parts: Sequence[object], name: str) -> Array:
 
 
 def _numbers(parts: Sequence[object], name: str, of: str) -> Int:
-    """Concatenate index arrays, shifted by the number of `of` entries before."""
+    """Concatenate the index arrays `name`, which count the entries of the arrays `of`."""
     ends = np.cumsum([0, *(len(getattr(part, of)) for part in parts)])
     return np.concatenate([getattr(part, name) + end for part, end in zip(parts, ends, strict=False)])

@@ -1,4 +1,4 @@
-"""Generated cells: from an arrangement of fibres to a coarse mesh.
+"""The generation of a coarse mesh from an arrangement of fibres.
 
 Imports `case`, `mesh`, `mesh.outline`, `mesh.readers`, `mesh.sizes`, `mesh.tiles` and `microstructure`.  Main entries:
 `gmsh_mesher.begin` and `gmsh_mesher.NodedCell`.

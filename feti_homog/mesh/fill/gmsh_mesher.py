@@ -1,8 +1,8 @@
-"""The coarse periodic mesh of a generated cell: its lines, nodes on the lines, tiles, triangles."""
+"""The steps from a cell section to a coarse periodic mesh: lines, nodes on the lines, tiles, triangles."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -14,7 +14,7 @@ from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import CoarseMesh, representatives
 from feti_homog.mesh.outline.bare_outline import BareOutline
 from feti_homog.mesh.outline.lines import LineStations
-from feti_homog.mesh.outline.outline import Outline
+from feti_homog.mesh.outline.outline import Marks, Outline
 from feti_homog.mesh.sizes import element_estimate
 from feti_homog.mesh.sizes.graded_size import MeshSizes
 from feti_homog.mesh.tiles.tile_filling import Filling, Tile
@@ -24,26 +24,23 @@ from feti_homog.microstructure.shapes import Conics
 
 
 def begin(
-    cell: cell_section.Cell,
-    listed: Arrangement | None,
-    marks: Mapping[int, Sequence[float]],
-    policy: TilePolicy,
+    cell: cell_section.Cell, listed: Arrangement | None, marks: Marks, policy: TilePolicy
 ) -> UnmeshedCell | CoarseMesh:
-    """Begin the periodic coarse mesh for a square, hexagonal or random cell, or a table.
+    """Begin the periodic coarse mesh of a generated cell.
 
-    Round fibres and ellipses give the bare lines, polygons the whole mesh.
+    A lattice, random cell or table with round or elliptic fibres gets bare lines, a table with polygons a mesh.
 
-    Elements have about the size mesh_size * width, on circles interface_size * width. The mesh has the width 1 until it
-    is scaled, so that cells of one shape have one mesh at all sizes.
+    The element size is about mesh_size * width, and interface_size * width on circles. The mesh has the width 1 before
+    the final scaling, so that cells of one shape have the same mesh at all sizes.
 
     Args:
-        listed: a table's arrangement; None for other cells, which may be large.
-        marks: maps a curve (`BareOutline.of`) to angles in degrees, measured at its centre, where the mesh gets nodes:
-            debond tips. A mark moves to another mark, or to a crossing of the circle with the cell's boundary, that is
-            within MERGED.
+        listed: the arrangement of a table; None for other cells, which may be large.
+        marks: directions of debond tips, where the mesh gets nodes. A mark moves to another mark, or to a crossing of
+            the circle with the cell boundary, within MERGED.
+        policy: the choice of tiles.
 
     Raises:
-        MeshError: the fibres cannot be arranged, or there would be too many elements.
+        MeshError: the fibres cannot be arranged, or the mesh would have too many elements.
     """
     sizes = MeshSizes.of(cell, len(marks) > 0)
     estimate = element_estimate.ElementEstimate.of(cell, listed)
@@ -55,21 +52,18 @@ def begin(
         keys = ("mesh_size", "interface_size", *(["tip_size"] if at_tips else []))
         values = [f"{name} = {value:.3g}" for name in keys if (value := getattr(cell, name)) is not None]
         values += [] if cell.fibres is None else [f"fibres = {cell.fibres}"]
-        raise MeshError(
-            f"[cell] {', '.join(values)}: about {count:.2g} elements before refine; expected at most {limit}; "
-            "refine splits them on the ranks"
-        )
+        elements = f"{count:.2g} elements before refine; expected at most {limit}; refine splits them on the ranks"
+        raise MeshError(f"[cell] {', '.join(values)}: about {elements}")
     arrangement = arrange(cell) if listed is None else listed
     smallest = int(arrangement.radii.argmin())
     if arrangement.radii[smallest] < arrangements.SMALLEST_RADIUS * arrangement.width:
-        asked = cell_sizes.fractions_in_words(cell) if cell.fractions else 'geometry = "table"'
-        raise MeshError(
-            f"[cell] {asked}: a {'void' if arrangement.is_void[smallest] else 'fibre'} has a radius of "
-            f"{arrangement.radii.min():.2g}; expected at least {arrangements.SMALLEST_RADIUS} of the width of the cell"
-        )
+        request = cell_sizes.fractions_in_words(cell) if cell.fractions else 'geometry = "table"'
+        kind = "void" if arrangement.is_void[smallest] else "fibre"
+        expected = f"expected at least {arrangements.SMALLEST_RADIUS} of the width of the cell"
+        raise MeshError(f"[cell] {request}: a {kind} has a radius of {arrangement.radii.min():.2g}; {expected}")
     scale = arrangement_scale(cell, arrangement)
     if not isinstance(arrangement.outlines, Conics):
-        from feti_homog.mesh.fill.shape_mesher import mesh_outlines  # with a reader of meshes
+        from feti_homog.mesh.fill.shape_mesher import mesh_outlines  # imports a mesh reader
 
         return mesh_outlines(arrangement, sizes, scale)
     tiles = tiling(arrangement, sizes.largest, marks, policy)
@@ -79,7 +73,7 @@ def begin(
 
 
 def arrangement_scale(cell: cell_section.Cell, arrangement: Arrangement) -> float:
-    """Return the ratio of lengths in the cell and in the arrangement."""
+    """Return the ratio of lengths in the cell to lengths in the arrangement."""
     if cell.fibre_radius is not None:
         return float(cell.fibre_radius / arrangement.radii[: arrangement.fibres].mean())
     width = cell_sizes.mixed_width(cell) if cell.table is None else cell.table.width
@@ -88,13 +82,13 @@ def arrangement_scale(cell: cell_section.Cell, arrangement: Arrangement) -> floa
 
 @dataclass(frozen=True)
 class UnmeshedCell:
-    """A cell with discs or ellipses before its lines have nodes.
+    """A cell with discs or ellipses, before the lines have nodes.
 
     Attributes:
         arrangement: the fibres.
         bare: the lines.
         sizes: element sizes.
-        tiles: the tiling that will cut it; None if it is filled at once.
+        tiles: the tiling; None for a cell of one tile.
         scale: as in `NodedCell`.
     """
 
@@ -110,10 +104,10 @@ class UnmeshedCell:
         return self.arrangement.phases
 
     def with_nodes(self, stations: LineStations) -> NodedCell:
-        """Put nodes on the lines of the cell.
+        """Put nodes on all lines of the cell, and cut the cell into tiles.
 
         Raises:
-            MeshError: the lines would have too many.
+            MeshError: the lines would have too many nodes.
         """
         lines = self.bare.outline(stations)
         arrangement, sizes, nodes = self.arrangement, self.sizes, np.arange(len(lines.points))
@@ -124,12 +118,12 @@ class UnmeshedCell:
 
 @dataclass(frozen=True)
 class NodedCell:
-    """A cell with nodes on its lines, before triangles are made.
+    """A cell with nodes on the lines, before the tiles have triangles.
 
     Attributes:
         arrangement: the fibres.
         lines: the outline.
-        parts: tiles to fill.
+        parts: the empty tiles.
         scale: lengths in the mesh / lengths in the arrangement.
     """
 
@@ -139,7 +133,7 @@ class NodedCell:
     scale: float
 
     def mesh(self, fillings: Sequence[Filling]) -> CoarseMesh:
-        """Join the filled tiles, in the order of `parts`, to a mesh."""
+        """Join the fillings of all `parts`, in order, to one mesh."""
         ends = self.regions.nodes + np.cumsum([0, *(len(filling.inner) for filling in fillings)])
         filled = map(FilledTile, range(len(fillings)), self.parts, fillings, ends.tolist())
         centres = self.scale * self.arrangement.centres[: self.arrangement.fibres]
@@ -147,11 +141,11 @@ class NodedCell:
 
     @cached_property
     def regions(self) -> Regions:
-        """The cell's regions; the matrix around discs, which do not touch, is one region."""
+        """The regions of the cell; the matrix is one region, because discs do not touch."""
         arrangement, lines = self.arrangement, self.lines
         in_disc, in_ring = arrangement.within
         within = [(in_ring if ring else in_disc)[disc] for disc, ring in zip(lines.disc, lines.is_coating, strict=True)]
-        # Voids have a phase number behind all others; the last entry is the matrix.
+        # The phase number of voids follows all others; the last entry is the matrix.
         place = {name: number for number, name in enumerate((*arrangement.phases, phase_names.VOID))}
         phase = np.array([place[name] for name in (*within, arrangement.phases[0])])
         solid = phase < len(arrangement.phases)

@@ -1,4 +1,4 @@
-"""The coarse periodic mesh of a cell with any convex outlines: gmsh cuts them and fills them.
+"""The coarse periodic mesh of a cell with any convex outlines, which gmsh cuts at the cell sides and fills.
 
 Middle nodes on second-order edges define the curves, as in users' meshes.
 """
@@ -23,37 +23,36 @@ from feti_homog.microstructure import Arrangement, arrangements, phase_names
 from feti_homog.microstructure.shapes import convex_sums
 from feti_homog.typing import Float
 
-# Distance from a side / size of the cell within which curves lie on it; core / frame of a polygon that is a circle.
+# Largest distance of a curve on a side from the side / cell size; largest core / frame of a polygon that is a circle.
 SAME_PLACE = 1e-6
-# Cells of the grid of sizes along a side.
+# Limits for the grid cells of the sizes along a side.
 FEWEST_CELLS, MOST_CELLS = 32, 1000
-
 # Edges of coatings / thickness; cosine of the angle between normals of outlines and sides that face each other.
 COATING_EDGE, FACING = 2.0, 0.9
-# Sources of sizes that count at a position.
+# Number of sources that contribute to the size at a position.
 NEAREST = 12
 # Smallest size / size of the cell.
 LEAST = 1e-5
 
 
 def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> CoarseMesh:
-    """Mesh a cell whose fibres have any convex outlines; see `gmsh_mesher.begin`.
+    """Mesh a cell of fibres with any convex outlines; see `gmsh_mesher.begin`.
 
     Raises:
-        MeshError: it would have too many elements.
+        MeshError: the mesh would have too many elements.
     """
     field = _size_field(arrangement, sizes)
     refuse_many(field, field.least, arrangement.size)
     with gmsh_session() as gmsh:
         number = _add_surfaces(gmsh, arrangement)
-        # Curves on the right and upper side have the nodes on the left and lower one.
+        # Curves on the right and upper sides copy the nodes of the left and lower sides.
         curves = [tag for _, tag in gmsh.model.getEntities(1)]
         boxes = np.array([gmsh.model.getBoundingBox(1, tag) for tag in curves]).reshape(-1, 2, 3)[:, :, :2]
         for axis, width in enumerate(arrangement.size):
             sides = []
             for level in (0.0, width):
-                on = np.flatnonzero(np.abs(boxes[:, :, axis] - level).max(axis=1) < SAME_PLACE)
-                sides.append([curves[k] for k in on[np.argsort(boxes[on, :, 1 - axis].mean(axis=1))]])
+                indices = np.flatnonzero(np.abs(boxes[:, :, axis] - level).max(axis=1) < SAME_PLACE)
+                sides.append([curves[k] for k in indices[np.argsort(boxes[indices, :, 1 - axis].mean(axis=1))]])
             moved = np.eye(4)
             moved[axis, 3] = width
             gmsh.model.mesh.setPeriodic(1, sides[1], sides[0], moved.ravel().tolist())
@@ -89,7 +88,7 @@ def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> C
 
 
 def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
-    """Add the surfaces in the cell to groups by phase; return their precedence, 0 in the matrix."""
+    """Add the surfaces in the cell to a group for each phase; return the precedence of each surface."""
     occ, (curves, disc, around) = gmsh.model.occ, images(arrangement)
     assert isinstance(curves, convex_sums.ConvexSums)
     rectangle = (2, occ.addRectangle(0.0, 0.0, 0.0, *arrangement.size.tolist()))
@@ -112,7 +111,7 @@ def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
 
 
 def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int) -> int:
-    """Add the surface of an ellipse, or of a polygon with a margin; return its tag."""
+    """Add the surface of an ellipse, or of a polygon with a margin; return the tag."""
     occ, centre = gmsh.model.occ, shapes.centres[number]
     frame, core = shapes.frames[number], shapes.cores[number]
     semi_axes = np.linalg.norm(frame, axis=0)
@@ -125,7 +124,7 @@ def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int) ->
     def point(place: Float) -> int:
         return int(occ.addPoint(*place.tolist(), 0.0))
 
-    # Corners run counter-clockwise, and so do lines and, around a margin, arcs.
+    # Corners, lines and, around a margin, arcs are in counter-clockwise order.
     corners = core[np.sort(np.unique(core.round(14), axis=0, return_index=True)[1])] + centre
     following = np.roll(corners, -1, axis=0)
     along = (following - corners) / np.linalg.norm(following - corners, axis=1, keepdims=True)
@@ -136,7 +135,7 @@ def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int) ->
     for k, corner in enumerate(following):
         lines.append(occ.addLine(starts[k], stops[k]))
         if a:
-            # Half a turn, of two corners, has no sense of its own.
+            # The sense of a half turn, around one of two corners, needs a middle point.
             middle = [point(corner + a * along[k])] if len(corners) == 2 else []
             around, places = point(corner), [stops[k], *middle, starts[(k + 1) % len(starts)]]
             lines += [occ.addCircleArc(begin, around, end) for begin, end in pairwise(places)]
@@ -146,8 +145,8 @@ def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int) ->
 def _size_field(arrangement: Arrangement, sizes: MeshSizes) -> SizeField:
     """Return the size field h = min_k h_k + g |x - x_k| over points x_k on all outlines.
 
-    h_k is at most the interface size, a part of the circle with the curvature there, and PASSAGE_EDGE times the
-    distance to the next outline or to a cell side that the outline faces.
+    h_k is at most the interface size, a fraction of the circle with the local curvature, and PASSAGE_EDGE times the
+    distance to the next outline or to a cell side opposite the outline.
     """
     size, shapes = arrangement.size, arrangement.outer
     assert isinstance(shapes, convex_sums.ConvexSums)
@@ -158,17 +157,17 @@ def _size_field(arrangement: Arrangement, sizes: MeshSizes) -> SizeField:
     # The distance to the nearest point on another shape, or on an image.
     distance = np.full(len(places), np.inf)
     for label in np.unique(shape):
-        mine, rest = places[shape == label], places[shape != label]
-        if len(rest):
-            distance[shape == label] = cKDTree(wrap(rest, size), boxsize=size).query(wrap(mine, size))[0]
-        own_images = (mine + (arrangements.STEPS * size)[:, None]).reshape(-1, 2)
-        distance[shape == label] = np.minimum(distance[shape == label], cKDTree(own_images).query(mine)[0])
+        points, other_points = places[shape == label], places[shape != label]
+        if len(other_points):
+            distance[shape == label] = cKDTree(wrap(other_points, size), boxsize=size).query(wrap(points, size))[0]
+        image_points = (points + (arrangements.STEPS * size)[:, None]).reshape(-1, 2)
+        distance[shape == label] = np.minimum(distance[shape == label], cKDTree(image_points).query(points)[0])
     length = np.minimum(sizes.interface, PASSAGE_EDGE * distance)
     length = np.minimum(length, np.minimum(2 * np.pi * rounds / MIN_EDGES_AROUND, COATING_EDGE * thickness)[shape])
     for axis in (0, 1):
-        away = np.abs(places[:, axis] - np.round(places[:, axis] / size[axis]) * size[axis])
+        to_side = np.abs(places[:, axis] - np.round(places[:, axis] / size[axis]) * size[axis])
         faces = np.abs(normal[:, axis]) > FACING
-        length = np.where(faces, np.minimum(length, PASSAGE_EDGE * away), length)
+        length = np.where(faces, np.minimum(length, PASSAGE_EDGE * to_side), length)
     length = np.maximum(length, LEAST * size.max())
     growth = np.full(len(places), MAX_GROWTH)
     return SizeField([(places, length, growth)], size, sizes.largest, nearest=NEAREST)

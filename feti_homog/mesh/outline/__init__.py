@@ -1,4 +1,4 @@
-"""Lines of a cell and the nodes on them: sides, arcs of fibres, bridges between fibres.
+"""The lines of a cell, with nodes: sides, fibre arcs, and bridges between fibres.
 
 Imports `mesh.sizes`, `microstructure` and `system`.  Main entries: `bare_outline` and `outline`.
 """

@@ -1,8 +1,8 @@
-"""The lines of a cell with discs and ellipses, cut where they meet; all ranks place their nodes afterwards."""
+"""The lines of a cell with discs and ellipses, cut at crossings, before all ranks place nodes on the lines."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,15 +20,15 @@ NO_BRIDGES = outline.Bridges(np.zeros((0, 2), np.int64), np.zeros(0))
 
 @dataclass(frozen=True)
 class BareOutline:
-    """The lines of a cell before they have nodes.
+    """The lines of a cell before the placement of nodes.
 
     Attributes:
-        size: (2,) width and height.
-        curves, disc, around: k outlines, (k,), (k,) as `outline.images` finds them.
+        size: (2,) width and height of the cell.
+        curves, disc, around: k outlines, (k,) and (k,), as in `outline.images`.
         vertices: (v, 2) line ends.
-        circle: (a,) the curve of each arc.
-        lines: arcs, then bridges.
-        field: the size of edges.
+        circle: (a,) curve of each arc.
+        lines: arcs and bridges.
+        field: edge sizes.
     """
 
     size: Float
@@ -42,34 +42,28 @@ class BareOutline:
 
     @classmethod
     def of(
-        cls,
-        arrangement: Arrangement,
-        sizes: MeshSizes,
-        marks: Mapping[int, Sequence[float]],
-        bridges: outline.Bridges | None = None,
+        cls, arrangement: Arrangement, sizes: MeshSizes, marks: outline.Marks, bridges: outline.Bridges | None = None
     ) -> BareOutline:
         """Divide the outlines and cell sides into lines, for edges of at most `sizes`.
 
-        `marks` maps a curve to angles in degrees, measured at its centre, that become nodes: curve k is the outer curve
-        of fibre k, and ~k the curve within its coating. Bridges, between discs in a cell of tiles, are the last curves.
+        The `marks` become nodes. In a cell of tiles, bridges between discs are the last curves.
         """
         sampling, bridges = (lines.WHOLE, NO_BRIDGES) if bridges is None else (lines.IN_TILES, bridges)
         size = arrangement.size
         curves, disc, around = outline.images(arrangement)
         assert isinstance(curves, Conics)
-        sides = ((axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis]))
-        border = np.concatenate(
-            [outline.on_side(outline.crossings(curves, axis, size), axis, level) for axis, level in sides]
-        )
+        levels = ((axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis]))
+        sides = [outline.on_side(outline.crossings(curves, axis, size), axis, level) for axis, level in levels]
+        border = np.concatenate(sides)
         name = np.where(around == MATRIX, disc, ~disc)
         crossing = outline.on_curves(curves, border)
         angles = outline.vertex_angles(curves, name, crossing, marks)
         border = np.unique(border, axis=0)
         (circle, *_), ends, away = _arcs(curves, border, angles, size)
-        # Vertices within coatings face vertices on the curve around, at the same distances, unless they are marks.
+        # Except marks, vertices on inner coating curves face vertices on the outer curve, at the same distances.
         sparse = (around != MATRIX) & ~np.isin(name, list(marks))
         outer = np.concatenate([border, ends[away & ~sparse[circle]]])
-        # Ends of bridges have room enough, and make nothing finer.
+        # Bridge ends have enough room, and need no finer edges.
         angles = tuple(np.concatenate(parts) for parts in zip(angles, bridges.on_circles, strict=True))
         (circle, start, stop), ends, away = _arcs(curves, border, angles, size)
         vertices = np.concatenate([border, ends[away]])
@@ -83,12 +77,12 @@ class BareOutline:
             begin, end = (curves[bridges.ends[:, k]].points(bridges.angle + k * np.pi) for k in (0, 1))
             longest = np.full((len(begin), 2), field.largest)
             if field.graded is None:
-                # Interpolated between both ends, as in gmsh across the matrix.
+                # Edge sizes vary linearly between both ends, as in gmsh across the matrix.
                 at_ends = np.stack([field(begin), field(end)], axis=1)
                 longest = np.minimum(at_ends, caps[bridges.ends])
             straight = Segments(begin, end - begin, longest)
         else:
-            from feti_homog.mesh.outline import elliptic_outline  # discs, the common case, do without
+            from feti_homog.mesh.outline import elliptic_outline  # discs do not need the module
 
             field = elliptic_outline.size_field(arrangement, sizes, outer, tips, curves[crossing[0]], crossing[1])
             arcs = elliptic_outline.EllipticArcs.of(curves[circle], start, stop, sizes.interface)
@@ -96,10 +90,10 @@ class BareOutline:
         return cls(size, curves, disc, around, vertices, circle, SizedLines(arcs, straight, sampling), field)
 
     def outline(self, stations: LineStations) -> outline.Outline:
-        """Return the outline with these nodes; opposite sides have the same nodes.
+        """Make the outline from nodes on arcs and bridges, and place equal nodes on opposite sides.
 
         Raises:
-            MeshError: the sides would have more than the sampling allows.
+            MeshError: the sides would have more nodes than the sampling allows.
         """
         arcs, bridges = stations
         circle, straight = self.circle, np.full(len(self.lines.bridges), MATRIX)
@@ -111,7 +105,7 @@ class BareOutline:
             curves = Curves(np.arange(len(placed.share)), placed.first, *regions)
             parts.append((kind.points(placed.line, placed.share), curves))
         points, curves = Curves.joined(parts)
-        # Vertices, found by position, have the first numbers, and then the nodes between.
+        # Vertices, identified by position, have the first numbers; the other nodes follow.
         is_end = np.zeros(len(points), bool)
         is_end[curves.first[:-1]] = is_end[curves.first[1:] - 1] = True
         number = np.cumsum(~is_end) - 1 + len(self.vertices)
@@ -121,7 +115,7 @@ class BareOutline:
         return outline.Outline(nodes, replace(curves, node=number[curves.node]), ellipses, self.disc, self.around)
 
     def _sides(self, axis: int) -> Iterator[tuple[Float, Curves]]:
-        """Yield the nodes (n, 2), the same on both sides along `axis`, and their curves."""
+        """Yield the nodes (n, 2) and curves of both sides along `axis`, with the same nodes."""
         places = outline.crossings(self.curves, axis, self.size)
         begin, span = places[:-1], np.diff(places)
         longest = np.full((len(span), 2), self.field.largest)
@@ -129,8 +123,8 @@ class BareOutline:
         sampling = self.lines.sampling
         for level, low in ((0.0, True), (self.size[1 - axis], False)):
             inside = outline.curve_at(self.curves, outline.on_side(begin + span / 2, axis, level))
-            # A chord has two edges or more: a triangle with two arc edges beside it could not be flipped. From one
-            # circle of a coating to the other it is no chord.
+            # A chord has at least two edges, because a triangle with a chord and two arc edges cannot flip. A piece
+            # between both circles of a coating is not a chord.
             into = np.where(inside == MATRIX, MATRIX, self.around[inside])
             crosses = np.zeros(len(inside), bool)
             crosses[:-1] |= into[1:] == inside[:-1]
@@ -150,7 +144,7 @@ class BareOutline:
 def _arcs(
     curves: Conics, border: Float, vertices: outline.OnCircles, size: Float
 ) -> tuple[tuple[Int, Float, Float], Float, Bool]:
-    """Divide curves into arcs; return these, their first points (a, 2), and which are not in `border` (b, 2)."""
+    """Divide curves into arcs; also return start points (a, 2), and a mask (a,) of points off `border` (b, 2)."""
     arcs = outline.arcs_within(curves, vertices, size)
     ends, same = curves[arcs[0]].points(arcs[1]), outline.SAME_PLACE * size.max()
     away = np.all((ends > same) & (ends < size - same), axis=1)

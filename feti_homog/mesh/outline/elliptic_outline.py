@@ -23,7 +23,7 @@ class EllipticArcs(Lines):
 
     Attributes:
         ellipses: (a,) the ellipse of each arc.
-        angle, way: (a, k) parameters of positions on each arc, and the arc lengths up to these positions.
+        angle, way: (a, k) parameters of samples on each arc, and arc lengths up to the samples.
     """
 
     ellipses: Ellipses
@@ -42,11 +42,11 @@ class EllipticArcs(Lines):
 
     @property
     def lengths(self) -> Float:
-        """See `Lines`."""
+        """The length (a,) of each arc."""
         return self.way[:, -1]
 
     def points(self, line: Int, share: Float) -> Float:
-        """See `Lines`."""
+        """Return the points (n, 2) at the fractions `share` (n,) of the arcs `line` (n,)."""
         way = self.way / self.way[:, -1:]
         after = np.clip((way[line] <= share[:, None]).sum(axis=1), 1, convex_sums.POINTS)
         low, high = way[line, after - 1], way[line, after]
@@ -65,8 +65,8 @@ def size_field(
 ) -> graded_size.SizeField:
     """Return the size field of a cell with ellipses; see `graded_size.size_field`.
 
-    Cell sides meet the ellipses `crossed` (c,) at `crossings` (c, 2). There edges suit the length R phi, with the angle
-    phi between side and ellipse, and the radius of curvature R.
+    Cell sides meet the ellipses `crossed` (c,) at `crossings` (c, 2), where the edge length is in proportion to R phi,
+    with the angle phi between side and ellipse, and the radius of curvature R.
     """
     size, largest, inner = arrangement.size, sizes.largest, arrangement.outlines
     assert isinstance(inner, Ellipses)
@@ -77,8 +77,8 @@ def size_field(
     angle = np.tile(np.linspace(0, 2 * np.pi, convex_sums.POINTS, endpoint=False), len(ellipses))
     around = np.repeat(np.arange(len(ellipses)), convex_sums.POINTS)
     points, normal = ellipses[around].points(angle), ellipses[around].normal(angle)
-    # Edges on either side of coatings: as on circles, sqrt(t R), with the thickness and the radius of curvature there,
-    # but not longer than in the thinnest coatings around circles.
+    # Edges on both sides of coatings: as on circles, sqrt(t R), with the local thickness and radius of curvature, but
+    # not longer than in the thinnest coatings around circles.
     within, coating = inner[disc[around]], arrangement.coating[disc[around]]
     thickness = within.grown(coating).support(normal) - within.support(normal)
     thin = np.minimum(np.sqrt(thickness * within.bend(normal)), LONGEST * thickness)

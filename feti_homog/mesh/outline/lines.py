@@ -1,4 +1,4 @@
-"""The lines of a cell: pieces of sides, arcs, bridges, and nodes at distances that follow edge sizes."""
+"""The lines of a cell (pieces of sides, arcs and bridges), and the placement of nodes by edge sizes."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from feti_homog.microstructure.shapes import on_circle
 from feti_homog.system.parallel import dividing
 from feti_homog.typing import Float, Int
 
-# Regions beside a curve that are no disc or coating.
+# Regions beside a curve that are neither a disc nor a coating.
 MATRIX, OUTSIDE = -1, -2
 SAMPLES_OF_AN_EDGE = 3
 
 
 @dataclass(frozen=True)
 class Curves:
-    """Bridges, and pieces of sides or circles, counter-clockwise around cell or disc.
+    """Lines of a cell: bridges, and pieces of sides or circles, counter-clockwise around cell or disc.
 
     Attributes:
         node, first: curve k has the nodes node[first[k] : first[k + 1]], from end to end.
-        circle: (c,) the circle it lies on; MATRIX for a straight line.
-        inside: (c,) the region on its left: the disc, or the coating, within that circle, or MATRIX, or OUTSIDE.
-        outside: (c,) the region on its right: the coating within the circle around it, or MATRIX, or OUTSIDE.
+        circle: (c,) the circle of each curve; MATRIX for a straight line.
+        inside: (c,) the region on the left: the disc or coating within the circle, MATRIX or OUTSIDE.
+        outside: (c,) the region on the right: the coating within the surrounding circle, MATRIX or OUTSIDE.
     """
 
     node: Int
@@ -42,20 +42,20 @@ class Curves:
 
     @property
     def edges(self) -> tuple[Int, Int]:
-        """Nodes (e, 2) of all edges, and the curve (e,) of each."""
+        """The nodes (e, 2) of all edges, and the curve (e,) of each edge."""
         counts = np.diff(self.first)
         begin = np.delete(np.arange(len(self.node)), self.first[1:] - 1)
         return self.node[begin[:, None] + [0, 1]], np.repeat(np.arange(len(self)), counts - 1)
 
     def chosen(self, some: Int) -> Curves:
-        """Return the curves of the indices `some` (k,)."""
+        """Select the curves with the indices `some` (k,)."""
         counts = np.diff(self.first)[some]
         node, first = self.node[dividing.ranges(self.first[some], counts)], np.concatenate([[0], np.cumsum(counts)])
         return Curves(node, first, self.circle[some], self.inside[some], self.outside[some])
 
     @classmethod
     def joined(cls, parts: Sequence[tuple[Float, Curves]]) -> tuple[Float, Curves]:
-        """Concatenate curves, part after part, with their points (n, 2), which each part numbers from 0."""
+        """Concatenate the points (n, 2) and the curves of all parts, which number points from 0."""
         begin = np.cumsum([0, *(len(points) for points, _ in parts)])
         counts = np.concatenate([np.diff(curves.first) for _, curves in parts])
         curves = cls(
@@ -67,28 +67,28 @@ class Curves:
 
 
 class Lines:
-    """Base class of c lines; each attribute is an array (c, ...).
+    """The base class of c lines; each attribute is an array (c, ...).
 
     Attributes:
-        cap: (c, 2) longest allowed edge at the two ends of each line; it varies linearly between them.
+        cap: (c, 2) longest allowed edge at both ends of each line; the limit varies linearly between the ends.
     """
 
     cap: Float
 
     @property
     def lengths(self) -> Float:
-        """(c,) length of each line."""
+        """The length (c,) of each line."""
         raise NotImplementedError
 
     def points(self, line: Int, share: Float) -> Float:
-        """Return the points (n, 2) at these fractions (n,) of lines (n,)."""
+        """Return the points (n, 2) at the fractions `share` (n,) of the lines `line` (n,)."""
         raise NotImplementedError
 
     def __len__(self) -> int:
         return len(self.lengths)
 
     def chosen(self, some: slice) -> Self:
-        """Return the lines of a slice."""
+        """Select a slice of the lines."""
         return type(self)(**{name: values[some] for name, values in vars(self).items()})
 
 
@@ -108,11 +108,11 @@ class Arcs(Lines):
 
     @property
     def lengths(self) -> Float:
-        """See `Lines`."""
+        """The length (a,) of each arc."""
         return np.asarray(self.span * self.circles[:, 2])
 
     def points(self, line: Int, share: Float) -> Float:
-        """See `Lines`."""
+        """Return the points (n, 2) at the fractions `share` (n,) of the arcs `line` (n,)."""
         return on_circle(self.circles[line], self.start[line] + self.span[line] * share)
 
 
@@ -121,7 +121,7 @@ class Segments(Lines):
     """Straight lines.
 
     Attributes:
-        begin, way: (s, 2) first ends, and vectors from these to the second ends.
+        begin, way: (s, 2) first ends, and vectors from the first to the second ends.
     """
 
     begin: Float
@@ -130,21 +130,21 @@ class Segments(Lines):
 
     @property
     def lengths(self) -> Float:
-        """See `Lines`."""
+        """The length (s,) of each segment."""
         return np.asarray(np.linalg.norm(self.way, axis=1))
 
     def points(self, line: Int, share: Float) -> Float:
-        """See `Lines`."""
+        """Return the points (n, 2) at the fractions `share` (n,) of the segments `line` (n,)."""
         return np.asarray(self.begin[line] + share[:, None] * self.way[line])
 
 
 @dataclass(frozen=True)
 class Sampling:
-    """Numbers of positions at which edge sizes are sampled.
+    """The numbers of positions for samples of the edge size.
 
     Attributes:
         arc, side, bridge: positions along an arc, a piece of a side and a bridge.
-        most_nodes: on all arcs, on the sides along one axis, or on all bridges.
+        most_nodes: limit for the nodes on all arcs, on the sides along one axis, or on all bridges.
     """
 
     arc: int
@@ -159,10 +159,10 @@ WHOLE, IN_TILES = Sampling(65, 513, 17, 120_000), Sampling(17, 129, 17, 3_000_00
 
 @dataclass(frozen=True)
 class Stations:
-    """Nodes on c lines.
+    """The positions of nodes on c lines.
 
     Attributes:
-        share: (n,) fraction of the line's length, from 0 to 1.
+        share: (n,) fraction of the line length before each node, from 0 to 1.
         first: (c + 1,) line k has the nodes from first[k] up to first[k + 1].
         edges: int ds / h over all lines.
     """
@@ -173,7 +173,7 @@ class Stations:
 
     @property
     def line(self) -> Int:
-        """(n,) line of each node."""
+        """The line (n,) of each node."""
         return np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
 
     @classmethod
@@ -181,7 +181,7 @@ class Stations:
         """Concatenate the nodes of lines, part after part.
 
         Raises:
-            MeshError: they have more than `limit` edges together.
+            MeshError: all parts together have more than `limit` edges.
         """
         edges = sum(part.edges for part in parts)
         _refuse_many(edges, limit)
@@ -191,20 +191,18 @@ class Stations:
 
 def _refuse_many(edges: float, limit: int) -> None:
     if edges > limit:
-        raise MeshError(
-            f"[cell] the lines of the cell need about {edges:.2g} nodes; expected at most "
-            f"{limit}: make mesh_size and interface_size larger, or fibre_fraction or fibres smaller"
-        )
+        hint = "make mesh_size and interface_size larger, or fibre_fraction or fibres smaller"
+        raise MeshError(f"[cell] the lines of the cell need about {edges:.2g} nodes; expected at most {limit}: {hint}")
 
 
 def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges: Int | int, limit: int) -> Stations:
-    """Place nodes equidistant in ds / h, with `least_edges`, () or (c,), edges or more on each line.
+    """Place nodes on lines, equidistant in the measure ds / h of the size h.
 
-    The size h is sampled along each line by itself, at `least_samples` equidistant positions, and where it is graded,
-    at SAMPLES_OF_AN_EDGE or more for each edge.
+    A line has at least `least_edges`, () or (c,), edges. Samples of h are at `least_samples` equidistant positions on
+    each line and, for graded sizes, at SAMPLES_OF_AN_EDGE positions or more on each edge.
 
     Raises:
-        MeshError: there would be more than `limit`.
+        MeshError: the lines would have more than `limit` nodes.
     """
     lengths = lines.lengths
 
@@ -220,9 +218,9 @@ def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges:
         wide = (np.diff(line) == 0) & (way > 1 / SAMPLES_OF_AN_EDGE * np.minimum(sizes[:-1], sizes[1:]))
         if not wide.any():
             break
-        at = np.flatnonzero(wide) + 1
-        middle, of = (samples[at - 1] + samples[at]) / 2, line[at]
-        inserted = (line, at, of), (samples, at, middle), (sizes, at, size_at(of, middle))
+        index = np.flatnonzero(wide) + 1
+        middle, owner = (samples[index - 1] + samples[index]) / 2, line[index]
+        inserted = (line, index, owner), (samples, index, middle), (sizes, index, size_at(owner, middle))
         line, samples, sizes = (np.insert(*values) for values in inserted)
     density, begin = lengths[line] / sizes, np.searchsorted(line, np.arange(len(lengths) + 1))
     # int ds / h from the beginning of each line, by the trapezoidal rule.
@@ -238,7 +236,7 @@ def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges:
     line = np.repeat(np.arange(len(edges)), edges + 1)
     target = (np.arange(first[-1]) - first[line]) * (total / edges)[line]
     target[first[1:] - 1] = total
-    # Linear between samples, of all lines in one ascending row, 1 apart; the rounding of large sums may miss an
+    # Interpolate between samples in one ascending row of all lines, 1 apart; the rounding of large sums may miss an
     # interval by one.
     shift = np.concatenate([[0.0], np.cumsum(total + 1)])[: len(last)]
     row = measure + np.repeat(shift, counts)
@@ -251,40 +249,35 @@ def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges:
     return Stations(share, first, float(total.sum()))
 
 
-# Nodes of the arcs, and of the bridges.
+# The nodes of the arcs and the nodes of the bridges.
 LineStations = tuple[Stations, Stations]
 
 
 @dataclass(frozen=True)
 class SizedLines:
-    """Arcs and bridges, whose nodes depend on no other line, so that each rank can place some of them."""
+    """Arcs and bridges, with independent nodes on each line, so that ranks can divide the work."""
 
     arcs: Lines
     bridges: Lines
     sampling: Sampling
 
     def parts(self, count: int) -> list[SizedLines]:
-        """Divide the lines, in order, into `count` parts of equal numbers."""
-        arcs, bridges = (
-            [lines.chosen(slice(*ends)) for ends in pairwise(dividing.even(len(lines), count))]
-            for lines in (self.arcs, self.bridges)
-        )
-        return [SizedLines(*lines, self.sampling) for lines in zip(arcs, bridges, strict=True)]
+        """Divide the lines, in order, into `count` parts of equal size."""
+        ends = zip(*(pairwise(dividing.even(len(lines), count)) for lines in (self.arcs, self.bridges)), strict=True)
+        return [SizedLines(self.arcs.chosen(slice(*a)), self.bridges.chosen(slice(*b)), self.sampling) for a, b in ends]
 
     def stations(self, field: SizeField) -> LineStations:
-        """Place the nodes on these lines.
+        """Place the nodes on the arcs and bridges.
 
         Raises:
-            MeshError: there would be more than the sampling allows.
+            MeshError: the lines would have more nodes than the sampling allows.
         """
         sampling = self.sampling
-        return (
-            place_nodes(field, self.arcs, sampling.arc, 1, sampling.most_nodes),
-            place_nodes(field, self.bridges, sampling.bridge, 1, sampling.most_nodes),
-        )
+        arcs = place_nodes(field, self.arcs, sampling.arc, 1, sampling.most_nodes)
+        return arcs, place_nodes(field, self.bridges, sampling.bridge, 1, sampling.most_nodes)
 
     def joined(self, parts: Sequence[LineStations]) -> LineStations:
-        """Join the nodes of all parts.
+        """Concatenate the nodes of all parts of these lines.
 
         Raises:
             MeshError: the sampling allows fewer nodes.

@@ -1,4 +1,4 @@
-"""The lines of a cell with nodes on them, and before: images, vertices, arcs, pieces of sides."""
+"""The lines of a cell with nodes, and the steps before: images, vertices, arcs and pieces of sides."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,25 +12,27 @@ from feti_homog.microstructure.shapes import Conics, Discs, Ellipses, Outlines
 from feti_homog.typing import Bool, Float, Int
 
 TURN = 2 * np.pi
-# Relative distance below which two positions are one.
+# Relative distance below which two positions coincide.
 SAME_PLACE = 1e-9
-# A mark nearer than this many radians to another vertex of its circle is that vertex.
+# Angle between a mark and another vertex on a circle, in radians, below which the mark is that vertex.
 MERGED = np.radians(0.05)
 
 # Circle (v,) and angle (v,) in radians of points on circles.
 OnCircles = tuple[Int, Float]
+# Angles in degrees, measured at the centre, by curve: k is the outer curve of fibre k, ~k the curve within its coating.
+Marks = Mapping[int, Sequence[float]]
 
 
 @dataclass(frozen=True)
 class Bridges:
-    """Lines (b,) between discs `ends` (b, 2), the second in the direction `angle` (b,)."""
+    """Straight lines from the first to the second disc in `ends` (b, 2), with directions `angle` (b,)."""
 
     ends: Int
     angle: Float
 
     @property
     def on_circles(self) -> OnCircles:
-        """The points at which bridges begin, then the points at which they end."""
+        """The start points of all bridges, then the end points."""
         return self.ends.T.ravel(), np.concatenate([self.angle, self.angle + np.pi]) % TURN
 
 
@@ -39,11 +41,11 @@ class Outline:
     """The lines of a cell.
 
     Attributes:
-        points: (n, 2) nodes on all lines, exactly in place.
-        curves: through the nodes.
-        ellipses: k circles and ellipses in the plane, disc by disc and image by image, each from without.
+        points: (n, 2) exact positions of the nodes on all lines.
+        curves: curves through the nodes.
+        ellipses: k circles and ellipses in the plane, disc by disc and image by image, coating before core.
         disc: (k,) disc or ellipse of each image.
-        around: (k,) circle around each circle; MATRIX without one.
+        around: (k,) circle around each circle; MATRIX in the matrix.
     """
 
     points: Float
@@ -54,14 +56,14 @@ class Outline:
 
     @property
     def is_coating(self) -> Bool:
-        """(k,) which circles have a coating within."""
+        """The mask (k,) of circles that surround a coating."""
         return np.isin(np.arange(len(self.around)), self.around)
 
 
 def images(arrangement: Arrangement) -> tuple[Outlines, Int, Int]:
-    """Find the outlines (k,) in the cell, their fibres (k,), and the outlines around (k,).
+    """Find the outlines (k,) in the cell, with the fibres (k,) and the surrounding outlines (k,).
 
-    Periodic images are listed separately, fibre by fibre and image by image, each from without.
+    Periodic images have separate entries, fibre by fibre and image by image, coating before core.
     """
     size, outlines, outer = arrangement.size, arrangement.outlines, arrangement.outer
     steps = np.array(list(np.ndindex(3, 3))) - 1
@@ -82,47 +84,45 @@ def images(arrangement: Arrangement) -> tuple[Outlines, Int, Int]:
 
 
 def crossings(curves: Conics, axis: int, size: Float) -> Float:
-    """Sort the coordinates of corners and crossings of curves on the side at 0 along `axis`."""
+    """Return the sorted coordinates of corners and curve crossings on the side at 0 along `axis`."""
     middle, half = curves.chord(axis)
     crossing = np.concatenate([middle - half, middle + half])[np.tile(half > 0, 2)]
     return np.concatenate([[0.0], np.sort(crossing[(crossing > 0) & (crossing < size[axis])]), [size[axis]]])
 
 
 def on_side(places: Float, axis: int, level: float) -> Float:
-    """Return points (k, 2) on a side along `axis`, with the other coordinate `level`."""
+    """Return the points (k, 2) with coordinates `places` on a side at `level` along `axis`."""
     points = np.full((len(places), 2), level)
     points[:, axis] = places
     return points
 
 
 def curve_at(curves: Conics, points: Float) -> Int:
-    """Find the smallest closed curve (k,) around each point of a line, or MATRIX."""
+    """Find the smallest closed curve (k,) around each point on a line, or MATRIX."""
     beyond = curves.centres - np.clip(curves.centres, points.min(axis=0), points.max(axis=0))
-    close = np.flatnonzero(np.linalg.norm(beyond, axis=1) < curves.longest)
-    if not len(close):
+    numbers = np.flatnonzero(np.linalg.norm(beyond, axis=1) < curves.longest)
+    if not len(numbers):
         return np.full(len(points), MATRIX)
-    offsets = (points[:, None] - curves.centres[close]).reshape(-1, 2)
-    levels = np.linalg.norm(curves[np.tile(close, len(points))].unit(offsets), axis=1)
-    holds = levels.reshape(len(points), len(close)) < 1
-    return np.where(holds.any(axis=1), close[np.where(holds, curves.radii[close], np.inf).argmin(axis=1)], MATRIX)
+    offsets = (points[:, None] - curves.centres[numbers]).reshape(-1, 2)
+    levels = np.linalg.norm(curves[np.tile(numbers, len(points))].unit(offsets), axis=1)
+    holds = levels.reshape(len(points), len(numbers)) < 1
+    return np.where(holds.any(axis=1), numbers[np.where(holds, curves.radii[numbers], np.inf).argmin(axis=1)], MATRIX)
 
 
 def on_curves(curves: Conics, points: Float) -> tuple[Int, Float]:
-    """Find the curves (c,) on which points lie, and these points (c, 2)."""
+    """Find the curve (c,) of each point on a curve; also return the points (c, 2)."""
     close = cKDTree(points).query_ball_point(curves.centres, curves.longest * (1 + SAME_PLACE))
     number = np.repeat(np.arange(len(curves)), [len(candidates) for candidates in close])
     points = points[np.concatenate([np.zeros(0, np.int64), *filter(len, close)]).astype(int)]
     unit = curves[number].unit(points - curves.centres[number])
-    on_it = np.abs(np.linalg.norm(unit, axis=1) - 1) < SAME_PLACE
-    return number[on_it], points[on_it]
+    is_on_curve = np.abs(np.linalg.norm(unit, axis=1) - 1) < SAME_PLACE
+    return number[is_on_curve], points[is_on_curve]
 
 
-def vertex_angles(
-    curves: Conics, name: Int, crossing: tuple[Int, Float], marks: Mapping[int, Sequence[float]]
-) -> OnCircles:
+def vertex_angles(curves: Conics, name: Int, crossing: tuple[Int, Float], marks: Marks) -> OnCircles:
     """Return the curves (v,) and parameters (v,) in [0, 2 pi) of crossings and marks.
 
-    `marks` have angles in degrees by the names (k,) of the curves.
+    `name` (k,) has the key of each curve in `marks`.
     """
     number, points = crossing
     offset, count = points - curves.centres[number], len(number)
@@ -136,12 +136,12 @@ def vertex_angles(
 
 
 def arcs_within(curves: Conics, vertices: OnCircles, size: Float) -> tuple[Int, Float, Float]:
-    """Divide curves into arcs of a quarter turn or less in the cell: curve, start, stop (a,).
+    """Divide curves into arcs of at most a quarter turn in the cell.
 
-    Curves without vertices get one at 0.
+    Returns the curve, start and stop (a,) of each arc. The arcs of a curve without vertices begin at 0.
     """
-    without = np.setdiff1d(np.arange(len(curves)), vertices[0])
-    curve, angle = np.append(vertices[0], without), np.append(vertices[1], np.zeros(len(without)))
+    bare_curves = np.setdiff1d(np.arange(len(curves)), vertices[0])
+    curve, angle = np.append(vertices[0], bare_curves), np.append(vertices[1], np.zeros(len(bare_curves)))
     order = np.lexsort((angle, curve))
     curve, angle = curve[order], angle[order]
     is_first = np.diff(curve, prepend=-1) != 0
@@ -151,18 +151,14 @@ def arcs_within(curves: Conics, vertices: OnCircles, size: Float) -> tuple[Int, 
     parts = np.maximum(1, np.ceil(span / (TURN / 4) - SAME_PLACE)).astype(int)
     begin = np.repeat(np.arange(len(parts)), parts)
     part = np.arange(len(begin)) - np.repeat(np.cumsum(parts) - parts, parts)
-    whose, first, last = curve[begin], *(angle[begin] + (span[begin] * k / parts[begin]) for k in (part, part + 1))
-    middle = curves[whose].points((first + last) / 2)
+    arc_curve, first, last = curve[begin], *(angle[begin] + (span[begin] * k / parts[begin]) for k in (part, part + 1))
+    middle = curves[arc_curve].points((first + last) / 2)
     within = np.all((middle > 0) & (middle < size), axis=1)
-    return whose[within], first[within], last[within]
+    return arc_curve[within], first[within], last[within]
 
 
-def tip_vertices(arrangement: Arrangement, marks: Mapping[int, Sequence[float]], vertices: Float) -> Float:
-    """Find the vertices (t, 2) at the marked angles on fibre curves.
-
-    `marks` has angles in degrees by curve: k is the outer curve of fibre k, ~k the curve within its coating.  Marks on
-    curves that do not exist are left out.
-    """
+def tip_vertices(arrangement: Arrangement, marks: Marks, vertices: Float) -> Float:
+    """Find the vertices (t, 2) at all marks on existing curves."""
     names = {*range(len(arrangement.radii)), *(~np.flatnonzero(arrangement.coated)).tolist()}
     pairs = [(name, mark) for name, angles in marks.items() if name in names for mark in angles]
     name, mark = np.array([k for k, _ in pairs], np.int64), np.array([mark for _, mark in pairs])

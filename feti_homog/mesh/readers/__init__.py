@@ -1,4 +1,4 @@
-"""Users' meshes: gmsh, Abaqus, VTK and Medit files, their checks, and curves along interfaces.
+"""Readers of users' meshes (gmsh, Abaqus, VTK and Medit files), mesh checks, and curves along interfaces.
 
 Imports `case`, `mesh`, `mesh.tiles`, `microstructure`, `schema` and `system`.  Main entry: `msh_reader.read`.
 """

@@ -14,8 +14,8 @@ from feti_homog.mesh.readers.raw_mesh import Block, RawMesh, assembled
 from feti_homog.schema import wording
 from feti_homog.system.runtime import input_files
 
-# Types of elements, and the numbers of nodes that they may have: lines; quadrilaterals, which are cut in two;
-# triangles, among them rigid ones.
+# Patterns of element types, and the allowed numbers of nodes: lines; quadrilaterals, which the reader cuts in two;
+# triangles, also rigid elements.
 SIZES: dict[str, tuple[int, ...]] = {
     r"(T2D|T3D|B2|B3|DC1D)\w*": (2, 3),
     **{rf"(CPE|CPS|CPEG|DC2D|M3D|S|R3D){size}[A-Z]*5?": (size,) for size in (4, 8, 9)},
@@ -24,21 +24,21 @@ SIZES: dict[str, tuple[int, ...]] = {
 }
 # Real numbers; Fortran writes 1.0D+00.
 REAL = r"(?i)[+-]?(([0-9]+(\.[0-9]*)?|\.[0-9]+)([ed][+-]?[0-9]+)?|nan|inf|infinity)"
-# Members that sets may have together, in any file; in one with more characters as many as these.
+# Limit for the members of all sets together; in long files, the limit is the number of characters.
 MOST_MEMBERS = 10**6
-# From which of its sets an element has its phase: those before come first.
+# The kinds of sets that name the phase of an element, in the order of precedence.
 BY_SECTION, BY_SET, BY_ELEMENTS = range(3)
 
 
 def load(path: Path) -> RawMesh:
-    """Read triangles with three or six nodes, and lines with two or three, from an input file with one part.
+    """Read triangles, quadrilaterals and lines from an input file with one part.
 
-    A triangle's phase and a line's curve is its set that a *SOLID SECTION names, else its *ELSET, else the ELSET on
-    *ELEMENT; names are in lower case unless quoted.
+    The set that a *SOLID SECTION names, else the *ELSET, else the ELSET on *ELEMENT is the phase of a triangle, or the
+    curve of a line; names are in lower case unless quoted. Elements have first or second order.
 
     Raises:
         OSError: the file cannot be read.
-        MeshError: it is damaged, or has other elements.
+        MeshError: the file is damaged, or has other elements.
     """
     text = input_files.read(path).decode("utf-8-sig", "replace")
     content = _Content(budget=max(MOST_MEMBERS, len(text)))
@@ -52,12 +52,16 @@ def load(path: Path) -> RawMesh:
 
 @dataclass
 class _Content:
-    """Nodes, triangles and lines (each with its nodes) in a file, and its sets with their elements.
+    """The nodes, elements and sets in the blocks of a file so far.
 
     Attributes:
-        budget: how many members sets may still get from ranges and from other sets.
-        seen: PART and INSTANCE, if there is one.
-        is_assembly: whether the next block belongs to the assembly, and not to a part or an instance of it.
+        budget: number of members that sets may still get.
+        nodes: coordinates by node number.
+        triangles, lines: nodes by element number; triangles include quadrilaterals.
+        sets: elements by kind and name of the set.
+        materials: materials of the sections, by set name.
+        seen: PART and INSTANCE, if the file has them.
+        is_assembly: whether the next block belongs to the assembly itself, and not to a part or an instance.
     """
 
     budget: int
@@ -70,7 +74,7 @@ class _Content:
     is_assembly: bool = False
 
     def take(self, block: KeywordBlock) -> None:
-        """Read one block; ValueError where it is refused or faulty."""
+        """Read one block; ValueError if the block is refused or faulty."""
         if block.keyword in REFUSED:
             raise ValueError(REFUSED[block.keyword])
         match block.keyword:
@@ -99,7 +103,7 @@ class _Content:
                 self.materials[name] = block.parameters.get("MATERIAL", name)
 
     def _take_elements(self, block: KeywordBlock) -> None:
-        """Read elements and check their node counts against their type."""
+        """Read elements, and check the node counts against the element type."""
         if self.is_assembly:
             raise ValueError("elements of the assembly are not read: expected all in the part")
         kind = block.parameters.get("TYPE", "").upper()
@@ -119,7 +123,7 @@ class _Content:
                 self.sets.setdefault((BY_ELEMENTS, block.parameters["ELSET"]), set()).add(tag)
 
     def _take_set(self, block: KeywordBlock) -> None:
-        """Read the members of a set: numbers, names of sets or, with GENERATE, ranges with a step (default 1)."""
+        """Read the members of a set: numbers, set names or, with GENERATE, ranges with a step (default 1)."""
         members = self.sets.setdefault((BY_SET, block.parameter("ELSET")), set())
         for row in block.rows:
             parts: Iterable[Collection[int]] = (
@@ -137,29 +141,29 @@ class _Content:
                 members.update(part)
 
     def members(self, name: str) -> set[int]:
-        """Return the elements of a set: by section, by *ELSET or by *ELEMENT."""
+        """Return the elements of a set, from sections, *ELSET and *ELEMENT."""
         levels = [self.sets[level, name] for level in (BY_SECTION, BY_SET, BY_ELEMENTS) if (level, name) in self.sets]
         if not levels:
             raise ValueError(f'there is no element set "{name}"')
         return set().union(*levels)
 
     def raw_mesh(self) -> RawMesh:
-        """Group the triangles by the names of their sets, and add the line sets.
+        """Group the triangles by set names, and add the sets of lines.
 
         Raises:
-            MeshError: there are no triangles, or nodes of elements or sets of sections are missing.
+            MeshError: triangles, nodes of elements, or sets of sections are missing.
         """
         faults = [] if self.triangles else ["no triangles in it"]
         elements = self.triangles | self.lines
         lost = ((tag, node) for tag, nodes in elements.items() for node in nodes if node not in self.nodes)
         faults += [f"element {tag}: there is no node {node}" for tag, node in islice(lost, 1)]
-        known = {name for _, name in self.sets}
-        unknown = [name for name in self.materials if name not in known]
+        set_names = {name for _, name in self.sets}
+        unknown = [name for name in self.materials if name not in set_names]
         faults += [f'a section names the element set "{name}": there is none' for name in unknown]
         if faults:
             raise MeshError(*faults)
         made_of = [(material, self.members(name)) for name, material in self.materials.items()]
-        # Sets that sections name have the phases, unless only the materials of the sections have their names.
+        # Phases are the names of the sets of sections, or of the materials if only a material is named matrix.
         by_material = "matrix" in self.materials.values() and "matrix" not in self.materials
         for name, (material, members) in zip(self.materials, made_of, strict=True):
             self.sets.setdefault((BY_SECTION, material if by_material else name), set()).update(members)
@@ -188,7 +192,7 @@ class _Content:
 
 
 def _names_of(sets: Iterable[tuple[str, set[int]]]) -> dict[int, tuple[str, ...]]:
-    """Return the set names of each element, without repetition."""
+    """Return the names of the sets of each element, without repetition."""
     names: dict[int, dict[str, None]] = {}
     for name, members in sets:
         for tag in members:
@@ -197,12 +201,12 @@ def _names_of(sets: Iterable[tuple[str, set[int]]]) -> dict[int, tuple[str, ...]
 
 
 def _integer(word: str) -> int:
-    """Convert a word into a whole number; ValueError for other words."""
+    """Convert a word into a whole number; ValueError for any other word."""
     return int(_checked(word, "[+-]?[0-9]{1,15}", "a whole number of at most 15 digits"))
 
 
 def _checked(word: str, pattern: str, expected: str) -> str:
-    """Return a word that has a pattern; ValueError for other words."""
+    """Return a word that matches a pattern; ValueError for any other word."""
     if not re.fullmatch(pattern, word):
         raise ValueError(f"{wording.toml_value(word)}: expected {expected}")
     return word

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from feti_homog.errors import MeshError
 from feti_homog.schema import wording
 
-# Keywords that are read and their parameters; None: any parameters may be there.
+# Keywords of the reader, and the allowed parameters; None allows any parameters.
 READ: dict[str, tuple[str, ...] | None] = {
     "NODE": ("NSET", "SYSTEM"),
     "ELEMENT": ("TYPE", "ELSET"),
@@ -18,7 +18,7 @@ READ: dict[str, tuple[str, ...] | None] = {
     **dict.fromkeys(("PART", "END PART", "INSTANCE", "END INSTANCE", "ASSEMBLY", "END ASSEMBLY")),
 }
 OF_SECTIONS = ("ELSET", "MATERIAL")
-# Keywords that make or move nodes and elements, and why they are refused.
+# Keywords that make or move nodes and elements, and the reason for the refusal.
 GENERATORS = (
     *("SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "IMPERFECTION", "IMPORT", "PARAMETER"),
     *("SYMMETRIC MODEL GENERATION", "SUBSTRUCTURE GENERATE", "USER ELEMENT", "REFINE MESH", "MODEL CHANGE"),
@@ -26,7 +26,7 @@ GENERATORS = (
 REFUSED = dict.fromkeys(GENERATORS, "it makes or moves nodes or elements, and is not read: write them out")
 REFUSED["INCLUDE"] = "other files are not read: expected all in one file"
 WHOLE = {name.replace(" ", ""): name for name in (*READ, *REFUSED)}
-# How keywords without nodes and elements begin, without blanks.
+# Beginnings of keywords without nodes and elements, without blanks.
 BEGINNINGS = """
 ACOUSTIC ADAPTIVE ADJUST AMPLITUDE ANISOTROPIC ANNEAL AQUA BASELINE BASEMOTION BEAM BIAXIAL BOND BOUNDARY BRITTLE
 BUCKL BULKVISCOSITY CADDEDMASS CAP CASTIRON CAVITY CECHARGE CECURRENT CENTROID CFILM CFLOW CFLUX CHANGEFRICTION CLAY
@@ -54,13 +54,13 @@ OTHERS = tuple(BEGINNINGS.split())
 
 @dataclass
 class KeywordBlock:
-    """A keyword line and the data lines below it.
+    """A keyword line and the data lines below.
 
     Attributes:
-        number: the number of the keyword line, from 1.
-        word: the keyword as the file has it.
-        keyword: the keyword in full; empty if it makes no mesh.
-        parameters: their values by their names in upper case.
+        number: number of the keyword line, from 1.
+        word: the keyword as in the file.
+        keyword: the keyword in full; empty for keywords without nodes and elements.
+        parameters: parameter values by parameter names in upper case.
         rows: the words of each data line.
     """
 
@@ -72,12 +72,12 @@ class KeywordBlock:
 
     @classmethod
     def begun(cls, number: int, line: str) -> KeywordBlock:
-        """Begin a block with the keyword and parameters of its line.
+        """Begin a block with the keyword and parameters of a keyword line.
 
         For example, *ELEMENT, TYPE=CPE3 has the keyword ELEMENT and the parameter TYPE.
 
         Raises:
-            MeshError: the keyword is unknown, or the reader ignores a parameter that may matter.
+            MeshError: the keyword is unknown, or a parameter of a mesh keyword is not read.
         """
         word, *rest = (part.strip() for part in line[1:].split(","))
         try:
@@ -97,17 +97,17 @@ class KeywordBlock:
         return cls(number, word, keyword, parameters)
 
     def parameter(self, name: str) -> str:
-        """Return a parameter; ValueError if it is missing."""
+        """Return a parameter value; ValueError for a missing parameter."""
         if name not in self.parameters:
             raise ValueError(f"no {name}")
         return self.parameters[name]
 
 
 def blocks(text: str) -> Iterator[KeywordBlock]:
-    """Yield the blocks of a file.
+    """Yield the keyword blocks of a file.
 
     Raises:
-        MeshError: a keyword is unknown, or data stand before the first one.
+        MeshError: a keyword is unknown, or data precede the first keyword.
     """
     block, open_line = None, ""
     for number, line in enumerate(map(str.strip, text.splitlines()), start=1):
@@ -130,17 +130,17 @@ def blocks(text: str) -> Iterator[KeywordBlock]:
 
 
 def resolved(word: str) -> str:
-    """Complete an abbreviated keyword; empty if it makes no nodes or elements.
+    """Complete an abbreviated keyword; empty for keywords without nodes and elements.
 
-    Blanks and capitals do not matter. A keyword may be abbreviated if no other one begins in the same way.
+    Blanks and capitals do not matter. An abbreviation is valid if it is the beginning of only one keyword.
 
     Raises:
-        ValueError: no keyword begins so, or several do.
+        ValueError: the word begins no keyword, or several keywords.
     """
     key = re.sub(r"\s", "", word.upper())
     if key in WHOLE or key.startswith(OTHERS):
         return WHOLE.get(key, "")
-    # *ELEM is *ELEMENT, although *ELEMENT OUTPUT begins with it too.
+    # *ELEM is *ELEMENT, although *ELEMENT OUTPUT has the same beginning.
     longer = {name for name in (*WHOLE, *OTHERS) if key and name.startswith(key)}
     keywords = {WHOLE.get(name, "") for name in longer if not any(map(name.startswith, longer - {name}))}
     if len(keywords) != 1:

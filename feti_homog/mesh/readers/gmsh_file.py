@@ -1,7 +1,7 @@
-"""Triangles and lines of a .msh file, versions 2 to 2.2, 4.0 and 4.1, which gmsh reads in a process of its own.
+"""Read triangles and lines from a .msh file, versions 2 to 2.2, 4.0 and 4.1, by gmsh in a separate process.
 
-gmsh runs scripts, opens files beside a mesh and passes over unknown text: it reads a copy of the sections that make a
-mesh, alone in a folder, and the number of elements is compared with the file's.
+gmsh runs scripts, opens files beside a mesh and ignores unknown text. Therefore, gmsh reads a copy of the mesh sections
+in an empty folder, and the number of elements must agree with the original file.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from feti_homog.schema import wording
 from feti_homog.system.runtime import input_files
 from feti_homog.typing import Float, Int
 
-# Names that gmsh gives to lines, and to triangles and what is cut into triangles.
+# Names in gmsh of lines, and of triangles and quadrilaterals.
 LINES = ("Line 2", "Line 3")
 TRIANGLES = ("Triangle 3", "Triangle 6", "Quadrilateral 4", "Quadrilateral 9", "Quadrilateral 8")
 VERSION = re.compile(rb"2(\.[0-2]?0*)?|4(\.[01]?0*)?")
-# Sections that gmsh is given, and others without nodes or elements.
+# Sections for gmsh, and other sections without nodes or elements.
 GIVEN = ("MeshFormat", "Entities", "PartitionedEntities", "Nodes", "ParametricNodes", "Elements")
 OTHERS = {"Comments", "Periodic", "GhostElements", "Parametrizations", "NodeData", "ElementData", "ElementNodeData"}
 OTHERS |= {"InterpolationScheme"}
 SECTION = re.compile(rb"\s*\$(\w+)[ \t\r]*(?=\n)")
 NAME = re.compile(rb'^[ \t]*(\d{1,15})[ \t]+(-?\d{1,15})[ \t]+"([^"\n]*)"', re.MULTILINE)
-# Bytes that gmsh may need: so many in any file, or so many for each of the file's.
+# Memory limit of gmsh: bytes for any file, and bytes for each byte of the file; the larger limit counts.
 MOST_BYTES, MOST_RATIO = 2**31, 50
 
 # Numbers (m,), nodes (m, k) and entities (m,) of the elements of one type.
@@ -43,13 +43,13 @@ Elements = tuple[Int, Int, Int]
 
 @dataclass(frozen=True)
 class MshContent:
-    """Nodes, elements and physical groups.
+    """The nodes, elements and physical groups of a file.
 
     Attributes:
         tags, points: (n,) and (n, 3) numbers and positions of the nodes.
-        elements: by gmsh's names of their types, entity by entity.
+        elements: elements by the name of the element type in gmsh, entity by entity.
         groups: physical groups of each entity (dimension, number).
-        names: names of physical groups (dimension, number) that have one.
+        names: names of the physical groups (dimension, number) with a name.
     """
 
     tags: Int
@@ -60,7 +60,7 @@ class MshContent:
 
     @classmethod
     def of(cls, gmsh: ModuleType) -> MshContent:
-        """Copy the mesh of gmsh's current model."""
+        """Copy the current mesh from gmsh."""
         model = gmsh.model
         tags, points, _ = model.mesh.getNodes()
         groups, blocks = {}, defaultdict[str, list[Elements]](list)
@@ -71,23 +71,21 @@ class MshContent:
                 rows = nodes.astype(np.int64).reshape(len(numbers), -1)
                 name = model.mesh.getElementProperties(kind)[0]
                 blocks[name].append((numbers.astype(np.int64), rows, np.full(len(numbers), entity)))
-        elements = {
-            kind: tuple(np.concatenate(parts) for parts in zip(*rows, strict=True)) for kind, rows in blocks.items()
-        }
+        elements = {kind: tuple(np.concatenate(k) for k in zip(*rows, strict=True)) for kind, rows in blocks.items()}
         names = {group: model.getPhysicalName(*group) for group in model.getPhysicalGroups()}
         return cls(tags.astype(np.int64), points.reshape(-1, 3), elements, groups, names)
 
     def name(self, dimension: int, group: int) -> str:
-        """Return the name of a physical group, or its number."""
+        """Return the name of a physical group, or "number k" without a name."""
         return self.names.get((dimension, group)) or f"number {group}"
 
 
 def load(path: Path) -> RawMesh:
-    """Read the triangles of a .msh file and check their kind and numbers only.
+    """Read a .msh file, and check only element types and numbers.
 
     Raises:
-        OSError: it cannot be read.
-        MeshError: it is damaged, or it has other elements.
+        OSError: the file cannot be read.
+        MeshError: the file is damaged, or has other elements than triangles, quadrilaterals and lines.
     """
     data = input_files.read(path)
     sections = _sections(data.removeprefix(codecs.BOM_UTF8))
@@ -110,13 +108,12 @@ def load(path: Path) -> RawMesh:
         *_, count = counts = [*map(int, head.groups())]
         expected = 1 + sum(counts)
         if not is_binary and (lines := sum(not line.isspace() for line in io.BytesIO(text))) != expected:
-            # gmsh would skip some of them.
+            # gmsh would skip lines.
             raise MeshError(f"$Elements: {lines} lines, and its counts announce {expected}, one for each element")
     with TemporaryDirectory() as folder:
         copy = Path(folder, "mesh.msh")
-        copy.write_bytes(
-            b"".join(b"$%b%b\n$End%b\n" % (k.encode(), sections[k], k.encode()) for k in GIVEN if k in sections)
-        )
+        copies = (b"$%b%b\n$End%b\n" % (k.encode(), sections[k], k.encode()) for k in GIVEN if k in sections)
+        copy.write_bytes(b"".join(copies))
         try:
             content = input_files.in_own_process(copy, _read_by_gmsh, memory=max(MOST_BYTES, MOST_RATIO * len(data)))
         except CaseError:
@@ -135,7 +132,7 @@ def load(path: Path) -> RawMesh:
 
 
 def _sections(content: bytes) -> dict[str, bytes]:
-    """Split a file into sections: their text behind the first line, by name."""
+    """Split a file into sections by name, without the first and last lines of sections."""
     start = content[:4096].lstrip()
     if start.startswith(b"$NOD"):
         raise MeshError("format 1 of gmsh: save it in format 2.2 or 4.1")
@@ -146,8 +143,8 @@ def _sections(content: bytes) -> dict[str, bytes]:
         header = SECTION.match(content, place)
         name = "" if header is None else header[1].decode(errors="replace")
         if header is None or name not in {*GIVEN, *OTHERS, "PhysicalNames"}:
-            rest = content[place:end].lstrip()
-            line, text = content.count(b"\n", 0, end - len(rest)) + 1, rest[:80].partition(b"\n")[0]
+            remainder = content[place:end].lstrip()
+            line, text = content.count(b"\n", 0, end - len(remainder)) + 1, remainder[:80].partition(b"\n")[0]
             word = wording.toml_value(text.decode(errors="replace").strip())
             raise MeshError(f"line {line}: {word}: expected a section of a mesh, such as $Nodes, or $Comments")
         if name in sections:
@@ -164,7 +161,7 @@ def _sections(content: bytes) -> dict[str, bytes]:
 
 
 def _read_by_gmsh(path: Path) -> MshContent:
-    # Wrong extreme numbers in the head of a section do no harm; "Error loading" says no more than the last one.
+    # Wrong extreme numbers in the head of a section do no harm; "Error loading" repeats the previous message.
     passed = ("Info", "Progress", "Warning: Min/Max", "Error: Error loading")
     with gmsh_session() as gmsh:
         gmsh.option.setNumber("Mesh.PartitionCreateTopology", 0)  # which adds elements between partitions
@@ -185,15 +182,15 @@ def _read_by_gmsh(path: Path) -> MshContent:
                 break
     if not only_groups:
         return content
-    # Other programs write physical groups alone: each stands for an entity.
+    # Other programs write only physical groups: a group stands for an entity.
     return replace(content, groups={key: (key[1],) if key[1] else () for key in content.groups})
 
 
 def raw_mesh(content: MshContent) -> RawMesh:
-    """Convert content into triangles and curves.
+    """Convert the content of a file into triangles and curves.
 
     Raises:
-        MeshError: numbers are there twice, or elements are not of LINES and TRIANGLES.
+        MeshError: nodes or elements share a number, or an element type is not in LINES or TRIANGLES.
     """
     elements, none, faults = content.elements, np.zeros((0, 2), np.int64), list[str]()
     tags = np.concatenate([none[:, 0], *(numbers for numbers, *_ in elements.values())])

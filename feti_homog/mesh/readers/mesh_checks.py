@@ -1,4 +1,4 @@
-"""Check users' meshes: each function finds one kind of fault and names the first offenders."""
+"""Check users' meshes: each function lists faults of one kind, with the first few nodes, edges or elements."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -9,32 +9,32 @@ from scipy.spatial import cKDTree
 from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, edge_keys, edges, twins, void_edges
 from feti_homog.mesh.periodic_topology import Torus, components, edge_pairs
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, at, first_of
+from feti_homog.schema import types
 from feti_homog.typing import Bool, Float, Int, Int32
 
-# Nodes nearer than this, relative to the cell, are at the same place: files may round coordinates.
+# Distance / cell size below which two nodes coincide: files may round coordinates.
 SAME_PLACE = 1e-7
-# Nodes at the same place of which all pairs are listed: their number grows as the square of that of nodes.
+# Coincident nodes up to which all pairs are listed: the number of pairs grows with the square of the nodes.
 MOST_PAIRS = 1000
-# Pairs of an edge and a node near it that are looked at; they may grow as the square too.
+# Limit for pairs of an edge and a nearby node, whose number may grow with the square, too.
 MOST_CANDIDATES = 10**7
-# A node nearer to an edge than this, relative to its length, hangs on it; an element that flat would be of no use.
+# Distance / edge length below which a node hangs on an edge; a flatter element would be of no use.
 HANGING_DISTANCE = 1e-2
-# Area of a triangle, relative to its longest edge squared, up to which it is zero but for rounding of coordinates.
+# Triangle area / square of the longest edge, up to which the area is zero but for rounding.
 FLAT_AREA = 1e-9
-# Lengths that can be computed with, as of the numbers in a case file.
-SMALLEST, LARGEST = 1e-100, 1e100
 SIDES = {(0, 0): "left", (0, 1): "right", (1, 0): "lower", (1, 1): "upper"}
-# Share of the cell that rounding of coordinates may leave uncovered.
+NO_PARTNER = {(k, i): f"{name} side have no partner on the {SIDES[k, 1 - i]} side: " for (k, i), name in SIDES.items()}
+# Fraction of the cell that rounding of coordinates may leave uncovered.
 ROUNDING = 1e-6
 
 
 def _listed(before: str, items: Sequence[Any] | Int | Int32, name: Callable[..., str], after: str = "") -> list[str]:
-    """Make one fault that names the first few items; none without items."""
+    """List one fault that names the first few items; no fault without items."""
     return [f"{before}{first_of(map(name, items), len(items))}{after}"] if len(items) else []
 
 
 def unlabelled(mesh: RawMesh) -> list[str]:
-    """List elements that are in no physical surface, or in several."""
+    """List elements in no physical surface or in several surfaces."""
     none = np.flatnonzero(np.isin(mesh.group, [k for k, names in enumerate(mesh.groups) if not names]))
     faults = _listed("", none, mesh.element, f": not in any {mesh.container}")
     used, first = np.unique(mesh.group, return_index=True)
@@ -46,19 +46,19 @@ def unlabelled(mesh: RawMesh) -> list[str]:
 
 
 def not_finite(mesh: RawMesh) -> list[str]:
-    """List nodes whose coordinates are not finite, or report an extreme cell size."""
+    """List nodes with coordinates that are not finite, or report an extreme cell size."""
     bad = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
     if len(bad):
         return _listed("", bad, mesh.node, ": coordinates are not finite")
     size = np.ptp(mesh.points[:, :2], axis=0)
-    if np.abs(mesh.points).max() <= LARGEST and size.min() >= SMALLEST:
+    if np.abs(mesh.points).max() <= types.LARGEST and size.min() >= types.SMALLEST:
         return []
-    expected = f"expected lengths and coordinates from {SMALLEST} to {LARGEST}"
+    expected = f"expected lengths and coordinates from {types.SMALLEST} to {types.LARGEST}"
     return [f"the cell is {size[0]:.3g} x {size[1]:.3g}: {expected}"]
 
 
 def not_planar(mesh: RawMesh) -> list[str]:
-    """Name the first node off the plane of node 0."""
+    """Name the first node outside the plane of node 0."""
     height = mesh.points[:, 2]
     bad = np.flatnonzero(np.abs(height - height[0]) > SAME_PLACE * np.ptp(mesh.points[:, :2], axis=0).max())
     places = (f"{mesh.node(int(k))} has z = {height[k]:.9g}" for k in (*bad[:1], 0))
@@ -75,11 +75,11 @@ def flat(mesh: RawMesh) -> list[str]:
 
 
 def duplicate_nodes(mesh: RawMesh) -> list[str]:
-    """List different nodes at the same place."""
+    """List different nodes at the same position."""
     plane = mesh.points[:, :2]
     reach = SAME_PLACE * np.ptp(plane, axis=0).max()
     column, row = ((plane - plane.min(axis=0)) // (reach / 2)).astype(np.int64).T
-    square = column * (row.max() + 1) + row  # all of whose nodes are nearer than that to each other
+    square = column * (row.max() + 1) + row  # whose diagonal is shorter than the reach
     order = np.argsort(square, kind="stable")
     same = square[order[1:]] == square[order[:-1]]
     pairs = np.sort(np.column_stack([order[:-1][same], order[1:][same]]), axis=1)
@@ -90,7 +90,7 @@ def duplicate_nodes(mesh: RawMesh) -> list[str]:
 
 
 def middle_nodes(mesh: RawMesh) -> list[str]:
-    """List middle nodes that are not finite, off the plane, off a straight side, too far away, or not shared."""
+    """List middle nodes at wrong positions, and edges with two middle nodes."""
     middles, plane = mesh.middles, mesh.points[:, :2]
     if len(middles.tags) == 0:
         return []
@@ -110,11 +110,11 @@ def middle_nodes(mesh: RawMesh) -> list[str]:
         "farther from the middle than half the edge's length": far,
     }
     faults = []
-    for fault, bad in kinds.items():
-        first = np.flatnonzero(bad)
+    for fault, is_faulty in kinds.items():
+        first = np.flatnonzero(is_faulty)
         first = first[np.unique(middles.tags[first], return_index=True)[1]]
         faults += _listed("", first, lambda k: f"middle node {middles.tags[k]} {at(middles.points[k])}", f": {fault}")
-    # The two triangles of an edge have one middle node.
+    # Both triangles of an edge share one middle node.
     pairs = np.stack(twins(edge_keys(middles.edges, len(mesh.points))), axis=1)
     pairs = pairs[middles.tags[pairs[:, 0]] != middles.tags[pairs[:, 1]]]
 
@@ -125,11 +125,10 @@ def middle_nodes(mesh: RawMesh) -> list[str]:
 
 
 def overlapping(mesh: RawMesh) -> list[str]:
-    """List edges with more than two triangles, or with two on the same side."""
+    """List edges with more than two triangles, or with two triangles on the same side."""
     pairs = edges(mesh.triangles)
-    _, first, where, number = np.unique(
-        edge_keys(pairs, len(mesh.points)), return_index=True, return_inverse=True, return_counts=True
-    )
+    keys = edge_keys(pairs, len(mesh.points))
+    _, first, where, number = np.unique(keys, return_index=True, return_inverse=True, return_counts=True)
     forward = np.bincount(where, pairs[:, 0] < pairs[:, 1], len(first))
     crowded, folded = np.flatnonzero(number > 2), np.flatnonzero((number == 2) & (forward != 1))
     before = "overlapping elements, more than two share an edge: "
@@ -141,7 +140,7 @@ def overlapping(mesh: RawMesh) -> list[str]:
 def hanging_nodes(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
     """List nodes that lie within inner edges with a single triangle.
 
-    `plane` (n, 2) are positions with the lower left corner at the origin, nodes on sides exactly there.
+    `plane` (n, 2) are node positions relative to the lower left corner; nodes on sides have exact coordinates.
     """
     pairs = edges(mesh.triangles)
     _, first, number = np.unique(edge_keys(pairs, len(plane)), return_index=True, return_counts=True)
@@ -158,16 +157,16 @@ def hanging_nodes(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
     if some.step * tree.query_ball_point(middle[some], reach[some], return_length=True).sum() > MOST_CANDIDATES:
         return [f"{len(inner)} edges within the cell have one triangle only, and long ones cross: no mesh of a cell"]
     hanging = []
-    for candidates, pair, way in zip(tree.query_ball_point(middle, reach), inner, along, strict=True):
-        within = np.setdiff1d(nodes[candidates], pair)
-        away = plane[within] - plane[pair[0]]
-        distance = np.abs(way[0] * away[:, 1] - way[1] * away[:, 0])
-        hanging += [(node, pair) for node in within[distance < HANGING_DISTANCE * (way @ way)]]
+    for candidates, pair, vector in zip(tree.query_ball_point(middle, reach), inner, along, strict=True):
+        inner_nodes = np.setdiff1d(nodes[candidates], pair)
+        offset = plane[inner_nodes] - plane[pair[0]]
+        distance = np.abs(vector[0] * offset[:, 1] - vector[1] * offset[:, 0])
+        hanging += [(node, pair) for node in inner_nodes[distance < HANGING_DISTANCE * (vector @ vector)]]
     return _listed("hanging nodes: ", hanging, lambda hung: f"{mesh.node(hung[0])} on {mesh.edge(hung[1])}")
 
 
 def missing_corners(plane: Float, origin: Float, size: Float) -> list[str]:
-    """Name corners of the bounding rectangle without a node."""
+    """List corners of the bounding rectangle without a node."""
     corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * size
     missing = [at(corner + origin) for corner in corners if not np.all(plane == corner, axis=1).any()]
     advice = "of the cell; if a hole is there, shift the fibres until the corners lie in material"
@@ -175,16 +174,15 @@ def missing_corners(plane: Float, origin: Float, size: Float) -> list[str]:
 
 
 def too_large(plane: Float, triangles: Int32, size: Float) -> list[str]:
-    """Report triangles whose total area exceeds the rectangle."""
+    """Report triangles whose total area exceeds the area of the rectangle."""
     total, cell = abs(areas(plane, triangles).sum()), size.prod()
     overlap = f"the elements overlap: their area is {total:.9g}, that of the cell {cell:.9g}"
     return [overlap] if total > (1 + ROUNDING) * cell else []
 
 
 def unrefined_sides(plane: Float, size: Float) -> list[str]:
-    """Name sides without inner nodes, where an element would be its own neighbour."""
-    levels = {SIDES[axis, side]: (axis, side * size[axis]) for axis, side in SIDES}
-    bare = [name for name, (axis, level) in levels.items() if np.count_nonzero(plane[:, axis] == level) < 3]
+    """List sides without inner nodes, where an element would be a neighbour of itself."""
+    bare = [name for (axis, side), name in SIDES.items() if np.count_nonzero(plane[:, axis] == side * size[axis]) < 3]
     return [f"no node between the corners of the {', '.join(bare)} side: expected one at least"] if bare else []
 
 
@@ -196,13 +194,13 @@ def stray_lines(mesh: RawMesh) -> list[str]:
 
 
 def cannot_debond(mesh: RawMesh, pairs: Int32, fit: Bool) -> list[str]:
-    """List the debonded lines (d, 2) that are no fibre-matrix edges; `fit` (d,) marks such edges."""
+    """List the debonded lines (d, 2) that are not fibre-matrix edges, by the mask `fit` (d,) of fibre-matrix edges."""
     fault = f'lines in the {mesh.curve_container} "{DEBONDED}" that are not between a fibre and the matrix: '
     return _listed(fault, pairs[~fit], mesh.edge)
 
 
 def unused_curves(mesh: RawMesh) -> tuple[str, ...]:
-    """List all curves but DEBONDED, in one line."""
+    """List all curves except DEBONDED in one line."""
     names = [f'"{name}"' for name in mesh.curves if name != DEBONDED]
     advice = f'not used; lines that are debonded from the start belong in "{DEBONDED}"'
     return tuple(_listed(f"{mesh.curve_container} ", names, str, f": {advice}"))
@@ -215,18 +213,11 @@ def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
         nodes, partners = (np.flatnonzero(plane[:, axis] == k * size[axis]) for k in (side, 1 - side))
         along, other = plane[nodes, 1 - axis], np.sort(plane[partners, 1 - axis])
         after = np.clip(np.searchsorted(other, along), 1, len(other) - 1)
-        away = np.minimum(np.abs(other[after] - along), np.abs(other[after - 1] - along))
+        gap = np.minimum(np.abs(other[after] - along), np.abs(other[after - 1] - along))
         shift = np.where(np.arange(3) == axis, (1 - 2 * side) * size[axis], 0.0)
-        faults += _listed(
-            f"not periodic, nodes of the {_no_partner(axis, side)}",
-            nodes[away > SAME_PLACE * size.max()],
-            lambda k, shift=shift: f"{mesh.node(k)}, expected at {at(mesh.points[k] + shift)}",
-        )
+        before, single = f"not periodic, nodes of the {NO_PARTNER[axis, side]}", nodes[gap > SAME_PLACE * size.max()]
+        faults += _listed(before, single, lambda k, s=shift: f"{mesh.node(k)}, expected at {at(mesh.points[k] + s)}")
     return faults
-
-
-def _no_partner(axis: int, side: int) -> str:
-    return f"{SIDES[axis, side]} side have no partner on the {SIDES[axis, 1 - side]} side: "
 
 
 def unmatched_sides(raw: RawMesh, mesh: CoarseMesh) -> list[str]:
@@ -235,17 +226,14 @@ def unmatched_sides(raw: RawMesh, mesh: CoarseMesh) -> list[str]:
     for axis, side in SIDES:
         levels = (k * mesh.period[axis] for k in (side, 1 - side))
         sides, opposite = (pairs[np.all(mesh.points[pairs, axis] == level, axis=1)] for level in levels)
-        keys, images = (
-            edge_keys(mesh.representative[some].astype(np.int32), len(mesh.points)) for some in (sides, opposite)
-        )
-        faults += _listed(
-            f"not periodic, edges of the {_no_partner(axis, side)}", sides[~np.isin(keys, images)], raw.edge
-        )
+        keys, images = (edge_keys(mesh.representative[some], len(mesh.points)) for some in (sides, opposite))
+        before = f"not periodic, edges of the {NO_PARTNER[axis, side]}"
+        faults += _listed(before, sides[~np.isin(keys, images)], raw.edge)
     return faults
 
 
 def islands(raw: RawMesh, mesh: CoarseMesh) -> list[str]:
-    """List mesh parts that share no edge with the largest part, which would float."""
+    """List floating mesh parts, which share no edge with the largest part."""
     part = components(len(mesh.triangles), *edge_pairs(Torus.of(mesh).triangle_torus_edges))
     loose = np.flatnonzero(part != np.bincount(part).argmax())
     first = loose[np.unique(part[loose], return_index=True)[1]]
@@ -253,7 +241,7 @@ def islands(raw: RawMesh, mesh: CoarseMesh) -> list[str]:
 
 
 def void_faults(raw: RawMesh, mesh: CoarseMesh, has_voids: bool) -> list[str]:
-    """List unexpected holes, voids without an area, touching voids, and uncovered area."""
+    """List unexpected holes, voids without an area, touching voids, and uncovered areas."""
     pairs, empty = void_edges(mesh), 1.0 - areas(mesh.points, mesh.triangles).sum() / mesh.period.prod()
     if len(pairs) == 0:
         return [f"the elements leave {empty:.3g} of the cell uncovered"] if empty > ROUNDING else []

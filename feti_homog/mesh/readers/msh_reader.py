@@ -1,4 +1,4 @@
-"""Read a user's mesh: name its phases, move it onto a rectangle, check it, and make a coarse mesh of it."""
+"""Read a mesh file of a user: name the phases, repair and check the mesh, and convert it into a coarse mesh."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -29,35 +29,35 @@ LOADERS = {
     ".mesh": vtk_file.load_medit,
 }
 NUMBER = re.compile("number [0-9]+")
-"""Groups that have no other name."""
+"""Names of groups that have only a number in the file."""
 HOLE = "expected no elements in a void, which is a hole in the mesh (with voids = true in [cell])"
 Selectors = Mapping[str, tuple[str | int, ...]]
-# Sine of the angle at a node of the hull that is zero but for rounding.
+# Sine of the angle at a hull node up to which the angle is zero but for rounding.
 STRAIGHT = 1e-5
-# Slope of sides that may be meant to be upright; share of the hull that a cell with voids fills at least.
+# Slope up to which sides count as upright; fraction of the hull that a cell with voids fills at least.
 UPRIGHT, FILLED = 1e-2, 0.4
 
 
 def read_cell(cell: cell_section.Cell) -> CoarseMesh:
-    """Read the user's mesh of a cell, with the repair that the case selects. Raises as `read`."""
+    """Read the mesh file of a cell, with the repair that the case selects. Raises as `read`."""
     assert cell.file is not None
     snap = cell.snap_tolerance if cell.repair == "snap" else None
     return read(cell.file, snap, cell.phases, bool(cell.voids))
 
 
 def read(path: Path, snap: float | None = None, phases: Selectors | None = None, has_voids: bool = False) -> CoarseMesh:
-    """Read the coarse mesh from a file that one of the LOADERS reads, moved to [0, width] x [0, height].
+    """Read the coarse mesh from a file, and move it to [0, width] x [0, height].
 
-    It consists of triangles with three or six nodes, in either sense, in physical surfaces "matrix", "fibre", "glass",
-    ..., fills a rectangle but for voids, if it `has_voids`, and has matching nodes on opposite sides. Lines in curve
-    "debonded" are edges between a fibre and the matrix that are debonded. Round interfaces become circles
-    (`with_circles`), elliptic ones ellipses (`with_ellipses`); others follow their middle nodes (`with_bent_edges`).
-    `phases` maps phases to their names and numbers in the file, where these differ (`with_phases`).
-    With `snap`, nodes on sides are first moved by up to that / width to where they should be (`snapped`).
+    The file, of a suffix in LOADERS, has triangles with three or six nodes, in either sense, in physical surfaces
+    "matrix", "fibre", "glass", ... The triangles fill a rectangle, except voids if the cell `has_voids`, and opposite
+    sides have matching nodes. Lines in the curve "debonded" are edges between a fibre and the matrix that are debonded
+    from the start. Round interfaces become circles (`with_circles`), elliptic interfaces ellipses (`with_ellipses`);
+    other interfaces follow the middle nodes (`with_bent_edges`). `phases` maps phases to names and numbers in the file
+    (`with_phases`). With the tolerance `snap`, relative to the width, nodes first move onto sides (`snapped`).
 
     Raises:
-        MeshError: with all faults of the first stage that has any: file, labels, shapes, middle nodes, connections,
-            sides, debonded lines.
+        MeshError: all faults of the first faulty stage: file, labels, shapes, middle nodes, connections, sides,
+            debonded lines.
     """
     moved = 0.0
     try:
@@ -75,9 +75,9 @@ def read(path: Path, snap: float | None = None, phases: Selectors | None = None,
 
 
 def made(raw: RawMesh, path: str, has_voids: bool = True) -> CoarseMesh:
-    """Check a raw mesh and make it a coarse mesh; faults begin with `path`. Raises as `read`."""
+    """Check a raw mesh and convert it; faults begin with `path`. Raises as `read`."""
     _refuse(path, mesh_checks.not_planar(raw), mesh_checks.flat(raw), mesh_checks.duplicate_nodes(raw))
-    # All counter-clockwise; middle nodes are those of edges, whichever way these run.
+    # All triangles become counter-clockwise; middle nodes belong to edges of either direction.
     clockwise = areas(raw.points[:, :2], raw.triangles) < 0
     raw = replace(raw, triangles=np.where(clockwise[:, None], raw.triangles[:, ::-1], raw.triangles))
     _refuse(path, mesh_checks.middle_nodes(raw))
@@ -115,25 +115,25 @@ def made(raw: RawMesh, path: str, has_voids: bool = True) -> CoarseMesh:
     _refuse(path, mesh_checks.cannot_debond(raw, mesh.debonded_edges, can_debond(mesh, mesh.debonded_edges)))
     middles = replace(raw.middles, points=raw.middles.points - [*origin, 0.0])
     mesh = with_circles(mesh, middles)
-    # Fibres keep the numbers that they have without bent edges: round ones first.
+    # Fibre numbers are those without bent edges: round fibres first.
     numbers = Torus.of(mesh).constituent.astype(np.int32)
     mesh = with_bent_edges(with_ellipses(mesh, middles), middles)
     return replace(mesh, precedence=numbers)
 
 
 def _refuse(path: str, *faults: Sequence[str]) -> None:
-    """Raise MeshError with all faults, if there are any."""
+    """Raise MeshError if there are faults."""
     if lines := [f"{path}: {fault}" for kind in faults for fault in kind]:
         raise MeshError(*lines)
 
 
 def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
-    """Move the outer nodes onto a rectangle's sides, opposite each other; also return the largest move.
+    """Move outer nodes onto the sides of a rectangle; also return the largest move.
 
-    A side lies at the median among nodes within `tolerance`, relative to the width, from the outermost. Partners, each
-    other's nearest within the tolerance along the side, both move to the middle between them, but for corners. On
-    sides, middle nodes in second-order triangles are then midway between the ends of their edges. Nodes that are
-    farther stay where they are, for the checks to report.
+    A side lies at the median of all nodes within `tolerance`, relative to the width, of the outermost node. Two nodes
+    on opposite sides are partners if each is the nearest to the other, within the tolerance along the side; both move
+    to the mean position along the side, except corners. Middle nodes on sides move midway between the edge ends. Nodes
+    beyond the tolerance stay, and the checks report such nodes.
     """
     plane = raw.points[:, :2].copy()
     pairs = edges(raw.triangles)
@@ -151,9 +151,9 @@ def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
             sides[axis, extreme is np.max] = side
     for axis in (0, 1):
         low, high, along = sides[axis, False], sides[axis, True], plane[:, 1 - axis]
-        away, to_high = cKDTree(along[high, None]).query(along[low, None])
+        distance, to_high = cKDTree(along[high, None]).query(along[low, None])
         to_low = cKDTree(along[low, None]).query(along[high, None])[1]
-        mutual = (to_low[to_high] == np.arange(len(low))) & (away <= reach)
+        mutual = (to_low[to_high] == np.arange(len(low))) & (distance <= reach)
         corners = along.min(), along.max()
         mutual &= ~np.isin(along[low], corners) & ~np.isin(along[high[to_high]], corners)
         a, b = low[mutual], high[to_high[mutual]]
@@ -171,7 +171,7 @@ def _lattice(plane: Float, triangles: Int32) -> list[str]:
     corners = plane[hull.vertices]
     before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
     turn = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    # Nodes on straight sides are no corners.
+    # A node on a straight side is not a corner.
     corners = corners[turn > STRAIGHT * np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)]
     if len(corners) not in (4, 6) or np.abs(areas(plane, triangles)).sum() < FILLED * hull.volume:
         return []
@@ -186,12 +186,12 @@ def _lattice(plane: Float, triangles: Int32) -> list[str]:
 
 
 def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
-    """Rename each group to the phase that selects its name, or else its alias.
+    """Rename each group to the phase that selects the group by name or alias.
 
-    Other groups keep their names. `debonded` selects curves.
+    Other groups keep their names. The entry `debonded` selects curves.
 
     Raises:
-        MeshError: a name or number that no element has; one line for each.
+        MeshError: names or numbers that no element has, in a line each.
     """
     pairs, faults = [(phase, name) for phase, selected in phases.items() for name in selected], []
     for phase, name in pairs:
@@ -205,27 +205,27 @@ def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
     phase_of = {_key(name): phase for phase, name in pairs if phase != DEBONDED}
     lines = set(map(_key, phases.get(DEBONDED, ())))
     curves = {DEBONDED if _key(name) in lines else name: ends for name, ends in mesh.curves.items()}
-    both = zip(mesh.groups, mesh.aliases or ((),) * len(mesh.groups), strict=True)
-    groups = tuple(_selecting(names, phase_of) or _selecting(aliases, phase_of) or names for names, aliases in both)
+    labels = zip(mesh.groups, mesh.aliases or ((),) * len(mesh.groups), strict=True)
+    groups = tuple(_selecting(names, phase_of) or _selecting(aliases, phase_of) or names for names, aliases in labels)
     return replace(mesh, groups=groups, curves=curves)
 
 
 def _selecting(names: tuple[str, ...], phase_of: Mapping[str, str]) -> tuple[str, ...]:
-    """Return the phases that select any of the names, without repetition."""
+    """Return the phases that select one of the names, without repetition."""
     return tuple(dict.fromkeys(phase_of[_key(name)] for name in names if _key(name) in phase_of))
 
 
 def _key(name: str | int) -> str:
-    """Convert a name, or the number of a nameless group, for comparison without case."""
+    """Convert a group name or group number for comparison without case."""
     return (f"number {name}" if isinstance(name, int) else name).casefold()
 
 
 def unknown_phases(mesh: RawMesh) -> list[str]:
-    """List physical surfaces whose name is not a phase, and a missing matrix."""
+    """List physical surfaces with a name that is not a phase, and a missing matrix."""
     names = list(dict.fromkeys(chain.from_iterable(mesh.groups)))
     has_matrix = "matrix" in names
     expected = 'expected "matrix", "fibre", "glass", ... of letters, digits, _ and -, "fibre:2"'
-    # Without a matrix all groups are named anew, and numbers need no further word.
+    # Without a matrix, the user renames all groups, so that numbers are no further fault.
     faults = [
         f'{mesh.container} "{name}" is not a phase: {HOLE if name == phase_names.VOID else expected}'
         for name in names
@@ -253,7 +253,7 @@ def unknown_phases(mesh: RawMesh) -> list[str]:
 
 
 def known_names(mesh: RawMesh, of_curves: bool = False) -> str:
-    """List the names of groups, or of curves; numbers stand for nameless ones."""
+    """List the names of groups, or of curves, in a phrase for messages."""
     names = _names(mesh, of_curves)
     return f"the file has {first_of(map(_as_selected, names), len(names), 20) or 'none'}"
 

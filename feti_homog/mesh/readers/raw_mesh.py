@@ -1,4 +1,4 @@
-"""Assemble the triangles of a file, with three or six nodes, as one mesh; quadrilaterals are cut in two."""
+"""Assemble the triangles and quadrilaterals of a file into one mesh of triangles with corner nodes."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,22 +10,22 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from feti_homog.mesh.coarse_mesh import edge_keys
 from feti_homog.typing import Float, Int, Int32
 
-# The physical curve of the edges that are debonded from the start.
+# The physical curve of edges that are debonded from the start.
 DEBONDED = "debonded"
 # The triangles on either side of the diagonal 02, and on either side of the diagonal 13.
 HALVES = np.array([[[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]])
-# Ratio of the smaller triangles by which the diagonal that leaves the larger one is preferred to alternate ones.
+# Ratio of the smaller triangles of both diagonals, from which the ratio prevails over alternating diagonals.
 MUCH_LARGER = 2.0
 
 
 @dataclass(frozen=True)
 class MiddleNodes:
-    """Middle nodes on k triangle sides; a side that two triangles share is listed twice.
+    """The middle nodes on k triangle sides; a side of two triangles has two entries.
 
     Attributes:
-        edges: (k, 2) corner nodes at the ends, numbered from 0.
-        tags: (k,) their numbers in the file.
-        points: (k, 3) their positions.
+        edges: (k, 2) corner nodes at the ends of each side, numbered from 0.
+        tags: (k,) middle node numbers in the file.
+        points: (k, 3) middle node positions.
     """
 
     edges: Int32
@@ -33,7 +33,7 @@ class MiddleNodes:
     points: Float
 
     def between(self, pairs: Int32) -> Float:
-        """Middle node (p, 2) between each pair (p, 2) of corners; NaN where none exists."""
+        """Return the middle node position (p, 2) of each corner pair (p, 2), else NaN."""
         nodes, middle = int(max(self.edges.max(initial=0), pairs.max(initial=0))) + 1, np.full((len(pairs), 2), np.nan)
         keys = edge_keys(self.edges, nodes), edge_keys(pairs, nodes)
         _, number, place = np.intersect1d(*keys, return_indices=True)
@@ -43,18 +43,19 @@ class MiddleNodes:
 
 @dataclass(frozen=True)
 class RawMesh:
-    """Triangles in a mesh file: nodes in use with their tags, elements with their tags and group.
+    """The triangles of a mesh file, with n corner nodes and m elements.
 
     Attributes:
         node_tags: (n,) node numbers in the file.
-        points: (n, 3) their positions.
+        points: (n, 3) node positions.
         element_tags: (m,) element numbers in the file.
         triangles: (m, 3) nodes, numbered from 0.
-        group: (m,) index into `groups`, names of the physical surfaces or sets that elements belong to.
-        curves: (d, 2) node tags at the line ends in each physical curve or line set, by its name.
+        group: (m,) index of each element into `groups`.
+        groups: names of the physical surfaces or sets in each combination that elements belong to.
+        curves: (d, 2) node tags at the line ends in each physical curve or line set, by name.
         middles: the middle nodes in second-order triangles.
-        aliases: other names for each group, by which a case may select it; may be empty.
-        container, curve_container: the file's words for a group, and for an entry in `curves`.
+        aliases: other names of each group, which a case may select; may be empty.
+        container, curve_container: the words of the file format for a group, and for an entry in `curves`.
     """
 
     node_tags: Int
@@ -71,7 +72,7 @@ class RawMesh:
 
     @property
     def debonded(self) -> Int:
-        """End node tags (d, 2) of the lines in the curve DEBONDED."""
+        """The end node tags (d, 2) of the lines in the curve DEBONDED."""
         return self.curves.get(DEBONDED, np.zeros((0, 2), np.int64))
 
     def node(self, number: int) -> str:
@@ -79,7 +80,7 @@ class RawMesh:
         return f"node {self.node_tags[number]} {at(self.points[number])}"
 
     def element(self, number: int) -> str:
-        """Describe an element in words, with the position of its centre."""
+        """Describe an element in words, with the centre position."""
         centre = self.points[self.triangles[number]].mean(axis=0)
         return f"element {self.element_tags[number]} at {at(centre)}"
 
@@ -101,13 +102,13 @@ def first_of(names: Iterable[str], total: int, shown: int = 3) -> str:
 
 @dataclass(frozen=True)
 class Block:
-    """m triangles or quadrilaterals in a file.
+    """A block of m triangles or quadrilaterals in a file.
 
     Attributes:
-        tags: (m,) their numbers.
-        nodes: (m, 3), (m, 6), (m, 4), (m, 8) or (m, 9) their node numbers: corners, then, in second-order ones,
-            middles on the edges 01, 12, ..., then inner ones.
-        group: (m,) by element.
+        tags: (m,) element numbers.
+        nodes: (m, 3), (m, 6), (m, 4), (m, 8) or (m, 9) node numbers: corners, then, in second-order elements, middle
+            nodes on the edges 01, 12, ..., then inner nodes.
+        group: (m,) group of each element.
     """
 
     tags: Int
@@ -124,7 +125,7 @@ def assembled(
     containers: tuple[str, str] = ("physical surface", "physical curve"),
     aliases: Sequence[tuple[str, ...]] = (),
 ) -> RawMesh:
-    """Assemble blocks, at least one, and the corner nodes that they use.
+    """Assemble one or more blocks, with all corner nodes in use, into one mesh.
 
     Args:
         node_tags, points: (n,) and (n, 3) numbers and positions of all nodes in the file.
@@ -169,11 +170,11 @@ def assembled(
 
 
 def in_triangles(corners: Int, points: Float) -> Int:
-    """Cut quadrilaterals (m, 4), with corners among points (n, 2 or 3), into two triangles (m, 2, 3) each.
+    """Cut quadrilaterals (m, 4), with corners among points (n, 2 or 3), into pairs of triangles (m, 2, 3).
 
-    Diagonals join nodes that an even number of sides parts from the first node of connected quadrilaterals, so that
-    they alternate in a grid: parallel ones couple stretch and shear.  The cut depends on places, not on numbers.  Where
-    such a diagonal leaves a much smaller triangle than the other one, or sides do not tell, the better one is taken.
+    Diagonals join nodes at an even number of sides from the first node of connected quadrilaterals, so that diagonals
+    alternate in a grid: parallel diagonals couple stretch and shear.  The cut depends on positions, not on numbers.  If
+    this diagonal makes a much smaller triangle than the other diagonal, or does not exist, the better diagonal counts.
     """
     x, y = points[corners].T[:2]  # (4, m)
 
@@ -189,8 +190,8 @@ def in_triangles(corners: Int, points: Float) -> Int:
     order = np.lexsort(points[used, :2].T)
     part = connected_components(sides, directed=False)[1]
     start = order[np.unique(part[order], return_index=True)[1]]
-    away = dijkstra(sides, directed=False, indices=start, unweighted=True, min_only=True)
-    even = np.asarray(away % 2 == 0)[inner]
+    steps = dijkstra(sides, directed=False, indices=start, unweighted=True, min_only=True)
+    even = np.asarray(steps % 2 == 0)[inner]
     preferred = np.where((even != np.roll(even, 1, axis=1)).all(axis=1), np.where(even[:, 0], 1, -1), 0)
     limit = np.where(preferred == 0, 1.0, MUCH_LARGER**preferred)
     return np.take_along_axis(corners[:, None], HALVES[(second > limit * first).astype(int)], axis=2)

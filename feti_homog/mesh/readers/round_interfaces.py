@@ -1,4 +1,4 @@
-"""Curves along users' interfaces: circles and ellipses, closed on the torus, and arcs through middle nodes."""
+"""Fit curves to interfaces in users' meshes: closed circles and ellipses, and arcs through middle nodes."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -16,24 +16,24 @@ from feti_homog.typing import Float, Int, Int32
 
 # Largest distance of a node from its circle, relative to the radius: files may round coordinates to seven digits.
 ROUNDNESS_TOLERANCE = 1e-6
-# A circle has at least so many edges or, with middle nodes on it, halves of edges: other regular polygons are meant as
-# such.
+# Least number of edges on a circle or, with middle nodes, of edge halves: regular polygons with fewer edges stay
+# polygons.
 MIN_CIRCLE_EDGES = 8
-# An ellipse has more freedom to go through the corners of a polygon.
+# An ellipse, with more parameters than a circle, can pass through the corners of more polygons.
 MIN_ELLIPSE_EDGES = MIN_CIRCLE_EDGES + 2
-# Rise / length of an edge on a circle that is as long as the radius.  If edges were bent more, elements beside the tips
-# of thin ellipses could turn over.
+# Rise / length of a circle edge as long as the radius, which spans 60 degrees.  With larger ratios, elements beside the
+# tips of thin ellipses could turn over.
 MOST_BENT = 1 - np.sqrt(3) / 2
-# Distance of a middle node from its edge / length of the edge up to which the edge is straight.
+# Distance of a middle node from the chord / chord length, up to which an edge is straight.
 STRAIGHT = 1e-5
 
 
 def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
-    """Replace round interfaces by circles, and move their nodes onto these exactly.
+    """Replace round interfaces by circles, and move interface nodes exactly onto the circles.
 
-    A closed interface between two phases is a circle if all its nodes are within ROUNDNESS_TOLERANCE radii of one,
-    there are at least MIN_CIRCLE_EDGES edges, none on a side of the cell or longer than the radius, and no corner of
-    the cell is on it. Middle nodes, where there are any, cut edges in two. Others stay polygons.
+    A closed interface between two phases is a circle if all nodes are within ROUNDNESS_TOLERANCE radii of a circle, and
+    the interface has at least MIN_CIRCLE_EDGES edges, no edge on a cell side or longer than the radius, and no cell
+    corner. Middle nodes cut edges in two. Other interfaces stay polygons.
     """
     pairs = interface_edges(mesh)
     points, circles, arcs = mesh.points.copy(), list[Ellipses](), list[Int32]()
@@ -45,10 +45,10 @@ def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
         points[classes] = moved
         circles += [circle.at(circle.centres - step) for step, _ in loop]
         arcs += [pairs[edges] for _, edges in loop]
-    # Copies follow their representatives; those on high sides stay there.
+    # Copies move like their representatives, but stay on the right or upper side.
     mesh = replace(mesh, points=np.where(mesh.points == mesh.period, mesh.period, points[mesh.representative]))
     mesh = _with_arcs(mesh, circles, arcs)
-    # Edges are flipped where a triangle has two on one circle; if this fails, the circle stays a polygon.
+    # Flip edges of triangles with two edges on one circle; if this fails, the circle stays a polygon.
     nodes = len(mesh.points)
     triangles = flip_double_arcs(mesh.triangles, mesh.phase, mesh.arc_edges, mesh.arc_circle, nodes)
     bad, _ = double_arcs(triangles, mesh.arc_edges, mesh.arc_circle, nodes)
@@ -65,12 +65,12 @@ def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
 
 
 def with_ellipses(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
-    """Replace elliptic interfaces by ellipses, where they are no circles.
+    """Replace elliptic interfaces that are not circles by ellipses.
 
-    A closed interface between two phases is an ellipse if all its nodes are within ROUNDNESS_TOLERANCE of one, and it
-    has at least MIN_ELLIPSE_EDGES edges, none on a side of the cell, none that spans more than 60 degrees of its
-    parameter or that the ellipse leaves by more than MOST_BENT of its length. Middle nodes, where there are any, cut
-    edges in two. Others stay as they are. Edges are flipped where a triangle has two on one ellipse.
+    A closed interface between two phases is an ellipse if all nodes are within ROUNDNESS_TOLERANCE of an ellipse, and
+    the interface has at least MIN_ELLIPSE_EDGES edges. An edge must not lie on a cell side, span more than 60 degrees
+    of the ellipse parameter, or have a rise of more than MOST_BENT edge lengths. Middle nodes cut edges in two. Other
+    interfaces do not change. Edges flip in triangles with two edges on one ellipse.
     """
     pairs, nodes = interface_edges(mesh), len(mesh.points)
     pairs = pairs[~np.isin(edge_keys(pairs, nodes), edge_keys(mesh.arc_edges, nodes))]
@@ -91,10 +91,10 @@ def with_ellipses(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
 
 
 def with_bent_edges(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
-    """Bend interface edges to the circle through their ends and middle node.
+    """Bend each interface edge to the circle through both ends and the middle node.
 
-    Edges on circles stay there, and so do straight ones, whose middle node is within STRAIGHT of the chord.
-    Edges are flipped where a triangle has two on one curve, which has no corner there.
+    Edges on circles and ellipses do not change, and neither do straight edges, with the middle node within STRAIGHT
+    lengths of the chord. Edges flip in triangles with two edges on one curve, which has no corner between the edges.
     """
     pairs, nodes = interface_edges(mesh), len(mesh.points)
     pairs = pairs[~np.isin(edge_keys(pairs, nodes), edge_keys(mesh.arc_edges, nodes))]
@@ -117,7 +117,7 @@ def with_bent_edges(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
 
 
 def _with_arcs(mesh: CoarseMesh, curves: Sequence[Ellipses], arcs: Sequence[Int32]) -> CoarseMesh:
-    """Add ellipses, and the edges (a, 2) on each, to the mesh."""
+    """Add ellipses to the mesh, with the edges (a, 2) on each ellipse."""
     number = np.repeat(np.arange(len(arcs)), np.array([len(pairs) for pairs in arcs], np.intp))
     return replace(
         mesh,
@@ -130,11 +130,13 @@ def _with_arcs(mesh: CoarseMesh, curves: Sequence[Ellipses], arcs: Sequence[Int3
 def _closed_loops(
     mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes, fewest: int
 ) -> Iterator[tuple[Int, Float, Float, list[tuple[Float, Int]]]]:
-    """Yield closed interfaces of `fewest` edges or halves, none on a cell side, that are contractible on the torus.
+    """Yield closed interfaces that are contractible on the torus, off the cell sides.
+
+    An interface has at least `fewest` edges or, with middle nodes, edge halves.
 
     Yields:
-        Node classes (k,) in order, their unwrapped positions (k, 2), these with those of middle nodes between them, and
-        the distance (2,) from each image in the plane with the numbers of the interface edges there.
+        Node classes (k,) in order, unwrapped positions (k, 2) of the classes, unwrapped positions of corner and middle
+        nodes in order, and for each image in the plane the distance (2,) and the numbers of the interface edges.
     """
     if len(pairs) == 0:
         return
@@ -158,20 +160,20 @@ def _closed_loops(
             places = mesh.points[classes[order[0]]] + np.cumsum(hops, axis=0) - hops
             members = np.flatnonzero(part[ends[:, 0]] == part[start])
             place = np.argsort(order)[np.searchsorted(np.sort(order), ends[members])]
-            away = np.round((places[place[:, 0]] - mesh.points[pairs[members, 0]]) / size)
-            # A middle node is between the places of its edge's ends, behind the last place if these are far apart.
+            periods = np.round((places[place[:, 0]] - mesh.points[pairs[members, 0]]) / size)
+            # A middle node follows the first end of its edge, or the last node if the edge closes the loop.
             between = np.where(np.ptp(place, axis=1) == 1, place.mean(axis=1), len(order))
             along = np.argsort(np.append(np.arange(len(order)), between), kind="stable")
-            chain = np.concatenate([places, bends[members] + away * size])[along]
+            chain = np.concatenate([places, bends[members] + periods * size])[along]
             chain = chain[~np.isnan(chain[:, 0])]
-            distinct, which = np.unique(away, axis=0, return_inverse=True)
-            images = [(step * size, members[which.ravel() == k]) for k, step in enumerate(distinct)]
+            distinct, image_number = np.unique(periods, axis=0, return_inverse=True)
+            images = [(step * size, members[image_number.ravel() == k]) for k, step in enumerate(distinct)]
             if len(chain) >= fewest:
                 yield classes[order], places, chain, images
 
 
 def _moved(points: Float, places: Float, circle: Ellipses, size: Float) -> Float | None:
-    """Move points (k, 2) onto the circle, side nodes along their side; None if impossible."""
+    """Move points (k, 2) onto a circle, and side nodes along the side; None if impossible."""
     centres, radius = circle.centres - np.round((places - points) / size) * size, circle.frames[0, 0, 0]
     spokes = points - centres
     moved: Float = centres + radius * spokes / np.linalg.norm(spokes, axis=1)[:, None]
@@ -181,7 +183,7 @@ def _moved(points: Float, places: Float, circle: Ellipses, size: Float) -> Float
     for axis in (0, 1):
         fixed = np.flatnonzero(on_side[:, axis])
         across = 1 - (spokes[fixed, axis] / radius) ** 2
-        # Where the circle nearly touches the side, a node cannot get onto it along the side.
+        # If the circle nearly touches the side, a node along the side cannot reach the circle.
         if np.any(across < 1e-4):
             return None
         moved[fixed, axis] = points[fixed, axis]
@@ -191,7 +193,7 @@ def _moved(points: Float, places: Float, circle: Ellipses, size: Float) -> Float
 
 
 def _fit_circle(places: Float) -> Ellipses:
-    """Fit a circle |d|^2 = 2 c.d + r^2 - |c|^2, d from the mean of the positions (k, 2)."""
+    """Fit a circle |d|^2 = 2 c.d + r^2 - |c|^2 to positions (k, 2) at offsets d from the mean."""
     mean = places.mean(axis=0)
     scale = np.abs(places - mean).max()
     scaled = (places - mean) / scale
@@ -202,19 +204,18 @@ def _fit_circle(places: Float) -> Ellipses:
 
 
 def fit_ellipse(places: Float) -> Ellipses | None:
-    """Fit an ellipse to a closed chain of positions (k, 2) in order; None if `_holds` is false.
+    """Fit an ellipse to an ordered closed chain of positions (k, 2).
 
-    The conic d.A.d + b.d = 1 that fits best, d from the mean of the places, is |F^-1 (d - c)| = 1.
+    The best conic d.A.d + b.d = 1, with offsets d from the mean, is |F^-1 (d - c)| = 1; None if `_holds` is false.
     """
     mean = places.mean(axis=0)
     scale = np.abs(places - mean).max()
     x, y = ((places - mean) / scale).T
-    (xx, xy, yy, bx, by), *_ = np.linalg.lstsq(
-        np.column_stack([x * x, x * y, y * y, x, y]), np.ones(len(x)), rcond=None
-    )
+    matrix = np.column_stack([x * x, x * y, y * y, x, y])
+    (xx, xy, yy, bx, by), *_ = np.linalg.lstsq(matrix, np.ones(len(x)), rcond=None)
     A = np.array([[xx, xy / 2], [xy / 2, yy]])
     values, axes = np.linalg.eigh(A)
-    if values[0] <= np.sqrt(np.finfo(float).eps) * values[1]:  # it may be a parabola but for rounding
+    if values[0] <= np.sqrt(np.finfo(float).eps) * values[1]:  # but for rounding, the conic may be a parabola
         return None
     centre = -np.linalg.solve(A, [bx, by]) / 2
     level = 1 + centre @ A @ centre
@@ -224,7 +225,7 @@ def fit_ellipse(places: Float) -> Ellipses | None:
 
 
 def _holds(ellipse: Ellipses, chain: Float) -> bool:
-    """Return whether positions (k, 2) are on an ellipse F, with distances |F^-1 d| <= 1 from each to the next."""
+    """Return whether a chain of positions (k, 2) is on an ellipse F, with steps |F^-1 d| <= 1."""
     on_circle = np.linalg.solve(ellipse.frames[0], (chain - ellipse.centres).T)
     chord = np.hypot(*(np.roll(on_circle, -1, axis=1) - on_circle))
     return bool(chord.max() <= 1 and np.all(np.abs(np.hypot(*on_circle) - 1) <= ROUNDNESS_TOLERANCE))

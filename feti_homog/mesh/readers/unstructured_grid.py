@@ -1,4 +1,4 @@
-"""Convert a grid with VTK's cell types and cell data, read from VTK or Medit files, into triangles and lines."""
+"""Convert a grid from a VTK or Medit file, with VTK cell types and cell data, into triangles and lines."""
 
 import re
 import warnings
@@ -14,14 +14,12 @@ from feti_homog.schema import wording
 from feti_homog.typing import Float, Int
 
 Numbers = np.ndarray[Any, Any]
-
-# The first word that is no number, where whole or real numbers are read.
+# Patterns of the first word that is not a whole number or not a real number.
 WRONG_WORD = {
     "i8": re.compile(rb"(?<!\S)(?![-+]?\d+(?!\S))\S+"),
     "f8": re.compile(rb"(?i)(?<!\S)(?![-+]?((\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?|nan|inf)(?!\S))\S+"),
 }
-
-# Numbers of nodes by VTK's type of cell; quadrilaterals are cut in two triangles.
+# Numbers of nodes by VTK cell type; quadrilaterals become two triangles.
 TRIANGLES = {5: 3, 9: 4, 22: 6, 23: 8, 28: 9}
 LINES = {3: 2, 21: 3}
 POINTS = (1, 2)
@@ -29,7 +27,7 @@ POLYGON, PIXEL = 7, 8
 NAMES = {0: "empty cells", 4: "polylines", 6: "triangle strips", 7: "polygons", 10: "tetrahedra", 12: "hexahedra"}
 NAMES |= {13: "wedges", 14: "pyramids", 34: "triangles of seven nodes", 42: "polyhedra", 69: "triangles of any order"}
 PHASE = "phase"
-# Cell data by which other programs number materials, in the order of precedence.
+# Cell data with material numbers of other programs, in the order of precedence.
 NUMBERS = (
     *("medit:ref", "gmsh:physical", "CellEntityIds", "mat_id", "MaterialIds"),
     *("material", "cell_tags", "region", "gmsh:geometrical"),
@@ -39,15 +37,15 @@ MOST_PHASES = 10**9
 
 @dataclass(frozen=True)
 class Grid:
-    """Points and m cells; MeshError where the arrays do not belong together.
+    """A grid of n points and m cells; MeshError for inconsistent arrays.
 
     Attributes:
-        points: (n, 3) their coordinates.
-        types: (m,) VTK's cell types.
-        nodes: their nodes, cell after cell, numbered from 0.
-        counts: (m,) how many nodes each has.
-        data: cell data, (m,) or (m, k), by their names.
-        first: the file's number for the first node and the first cell.
+        points: (n, 3) coordinates.
+        types: (m,) VTK cell types.
+        nodes: nodes of all cells, cell after cell, numbered from 0.
+        counts: (m,) number of nodes of each cell.
+        data: cell data, (m,) or (m, k), by name.
+        first: number of the first node and the first cell in the file.
     """
 
     points: Float
@@ -71,7 +69,7 @@ class Grid:
             raise MeshError(*(f"cell data {name}: {size} values for {m} cells" for name, size in sizes.items()))
 
     def nodes_of(self, cells: Int, count: int) -> Int:
-        """Return the file's numbers (k, count) of the first `count` nodes in cells (k,)."""
+        """Return the first `count` nodes (k, count) of each cell (k,), as numbered in the file."""
         starts = (np.cumsum(self.counts) - self.counts)[cells]
         return np.asarray(self.first + self.nodes[starts[:, None] + np.arange(count)], np.int64)
 
@@ -79,10 +77,10 @@ class Grid:
 def mesh_of(grid: Grid) -> RawMesh:
     """Convert a grid into triangles and lines.
 
-    The cell data `phase` are 0 in the matrix, 1 in phase fibre, k in fibre:k.  Without them, triangles are grouped by
-    the first of NUMBERS in the grid, otherwise by its only cell data of whole numbers.  The optional cell data
-    `debonded` are 1 on lines that are debonded from the start.  All other lines form one curve for each number or,
-    beside phases, a single curve `line`.
+    The cell data `phase` are 0 in the matrix, 1 in phase fibre, k in fibre:k.  Without `phase`, the first of NUMBERS in
+    the grid, or else the only cell data of whole numbers, group the triangles.  The optional cell data `debonded` are 1
+    on lines that are debonded from the start.  All other lines form one curve for each number or, with `phase`, a
+    single curve `line`.
 
     Raises:
         MeshError: the grid has other cells or no phases.
@@ -95,8 +93,8 @@ def mesh_of(grid: Grid) -> RawMesh:
     types[(types == POLYGON) & (counts == 3)] = 5
     types[((types == POLYGON) | (types == PIXEL)) & (counts == 4)] = 9
     grid, faults = replace(grid, types=types, nodes=nodes), _other_cells(types, counts, grid.first)
-    whole = [k for k, values in data.items() if k != DEBONDED and values.ndim == 1 and values.dtype.kind in "iu"]
-    name = next((name for name in (PHASE, *NUMBERS) if name in data), whole[0] if len(whole) == 1 else "")
+    integers = [k for k, values in data.items() if k != DEBONDED and values.ndim == 1 and values.dtype.kind in "iu"]
+    name = next((name for name in (PHASE, *NUMBERS) if name in data), integers[0] if len(integers) == 1 else "")
     if not name:
         expected = "expected 0 in the matrix, 1 in phase fibre, 2 in fibre:2, ..."
         faults.append(f"no cell data named {PHASE}, but {', '.join(data) or 'none'}: {expected}")
@@ -104,8 +102,8 @@ def mesh_of(grid: Grid) -> RawMesh:
         faults.append(f"cell data {name}: expected one value for each of {len(types)} cells")
     else:
         values = np.ravel(data[name])
-        bad = values[~((values == np.round(values)) & (values >= 0) & (values < MOST_PHASES))]
-        faults += [f"cell data {name} = {k:g}: expected 0, 1, 2, ... below {MOST_PHASES}" for k in bad[:1]]
+        faulty = values[~((values == np.round(values)) & (values >= 0) & (values < MOST_PHASES))]
+        faults += [f"cell data {name} = {k:g}: expected 0, 1, 2, ... below {MOST_PHASES}" for k in faulty[:1]]
     if faults:
         raise MeshError(*faults)
     has_phases, groups, blocks = name == PHASE, values.astype(np.int64), []
@@ -128,7 +126,7 @@ def mesh_of(grid: Grid) -> RawMesh:
 
 
 def _other_cells(types: Int, counts: Int, first: int) -> list[str]:
-    """List unusable cell types, wrong node counts, and missing triangles; `first` is the first cell's number."""
+    """List unusable cells, wrong node counts, and missing triangles; `first` is the first cell number."""
     usable, faults = TRIANGLES | LINES, []
     for kind in np.unique(types).tolist():
         cells = np.flatnonzero(types == kind)
@@ -146,7 +144,7 @@ def _other_cells(types: Int, counts: Int, first: int) -> list[str]:
 
 
 class NotANumber(ValueError):
-    """A word where a number is expected; `place` is where it begins in the text."""
+    """The error for a word at `place` in a text that should be a number."""
 
     def __init__(self, text: bytes, kind: str) -> None:
         wrong = WRONG_WORD[kind].search(text)
@@ -156,10 +154,10 @@ class NotANumber(ValueError):
 
 
 def numbers(text: bytes, kind: str) -> Numbers:
-    """Convert text into numbers, whole (`i8`) or real (`f8`).
+    """Convert text into whole numbers (`i8`) or real numbers (`f8`).
 
     Raises:
-        NotANumber: another word is in it.
+        NotANumber: a word in the text is not such a number.
     """
     if not text.strip():
         return np.zeros(0, kind)
@@ -167,5 +165,5 @@ def numbers(text: bytes, kind: str) -> Numbers:
         warnings.simplefilter("error")
         try:
             return np.fromstring(text, kind, sep=" ")
-        except (DeprecationWarning, ValueError):  # the one becomes the other in a later version of NumPy
+        except (DeprecationWarning, ValueError):  # a later version of NumPy turns the warning into an error
             raise NotANumber(text, kind) from None

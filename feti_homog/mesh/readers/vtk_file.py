@@ -1,6 +1,6 @@
-"""Read legacy VTK files (.vtk), text or binary, up to version 5.1, and Medit's mesh files (.mesh).
+"""Read legacy VTK files (.vtk), text or binary, up to version 5.1, and Medit mesh files (.mesh).
 
-FreeFEM, Netgen, Gmsh and MMG write Medit's files.
+FreeFEM, Netgen, Gmsh and MMG write Medit files.
 """
 
 from __future__ import annotations
@@ -30,12 +30,11 @@ TYPES = {"char": "i1", "short": "i2", "int": "i4", "long": "i8"}
 TYPES |= {f"unsigned_{name}": f"u{kind[1]}" for name, kind in TYPES.items()}
 TYPES |= {f"vtktype{name.lower()}": kind for name, kind in XML_TYPES.items() if "Int" in name}
 TYPES |= {"signed_char": "i1", "vtkidtype": "i4", "float": "f4", "double": "f8"}
-# Numbers of a cell or a point in the sections that name their type; that of SCALARS stands behind it.
+# Values for a cell or a point by section; the header of SCALARS may give another number.
 WIDTHS = {"SCALARS": 1, "VECTORS": 3, "NORMALS": 3, "TENSORS": 9, "TENSORS6": 6, "GLOBAL_IDS": 1, "PEDIGREE_IDS": 1}
-
-# Medit's sections of cells: VTK's type, number of nodes.
+# Cell sections of Medit: VTK cell type, number of nodes.
 CELLS = {"EDGES": (3, 2), "TRIANGLES": (5, 3), "QUADRILATERALS": (9, 4)}
-# Numbers per entry of sections, nodes and reference of cells; vectors have as many as coordinates.
+# Values for an entry of each section, for cells the nodes and a reference; vectors have the space dimension.
 ENTRIES = {
     **dict.fromkeys(("CORNERS", "RIDGES", "REQUIREDVERTICES", "REQUIREDEDGES", "REQUIREDTRIANGLES"), 1),
     **dict.fromkeys(("NORMALATVERTICES", "TANGENTATVERTICES", "VERTEXONGEOMETRICVERTEX", "EDGEONGEOMETRICEDGE"), 2),
@@ -47,11 +46,11 @@ VECTORS, VERTICES = ("NORMALS", "TANGENTS"), "VERTICES"
 
 
 def load(path: Path) -> RawMesh:
-    """Read triangles and lines from a VTK file; nodes and cells have its numbers, from 0.
+    """Read triangles and lines from a VTK file, which numbers nodes and cells from 0.
 
     Raises:
         OSError: the file cannot be read.
-        MeshError: it is damaged, or has other cells or no phases.
+        MeshError: the file is damaged, or has other cells or no phases.
     """
     file = Scanner(input_files.read(path))
     if file.line()[:4] != ["#", "vtk", "DataFile", "Version"]:
@@ -87,14 +86,14 @@ def load(path: Path) -> RawMesh:
 
 
 def _cells(file: Scanner, count: int, size: int) -> tuple[Int, Int]:
-    """Read the cells: nodes behind all offsets or, before version 5, rows of a node count and nodes."""
+    """Read the nodes of all cells, and the node count of each cell."""
     if file.follows("OFFSETS"):
         offsets = file.take(count, "".join(file.line()[1:2])).astype(np.int64)
         if not file.follows("CONNECTIVITY"):
             file.refuse("CELLS: expected CONNECTIVITY behind OFFSETS")
         return file.take(size, "".join(file.line()[1:2])).astype(np.int64), np.diff(offsets)
     rows = file.take(size, "int").astype(np.int64)
-    # A row begins behind the nodes of the row before: follow these links from entry 0.
+    # Before version 5, a row has a node count and nodes: follow the links from row to row, from entry 0.
     onward = np.clip(np.arange(size) + 1 + rows, 0, size)
     graph = csr_array((np.ones(size), onward, np.append(np.arange(size + 1), size)), shape=(size + 1, size + 1))
     starts = breadth_first_order(graph, 0, return_predecessors=False)
@@ -103,7 +102,7 @@ def _cells(file: Scanner, count: int, size: int) -> tuple[Int, Int]:
 
 
 def _arrays(file: Scanner, section: str, words: list[str], length: int) -> Iterator[tuple[str, Numbers, int]]:
-    """Read arrays of `length` points or cells; yield name, values and width of each, but skip tables."""
+    """Yield name, values and width of the arrays for `length` points or cells in a section."""
     byte = "unsigned_char" if file.is_binary else "float"
     if section == "FIELD":
         for _ in range(min(file.count(words[1]), len(file.content))):
@@ -127,11 +126,11 @@ def _arrays(file: Scanner, section: str, words: list[str], length: int) -> Itera
 
 
 def load_medit(path: Path) -> RawMesh:
-    """Read triangles and lines from a Medit file; nodes have numbers from 1, cells section by section.
+    """Read triangles and lines from a Medit file, which numbers nodes and cells from 1.
 
     Raises:
         OSError: the file cannot be read.
-        MeshError: it is damaged, or has other cells.
+        MeshError: the file is damaged, or has other cells.
     """
     file = Scanner(re.sub(rb"#[^\n]*", b"", input_files.read(path)))
     if file.word() != "MeshVersionFormatted":
@@ -163,13 +162,13 @@ def load_medit(path: Path) -> RawMesh:
 
 
 class Scanner:
-    """Read lines, words and arrays of a file; binary arrays are big-endian."""
+    """A reader of lines, words and arrays in a file, with big-endian binary arrays."""
 
     def __init__(self, content: bytes) -> None:
         self.content, self.place, self.is_binary = content.removeprefix(codecs.BOM_UTF8), 0, False
 
     def line(self) -> list[str]:
-        """Read the words of the next line that is not blank, behind any METADATA block; empty at the end."""
+        """Read the words of the next line, without blank lines and METADATA blocks; empty at the end."""
         words = list[str]()
         while not words and self.place < len(self.content):
             start, self.place = self.place, self.content.find(b"\n", self.place) + 1 or len(self.content)
@@ -197,7 +196,7 @@ class Scanner:
         return int(word)
 
     def take(self, count: int, name: str) -> Numbers:
-        """Read an array (count,) of VTK's type `name`."""
+        """Read an array (count,) of the VTK type `name`."""
         if name.lower() not in TYPES:
             self.refuse(f"{wording.toml_value(name)}: expected a type of numbers, such as int or double")
         kind = TYPES[name.lower()]

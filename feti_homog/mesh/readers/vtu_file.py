@@ -1,4 +1,4 @@
-"""Read triangles and lines from VTK's XML files (.vtu): text, base64 or raw, compressed or not."""
+"""Read triangles and lines from XML files of VTK (.vtu): text, base64 or raw, compressed or not."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ TYPES = {f"{sign}Int{8 * size}": f"{kind}{size}" for sign, kind in (("", "i"), (
 TYPES |= {"Float32": "f4", "Float64": "f8"}
 ORDERS = {"LittleEndian": "<", "BigEndian": ">"}
 COMPRESSORS = {"vtkZLibDataCompressor": zlib.decompressobj, "vtkLZMADataCompressor": lzma.LZMADecompressor}
-# Bytes that compressed data may have: so many in any file, or so many for each of the file's.
+# Limit for decompressed data: bytes for any file, and bytes for each byte of the file; the larger limit counts.
 MOST_BYTES, MOST_RATIO = 2**26, 50
 ARRAYS = ("connectivity", "offsets", "types")
 SEGMENT = re.compile(rb"[^=]+={0,2}")
 
 
 def load(path: Path) -> RawMesh:
-    """Read triangles and lines; nodes and cells have the file's numbers, from 0, piece after piece.
+    """Read triangles and lines, with numbers from 0 through all pieces of a file.
 
     Raises:
         OSError: the file cannot be read.
-        MeshError: it is damaged, or has other cells or no phases.
+        MeshError: the file is damaged, or has other cells or no phases.
     """
     content = input_files.read(path)
     size, start, stop, appended = len(content), content.find(b"<AppendedData"), content.rfind(b"</AppendedData>"), b""
@@ -48,7 +48,7 @@ def load(path: Path) -> RawMesh:
         raise MeshError(f"not XML: {error}") from None
     (grid,) = _children(root, "VTKFile", {"UnstructuredGrid": 1, "AppendedData": 0})["UnstructuredGrid"]
     arrays = _Arrays(root, appended, max(MOST_BYTES, MOST_RATIO * size))
-    pieces, tables, before = [], list[dict[str, Numbers]](), 0
+    pieces, tables, first_node = [], list[dict[str, Numbers]](), 0
     for piece in _children(grid, grid.tag, {"Piece": 1, "FieldData": 0})["Piece"]:
         sections = _children(piece, "Piece", {"Points": 1, "Cells": 1, "CellData": 0, "PointData": 0})
         sizes = []
@@ -68,18 +68,18 @@ def load(path: Path) -> RawMesh:
             raise MeshError(f"{len(types)} types of cells: expected {sizes[1]}")
         data = arrays.of(sections["CellData"][0]) if sections["CellData"] else {}
         tables += [data] if sizes[1] else []
-        pieces.append((points.reshape(-1, 3).astype(float), types, nodes + before, np.diff(ends, prepend=0)))
-        before += sizes[0]
+        pieces.append((points.reshape(-1, 3).astype(float), types, nodes + first_node, np.diff(ends, prepend=0)))
+        first_node += sizes[0]
     points, types, nodes, counts = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
     tables = tables or [{}]
-    if lost := set[str]().union(*tables) - set(tables[0]).intersection(*tables):
-        raise MeshError(f"cell data {min(lost)}: missing in one of {len(tables)} pieces")
+    if missing_names := set[str]().union(*tables) - set(tables[0]).intersection(*tables):
+        raise MeshError(f"cell data {min(missing_names)}: missing in one of {len(tables)} pieces")
     data = {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
     return mesh_of(Grid(points, types, nodes, counts, data))
 
 
 def _children(element: ElementTree.Element, name: str, tags: Mapping[str, int]) -> dict[str, list[Any]]:
-    """Return an element's children by tag; MeshError for unknown and missing children."""
+    """Group the children of an XML element by tag; MeshError for unknown and missing children."""
     children: dict[str, list[Any]] = {tag: element.findall(tag) for tag in tags}
     other = [child.tag for child in element if child.tag not in tags]
     expected = f"expected {' and '.join(tags)}"
@@ -93,7 +93,7 @@ def _children(element: ElementTree.Element, name: str, tags: Mapping[str, int]) 
 
 
 class _Arrays:
-    """Decode arrays in the form that the root declares; at most `budget` bytes are decompressed."""
+    """A decoder of arrays in the format of an XML root, up to `budget` decompressed bytes."""
 
     def __init__(self, root: ElementTree.Element, appended: bytes, budget: int) -> None:
         kind, compressor = root.get("type"), root.get("compressor", "")
@@ -116,7 +116,7 @@ class _Arrays:
         self.starts = [*sorted(starts), len(appended)]
 
     def of(self, section: ElementTree.Element) -> dict[str, Numbers]:
-        """Read the numeric arrays of a section by name: (k,), or a row for each tuple."""
+        """Read the numeric arrays (k,) or (k, width) of a section by name."""
         arrays = {}
         for array in section.iter("DataArray"):
             name, kind = array.get("Name") or "Points", TYPES.get(array.get("type", ""))
@@ -148,13 +148,12 @@ class _Arrays:
     def _offset(self, array: ElementTree.Element) -> int:
         word = array.get("offset", "").strip()
         if not re.fullmatch("[0-9]{1,15}", word) or int(word) > len(self.appended):
-            raise MeshError(
-                f"offset is {wording.toml_value(word)}: expected one in {len(self.appended)} appended bytes"
-            )
+            expected = f"expected one in {len(self.appended)} appended bytes"
+            raise MeshError(f"offset is {wording.toml_value(word)}: {expected}")
         return int(word)
 
     def _unpacked(self, data: bytes) -> bytes:
-        """Unpack data behind a header with their length or block lengths; ValueError or IndexError if cut off."""
+        """Unpack data behind a header with one or more lengths; ValueError or IndexError for missing data."""
         header = np.frombuffer(data, self.header, len(data) // self.header.itemsize)
         count, first = (int(header[0]), 3) if self.decompressor else (1, 0)
         lengths, start, unpacked = header[first : first + count].tolist(), (first + count) * self.header.itemsize, []

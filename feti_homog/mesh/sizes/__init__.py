@@ -1,4 +1,4 @@
-"""Sizes of elements: along interfaces, around tips, in passages, and how many elements they make.
+"""Element sizes along interfaces, around tips and in passages, and estimates of element numbers.
 
 Imports `case` and `microstructure`.  Main entry: `graded_size`.
 """

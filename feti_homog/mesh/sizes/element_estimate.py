@@ -1,4 +1,4 @@
-"""Estimates of the number of triangles before a mesh is made."""
+"""Estimate the number of triangles before the program makes a mesh."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from feti_homog.microstructure import Arrangement
 from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.typing import Float
 
-# Elements that are meshed in some minutes on one rank, and by all ranks together.
+# Limits for elements that one rank, or all ranks together, can make in some minutes.
 MAX_TRIANGLES, MAX_TRIANGLES_OF_TILES = 1_000_000, 20_000_000
 # Area of an equilateral triangle / its side squared.
 TRIANGLE_AREA = math.sqrt(3.0) / 4.0
-# Triangles about a fibre of a random cell, whose gaps are narrow.
+# Additional triangles around a fibre of a random cell, because of narrow gaps.
 TRIANGLES_OF_A_FIBRE = 160
-# Ratios of sizes beyond those that a case can ask for.
+# Size ratios, up to more than a case allows.
 RATIOS = np.geomspace(1.0, 1e7, 400)
-# Positions along each axis at which sizes are summed over a cell.
+# Sample positions of the size along each axis.
 POSITIONS = 200
 
 
 @dataclass(frozen=True)
 class ElementEstimate:
-    """A cell of width 1 before it is meshed; only the fibres of a table are arranged.
+    """The quantities of a cell of width 1 that determine the number of triangles.
 
     Attributes:
-        cell: with its element sizes.
-        fibres: how many.
-        mean_radius: of fibres, in tables also of voids.
-        height: relative to the width.
-        interfaces: total length.
-        ovals: fibres that are ellipses.
+        cell: the cell section, with element sizes.
+        fibres: number of fibres.
+        mean_radius: mean radius of the fibres, in tables also of voids.
+        height: cell height / cell width.
+        interfaces: total length of the interfaces.
+        ovals: the elliptic fibres in a table.
     """
 
     cell: cell_section.Cell
@@ -49,7 +49,7 @@ class ElementEstimate:
 
     @classmethod
     def of(cls, cell: cell_section.Cell, listed: Arrangement | None) -> ElementEstimate:
-        """Estimate the elements of a cell, with the arrangement of its table if it has one."""
+        """Collect the quantities of a cell; `listed` is the arrangement of a table, if any."""
         if listed is not None:
             from feti_homog.microstructure.shapes import shapes  # only tables have shapes
 
@@ -63,22 +63,21 @@ class ElementEstimate:
 
     @property
     def interface_size(self) -> float:
-        """Size of elements on interfaces."""
+        """The element size on interfaces."""
         asked = self.cell.interface_size or self.cell.mesh_size
         return min(asked, 2 * math.pi * self.mean_radius / MIN_EDGES_AROUND)
 
     @property
     def triangles(self) -> float:
-        """Estimate the number of triangles in a cell without debonded arcs.
+        """The estimated number of triangles in a cell without debonded arcs.
 
-        Triangles of one size fill the cell; others are added about fibres, at ends of ellipses, and beside interfaces.
-
-        On both sides of interfaces with length P there are 2 P int dx / (A (h + g x)^2) = 2 P / (A g h) triangles.
+        Triangles of one size fill the cell. Additional triangles are around fibres, at the ends of ellipses, and on
+        both sides of interfaces of length P: 2 P int dx / (A (h + g x)^2) = 2 P / (A g h).
         """
         cell = self.cell
         irregular = 0 if cell.geometry in cell_section.LATTICES else self.fibres
         count = self.height / (TRIANGLE_AREA * cell.mesh_size**2) + TRIANGLES_OF_A_FIBRE * irregular
-        # Ends of long axes have the radius of curvature b^2 / a.
+        # The radius of curvature at the ends of the long axis is b^2 / a.
         short, long = np.sort(self.ovals.semi_axes, axis=1).T
         ratios = (cell.interface_size or cell.mesh_size) / (2 * np.pi * short**2 / long / MIN_EDGES_AROUND)
         count += 2 * math.fsum(map(triangles_of_a_tip, np.maximum(1.0, ratios).tolist()))
@@ -88,13 +87,13 @@ class ElementEstimate:
 
 
 def refuse_many(size_at: Callable[[Float], Float], smallest: float, period: Float, limit: int = MAX_TRIANGLES) -> None:
-    """Refuse a cell of periods (2,) whose sizes need too many elements int dA / (A h^2).
+    """Refuse a cell of periods (2,) that needs too many elements int dA / (A h^2).
 
-    The sizes h(x) know narrow gaps and thin coatings, `ElementEstimate` only the numbers in the case. They are not
-    summed where their lower bound `smallest` keeps the number below `limit`.
+    Unlike `ElementEstimate`, the sizes h(x) depend on narrow gaps and thin coatings. The sum over h is unnecessary if
+    the lower bound `smallest` of the sizes keeps the number below `limit`.
 
     Raises:
-        MeshError: they are more than `limit`.
+        MeshError: the cell needs more than `limit` elements.
     """
     if period.prod() <= limit * TRIANGLE_AREA * smallest**2:
         return
@@ -102,22 +101,21 @@ def refuse_many(size_at: Callable[[Float], Float], smallest: float, period: Floa
     places = np.stack(np.meshgrid(share, share), axis=-1).reshape(-1, 2) * period
     count = float((1 / size_at(places) ** 2).mean() * period.prod() / TRIANGLE_AREA)
     if count > limit:
-        raise MeshError(
-            f"[cell] narrow gaps, thin coatings or small fibres need about {count:.2g} elements before refine; "
-            f"expected at most {limit}"
-        )
+        elements = f"{count:.2g} elements before refine; expected at most {limit}"
+        raise MeshError(f"[cell] narrow gaps, thin coatings or small fibres need about {elements}")
 
 
 def triangles_of_a_tip(ratio: np.float64 | float) -> float:
-    """Return the number of triangles that elements smaller by `ratio` add at a tip.
+    """Return the number of additional triangles around a tip.
 
-    int 2 pi r dr / (A (h + g r)^2) up to the radius where h + g r is the size around, less the triangles of that size.
+    With the surrounding size `ratio` h, the number is int 2 pi r dr / (A (h + g r)^2) up to the radius where
+    h + g r = ratio h, less the triangles of the surrounding size.
     """
     within = 2 * (np.log(ratio) + 1 / ratio - 1) - (1 - 1 / ratio) ** 2
     return float(math.pi / (TRIANGLE_AREA * MAX_GROWTH**2) * within)
 
 
 def ratio_at_a_tip(count: float) -> float:
-    """Return the size ratio at a tip that adds `count` triangles."""
+    """Return the size ratio at a tip with `count` additional triangles."""
     counts = [triangles_of_a_tip(ratio) for ratio in RATIOS]
     return float(np.interp(count, counts, RATIOS))

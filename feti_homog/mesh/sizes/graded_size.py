@@ -1,4 +1,4 @@
-"""Edge sizes on the cell's lines, smaller on circles and at debond tips."""
+"""The edge sizes on the lines of a cell, smaller on circles and at debond tips."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from feti_homog.microstructure import Arrangement, arrangements
 from feti_homog.microstructure.shapes import on_circle
 from feti_homog.typing import Float
 
-# Growth of the edge length per distance, at most.
+# Largest growth of the edge length per distance.
 MAX_GROWTH = 0.4
 NEAREST = 16  # sources that count at a position
-# Positions in one query of a tree, which bounds its memory.
+# Positions in one query of a tree, which limits the memory.
 CHUNK = 100_000
-# Edges around a fibre, at least.
+# Smallest number of edges around a fibre.
 MIN_EDGES_AROUND = 16
-# Edge length in a narrow passage, relative to its width.
+# Edge length in a narrow passage / width of the passage.
 PASSAGE_EDGE = 1.5
-# Angle between a circle and a side that it crosses, relative to the turn of the circle along an edge there.
+# Angle between a circle and a crossing side / turn of the circle along an edge at the crossing.
 WEDGE = 3
-
-
+# Edge size on a circle / largest size, below which elements grow from the circle: gmsh would interpolate sizes between
+# tiny discs that are far apart.
+FINE_CIRCLE = 0.1
 # Outward normals of the sides of a cell.
 AXES = np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]])
-
-# Places (k, 2), edge lengths (k,) and growths (k,).
+# Positions (k, 2), edge lengths (k,) and growths (k,).
 Source = tuple[Float, Float, Float]
 
 
@@ -40,10 +40,10 @@ def wrap(points: Float, size: Float) -> Float:
 
 
 def circle_size(arrangement: Arrangement, largest: float) -> Float:
-    """Return the longest edge (k,) on each circle, for MIN_EDGES_AROUND edges or more.
+    """Return the longest edge (k,) on each circle, for at least MIN_EDGES_AROUND edges.
 
-    Edges on a coating with thickness t on the radius a have at most sqrt(t a): then they are t / 8 away from their
-    arcs, and elements across the coating do not turn over when their edges are bent.
+    Edges on a coating of thickness t and inner radius a have a length of at most sqrt(t a). The distance to the arcs
+    is then at most t / 8, and elements across the coating do not turn over when edges bend.
     """
     shells, disc = arrangement.shells
     caps = np.minimum(largest, 2 * np.pi * shells.radii / MIN_EDGES_AROUND)
@@ -51,15 +51,15 @@ def circle_size(arrangement: Arrangement, largest: float) -> Float:
 
 
 def coating_size(arrangement: Arrangement) -> Float:
-    """Return sqrt(t a) (N,) for coatings of thickness t on discs of radius a, infinite for bare discs."""
+    """Return sqrt(t a) (N,) for coatings of thickness t on discs of radius a; infinite for bare discs."""
     return np.where(arrangement.coated, np.sqrt(arrangement.coating * arrangement.radii), np.inf)
 
 
 def passages(width: Float, curvature: Float, faces: tuple[Float, Float], caps: Sequence[Float | float]) -> list[Source]:
-    """Return both faces (k, 2) of passages as sources, where they make edges shorter than `caps` (k,).
+    """Return the sources on both faces (k, 2) of passages, where edges are shorter than `caps` (k,).
 
-    Edges are PASSAGE_EDGE times the width long, or as long as those of the other face let them grow. Their growth stays
-    below that of twice the width w + c s^2 / 2 at the distance s along a passage.
+    The edge length is PASSAGE_EDGE times the passage width, or less if the edges on the other face are shorter. The
+    length grows more slowly than twice the width w + c s^2 / 2 at the distance s along a passage of curvature c.
     """
     growth = np.minimum(MAX_GROWTH, np.sqrt((4 - 2 * PASSAGE_EDGE) * 2 * width * curvature))
     sources = []
@@ -71,29 +71,24 @@ def passages(width: Float, curvature: Float, faces: tuple[Float, Float], caps: S
 
 
 def at_vertices(vertices: Float, size: Float) -> Source:
-    """Return the vertices, once on the torus, as sources by the distance to the next."""
+    """Return the vertices as sources, with the distance to the next vertex on the torus as length."""
     places = wrap(vertices, size)
     tree = cKDTree(places, boxsize=size)
     same = tree.query_pairs(1e-9 * size.max(), output_type="ndarray")
     places = np.delete(places, same[:, 1], axis=0)
-    # A single vertex is infinitely far from the next.
+    # The distance from a single vertex is infinite.
     distance, _ = cKDTree(places, boxsize=size).query(places, k=2)
     return places, distance[:, 1], np.full(len(places), MAX_GROWTH)
 
 
-# Size of edges on a circle / largest size, below which elements grow from it: between tiny discs far apart, gmsh would
-# interpolate the sizes on their circles.
-FINE_CIRCLE = 0.1
-
-
 @dataclass(frozen=True)
 class MeshSizes:
-    """The largest edge lengths of a mesh; each is at most the one before.
+    """The largest edge lengths of a mesh, in descending order.
 
     Attributes:
-        largest: anywhere.
-        interface: on the circles.
-        tip: at debond tips.
+        largest: length anywhere.
+        interface: length on circles.
+        tip: length at debond tips.
     """
 
     largest: float
@@ -102,14 +97,14 @@ class MeshSizes:
 
     @classmethod
     def of(cls, cell: cell_section.Cell, has_tips: bool) -> MeshSizes:
-        """Return the sizes that a case asks for, in a cell of width 1."""
+        """Return the sizes in a case, relative to the cell width."""
         interface = cell.mesh_size if cell.interface_size is None else cell.interface_size
         return cls(cell.mesh_size, interface, interface if cell.tip_size is None or not has_tips else cell.tip_size)
 
     def are_graded(self, arrangement: Arrangement) -> bool:
         """Return whether the mesh is finer on circles or at tips than elsewhere.
 
-        It is on thin coatings and tiny discs.
+        Thin coatings and tiny discs make the mesh finer, too.
         """
         return bool(min(self.tip, self.on_circles(arrangement).min()) < self.largest)
 
@@ -121,13 +116,13 @@ class MeshSizes:
 
 
 class SizeField:
-    """The size h(x) = min(largest, min_k (h_k + g_k |x - x_k|)) on the torus, or a graded size if less.
+    """The size h(x) = min(largest, min_k (h_k + g_k |x - x_k|)) on the torus, or a smaller graded size.
 
     Source k acts within the distance `largest` / MAX_GROWTH.
 
     Attributes:
-        largest: size anywhere.
-        graded: the size that grows with the distance from lines; None if elements are not graded.
+        largest: largest size.
+        graded: the size that grows with the distance from lines; None without graded elements.
         least: lower bound of the sizes.
     """
 
@@ -142,12 +137,12 @@ class SizeField:
     ) -> None:
         """Prepare sources on the torus with periods `size` (2,).
 
-        The `nearest` sources count at a position; a query has `chunk` positions.
+        The size at a position depends on the `nearest` sources; a query has at most `chunk` positions.
         """
         self.largest, self.graded = largest, graded
         self._size, self._bound, self._nearest, self._chunk = size, largest / MAX_GROWTH, nearest, chunk
         places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
-        # Where the tree finds no more sources, it returns their number: an infinite length.
+        # For missing neighbours, the tree returns the number of sources, an index with infinite length.
         self._lengths, self._growths = np.append(lengths, np.inf), np.append(growths, MAX_GROWTH)
         self.least = min(largest, float(self._lengths.min()), np.inf if graded is None else graded.least)
         self._tree = cKDTree(wrap(places, size), boxsize=size)
@@ -165,14 +160,14 @@ class SizeField:
 
 
 def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips: Float) -> SizeField:
-    """Return the edge size on the torus, by passages, vertices, discs and tips.
+    """Return the edge size on the torus, from passages, vertices, discs and tips.
 
-    The sources (x_k, h_k) are the two faces of each narrow passage between two fibres, or between a fibre and
-    a side or corner of the cell, with h_k proportional to its width, and the `vertices` (v, 2) that the mesh
-    must have, with the distance to the next one.
+    The sources (x_k, h_k) are the faces of narrow passages between two fibres, or between a fibre and a side or corner
+    of the cell, with h_k proportional to the passage width, and the mandatory `vertices` (v, 2), with the distance to
+    the next vertex.
 
-    A size is at most h_i + g d at the distance d from a disc, and h_t + g max(0, d - h_t) from one of the `tips`
-    (t, 2), so that edges at a tip have the size h_t; the growth g is MAX_GROWTH.
+    The size is at most h_i + g d at the distance d from a disc, and h_t + g max(0, d - h_t) at the distance d from one
+    of the `tips` (t, 2), where edges have the size h_t; the growth g is MAX_GROWTH.
     """
     size, largest, (shells, disc) = arrangement.size, sizes.largest, arrangement.shells
     circles, caps = np.column_stack([shells.centres, shells.radii]), circle_size(arrangement, largest)
@@ -184,7 +179,7 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
     gap, normal = distance - one[:, 2] - other[:, 2], vector / distance[:, None]
     faces = one[:, :2] + one[:, 2:] * normal, other[:, :2] - other[:, 2:] * normal
     sources = passages(gap, 1 / one[:, 2] + 1 / other[:, 2], faces, (longest[first], longest[second]))
-    # Between circles and sides, and where they cross.
+    # Between circles and sides, and at crossings.
     centres, radii = circles[:, :2] % size, circles[:, 2]
     for axis in AXES:
         distance = np.where(axis > 0, size - centres, centres)[:, axis != 0][:, 0]
@@ -196,20 +191,17 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
         half = (radii * np.sin(angle))[sharp, None] * np.abs(axis[::-1])
         for crossing in (foot[sharp] - half, foot[sharp] + half):
             sources.append((crossing, length[sharp], np.full(len(crossing), MAX_GROWTH)))
-    # Where a circle passes near the corner: the corner and the nearest point on the circle.
+    # At circles near the corner: the corner and the nearest point on the circle.
     offset = (circles[:, :2] + size / 2) % size - size / 2
     distance = np.linalg.norm(offset, axis=1)
     to_corner = PASSAGE_EDGE * np.abs(distance - circles[:, 2])
     close = to_corner < caps
     facing = offset[close] * (1 - circles[close, 2] / distance[close])[:, None]
     corners = np.concatenate([facing, np.zeros_like(facing)])
-    sources += [
-        (corners, np.tile(to_corner[close], 2), np.full(len(corners), MAX_GROWTH)),
-        at_vertices(vertices, size),
-    ]
+    sources += [(corners, np.tile(to_corner[close], 2), np.full(len(corners), MAX_GROWTH)), at_vertices(vertices, size)]
     if not sizes.are_graded(arrangement):
         return SizeField(sources, size, largest)
-    # Points h_i apart on the outer circles find the nearest disc.
+    # Points at distances h_i on the outer circles, for searches of the nearest disc.
     lengths = sizes.on_circles(arrangement)
     counts = np.ceil(2 * np.pi * outer[:, 2] / lengths).astype(int)
     disc = np.repeat(np.arange(len(counts)), counts)
@@ -219,7 +211,7 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
 
 
 class FromLines:
-    """The smaller one of h_i + g d and h_t + g max(0, d - h_t), see `size_field`.
+    """The minimum of h_i + g d and h_t + g max(0, d - h_t), see `size_field`.
 
     Attributes:
         least: lower bound of the sizes.
@@ -228,9 +220,9 @@ class FromLines:
     def __init__(
         self, size: Float, points: Float, lengths: Float, tip: float, tips: Float, circles: Float | None = None
     ) -> None:
-        """Take `points` (s, 2) on lines with their lengths h_i (s,), and h_t with the `tips` (t, 2).
+        """Prepare `points` (s, 2) on lines with lengths h_i (s,), and `tips` (t, 2) with the length h_t.
 
-        d is measured from the circles (s, 3) on which the points lie, or without circles from the points.
+        The distance d refers to the circles (s, 3) through the points or, without circles, to the points.
         """
         self._size, self._lengths, self._tip, self._circles = size, lengths, tip, circles
         self._points, self._tips = (cKDTree(wrap(x.reshape(-1, 2), size), boxsize=size) for x in (points, tips))
@@ -244,6 +236,6 @@ class FromLines:
             circles = self._circles[nearest]
             offset = (points - circles[:, :2] + self._size / 2) % self._size - self._size / 2
             distance = np.abs(np.linalg.norm(offset, axis=1) - circles[:, 2])
-        # Without tips the distance is infinite.
+        # Without tips, the distance is infinite.
         at_tips = self._tip + MAX_GROWTH * np.maximum(0.0, self._tips.query(places)[0] - self._tip)
         return np.asarray(np.minimum(self._lengths[nearest] + MAX_GROWTH * distance, at_tips))

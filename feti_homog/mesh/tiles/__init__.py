@@ -1,4 +1,4 @@
-"""Tiles of a large cell: how it is divided, filled by gmsh, and joined on the torus.
+"""The tiles of a large cell: division, filling by gmsh, and union on the torus.
 
 Imports `mesh`, `mesh.outline`, `mesh.sizes` and `microstructure`.  Main entries: `tiling.TilePolicy` and
 `tile_filling.fill`.

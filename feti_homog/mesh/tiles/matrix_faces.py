@@ -1,10 +1,10 @@
-"""The matrix between discs as faces in a planar graph, whose lines are bridges and cell sides.
+"""The matrix between discs as faces of a planar graph, whose lines are bridges and cell sides.
 
 A bridge is a straight line across the matrix between the facing points of neighbouring discs, normal to both circles.
-In a narrow gap it is about as long as the edges there, so a mesh can have it without bad triangles.
+In a narrow gap, a bridge is about as long as the edges of the mesh, and allows good triangles.
 
-Its nodes are the discs and the cell corners outside discs; lines leave a disc in the directions in which they begin on
-its circle. Lines are listed twice, once from either end.
+The graph nodes are the discs and the cell corners outside discs. Two half-lines represent a line, one from either end.
+A half-line leaves a disc in the direction of the start point on the circle.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from feti_homog.microstructure import arrangements
 from feti_homog.microstructure.shapes import on_circle
 from feti_homog.typing import Float, Int
 
-# Distance of bridges from third discs / their radius, and of bridge ends from cell sides / mean radius, at least.
+# Least distance of bridges from third discs / disc radius, and of bridge ends from cell sides / mean radius.
 CLEAR = 0.3
-# Between two bridges on one disc, at least.
+# Least angle between two bridges on one disc.
 LEAST_ANGLE = np.radians(25)
 
 
@@ -33,10 +33,10 @@ class CentreLines:
 
     Attributes:
         ends: (e, 2) discs.
-        angle: (e,) direction from the first to the second.
-        gap: (e,) between the discs.
-        facing: (e, 2, 2) the point on each end's circle that faces the other.
-        clearance: (e,) least distance between the line and a third disc's centre / its radius.
+        angle: (e,) direction from the first to the second disc.
+        gap: (e,) distance between the circles.
+        facing: (e, 2, 2) the point on each of both circles that faces the other circle.
+        clearance: (e,) least distance between the line and the centre of a third disc / radius of that disc.
     """
 
     ends: Int
@@ -56,38 +56,33 @@ def centre_lines(circles: Float, which: Int) -> CentreLines:
     length = np.linalg.norm(vector, axis=1)
     normal = vector / length[:, None]
     clearance = np.full(len(ends), np.inf)
-    # Discs of about one radius at a time: small ones far from a line need not be looked at.
+    # Discs of about one radius at a time, so that searches omit small discs far from a line.
     classes = np.floor(np.log2(radii / radii.min())).astype(int)
     for members in (np.flatnonzero(classes == level) for level in np.unique(classes)):
         tree, reach = cKDTree(centres[members]), (1 + CLEAR) * radii[members].max()
         for begin in range(0, len(ends), CHUNK):
-            some = slice(begin, begin + CHUNK)
-            close = tree.query_ball_point(centres[ends[some, 0]] + vector[some] / 2, length[some] / 2 + reach)
+            batch = slice(begin, begin + CHUNK)
+            close = tree.query_ball_point(centres[ends[batch, 0]] + vector[batch] / 2, length[batch] / 2 + reach)
             line = begin + np.repeat(np.arange(len(close)), [len(candidates) for candidates in close])
             disc = members[np.concatenate([np.zeros(0, np.int64), *filter(len, close)]).astype(int)]
-            third = (disc[:, None] != ends[line]).all(axis=1)
-            line, disc = line[third], disc[third]
+            is_third = (disc[:, None] != ends[line]).all(axis=1)
+            line, disc = line[is_third], disc[is_third]
             offset = centres[disc] - centres[ends[line, 0]]
             share = np.clip((offset * vector[line]).sum(axis=1) / length[line] ** 2, 0, 1)
-            away = np.linalg.norm(offset - share[:, None] * vector[line], axis=1)
-            np.minimum.at(clearance, line, away / radii[disc])
+            distance = np.linalg.norm(offset - share[:, None] * vector[line], axis=1)
+            np.minimum.at(clearance, line, distance / radii[disc])
     facing = centres[ends] + radii[ends][:, :, None] * np.stack([normal, -normal], axis=1)
-    return CentreLines(
-        ends=which[ends],
-        angle=np.arctan2(normal[:, 1], normal[:, 0]),
-        gap=length - radii[ends].sum(axis=1),
-        facing=facing,
-        clearance=clearance,
-    )
+    angle, gap = np.arctan2(normal[:, 1], normal[:, 0]), length - radii[ends].sum(axis=1)
+    return CentreLines(which[ends], angle, gap, facing, clearance)
 
 
 def bridges(lines: CentreLines, size: Float, margin: float, largest: float, vertices: OnCircles) -> Bridges:
     """Choose bridges among the centre lines, clear of other discs and sides.
 
-    On one disc, bridges are at least LEAST_ANGLE apart and as far from its `vertices`; of two bridges that are too
-    close the shorter one stays.  Good triangles near a cell side need room: the ends of a bridge are more than `margin`
-    from the sides, and its middle is farther from them than `largest` or than the length of the bridge, whichever is
-    less.
+    On a disc, the angle between two bridges, or between a bridge and a vertex among `vertices`, is at least
+    LEAST_ANGLE; the shorter of two close bridges stays.  Good triangles near a cell side need room: the distance from
+    the sides is more than `margin` at the ends of a bridge, and in the middle more than the lesser of `largest` and the
+    bridge length.
     """
     middle = lines.facing.mean(axis=1)
     away, ends_away = (np.minimum(points, size - points) for points in (middle, lines.facing))
@@ -99,33 +94,33 @@ def bridges(lines: CentreLines, size: Float, margin: float, largest: float, vert
     # Vertices come before all bridges.
     first, count = len(vertices[0]), len(order)
     rank = np.concatenate([first + np.arange(count), first + np.arange(count), np.arange(first)])
-    # Pairs of points on one circle within LEAST_ANGLE; circles are farther apart than that.
+    # Pairs of points on one circle within LEAST_ANGLE; circle numbers differ by more.
     places = wrap(np.column_stack([circle, angle]), np.array([np.inf, TURN]))
-    near = cKDTree(places, boxsize=[0, TURN]).query_pairs(LEAST_ANGLE, output_type="ndarray")
-    better, worse = np.sort(rank[near], axis=1).T
-    # All vertices stay, however near each other; each rank that stays, best first, excludes the worse ones near it.
+    close = cKDTree(places, boxsize=[0, TURN]).query_pairs(LEAST_ANGLE, output_type="ndarray")
+    better, worse = np.sort(rank[close], axis=1).T
+    # All vertices stay, even close vertices; points that stay, best first, exclude worse points nearby.
     better, worse = better[worse >= first], worse[worse >= first]
-    stays, open_ = np.zeros(first + count, bool), np.ones(first + count, bool)
-    while open_.any():
-        between = open_[better] & open_[worse]
+    chosen, undecided = np.zeros(first + count, bool), np.ones(first + count, bool)
+    while undecided.any():
+        between = undecided[better] & undecided[worse]
         better, worse = better[between], worse[between]
-        free = open_.copy()
+        free = undecided.copy()
         free[worse] = False
-        stays |= free
-        open_ &= ~free
-        open_[worse[free[better]]] = False
-    return Bridges(candidates.ends[stays[first:]], candidates.angle[stays[first:]])
+        chosen |= free
+        undecided &= ~free
+        undecided[worse[free[better]]] = False
+    return Bridges(candidates.ends[chosen[first:]], candidates.angle[chosen[first:]])
 
 
 @dataclass(frozen=True)
 class HalfLines:
-    """Half-lines (h,) in pairs: number k and its other half twin[k].
+    """The h half-lines of the graph, two for each line.
 
     Attributes:
-        node: (h,) that it begins at.
-        angle: (h,) in [0, 2 pi) from the centre of the node.
-        start: (h, 2) where it begins.
-        twin: (h,)
+        node: (h,) start node.
+        angle: (h,) direction of the start point from the node centre, in [0, 2 pi).
+        start: (h, 2) start point.
+        twin: (h,) the other half-line of the same line.
     """
 
     node: Int
@@ -137,23 +132,22 @@ class HalfLines:
     def of(cls, nodes: Int, centres: Float, starts: Float) -> HalfLines:
         """Halve the lines between `nodes` (l, 2), from starts[:, 0] to starts[:, 1] (l, 2, 2).
 
-        The nodes have these centres (n, 2); halves from the second node come last.
+        `centres` (n, 2) are node positions; half-lines from the second nodes come last.
         """
         node, start = nodes.T.ravel(), np.concatenate([starts[:, 0], starts[:, 1]])
         other = np.concatenate([starts[:, 1], starts[:, 0]])
-        # A corner is its own place: what leaves it is seen from where it goes.
+        # At a corner, the start point is the centre: the direction is that of the other end.
         offset = np.where(np.all(start == centres[node], axis=1)[:, None], other, start) - centres[node]
         angle = np.arctan2(offset[:, 1], offset[:, 0]) % TURN
         return cls(node, angle, start, (np.arange(len(node)) + len(nodes)) % len(node))
 
     def faces(self) -> tuple[Int, Int]:
-        """Return the half-line (h,) after each one around the face on its left, and that face (h,)."""
+        """Return the next half-line (h,) around the face on the left, and the face (h,)."""
         order = np.lexsort((self.angle, self.node))
-        place = np.empty_like(order)
-        place[order] = np.arange(len(order))
+        place = np.argsort(order)
         first = np.searchsorted(self.node[order], self.node[order])
         last = np.searchsorted(self.node[order], self.node[order], side="right") - 1
-        # Clockwise the next from where one came.
+        # The next half-line clockwise from the twin.
         arrived = place[self.twin]
         after = order[np.where(arrived == first[arrived], last[arrived], arrived - 1)]
         return after, components(len(after), np.arange(len(after)), after)
@@ -161,7 +155,7 @@ class HalfLines:
 
 @dataclass(frozen=True)
 class MatrixTiles:
-    """The tiles, cells of a grid, of the matrix faces beside discs.
+    """The tiles of the matrix faces, which are cells of a grid.
 
     Attributes:
         lines: half-lines that divide the matrix: side pieces, then bridges.
@@ -180,29 +174,23 @@ def beside(lines: HalfLines, label: Int, alone: Int, disc: Int, angle: Float) ->
     The next half-line clockwise has the label among `label` (h,), a disc without half-lines among `alone` (n,).
     """
     order = np.lexsort((lines.angle, lines.node))
-    node, at = lines.node[order], lines.angle[order]
-    # Twice a turn apart, so that those of one disc stay together.
-    place = np.searchsorted(node * 2 * TURN + at, disc * 2 * TURN + angle % TURN, side="right") - 1
+    node, line_angle = lines.node[order], lines.angle[order]
+    # Keys of discs differ by two turns, so that the half-lines of a disc stay together.
+    place = np.searchsorted(node * 2 * TURN + line_angle, disc * 2 * TURN + angle % TURN, side="right") - 1
     first, last = np.searchsorted(node, disc), np.searchsorted(node, disc, side="right") - 1
     around = label[order[np.where(place < first, last, place)]]
     return np.where(alone[disc] < 0, around, alone[disc])
 
 
 def matrix_tiles(
-    circles: Float,
-    outer: Int,
-    sides: tuple[Int, Float],
-    bridges: Bridges,
-    lines: CentreLines,
-    size: Float,
-    grid: Int,
+    circles: Float, outer: Int, sides: tuple[Int, Float], bridges: Bridges, lines: CentreLines, size: Float, grid: Int
 ) -> MatrixTiles | None:
-    """Deal the matrix faces to the cells of a grid (2,) by their centroids.
+    """Distribute the matrix faces to the cells of a grid (2,) by centroids.
 
     None if a disc, or a group of discs without bridges to the sides, has no face.
 
     Args:
-        circles: (k, 3).
+        circles: (k, 3) centres and radii.
         outer: (n,) circles that bound the matrix.
         sides: nodes (s, 2) and ends (s, 2, 2) of side pieces in the matrix, counter-clockwise around the cell.
     """
@@ -215,19 +203,19 @@ def matrix_tiles(
     count = loop.max() + 1
     alone = np.full(len(circles), -1)
     alone[lone] = count + np.arange(len(lone))
-    # A centre line crosses no bridge, for both are edges in one triangulation. So, in the cell and away from third
-    # discs, there is one face along it.
+    # A centre line crosses no bridge: both are edges of one triangulation. So a centre line in the cell, away from
+    # third discs, runs through one face.
     free = (lines.clearance > 1) & np.all((lines.facing > 0) & (lines.facing < size), axis=(1, 2))
     n = half.node.max() + 1
     free &= ~np.isin(lines.ends @ [n, 1], half.node * n + half.node[half.twin])
     pairs = (beside(half, loop, alone, lines.ends[free, k], lines.angle[free] + k * np.pi) for k in (0, 1))
     face = components(count + len(lone), *pairs)
-    # Lines, and chords along circles between them.
+    # The lines, and chords along circles between lines.
     end, which = half.start[half.twin], np.tile(loop, 2)
     a, b = np.concatenate([half.start, end]), np.concatenate([end, half.start[after]])
     cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    # A face has one loop around it, and others in it, which are negative. The one beyond the sides has none around it.
-    # Loops around trees, which have both halves of all their lines, have no area but for rounding.
+    # A face has one outer loop, and negative inner loops. The face beyond the sides has no outer loop. Loops around
+    # trees contain both halves of all lines, and have no area but for rounding.
     is_tree = np.bincount(loop, loop[half.twin] != loop) == 0
     around = np.bincount(face[:count], (np.bincount(which, cross) > 0) & ~is_tree, face.max() + 1)
     beyond = face[loop[half.twin[0]]]
@@ -239,7 +227,7 @@ def matrix_tiles(
 
 
 def grid_cell(points: Float, size: Float, grid: Int) -> Int:
-    """Find the cell (k,) of a grid (2,) over [0, size] that contains each point."""
+    """Find the cell (k,) of a grid (2,) over [0, size] around each point."""
     share = (points / size).round(arrangements.DECIMALS)
     column, row = np.clip((share * grid).astype(np.int64), 0, grid - 1).T
     return np.asarray(column * grid[1] + row)

@@ -1,4 +1,4 @@
-"""The regions of an outline filled with triangles by gmsh."""
+"""Fill the regions of an outline with triangles by gmsh."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,12 +16,12 @@ from feti_homog.mesh.sizes.graded_size import MAX_GROWTH
 from feti_homog.microstructure import arrangements
 from feti_homog.typing import Array, Float, Int, Int32
 
-# An algorithm of gmsh. The default makes the better triangles of one size, but leaves a disc with thousands of nodes on
-# its circle unfilled.
+# An algorithm of gmsh. The default makes better triangles of one size, but fails in a disc with thousands of nodes on
+# the circle.
 DELAUNAY = 5
 
-# Area within a closed line, negative if that runs clockwise, its corners x + i y (k,), and the tags of its gmsh lines,
-# negative for lines run backwards.
+# A closed line: inner area, negative for a clockwise line, corners x + i y (k,), and tags of the gmsh lines, negative
+# for backward lines.
 Loop = tuple[float, Array, list[int]]
 
 
@@ -31,10 +31,10 @@ class Tile:
 
     Attributes:
         points: (n, 2) nodes on the lines.
-        nodes, classes: (n,) their numbers in the cell, and representatives of their periodic classes.
-        curves: through the nodes; beyond a curve that bounds the tile is OUTSIDE.
-        largest: element size.
-        is_graded: whether elements grow from the sizes on lines, which else are interpolated.
+        nodes, classes: (n,) node numbers in the cell, and representatives of the periodic node classes.
+        curves: curves through the nodes; the region beyond a tile border is OUTSIDE.
+        largest: largest element size.
+        is_graded: whether elements grow from the sizes on lines; otherwise gmsh interpolates the sizes.
     """
 
     points: Float
@@ -50,9 +50,9 @@ class Filling:
     """The triangles in a tile.
 
     Attributes:
-        inner: (k, 2) nodes off the lines, numbered after the nodes on lines.
-        triangles: (m, 3) counter-clockwise.
-        circle: (m,) the smallest circle around each, or MATRIX.
+        inner: (k, 2) inner nodes, numbered after the nodes on lines.
+        triangles: (m, 3) counter-clockwise nodes.
+        circle: (m,) the smallest circle around each triangle, or MATRIX.
     """
 
     inner: Float
@@ -62,17 +62,13 @@ class Filling:
 
 @contextmanager
 def gmsh_session() -> Iterator[ModuleType]:
-    """Initialise gmsh, silent, with fixed options and an empty model; finalise it at the end."""
+    """Run gmsh in a context, silently, with fixed options and an empty model."""
     import gmsh
 
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
-        for option, value in {
-            "General.Terminal": 0,
-            "General.NumThreads": 1,
-            "Mesh.RandomSeed": 1,
-            "Mesh.Renumber": 0,
-        }.items():
+        options = {"General.Terminal": 0, "General.NumThreads": 1, "Mesh.RandomSeed": 1, "Mesh.Renumber": 0}
+        for option, value in options.items():
             gmsh.option.setNumber(option, value)
         gmsh.model.add("cell")
         yield gmsh
@@ -81,17 +77,17 @@ def gmsh_session() -> Iterator[ModuleType]:
 
 
 def fill(tile: Tile) -> Filling:
-    """Fill a tile; as few triangles as possible have two edges on one circle.
+    """Fill a tile with triangles, and avoid triangles with two edges on one circle.
 
     Raises:
-        MeshError: gmsh cannot fill it.
+        MeshError: gmsh cannot fill the tile.
     """
     with gmsh_session() as gmsh:
         gmsh.option.setNumber("Mesh.MeshSizeMax", tile.largest)
         surfaces, circle, within = _add_surfaces(gmsh, tile)
         if tile.is_graded:
-            # Elements have the nearest outline edge's size h, h + g d at the distance d from it. Otherwise gmsh would
-            # interpolate between the lines: a disc would be as fine within as on its circle.
+            # The element size is h + g d at the distance d from the nearest outline edge, of length h. Otherwise gmsh
+            # would interpolate between the lines: a disc would be as fine inside as on the circle.
             field = gmsh.model.mesh.field
             extended = field.add("Extend")
             field.setNumbers(extended, "CurvesList", [tag for _, tag in gmsh.model.getEntities(1)])
@@ -103,7 +99,7 @@ def fill(tile: Tile) -> Filling:
             gmsh.option.setNumber("Mesh.Algorithm", DELAUNAY)
         try:
             gmsh.model.mesh.generate(2)
-        except Exception as error:  # gmsh has no other
+        except Exception as error:  # gmsh raises no other class
             raise _unfilled(tile, str(error)) from error
         tags, coordinates, _ = gmsh.model.mesh.getNodes()
         triangle = gmsh.model.mesh.getElementType("Triangle", 1)
@@ -124,27 +120,26 @@ def fill(tile: Tile) -> Filling:
 
 def _unfilled(tile: Tile, why: str) -> MeshError:
     curves = tile.curves
-    # A disc that a side cuts has pieces on the other side of the cell.
+    # If a side cuts a disc, pieces are on the opposite side of the cell.
     in_matrix = np.flatnonzero((curves.inside == MATRIX) | (curves.outside == MATRIX))
     points = tile.points[curves.chosen(in_matrix).node] if len(in_matrix) else tile.points
     (x, y), (right, top) = points.min(axis=0), points.max(axis=0)
-    return MeshError(
-        f"[cell] gmsh cannot fill the part from ({x:.4g}, {y:.4g}) to ({right:.4g}, {top:.4g}) of the cell of width 1: "
-        f"{why}; expected another seed, mesh_size or interface_size"
-    )
+    part = f"the part from ({x:.4g}, {y:.4g}) to ({right:.4g}, {top:.4g}) of the cell of width 1"
+    return MeshError(f"[cell] gmsh cannot fill {part}: {why}; expected another seed, mesh_size or interface_size")
 
 
 def arc_edges(curves: Curves) -> tuple[Int32, Int32]:
-    """Return the edges (a, 2) on circles, and their circles (a,)."""
+    """Find the edges (a, 2) on circles, and the circle (a,) of each edge."""
     pairs, curve = curves.edges
     circle = curves.circle[curve]
     return pairs[circle != MATRIX].astype(np.int32), circle[circle != MATRIX].astype(np.int32)
 
 
 def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int], float]:
-    """Add the surfaces of all regions; return their tags, the circle around each or MATRIX, and their area.
+    """Add the surfaces of all regions to gmsh.
 
-    Each outline edge is a line with one element, and node n is point n + 1.
+    Each outline edge is a line with one element, and node n is point n + 1. Returns the surface tags, the circle
+    around each surface or MATRIX, and the total area.
     """
     curves, geo = tile.curves, gmsh.model.geo
     for tag, (x, y) in enumerate(tile.points.round(arrangements.GMSH_DECIMALS).tolist(), 1):
@@ -153,7 +148,7 @@ def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int], f
     lines = [np.array([geo.addLine(*ends) for ends in pairwise((curve + 1).tolist())]) for curve in nodes]
     for tag in np.concatenate(lines).tolist():
         geo.mesh.setTransfiniteCurve(tag, 2)
-    # Curves run forwards, then backwards with negative tags, and have a region on their left.
+    # Curves run forwards, then backwards with negative tags, with a region on the left.
     directed = list(zip(curves.inside.tolist(), nodes, lines, strict=True))
     for region, curve, tags in zip(curves.outside.tolist(), nodes, lines, strict=True):
         directed.append((region, curve[::-1], -tags[::-1]))
@@ -166,8 +161,8 @@ def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int], f
             loop.append(after.pop((region, node)))
             node = int(loop[-1][0][-1])
         polygon = tile.points[np.concatenate([curve[:-1] for curve, _ in loop])] @ [1, 1j]
-        away = polygon - polygon[0]
-        area = float((away.conj() * np.roll(away, -1)).imag.sum() / 2)
+        offset = polygon - polygon[0]
+        area = float((offset.conj() * np.roll(offset, -1)).imag.sum() / 2)
         tags = np.concatenate([tags for _, tags in loop])
         regions.setdefault(region, []).append((area, polygon, tags.tolist()))
     surfaces, circle = [], []
@@ -176,9 +171,9 @@ def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int], f
         loops = regions[region]
         outer_and_holes = {k: [line_tags] for k, (area, _, line_tags) in enumerate(loops) if area >= 0}
         for polygon, line_tags in (loop[1:] for loop in loops if loop[0] < 0):
-            # A polygon turns once around a point within. Of one within the other the inner is meant, the smaller.
-            away = [loops[k][1] - polygon[0] for k in outer_and_holes]
-            turns = [np.angle(np.roll(vectors, -1) / vectors).sum() for vectors in away]
+            # A polygon turns once around an inner point. Of nested polygons, the smallest surrounds the hole.
+            offsets = [loops[k][1] - polygon[0] for k in outer_and_holes]
+            turns = [np.angle(np.roll(vectors, -1) / vectors).sum() for vectors in offsets]
             _, around = min((loops[k][0], k) for k, turn in zip(outer_and_holes, turns, strict=True) if turn > np.pi)
             outer_and_holes[around].append(line_tags)
         for group in outer_and_holes.values():

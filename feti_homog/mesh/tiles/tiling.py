@@ -1,11 +1,11 @@
-"""Tiles in a large cell: parts of its outline that ranks fill by themselves, with the same nodes on common borders.
+"""Tiles of a large cell: parts of the outline that ranks fill independently, with common nodes on common borders.
 
-They depend on the cell alone, so that its mesh is the same on any number of ranks.  A rank has the torus for the tiles
-that it has filled: nodes on lines have their numbers in the outline, nodes within tiles the numbers behind, one tile
-after the other; a torus edge has the number that its two classes make.
+Tiles depend on the cell alone, so that the mesh is the same on any number of ranks.  A rank has the torus of the tiles
+that the rank has filled: outline numbers identify nodes on lines, the following numbers identify nodes within tiles,
+tile by tile, and the two classes of a torus edge determine the number of the edge.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,17 +13,9 @@ from scipy.spatial import QhullError
 
 from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys
 from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE
-from feti_homog.mesh.outline.outline import Bridges, Outline, crossings, curve_at, images, on_side
+from feti_homog.mesh.outline.outline import Bridges, Marks, Outline, crossings, curve_at, images, on_side
 from feti_homog.mesh.periodic_topology import Torus, plane_edges_of
-from feti_homog.mesh.tiles.matrix_faces import (
-    CLEAR,
-    MatrixTiles,
-    beside,
-    bridges,
-    centre_lines,
-    grid_cell,
-    matrix_tiles,
-)
+from feti_homog.mesh.tiles import matrix_faces
 from feti_homog.mesh.tiles.tile_filling import Filling, Tile, arc_edges
 from feti_homog.microstructure import Arrangement
 from feti_homog.microstructure.shapes import Discs, Ellipses
@@ -32,12 +24,12 @@ from feti_homog.typing import Array, Int
 
 @dataclass(frozen=True)
 class TilePolicy:
-    """The cells that are cut into tiles, and the number of tiles.
+    """The least size of cells with tiles, and the size of tiles.
 
     Attributes:
-        least_discs: cells with fewer are filled at once.
-        discs: in a tile. Smaller tiles put more nodes on borders, where bridges fix their places; larger ones leave too
-            few tiles for many ranks.
+        least_discs: cells with fewer discs are one tile.
+        discs: discs in a tile. Small tiles put many nodes on borders, where bridges fix the positions; large tiles are
+            too few for many ranks.
     """
 
     least_discs: int = 400
@@ -49,32 +41,30 @@ DEFAULT_TILES = TilePolicy()
 
 @dataclass(frozen=True)
 class Tiling:
-    """Tiles for all parts of a cell.
+    """The assignment of all parts of a cell to tiles.
 
     Attributes:
-        bridges: on tile borders.
+        bridges: bridges on tile borders.
         beside: (b, 2) the tiles to the left and right of each bridge.
-        matrix: its faces with their tiles.
-        within: (k,) the tile within each circle; all images of a disc are in one.
+        matrix: the tiles of the matrix faces.
+        within: (k,) the tile within each circle; all images of a disc have the same tile.
     """
 
     bridges: Bridges
     beside: Int
-    matrix: MatrixTiles
+    matrix: matrix_faces.MatrixTiles
     within: Int
 
 
 def is_tiled(arrangement: Arrangement, policy: TilePolicy) -> bool:
-    """Return whether an arrangement is large and has round discs only."""
+    """Return whether an arrangement is large and consists of round discs."""
     return len(arrangement.phase) >= policy.least_discs and isinstance(arrangement.outlines, Discs)
 
 
-def tiling(
-    arrangement: Arrangement, largest: float, marks: Mapping[int, Sequence[float]], policy: TilePolicy
-) -> Tiling | None:
-    """Tile a large cell with round fibres; None for others, or without room for bridges.
+def tiling(arrangement: Arrangement, largest: float, marks: Marks, policy: TilePolicy) -> Tiling | None:
+    """Tile a large cell with round fibres; None for other cells, or without room for bridges.
 
-    `largest` is the element size, and `marks` are as in `BareOutline.of`.
+    `largest` is the element size; `marks` become nodes, which bridges avoid.
     """
     if not is_tiled(arrangement, policy):
         return None
@@ -84,13 +74,14 @@ def tiling(
     circles = discs.circles
     outer = np.flatnonzero(around == MATRIX)
     try:
-        lines = centre_lines(circles, outer)
+        lines = matrix_faces.centre_lines(circles, outer)
     except QhullError:  # all centres on one line
         return None
     marked = [(k, np.radians(angle)) for k in outer.tolist() for angle in marks.get(int(disc[k]), ())]
     vertices = np.array([k for k, _ in marked], np.int64), np.array([angle for _, angle in marked])
-    candidates = bridges(lines, size, CLEAR * arrangement.outer_radii.mean(), largest, vertices)
-    # Side pieces in the matrix: the nodes, discs or corners, and the points at their ends.
+    margin = matrix_faces.CLEAR * arrangement.outer_radii.mean()
+    candidates = matrix_faces.bridges(lines, size, margin, largest, vertices)
+    # Side pieces in the matrix: the discs or corners at both ends, and the end points.
     nodes, ends = [], []
     for axis, is_far in np.ndindex(2, 2):
         level, places = is_far * size[1 - axis], crossings(discs[outer], axis, size)
@@ -105,7 +96,7 @@ def tiling(
         ends.append(points[piece[:, None] + [0, 1]][:, way])
     sides = np.concatenate(nodes), np.concatenate(ends)
     grid = np.maximum(1, np.round(size * np.sqrt(len(arrangement.radii) / policy.discs / size.prod()))).astype(int)
-    matrix = matrix_tiles(circles, outer, sides, candidates, lines, size, grid)
+    matrix = matrix_faces.matrix_tiles(circles, outer, sides, candidates, lines, size, grid)
     if matrix is None:
         return None
     half = matrix.lines
@@ -115,59 +106,59 @@ def tiling(
         bridges=Bridges(np.stack([half.node[bridge], half.node[half.twin[bridge]]], axis=1), half.angle[bridge]),
         beside=np.stack([matrix.tile[bridge], matrix.tile[half.twin[bridge]]], axis=1),
         matrix=matrix,
-        within=grid_cell(np.mod(arrangement.centres, size), size, grid)[disc],
+        within=matrix_faces.grid_cell(np.mod(arrangement.centres, size), size, grid)[disc],
     )
 
 
 def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[Tile]:
     """Cut a cell with the outline `lines` into tiles.
 
-    Without a tiling the cell is one tile.
+    Without a tiling, the cell is one tile.
     """
     if tiles is None:
         return [cell]
-    # The tiles to the left and right of each curve, OUTSIDE beyond the sides.
+    # The tiles on both sides of each curve, OUTSIDE beyond the sides.
     curves, matrix = cell.curves, tiles.matrix
-    left, right = tiles.within[curves.inside], tiles.within[curves.outside]
+    on_left, on_right = tiles.within[curves.inside], tiles.within[curves.outside]
     is_side = curves.outside == OUTSIDE
     pieces = np.flatnonzero(is_side & (curves.inside == MATRIX))
-    left[pieces], right[is_side] = matrix.tile[: len(pieces)], OUTSIDE
+    on_left[pieces], on_right[is_side] = matrix.tile[: len(pieces)], OUTSIDE
     arc = np.flatnonzero((curves.circle != MATRIX) & (curves.outside == MATRIX))
-    # The middle of the first edge shows where on the circle an arc is.
+    # The middle of the first edge gives the direction of an arc.
     begin = curves.first[arc]
     middle = (lines.points[curves.node[begin]] + lines.points[curves.node[begin + 1]]) / 2
     offset = middle - lines.ellipses.centres[curves.circle[arc]]
     angle = np.arctan2(offset[:, 1], offset[:, 0])
-    right[arc] = beside(matrix.lines, matrix.tile, matrix.alone, curves.circle[arc], angle)
+    on_right[arc] = matrix_faces.beside(matrix.lines, matrix.tile, matrix.alone, curves.circle[arc], angle)
     n = len(tiles.bridges.angle)
-    left[len(curves) - n :], right[len(curves) - n :] = tiles.beside.T
-    tile = np.concatenate([left, right[right != left]])
-    curve = np.concatenate([np.arange(len(curves)), np.flatnonzero(right != left)])
+    on_left[len(curves) - n :], on_right[len(curves) - n :] = tiles.beside.T
+    tile = np.concatenate([on_left, on_right[on_right != on_left]])
+    curve = np.concatenate([np.arange(len(curves)), np.flatnonzero(on_right != on_left)])
     order = np.lexsort((curve, tile))
     tile, curve = tile[order], curve[order]
     parts = []
     for name in np.unique(tile[tile != OUTSIDE]).tolist():
-        some = curve[np.searchsorted(tile, name) : np.searchsorted(tile, name, side="right")]
-        mine = curves.chosen(some)
-        nodes, node = np.unique(mine.node, return_inverse=True)
-        inside = np.where(left[some] == name, mine.inside, OUTSIDE)
-        outside = np.where(right[some] == name, mine.outside, OUTSIDE)
-        bounded = replace(mine, node=node, inside=inside, outside=outside)
+        numbers = curve[np.searchsorted(tile, name) : np.searchsorted(tile, name, side="right")]
+        tile_curves = curves.chosen(numbers)
+        nodes, node = np.unique(tile_curves.node, return_inverse=True)
+        inside = np.where(on_left[numbers] == name, tile_curves.inside, OUTSIDE)
+        outside = np.where(on_right[numbers] == name, tile_curves.outside, OUTSIDE)
+        bounded = replace(tile_curves, node=node, inside=inside, outside=outside)
         parts.append(replace(cell, points=cell.points[nodes], nodes=nodes, classes=cell.classes[nodes], curves=bounded))
     return parts
 
 
 @dataclass(frozen=True)
 class Regions:
-    """Regions in a generated cell, known to every rank.
+    """The regions of a generated cell, which every rank has.
 
     Attributes:
-        width, height, scale: of the mesh, and its lengths / lengths in tiles.
-        phases: names, the matrix first.
+        width, height, scale: size of the mesh, and mesh lengths / lengths in tiles.
+        phases: phase names, the matrix first.
         ellipses: the k circles, as in `CoarseMesh`.
-        constituent: (k + 1,) the constituent next within each circle, -1 in a void; the last is the matrix.
-        phase, precedence: (constituents,) phase number of each; ascending numbers, as in `CoarseMesh`.
-        nodes: on the lines.
+        constituent: (k + 1,) the constituent directly within each circle, -1 in a void; the last entry is the matrix.
+        phase, precedence: (constituents,) phase number and ascending precedence, as in `CoarseMesh`.
+        nodes: number of nodes on the lines.
     """
 
     width: float
@@ -186,9 +177,9 @@ class FilledTile:
     """A tile with its triangles.
 
     Attributes:
-        number: the tile's index among all tiles.
-        tile, filling: nodes on the lines; triangles and nodes within.
-        first: number of the first node off the lines.
+        number: index of the tile among all tiles.
+        tile, filling: the lines with nodes; the triangles and inner nodes.
+        first: number of the first inner node.
     """
 
     number: int
@@ -198,7 +189,7 @@ class FilledTile:
 
 
 def tile_mesh(regions: Regions, tiles: Sequence[FilledTile]) -> tuple[CoarseMesh, Int, Int]:
-    """Join filled tiles to a mesh without voids.
+    """Join filled tiles to one mesh, without the triangles in voids.
 
     Also returns the class (n,) of each node, numbered in the cell, and the tile (m,) of each triangle.
     """
@@ -210,22 +201,21 @@ def tile_mesh(regions: Regions, tiles: Sequence[FilledTile]) -> tuple[CoarseMesh
         numbers, classes = (np.concatenate([nodes, inner]) for nodes in (tile.nodes, tile.classes))
         constituent = regions.constituent[filling.circle]
         solid = np.flatnonzero(constituent >= 0)
-        # A tile has arcs of its voids, too.
+        # A tile also has arcs with only a void on the side of the tile.
         sides = np.stack([curves.inside, curves.outside])
         is_solid = (sides != OUTSIDE) & (regions.constituent[sides] >= 0)
         arcs, circle = arc_edges(curves.chosen(np.flatnonzero(is_solid.any(axis=0))))
         elements = numbers[filling.triangles[solid]], constituent[solid], np.full(len(solid), filled.number)
         points = np.concatenate([tile.points, filling.inner])
         parts.append((numbers, classes, points, *elements, tile.nodes[arcs], circle))
-    numbers, classes, points, triangles, constituent, tile_of, arcs, circle = (
-        np.concatenate(arrays) for arrays in zip(*parts, strict=True)
-    )
+    arrays = map(np.concatenate, zip(*parts, strict=True))
+    numbers, classes, points, triangles, constituent, tile_of, arcs, circle = arrays
     number, triangles = np.unique(triangles, return_inverse=True)
     everywhere, first = np.unique(numbers, return_index=True)
     place = first[np.searchsorted(everywhere, number)]
     _, first, inverse = np.unique(classes[place], return_index=True, return_inverse=True)
     arcs = np.searchsorted(number, arcs).astype(np.int32)
-    # An arc between two tiles is in both.
+    # Two adjacent tiles both have the arcs between them.
     once = np.sort(np.unique(edge_keys(arcs, len(number)), return_index=True)[1])
     mesh = CoarseMesh(
         width=regions.width,
@@ -245,9 +235,9 @@ def tile_mesh(regions: Regions, tiles: Sequence[FilledTile]) -> tuple[CoarseMesh
 
 
 def tile_torus(regions: Regions, tiles: Sequence[FilledTile], all_nodes: int) -> tuple[Torus, Int]:
-    """Return the torus of filled tiles, without voids, and the tile (m,) of each triangle.
+    """Make the torus of filled tiles, without voids; also return the tile (m,) of each triangle.
 
-    `all_nodes` counts the nodes in the cell.
+    `all_nodes` is the number of nodes in the cell.
     """
     mesh, classes, tile = tile_mesh(regions, tiles)
     plane, triangle_edges = plane_edges_of(mesh)
