@@ -1,4 +1,4 @@
-"""Faults of interfaces between phases, remarks on unexpected properties of a cell, warnings of coarse interfaces."""
+"""Interface faults, remarks on unexpected cell properties, and warnings about coarse interface elements."""
 
 import math
 
@@ -22,9 +22,10 @@ RESOLVED_SOFTENING = 1 / 3
 
 
 def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
-    """Return the number (phases, phases) of the interface between two phases; -1 where they never part.
+    """Return the interface number (phases, phases) between two phases.
 
-    An interface without `between`, or perfect bonding, lies between the matrix, the first phase, and all other phases.
+    The number is -1 where two phases never part.  An interface without `between`, or perfect bonding, lies between the
+    matrix, the first phase, and all other phases.
     """
     pairs = np.full((len(phases), len(phases)), -1)
     for number, between in enumerate([interface.between for interface in case.interfaces] or [None]):
@@ -37,7 +38,7 @@ def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
 
 
 def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -> list[str]:
-    """List interfaces between absent or separate phases; phases `first` (n,) touch phases `second` (n,)."""
+    """List interface faults; phases `first` (n,) touch phases `second` (n,)."""
     lines = []
     touching = np.zeros((len(phases), len(phases)), bool)
     touching[first, second] = touching[second, first] = True
@@ -55,9 +56,10 @@ def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -
 
 
 def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
-    """List remarks on the mesh, on an [interface] without effect, and on nodes that never part.
+    """List the remarks on a mesh and its interfaces.
 
-    `pairs` as in `share_entities`.
+    The remarks concern the mesh, an [interface] without effect, and nodes that never part; `pairs` as in
+    `share_entities`.
     """
     lines, has_curve = [*torus.mesh.remarks], len(torus.mesh.debonded_edges) > 0
     if case.interface is None:
@@ -109,15 +111,15 @@ def table_remarks(case: Case) -> tuple[str, ...]:
 
 
 def longest(ends: Float) -> float:
-    """Return the longest edge between `ends` (e, 2, 2); 0 without edges."""
+    """Return the greatest length of edges with `ends` (e, 2, 2); 0 without edges."""
     return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max(initial=0.0))
 
 
 def process_zone(case: Case) -> float | None:
     """Return the least process zone length E' G_Ic / sigma_c^2.
 
-    Return None unless bonds break by energy.  sigma_c = sqrt(2 k_n G_Ic); for cohesive laws G_Ic and sigma_c are the
-    toughness and strength in the pure mode with the shorter zone.  E' is Young's modulus in the plane state,
+    The result is None unless bonds break by energy.  sigma_c = sqrt(2 k_n G_Ic); for cohesive laws G_Ic and sigma_c
+    are the toughness and strength in the pure mode with the shorter zone.  E' is Young's modulus in the plane state,
     E / (1 - nu^2) in plane strain, along the most compliant axis in all phases.
     """
     lengths = [1 / (2 * bond.normal_stiffness) for bond in case.interfaces if bond.toughness and bond.normal_stiffness]

@@ -19,12 +19,12 @@ from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Array, Bool, Float, Int, Int32
 
 NO_ROWS = np.zeros((0, 3), np.int64)
-# Number of element layers about shared vertices: vertices at most two edges from these have all of their elements.
+# Number of element layers about shared vertices, so that all vertices within two edges have complete patches.
 LAYERS = 3
 
 
 class SharedVertices:
-    """The shared vertices of body pieces in this rank's meshes, each mesh with some pieces.
+    """The vertices that pieces of a body share, in this rank's meshes of one or more pieces.
 
     Attributes:
         meshes: indices of this rank's meshes with shared vertices.
@@ -34,7 +34,7 @@ class SharedVertices:
     """
 
     def __init__(self, comm: MPI.Intracomm, meshes: Sequence[tuple[Sequence[Submesh], FineMesh]]) -> None:
-        """Find the common vertices and edges of several pieces.  Collective."""
+        """Find the vertices and edges that several pieces share.  Collective."""
         self._comm = comm
         # On the piece borders: vertices (n, 3) by body, entity and position, their classes (n,), coarse edges (e, 3) by
         # body, entity and position, and the vertex classes (e, m) along these edges.
@@ -81,7 +81,7 @@ class SharedVertices:
         return self._at_home(self._rows, np.concatenate([np.zeros((0, width)), *parts]), self.classes, sums)
 
     def _copies(self, parts: Sequence[Int]) -> list[Int]:
-        """Count the copies of each row (n, 3) in all meshes; the second column is 1 at the first copy.  Collective."""
+        """Count the copies of each row (n, 3) in all meshes, and mark first copies with 1.  Collective."""
 
         def copies(number: Int, _: Int) -> Int:
             _, first, count = np.unique(number, return_index=True, return_counts=True)
@@ -93,9 +93,9 @@ class SharedVertices:
     def _at_home(
         self, rows: Int, values: Array, parts: Sequence[Array], combine: Callable[[Int, Array], Array]
     ) -> list[Array]:
-        """Call `combine` on the home ranks with the numbers of rows (n, 3) and with values (n, k).  Collective.
+        """Combine the values (n, k) of equal rows (n, 3) on home ranks.  Collective.
 
-        Return the combined rows in arrays with the lengths of `parts`.
+        `combine` takes a number of each row, and the values.  The results are arrays with the lengths of `parts`.
         """
         comm, home = self._comm, rows[:, 1:].sum(axis=1) // 2 % self._comm.size
         rows, values, source, place = distributed_arrays.exchange(
@@ -111,9 +111,10 @@ class SharedVertices:
 
 
 def border_lines(s: Submesh, mesh: FineMesh, classes: Int32) -> tuple[Int, Int, Int]:
-    """Return the triangles (e,) at a piece border, their border edges (e,), and the edge classes (e, M + 1).
+    """Find the triangles and edges along the border of a piece.
 
-    `classes` (t, q) are the lattice node classes of all triangles.
+    `classes` (t, q) are the lattice node classes of all triangles.  Return the triangle (e,) at each border edge, the
+    position (e,) of the edge in the triangle, and the node classes (e, M + 1) along the edge.
     """
     edge, inner = s.edge_class[s.triangle_edges], np.arange(mesh.lattice.intervals - 1)
     triangle, k = np.nonzero(np.bincount(edge.ravel(), minlength=len(s.edge_keys))[edge] == 1)
@@ -159,7 +160,7 @@ class _Strip:
         stress: recovered stress on these elements.
         is_vertex: (classes,) whether a class is a vertex of these elements.
         shared: (n,) shared vertices.
-        sides: (f, 2) vertices of the element sides, each side once in its body.
+        sides: (f, 2) vertices of the element sides, where each side of a body counts once.
         vector: (f, 2) vectors from the first to the second vertex of a side.
         bounds: (b,) vertices of sides with one element in the body.
     """
@@ -173,7 +174,10 @@ class _Strip:
 
     @classmethod
     def of(cls, body: stress_recovery.RecoveredStress, classes: Int, cut: Int, is_first: Bool) -> _Strip:
-        """Find the elements; this piece counts a side of `cut` (c, 2) only where its copy `is_first`."""
+        """Find the elements about the shared vertices `classes`.
+
+        Of the sides along a `cut` (c, 2), this piece counts only the sides that are `is_first`.
+        """
         is_vertex, at = np.zeros(len(body.u), bool), body.node_class[body.triangles[:, :3]]
         is_vertex[classes] = True
         for _ in range(LAYERS):
@@ -191,7 +195,10 @@ class _Strip:
         return cls(stress, is_vertex, stress.numbers[classes], sides[once], vector[once], np.unique(sides[single]))
 
     def neighbours(self, at_boundary: Bool) -> local_fits.PatchNeighbours:
-        """Return vertex pairs with the first on the body boundary, where shared vertices are `at_boundary` (n,)."""
+        """Pair the vertices on the body boundary with their neighbours.
+
+        `at_boundary` (n,) marks the shared vertices on the boundary.
+        """
         is_bound = np.zeros(int(self.is_vertex.sum()), bool)
         is_bound[self.bounds] = True
         is_bound[self.shared] = at_boundary
@@ -201,14 +208,14 @@ class _Strip:
 
 
 def _code(a: Int, b: Int, size: int) -> Int:
-    """Return a number for each pair of vertices, among `size` vertices."""
+    """Assign a number to each unordered pair of vertices, among `size` vertices."""
     return np.asarray(np.minimum(a, b) * size + np.maximum(a, b))
 
 
 def _over_pieces(
     shared: SharedVertices, strips: Sequence[_Strip], pairs: Sequence[tuple[Float, Float]]
 ) -> list[tuple[Float, Float]]:
-    """Add strip moments and sums (vertices, p, ..) over all pieces, at shared vertices.  Collective."""
+    """Add the moments and sums `pairs` (vertices, p, ..) of all pieces at shared vertices.  Collective."""
     parts = [
         np.concatenate([a[strip.shared], b[strip.shared]], axis=2) for strip, (a, b) in zip(strips, pairs, strict=True)
     ]

@@ -29,11 +29,11 @@ from feti_homog.materials import voigt
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Array, Float, Int
 
-# Length at which the modes are separated / radius of the fibre; at least one element counts.
+# Closed length that separates the modes / fibre radius; the length has at least one element.
 MODE_LENGTH = 1e-3
 QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
-# Radius around a tip beyond which no node turns / distance to boundaries; largest such radius / a period of the cell;
-# radius within which all nodes turn by the same angle / the first radius.
+# REACH: radius of the turning nodes about a tip / distance to boundaries.  REACH_OF_A_PERIOD: largest such radius /
+# cell period.  CORE: radius within which all nodes turn by the same angle / radius of the turning nodes.
 REACH, REACH_OF_A_PERIOD, CORE = 0.8, 0.32, 0.5
 # Relative distance from a circle beyond which a node of both bodies is on another boundary, or on another image.
 OFF_CIRCLE = 1e-4
@@ -150,7 +150,7 @@ class EnergyReleaseRates:
         self._boundaries = self._gathered(np.concatenate(points)), self._gathered(np.concatenate(body))
 
     def of(self, response: Response) -> EnergyRelease:
-        """Return G and its modes at all tips in a response.  Collective."""
+        """Return the energy release rates at all tips of a response.  Collective."""
         solution, status = response.state.solution, self._gathered(response.state.status)
         tips = self._chains.tips(status)
         # Tips on circles, in the order of fibres, interfaces and directions.
@@ -208,9 +208,10 @@ class EnergyReleaseRates:
         return np.asarray(-outward * distributed_arrays.allreduce_sum(self.cell.comm, change) / self.radius[tips.node])
 
     def _closing(self, tips: debonded_arcs.CrackTips, status: Status, force: Float, jump: Float) -> tuple[Float, Float]:
-        """Return `closing_work` (t, 2) in opening and in shear, and the closed lengths (t,).
+        """Return the work that closes each crack, and the closed lengths (t,).
 
-        A length is MODE_LENGTH times the radius, or the length of the element behind the tip if that is larger.
+        The work is `closing_work` (t, 2) in opening and in shear.  A length is MODE_LENGTH times the
+        radius, or the length of the element behind the tip if that is larger.
         """
         smallest, order = MODE_LENGTH * self.radius[tips.node], self.cell.case.cell.order
         work, length = np.zeros((len(smallest), 2)), np.zeros(len(smallest))
@@ -241,5 +242,5 @@ class EnergyReleaseRates:
 
 
 def nearest_image(offset: Float, period: Float) -> Float:
-    """Shift offsets (..., 2) to their shortest images."""
+    """Shift offsets (..., 2) to their shortest periodic images."""
     return np.asarray(offset - np.round(offset / period) * period)
