@@ -5,8 +5,8 @@ the inverse of the dual operator of the bonded cell, prescribed jumps g in rows 
 
     lam = H (d E - g),      |UC| Sigma = L E - b^T g,      b = (H d)_D,
 
-L the bonded stiffness times the area: the cell stores x.S x / 2 with x = (g, E), S = [[H_DD, -b], [-b^T, L]].  The
-matrix S of `coulomb_faces` is the plane one; in generalized plane strain `AxialFaces` adds rows and columns behind it.
+where L is the bonded stiffness times the area: the cell stores x.S x / 2 with x = (g, E), S = [[H_DD, -b], [-b^T, L]].
+`coulomb_faces` uses the S of the plane problem; in generalized plane strain `AxialFaces` appends rows and columns.
 """
 
 from collections.abc import Sequence
@@ -37,7 +37,7 @@ from feti_homog.typing import Float, Int
 
 
 class CondensedProblem:
-    """One problem of the cell, condensed to the rows of the last `take`.
+    """One problem of the cell, condensed to the rows from the last call of `take`.
 
     Attributes:
         interface: contact problem of the plane or of the axial displacements.
@@ -63,7 +63,10 @@ class CondensedProblem:
         self._some: tuple[Int, Float] | None = None
 
     def take(self, rows: Int, springs: Float) -> tuple[Float, Float, Float]:
-        """Condense the problem to rows D: return H_DD (n, n) plus springs, b (n, v) and L (v, v).  Collective."""
+        """Condense the problem to the global rows D.  Collective.
+
+        Return H_DD (n, n) plus springs (n,), b (n, v) and L (v, v).
+        """
         self.rows, self._some = rows, None
         self._columns, K = self._inverse.columns(rows)
         K[np.diag_indices(len(K))] += springs
@@ -84,13 +87,13 @@ class CondensedProblem:
         return np.asarray(self._response @ strain - self._columns @ jump)
 
     def some_multipliers(self, rows: Int, jump: Float, strain: Float) -> Float:
-        """Return lam (k, c) in owned rows (k, c); the last rows keep their columns of H."""
+        """Return the multipliers (k, c) in owned rows (k, c), with stored columns for the last rows."""
         if self._some is None or self._some[0] is not rows:
             self._some = rows, self._columns[rows.ravel()]
         return self._response[rows] @ strain - (self._some[1] @ jump).reshape(rows.shape)
 
     def solution(self, bonds: BondState, jump: Float, strain: Float) -> DualSolution:
-        """Return the multipliers, and their jumps from the dual operator.  Collective."""
+        """Return the dual solution, with jumps from the dual operator.  Collective."""
         solver, lam = self.solver, self.multipliers(jump, strain)
         torn = solver.d @ strain
         jumps, opened = torn - solver.operator.apply(lam), np.zeros(len(lam))
@@ -108,9 +111,9 @@ class CondensedProblem:
 
 
 class AxialFaces:
-    """The axial problem in the matrix S of `coulomb_faces`, with its jumps eliminated: g = K^-1 b E.
+    """The axial problem in the matrix S of `coulomb_faces`, with eliminated jumps: g = K^-1 b E.
 
-    HELD times its diagonal entry holds each row without springs: the largest entry may belong to a stiff spring.
+    A stiffness of HELD times the diagonal entry holds each row: the largest entry may belong to a stiff spring.
 
     Attributes:
         problem: condensed axial problem.
@@ -153,7 +156,7 @@ class SlidingCell:
         self.faces = CoulombFaces(np.zeros((0, 0)), np.zeros(0))
 
     def take(self, bonds: BondState) -> None:
-        """Condense the cell to debonded nodes and, on springs, to damaged bonds.  Collective."""
+        """Condense the cell to debonded nodes, and to damaged bonds on springs.  Collective."""
         comm, row, first = self.solver.comm, self.interface.nodes.row, self._plane.first
         problems = (self._plane, *self._axial)
         more = np.hstack([problem.gained(bonds) for problem in problems])
@@ -225,7 +228,7 @@ class SlidingCell:
         return np.asarray((x / self.faces.size)[: self.faces.loads.start])
 
     def traction(self, x: Float) -> Float:
-        """Return the traction in the intact fraction of each bond, (k, 2), or (k, 3) with the axial traction."""
+        """Return the traction in the intact fraction of bonds, (k, 2), or (k, 3) with the axial traction."""
         force = np.zeros((len(self.friction), sum(rows.shape[1] for rows in self._held_rows)))
         parts = zip(self._held_rows, self._parts(x), strict=True)
         force[self._held] = np.hstack([problem.some_multipliers(rows, *answer) for rows, (problem, answer) in parts])

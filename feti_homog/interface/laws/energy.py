@@ -26,13 +26,13 @@ from feti_homog.typing import Bool, Float, Int
 if TYPE_CHECKING:
     from feti_homog.feti.exact import exact_inverse
 
-# Blocks of H are rounding below this fraction of the stiffness beside the bond.
+# Fraction of the stiffness beside a bond below which blocks of H are rounding errors.
 RIGID = 1e-9
 
 
 @dataclass(frozen=True)
 class SpringEnergy(SpringLaw):
-    """A bond breaks when its spring energy reaches the toughness.
+    """The law by which a bond breaks when its spring energy reaches the toughness.
 
     G_I = <t_n>^2 / (2 k_n), G_II = t_t^2 / (2 k_t), tan^2 psi = G_II / G_I;
     G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)].
@@ -41,7 +41,7 @@ class SpringEnergy(SpringLaw):
 
     Attributes:
         toughness: G_Ic, energy per area.
-        mode_sensitivity: lambda; with 1 G_c is independent of the mode, with 0 pure shear breaks no bond.
+        mode_sensitivity: lambda; at 1, G_c is independent of the mode; at 0, pure shear breaks no bond.
     """
 
     normal_stiffness: float | Float
@@ -54,7 +54,7 @@ class SpringEnergy(SpringLaw):
 
     @classmethod
     def of_keys(cls, value: KeyValues) -> Self:
-        """Make the law from stiffnesses and toughness; by default the axial stiffness is the tangential stiffness."""
+        """Make the law from [interface] keys; the axial stiffness defaults to the tangential one."""
         return cls(
             value("normal_stiffness"),
             value("tangential_stiffness"),
@@ -64,34 +64,34 @@ class SpringEnergy(SpringLaw):
         )
 
     def mode_factor(self, traction: Float) -> Float:
-        """Return sqrt(G_Ic / G_c) (p,) under tractions (p, c)."""
+        """Return the factor sqrt(G_Ic / G_c) (p,) of the modes of tractions (p, c)."""
         # 1 / (1 + tan^2 x) = cos^2 x
         return np.asarray(np.cos((1.0 - self.mode_sensitivity) * self.mode_angle(traction)))
 
     def share(self, traction: Float) -> Float:
-        """Return sqrt((G_I + G_II) / G_c) (p,) under tractions (p, c).
+        """Return the utilisation sqrt((G_I + G_II) / G_c) (p,) under tractions (p, c).
 
-        This utilisation is convex, and homogeneous of degree one because psi is independent of the traction's size.
+        The utilisation is convex, and homogeneous of degree one because psi is independent of the size of the traction.
         """
         return np.asarray(np.sqrt(sum(self.energies(traction)) / self.toughness) * self.mode_factor(traction))
 
     def fracture_toughness(self, traction: Float) -> Float:
-        """Return G_c (p,) under tractions (p, c), energy per area."""
+        """Return the toughness G_c (p,) in the modes of tractions (p, c), an energy per area."""
         return np.asarray(self.toughness / self.mode_factor(traction) ** 2)
 
     def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
-        """Return G_c (p,) of bonds `which` (k,) under tractions (k, c)."""
+        """Return the toughness G_c (p,) of the bonds `which` (k,) under tractions (k, c)."""
         return self.at(np.flatnonzero(which)).fracture_toughness(traction[which])
 
 
 @dataclass(frozen=True)
 class TipEnergies:
-    """The tips: this rank's intact bonds beside broken bonds.
+    """The debonding tips of this rank: t intact bonds beside broken bonds.
 
     Attributes:
         H: (t, 2, 2) diagonal blocks of the inverse dual operator.
         length: (t,) tributary lengths.
-        stiffness: (t, c) upper bound of H, as `ExactInverse.stiffness`.
+        stiffness: (t, c) upper bounds of H, as `ExactInverse.stiffness`.
         axial: (t,) H for slip along the fibres; empty without an axial problem.
     """
 
@@ -103,7 +103,7 @@ class TipEnergies:
 
 @dataclass(frozen=True, kw_only=True)
 class ReleasedEnergy(SpringEnergy):
-    """A bond at a tip breaks when its break releases G_c l, with its tributary length l.
+    """The law by which a bond at a tip breaks when the break releases G_c l, with tributary length l.
 
     All other bonds break when the spring energy reaches G_c.
 
@@ -122,11 +122,11 @@ class ReleasedEnergy(SpringEnergy):
         influence: exact_inverse.ExactInverse,
         axial: exact_inverse.ExactInverse | None = None,
     ) -> Self:
-        """Make the law from springs and the inverse dual operators."""
+        """Make the law from a spring law and the inverse dual operators."""
         return cls(**vars(springs), influence=influence, axial=axial)
 
     def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> SpringsAndTips:
-        """Return the law at this rank's nodes in a bond state.  Collective; the methods of the result are not.
+        """Return the law at this rank's nodes in a bond state.  Collective, unlike the methods of the result.
 
         Raises:
             ConvergenceError: rounding hides the released energy.
@@ -164,12 +164,12 @@ class ReleasedEnergy(SpringEnergy):
 
 @dataclass(frozen=True, kw_only=True)
 class SpringsAndTips(SpringEnergy):
-    """The law in a bond state: sqrt(released / (G_c l)) at tips, the spring criterion at all other nodes.
+    """The law in one bond state: sqrt(released / (G_c l)) at tips, the spring criterion at other nodes.
 
     Attributes:
         tips: tips of this rank.
-        number: (p,) tip number of a node, or -1.
-        contact: whether contact keeps faces from overlap.
+        number: (p,) tip number of each node, or -1.
+        contact: whether contact prevents overlap of faces.
     """
 
     tips: TipEnergies
@@ -177,7 +177,7 @@ class SpringsAndTips(SpringEnergy):
     contact: bool
 
     def share(self, traction: Float) -> Float:
-        """Return the utilisation (p,) by tractions (p, c)."""
+        """Return the utilisation (p,) under tractions (p, c)."""
         used, at = super().share(traction), np.flatnonzero(self.number >= 0)
         springs, tips, t = self.at(at), self.tips, self.number[at]
         length, stiffness = tips.length[t], tips.stiffness[t]
@@ -191,15 +191,15 @@ class SpringsAndTips(SpringEnergy):
         return used
 
     def convex(self, p: int) -> Bool:
-        """Return False (p,) at tips, because the released energy need not be subadditive."""
+        """Return False (p,) at tips, where the released energy need not be subadditive."""
         return np.asarray(self.number < 0)
 
 
 def released_energy(H: Float, lam: Float, stiffness: Float, contact: bool) -> Float:
-    """Return the released energy (m,) of each break, for blocks H (m, 2, 2) and forces (m, 2).
+    """Return the released energy (m,) of each break, from blocks H (m, 2, 2) and forces `lam` (m, 2).
 
-    `stiffness` (m, 2) bounds H: where H is rounding relative to this bound, as at the last bond of a fibre, no force
-    can act.  With `contact` the faces that would overlap keep the normal force.
+    `stiffness` (m, 2) bounds H.  Where H is a rounding error relative to this bound, as at the last bond of a fibre, no
+    force can act.  With `contact` the faces that would overlap keep the normal force.
     """
     root = np.sqrt(stiffness)
     ratio, vectors = np.linalg.eigh(H / (root[:, :, None] * root[:, None, :]))

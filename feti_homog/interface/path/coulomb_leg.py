@@ -1,7 +1,7 @@
-"""Legs with friction on debonded faces: linear pieces, between which statuses change or bonds break.
+"""Path legs with friction on debonded faces: linear pieces between changes of status and breaks of bonds.
 
-An equal load step is implicit: slips grow with the sign of the traction at its end.  The way within a step is unknown:
-its heat is the work of final forces on slips, and the work of the loads is stored, released or heat.
+An equal load step is implicit: slips grow with the sign of the final traction.  The way within a step is unknown: the
+heat is the work of final forces on slips, and the work of the loads is stored, released or heat.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -31,7 +31,7 @@ CYCLE = "friction: the statuses of the faces change without end at one load (a c
 
 
 class CoulombLeg(Leg):
-    """Leg with statuses (n,) of faces and scaled x (m,), as in `CoulombFaces`.
+    """A leg with face statuses (n,) and scaled x (m,), as in `CoulombFaces`.
 
     Rates solve a complementarity problem, and are constant until a face reaches a limit of its status, a bond its
     strength, or s = 1.
@@ -57,7 +57,7 @@ class CoulombLeg(Leg):
 
     @property
     def state(self) -> Equilibrium:
-        """Equilibrium at s, computed once.  Collective."""
+        """The equilibrium at s, computed once.  Collective."""
         if self._state is None:
             loads = [*self.waypoints[: self.leg], self._load_at(self._share)]
             self._state = self.sliding.equilibrium(loads, self._bonds, self._x)
@@ -67,7 +67,7 @@ class CoulombLeg(Leg):
         return replace(super()._path_state(), stretched=self.sliding.stretched(self._x))
 
     def _on_root(self, find: Callable[..., tuple[Status, Float]], *arguments: Any) -> tuple[Status, Float]:
-        """Call `find` on rank 0; return its statuses and x, whose product all ranks store.  Collective."""
+        """Call `find` on rank 0, and return the statuses and x on all ranks.  Collective."""
         faces = self.sliding.faces
 
         def found() -> tuple[Status, Float, Float]:
@@ -84,7 +84,7 @@ class CoulombLeg(Leg):
         return Prescribed(load.by_stress, self.sliding.given(load), x[1 : 2 * len(self.sliding.rows) : 2])
 
     def _stand(self, status: Status, x: Float, mean: Macroscopic, way: Energies) -> None:
-        """Set the state to statuses and scaled x, after a way with these energies."""
+        """Set the current state, and add the energies of the way to this state."""
         self._energies = self._energies.plus(way)
         self._bonds = self.sliding.bonds(self._bonds, status, x)
         self._status, self._x, self._mean, self._state = status, x, mean, None
@@ -93,7 +93,7 @@ class CoulombLeg(Leg):
         """Find the state at s with the bonds of `begin`, after a break if `begin` has one.  Collective.
 
         In a break faces lose the product of jumps and mean forces; slips turn a part into heat by the final forces, and
-        the break has released the rest.
+        the break releases the rest.
         """
         sliding, self._bonds = self.sliding, begin.bonds
         self._status, self._x = status, x = sliding.begin(begin.bonds, begin.last.strain)
@@ -116,11 +116,11 @@ class CoulombLeg(Leg):
         self._stand(status, x, mean, Energies(work, released, fracture, heat))
 
     def _advance(self) -> Iterator[Point]:
-        """Advance along the rates up to the next change, and past it.
+        """Advance along the rates up to and past the next change.
 
         Raises:
             NotCarriedError: nothing carries more, after a point at the largest load.
-            StuckError: no statuses go on, or they change without end.
+            StuckError: no statuses continue the state, or statuses change without end.
         """
         sliding, faces, share = self.sliding, self.sliding.faces, self._share
         velocity = sliding.given(self.end) - sliding.given(self.start)
