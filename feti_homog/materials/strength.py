@@ -1,7 +1,7 @@
-"""Strength criteria of phases, each as its utilisation: 1 at failure, proportional to the stress.
+"""Compute the utilisation of phases by strength criteria: 1 at failure, proportional to the stress.
 
 Maximum principal stress sigma_1 / X; von Mises; Drucker and Prager by both uniaxial strengths; for fibres along x3 the
-four modes of Hashin (J. Appl. Mech. 47 (1980) 329), of which the largest counts.
+largest of Hashin's four modes (J. Appl. Mech. 47 (1980) 329).
 """
 
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ CRITERIA = {
         "transverse_shear",
     ),
 }  # fmt: skip
-"""Criteria, each with the keys that it needs."""
+"""Criteria with the keys that each criterion needs."""
 
 
 def criterion(strength: PhaseStrength) -> str:
@@ -38,7 +38,7 @@ def criterion(strength: PhaseStrength) -> str:
 
 
 def utilisation(strength: PhaseStrength, stress: Float, principal: Float, von_mises: Float) -> Float:
-    """Compute the utilisation (n,) of a strength.
+    """Compute the utilisation (n,) of a phase strength by stresses.
 
     Args:
         stress: (n, 6) in the order [11, 22, 33, 23, 13, 12], x3 along the fibres.
