@@ -53,8 +53,8 @@ def size(case: Case, estimate: element_estimate.ElementEstimate) -> float | None
     balanced: float = TIP_SHARE * 2**cell.refine * radius * (fine / radius) ** (2 * cell.order)
     size_at_tips = max(balanced, LEAST_SIZE)
     if len(case.section.openings) > 1:
-        share = TIP_TRIANGLES * estimate.triangles / tips
-        size_at_tips = max(size_at_tips, around / element_estimate.ratio_at_a_tip(share))
+        triangles_of_a_tip = TIP_TRIANGLES * estimate.triangles / tips
+        size_at_tips = max(size_at_tips, around / element_estimate.ratio_at_a_tip(triangles_of_a_tip))
     return min(around, size_at_tips)
 
 
@@ -95,9 +95,9 @@ class EstimatedNodes:
             return (debonded_arcs.NOT_MOVED,) * len(case.interfaces)
         distance, moved = float(np.degrees(outline.MERGED)), []
         for pair, interface in enumerate(case.interfaces):
-            at = self.is_vertex & (self.pair == pair)
+            candidate = self.is_vertex & (self.pair == pair)
             tips = debonded_arcs.tips(interface.debonded, case.section.openings, fibres)
-            moved.append(debonded_arcs.moved_tips(tips, self.fibre[at], self.direction[at], distance))
+            moved.append(debonded_arcs.moved_tips(tips, self.fibre[candidate], self.direction[candidate], distance))
         return tuple(moved)
 
 
@@ -117,17 +117,17 @@ def faults(case: Case, nodes: EstimatedNodes, moved: Sequence[debonded_arcs.Move
     for pair, interface in enumerate(case.interfaces):
         fibres, directions = nodes.fibre[nodes.pair == pair], nodes.direction[nodes.pair == pair]
         label = interface_section.interface_label(pair, len(case.interfaces))
-        for (place, arc), opening in ((arc, opening) for arc in enumerate(interface.debonded) for opening in openings):
-            angle, line = opening if arc.angle is None else arc.angle, f"[{label}] debonded[{place}]"
+        for (number, arc), opening in ((arc, opening) for arc in enumerate(interface.debonded) for opening in openings):
+            angle, line = opening if arc.angle is None else arc.angle, f"[{label}] debonded[{number}]"
             inside = debonded_arcs.debonded([arc], opening, fibres, directions, moved[pair])
             for fibre in [None] if isinstance(arc.fibre, str) else arc.fibre:
                 if not angle or (inside if fibre is None else inside[fibres == fibre]).any():
                     continue
                 if fibre is not None and fibre not in fibres:
-                    which = (
+                    kind = (
                         "that can debond" if interface.between is None else f"between {' and '.join(interface.between)}"
                     )
-                    lines.append(f"{line}.fibre: fibre {fibre} has no interface {which}")
+                    lines.append(f"{line}.fibre: fibre {fibre} has no interface {kind}")
                     continue
                 whose = "any fibre" if fibre is None else f"fibre {fibre}"
                 words = (

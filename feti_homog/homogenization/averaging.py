@@ -1,4 +1,4 @@
-"""Macroscopic response of a cell, errors in the laws that it obeys, and debonded lengths of fibres.
+"""Macroscopic responses of a cell, errors in the balance laws, and debonded lengths of fibres.
 
 A strain E is [E11, E22, gamma12], followed by the other loads of the problem; a stress has the conjugate entries.
 """
@@ -262,7 +262,7 @@ class FibreInterfaces:
         return [int(number) for number in np.flatnonzero(is_loose) + 1]
 
     def angle(self, length: Float) -> Float:
-        """Convert interface lengths (f,) to degrees; an interface that is not round counts 360 in all."""
+        """Convert interface lengths (f,) to degrees, or to fractions of 360 for fibres that are not round."""
         return np.asarray(length * self._degrees)
 
     def share(self, length: Float) -> float:

@@ -58,8 +58,7 @@ def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -
 def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
     """List the remarks on a mesh and its interfaces.
 
-    The remarks concern the mesh, an [interface] without effect, and nodes that never part; `pairs` as in
-    `share_entities`.
+    Remarks concern the mesh, an [interface] without effect, and nodes that never part; `pairs` as `share_entities`.
     """
     lines, has_curve = [*torus.mesh.remarks], len(torus.mesh.debonded_edges) > 0
     if case.interface is None:
@@ -71,7 +70,7 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
     may_part = pairs[torus.mesh.phase[first], torus.mesh.phase[second]] >= 0
     ends = np.unique(torus.edge_ends[edge[may_part & (torus.constituent[first] != torus.constituent[second])]])
     kinds = ((torus.meeting[ends] > 2, "three bodies meet"), (torus.touching[ends], "two bodies meet more than once"))
-    if counts := [f"at {which.sum()} {kind}" for which, kind in kinds if which.any()]:
+    if counts := [f"at {mask.sum()} {kind}" for mask, kind in kinds if mask.any()]:
         lines.append(f"[interface] nodes that never part: {', '.join(counts)}")
     # A bond at the pinned node, Eq. (15).
     pinned = np.searchsorted(torus.class_keys, submeshes.pinned_class(torus))
@@ -149,14 +148,14 @@ def warnings(case: Case, width: float, edge: float) -> list[str]:
     size = f"elements on the interface are up to {edge / 2**case.cell.refine:.3g} long"
     size += f" after refine = {case.cell.refine}" if case.cell.refine else ""
     if softens:
-        zone, share = f"E' G / N^2 = {length:.3g} long", "a third"
+        zone, fraction = f"E' G / N^2 = {length:.3g} long", "a third"
     else:
         # The bonds of the shortest process zone break at this traction in pure opening.
         pairs = [(bond.normal_stiffness or 0.0, bond.toughness or 0.0) for bond in case.interfaces]
         stiffness, toughness = max(pair for pair in pairs if all(pair))
         strength = f"{math.sqrt(2.0 * stiffness * toughness):.3g}"
-        zone, share = f"E' G_Ic / sigma_c^2 = {length:.3g} long for sigma_c = sqrt(2 k_n G_Ic) = {strength}", "half"
-    law, limit = f'[interface] law = "{case.interfaces[0].criterion}"', f"elements should be at most {share} of that"
+        zone, fraction = f"E' G_Ic / sigma_c^2 = {length:.3g} long for sigma_c = sqrt(2 k_n G_Ic) = {strength}", "half"
+    law, limit = f'[interface] law = "{case.interfaces[0].criterion}"', f"elements should be at most {fraction} of that"
     refine = math.ceil(math.log2(edge / (resolved * length)))
     # Rounded down to two digits.
     needed = resolved * length * 2**case.cell.refine / width

@@ -177,7 +177,7 @@ def distribute(
         interface_nodes=_interface_nodes(torus, pairs, lattice) if across else None,
     )
     shares = submeshes.cut_for_ranks(torus, cut.subdomain, table, n_ranks, submeshes.pinned_class(torus))
-    return [RankShare(summary, table, pairs, share) for share in shares]
+    return [RankShare(summary, table, pairs, part) for part in shares]
 
 
 def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triangles: int) -> CellSummary:
@@ -220,7 +220,7 @@ def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triang
 def _cut_across(
     case: Case, torus: Torus, lattice: ReferenceLattice, n_ranks: int, policy: partition_policy.PartitionPolicy
 ) -> partition.Partition | None:
-    """Cut the cell across materials; None if the policy forbids it or a rank gets nothing."""
+    """Cut the cell across materials; return None if the policy or METIS prevents the cut."""
     triangles = len(torus.mesh.triangles)
     dofs = triangles * lattice.intervals**2
     pieces = policy.across_pieces(dofs, n_ranks) if partition_policy.can_be_cut_across(case) else 0
@@ -249,7 +249,7 @@ def in_cell(points: Float, period: Float) -> Float:
 
 
 def _interface_nodes(torus: Torus, pairs: Int, lattice: ReferenceLattice) -> int:
-    """Count the nodes at which two bodies could part if they had an interface."""
+    """Count the nodes at which two bodies could part along an interface."""
     first, second, edge = torus.sides
     between = edge[pairs[torus.mesh.phase[first], torus.mesh.phase[second]] >= 0]
     plane = np.unique(torus.torus_edge, return_index=True)[1][between]

@@ -159,29 +159,29 @@ def _recovered(
     if is_nested and not across:
         for interior in cell.nested_interiors if keep else nested_interiors(boundary, cell.lattice, lattice):
             displacement = interior.displacement(u, loads)
-            place = np.full(displacement.shape[0] * displacement.shape[1], NONE)
-            place[interior.fixed] = interior.place
-            solved.append((interior.members, interior.mesh, displacement, place))
+            position = np.full(displacement.shape[0] * displacement.shape[1], NONE)
+            position[interior.fixed] = interior.place
+            solved.append((interior.members, interior.mesh, displacement, position))
     else:
         displacements, firsts = cell.displacements(u, loads, keep), cell.offsets if across else boundary.offsets
         dofs = [np.arange(len(part.dofs)) for part in cell.parts] if across else boundary.dofs
         for group in groups(cell.parts, lattice):
             parts = [cell.parts[k] for k in group]
             mesh = refinement.joined([part.mesh for part in parts])
-            places = [np.full(len(part.dofs), NONE) for part in parts]
+            positions = [np.full(len(part.dofs), NONE) for part in parts]
             if is_nested:
                 mesh = replace(mesh, nodes=mesh.nodes[:, lattice.within(cell.lattice)], lattice=lattice)
-            for k, place in zip(group, places, strict=True):
-                place[dofs[k]] = firsts[k] + np.arange(len(dofs[k]))
+            for k, position in zip(group, positions, strict=True):
+                position[dofs[k]] = firsts[k] + np.arange(len(dofs[k]))
             displacement = np.concatenate([next(displacements)[1] for _ in group])
             shape = -1, parts[0].problem.components, len(responses)
-            solved.append((parts, mesh, displacement.reshape(shape), np.concatenate(places)))
+            solved.append((parts, mesh, displacement.reshape(shape), np.concatenate(positions)))
     groups_of_rank, meshes = list[Group](), list[tuple[list[Submesh], FineMesh]]()
-    for members, mesh, displacement, place in solved:
+    for members, mesh, displacement, position in solved:
         first, pieces = members[0], [s.submesh for s in members]
         stress = stress_recovery.RecoveredStress.on(mesh, first.L, first.problem, displacement, loads, first.is_mixed)
         sides = arc_error.ArcSides.of(stress, pieces, lattice)
-        groups_of_rank.append(Group(stress, sides, place[:: first.problem.components]))
+        groups_of_rank.append(Group(stress, sides, position[:: first.problem.components]))
         meshes.append((pieces, mesh))
     body, shared, fits = cell.table.body, None, dict[int, tuple[Int, Float]]()
     if (len(body) > 1) if across else (np.bincount(body) > 1).any():
@@ -218,27 +218,27 @@ def boundary_tractions(
     """
     forces, lengths = _forces(cell, responses, groups)
     sums, of_node = list[Float](), np.append(lengths, 0.0)  # at NONE, the last
-    for stress, sides, place in groups:
+    for stress, sides, position in groups:
         ends = stress.node_class[stress.triangles[sides.element[:, None], sides.ends]].ravel()
         half = np.repeat(sides.points[:, -1] - sides.points[:, 0], 2, axis=0) / 2
         free = np.repeat(sides.at_void, 2)
         rows = np.column_stack([half[:, 1], -half[:, 0], np.hypot(*half.T), np.ones(len(ends)), free])
-        loaded = np.flatnonzero(free | (of_node[place[ends]] > 0))
-        sums.append(np.stack([np.bincount(ends[loaded], row, len(place)) for row in rows[loaded].T], axis=1))
+        loaded = np.flatnonzero(free | (of_node[position[ends]] > 0))
+        sums.append(np.stack([np.bincount(ends[loaded], row, len(position)) for row in rows[loaded].T], axis=1))
     if shared is not None:
         parts = [sums[number][classes] for number, classes in zip(shared.meshes, shared.classes, strict=True)]
         for number, classes, total in zip(shared.meshes, shared.classes, shared.sum(parts), strict=True):
             sums[number][classes] = total
     by_group = dict[int, local_fits.KnownTractions]()
-    for number, ((stress, _, place), table) in enumerate(zip(groups, sums, strict=True)):
-        at = np.flatnonzero((table[:, 3] == 2) | (table[:, 4] > 0))
-        if len(at):
-            areas, size, is_free = table[at, :2], table[at, 2], table[at, 4] > 0
-            traction = forces[np.maximum(place[at], 0)[:, None] + np.arange(stress.problem.components)]
+    for number, ((stress, _, position), table) in enumerate(zip(groups, sums, strict=True)):
+        selected = np.flatnonzero((table[:, 3] == 2) | (table[:, 4] > 0))
+        if len(selected):
+            areas, size, is_free = table[selected, :2], table[selected, 2], table[selected, 4] > 0
+            traction = forces[np.maximum(position[selected], 0)[:, None] + np.arange(stress.problem.components)]
             traction[is_free] = 0.0
-            length = of_node[place[at]] if nested else np.hypot(*areas.T)
+            length = of_node[position[selected]] if nested else np.hypot(*areas.T)
             traction /= np.where(is_free, 1.0, np.maximum(length, 1e-300))[:, None, None]
-            by_group[number] = local_fits.KnownTractions.at(at, areas / size[:, None], traction)
+            by_group[number] = local_fits.KnownTractions.at(selected, areas / size[:, None], traction)
     return by_group
 
 

@@ -83,7 +83,7 @@ class PartitionPolicy:
     strip_dofs: int = 30_000
 
     def across_pieces(self, dofs: int, n_ranks: int) -> int:
-        """Return the number of pieces across materials, the same per rank; 0 for cuts by body."""
+        """Return the number of pieces across materials, a multiple of `n_ranks`; 0 for other cuts."""
         if dofs > self.across_dofs:
             return 0
         if n_ranks <= self.whole_ranks and dofs <= self.whole_dofs:
@@ -184,7 +184,10 @@ def memory(nodes: Sequence[int], subdomains: Sequence[int], components: Sequence
 
 
 def memory_to_the_end(case: Case, few: float, multipliers: int, columns: int, ranks: int) -> float:
-    """Estimate the largest rank's bytes after all bonds break, from its bytes `few` before."""
+    """Estimate the memory of the largest rank after all bonds break, in bytes.
+
+    `few` is the memory of this rank before the breaks.
+    """
     stored = columns if columns <= thresholds.NEVER_REFACTORED_ROWS else thresholds.INFLUENCE_COLUMNS
     faces = PAIR_BYTES * multipliers**2 if case.has_friction else 0
     return few + columns / ranks * (PATH_BYTES + stored * PAIR_BYTES) + faces

@@ -56,7 +56,7 @@ def is_mixed(case: Case, phase: str) -> bool:
 
 
 def law_derivatives(case: Case, phase: str, change: material_derivatives.LawChange) -> tuple[Float, ...]:
-    """Differentiate `law` in the plane problem and, if the case has one, in the axial problem."""
+    """Differentiate `law` in the plane problem and, if present, in the axial problem."""
     problem, dC = problems(case)[0], change.stiffness
     if problem == PLANE:
         return (dC,)
@@ -80,8 +80,8 @@ def secants(plane: Float, *axial: Float) -> dict[str, Float]:
     """
     if not axial:
         return {"stiffness": plane}
-    C, place = np.zeros((6, 6)), np.ix_(IN_PLANE, IN_PLANE)
-    C[place], C[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)] = plane[:4, :4], axial[0]
+    C, block = np.zeros((6, 6)), np.ix_(IN_PLANE, IN_PLANE)
+    C[block], C[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)] = plane[:4, :4], axial[0]
     return {"stiffness": C} | ({"thermal_stress": spatial_vector(plane[:, 4], None)} if len(plane) > 4 else {})
 
 
@@ -167,7 +167,7 @@ class SectionValues:
 
 
 def bond_law(bonds: Sequence[interface_section.InterfaceSection], pair: Int, factor: float | Float = 1.0) -> BondLaw:
-    """Make the bond law at nodes from the arguments of `SectionValues`; no section breaks no bond."""
+    """Make the bond law from arguments as in `SectionValues`; without sections no bond breaks."""
     name = bonds[0].criterion if bonds else bond_laws.DEFAULT
     return law_class(name).of_keys(SectionValues(bonds, pair, factor))
 

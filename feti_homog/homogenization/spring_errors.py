@@ -50,8 +50,8 @@ class SpringSides:
             nodes = nodes[inner][:, starts[:, None] + np.arange(lattice.order + 1)].reshape(-1, lattice.order + 1)
             side = np.tile(np.arange(len(starts)), len(turn))
             normal, turn = np.repeat(normal, len(starts), axis=0), np.repeat(turn, len(starts))
-            places = (side[:, None] + (1 + POINTS) / 2) * lattice.order / lattice.intervals
-            normal = np.stack([shared_entities.along(normal, turn, place) for place in places.T], axis=1)
+            positions = (side[:, None] + (1 + POINTS) / 2) * lattice.order / lattice.intervals
+            normal = np.stack([shared_entities.along(normal, turn, position) for position in positions.T], axis=1)
             sides.append((nodes, normal, turn))
         self._nodes, normal, turn = (np.concatenate(table) for table in zip(*sides, strict=True))
         speed = np.hypot(*np.moveaxis(normal, 2, 0))
@@ -98,12 +98,13 @@ class SpringSides:
         # define the functions on sides in both energies; what these functions lack, the exact jump d adds to the spring
         # energy, and to the energy of t on the distance from d to these functions.
         side = np.flatnonzero(holds[self._nodes].all(axis=1))
-        at, ds, shape = self._nodes[side], self._ds[side], self._shape[:, side]
-        k, moved, traction = stiffness[at], self._in_space(jump)[at], self._in_space(stiffness[:, :, None] * jump)[at]
+        node, ds, shape = self._nodes[side], self._ds[side], self._shape[:, side]
+        k, moved = stiffness[node], self._in_space(jump)[node]
+        traction = self._in_space(stiffness[:, :, None] * jump)[node]
         blended = np.einsum("afq,fadi->fqdi", shape, moved)
         if moved.shape[2] == 2:
             blended = np.einsum("fqcd,fqdi->fqci", self._frame[side], blended)
-        lumped = np.einsum("fa,fac,faci,facj->ij", self._weights[side], k, jump[at], jump[at], optimize=True)
+        lumped = np.einsum("fa,fac,faci,facj->ij", self._weights[side], k, jump[node], jump[node], optimize=True)
         between = np.einsum("afq,fac->fqc", shape, k)
         on_sides = np.einsum("fq,fqc,fqci,fqcj->ij", ds, between, blended, blended, optimize=True)
         differences = (np.diff(values, n=self._order, axis=1)[:, 0] for values in (traction, moved))

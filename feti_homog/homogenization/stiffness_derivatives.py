@@ -71,10 +71,10 @@ def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response
     for number, bond in enumerate(case.interfaces):
         label = f"interface.{number + 1}" if len(case.interfaces) > 1 else "interface"
         # The problems and components of the springs that have a stiffness.
-        places = {"normal_stiffness": [(0, 0)], "tangential_stiffness": [(0, 1)], "axial_stiffness": [(1, 0)]}
+        springs_of_keys = {"normal_stiffness": [(0, 0)], "tangential_stiffness": [(0, 1)], "axial_stiffness": [(1, 0)]}
         if bond.axial_stiffness is None:
-            places["tangential_stiffness"].append((1, 0))
-        for key, pairs_of_key in places.items():
+            springs_of_keys["tangential_stiffness"].append((1, 0))
+        for key, pairs_of_key in springs_of_keys.items():
             value = getattr(bond, key)
             if value is not None and np.isfinite(value):
                 energies = tuple(
@@ -217,9 +217,9 @@ def _velocity(points: Float, cell: CellSummary) -> Float:
         gaps = np.linalg.norm(centres[:, None] + IMAGES * period - centre, axis=2) - radii[:, None] - radius
         gaps[number, (IMAGES == 0).all(axis=1)] = np.inf
         reach = gaps.min() / 2  # so that at most one fibre moves a node
-        away = points - centre
-        away -= period * np.round(away / period)
-        distance = np.linalg.norm(away, axis=1, keepdims=True)
-        share = np.clip((radius + reach - distance) / reach, 0.0, 1.0) * radius / np.maximum(distance, radius)
-        V += away * np.where(distance <= radius * (1 + ROUNDING), 1.0, share)
+        offset = points - centre
+        offset -= period * np.round(offset / period)
+        distance = np.linalg.norm(offset, axis=1, keepdims=True)
+        fraction = np.clip((radius + reach - distance) / reach, 0.0, 1.0) * radius / np.maximum(distance, radius)
+        V += offset * np.where(distance <= radius * (1 + ROUNDING), 1.0, fraction)
     return V

@@ -202,11 +202,11 @@ def _neighbours(torus: Torus, subdomain: Int) -> tuple[Int, Int, Int, Int]:
     and the subdomain (k,) of this triangle.
     """
     a, b, _ = torus.sides
-    apart = subdomain[a] != subdomain[b]
+    differs = subdomain[a] != subdomain[b]
     edges = torus.triangle_torus_edges
     alone = (np.bincount(edges.ravel(), minlength=len(torus.edge_keys)) == 1) & ~torus.at_void
     triangle, k = np.nonzero(alone[edges])
-    return subdomain[a[apart]], subdomain[b[apart]], torus.edge_keys[edges[triangle, k]], subdomain[triangle]
+    return subdomain[a[differs]], subdomain[b[differs]], torus.edge_keys[edges[triangle, k]], subdomain[triangle]
 
 
 def _assigned(load: Int, neighbours: list[tuple[Int, Int, Int, Int]], n_ranks: int) -> Int:

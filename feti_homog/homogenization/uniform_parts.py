@@ -53,9 +53,9 @@ class UniformPart:
 
 def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterator[UniformPart]:
     """Yield the parts of all subdomains, ordered by phase and body; `phase_of` (constituents,) names phases."""
-    for place, s in enumerate(subdomains):
+    for number, s in enumerate(subdomains):
         if s.material is None:
-            yield UniformPart(place, s.submesh, s.mesh, np.arange(s.n_dofs), s.L, s.problem, s.is_mixed)
+            yield UniformPart(number, s.submesh, s.mesh, np.arange(s.n_dofs), s.L, s.problem, s.is_mixed)
             continue
         order = np.lexsort((s.submesh.constituent, s.material))
         bodies = s.submesh.constituent[order]
@@ -64,7 +64,7 @@ def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterat
             submesh = replace(submeshes.part(s.submesh, members), body=body, phase=phase_of[body])
             mesh, classes = _restricted(s.mesh, members)
             is_mixed = bool(np.broadcast_to(s.mixed, len(s.laws))[law])
-            yield UniformPart(place, submesh, mesh, s.problem.dofs(classes), s.laws[law], s.problem, is_mixed)
+            yield UniformPart(number, submesh, mesh, s.problem.dofs(classes), s.laws[law], s.problem, is_mixed)
 
 
 def nodes_of_parts(s: Subdomain) -> int:
@@ -72,8 +72,8 @@ def nodes_of_parts(s: Subdomain) -> int:
     body, nodes = np.repeat(s.submesh.constituent, s.mesh.nodes.shape[1]), s.mesh.nodes.ravel()
     last = np.empty(len(s.mesh.points), np.int64)
     last[nodes] = body
-    more = np.flatnonzero(last[nodes] != body)
-    return len(last) + len(np.unique(nodes[more].astype(np.int64) * (int(body.max()) + 1) + body[more]))
+    repeated = np.flatnonzero(last[nodes] != body)
+    return len(last) + len(np.unique(nodes[repeated].astype(np.int64) * (int(body.max()) + 1) + body[repeated]))
 
 
 def _restricted(mesh: FineMesh, members: Int) -> tuple[FineMesh, Int]:
@@ -181,24 +181,24 @@ def nested_interiors(
             fine = np.empty(mesh.n_classes, np.int64)
             fine[mesh.node_class[mesh.nodes]] = s.mesh.node_class[s.mesh.nodes[:, nested]]
             numbers.append(of_fine[s.problem.dofs(fine)])
-        place = np.concatenate(numbers)
-        fixed = np.flatnonzero(place != inside)
+        position = np.concatenate(numbers)
+        fixed = np.flatnonzero(position != inside)
         mesh = refinement.joined(meshes)
         body = assembly.assemble(mesh, first.L, first.problem, first.is_mixed)
         interior = one_subdomain.Interior(body.K, fixed)
         loads = body.Q[interior.dofs] if any(s.submesh.at_void.any() for s in members) else None
-        yield NestedInterior(members, mesh, fixed, place[fixed], interior, loads)
+        yield NestedInterior(members, mesh, fixed, position[fixed], interior, loads)
 
 
 def groups(subdomains: Sequence[Subdomain | UniformPart], lattice: ReferenceLattice) -> Iterator[list[int]]:
     """Yield groups of consecutive one-phase subdomains, up to ELEMENTS_AT_ONCE elements."""
     group, elements = list[int](), 0
-    for place, s in enumerate(subdomains):
+    for number, s in enumerate(subdomains):
         count = len(s.mesh.nodes) * len(lattice.triangles)
         elements += count
         if group and (elements > ELEMENTS_AT_ONCE or s.submesh.phase != subdomains[group[0]].submesh.phase):
             yield group
             group, elements = [], count
-        group.append(place)
+        group.append(number)
     if group:
         yield group

@@ -93,10 +93,10 @@ class TornCell:
 
         `u` is (boundary dofs, k), `loads` are (v, k), and u* is (dofs, k); `keep` stores the factors.
         """
-        place, extended = -1, np.zeros(0)
+        number, extended = -1, np.zeros(0)
         for part in self.parts:
-            if part.place != place:
-                place, extended = part.place, self.solver.extended(part.place, u, loads, keep)
+            if part.place != number:
+                number, extended = part.place, self.solver.extended(part.place, u, loads, keep)
             yield part, extended[part.dofs]
 
     def across_bonds(self, solution: DualSolution, u: Float) -> tuple[Float, Float]:
@@ -209,8 +209,8 @@ def tear(
     Raises:
         CaseError, MeshError: on every rank.
     """
-    share, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
-    summary, recovers = share.summary, case.output.mesh_error or case.output.fields
+    part, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
+    summary, recovers = part.summary, case.output.mesh_error or case.output.fields
 
     def solver_of(problem: Problem, subdomains: list[Subdomain]) -> FetiSolver:
         applications = partition_policy.applications(case, problem, summary.across)
@@ -221,7 +221,7 @@ def tear(
         solver = solver_of(phase_laws.problems(case)[0], subdomains)
         multipliers, dimension = solver.jump_operator.global_rows, solver.coarse_dimension
         line.append(f"{multipliers} multipliers, coarse dimension {dimension}")
-    cell = TornCell(comm, case, summary, lattice, share.table, subdomains, solver)
+    cell = TornCell(comm, case, summary, lattice, part.table, subdomains, solver)
     if len(phase_laws.problems(case)) == 1:
         return cell
     with progress.stage("assemble") as line:
@@ -250,16 +250,16 @@ def assemble_subdomains(
     """
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
     with progress.stage("mesh") as line:
-        share = cut(case, lattice, comm, policy)
-        summary = share.summary
-        shared = shared_entities.share_entities(comm, share.submeshes, share.table, share.pairs, lattice)
+        part = cut(case, lattice, comm, policy)
+        summary = part.summary
+        shared = shared_entities.share_entities(comm, part.submeshes, part.table, part.pairs, lattice)
         line.append(f"{summary.coarse_triangles} triangles, {summary.bodies} bodies, {summary.subdomains} subdomains")
     for remark in summary.remarks:
         progress.say(f"remark: {remark}")
 
     def assembled() -> list[Subdomain]:
         problem, subdomains = phase_laws.problems(case)[0], list[Subdomain]()
-        for s in share.submeshes.cut():
+        for s in part.submeshes.cut():
             phase_of = summary.constituent_phase[s.constituent]
             material = None if s.phase else np.unique(phase_of, return_inverse=True)[1]
             mixed = tuple(phase_laws.is_mixed(case, name) for name in _phases(summary, s))
@@ -275,7 +275,7 @@ def assemble_subdomains(
         if summary.voids:
             line.append(f"{summary.voids} voids, porosity {1 - meshed / summary.area:.6g},")
         line.append(f"{dofs} degrees of freedom, refine = {case.cell.refine}, order = {case.cell.order}")
-    return share, shared, lattice, subdomains
+    return part, shared, lattice, subdomains
 
 
 def _laws(case: Case, summary: CellSummary, submesh: Submesh, problem: Problem) -> Float:
