@@ -128,8 +128,8 @@ def moved_tips(marks: Mapping[int, Sequence[float]], fibre: Int, direction: Floa
     for number, ends in marks.items():
         directions = direction[fibre == number + 1]
         for end in ends:
-            away = (directions - end + 180.0) % 360.0 - 180.0
-            nearest = away[np.argmin(np.abs(away))] if len(away) else np.inf
+            offset = (directions - end + 180.0) % 360.0 - 180.0
+            nearest = offset[np.argmin(np.abs(offset))] if len(offset) else np.inf
             if TIP_TOLERANCE_DEGREES < abs(nearest) <= limit:
                 moved[number + 1, end] = end + float(nearest)
     return moved
@@ -155,8 +155,8 @@ def debonded(
                 if direction == tip:
                     end[fibre == number] += actual - direction
         start, stop = ends
-        away = (angle - start) % 360.0
-        within = (away > TIP_TOLERANCE_DEGREES) & (away < stop - start - TIP_TOLERANCE_DEGREES)
+        offset = (angle - start) % 360.0
+        within = (offset > TIP_TOLERANCE_DEGREES) & (offset < stop - start - TIP_TOLERANCE_DEGREES)
         within = (within & (0 < width < 360)) | (width >= 360.0)
         inside |= within & (np.isin(fibre, arc.fibre) if isinstance(arc.fibre, tuple) else True)
     return inside

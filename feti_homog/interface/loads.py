@@ -70,7 +70,7 @@ class Load:
         return cls(values, np.zeros(len(values), bool))
 
     def parts(self, sizes: Sequence[int]) -> list[Load]:
-        """Split the load into parts with these numbers of components."""
+        """Split the load into parts with given numbers of components."""
         ends = np.cumsum(sizes)[:-1]
         return [Load(*part) for part in zip(np.split(self.values, ends), np.split(self.by_stress, ends), strict=True)]
 

@@ -116,9 +116,9 @@ def energy_beside_springs(interface: ContactProblem, state: Equilibrium) -> floa
 
     C_0 lam^2 + g^2 / (C - C_0) exceeds lam C lam by r^2 / (C - C_0) + 2 r lam.
     """
-    r, more = slipped(interface, state), state.solution.compliance - interface.solver.intact_compliance
+    r, gained = slipped(interface, state), state.solution.compliance - interface.solver.intact_compliance
     rows = np.flatnonzero(r)
-    return float(r[rows] @ (r[rows] / more[rows] + 2.0 * state.solution.lam[rows]))
+    return float(r[rows] @ (r[rows] / gained[rows] + 2.0 * state.solution.lam[rows]))
 
 
 def held_traction(cell: CoupledInterfaces, state: Equilibrium) -> Float:

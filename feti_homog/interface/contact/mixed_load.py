@@ -34,17 +34,17 @@ def solve(scales: LoadScales, load: Load, start: Float) -> DualSolution:
     needed = slice(0 if strains[0].any() else 1, None)
     solutions = solver.solve_many(strains[needed], starts[:, needed])
     stresses = np.stack([solver.stress_integral(solution)[unknown] / scales.size.prod() for solution in solutions])
-    missing = load.values[unknown]
+    deficit = load.values[unknown]
     if strains[0].any():
-        missing = missing - stresses[0]
+        deficit = deficit - stresses[0]
     imposed = scales.imposed_strain(strains[0])
     noise = scales.sign_noise * float((scales.roots[: len(imposed)] * imposed).max())
     # Roots of stiffnesses scale the strains, so that all strains have similar sizes.  Scaled stiffnesses below the
     # solver's error, and scaled stresses below `noise`, are zero.
     stiffness, roots = stresses[-len(unknown) :], scales.roots[unknown]
     eigenvalues, vectors = np.linalg.eigh((stiffness + stiffness.T) / (2 * np.outer(roots, roots)))
-    along, resists = vectors.T @ (missing / roots), eigenvalues > scales.sign_noise
-    largest = max(NEGLIGIBLE * np.abs(missing / roots).max(), noise)
+    along, resists = vectors.T @ (deficit / roots), eigenvalues > scales.sign_noise
+    largest = max(NEGLIGIBLE * np.abs(deficit / roots).max(), noise)
     is_carried = not np.abs(along[~resists]).max(initial=0.0) > largest
     answer = vectors[:, resists] @ (along[resists] / eigenvalues[resists]) / roots if is_carried else None
     # Rank 0 decides: where a stiffness nearly vanishes, rounding may differ from processor to processor.

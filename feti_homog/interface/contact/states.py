@@ -57,7 +57,7 @@ class BondState:
         return np.zeros(len(self.status), np.int8) if self.sliding is None else self.sliding
 
     def with_status(self, status: Status) -> BondState:
-        """Return these bonds with other statuses (k,)."""
+        """Return the bonds with other statuses (k,)."""
         return replace(self, status=status)
 
     def flipped(self, which: Bool) -> BondState:

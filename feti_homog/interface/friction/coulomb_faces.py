@@ -113,13 +113,13 @@ class StatusSearch:
 
     def _tried(self, status: Status) -> Iterator[tuple[Status, Float]]:
         """Yield all admissible statuses, the closest to a guess first; nothing for too many sets."""
-        several = np.flatnonzero(self.allowed.sum(axis=1) > 1)
-        if self.allowed[several].sum(axis=1).astype(float).prod() > MOST_TRIED:
+        choosers = np.flatnonzero(self.allowed.sum(axis=1) > 1)
+        if self.allowed[choosers].sum(axis=1).astype(float).prod() > MOST_TRIED:
             return
-        choices = np.array(list(product(*(STATUSES[row] for row in self.allowed[several]))), np.int8)
-        for choice in choices[np.argsort((choices != status[several]).sum(axis=1), kind="stable")]:
+        choices = np.array(list(product(*(STATUSES[row] for row in self.allowed[choosers]))), np.int8)
+        for choice in choices[np.argsort((choices != status[choosers]).sum(axis=1), kind="stable")]:
             trial = status.copy()
-            trial[several] = choice
+            trial[choosers] = choice
             x, balanced = self.faces.linear(trial, self.load, self.start)
             if balanced and self.faces.is_balanced(trial, self.load, x) and (self._improved(trial, x) == trial).all():
                 yield trial, x
@@ -153,8 +153,8 @@ class StatusSearch:
             better[over] = sign
             better[back] = STICK
         touches = ~closed & (gap < -noise) & allowed[:, FORWARD]
-        way = np.where(np.abs(moved) > noise, np.sign(moved), STICK)
-        better[touches] = np.where(faces.friction > 0.0, way, FORWARD)[touches]
+        direction = np.where(np.abs(moved) > noise, np.sign(moved), STICK)
+        better[touches] = np.where(faces.friction > 0.0, direction, FORWARD)[touches]
         better[pulled] = OPEN_FACE
         return better
 

@@ -93,7 +93,7 @@ class FaceSystem:
         return y
 
     def linear(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, bool]:
-        """Solve for the scaled x (m,) with these statuses; return x and whether it is a solution."""
+        """Solve for the scaled x (m,) with given statuses; return x, and whether x is a solution."""
         rows = status_system.free_rows(status, self.friction, load.by_stress)
         x, values = self.prescribed(status, load, start)
         followed = self._turned(*rows)
@@ -106,12 +106,12 @@ class FaceSystem:
         return self._system(*rows).solve(x, values)
 
     def sign(self, status: Status, by_stress: Bool) -> int:
-        """Return the sign of the determinant with these statuses, 0 with free motions."""
+        """Return the sign of the determinant for given statuses, 0 with free motions."""
         rows = status_system.free_rows(status, self.friction, by_stress)
         return (self._turned(*rows) or self._system(*rows)).sign
 
     def _turned(self, free: Bool, slope: Float) -> status_system.FollowedStatuses | None:
-        """Update `FollowedStatuses` to these free rows; None with free motions, or before updates pay."""
+        """Update `FollowedStatuses` to given free rows; None with free motions, or before updates pay."""
         if self._followed is None:
             if self._factored < FACTORIZATIONS:
                 return None
@@ -119,7 +119,7 @@ class FaceSystem:
         return self._followed if self._followed.turn(free, slope) else None
 
     def _system(self, free: Bool, slope: Float) -> status_system.StatusSystem:
-        """Factor the system of these rows, or return the stored last system."""
+        """Factor the system of given rows, or return the stored last system."""
         key = free.tobytes() + slope.tobytes()
         if self._last is None or self._last[0] != key:
             self._last = key, status_system.StatusSystem(self.S, free, slope)
@@ -131,7 +131,7 @@ class FaceSystem:
         return status, self.linear(status, load, x)[0] if self.sign(status, load.by_stress) else x
 
     def is_balanced(self, status: Status, load: Prescribed, x: Float) -> bool:
-        """Return whether no force drives a free motion, such as a fibre that turns in its hole."""
+        """Return whether no force drives a free motion, such as a fibre that turns in a hole."""
         (free, slope), fixed = status_system.free_rows(status, self.friction, load.by_stress), np.zeros(len(x))
         # Only prescribed entries: a free motion in x is as large as its force divided by the stiffness HELD.
         fixed[self.loads] = np.where(load.by_stress, 0.0, load.values)

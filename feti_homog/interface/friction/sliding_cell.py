@@ -75,8 +75,8 @@ class CondensedProblem:
     def gained(self, bonds: BondState) -> Float:
         """Return the compliance (k, c) that damage adds to springs under tension."""
         interface, pulled = self.interface, replace(bonds, pressed=np.zeros(len(bonds.status), bool))
-        more = interface.compliance(pulled) - self.solver.intact_compliance
-        return np.asarray(more[self.rows_of(slice(None))])
+        increase = interface.compliance(pulled) - self.solver.intact_compliance
+        return np.asarray(increase[self.rows_of(slice(None))])
 
     def rows_of(self, node: Int | slice) -> Int:
         """Return the owned rows (p, c) of nodes (p,)."""
@@ -97,8 +97,8 @@ class CondensedProblem:
         solver, lam = self.solver, self.multipliers(jump, strain)
         torn = solver.d @ strain
         jumps, opened = torn - solver.operator.apply(lam), np.zeros(len(lam))
-        mine = (self.rows >= self.first) & (self.rows < self.first + len(lam))
-        opened[self.rows[mine] - self.first] = jump[mine]
+        is_local = (self.rows >= self.first) & (self.rows < self.first + len(lam))
+        opened[self.rows[is_local] - self.first] = jump[is_local]
         alpha = np.zeros(solver.natural.kernel_dimension)
         if len(alpha):
             alpha -= solver.natural.amplitudes(jumps - opened)
@@ -159,21 +159,21 @@ class SlidingCell:
         """Condense the cell to debonded nodes, and to damaged bonds on springs.  Collective."""
         comm, row, first = self.solver.comm, self.interface.nodes.row, self._plane.first
         problems = (self._plane, *self._axial)
-        more = np.hstack([problem.gained(bonds) for problem in problems])
-        self._more = more[:, 1]
-        self._damaged = (bonds.status == BONDED) & (more[:, :2] > 0.0).any(axis=1)
+        gained = np.hstack([problem.gained(bonds) for problem in problems])
+        self._more = gained[:, 1]
+        self._damaged = (bonds.status == BONDED) & (gained[:, :2] > 0.0).any(axis=1)
         self._face_nodes = np.flatnonzero((bonds.status != BONDED) | self._damaged)
         self._held = np.flatnonzero(bonds.status == BONDED)
         self._held_rows = [problem.rows_of(self._held) for problem in problems]
-        pulled = (more > 0.0) & self._damaged[:, None]
-        self._springs = springs = np.divide(1.0, more, out=np.zeros_like(more), where=pulled)
+        pulled = (gained > 0.0) & self._damaged[:, None]
+        self._springs = springs = np.divide(1.0, gained, out=np.zeros_like(gained), where=pulled)
         self._mu = np.where(self._damaged, self.friction_of_damage, self.friction)
         along = [problem.first + problem.interface.nodes.row for problem in self._axial]
         table = np.column_stack([first + row, self._mu, *along, springs])[self._face_nodes]
         table = np.concatenate(comm.allgather(table))
         table = table[np.argsort(table[:, 0])]
         faces, before, old = self.faces, self.rows, self.springs
-        self.rows, springs = table[:, 0].astype(np.int64), table[:, -more.shape[1] :]
+        self.rows, springs = table[:, 0].astype(np.int64), table[:, -gained.shape[1] :]
         self.springs = springs[:, :2].ravel()
         self._position = np.searchsorted(self.rows, first + row[self._face_nodes])
         K, b, L = self._plane.take((self.rows[:, None] + np.arange(2)).ravel(), self.springs)
@@ -196,8 +196,8 @@ class SlidingCell:
         """
         self.take(bonds)
         jump = np.zeros((len(bonds.status), 2)) if bonds.gap_and_slip is None else bonds.gap_and_slip
-        apart = np.where(self._damaged, ~bonds.pressed, bonds.status == OPEN)
-        table = np.column_stack([np.where(apart, OPEN_FACE, bonds.sliding_signs), jump])[self._face_nodes]
+        is_apart = np.where(self._damaged, ~bonds.pressed, bonds.status == OPEN)
+        table = np.column_stack([np.where(is_apart, OPEN_FACE, bonds.sliding_signs), jump])[self._face_nodes]
         table = np.concatenate(self.solver.comm.allgather(np.column_stack([self._position, table])))
         table = table[np.argsort(table[:, 0])]
         status: Status = table[:, 1].astype(np.int8)
@@ -265,17 +265,17 @@ class SlidingCell:
         """
         states, of_problems = list[Equilibrium](), list(zip(*map(self.cell.parts, loads), strict=True))
         scales, asked = [problem.scales for problem in self.cell.problems], list[Float]()
-        for scale, of in zip(scales, of_problems, strict=True):
-            asked.append(np.max([scale.asked(load) for load in of], axis=0))
+        for scale, problem_loads in zip(scales, of_problems, strict=True):
+            asked.append(np.max([scale.asked(load) for load in problem_loads], axis=0))
         # Rounding in an unloaded problem is as large as in the loaded problem.
         largest = max(scale.imposed_strain(strain).max() for scale, strain in zip(scales, asked, strict=True))
         # The jumps in friction come from x: the jumps of F lambda would be divided by a vanishing compliance.
         stresses, jumps = list[Float](), list[Float]()
-        for of, strains, (problem, (jump, strain)) in zip(of_problems, asked, self._parts(x), strict=True):
+        for problem_loads, strains, (problem, (jump, strain)) in zip(of_problems, asked, self._parts(x), strict=True):
             solution = problem.solution(bonds, jump, strain)
             strains[: problem.solver.problem.strains] = largest
             certificate = problem.interface.certificate(bonds, solution, strains)
-            states.append(Equilibrium(of[-1], bonds, solution, 0, 1, 0, certificate, strains))
+            states.append(Equilibrium(problem_loads[-1], bonds, solution, 0, 1, 0, certificate, strains))
             stresses.append(problem.interface.scales.bond_stress(problem.interface.acting(bonds, strain, strains)))
             jumps.append(jump.reshape(-1, problem.solver.jump_operator.components))
         plane, *axial = states

@@ -174,16 +174,16 @@ class FollowedStatuses:
         while pending:
             failed = []
             for j in pending:
-                at, count = int(self._index[j]), self._count
-                w = self._row(int(free[j]), at)
+                position, count = int(self._index[j]), self._count
+                w = self._row(int(free[j]), position)
                 if slope[j]:
                     w += slope[j] * self._row(1, int(self._index[j - 1]))
-                pivot = w[at]
+                pivot = w[position]
                 if abs(pivot) < LEAST_PIVOT:
                     failed.append(j)
                     continue
-                w[at] -= 1.0
-                column = self._R[:, :size, at] - self._U[:, :size, :count] @ self._V[:count, at]
+                w[position] -= 1.0
+                column = self._R[:, :size, position] - self._U[:, :size, :count] @ self._V[:count, position]
                 self._U[:, :size, count], self._V[count, :size] = column, w / pivot
                 self._count += 1
                 if self._count == MOST_CHANGES:
@@ -211,10 +211,10 @@ class FollowedStatuses:
         """Return M^-1 c (m,)."""
         size, permuted = self._size, np.empty(self._size)
         permuted[self._index] = c
-        few = np.flatnonzero(permuted)
-        some = few if len(few) <= FEW else slice(size)
-        change = self._U[0, :size, : self._count] @ (self._V[: self._count, :size][:, some] @ permuted[some])
-        return np.asarray((self._R[0, :size, :size][:, some] @ permuted[some] - change)[self._index])
+        nonzero = np.flatnonzero(permuted)
+        columns = nonzero if len(nonzero) <= FEW else slice(size)
+        change = self._U[0, :size, : self._count] @ (self._V[: self._count, :size][:, columns] @ permuted[columns])
+        return np.asarray((self._R[0, :size, :size][:, columns] @ permuted[columns] - change)[self._index])
 
     def solve(self, x: Float, rhs: Float, terms: Callable[[Float], Float]) -> tuple[Float, Float] | None:
         """Solve for x; return x and S x (m,), from a start with the prescribed entries.
@@ -246,24 +246,24 @@ class FollowedStatuses:
         if len(entries) and not self.turn(free, slope):
             return False
         self._flush()
-        some, at = np.flatnonzero(units != 1.0), self._index[entries]
-        places, unit = self._index[some], units[some]
-        self._R[:, : self._size, places] *= np.where(self.free[some], 1.0 / unit, unit)
-        self._R[:, places, : self._size] *= np.stack([1.0 / unit, unit])[:, :, None]
+        rescaled, changed = np.flatnonzero(units != 1.0), self._index[entries]
+        rescaled_rows, unit = self._index[rescaled], units[rescaled]
+        self._R[:, : self._size, rescaled_rows] *= np.where(self.free[rescaled], 1.0 / unit, unit)
+        self._R[:, rescaled_rows, : self._size] *= np.stack([1.0 / unit, unit])[:, :, None]
         before = self.S[entries[:, None], entries] * np.outer(units[entries], units[entries])
-        self._R[1, at[:, None], at] += S[other[:, None], other] - before
+        self._R[1, changed[:, None], changed] += S[other[:, None], other] - before
         size, m = self._size, len(S)
         new = np.setdiff1d(np.arange(m), old)
-        free, slope, place = np.zeros(m, bool), np.zeros(m), np.empty(m, np.int64)
-        free[old], slope[old], place[old], place[new] = self.free, self.slope, self._index, np.arange(size, m)
-        self.S, self.free, self.slope, self._index = S, free, slope, place
+        free, slope, position = np.zeros(m, bool), np.zeros(m), np.empty(m, np.int64)
+        free[old], slope[old], position[old], position[new] = self.free, self.slope, self._index, np.arange(size, m)
+        self.S, self.free, self.slope, self._index = S, free, slope, position
         if m > self._R.shape[1]:
             # Leave room for more entries.
             R = np.empty((2, m + m // 4, m + m // 4))
             R[:, :size, :size] = self._R[:, :size, :size]
             self._R = R
             self._forget()
-        order = np.argsort(place)
+        order = np.argsort(position)
         first, last = order[:size], order[size:]
         sliding = np.flatnonzero(slope[first])
         coupling = S[first[:, None], last]

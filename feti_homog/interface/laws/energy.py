@@ -54,7 +54,7 @@ class SpringEnergy(SpringLaw):
 
     @classmethod
     def of_keys(cls, value: KeyValues) -> Self:
-        """Make the law from [interface] keys; the axial stiffness defaults to the tangential one."""
+        """Make the law from [interface] keys; the axial stiffness defaults to the tangential stiffness."""
         return cls(
             value("normal_stiffness"),
             value("tangential_stiffness"),
@@ -133,18 +133,18 @@ class ReleasedEnergy(SpringEnergy):
         """
         self._activate(self.influence, cell.plane, bonds)
         neighbours, first = self.influence.neighbours, self.influence.neighbours.first
-        everywhere = np.concatenate(neighbours.comm.allgather(bonds.status))
-        beside = np.flatnonzero((everywhere == BONDED) & (neighbours.adjacency @ (everywhere != BONDED) > 0))
-        mine = (beside >= first) & (beside < first + len(bonds.status))
-        rows = neighbours.rows[beside][:, None] + np.arange(2)
-        H, axial = self.influence.inverse_blocks(rows)[mine], np.zeros(0)
-        stiffness = self.influence.stiffness[rows[mine]]
-        node, number = beside[mine] - first, np.full(len(bonds.status), -1)
+        all_status = np.concatenate(neighbours.comm.allgather(bonds.status))
+        at_tips = np.flatnonzero((all_status == BONDED) & (neighbours.adjacency @ (all_status != BONDED) > 0))
+        is_local = (at_tips >= first) & (at_tips < first + len(bonds.status))
+        rows = neighbours.rows[at_tips][:, None] + np.arange(2)
+        H, axial = self.influence.inverse_blocks(rows)[is_local], np.zeros(0)
+        stiffness = self.influence.stiffness[rows[is_local]]
+        node, number = at_tips[is_local] - first, np.full(len(bonds.status), -1)
         if self.axial is not None:
             self._activate(self.axial, cell.problems[1], bonds)
-            rows = self.axial.neighbours.rows[beside]
-            axial = self.axial.inverse_blocks(np.stack([rows, rows], axis=1))[mine, 0, 0]
-            stiffness = np.column_stack([stiffness, self.axial.stiffness[rows[mine]]])
+            rows = self.axial.neighbours.rows[at_tips]
+            axial = self.axial.inverse_blocks(np.stack([rows, rows], axis=1))[is_local, 0, 0]
+            stiffness = np.column_stack([stiffness, self.axial.stiffness[rows[is_local]]])
         number[node] = np.arange(len(node))
         tips = TipEnergies(H, cell.nodes.length[node], stiffness, axial)
         springs = {field.name: getattr(self, field.name) for field in fields(SpringEnergy)}
@@ -178,16 +178,16 @@ class SpringsAndTips(SpringEnergy):
 
     def share(self, traction: Float) -> Float:
         """Return the utilisation (p,) under tractions (p, c)."""
-        used, at = super().share(traction), np.flatnonzero(self.number >= 0)
-        springs, tips, t = self.at(at), self.tips, self.number[at]
+        used, at_tips = super().share(traction), np.flatnonzero(self.number >= 0)
+        springs, tips, t = self.at(at_tips), self.tips, self.number[at_tips]
         length, stiffness = tips.length[t], tips.stiffness[t]
-        lam = traction[at] * length[:, None]
+        lam = traction[at_tips] * length[:, None]
         released = released_energy(tips.H[t], lam[:, :2], stiffness[:, :2], self.contact)
         if len(tips.axial):
             gives_way = tips.axial[t] > RIGID * stiffness[:, 2]
             along = lam[:, 2] ** 2 / np.where(gives_way, 2.0 * tips.axial[t], 1.0)
             released = released + np.where(gives_way, along, 0.0)
-        used[at] = np.sqrt(released / (springs.toughness * length)) * springs.mode_factor(traction[at])
+        used[at_tips] = np.sqrt(released / (springs.toughness * length)) * springs.mode_factor(traction[at_tips])
         return used
 
     def convex(self, p: int) -> Bool:

@@ -37,7 +37,7 @@ NUMBERS = ("normal_stiffness", "tangential_stiffness", "normal_strength", "tange
 
 
 def numbers(value: Callable[..., float | Float]) -> dict[str, Any]:
-    """Return the constants of a law; the axial stiffness defaults to the tangential one."""
+    """Return the constants of a law; the axial stiffness defaults to the tangential stiffness."""
     axial = value("axial_stiffness", "tangential_stiffness")
     return {name: value(name) for name in NUMBERS} | {"axial_stiffness": axial}
 
@@ -72,8 +72,8 @@ class CohesiveLaw(SpringLaw):
         """Make the law and its damage levels from the keys in [interface]."""
         law, branch = cls(**numbers(value), levels=(0.0, 1.0)), cls.branch(value)
         # The levels follow from all sections, so that all ranks agree.
-        everywhere = cls(**numbers(value.everywhere), levels=(0.0, 1.0), **branch)
-        levels = everywhere.levels_for(value.common("teeth"), value.common("softening_tolerance"))
+        law_of_all = cls(**numbers(value.everywhere), levels=(0.0, 1.0), **branch)
+        levels = law_of_all.levels_for(value.common("teeth"), value.common("softening_tolerance"))
         return replace(law, levels=levels, **branch)
 
     @classmethod
@@ -261,7 +261,7 @@ class BilinearLaw(PiecewiseLinear):
 
 @dataclass(frozen=True)
 class TableLaw(PiecewiseLinear):
-    """A law with a table of traction over opening in mode I; other modes stretch the table to their toughness."""
+    """A law with a table of traction over opening in mode I, stretched to the toughness of other modes."""
 
     @classmethod
     def branch(cls, value: KeyValues) -> dict[str, Any]:

@@ -26,7 +26,7 @@ class Strength(BondLaw):
 
     @classmethod
     def of_keys(cls, value: KeyValues) -> Self:
-        """Make the law from [interface] keys; the axial strength defaults to the tangential one."""
+        """Make the law from [interface] keys; the axial strength defaults to the tangential strength."""
         return cls(
             value("normal_strength"), value("tangential_strength"), value("axial_strength", "tangential_strength")
         )

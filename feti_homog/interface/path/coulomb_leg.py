@@ -64,6 +64,7 @@ class CoulombLeg(Leg):
         return self._state
 
     def _path_state(self) -> PathState:
+        """Return the path state at s, with the spring energy of damaged bonds.  Collective."""
         return replace(super()._path_state(), stretched=self.sliding.stretched(self._x))
 
     def _on_root(self, find: Callable[..., tuple[Status, Float]], *arguments: Any) -> tuple[Status, Float]:
@@ -90,7 +91,7 @@ class CoulombLeg(Leg):
         self._status, self._x, self._mean, self._state = status, x, mean, None
 
     def _settle(self, begin: PathState) -> None:
-        """Find the state at s with the bonds of `begin`, after a break if `begin` has one.  Collective.
+        """Find the state at s with the bonds of `begin`, after the break in `begin` if any.  Collective.
 
         In a break faces lose the product of jumps and mean forces; slips turn a part into heat by the final forces, and
         the break releases the rest.
@@ -110,7 +111,7 @@ class CoulombLeg(Leg):
         self._first = True
 
     def _go_straight(self, status: Status, x: Float, released: float, heat: float, fracture: float = 0.0) -> None:
-        """Advance straight to scaled x with these statuses and energy losses."""
+        """Advance on a straight path to given statuses and scaled x, with energy losses per area."""
         before, mean = self._mean, self.sliding.macroscopic(x)
         work = 0.5 * float((before.stress + mean.stress) @ (mean.strain - before.strain))
         self._stand(status, x, mean, Energies(work, released, fracture, heat))
@@ -122,7 +123,7 @@ class CoulombLeg(Leg):
             NotCarriedError: nothing carries more, after a point at the largest load.
             StuckError: no statuses continue the state, or statuses change without end.
         """
-        sliding, faces, share = self.sliding, self.sliding.faces, self._share
+        sliding, faces, start = self.sliding, self.sliding.faces, self._share
         velocity = sliding.given(self.end) - sliding.given(self.start)
         try:
             status, rate = self._on_root(faces.rates, self._status, self._x, self.end.by_stress, velocity)
@@ -130,8 +131,8 @@ class CoulombLeg(Leg):
             if self._share > self._reported:
                 yield self._point(0, 0, self._path_state())
             raise
-        status, x = self._on_root(faces.settled, status, self._given(share, self._x), self._x)
-        change, rest = self.cell.comm.bcast(faces.next_change(status, x, rate)), 1.0 - share
+        status, x = self._on_root(faces.settled, status, self._given(start, self._x), self._x)
+        change, rest = self.cell.comm.bcast(faces.next_change(status, x, rate)), 1.0 - start
         if change >= rest - ROUNDING:
             change = np.inf
         tractions = (sliding.traction(state) for state in (x, x + min(rest, change) * rate))
@@ -143,13 +144,13 @@ class CoulombLeg(Leg):
         if not rounded.any():
             faces.keep(after, faces.product(x) + way * faces.product(rate))
         self._go_straight(status, after, 0.0, faces.heat(status, x, after) / self.cell.area)
-        self._share = 1.0 if breaks > 1.0 and change >= rest else share + way
+        self._share = 1.0 if breaks > 1.0 and change >= rest else start + way
         if breaks <= 1.0:
             yield from self._break_overloaded(is_due=True)
         elif self._share < 1.0 and (self._first or self._share - self._reported >= LEAST_SHARE):
             self._first = False
             yield self._point(0, 0, self._path_state())
-        self._changes = 0 if self._share > share + ROUNDING else self._changes + 1
+        self._changes = 0 if self._share > start + ROUNDING else self._changes + 1
         if self._changes > MOST_CHANGES_AT_A_LOAD:
             raise StuckError(CYCLE)
 

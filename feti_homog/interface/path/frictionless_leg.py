@@ -60,13 +60,16 @@ class FrictionlessLeg(Leg):
         yield from super().points()
 
     def _is_over(self) -> bool:
+        """Return whether the leg is at its end, or a solve did not converge."""
         return self._share >= 1.0 or not self._state.converged
 
     def _settle(self, begin: PathState) -> None:
+        """Find the equilibrium at s with the bonds of `begin`.  Collective."""
         self._bends_before, self._false_alarm, self._from = np.inf, False, begin
         self._go_to(self._share)
 
     def _go_to(self, share: float) -> None:
+        """Advance to the equilibrium at a fraction of the leg.  Collective."""
         self._stand(share, self._solve(share, self._from.bonds, self._from.lam))
 
     def _solve(self, share: float, bonds: BondState, lam: Multipliers) -> Equilibrium:
@@ -88,14 +91,14 @@ class FrictionlessLeg(Leg):
         Raises:
             NotCarriedError: neither open nor touching faces carry the load's stresses.
         """
-        cell, before, share = self.cell, self._state, self._share
+        cell, before, start = self.cell, self._state, self._share
         try:
             # The solutions at the end of the leg with fixed contact states.
             end = cell.linear(self.end, before.bonds, before.multipliers)
         except NotCarriedError:
-            beyond = min(share + SAME_SHARE, 1.0)
+            beyond = min(start + SAME_SHARE, 1.0)
             touching = self._solve(beyond, before.bonds, before.multipliers)
-            self._stand(share, self._solve(share, touching.bonds, touching.multipliers))
+            self._stand(start, self._solve(start, touching.bonds, touching.multipliers))
             yield self._turn(beyond)
             self._stand(beyond, touching)
             self._false_alarm = False
@@ -104,9 +107,9 @@ class FrictionlessLeg(Leg):
         breaks = first_break(cell, self.law, before.bonds, cell.traction(before.solutions), cell.traction(end))
         begins, certain = (1.0, 1.0) if self._false_alarm else first_change(cell.plane, before, end[0])
         begins, certain = (np.inf, np.inf) if begins == 1.0 else (begins, certain)
-        breaks, begins, certain = (share + (1.0 - share) * way for way in (breaks, begins, certain))
+        breaks, begins, certain = (start + (1.0 - start) * way for way in (breaks, begins, certain))
         target = min(breaks, begins, 1.0)
-        is_here = target - share <= SAME_SHARE and (target == begins or (target == breaks and self._is_due()))
+        is_here = target - start <= SAME_SHARE and (target == begins or (target == breaks and self._is_due()))
         reached = is_here or self._approach(target, end)
         is_due = reached and target == breaks and self._is_due()
         is_reported, turned = self._share <= self._reported + SAME_SHARE, False

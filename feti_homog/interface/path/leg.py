@@ -49,7 +49,7 @@ class Leg(ABC):
 
     @abstractmethod
     def _settle(self, begin: path_points.PathState) -> None:
-        """Find the state at s with the bonds of `begin`, after a break if `begin` has one.  Collective."""
+        """Find the state at s with the bonds of `begin`, after the break in `begin` if any.  Collective."""
 
     @abstractmethod
     def _advance(self) -> Iterator[path_points.Point]:
@@ -103,7 +103,7 @@ class Leg(ABC):
         return self._used()[1] > 1.0 + UTILISATION_TIE and self.state.converged
 
     def _break_overloaded(self, is_due: bool = False) -> Iterator[path_points.Point]:
-        """Break the worst bonds at s while they are overloaded, and first if a break is due.  Collective."""
+        """Break the worst bonds at s while bonds are overloaded, and first if a break is due.  Collective."""
         while is_due or self._is_overloaded():
             broke, softened, broken = self._release(self._used()[2])
             yield self._point(broke, softened, broken)

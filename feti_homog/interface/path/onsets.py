@@ -60,17 +60,19 @@ class Onset:
         if before is None:
             factors[loaded] = 1.0 / used[loaded]
         else:
-            at, along = node[loaded], direction.reshape(-1, c)[loaded]
-            bonds, start, ray, used = self.bonds.at(at), before[at], ray[loaded], used[loaded]
+            nodes, along = node[loaded], direction.reshape(-1, c)[loaded]
+            bonds, start, ray, used = self.bonds.at(nodes), before[nodes], ray[loaded], used[loaded]
             exact = bonds.first_factor(start, along)
             if exact is None:
                 # Bisection, without bonds that break after another bond under the same ray.
                 lower, upper = (1.0 - bonds.share(start)) / used, (1.0 + bonds.share(-start)) / used
                 first, is_convex = np.full(n, np.inf), bonds.convex(len(used))
                 np.minimum.at(first, ray[is_convex], upper[is_convex])
-                some = np.flatnonzero((lower <= first[ray] * (1.0 + UTILISATION_TIE)) | ~is_convex)
+                rivals = np.flatnonzero((lower <= first[ray] * (1.0 + UTILISATION_TIE)) | ~is_convex)
                 exact = np.full(len(used), np.inf)
-                exact[some] = bonds.at(some).crossing(start[some], along[some], np.zeros(len(some)), upper[some])
+                exact[rivals] = bonds.at(rivals).crossing(
+                    start[rivals], along[rivals], np.zeros(len(rivals)), upper[rivals]
+                )
             factors[loaded] = exact
         return factors.reshape(n, k)
 
@@ -104,10 +106,10 @@ def first_change(interface: ContactProblem, state: Equilibrium, end: DualSolutio
     tension = np.maximum(interface.scales.force_noise(state.solution), interface.scales.force_noise(end))
     # Damaged bonds change between tension and compression when their force vanishes.
     damaged = interface.damaged(state.bonds)
-    at = (state.status == CLOSED) | damaged
-    pressure = np.where(damaged & ~state.bonds.pressed, 1.0, -1.0)[at]
-    before, after = (pressure * lam[nodes.row][at] for lam in (state.solution.lam, end.lam))
-    shares = [shares_to_zero(before, after, tension[at])]
+    in_contact = (state.status == CLOSED) | damaged
+    pressure = np.where(damaged & ~state.bonds.pressed, 1.0, -1.0)[in_contact]
+    before, after = (pressure * lam[nodes.row][in_contact] for lam in (state.solution.lam, end.lam))
+    shares = [shares_to_zero(before, after, tension[in_contact])]
     # Faces without contact overlap.
     is_open = (state.status == OPEN) & interface.contact
     before, after = state.solution.jump[nodes.row], end.jump[nodes.row]

@@ -65,17 +65,17 @@ def increments(
     Raises:
         NotCarriedError: nothing carries more, or a step has no admissible statuses.
     """
-    legs, way = len(waypoints), None
+    legs, current = len(waypoints), None
     for step in range(begin.leg + 1, steps + 1):
         leg = (step * legs - 1) // steps
-        if way is None or leg > way.leg:
+        if current is None or leg > current.leg:
             position = begin.position or max((step - 1) * legs / steps - leg, 0.0)
-            way = engine(cell, law, waypoints, leg, replace(begin, leg=leg, position=position))
-        point = way.step(step, steps, worst_only)
+            current = engine(cell, law, waypoints, leg, replace(begin, leg=leg, position=position))
+        point = current.step(step, steps, worst_only)
         begin = point.after
         yield point
-        if way.limit is not None:
-            raise way.limit
+        if current.limit is not None:
+            raise current.limit
         if not point.state.converged:
             return
 
@@ -99,6 +99,6 @@ def _first_leg(cell: CoupledInterfaces, law: BondLaw, load: Load, legs: int, beg
             after = PathState(1, 0.0, state.bonds, lam, reached, reached)
             yield Point(1.0 / legs, 1.0, state, 0, 0, energies, used, after)
             return
-        place = PathState(0, factor, state.bonds, lam, begin.origin, reached)
-        broke, softened, begin = break_bonds(cell, law, worst, state, place)
+        path_state = PathState(0, factor, state.bonds, lam, begin.origin, reached)
+        broke, softened, begin = break_bonds(cell, law, worst, state, path_state)
         yield Point(factor / legs, factor, state, broke, softened, energies, used / largest, begin)

@@ -87,7 +87,7 @@ class Point:
 
 
 def unloaded(cell: CoupledInterfaces, bonds: BondState) -> PathState:
-    """Return the beginning of a path with these bonds."""
+    """Return the unloaded path state with given bonds."""
     nothing = Macroscopic(np.zeros(len(cell.loads)), np.zeros(len(cell.loads)))
     return PathState(0, 0.0, bonds, cell.no_multipliers(), nothing, nothing)
 
