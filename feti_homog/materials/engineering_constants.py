@@ -183,6 +183,7 @@ def anisotropy(stiffness: ArrayLike) -> float:
 
 
 def _distance(C: Float, nearest: Float) -> float:
+    """Return the distance ||C - nearest|| / ||C|| of two stiffnesses as tensors."""
     scale = _MANDEL[len(C)]
     return float(np.linalg.norm(scale * (C - nearest)) / np.linalg.norm(scale * C))
 
@@ -209,7 +210,7 @@ def transversely_isotropic_part(stiffness: ArrayLike, expansion: ArrayLike | Non
 
 
 def transversely_isotropic_stiffness(constants: TransverseIsotropy) -> Float:
-    """Return the stiffness C (6, 6) of these constants.
+    """Return the stiffness C (6, 6) of transversely isotropic constants.
 
     C11 = C22 = k + m, C12 = k - m, C13 = C23 = 2 nu_A k, C33 = E_A + 4 nu_A^2 k, C44 = C55 = G_A, C66 = m.
     """

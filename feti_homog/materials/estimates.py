@@ -120,6 +120,7 @@ def halpin_tsai(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimat
 
 
 def _phases(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> list[tuple[float, TransverseIsotropy]]:
+    """Return the volume fraction and the constants of the matrix and of each kind of fibres."""
     rest = 1 - sum(family.fraction for family in fibres)
     return [(rest, matrix), *((family.fraction, family.constants) for family in fibres)]
 

@@ -75,7 +75,7 @@ def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, fl
     turn = strain_rotation(-getattr(material, "angle", 0.0))
     turn = turn if len(C) == 6 else turn[IN_PLANE_BLOCK]
     for name, value in values.items():
-        moved = {other: complex(known, STEP * (other == name)) for other, known in values.items()}
+        moved = {other: complex(constant, STEP * (other == name)) for other, constant in values.items()}
         varied = replace(material, **moved)
         if isinstance(varied, material_forms.Isotropic):
             named = {entry: getattr(varied, key) for entry, key in ISOTROPIC_COMPLIANCE.items()}
@@ -87,14 +87,14 @@ def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, fl
 
 def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:
     """Yield the derivatives by the entries of a stiffness, on both sides of the diagonal."""
-    given = np.array(material.stiffness)
-    for i, j in zip(*np.triu_indices(len(given)), strict=True):
-        if (i, j) in COUPLINGS and len(given) == 6:
+    matrix = np.array(material.stiffness)
+    for i, j in zip(*np.triu_indices(len(matrix)), strict=True):
+        if (i, j) in COUPLINGS and len(matrix) == 6:
             continue
-        changed = (given + given.T) / 2 + 0j
+        changed = (matrix + matrix.T) / 2 + 0j
         changed[[i, j], [j, i]] += 1j * STEP
-        full = changed.imag / STEP if len(given) == len(C) else _of_plane_state(changed, plane, condensed="stress")
-        yield f"stiffness.C{i + 1}{j + 1}", float((given[i, j] + given[j, i]) / 2), full
+        full = changed.imag / STEP if len(matrix) == len(C) else _of_plane_state(changed, plane, condensed="stress")
+        yield f"stiffness.C{i + 1}{j + 1}", float((matrix[i, j] + matrix[j, i]) / 2), full
 
 
 def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:

@@ -128,6 +128,7 @@ def reuss(fractions: ArrayLike, stiffnesses: ArrayLike) -> Float:
 
 
 def is_isotropic(stiffness: ArrayLike) -> bool:
+    """Return whether a plane stiffness is isotropic, up to rounding."""
     return engineering_constants.anisotropy(stiffness) < ISOTROPY
 
 

@@ -29,12 +29,12 @@ def criterion(strength: PhaseStrength) -> str:
     Raises:
         ValueError: no criterion has exactly these keys.
     """
-    given = [name for names in CRITERIA.values() for name in names if getattr(strength, name) is not None]
+    names_given = [name for names in CRITERIA.values() for name in names if getattr(strength, name) is not None]
     for title, names in CRITERIA.items():
-        if given == list(names):
+        if names_given == list(names):
             return title
     groups = "; ".join(f"{', '.join(names)} ({title})" for title, names in CRITERIA.items())
-    raise ValueError(f"strength: {', '.join(given) or 'empty'}: expected the keys of one criterion: {groups}")
+    raise ValueError(f"strength: {', '.join(names_given) or 'empty'}: expected the keys of one criterion: {groups}")
 
 
 def utilisation(strength: PhaseStrength, stress: Float, principal: Float, von_mises: Float) -> Float:
@@ -47,14 +47,14 @@ def utilisation(strength: PhaseStrength, stress: Float, principal: Float, von_mi
     """
     limits = {name: float(limit) for name, limit in vars(strength).items() if limit is not None}
     if "principal" in limits:
-        share = principal / limits["principal"]
+        ratio = principal / limits["principal"]
     elif "von_mises" in limits:
-        share = von_mises / limits["von_mises"]
+        ratio = von_mises / limits["von_mises"]
     elif "tension" in limits:
-        share = _drucker_prager(limits, stress[:, :3].sum(axis=1), von_mises)
+        ratio = _drucker_prager(limits, stress[:, :3].sum(axis=1), von_mises)
     else:
-        share = _hashin(limits, stress)
-    return np.maximum(share, 0.0)
+        ratio = _hashin(limits, stress)
+    return np.maximum(ratio, 0.0)
 
 
 def _drucker_prager(limits: Mapping[str, float], trace: Float, von_mises: Float) -> Float:
