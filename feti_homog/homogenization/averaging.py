@@ -156,7 +156,7 @@ class Homogenization:
         return self._scaled(state, scale, stress, energy, u, checks)
 
     def _stretched(self, state: Equilibrium) -> float:
-        """Return twice the spring energy per area, including rubbing bonds.  Collective."""
+        """Return twice the spring energy per area, including bonds with friction.  Collective."""
         springs = state.solution.compliance * state.solution.lam
         twice = float(state.solution.lam @ springs) + coupled_interfaces.energy_beside_springs(self.interface, state)
         return float(self.cell.comm.allreduce(twice)) / self.cell.summary.area

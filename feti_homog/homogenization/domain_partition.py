@@ -233,7 +233,10 @@ def _cut_across(
 
 
 def match_distance(case: Case, width: float, height: float, centres: Float, radii: Float) -> float | None:
-    """Return the distance between fibres, centres (n, 2) and radii (n,), and the matched table."""
+    """Return the distance between the fibres and the matched table; None without a table.
+
+    `centres` are (n, 2), and `radii` are (n,).
+    """
     window = case.cell.matched
     if window is None:
         return None

@@ -80,7 +80,7 @@ class CrackExtension:
 
 @dataclass(frozen=True)
 class EnergyRelease:
-    """Energy release at t tips, ordered by fibre, interface and direction.
+    """The energy release rates at t tips, ordered by fibre, interface and direction.
 
     Attributes:
         fibre: (t,) numbers from 1.

@@ -111,7 +111,7 @@ def energy_errors(
 
 
 def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
-    """Return the element and arc error ratios to a mesh with `fewer` halvings less.  Collective."""
+    """Return the ratios of element and arc errors to errors with `fewer` halvings less.  Collective."""
     order = cell.lattice.order
     if cell.summary.across and fewer:
         return SAMPLED[any(s.is_mixed for s in cell.subdomains)]

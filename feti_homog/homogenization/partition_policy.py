@@ -29,7 +29,7 @@ TOLERANCES = {"feti_ksp_rtol", "feti_ksp_atol", "feti_ksp_max_it"}
 # Bytes of a rank without degrees of freedom, for each degree of freedom, and for each multiplier with stored columns.
 BASE_BYTES, DOF_BYTES, COLUMN_BYTES = 1.8e8, 1.5e3, 2.0e4
 # Additional bytes for each displacement of the largest problem in a cell of one factor.  For seven bonded cells of
-# 31 000 to 271 000 degrees of freedom estimates are 0.93 to 1.07 times the measured memory, for two of order 2 0.85.
+# 31 000 to 271 000 degrees of freedom estimates are 0.93 to 1.07 times the measured memory, with order 2 0.85 times.
 FACTOR_BYTES = 2.9e2
 # Additional bytes of a path to complete debonding: for each multiplier of a rank, and for each pair of a multiplier and
 # an influence column; a cell that is factored anew has `INFLUENCE_COLUMNS` columns.  For five paths with 1 to 50 fibres
@@ -99,8 +99,8 @@ BY_COST = PartitionPolicy(across_dofs=400_000)
 def can_be_cut_across(case: Case) -> bool:
     """Return whether subdomains may reach across materials.
 
-    They may if nothing parts, and the case leaves the cut to the program.  Jumps at nearly incompressible phases and
-    between very different stiffnesses are scaled body by body; dual solver options are meant for bodies.
+    Subdomains may if nothing can part and the case does not set the cut.  Jumps at nearly incompressible phases
+    and between very different stiffnesses need scales of single bodies; dual solver options assume single bodies.
     """
     asked, free = case.decomposition, ("auto", None, None, "torus")
     if case.interfaces or (asked.cut, asked.subdomains, asked.max_dofs, case.cell.bodies) != free:

@@ -165,10 +165,7 @@ def _measures(material: material_forms.Material, stress: Float) -> Float:
 
 
 def _largest(values: Float, points: Float) -> Largest:
-    """Find the largest of the values (n, 4) at points (n, 4, 2).
-
-    Almost equal values take the first position by x, then by y.
-    """
+    """Find the largest of the values (n, 4) at points (n, 4, 2); ties take the first by x, then y."""
     peak, positions = values.max(axis=0), np.zeros((values.shape[1], 2))
     for number, (column, top) in enumerate(zip(values.T, peak, strict=True)):
         tied = points[column >= top - TIE * abs(top), number] if np.isfinite(top) else points[:1, number]

@@ -38,7 +38,7 @@ def criterion(strength: PhaseStrength) -> str:
 
 
 def utilisation(strength: PhaseStrength, stress: Float, principal: Float, von_mises: Float) -> Float:
-    """Compute the utilisation (n,) of a phase strength by stresses.
+    """Compute the utilisation (n,) of a phase strength under stresses.
 
     Args:
         stress: (n, 6) in the order [11, 22, 33, 23, 13, 12], x3 along the fibres.

@@ -65,7 +65,7 @@ class ContactProblem:
     def active(self, status: Status) -> Float:
         """Mark the active multipliers (owned rows,) by 1.
 
-        These are all multipliers at bonded nodes, and normal forces at closed nodes.
+        All multipliers at bonded nodes, and normal forces at closed nodes, are active.
         """
         mask = np.ones(self.solver.rows)
         mask[self._pairs] = (status == BONDED)[:, None]

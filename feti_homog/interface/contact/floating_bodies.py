@@ -125,7 +125,7 @@ class FloatingBodies:
             Amplitudes (dimension,) to add to alpha, and (k,) open nodes that squeeze a fibre.
 
         Raises:
-            ConvergenceError: on every rank; a linear programme was not solved.
+            ConvergenceError: on every rank, if HiGHS does not solve a linear programme.
         """
         gap = solution.jump[self.nodes.row]
         if not self.comm.allreduce(bool((self.is_open & (gap < -self.noise)).any()), MPI.LOR):

@@ -67,7 +67,7 @@ class StatusSearch:
         return result or self.by_trial(status) or self.by_continuation(status)
 
     def by_pivots(self, status: Status, solves: int | None = None) -> Found:
-        """Return the statuses at which the pivots end, if the forces balance."""
+        """Search by pivots, and return the final statuses and x if the forces balance."""
         result, balanced = self._pivoted(status, solves)
         return result if balanced else None
 

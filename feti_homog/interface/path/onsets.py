@@ -44,7 +44,7 @@ class Onset:
         return cls(law.in_state(cell, bonds), np.asarray(bonds.status == BONDED))
 
     def utilisation(self, traction: Float, node: Int) -> Float:
-        """Return the utilisation (p,) by tractions (p, c) at the nodes (p,), 0 at debonded nodes."""
+        """Return the utilisation (p,) under tractions (p, c) at the nodes (p,), 0 at debonded nodes."""
         return np.where(self.bonded[node], self.bonds.at(node).share(traction), 0.0)
 
     def factors(self, direction: Float, noise: Float, before: Float | None = None) -> Float:

@@ -22,7 +22,7 @@ class PathState:
     Attributes:
         leg, position: the load is at the fraction `position`, 0..1, of the way to waypoint `leg`; with increments,
             `leg` is the number of finished steps.
-        bonds, lam: bond states and multipliers to begin with.
+        bonds, lam: initial bond states and multipliers.
         origin: state at the beginning of the leg.
         last: state at the last point.
         broken: fracture energy per area at the last point, by the mode in which each bond broke, 0 without toughness;
