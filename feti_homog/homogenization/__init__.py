@@ -1,4 +1,4 @@
-"""From case to torn cell, and from its solutions to averages.
+"""From a case to the torn cell, and from solutions to averages.
 
 Imports `case`, `fem`, `feti`, `interface`, `materials`, `mesh`, `microstructure`, `schema` and `system`.  Main entries:
 `unit_cell.tear` and `averaging.Homogenization`.

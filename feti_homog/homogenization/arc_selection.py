@@ -1,4 +1,4 @@
-"""Debonded arcs in a cell: their faults, their tips, and the mesh size there."""
+"""Debonded arcs in a cell: faults in the case, tips of arcs, and the element size at tips."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from feti_homog.mesh.sizes import element_estimate
 from feti_homog.microstructure import phase_names
 from feti_homog.typing import Bool, Float, Int
 
-# The stress at a tip is singular, so that the energy errs by about the size of the elements there, elsewhere by
-# h^(2 order). With this fraction of the balanced size tips err no more than the rest (`scripts/measure_tips.py`).
+# The singular stress at a tip causes an energy error of about the element size at the tip; the rest of the mesh errs by
+# h^(2 order). At this fraction of the balanced size tips err no more than the rest (`scripts/measure_tips.py`).
 TIP_SHARE = 0.5
-# Largest ratio of triangles that the tips of many openings, of which a state has one, add to a mesh by default.
+# Largest default ratio of the triangles that tips add to the triangles of a mesh for several openings.
 TIP_TRIANGLES = 2.0
-LEAST_SIZE = 1e-5  # at tips / width of the cell, by default
+LEAST_SIZE = 1e-5  # least default element size at tips / cell width
 
 
 def marks(case: Case, fibres: int) -> dict[int, list[float]]:
@@ -36,14 +36,14 @@ def marks(case: Case, fibres: int) -> dict[int, list[float]]:
 
 
 def size(case: Case, estimate: element_estimate.ElementEstimate) -> float | None:
-    """Return the element size at tips over the cell width; None for the size on interfaces.
+    """Return the element size at tips / cell width; None for the size on interfaces.
 
     Without `tip_size` in the case the size is, with the mean radius / width R,
 
         h_t = 2^refine R (h / R)^(2 order) / 2,  h = interface_size / 2^refine,
 
-    but with several openings so large that their tips take at most TIP_TRIANGLES.  Along paths, and so in envelopes,
-    tips move, and `tip_size` alone counts.
+    but with several openings the size is so large that tips take at most TIP_TRIANGLES.  Along paths, and so in
+    envelopes, tips move, and only `tip_size` counts.
     """
     cell, tips = case.cell, sum(map(len, marks(case, estimate.fibres).values()))
     if cell.tip_size is not None or case.section.breaks or not tips:
@@ -53,14 +53,14 @@ def size(case: Case, estimate: element_estimate.ElementEstimate) -> float | None
     balanced: float = TIP_SHARE * 2**cell.refine * radius * (fine / radius) ** (2 * cell.order)
     size_at_tips = max(balanced, LEAST_SIZE)
     if len(case.section.openings) > 1:
-        share = TIP_TRIANGLES * estimate.triangles / tips
-        size_at_tips = max(size_at_tips, around / element_estimate.ratio_at_a_tip(share))
+        triangles_of_a_tip = TIP_TRIANGLES * estimate.triangles / tips
+        size_at_tips = max(size_at_tips, around / element_estimate.ratio_at_a_tip(triangles_of_a_tip))
     return min(around, size_at_tips)
 
 
 @dataclass(frozen=True)
 class EstimatedNodes:
-    """Interface nodes (k,) on rank 0, before refinement: fibres from 1, interfaces, directions in degrees."""
+    """The interface nodes (k,) on rank 0 before refinement: fibres from 1, interfaces, directions in degrees."""
 
     fibre: Int
     pair: Int
@@ -79,9 +79,9 @@ class EstimatedNodes:
         inner = np.take_along_axis(sides, torus.nesting[sides].argmax(axis=0)[None], axis=0)[0]
         between = edge[pair >= 0]
         plane = np.unique(torus.torus_edge, return_index=True)[1][between]
-        share = np.linspace(0.0, 1.0, lattice.intervals + 1)[None, :, None]
+        fraction = np.linspace(0.0, 1.0, lattice.intervals + 1)[None, :, None]
         ends = torus.mesh.points[torus.edges[plane]]
-        points = ends[:, :1] * (1 - share) + ends[:, 1:] * share
+        points = ends[:, :1] * (1 - fraction) + ends[:, 1:] * fraction
         parts = np.ones(points.shape[:2], bool)
         parts[:, [0, -1]] = ~torus.never_part[torus.node_class[torus.edges[plane]]]
         side, step = np.nonzero(parts)
@@ -90,14 +90,14 @@ class EstimatedNodes:
         return cls(numbers[inner[side]], pair[pair >= 0][side], directions, is_vertex)
 
     def moved_tips(self, case: Case, fibres: int) -> tuple[debonded_arcs.MovedTips, ...]:
-        """Return, by interface, the tips that the mesher moved into a near vertex; no tips in a user's mesh."""
+        """Return the tips that the mesher moved to vertices, by interface; none in a user's mesh."""
         if case.cell.has_own_mesh:
             return (debonded_arcs.NOT_MOVED,) * len(case.interfaces)
         distance, moved = float(np.degrees(outline.MERGED)), []
         for pair, interface in enumerate(case.interfaces):
-            at = self.is_vertex & (self.pair == pair)
+            candidate = self.is_vertex & (self.pair == pair)
             tips = debonded_arcs.tips(interface.debonded, case.section.openings, fibres)
-            moved.append(debonded_arcs.moved_tips(tips, self.fibre[at], self.direction[at], distance))
+            moved.append(debonded_arcs.moved_tips(tips, self.fibre[candidate], self.direction[candidate], distance))
         return tuple(moved)
 
 
@@ -117,17 +117,17 @@ def faults(case: Case, nodes: EstimatedNodes, moved: Sequence[debonded_arcs.Move
     for pair, interface in enumerate(case.interfaces):
         fibres, directions = nodes.fibre[nodes.pair == pair], nodes.direction[nodes.pair == pair]
         label = interface_section.interface_label(pair, len(case.interfaces))
-        for (place, arc), opening in ((arc, opening) for arc in enumerate(interface.debonded) for opening in openings):
-            angle, line = opening if arc.angle is None else arc.angle, f"[{label}] debonded[{place}]"
+        for (number, arc), opening in ((arc, opening) for arc in enumerate(interface.debonded) for opening in openings):
+            angle, line = opening if arc.angle is None else arc.angle, f"[{label}] debonded[{number}]"
             inside = debonded_arcs.debonded([arc], opening, fibres, directions, moved[pair])
             for fibre in [None] if isinstance(arc.fibre, str) else arc.fibre:
                 if not angle or (inside if fibre is None else inside[fibres == fibre]).any():
                     continue
                 if fibre is not None and fibre not in fibres:
-                    which = (
+                    kind = (
                         "that can debond" if interface.between is None else f"between {' and '.join(interface.between)}"
                     )
-                    lines.append(f"{line}.fibre: fibre {fibre} has no interface {which}")
+                    lines.append(f"{line}.fibre: fibre {fibre} has no interface {kind}")
                     continue
                 whose = "any fibre" if fibre is None else f"fibre {fibre}"
                 words = (

@@ -1,6 +1,6 @@
-"""Macroscopic response of a cell, errors in the laws that it obeys, and debonded lengths of fibres.
+"""Macroscopic responses of a cell, errors in the balance laws, and debonded lengths of fibres.
 
-Strains E are [E11, E22, gamma12] in the plane, then the problem's other loads; stresses are alike.
+A strain E is [E11, E22, gamma12], followed by the other loads of the problem; a stress has the conjugate entries.
 """
 
 from collections.abc import Sequence
@@ -22,29 +22,29 @@ from feti_homog.typing import Bool, Float
 
 @dataclass(frozen=True)
 class Response:
-    """The cell under one macroscopic strain.
+    """The response of the cell to one macroscopic strain.
 
     Attributes:
         strain: (v,) E.
-        stress: (v,) Sigma = <sigma>, which does work on E.
-        scale: factor from `state` to the response.
+        stress: (v,) Sigma = <sigma>, conjugate to E.
+        scale: ratio of the response to `state`.
         stored: energy per cell area, 1/2 <sigma:eps> from the displacements plus spring energy.
         in_springs: spring energy, 1/2 sum lam^2 C / |UC|.
         state: interface states, multipliers, jumps and amplitudes.
         u: (boundary dofs,) fluctuating displacement u* on this rank's subdomain boundaries; (0,) if brief.
         checks: relative error in each law.
-            `strain`: <eps> = E, Eq. (3), where <eps> includes the debonded faces' opening and the voids' strain, found
-            from their boundaries; for a cell that is one subdomain, whether its mesh is closed.
-            `hill`: <sigma:eps> = Sigma:E, Eq. (8), springs included, with friction the work done on debonded faces
-            too; relative to <sigma:eps> or, if less, to Reuss' energy bound for a bonded cell, because a debonded
-            cell may store nothing; for a cell that is one subdomain, by the factor (`CondensedLoads.energy`).
+            `strain`: <eps> = E, Eq. (3), where <eps> includes the opening of debonded faces and the strain of voids,
+            both from boundaries; in a cell of one subdomain this error shows whether the mesh is closed.
+            `hill`: <sigma:eps> = Sigma:E, Eq. (8), with the spring energy and the friction work on debonded faces;
+            relative to the larger of <sigma:eps> and Reuss' energy bound for a bonded cell, because a debonded
+            cell may store nothing; in a cell of one subdomain from the factor (`CondensedLoads.energy`).
             `jump`: the largest opening at a glued node relative to the largest displacement, which does not vanish
-            where forces do; absent for a cell that is one subdomain.
-            `stress`: the largest error in a prescribed stress relative to the largest stress or, if less, to the least
-            stress from the strains in a bonded cell.  And the KKT certificate of contact.
+            without forces; absent in a cell of one subdomain.
+            `stress`: the largest error in a prescribed stress relative to the larger of the largest stress and the
+            least stress that the strains cause in a bonded cell.  The KKT certificate of contact follows.
         counts: numbers of `bonded`, `open` and `closed` interface nodes.
         damage: (k,) bond damage, 0 intact to 1 broken.
-        shares: (m,) contribution of this rank's elements to the estimated error of E . Sigma; None without estimate.
+        shares: (m,) contributions of this rank's elements to the estimated error of E . Sigma; None without estimate.
     """
 
     strain: Float
@@ -67,12 +67,12 @@ class Response:
 
     @property
     def debonded(self) -> int:
-        """Number of debonded interface nodes."""
+        """The number of debonded interface nodes."""
         return self.counts["open"] + self.counts["closed"]
 
 
 class Homogenization:
-    """Averages over a torn cell with its interfaces.
+    """The averages over a torn cell with interfaces.
 
     Attributes:
         law: bond law, without the energies released at tips.
@@ -86,19 +86,19 @@ class Homogenization:
 
     @property
     def intact(self) -> BondState:
-        """Interface state with all bonds."""
+        """The interface state in which all bonds hold."""
         nodes = len(self.interface.nodes.row)
         return BondState(np.zeros(nodes, np.int8), self.law.begin(nodes), np.zeros(nodes, bool))
 
     @property
     def loads(self) -> tuple[str, ...]:
-        """Unit load names."""
+        """The names of the unit loads."""
         return self.cell.solver.problem.loads
 
     def respond(self, strains: Float, bonds: BondState, starts: Sequence[Float]) -> list[Response]:
-        """Solve the unit-cell problem under each strain (k, v) and average.  Collective.
+        """Solve the unit-cell problem under each strain, and average.  Collective.
 
-        `bonds` have the debonded nodes and first contact statuses; `starts` are first multipliers.
+        Strains are (k, v); `bonds` has the debonded nodes and first contact statuses; `starts` are first multipliers.
 
         Raises:
             ConvergenceError: a solve broke down and left no numbers.
@@ -109,9 +109,9 @@ class Homogenization:
         return [self.response(self.interface.equilibrium(Load.strain(E), bonds, start), 1.0) for E, start in pairs]
 
     def response(self, state: Equilibrium, scale: float, brief: bool = False) -> Response:
-        """Average `scale` times an equilibrium.  Collective.
+        """Average an equilibrium, multiplied by `scale`.  Collective.
 
-        If `brief`, a state that F lambda did not confirm is averaged from its multipliers, with contact checks alone.
+        If `brief`, average a state without kernel amplitudes from its multipliers, with contact checks alone.
 
         Raises:
             ConvergenceError: the numbers of the state are not finite.
@@ -156,7 +156,7 @@ class Homogenization:
         return self._scaled(state, scale, stress, energy, u, checks)
 
     def _stretched(self, state: Equilibrium) -> float:
-        """Return twice the spring energy per area, rubbing bonds included.  Collective."""
+        """Return twice the spring energy per area, including bonds with friction.  Collective."""
         springs = state.solution.compliance * state.solution.lam
         twice = float(state.solution.lam @ springs) + coupled_interfaces.energy_beside_springs(self.interface, state)
         return float(self.cell.comm.allreduce(twice)) / self.cell.summary.area
@@ -164,7 +164,7 @@ class Homogenization:
     def _scaled(
         self, state: Equilibrium, scale: float, stress: Float, energy: float, u: Float, checks: dict[str, float]
     ) -> Response:
-        """Return the response that is `scale` times a state with <sigma:eps> = `energy`.  Collective."""
+        """Multiply a state by `scale`; `energy` is <sigma:eps> of the state.  Collective."""
         means = scale * state.solution.strain, scale * stress
         energies = scale**2 * energy / 2, scale**2 * self._stretched(state) / 2
         errors, damage = checks | state.certificate, self.damage(state.bonds)
@@ -176,7 +176,7 @@ class Homogenization:
         return (bonds.status != Contact.BONDED).astype(float) if damage is None else damage
 
     def _rubbing(self, state: Equilibrium) -> float:
-        """Return the work on faces with friction per area, which is not stored.  Collective."""
+        """Return the friction work per area, which the cell does not store.  Collective."""
         if state.bonds.gap_and_slip is None:
             return 0.0
         work = float(state.solution.lam @ state.solution.jump) - coupled_interfaces.energy_beside_springs(
@@ -185,17 +185,17 @@ class Homogenization:
         return float(self.cell.comm.allreduce(work)) / self.cell.summary.area
 
     def _unmet_stress(self, state: Equilibrium, stress: Float) -> float:
-        """Return the largest error in a prescribed stress, relative to load and stresses.  Collective."""
+        """Return the largest error in a prescribed stress, relative to all stresses.  Collective."""
         load, scales = state.load, self.interface.scales
-        # Roots of stiffnesses scale the stresses, so that no stress is small beside another.
+        # Roots of stiffnesses scale the stresses, so that all stresses have similar sizes.
         root, imposed = scales.roots, scales.imposed_strain(state.asked)
         error = np.abs((stress - load.values)[load.by_stress] / root[load.by_stress]).max()
         largest = max(np.abs(stress / root)[: len(imposed)].max(), (root[: len(imposed)] * imposed).max())
         return float(error / (largest or 1.0))
 
     def counts(self, status: Status) -> dict[str, int]:
-        """Count interface nodes in each state.  Collective."""
-        if self.cell.summary.across:  # without multipliers there nothing can part
+        """Count the interface nodes in each contact state.  Collective."""
+        if self.cell.summary.across:  # without multipliers no bond can break
             return {"bonded": self.cell.summary.interface_nodes or 0, "open": 0, "closed": 0}
         numbers = np.array([(status == kind).sum() for kind in (Contact.BONDED, Contact.OPEN, Contact.CLOSED)])
         sums = self.cell.comm.allreduce(numbers)
@@ -203,7 +203,7 @@ class Homogenization:
 
     @cached_property
     def _strain_of_jumps(self) -> Float:
-        """The matrix nu = (B B^T)^-1 B N (owned rows, m): int eps* = nu^T B u."""
+        """The matrix nu = (B B^T)^-1 B N (owned rows, m), with int eps* = nu^T B u."""
         solver = self.cell.solver
         B = solver.interface_operators.B
         integrals = solver.jump_operator.sum(B @ self._strain_of_displacements)
@@ -212,7 +212,7 @@ class Homogenization:
 
     @cached_property
     def _strain_of_displacements(self) -> Float:
-        """The matrix N (boundary dofs, m): N^T u = int eps* over bodies and voids."""
+        """The matrix N (boundary dofs, m), with N^T u = int eps* over bodies and voids."""
         m, dofs = self.cell.solver.problem.strains, self.cell.solver.interface_operators.dofs
         pairs = zip(self.cell.subdomains, dofs, strict=True)
         return np.concatenate([np.zeros((0, m)), *(s.mean_strain(boundary) for s, boundary in pairs)])
@@ -227,7 +227,7 @@ class Homogenization:
                 continue
             inside = np.ones(s.n_dofs, bool)
             inside[boundary] = False
-            if s.submesh.pinned >= 0:  # it does not move
+            if s.submesh.pinned >= 0:  # the pinned node does not move
                 inside[s.problem.dofs(np.array([s.submesh.pinned]))] = False
             inner = max(inner, float(np.abs(s.mean_strain(np.flatnonzero(inside))).max(initial=0.0)))
         return float(self.cell.comm.allreduce(inner, MPI.MAX) / self.cell.comm.allreduce(size, MPI.MAX))
@@ -252,25 +252,25 @@ class FibreInterfaces:
         self._degrees = np.where(np.isnan(radius), 360.0 / np.where(self._length > 0, self._length, 1.0), round_fibre)
 
     def length(self, which: Bool) -> Float:
-        """Return the interface length (f,) at the nodes `which` (k,) of all ranks.  Collective."""
+        """Sum the interface length of each fibre (f,) over the nodes `which` (k,).  Collective."""
         sums: Float = np.bincount(self._fibre, self._nodes.length * which, self._fibres).astype(float)
         return distributed_arrays.allreduce_sum(self._comm, sums)
 
     def loose(self, status: Status) -> list[int]:
-        """Return fibre numbers, from 1, without a bond that holds.  Collective."""
+        """List the fibres without any intact bond, numbered from 1.  Collective."""
         is_loose = (self.length(status == Contact.BONDED) == 0.0) & (self._length > 0.0)
         return [int(number) for number in np.flatnonzero(is_loose) + 1]
 
     def angle(self, length: Float) -> Float:
-        """Convert lengths (f,) to degrees; a fibre that is not round takes its fraction of 360."""
+        """Convert interface lengths (f,) to degrees, or to fractions of 360 for fibres that are not round."""
         return np.asarray(length * self._degrees)
 
     def share(self, length: Float) -> float:
-        """Return the fraction of the whole interface length that lengths (f,) have."""
+        """Return the ratio of the summed lengths (f,) to the whole interface length."""
         return float(length.sum() / (self._length.sum() or 1.0))
 
     def shares(self, status: Status) -> Float:
-        """Return the debonded fraction (i,) of the length of each [[interface]] section.  Collective."""
+        """Return the debonded length fraction (i,) of each [[interface]] section.  Collective."""
         length, debonded = (
             np.bincount(self._nodes.pair, values, self._pairs).astype(float)
             for values in (self._nodes.length, self._nodes.length * (status != Contact.BONDED))
@@ -280,5 +280,5 @@ class FibreInterfaces:
 
 
 def asymmetry(L: Float) -> float:
-    """Return max |L - L^T| / max |L|."""
+    """Return the relative asymmetry max |L - L^T| / max |L|."""
     return float(np.abs(L - L.T).max() / np.abs(L).max())

@@ -1,4 +1,4 @@
-"""Faults of interfaces between phases, remarks on unexpected properties of a cell, warnings of coarse interfaces."""
+"""Interface faults, remarks on unexpected cell properties, and warnings about coarse interface elements."""
 
 import math
 
@@ -22,9 +22,10 @@ RESOLVED_SOFTENING = 1 / 3
 
 
 def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
-    """Return the number (phases, phases) of the interface between two phases; -1 where they never part.
+    """Return the interface number (phases, phases) between two phases.
 
-    An interface without `between`, or perfect bonding, lies between the matrix, the first phase, and all other phases.
+    The number is -1 where two phases never part.  An interface without `between`, or perfect bonding, lies between the
+    matrix, the first phase, and all other phases.
     """
     pairs = np.full((len(phases), len(phases)), -1)
     for number, between in enumerate([interface.between for interface in case.interfaces] or [None]):
@@ -37,7 +38,7 @@ def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
 
 
 def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -> list[str]:
-    """List interfaces between absent or separate phases; phases `first` (n,) touch phases `second` (n,)."""
+    """List interface faults; phases `first` (n,) touch phases `second` (n,)."""
     lines = []
     touching = np.zeros((len(phases), len(phases)), bool)
     touching[first, second] = touching[second, first] = True
@@ -55,9 +56,9 @@ def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -
 
 
 def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
-    """List remarks on the mesh, on an [interface] without effect, and on nodes that never part.
+    """List the remarks on a mesh and its interfaces.
 
-    `pairs` as in `share_entities`.
+    Remarks concern the mesh, an [interface] without effect, and nodes that never part; `pairs` as `share_entities`.
     """
     lines, has_curve = [*torus.mesh.remarks], len(torus.mesh.debonded_edges) > 0
     if case.interface is None:
@@ -69,7 +70,7 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
     may_part = pairs[torus.mesh.phase[first], torus.mesh.phase[second]] >= 0
     ends = np.unique(torus.edge_ends[edge[may_part & (torus.constituent[first] != torus.constituent[second])]])
     kinds = ((torus.meeting[ends] > 2, "three bodies meet"), (torus.touching[ends], "two bodies meet more than once"))
-    if counts := [f"at {which.sum()} {kind}" for which, kind in kinds if which.any()]:
+    if counts := [f"at {mask.sum()} {kind}" for mask, kind in kinds if mask.any()]:
         lines.append(f"[interface] nodes that never part: {', '.join(counts)}")
     # A bond at the pinned node, Eq. (15).
     pinned = np.searchsorted(torus.class_keys, submeshes.pinned_class(torus))
@@ -109,15 +110,15 @@ def table_remarks(case: Case) -> tuple[str, ...]:
 
 
 def longest(ends: Float) -> float:
-    """Return the longest edge between `ends` (e, 2, 2); 0 without edges."""
+    """Return the greatest length of edges with `ends` (e, 2, 2); 0 without edges."""
     return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max(initial=0.0))
 
 
 def process_zone(case: Case) -> float | None:
     """Return the least process zone length E' G_Ic / sigma_c^2.
 
-    Return None unless bonds break by energy.  sigma_c = sqrt(2 k_n G_Ic); for cohesive laws G_Ic and sigma_c are the
-    toughness and strength in the pure mode with the shorter zone.  E' is Young's modulus in the plane state,
+    The result is None unless bonds break by energy.  sigma_c = sqrt(2 k_n G_Ic); for cohesive laws G_Ic and sigma_c
+    are the toughness and strength in the pure mode with the shorter zone.  E' is Young's modulus in the plane state,
     E / (1 - nu^2) in plane strain, along the most compliant axis in all phases.
     """
     lengths = [1 / (2 * bond.normal_stiffness) for bond in case.interfaces if bond.toughness and bond.normal_stiffness]
@@ -147,14 +148,14 @@ def warnings(case: Case, width: float, edge: float) -> list[str]:
     size = f"elements on the interface are up to {edge / 2**case.cell.refine:.3g} long"
     size += f" after refine = {case.cell.refine}" if case.cell.refine else ""
     if softens:
-        zone, share = f"E' G / N^2 = {length:.3g} long", "a third"
+        zone, fraction = f"E' G / N^2 = {length:.3g} long", "a third"
     else:
         # The bonds of the shortest process zone break at this traction in pure opening.
         pairs = [(bond.normal_stiffness or 0.0, bond.toughness or 0.0) for bond in case.interfaces]
         stiffness, toughness = max(pair for pair in pairs if all(pair))
         strength = f"{math.sqrt(2.0 * stiffness * toughness):.3g}"
-        zone, share = f"E' G_Ic / sigma_c^2 = {length:.3g} long for sigma_c = sqrt(2 k_n G_Ic) = {strength}", "half"
-    law, limit = f'[interface] law = "{case.interfaces[0].criterion}"', f"elements should be at most {share} of that"
+        zone, fraction = f"E' G_Ic / sigma_c^2 = {length:.3g} long for sigma_c = sqrt(2 k_n G_Ic) = {strength}", "half"
+    law, limit = f'[interface] law = "{case.interfaces[0].criterion}"', f"elements should be at most {fraction} of that"
     refine = math.ceil(math.log2(edge / (resolved * length)))
     # Rounded down to two digits.
     needed = resolved * length * 2**case.cell.refine / width

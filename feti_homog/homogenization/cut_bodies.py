@@ -19,22 +19,22 @@ from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Array, Bool, Float, Int, Int32
 
 NO_ROWS = np.zeros((0, 3), np.int64)
-# Number of element layers about shared vertices: vertices at most two edges from these have all of their elements.
+# Number of element layers about shared vertices, so that all vertices within two edges have complete patches.
 LAYERS = 3
 
 
 class SharedVertices:
-    """The shared vertices of body pieces in this rank's meshes, each mesh with some pieces.
+    """The vertices that several pieces of a body share, in the meshes of this rank.
 
     Attributes:
-        meshes: indices of this rank's meshes with shared vertices.
+        meshes: indices of this rank's meshes with shared vertices; a mesh has one or more pieces.
         classes: (n,) shared vertex classes in each such mesh.
         sides: (f, 2) vertices of the element sides along cuts, in each such mesh.
         is_first: (f,) whether a side belongs to the first of its two pieces.
     """
 
     def __init__(self, comm: MPI.Intracomm, meshes: Sequence[tuple[Sequence[Submesh], FineMesh]]) -> None:
-        """Find the common vertices and edges of several pieces.  Collective."""
+        """Find the vertices and edges that several pieces share.  Collective."""
         self._comm = comm
         # On the piece borders: vertices (n, 3) by body, entity and position, their classes (n,), coarse edges (e, 3) by
         # body, entity and position, and the vertex classes (e, m) along these edges.
@@ -47,15 +47,15 @@ class SharedVertices:
                 ends = s.vertex_class[s.triangles[triangle[:, None], np.stack([k, (k + 1) % 3], axis=1)]]
                 back = s.backwards[triangle, k]
                 ends[back] = ends[back, ::-1]
-                place = np.arange(line.shape[1])
-                place[-1] = 0
+                position = np.arange(line.shape[1])
+                position[-1] = 0
                 entity = sharers.entity_code(s.edge_keys[s.edge_class[s.triangle_edges[triangle, k]]], True)
                 body = s.constituent[triangle]
-                key = np.tile(entity[:, None], len(place))
+                key = np.tile(entity[:, None], len(position))
                 key[:, [0, -1]] = sharers.entity_code(s.class_keys[ends], False)
-                rows = np.stack(np.broadcast_arrays(body[:, None], key, place), axis=2).reshape(-1, 3)
-                classes, once = np.unique(line, return_index=True)
-                parts.append((rows[once], classes, np.column_stack([body, entity, np.zeros_like(entity)]), line))
+                rows = np.stack(np.broadcast_arrays(body[:, None], key, position), axis=2).reshape(-1, 3)
+                classes, index = np.unique(line, return_index=True)
+                parts.append((rows[index], classes, np.column_stack([body, entity, np.zeros_like(entity)]), line))
             borders.append([np.concatenate(table) for table in zip(*parts, strict=True)])
         vertex_copies, edge_copies = (self._copies([border[k] for border in borders]) for k in (0, 2))
         self._rows = NO_ROWS
@@ -81,7 +81,7 @@ class SharedVertices:
         return self._at_home(self._rows, np.concatenate([np.zeros((0, width)), *parts]), self.classes, sums)
 
     def _copies(self, parts: Sequence[Int]) -> list[Int]:
-        """Count the copies of each row (n, 3) in all meshes; the second column is 1 at the first copy.  Collective."""
+        """Count the copies of each row (n, 3) in all meshes, and mark the first copy.  Collective."""
 
         def copies(number: Int, _: Int) -> Int:
             _, first, count = np.unique(number, return_index=True, return_counts=True)
@@ -93,12 +93,12 @@ class SharedVertices:
     def _at_home(
         self, rows: Int, values: Array, parts: Sequence[Array], combine: Callable[[Int, Array], Array]
     ) -> list[Array]:
-        """Call `combine` on the home ranks with the numbers of rows (n, 3) and with values (n, k).  Collective.
+        """Combine the values (n, k) of equal rows (n, 3) on home ranks.  Collective.
 
-        Return the combined rows in arrays with the lengths of `parts`.
+        `combine` takes a number of each row, and the values.  The results are arrays with the lengths of `parts`.
         """
         comm, home = self._comm, rows[:, 1:].sum(axis=1) // 2 % self._comm.size
-        rows, values, source, place = distributed_arrays.exchange(
+        rows, values, source, position = distributed_arrays.exchange(
             comm, home, rows, values, np.full(len(rows), comm.rank), np.arange(len(rows))
         )
         order = np.lexsort(rows.T)
@@ -106,14 +106,15 @@ class SharedVertices:
         is_new[1:] = (np.diff(rows[order], axis=0) != 0).any(axis=1)
         number = np.empty(len(order), np.int64)
         number[order] = np.cumsum(is_new) - 1
-        place, combined = distributed_arrays.exchange(comm, source, place, combine(number, values))
-        return np.split(combined[np.argsort(place)], np.cumsum([len(part) for part in parts])[:-1]) if parts else []
+        position, combined = distributed_arrays.exchange(comm, source, position, combine(number, values))
+        return np.split(combined[np.argsort(position)], np.cumsum([len(part) for part in parts])[:-1]) if parts else []
 
 
 def border_lines(s: Submesh, mesh: FineMesh, classes: Int32) -> tuple[Int, Int, Int]:
-    """Return the triangles (e,) at a piece border, their border edges (e,), and the edge classes (e, M + 1).
+    """Find the triangles and edges along the border of a piece.
 
-    `classes` (t, q) are the lattice node classes of all triangles.
+    `classes` (t, q) are the lattice node classes of all triangles.  Return the triangle (e,) at each border edge, the
+    position (e,) of the edge in the triangle, and the node classes (e, M + 1) along the edge.
     """
     edge, inner = s.edge_class[s.triangle_edges], np.arange(mesh.lattice.intervals - 1)
     triangle, k = np.nonzero(np.bincount(edge.ravel(), minlength=len(s.edge_keys))[edge] == 1)
@@ -138,13 +139,13 @@ def fits_across_cuts(
     flags = shared.sum([np.isin(strip.shared, strip.bounds)[:, None].astype(float) for strip in strips])
     neighbours = [strip.neighbours(flag[:, 0] > 0) for strip, flag in zip(strips, flags, strict=True)]
     order = bodies[0].order if bodies else 1
-    more = [
+    additions = [
         (pairs.shared_matrices(moments, order), pairs.shared(sums, order))
         for pairs, (moments, sums) in zip(neighbours, patches, strict=True)
     ]
     fits = {}
-    more = _over_pieces(shared, strips, more)
-    for mesh, strip, pairs, patch, added in zip(shared.meshes, strips, neighbours, patches, more, strict=True):
+    additions = _over_pieces(shared, strips, additions)
+    for mesh, strip, pairs, patch, added in zip(shared.meshes, strips, neighbours, patches, additions, strict=True):
         changed = np.union1d(strip.shared, pairs.at[np.isin(pairs.other, strip.shared)])
         of_strip = local_fits.fitted(*(a[changed] + b[changed] for a, b in zip(patch, added, strict=True)))
         fits[mesh] = np.flatnonzero(strip.is_vertex)[changed], of_strip
@@ -159,7 +160,7 @@ class _Strip:
         stress: recovered stress on these elements.
         is_vertex: (classes,) whether a class is a vertex of these elements.
         shared: (n,) shared vertices.
-        sides: (f, 2) vertices of the element sides, each side once in its body.
+        sides: (f, 2) vertices of the element sides, where each side of a body counts once.
         vector: (f, 2) vectors from the first to the second vertex of a side.
         bounds: (b,) vertices of sides with one element in the body.
     """
@@ -173,42 +174,48 @@ class _Strip:
 
     @classmethod
     def of(cls, body: stress_recovery.RecoveredStress, classes: Int, cut: Int, is_first: Bool) -> _Strip:
-        """Find the elements; this piece counts a side of `cut` (c, 2) only where its copy `is_first`."""
-        is_vertex, at = np.zeros(len(body.u), bool), body.node_class[body.triangles[:, :3]]
+        """Find the elements about the shared vertices `classes`.
+
+        Of the sides along a `cut` (c, 2), this piece counts only the sides that are `is_first`.
+        """
+        is_vertex, corner_vertices = np.zeros(len(body.u), bool), body.node_class[body.triangles[:, :3]]
         is_vertex[classes] = True
         for _ in range(LAYERS):
-            reached = is_vertex[at].any(axis=1)
-            is_vertex[at[reached]] = True
+            reached = is_vertex[corner_vertices].any(axis=1)
+            is_vertex[corner_vertices[reached]] = True
         stress = replace(body, triangles=body.triangles[reached])
         corners, size = stress.points[stress.triangles[:, :3]], int(is_vertex.sum())
         start, stop = stress.vertices.ravel(), stress.vertices[:, [1, 2, 0]].ravel()
         vector = (corners[:, [1, 2, 0]] - corners).reshape(-1, 2)
-        code, once, count = np.unique(_code(start, stop, size), return_index=True, return_counts=True)
+        code, index, count = np.unique(_code(start, stop, size), return_index=True, return_counts=True)
         on_cut = _code(stress.numbers[cut[:, 0]], stress.numbers[cut[:, 1]], size)
-        single = once[(count == 1) & ~np.isin(code, on_cut)]
-        once = once[~np.isin(code, on_cut[~is_first])]
+        single = index[(count == 1) & ~np.isin(code, on_cut)]
+        index = index[~np.isin(code, on_cut[~is_first])]
         sides = np.stack([start, stop], axis=1)
-        return cls(stress, is_vertex, stress.numbers[classes], sides[once], vector[once], np.unique(sides[single]))
+        return cls(stress, is_vertex, stress.numbers[classes], sides[index], vector[index], np.unique(sides[single]))
 
     def neighbours(self, at_boundary: Bool) -> local_fits.PatchNeighbours:
-        """Return vertex pairs with the first on the body boundary, where shared vertices are `at_boundary` (n,)."""
+        """Pair the vertices on the body boundary with their neighbours.
+
+        `at_boundary` (n,) marks the shared vertices on the boundary.
+        """
         is_bound = np.zeros(int(self.is_vertex.sum()), bool)
         is_bound[self.bounds] = True
         is_bound[self.shared] = at_boundary
-        at, other = np.concatenate([self.sides, self.sides[:, ::-1]]).T
+        vertex, other = np.concatenate([self.sides, self.sides[:, ::-1]]).T
         vector = np.concatenate([self.vector, -self.vector])
-        return local_fits.PatchNeighbours(at[is_bound[at]], other[is_bound[at]], vector[is_bound[at]])
+        return local_fits.PatchNeighbours(vertex[is_bound[vertex]], other[is_bound[vertex]], vector[is_bound[vertex]])
 
 
 def _code(a: Int, b: Int, size: int) -> Int:
-    """Return a number for each pair of vertices, among `size` vertices."""
+    """Assign a number to each unordered pair of vertices, among `size` vertices."""
     return np.asarray(np.minimum(a, b) * size + np.maximum(a, b))
 
 
 def _over_pieces(
     shared: SharedVertices, strips: Sequence[_Strip], pairs: Sequence[tuple[Float, Float]]
 ) -> list[tuple[Float, Float]]:
-    """Add strip moments and sums (vertices, p, ..) over all pieces, at shared vertices.  Collective."""
+    """Add the moments and sums `pairs` (vertices, p, ..) of all pieces at shared vertices.  Collective."""
     parts = [
         np.concatenate([a[strip.shared], b[strip.shared]], axis=2) for strip, (a, b) in zip(strips, pairs, strict=True)
     ]

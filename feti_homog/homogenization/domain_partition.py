@@ -15,7 +15,7 @@ from feti_homog.mesh.tiles import tile_filling
 from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.typing import Bool, Float, Int
 
-ROUNDING = 1e-9  # of coordinates, relative to the cell or to the radius of a fibre
+ROUNDING = 1e-9  # rounding error of coordinates, relative to the cell or to a fibre radius
 
 
 @dataclass(frozen=True)
@@ -27,16 +27,16 @@ class CellSummary:
         phases: material phase names, the matrix first.
         bodies, subdomains, coarse_triangles: numbers of bodies, subdomains and coarse triangles.
         interface_edge: longest coarse edge between phases.
-        numbers: (constituents,) numbers from 1, as in case files, for fibres and the fibres that coatings coat; 0 for
+        numbers: (constituents,) number, from 1 as in case files, of a fibre, or of the fibre inside a coating; 0 for
             the matrix.
-        is_fibre: (constituents,) mark fibres, not the matrix and coatings.
+        is_fibre: (constituents,) whether a constituent is a fibre, not the matrix or a coating.
         constituent_phase: (constituents,) index of the phase in `phases`.
-        centres, radii: (constituents, 2) and (constituents,) centres, in the cell, and radii of fibres, else NaN.
+        centres, radii: (constituents, 2) and (constituents,) centres in the cell and radii of fibres, else NaN.
         frames: (constituents, 2, 2) as in `Ellipses`, for fibres that are circles or ellipses; else NaN.
         snapped: largest distance that a node in a user's mesh was moved to make sides match.
         voids: number of voids.
-        match_distance: distance between the fibres and a matched table, see `random_fibres`; None without table.
-        remarks: unexpected cell properties, a line each.
+        match_distance: distance between the fibres and a matched table, see `random_fibres`; None without a table.
+        remarks: lines about unexpected cell properties.
         across: whether subdomains reach across materials.
         interface_nodes: number of interface nodes, which have no multipliers; None unless `across`.
     """
@@ -64,17 +64,17 @@ class CellSummary:
 
     @property
     def is_cut(self) -> bool:
-        """True for several subdomains that are not whole bodies."""
+        """Whether the cell has several subdomains that are not whole bodies."""
         return self.subdomains > (1 if self.across else self.bodies)
 
     @property
     def fibres(self) -> int:
-        """Number of fibres."""
+        """The number of fibres."""
         return int(self.is_fibre.sum())
 
     @property
     def fibre_bodies(self) -> Int:
-        """The constituents (fibres,) that are fibres, by their numbers."""
+        """The constituent index (fibres,) of each fibre, ordered by fibre number."""
         return np.flatnonzero(self.is_fibre)
 
     @property
@@ -83,7 +83,7 @@ class CellSummary:
         return mesh_fibres.coating_thickness(self.numbers, self.is_fibre, Ellipses(self.centres, self.frames).semi_axes)
 
     def fibre_number(self, constituent: Int) -> Int:
-        """Return the fibre `numbers` (k,) for constituents (k,)."""
+        """Return the fibre numbers (k,) of constituents (k,)."""
         return np.asarray(self.numbers[constituent])
 
     def warnings(self) -> list[str]:
@@ -93,12 +93,12 @@ class CellSummary:
 
     @property
     def period(self) -> Float:
-        """Width and height (2,)."""
+        """The width and height (2,) of the cell."""
         return np.array([self.width, self.height])
 
     @property
     def area(self) -> float:
-        """|UC|."""
+        """The cell area |UC|."""
         return self.width * self.height
 
 
@@ -107,7 +107,7 @@ class RankShare:
     """The part of the cut cell on one rank.
 
     Attributes:
-        summary, table: for the whole cell.
+        summary, table: data of the whole cell.
         pairs: (phases, phases) as in `cell_remarks.pairs_of`.
         submeshes: the rank's submeshes.
     """
@@ -125,7 +125,7 @@ def distribute(
     n_ranks: int,
     policy: partition_policy.PartitionPolicy = partition_policy.DEFAULT_POLICY,
 ) -> list[RankShare]:
-    """Cut the cell into subdomains, and deal them to the ranks.
+    """Cut the cell, and deal the subdomains to the ranks.
 
     Raises:
         CaseError: an arc lies on a fibre that cannot have it, or selects no node.
@@ -177,11 +177,11 @@ def distribute(
         interface_nodes=_interface_nodes(torus, pairs, lattice) if across else None,
     )
     shares = submeshes.cut_for_ranks(torus, cut.subdomain, table, n_ranks, submeshes.pinned_class(torus))
-    return [RankShare(summary, table, pairs, share) for share in shares]
+    return [RankShare(summary, table, pairs, part) for part in shares]
 
 
 def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triangles: int) -> CellSummary:
-    """Summarize a tiled cell with its numbers of subdomains and coarse triangles."""
+    """Summarize a tiled cell with given numbers of subdomains and coarse triangles."""
     regions, lines, arrangement = noded.regions, noded.lines, noded.arrangement
     inside = regions.constituent[:-1]
     solid = np.flatnonzero(inside >= 0)
@@ -220,7 +220,7 @@ def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triang
 def _cut_across(
     case: Case, torus: Torus, lattice: ReferenceLattice, n_ranks: int, policy: partition_policy.PartitionPolicy
 ) -> partition.Partition | None:
-    """Cut the cell across materials; return None against the policy, or if a rank gets no piece."""
+    """Cut the cell across materials; return None if the policy or METIS prevents the cut."""
     triangles = len(torus.mesh.triangles)
     dofs = triangles * lattice.intervals**2
     pieces = policy.across_pieces(dofs, n_ranks) if partition_policy.can_be_cut_across(case) else 0
@@ -233,23 +233,26 @@ def _cut_across(
 
 
 def match_distance(case: Case, width: float, height: float, centres: Float, radii: Float) -> float | None:
-    """Return the match distance for fibre centres (n, 2) and radii (n,)."""
+    """Return the distance between the fibres and the matched table; None without a table.
+
+    `centres` are (n, 2), and `radii` are (n,).
+    """
     window = case.cell.matched
     if window is None:
         return None
-    from feti_homog.microstructure import random_fibres  # with statistics of neighbours
+    from feti_homog.microstructure import random_fibres  # imports the statistics of neighbours
 
     return random_fibres.distance_of(window, width, height, centres, radii)
 
 
 def in_cell(points: Float, period: Float) -> Float:
-    """Shift points (k, 2) into [0, period); rounded ends go to 0."""
+    """Shift points (k, 2) into [0, period), where points close to the period go to 0."""
     inside = np.mod(points, period)
     return np.where(inside > (1 - ROUNDING) * period, 0.0, inside)
 
 
 def _interface_nodes(torus: Torus, pairs: Int, lattice: ReferenceLattice) -> int:
-    """Count the nodes at which two bodies could part if they had an interface."""
+    """Count the nodes at which two bodies could part along an interface."""
     first, second, edge = torus.sides
     between = edge[pairs[torus.mesh.phase[first], torus.mesh.phase[second]] >= 0]
     plane = np.unique(torus.torus_edge, return_index=True)[1][between]

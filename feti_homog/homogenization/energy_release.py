@@ -29,11 +29,11 @@ from feti_homog.materials import voigt
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Array, Float, Int
 
-# Length at which the modes are separated / radius of the fibre; at least one element counts.
+# Closed length that separates the modes / fibre radius; the length has at least one element.
 MODE_LENGTH = 1e-3
 QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
-# Radius around a tip beyond which no node turns / distance to boundaries; largest such radius / a period of the cell;
-# radius within which all nodes turn by the same angle / the first radius.
+# REACH: radius of the turning nodes about a tip / distance to boundaries.  REACH_OF_A_PERIOD: largest such radius /
+# cell period.  CORE: radius within which all nodes turn by the same angle / radius of the turning nodes.
 REACH, REACH_OF_A_PERIOD, CORE = 0.8, 0.32, 0.5
 # Relative distance from a circle beyond which a node of both bodies is on another boundary, or on another image.
 OFF_CIRCLE = 1e-4
@@ -66,13 +66,13 @@ class CrackExtension:
         mesh = self.subdomain.mesh
         nodes = mesh.triangles[np.unique(self._elements_of[inside].indices)]
         points = mesh.points[nodes]
-        away = nearest_image(points - tip, self._period)
+        offset = nearest_image(points - tip, self._period)
         # All nodes of an element take the image of the element's node that is nearest to the tip.
-        nearest = np.argmin((away**2).sum(axis=2), axis=1)[:, None, None]
-        away = points + np.take_along_axis(away - points, nearest, axis=1)
-        fraction = np.clip((reach - np.linalg.norm(away, axis=2)) / (reach * (1 - CORE)), 0.0, 1.0)[..., None]
-        total = u.reshape(-1, 2)[mesh.node_class[nodes]] + away @ E
-        moved, changed = fraction * ((away + spoke) @ QUARTER_TURN.T), fraction * (total @ QUARTER_TURN.T)
+        nearest = np.argmin((offset**2).sum(axis=2), axis=1)[:, None, None]
+        offset = points + np.take_along_axis(offset - points, nearest, axis=1)
+        fraction = np.clip((reach - np.linalg.norm(offset, axis=2)) / (reach * (1 - CORE)), 0.0, 1.0)[..., None]
+        total = u.reshape(-1, 2)[mesh.node_class[nodes]] + offset @ E
+        moved, changed = fraction * ((offset + spoke) @ QUARTER_TURN.T), fraction * (total @ QUARTER_TURN.T)
         return point_fields.energy_change(
             points, total, self.subdomain.L[:3, :3], moved, changed, self.subdomain.is_mixed
         )
@@ -80,7 +80,7 @@ class CrackExtension:
 
 @dataclass(frozen=True)
 class EnergyRelease:
-    """Energy release at t tips, ordered by fibre, interface and direction.
+    """The energy release rates at t tips, ordered by fibre, interface and direction.
 
     Attributes:
         fibre: (t,) numbers from 1.
@@ -150,7 +150,7 @@ class EnergyReleaseRates:
         self._boundaries = self._gathered(np.concatenate(points)), self._gathered(np.concatenate(body))
 
     def of(self, response: Response) -> EnergyRelease:
-        """Return G and its modes at all tips in a response.  Collective."""
+        """Return the energy release rates at all tips of a response.  Collective."""
         solution, status = response.state.solution, self._gathered(response.state.status)
         tips = self._chains.tips(status)
         # Tips on circles, in the order of fibres, interfaces and directions.
@@ -182,35 +182,36 @@ class EnergyReleaseRates:
         """Return G (t,) from a virtual crack extension at each tip.  Collective."""
         if not len(tips.node):
             return np.zeros(0)
-        solution, bodies, place = response.state.solution, self.bodies[tips.node], self.points[tips.node]
-        spokes = nearest_image(place - self.cell.summary.centres[bodies[:, 1]], self._period)
+        solution, bodies, position = response.state.solution, self.bodies[tips.node], self.points[tips.node]
+        spokes = nearest_image(position - self.cell.summary.centres[bodies[:, 1]], self._period)
         # Within `reach` of a tip there is no other tip, and no boundary except the circle of the tip.
         radius, (points, body), period = np.linalg.norm(spokes, axis=1), self._boundaries, self._period
-        reach, places = np.minimum(radius, REACH_OF_A_PERIOD / REACH * period.min()), in_cell(place, period)
-        if len(place) > 1:
-            nearest, _ = cKDTree(places, boxsize=period).query(places, 2)
+        reach, wrapped = np.minimum(radius, REACH_OF_A_PERIOD / REACH * period.min()), in_cell(position, period)
+        if len(position) > 1:
+            nearest, _ = cKDTree(wrapped, boxsize=period).query(wrapped, 2)
             reach = np.minimum(reach, nearest[:, 1])
-        inside = cKDTree(in_cell(points, period), boxsize=period).query_ball_point(places, reach)
+        inside = cKDTree(in_cell(points, period), boxsize=period).query_ball_point(wrapped, reach)
         for t, nodes in enumerate(inside):
-            away = nearest_image(points[nodes] - place[t], period)
-            off_circle = np.abs(np.linalg.norm(away + spokes[t], axis=1) / radius[t] - 1) > OFF_CIRCLE
+            offset = nearest_image(points[nodes] - position[t], period)
+            off_circle = np.abs(np.linalg.norm(offset + spokes[t], axis=1) / radius[t] - 1) > OFF_CIRCLE
             limits = off_circle | ~np.isin(body[nodes], bodies[t])
-            reach[t] = REACH * min(reach[t], np.linalg.norm(away[limits], axis=1).min(initial=np.inf))
+            reach[t] = REACH * min(reach[t], np.linalg.norm(offset[limits], axis=1).min(initial=np.inf))
         u, E = self.cell.solver.displacement(solution), voigt.strain_tensor(solution.strain[:3])
         change, first = np.zeros(len(bodies)), 0
         for extension in self._extensions:
             last = first + extension.subdomain.n_dofs
             for t in np.flatnonzero((bodies == extension.subdomain.submesh.body).any(axis=1)):
-                change[t] += extension.energy_change(place[t], spokes[t], reach[t], u[first:last], E)
+                change[t] += extension.energy_change(position[t], spokes[t], reach[t], u[first:last], E)
             first = last
         turn = self.direction[tips.node] - self.direction[tips.behind]
         outward = np.sign((turn + 180.0) % 360.0 - 180.0)
         return np.asarray(-outward * distributed_arrays.allreduce_sum(self.cell.comm, change) / self.radius[tips.node])
 
     def _closing(self, tips: debonded_arcs.CrackTips, status: Status, force: Float, jump: Float) -> tuple[Float, Float]:
-        """Return `closing_work` (t, 2) in opening and in shear, and the closed lengths (t,).
+        """Return the work that closes each crack, and the closed lengths (t,).
 
-        A length is MODE_LENGTH times the radius, or the length of the element behind the tip if that is larger.
+        The work is `closing_work` (t, 2) in opening and in shear.  A length is MODE_LENGTH times the
+        radius, or the length of the element behind the tip if that is larger.
         """
         smallest, order = MODE_LENGTH * self.radius[tips.node], self.cell.case.cell.order
         work, length = np.zeros((len(smallest), 2)), np.zeros(len(smallest))
@@ -241,5 +242,5 @@ class EnergyReleaseRates:
 
 
 def nearest_image(offset: Float, period: Float) -> Float:
-    """Shift offsets (..., 2) to their shortest images."""
+    """Shift offsets (..., 2) to their shortest periodic images."""
     return np.asarray(offset - np.round(offset / period) * period)

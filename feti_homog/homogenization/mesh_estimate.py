@@ -1,6 +1,6 @@
-"""Estimate of the mesh error in the energy of each pair of responses, by recovered stresses.
+"""The mesh error in the energy of each pair of responses, estimated by recovered stresses.
 
-The recovered stresses in a body satisfy the tractions on interfaces, which are multipliers over lengths, and on voids.
+The recovered stresses in a body satisfy the tractions at interfaces, multipliers divided by lengths, and at voids.
 """
 
 from __future__ import annotations
@@ -26,28 +26,28 @@ if TYPE_CHECKING:
     from feti_homog.homogenization.cut_bodies import SharedVertices
 
 Members = list[Subdomain] | list[UniformPart]
-# Ratios of errors of elements and of arcs to errors on meshes refined once and twice less, by the order of elements,
-# measured by `scripts/measure_mesh_error.py --factors`; in cells with a phase that locks, for quadratic elements from
-# true errors; and to the mesh refined once less with displacements of the mesh at its nodes, by whether it has bubbles.
+# Ratios of element and arc errors to the errors on coarser meshes (`scripts/measure_mesh_error.py --factors`).  NESTED:
+# one and two halvings less, by element order.  LOCKED: cells with a phase that locks, for quadratic elements from true
+# errors.  SAMPLED: one halving less, with fine displacements at the coarse nodes, by whether elements have bubbles.
 NESTED = {1: ((0.26, 0.27), (0.07, 0.066)), 2: ((1 / 15, 1 / 14), (1 / 185, 1 / 255))}
 LOCKED = {1: (0.31, 0.34), 2: (0.1, 0.065)}
 SAMPLED = {False: (0.066, 0.065), True: (0.052, 0.065)}
-# Elements and arcs may cancel; the smallest fractions that remain (`scripts/measure_mesh_error.py`): on the diagonal,
-# and of two states if quadratic elements have interfaces that may part, or few corners have most of the error; of other
-# pairs of states by the order of elements.
+# Element and arc errors may cancel; the smallest fractions that remain (`scripts/measure_mesh_error.py`).  LEAST_SHARE:
+# on the diagonal, and for two states if quadratic elements have interfaces that may part, or if few corners have most
+# of the error.  LEAST_OF_TWO: for other pairs of states, by element order.
 LEAST_SHARE, LEAST_OF_TWO = 0.05, {1: 0.01, 2: 0.005}
 
 
 @dataclass(frozen=True)
 class EnergyErrors:
-    """Errors (k, k) in E_i . Sigma_j; k responses have strains E_i.
+    """The errors (k, k) in the energies E_i . Sigma_j of k responses.
 
     Attributes:
-        elements: 1/|UC| int ds_i : S : ds_j, with ds the recovered less the element stresses, plus the spring energy
-            beyond tips; this error makes the stiffness too high.
+        elements: 1/|UC| int ds_i : S : ds_j, with ds the recovered stresses less the element stresses, plus the
+            spring energy beyond tips; this error makes the stiffness too high.
         arcs: errors from straight or parabolic sides along arcs, and from springs along sides, of either sign.
-        shares: (m, k) contribution of this rank's elements to the diagonal of `elements`; may have no rows.
-        least_of_two: smallest ratio, off the diagonal, between the error and both parts without cancellation.
+        shares: (m, k) contributions of this rank's elements to the diagonal of `elements`; may have no rows.
+        least_of_two: smallest ratio, off the diagonal, of the error to the sum of both error sizes.
     """
 
     elements: Float
@@ -81,12 +81,12 @@ def energy_errors(
     keep: bool = True,
     nested: bool | None = None,
 ) -> EnergyErrors:
-    """Estimate response errors in one problem, by groups of subdomains.  Collective.
+    """Estimate the mesh errors of responses in one problem.  Collective.
 
     Args:
         contact: whether faces touch.
-        keep: whether later states need the interior factors, and the caller `shares`.
-        nested: whether to use the mesh refined less; by default where `is_nested`.
+        keep: whether later states need the interior factors, and the caller needs `shares`.
+        nested: whether to use the coarser mesh; by default the result of `is_nested`.
     """
     k, area = len(responses), cell.summary.area
     nested = is_nested(cell, responses) if nested is None else nested
@@ -111,7 +111,7 @@ def energy_errors(
 
 
 def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
-    """Return ratios of element and arc errors to errors with `fewer` halvings.  Collective."""
+    """Return the ratios of element and arc errors to errors with `fewer` halvings less.  Collective."""
     order = cell.lattice.order
     if cell.summary.across and fewer:
         return SAMPLED[any(s.is_mixed for s in cell.subdomains)]
@@ -121,7 +121,7 @@ def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
 
 
 def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
-    """Return whether a mesh with fewer refinements gives the error.  Collective.
+    """Return whether the coarser mesh gives the error.  Collective.
 
     Errors fall more slowly at corners and tips.  The result is false for cells with fibres other than circles and
     ellipses, or with straight sides at voids; and for debonded arcs with quadratic elements, or with tips to which the
@@ -146,10 +146,10 @@ def _has_corners(cell: TornCell) -> bool:
 def _recovered(
     cell: TornCell, responses: Sequence[Response], keep: bool, lattice: ReferenceLattice
 ) -> Iterator[tuple[stress_recovery.RecoveredStress, arc_error.ArcSides]]:
-    """Yield recovered stresses and arcs by subdomain group, on a lattice.  Collective before the first.
+    """Yield the recovered stresses and arc sides by subdomain group.  Collective before the first result.
 
-    A coarser lattice has its own equilibrium, but across materials the mesh displacements at its nodes, whose error is
-    hardly less.
+    On a coarser `lattice` each subdomain has a new equilibrium.  Subdomains across materials take the fine
+    displacements at the coarse nodes instead, with hardly smaller errors.
     """
     u = np.stack([response.u for response in responses], axis=1)
     loads = np.stack([response.strain for response in responses], axis=1)
@@ -159,29 +159,29 @@ def _recovered(
     if is_nested and not across:
         for interior in cell.nested_interiors if keep else nested_interiors(boundary, cell.lattice, lattice):
             displacement = interior.displacement(u, loads)
-            place = np.full(displacement.shape[0] * displacement.shape[1], NONE)
-            place[interior.fixed] = interior.place
-            solved.append((interior.members, interior.mesh, displacement, place))
+            position = np.full(displacement.shape[0] * displacement.shape[1], NONE)
+            position[interior.fixed] = interior.place
+            solved.append((interior.members, interior.mesh, displacement, position))
     else:
         displacements, firsts = cell.displacements(u, loads, keep), cell.offsets if across else boundary.offsets
         dofs = [np.arange(len(part.dofs)) for part in cell.parts] if across else boundary.dofs
         for group in groups(cell.parts, lattice):
             parts = [cell.parts[k] for k in group]
             mesh = refinement.joined([part.mesh for part in parts])
-            places = [np.full(len(part.dofs), NONE) for part in parts]
+            positions = [np.full(len(part.dofs), NONE) for part in parts]
             if is_nested:
                 mesh = replace(mesh, nodes=mesh.nodes[:, lattice.within(cell.lattice)], lattice=lattice)
-            for k, place in zip(group, places, strict=True):
-                place[dofs[k]] = firsts[k] + np.arange(len(dofs[k]))
+            for k, position in zip(group, positions, strict=True):
+                position[dofs[k]] = firsts[k] + np.arange(len(dofs[k]))
             displacement = np.concatenate([next(displacements)[1] for _ in group])
             shape = -1, parts[0].problem.components, len(responses)
-            solved.append((parts, mesh, displacement.reshape(shape), np.concatenate(places)))
+            solved.append((parts, mesh, displacement.reshape(shape), np.concatenate(positions)))
     groups_of_rank, meshes = list[Group](), list[tuple[list[Submesh], FineMesh]]()
-    for members, mesh, displacement, place in solved:
+    for members, mesh, displacement, position in solved:
         first, pieces = members[0], [s.submesh for s in members]
         stress = stress_recovery.RecoveredStress.on(mesh, first.L, first.problem, displacement, loads, first.is_mixed)
         sides = arc_error.ArcSides.of(stress, pieces, lattice)
-        groups_of_rank.append(Group(stress, sides, place[:: first.problem.components]))
+        groups_of_rank.append(Group(stress, sides, position[:: first.problem.components]))
         meshes.append((pieces, mesh))
     body, shared, fits = cell.table.body, None, dict[int, tuple[Int, Float]]()
     if (len(body) > 1) if across else (np.bincount(body) > 1).any():
@@ -198,9 +198,9 @@ def _recovered(
 
 
 class Group(NamedTuple):
-    """The recovered stresses and arcs of some subdomains, and positions (classes,) of displacements.
+    """The recovered stresses and arc sides of a subdomain group.
 
-    Positions number the displacements on all boundaries or, across materials, in all parts; NONE elsewhere.
+    `place` (classes,) has the positions of displacements on all boundaries or, across materials, in all parts, or NONE.
     """
 
     stress: stress_recovery.RecoveredStress
@@ -211,42 +211,42 @@ class Group(NamedTuple):
 def boundary_tractions(
     cell: TornCell, responses: Sequence[Response], groups: Sequence[Group], shared: SharedVertices | None, nested: bool
 ) -> dict[int, local_fits.KnownTractions]:
-    """Return, by group, the tractions between sides on arcs, and zero tractions at voids.  Collective.
+    """Return the known tractions of each group, at arcs and voids.  Collective.
 
-    A traction is the force divided by the node length if the mesh is `nested`, and otherwise divided by the side
-    length, so that uniform stresses give exact tractions.
+    Tractions at voids are zero.  At a node between two sides of an arc the traction is the force divided by
+    the node length if the mesh is `nested`, else by the side length, so that uniform stresses give exact tractions.
     """
     forces, lengths = _forces(cell, responses, groups)
     sums, of_node = list[Float](), np.append(lengths, 0.0)  # at NONE, the last
-    for stress, sides, place in groups:
+    for stress, sides, position in groups:
         ends = stress.node_class[stress.triangles[sides.element[:, None], sides.ends]].ravel()
         half = np.repeat(sides.points[:, -1] - sides.points[:, 0], 2, axis=0) / 2
         free = np.repeat(sides.at_void, 2)
         rows = np.column_stack([half[:, 1], -half[:, 0], np.hypot(*half.T), np.ones(len(ends)), free])
-        loaded = np.flatnonzero(free | (of_node[place[ends]] > 0))
-        sums.append(np.stack([np.bincount(ends[loaded], row, len(place)) for row in rows[loaded].T], axis=1))
+        loaded = np.flatnonzero(free | (of_node[position[ends]] > 0))
+        sums.append(np.stack([np.bincount(ends[loaded], row, len(position)) for row in rows[loaded].T], axis=1))
     if shared is not None:
         parts = [sums[number][classes] for number, classes in zip(shared.meshes, shared.classes, strict=True)]
         for number, classes, total in zip(shared.meshes, shared.classes, shared.sum(parts), strict=True):
             sums[number][classes] = total
     by_group = dict[int, local_fits.KnownTractions]()
-    for number, ((stress, _, place), table) in enumerate(zip(groups, sums, strict=True)):
-        at = np.flatnonzero((table[:, 3] == 2) | (table[:, 4] > 0))
-        if len(at):
-            areas, size, is_free = table[at, :2], table[at, 2], table[at, 4] > 0
-            traction = forces[np.maximum(place[at], 0)[:, None] + np.arange(stress.problem.components)]
+    for number, ((stress, _, position), table) in enumerate(zip(groups, sums, strict=True)):
+        selected = np.flatnonzero((table[:, 3] == 2) | (table[:, 4] > 0))
+        if len(selected):
+            areas, size, is_free = table[selected, :2], table[selected, 2], table[selected, 4] > 0
+            traction = forces[np.maximum(position[selected], 0)[:, None] + np.arange(stress.problem.components)]
             traction[is_free] = 0.0
-            length = of_node[place[at]] if nested else np.hypot(*areas.T)
+            length = of_node[position[selected]] if nested else np.hypot(*areas.T)
             traction /= np.where(is_free, 1.0, np.maximum(length, 1e-300))[:, None, None]
-            by_group[number] = local_fits.KnownTractions.at(at, areas / size[:, None], traction)
+            by_group[number] = local_fits.KnownTractions.at(selected, areas / size[:, None], traction)
     return by_group
 
 
 def _forces(cell: TornCell, responses: Sequence[Response], groups: Sequence[Group]) -> tuple[Float, Float]:
-    """Return the forces -B^T lam (boundary dofs, k) on bodies, and the lengths (boundary dofs,).  Collective.
+    """Return the interface forces on bodies and the node lengths.  Collective.
 
-    Lengths are 0 where forces give no tractions: if a phase locks, or rigid bonds end at debonded faces.  For
-    subdomains across materials, the rows are all dofs of the parts.
+    The forces are -B^T lam (boundary dofs, k).  The lengths (boundary dofs,) are 0 where forces give no tractions: if a
+    phase locks, or rigid bonds end at debonded faces.  For subdomains across materials, rows are all dofs of the parts.
     """
     k, state, nodes = len(responses), responses[0].state, cell.solver.jump_operator.nodes
     if cell.summary.across:

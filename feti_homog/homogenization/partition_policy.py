@@ -1,4 +1,4 @@
-"""Choose the number of pieces, and estimate memory, useful ranks, and dual operator applications.
+"""The number of pieces, and estimates of memory, useful ranks and dual operator applications.
 
 The memory is linear in the degrees of freedom, because bodies are cut into equally large pieces.
 `scripts/measure_cost.py` measures the constants.
@@ -21,49 +21,49 @@ from feti_homog.microstructure import phase_names
 from feti_homog.system.petsc import option_table, options_database
 from feti_homog.typing import Int
 
-# Ratio of stiffnesses up to which subdomains may have several phases: above, rounding in their dense matrices costs
+# Stiffness ratio up to which a subdomain may have several phases: at larger ratios, rounding in dense matrices costs
 # accuracy (4e-7 at 1e6, 2e-10 at 9e3) and then convergence.
 MOST_CONTRAST = 1e3
 # Options that only set the accuracy of the solver; other options need a dual problem, which one subdomain lacks.
 TOLERANCES = {"feti_ksp_rtol", "feti_ksp_atol", "feti_ksp_max_it"}
 # Bytes of a rank without degrees of freedom, for each degree of freedom, and for each multiplier with stored columns.
 BASE_BYTES, DOF_BYTES, COLUMN_BYTES = 1.8e8, 1.5e3, 2.0e4
-# Bytes more for each displacement of the largest problem of a cell that is one factor: of seven bonded cells of 31 000
-# to 271 000 degrees of freedom estimates are 0.93 to 1.07 times the measured memory, of two of order 2 0.85 times.
+# Additional bytes for each displacement of the largest problem in a cell of one factor.  For seven bonded cells of
+# 31 000 to 271 000 degrees of freedom estimates are 0.93 to 1.07 times the measured memory, with order 2 0.85 times.
 FACTOR_BYTES = 2.9e2
-# Bytes more of a path to complete debonding with influence columns: for each multiplier of a rank, and for each pair of
-# one and a column, of which a cell that is factored anew has `INFLUENCE_COLUMNS`. Of five paths of 1 to 50 fibres, 120
-# to 4 110 multipliers, on one rank, estimates are 0.93 to 1.17 times the measured memory.  The six dense matrices of
-# debonded faces with friction (`interface.friction`) take as much for each pair of jumps.
+# Additional bytes of a path to complete debonding: for each multiplier of a rank, and for each pair of a multiplier and
+# an influence column; a cell that is factored anew has `INFLUENCE_COLUMNS` columns.  For five paths with 1 to 50 fibres
+# and 120 to 4 110 multipliers, on one rank, estimates are 0.93 to 1.17 times the measured memory.  The six dense
+# matrices of debonded faces with friction (`interface.friction`) also take PAIR_BYTES for each pair of jumps.
 PATH_BYTES, PAIR_BYTES = 7e4, 50
 # Degrees of freedom below which a further rank waits longer than it computes.
 DOFS_OF_A_RANK = 50_000
-# Typical numbers, by which operators are chosen; iterations with coatings are without influence columns.
+# Typical numbers for the choice of operators; iterations with coatings are those without influence columns.
 ITERATIONS_OF_A_SOLVE, ITERATIONS_WITH_COATINGS, SOLVES_OF_A_CONTACT, SOLVES_OF_A_PATH = 20, 400, 3, 100
 
 
 @dataclass(frozen=True)
 class PartitionPolicy:
-    """Default piece counts; sizes in degrees of freedom after refinement.
+    """The rules for default piece counts.  Sizes are degrees of freedom after refinement.
 
     Attributes:
         piece_dofs: piece size; smaller pieces make the coarse problem slower, larger ones the factors and the
             dense matrices.
         piece_boundary_dofs: largest boundary between a piece and other bodies; for pieces in narrow bodies.
-        cut_factor: a bonded body is cut if it, or its boundary, is larger than a piece's by this factor.
-        even_cut_factor, even_share: factor in place of `cut_factor` for bodies up to this fraction of a rank's load,
-            which are distributed evenly without cuts.
+        cut_factor: ratio of a bonded body to a piece, by size or boundary, above which the body is cut.
+        even_cut_factor, even_share: the factor replaces `cut_factor` for bodies up to this fraction of a rank's load,
+            which the ranks balance without cuts.
         breakable_boundary_dofs: where bonds may break, a body is cut if its boundary is larger: the cell is solved so
             often that uncut bodies pay as long as their boundaries' dense matrices are small.
         tiles: tiles in the coarse mesh.
         across_dofs: where nothing can part, cells up to this size are cut across materials, not body by body.
-        across_piece_dofs: such a piece's size, with as many multipliers as a smaller piece within a body.
-        whole_dofs: such a cell on one rank is not cut up to this size: one sparse factor takes less time than dense
-            piece matrices, which need half its memory.
-        whole_ranks: largest number of ranks with one piece each in such a cell, whose Schur complements are factored
-            together; for more ranks these are too large.
-        strip_dofs: cells from this size on are halved into strips: smaller ones have short boundaries anyway, and
-            mesh errors, estimated up to boundaries, depend less on the direction that METIS cuts in.
+        across_piece_dofs: size of a piece across materials, with the multipliers of a smaller piece within a body.
+        whole_dofs: on one rank, a cell across materials is whole up to this size: one sparse factor takes less time
+            than dense piece matrices, which need half the memory.
+        whole_ranks: largest number of ranks with one piece per rank across materials; the Schur complements are
+            factored together, and are too large for more ranks.
+        strip_dofs: cells from this size on are halved into strips: smaller cells have short boundaries anyway, and
+            mesh errors, estimated up to boundaries, depend less on the direction of the cuts by METIS.
 
     `scripts/benchmark scripts/cases/benchmark_1m.toml --tools feti` times the sizes of bonded bodies,
     `scripts/benchmark_path` of bodies that may part, and `scripts/benchmark --table small` the last five sizes.
@@ -83,7 +83,7 @@ class PartitionPolicy:
     strip_dofs: int = 30_000
 
     def across_pieces(self, dofs: int, n_ranks: int) -> int:
-        """Return the number of pieces across materials, equal on all ranks; 0 for a cut body by body."""
+        """Return the number of pieces across materials, a multiple of `n_ranks`; 0 for other cuts."""
         if dofs > self.across_dofs:
             return 0
         if n_ranks <= self.whole_ranks and dofs <= self.whole_dofs:
@@ -99,8 +99,8 @@ BY_COST = PartitionPolicy(across_dofs=400_000)
 def can_be_cut_across(case: Case) -> bool:
     """Return whether subdomains may reach across materials.
 
-    They may if nothing parts, and the case leaves the cut to the program.  Jumps at nearly incompressible phases and
-    between very different stiffnesses are scaled body by body; dual solver options are meant for bodies.
+    Subdomains may if nothing can part and the case does not set the cut.  Jumps at nearly incompressible phases
+    and between very different stiffnesses need scales of single bodies; dual solver options assume single bodies.
     """
     asked, free = case.decomposition, ("auto", None, None, "torus")
     if case.interfaces or (asked.cut, asked.subdomains, asked.max_dofs, case.cell.bodies) != free:
@@ -126,13 +126,13 @@ def wanted_pieces(
     n_ranks: int,
     policy: PartitionPolicy = DEFAULT_POLICY,
 ) -> Int:
-    """Return the piece count (b,) of each body, by the case or else by the policy.
+    """Choose the number of pieces (b,) of each body.
 
-    There is at least one piece per rank.
+    The case or else the policy determines the numbers; each rank gets at least one piece.
 
     Args:
         load: (b,) coarse triangles in each body.
-        edges: (b,) coarse edges that each body shares with others.
+        edges: (b,) coarse edges between each body and other bodies.
     """
     # A coarse triangle brings about M^2 / 2 nodes.
     dofs_of_triangle = lattice.intervals**2
@@ -155,13 +155,13 @@ def wanted_pieces(
 
 
 def applications(case: Case, problem: Problem, across: bool = False) -> int:
-    """Estimate the applications of a dual operator; pieces `across` phases need no iterations for coatings."""
-    has_arcs = bool(case.arcs) or case.cell.has_own_mesh  # with a curve "debonded", perhaps
+    """Estimate the number of dual operator applications, also for pieces `across` phases."""
+    has_arcs = bool(case.arcs) or case.cell.has_own_mesh  # the mesh may have a curve "debonded"
     touches = case.interface is not None and case.interface.contact and (has_arcs or case.section.is_followed)
     contact = touches and problem != AXIAL  # along the fibres nothing touches
     bond = case.interface
     by_energy = bond is not None and bond.criterion in bond_laws.laws_with("growth") and bond.growth == "released"
-    # Envelopes with arcs need the inverse, for many solves.
+    # Envelopes with arcs need the inverse operator, which pays for many solves.
     many = case.section.is_followed or (has_arcs and case.section.breaks and by_energy)
     solves = SOLVES_OF_A_PATH if many else case.section.solves(len(problem.loads), contact)
     iterations = (
@@ -171,9 +171,10 @@ def applications(case: Case, problem: Problem, across: bool = False) -> int:
 
 
 def memory(nodes: Sequence[int], subdomains: Sequence[int], components: Sequence[int], columns: int) -> float:
-    """Estimate the bytes of the largest rank from the `nodes` and `subdomains` of each rank.
+    """Estimate the memory of the largest rank, in bytes.
 
     Args:
+        nodes, subdomains: numbers of nodes and subdomains on each rank.
         components: displacements at a node in each problem.
         columns: multipliers that have influence columns.
     """
@@ -183,7 +184,10 @@ def memory(nodes: Sequence[int], subdomains: Sequence[int], components: Sequence
 
 
 def memory_to_the_end(case: Case, few: float, multipliers: int, columns: int, ranks: int) -> float:
-    """Estimate the bytes of the largest rank when all bonds have broken, from its bytes `few` before."""
+    """Estimate the memory of the largest rank after all bonds break, in bytes.
+
+    `few` is the memory of this rank before the breaks.
+    """
     stored = columns if columns <= thresholds.NEVER_REFACTORED_ROWS else thresholds.INFLUENCE_COLUMNS
     faces = PAIR_BYTES * multipliers**2 if case.has_friction else 0
     return few + columns / ranks * (PATH_BYTES + stored * PAIR_BYTES) + faces
@@ -193,13 +197,13 @@ def recommended_ranks(dofs: int, bodies: int) -> int:
     """Return the number of ranks that a cell can use.
 
     The number is at most the number of bodies, because more ranks would cut bodies, which costs iterations.  In cells
-    that are cut across materials, coarse triangles stand for bodies.
+    that are cut across materials, `bodies` counts coarse triangles.
     """
     return max(1, min(bodies, -(-dofs // DOFS_OF_A_RANK)))
 
 
 def in_words(size: float) -> str:
-    """Format a number of bytes for readers."""
+    """Format a number of bytes in MiB or GiB."""
     size /= 2**20
     digits = 1 if size < 10 else 0
     return f"{size:.{digits}f} MiB" if size < 1000 else f"{size / 1024:.1f} GiB"

@@ -1,8 +1,8 @@
-"""Problems on the plane mesh: phase stiffness, springs and bond laws.
+"""The problems on the plane mesh, with phase stiffnesses, springs and bond laws.
 
-In generalized plane strain the plane problem's loads are e = [E11, E22, gamma12, E33, T], T a temperature
-change, and A = N^T C N with N e = [E11, E22, gamma12, E33] - alpha T.  So A e is [S11, S22, S12, S33] and the
-conjugate to T, and 1/2 e.A e the stored energy.
+In generalized plane strain the plane problem has the loads e = [E11, E22, gamma12, E33, T] with a temperature change
+T, and the stiffness A = N^T C N with N e = [E11, E22, gamma12, E33] - alpha T.  So A e is [S11, S22, S12, S33] with the
+conjugate to T, and 1/2 e.A e is the stored energy.
 """
 
 import math
@@ -21,8 +21,8 @@ from feti_homog.typing import Float, Int
 
 IN_PLANE, AXIAL_SHEAR = [0, 1, 5, 2], [4, 3]
 """Indices of the plane problem's strains, with E33, and of the axial strains among the six strains in space."""
-# Power of a fibre's factor for keys of these endings: laws remain similar, for all openings grow by the factor too, and
-# the length of the process zone stays.
+# Exponent of the fibre factor for keys with these endings.  Laws remain similar, because all openings grow by the
+# factor too, and the process zone keeps its length.
 POWERS = {"strength": 1, "toughness": 2}
 
 
@@ -51,12 +51,12 @@ def law(case: Case, phase: str, problem: Problem) -> Float:
 
 
 def is_mixed(case: Case, phase: str) -> bool:
-    """Return whether a phase's elements have their own bubble and pressure in the plane problem."""
+    """Return whether a phase's elements have a bubble and a pressure in the plane problem."""
     return cell_sizes.is_mixed(case.cell.order, case.material_of(phase), case.analysis.plane)
 
 
 def law_derivatives(case: Case, phase: str, change: material_derivatives.LawChange) -> tuple[Float, ...]:
-    """Differentiate `law` in the plane and, if there is one, in the axial problem."""
+    """Differentiate `law` in the plane problem and, if present, in the axial problem."""
     problem, dC = problems(case)[0], change.stiffness
     if problem == PLANE:
         return (dC,)
@@ -73,15 +73,15 @@ def law_derivatives(case: Case, phase: str, change: material_derivatives.LawChan
 
 
 def secants(plane: Float, *axial: Float) -> dict[str, Float]:
-    """Return `stiffness` and, if a temperature is a load, `thermal_stress` (6,).
+    """Assemble the effective `stiffness` and `thermal_stress` from stresses under unit loads.
 
-    Stiffness is (3, 3) or, with an axial problem, (6, 6), from stresses under unit loads, (v, v) in the plane problem
-    and (2, 2) in the axial one; the thermal stress is the one under a unit temperature.
+    Arguments are (v, v) in the plane problem and (2, 2) in the axial problem.  The stiffness is (3, 3) or, with an
+    axial problem, (6, 6).  If a temperature is a load, the thermal stress (6,) is the stress under a unit temperature.
     """
     if not axial:
         return {"stiffness": plane}
-    C, place = np.zeros((6, 6)), np.ix_(IN_PLANE, IN_PLANE)
-    C[place], C[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)] = plane[:4, :4], axial[0]
+    C, block = np.zeros((6, 6)), np.ix_(IN_PLANE, IN_PLANE)
+    C[block], C[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)] = plane[:4, :4], axial[0]
     return {"stiffness": C} | ({"thermal_stress": spatial_vector(plane[:, 4], None)} if len(plane) > 4 else {})
 
 
@@ -101,7 +101,7 @@ def spatial_vector(plane: Float | None, axial: Float | None) -> Float:
 
 
 def springs(case: Case, problem: Problem = PLANE) -> jump_operator.InterfaceSprings:
-    """Return the normal and tangential, or the axial springs; by default axial springs are tangential springs."""
+    """Return the springs of a problem; by default axial springs are like tangential springs."""
     along = [(bond.axial_stiffness or bond.tangential_stiffness or math.inf,) for bond in case.interfaces]
     around = [(bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf) for bond in case.interfaces]
     return jump_operator.InterfaceSprings(tuple(along if problem == AXIAL else around), has_softening(case))
@@ -119,20 +119,20 @@ def has_springs(case: Case) -> bool:
 
 
 def strength_factors(case: Case, fibres: int) -> Float:
-    """Return the bond strength of each fibre / strength in the case (fibres,).
+    """Return the ratios (fibres,) of fibre bond strengths to the strength in the case.
 
     f = (-ln(1 - U))^(1/m) / Gamma(1 + 1/m) with uniform U, Weibull's distribution with modulus m and mean 1, times the
     column `strength` in a fibre table.  Fibre N takes the generator's N-th number in any cell.
     """
     factors, scatter = np.ones(fibres), case.interface.scatter if case.interface else None
     if scatter is not None:
-        # A separate stream: the arrangement takes other numbers of the same seed.
+        # A separate random stream, because the arrangement takes other numbers from the same seed.
         uniform = np.random.default_rng(np.random.SeedSequence(scatter.seed, spawn_key=(1,))).random(fibres)
         factors = (-np.log1p(-uniform)) ** (1.0 / scatter.shape) / math.gamma(1.0 + 1.0 / scatter.shape)
     table = case.cell.table
     if table is None:
         return factors
-    from feti_homog.microstructure import periodic_table  # with windows of tables
+    from feti_homog.microstructure import periodic_table  # imports the windows of tables
 
     return factors * table.strength[periodic_table.fibre_rows(table, case.cell.window)]
 
@@ -162,12 +162,12 @@ class SectionValues:
         return np.array(values or [math.inf], float)
 
     def common(self, key: str) -> Any:
-        """Return the common value of all sections."""
+        """Return the common value of a key in all sections."""
         return getattr(self.bonds[0], key)
 
 
 def bond_law(bonds: Sequence[interface_section.InterfaceSection], pair: Int, factor: float | Float = 1.0) -> BondLaw:
-    """Return the bond law at nodes (k,), arguments as in `SectionValues`; without sections no bond breaks."""
+    """Make the bond law from arguments as in `SectionValues`; without sections no bond breaks."""
     name = bonds[0].criterion if bonds else bond_laws.DEFAULT
     return law_class(name).of_keys(SectionValues(bonds, pair, factor))
 

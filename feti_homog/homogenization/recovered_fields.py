@@ -1,7 +1,7 @@
-"""The fields of a response, and the largest stresses that they have in each phase.
+"""The fields of a response, and the largest stresses in each phase.
 
-Fields are nodal displacements, element means of strains and stresses, tractions and jumps.  Largest stresses are at the
-integration points of the elements: one of linear elements, six of quadratic ones.
+Fields are nodal displacements, element means of strains and stresses, tractions and jumps.  The largest stresses are
+those at the integration points: one point in a linear element, six points in a quadratic element.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,9 +18,9 @@ from feti_homog.materials import laws, material_forms, strength, voigt
 from feti_homog.typing import Float
 
 MEASURES = ("principal", "von_mises", "hydrostatic", "utilisation")
-# Values that differ relatively by less are equal but for rounding, as of symmetric positions.
+# Relative difference below which values are equal except for rounding, as at symmetric positions.
 TIE = 1e-6
-# Stresses of a free body, relative to the macroscopic ones, are rounding below this.
+# Fraction of the macroscopic stresses below which the stresses of a free body are rounding errors.
 ROUNDING = 1e-9
 
 
@@ -84,7 +84,7 @@ def out_of_plane_stress(cell: TornCell, stress: Float) -> Float:
 
 
 class Largest(NamedTuple):
-    """The largest value of each measure (4,), -inf without one, and its position (4, 2)."""
+    """The largest value (4,) of each measure, -inf without values, and its position (4, 2)."""
 
     value: Float
     position: Float
@@ -97,7 +97,7 @@ def largest_stresses(cell: TornCell, plane: Response | None, axial: Response | N
     constants leave S33 open have no entry.
 
     Args:
-        plane, axial: responses of both problems; a problem without a response has no stresses.
+        plane, axial: responses of both problems; a problem without a response has zero stresses.
     """
     in_plane = None if plane is None else _stresses(cell, plane)
     along = None if axial is None or cell.axial is None else _stresses(cell.axial, axial)
@@ -124,15 +124,15 @@ def largest_stresses(cell: TornCell, plane: Response | None, axial: Response | N
 
 
 def singularities(cell: TornCell, plane: Response | None) -> set[str]:
-    """Name the places of a state beside which stresses grow without limit on finer meshes."""
+    """Name the places at which stresses grow without limit on finer meshes."""
     corners = np.isnan(cell.summary.frames[cell.summary.fibre_bodies]).any()
     rigid = any(bond.normal_stiffness is None for bond in cell.case.interfaces)
     tips = plane is not None and rigid and plane.debonded > 0 < plane.counts["bonded"]
-    return {name for name, is_there in (("corners of fibres", corners), ("tips of debonding", tips)) if is_there}
+    return {name for name, exists in (("corners of fibres", corners), ("tips of debonding", tips)) if exists}
 
 
 def _stresses(cell: TornCell, response: Response) -> Iterator[tuple[Float, Float]]:
-    """Yield points (n, 2) and stresses (n, v), conjugate to the loads of the problem, of each part."""
+    """Yield the points (n, 2) and the stresses (n, v), conjugate to the loads, of each part."""
     loads = response.strain[:, None]
     for part, u in cell.displacements(response.u[:, None], loads):
         displacement = u.reshape(-1, part.problem.components, 1)
@@ -142,13 +142,13 @@ def _stresses(cell: TornCell, response: Response) -> Iterator[tuple[Float, Float
         m, L = part.problem.strains, part.L
         points = np.concatenate([chunk.points.reshape(-1, 2) for chunk in elements])
         stress = np.concatenate([chunk.stress.reshape(-1, m) for chunk in elements])
-        # Stresses that are conjugate to the other loads, as S33 to E33, follow from the strains of the first.
+        # Stresses conjugate to the other loads, such as S33 to E33, follow from the strains of the first loads.
         strain = np.linalg.solve(L[:m, :m], (stress - L[:m, m:] @ response.strain[m:]).T).T
         yield points, np.hstack([stress, strain @ L[:m, m:] + L[m:, m:] @ response.strain[m:]])
 
 
 def _measures(material: material_forms.Material, stress: Float) -> Float:
-    """Return the `MEASURES` (n, 4) of stresses (n, 6); principal stresses far from the largest are lower bounds."""
+    """Return the `MEASURES` (n, 4) of stresses (n, 6), with lower bounds for small principal stresses."""
     in_plane, S33, shears = stress[:, voigt.IN_PLANE], stress[:, 2], stress[:, [3, 4]]
     von_mises, hydrostatic = voigt.spatial_von_mises(in_plane, S33, shears), stress[:, :3].mean(axis=1)
     # The largest eigenvalue of the deviator is between vm / 3 and 2 vm / 3.
@@ -165,7 +165,7 @@ def _measures(material: material_forms.Material, stress: Float) -> Float:
 
 
 def _largest(values: Float, points: Float) -> Largest:
-    """Find the largest of values (n, 4) at points (n, 4, 2); of almost equal values the first position by x, then y."""
+    """Find the largest of the values (n, 4) at points (n, 4, 2); ties take the first by x, then y."""
     peak, positions = values.max(axis=0), np.zeros((values.shape[1], 2))
     for number, (column, top) in enumerate(zip(values.T, peak, strict=True)):
         tied = points[column >= top - TIE * abs(top), number] if np.isfinite(top) else points[:1, number]

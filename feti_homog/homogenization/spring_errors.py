@@ -1,4 +1,4 @@
-"""Estimate the energy errors of nodal springs, which add to the element and arc errors."""
+"""The energy errors of nodal springs, which add to the element and arc errors."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ from feti_homog.mesh import ReferenceLattice
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float
 
-# Gauss points of a side: integrals along ellipses and of products of quadratic functions are exact or nearly exact.
+# Gauss points of a side: exact or nearly exact for products of quadratic functions along ellipses.
 POINTS, WEIGHTS = roots_legendre(6)
 
 
@@ -37,8 +37,8 @@ class SpringSides:
             np.concatenate(table) for table in zip(*self._comm.allgather(rows), strict=True)
         )
         number, first = neighbours.node_numbers(jumps), 0
-        # For each side its nodes (order + 1,), normals (q, 2) at Gauss points, as long as the arc per unit of the arc's
-        # parameter, and turn.
+        # The nodes (order + 1,) of each side, the normals (q, 2) at Gauss points, whose length is the arc length per
+        # unit of the arc parameter, and the turn.
         starts = np.arange(0, lattice.intervals, lattice.order)
         sides = [(np.zeros((0, lattice.order + 1), np.int64), np.zeros((0, len(POINTS), 2)), np.zeros(0))]
         for part in parts:
@@ -50,8 +50,8 @@ class SpringSides:
             nodes = nodes[inner][:, starts[:, None] + np.arange(lattice.order + 1)].reshape(-1, lattice.order + 1)
             side = np.tile(np.arange(len(starts)), len(turn))
             normal, turn = np.repeat(normal, len(starts), axis=0), np.repeat(turn, len(starts))
-            places = (side[:, None] + (1 + POINTS) / 2) * lattice.order / lattice.intervals
-            normal = np.stack([shared_entities.along(normal, turn, place) for place in places.T], axis=1)
+            positions = (side[:, None] + (1 + POINTS) / 2) * lattice.order / lattice.intervals
+            normal = np.stack([shared_entities.along(normal, turn, position) for position in positions.T], axis=1)
             sides.append((nodes, normal, turn))
         self._nodes, normal, turn = (np.concatenate(table) for table in zip(*sides, strict=True))
         speed = np.hypot(*np.moveaxis(normal, 2, 0))
@@ -73,7 +73,7 @@ class SpringSides:
         self._share = np.where(turn > 0, length, 0.0) / {1: 12, 2: 60}[lattice.order]
 
     def errors(self, status: Status, compliance: Float, lam: Float) -> tuple[Float, Float]:
-        """Return the energies (k, k) beyond tips, and the energies on sides less `arc_energy`.  Collective.
+        """Return the energy errors (k, k) beyond tips, and along sides less `arc_energy`.  Collective.
 
         Args:
             status: (n,) states at this rank's interface nodes.
@@ -94,16 +94,17 @@ class SpringSides:
         ends = self._points[np.stack([tips.behind, tips.ahead])] - self._points[tips.node]
         behind, front = np.linalg.norm(ends - np.round(ends / self._period) * self._period, axis=2)
         beyond = np.einsum("t,tci,tcj->ij", behind / (behind + front), force[tips.node], jump[tips.node])
-        # Nodal spring energy less springs along this rank's sides, less the part known on arcs. Both energies are of
-        # the functions that nodes define on sides; the exact jump d adds to the energy of springs, and to the energy of
-        # t on the distance from d to these functions, as much as these lack.
+        # The nodal spring energy less the spring energy along this rank's sides, less the part known on arcs.  Nodes
+        # define the functions on sides in both energies; what these functions lack, the exact jump d adds to the spring
+        # energy, and to the energy of t on the distance from d to these functions.
         side = np.flatnonzero(holds[self._nodes].all(axis=1))
-        at, ds, shape = self._nodes[side], self._ds[side], self._shape[:, side]
-        k, moved, traction = stiffness[at], self._in_space(jump)[at], self._in_space(stiffness[:, :, None] * jump)[at]
+        node, ds, shape = self._nodes[side], self._ds[side], self._shape[:, side]
+        k, moved = stiffness[node], self._in_space(jump)[node]
+        traction = self._in_space(stiffness[:, :, None] * jump)[node]
         blended = np.einsum("afq,fadi->fqdi", shape, moved)
         if moved.shape[2] == 2:
             blended = np.einsum("fqcd,fqdi->fqci", self._frame[side], blended)
-        lumped = np.einsum("fa,fac,faci,facj->ij", self._weights[side], k, jump[at], jump[at], optimize=True)
+        lumped = np.einsum("fa,fac,faci,facj->ij", self._weights[side], k, jump[node], jump[node], optimize=True)
         between = np.einsum("afq,fac->fqc", shape, k)
         on_sides = np.einsum("fq,fqc,fqci,fqcj->ij", ds, between, blended, blended, optimize=True)
         differences = (np.diff(values, n=self._order, axis=1)[:, 0] for values in (traction, moved))
@@ -111,7 +112,7 @@ class SpringSides:
         return np.asarray(beyond), distributed_arrays.allreduce_sum(self._comm, lumped - on_sides - on_arcs - on_arcs.T)
 
     def _in_space(self, components: Float) -> Float:
-        """Return plane vectors (n, 2, k) from normal and tangential components; (n, 1, k) stay unchanged."""
+        """Rotate normal and tangential components to plane vectors (n, 2, k); keep components (n, 1, k)."""
         if components.shape[1] == 1:
             return components
         normal = self._normal

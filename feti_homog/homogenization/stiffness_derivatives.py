@@ -1,14 +1,14 @@
 """Stiffness derivatives by phase and elastic interface constants, without further solves.
 
-With e_i the strains under the unit load i, its other uniform loads behind, a linear cell's stiffness is
+Let e_i be the strains under the unit load i, followed by the other uniform loads.  The stiffness of a linear cell is
 
     |UC| C_ij = sum_phases A : int e_i (x) e_j + sum_rows [u]_i k [u]_j,
 
-and since its fields make it stationary, dC_ij has dA and dk in place of A and k: exact for the discrete cell.  Bodies
-need the integrals alone, once per phase.  With faces in contact the cell is linear as long as no face opens or closes.
+and because the fields make C_ij stationary, dC_ij has dA and dk in place of A and k, exactly for the discrete cell.
+Bodies need only the integrals, once per phase.  A cell with contact is linear as long as no face opens or closes.
 
-By the fraction f of growing fibres, d f / d ln R = 2 f, a stiffness changes as the energies do on the moving
-mesh, at fixed nodal u - E x: exact for the mesh, wherever the nodes between the fibres move.
+If all fibres grow, the fibre fraction f changes by d f / d ln R = 2 f, and the stiffness by the energy change on a
+moving mesh at fixed nodal u - E x: exactly for the mesh, wherever the nodes between the fibres move.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ IMAGES = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2)
 
 @dataclass(frozen=True)
 class Derivative:
-    """Derivatives of the stresses under unit loads by one constant.
+    """The derivatives of the stresses under unit loads by one constant.
 
     Attributes:
         name: the key with its section, such as `material.fibre.young`.
-        value: the constant.
-        energies: (v, v) stress derivatives in each problem under its unit loads.
+        value: value of the constant.
+        energies: (v, v) derivatives of the stresses under the unit loads of each problem.
     """
 
     name: str
@@ -48,7 +48,7 @@ class Derivative:
 
 
 def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response]]) -> list[Derivative]:
-    """Differentiate by all constants, from unit load responses by problem.  Collective."""
+    """Differentiate the stiffness by all constants, from the responses to unit loads.  Collective."""
     case, area = cells[0].case, cells[0].summary.area
     integrals = [_integrals(cell, group) for cell, group in zip(cells, responses, strict=True)]
     changes, is_heated = list[Derivative](), "temperature" in cells[0].solver.problem.loads
@@ -71,10 +71,10 @@ def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response
     for number, bond in enumerate(case.interfaces):
         label = f"interface.{number + 1}" if len(case.interfaces) > 1 else "interface"
         # The problems and components of the springs that have a stiffness.
-        places = {"normal_stiffness": [(0, 0)], "tangential_stiffness": [(0, 1)], "axial_stiffness": [(1, 0)]}
+        springs_of_keys = {"normal_stiffness": [(0, 0)], "tangential_stiffness": [(0, 1)], "axial_stiffness": [(1, 0)]}
         if bond.axial_stiffness is None:
-            places["tangential_stiffness"].append((1, 0))
-        for key, pairs_of_key in places.items():
+            springs_of_keys["tangential_stiffness"].append((1, 0))
+        for key, pairs_of_key in springs_of_keys.items():
             value = getattr(bond, key)
             if value is not None and np.isfinite(value):
                 energies = tuple(
@@ -89,10 +89,10 @@ def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response
 
 
 def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str, Float], Float]:
-    """Integrate e_i (x) e_j (v, k, v, k) by material, and the change by growth.  Collective.
+    """Integrate the strain products and the energy change by fibre growth.  Collective.
 
-    There are k unit loads.  Changes (k, k) are energy derivatives by ln R of all fibres, 0 unless the case has such
-    fibres.
+    Return int e_i (x) e_j (v, k, v, k) by material for k unit loads, and the energy derivatives (k, k) by ln R of all
+    fibres, which are 0 unless the case has a fraction in `_fractions`.
     """
     problem, loads = cell.solver.problem, np.stack([response.strain for response in responses], axis=1)
     boundary = np.stack([response.u for response in responses], axis=1)
@@ -121,10 +121,10 @@ def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str,
 
 @dataclass(frozen=True)
 class _Fields:
-    """Fields in e elements at q points under k loads.
+    """The fields in e elements at q points under k loads.
 
-    In mixed elements the energy is stationary for the bubble too; with the pressure lambda Pi div u it is the strain
-    energy less lambda r^2, r = div u - Pi div u.
+    In mixed elements the energy is stationary for the bubble too; with the pressure lambda Pi div u the energy is the
+    strain energy less lambda r^2, r = div u - Pi div u.
 
     Attributes:
         gradients, weights: (e, q, a, 2) for the nodes' shape functions, and (e, q).
@@ -141,7 +141,7 @@ class _Fields:
 
     @classmethod
     def of(cls, s: UniformPart, nodes: Int32, u: Float, loads: Float) -> _Fields:
-        """Find the fields in elements with nodes (e, a), displacements u (e, a, c, k) and loads (m, k)."""
+        """Compute the fields in elements from nodes (e, a), u (e, a, c, k) and loads (m, k)."""
         points, (_, a, c, k) = s.mesh.points[nodes], u.shape
         elements = bubble.Elements.of(points, s.L) if s.is_mixed else None
         g, w = shape_functions.gradients(points) if elements is None else (elements.gradients, elements.weights)
@@ -165,8 +165,8 @@ class _Fields:
     def change(self, problem: Problem, A: Float, V: Float, more: Float) -> Float:
         """Differentiate int e_i A e_j (k, k) by s, while nodes move by s V.
 
-        At fixed displacements, V (e, a, 2): int (de_i + div V e_i / 2) A e_j and its transpose, d grad u = -grad V grad
-        u; `more` (v - m, k) other loads.
+        At fixed displacements the derivative is int (de_i + div V e_i / 2) A e_j plus its transpose, with
+        d grad u = -grad V grad u.  V is (e, a, 2), and `more` (v - m, k) has the other loads.
         """
         (e, q, _, c, k), m = self.slopes.shape, problem.strains
         grad_V = self.gradients.transpose(0, 1, 3, 2) @ V[:, None]
@@ -209,17 +209,17 @@ def _fractions(case: Case) -> Iterator[float]:
 def _velocity(points: Float, cell: CellSummary) -> Float:
     """Return V = dx / d ln R (n, 2) at points (n, 2) while all fibres grow.
 
-    V is x - c in a fibre with centre c and radius R, and falls to 0 halfway to the next fibre.
+    In a fibre with centre c, V is x - c; outside, V falls to 0 halfway to the next fibre.
     """
     centres, radii, period = cell.centres[cell.is_fibre], cell.radii[cell.is_fibre], cell.period
     V = np.zeros_like(points)
     for number, (centre, radius) in enumerate(zip(centres, radii, strict=True)):
         gaps = np.linalg.norm(centres[:, None] + IMAGES * period - centre, axis=2) - radii[:, None] - radius
         gaps[number, (IMAGES == 0).all(axis=1)] = np.inf
-        reach = gaps.min() / 2  # so that no two fibres move a node
-        away = points - centre
-        away -= period * np.round(away / period)
-        distance = np.linalg.norm(away, axis=1, keepdims=True)
-        share = np.clip((radius + reach - distance) / reach, 0.0, 1.0) * radius / np.maximum(distance, radius)
-        V += away * np.where(distance <= radius * (1 + ROUNDING), 1.0, share)
+        reach = gaps.min() / 2  # so that at most one fibre moves a node
+        offset = points - centre
+        offset -= period * np.round(offset / period)
+        distance = np.linalg.norm(offset, axis=1, keepdims=True)
+        fraction = np.clip((radius + reach - distance) / reach, 0.0, 1.0) * radius / np.maximum(distance, radius)
+        V += offset * np.where(distance <= radius * (1 + ROUNDING), 1.0, fraction)
     return V

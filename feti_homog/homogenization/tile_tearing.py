@@ -28,7 +28,7 @@ from feti_homog.typing import Float, Int
 
 
 def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy) -> RankShare:
-    """Mesh and cut the cell; return the part on this rank.  Collective."""
+    """Mesh and cut the cell, and return this rank's part.  Collective."""
     noded = place_nodes(case, comm, policy.tiles)
     if mpi_errors.on_root(comm, can_be_torn_by_tiles, case, noded, lattice, policy):
         assert not isinstance(noded, CoarseMesh)
@@ -42,7 +42,9 @@ def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: Part
 def place_nodes(
     case: Case, comm: MPI.Intracomm, policy: tiling.TilePolicy
 ) -> gmsh_mesher.NodedCell | CoarseMesh | None:
-    """Return on rank 0 a user's mesh, or the cell with nodes on its lines; None elsewhere.  Collective.
+    """Place nodes on the lines of the cell.  Collective.
+
+    Return the cell with these nodes, or a user's mesh, on rank 0; None on other ranks.
 
     Raises:
         CaseError, MeshError: on every rank, as `begin_mesh`.
@@ -63,15 +65,15 @@ def place_nodes(
 
 
 def begin_mesh(case: Case, policy: tiling.TilePolicy) -> gmsh_mesher.UnmeshedCell | CoarseMesh:
-    """Return a user's mesh, or the cell that rank 0 makes alone.
+    """Read a user's mesh, or begin the mesh of the cell.
 
     Raises:
-        CaseError: a phase has no material, or a material no phase.
+        CaseError: a phase has no material, or a material has no phase.
         MeshError: the cell cannot be meshed, or its mesh file is faulty.
     """
     cell: gmsh_mesher.UnmeshedCell | CoarseMesh
     if case.cell.has_own_mesh:
-        from feti_homog.mesh.readers import msh_reader  # with the readers of all formats
+        from feti_homog.mesh.readers import msh_reader  # imports the readers of all formats
 
         cell = msh_reader.read_cell(case.cell)
     else:
@@ -84,7 +86,7 @@ def begin_mesh(case: Case, policy: tiling.TilePolicy) -> gmsh_mesher.UnmeshedCel
 
 
 def fill_tiles(cell: gmsh_mesher.NodedCell | CoarseMesh | None, comm: MPI.Intracomm) -> CoarseMesh | None:
-    """Return the mesh on rank 0; all ranks fill its tiles.  Collective.
+    """Fill the tiles on all ranks, and join the mesh on rank 0.  Collective.
 
     Raises:
         MeshError: on every rank, if a rank cannot fill a tile.
@@ -100,7 +102,7 @@ def fill_tiles(cell: gmsh_mesher.NodedCell | CoarseMesh | None, comm: MPI.Intrac
 
 
 def deal_tiles(tiles: Sequence[tile_filling.Tile], comm: MPI.Intracomm) -> list[tuple[int, tile_filling.Tile]]:
-    """Deal tiles from rank 0 to all ranks; return the numbers and tiles that this rank fills.  Collective."""
+    """Deal the tiles on rank 0; return the numbers and tiles of this rank.  Collective."""
     parts: list[list[tuple[int, tile_filling.Tile]]] = [[] for _ in range(comm.size)]
     loads = np.array([len(tile.points) for tile in tiles], np.int64)
     for k, rank in enumerate(dividing.balanced(loads, comm.size).tolist()):
@@ -120,10 +122,10 @@ def fill_own(tiles: list[tuple[int, tile_filling.Tile]]) -> list[tuple[int, tile
 def can_be_torn_by_tiles(
     case: Case, noded: gmsh_mesher.NodedCell | CoarseMesh | None, lattice: ReferenceLattice, policy: PartitionPolicy
 ) -> bool:
-    """Return whether each rank can cut its own tiles, so that no rank needs the whole mesh.
+    """Return whether the ranks can cut the cell without the whole mesh.
 
     Arc tips, bodies cut by the sides, a matrix in fewer pieces than tiles, and cells that are probably small enough for
-    cuts across materials need the whole mesh on one rank.  A user's mesh already is on one rank.
+    cuts across materials, need the whole mesh on one rank.  A user's mesh is on one rank already.
     """
     on_one_rank = case.arcs or case.cell.bodies == "plane" or case.decomposition.subdomains is not None
     if not isinstance(noded, gmsh_mesher.NodedCell) or len(noded.parts) < 2 or on_one_rank:
@@ -140,10 +142,10 @@ def tear_by_tiles(
     comm: MPI.Intracomm,
     policy: PartitionPolicy,
 ) -> RankShare:
-    """Tear a cell by its tiles, from the nodes on rank 0; return the part on this rank.  Collective.
+    """Tear a cell by its tiles, and return this rank's part.  Collective.
 
     Raises:
-        CaseError, MeshError: on every rank, as `tiled_cell` and `filling.fill`.
+        CaseError, MeshError: on every rank, as `tiled_cell` and `tile_filling.fill`.
     """
     phase_pairs, nesting, edges = mpi_errors.on_root(comm, tiled_cell, case, noded)
     regions: tiling.Regions = comm.bcast(None if noded is None else noded.regions)
@@ -159,7 +161,7 @@ def tear_by_tiles(
     pieces = wanted_pieces(case, load, edges, lattice, comm.size, policy)
     longest = comm.allreduce(float(torus.edge_lengths.max(initial=0.0)), MPI.MAX)
     local = mpi_errors.agree(comm, _cut, torus, tile, pieces / load, longest)
-    # Subdomains of all ranks are numbered by body, then by tile.
+    # Numbers of subdomains follow the body, then the tile, on all ranks together.
     first = np.unique(local, return_index=True)[1]
     parts = comm.allgather((torus.constituent[first], tile[first], np.bincount(local)))
     body, tiles, loads = (np.concatenate(rows) for rows in zip(*parts, strict=True))
@@ -169,7 +171,7 @@ def tear_by_tiles(
     neighbours = comm.gather(mpi_errors.agree(comm, _neighbours, torus, subdomain))
     rank = mpi_errors.on_root(comm, _assigned, loads, neighbours or [], comm.size)
     table = submeshes.SubdomainTable(body, rank, nesting, regions.phase)
-    # One class on all ranks is pinned, see `submesh.pinned_class`.
+    # All ranks together pin one class, see `submeshes.pinned_class`.
     at_interface, in_matrix = np.zeros((2, len(torus.class_keys)), bool)
     at_interface[torus.node_class[torus.mesh.arc_edges]] = True
     in_matrix[torus.node_class[torus.mesh.triangles[torus.constituent == 0]]] = True
@@ -181,7 +183,7 @@ def tear_by_tiles(
 
 
 def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) -> Int:
-    """Return the subdomain (m,) of each triangle on this rank, numbered by constituent, then by tile."""
+    """Cut this rank's triangles (m,) into subdomains, numbered by constituent, then by tile."""
     a, b, _ = torus.sides
     within = (tile[a] == tile[b]) & (torus.constituent[a] == torus.constituent[b])
     label = periodic_topology.components(len(tile), a[within], b[within])
@@ -194,17 +196,17 @@ def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) ->
 
 
 def _neighbours(torus: Torus, subdomain: Int) -> tuple[Int, Int, Int, Int]:
-    """Return the subdomain neighbours at this rank's edges, and the edges to other ranks.
+    """Find the subdomain neighbours at this rank's edges.
 
-    The result has both subdomains (n,) and (n,) at each edge inside the rank, the edges (k,) with one triangle on this
-    rank, and the subdomain (k,) of this triangle.
+    Return both subdomains (n,) and (n,) at each edge inside the rank, the edges (k,) with one triangle on this rank,
+    and the subdomain (k,) of this triangle.
     """
     a, b, _ = torus.sides
-    apart = subdomain[a] != subdomain[b]
+    differs = subdomain[a] != subdomain[b]
     edges = torus.triangle_torus_edges
     alone = (np.bincount(edges.ravel(), minlength=len(torus.edge_keys)) == 1) & ~torus.at_void
     triangle, k = np.nonzero(alone[edges])
-    return subdomain[a[apart]], subdomain[b[apart]], torus.edge_keys[edges[triangle, k]], subdomain[triangle]
+    return subdomain[a[differs]], subdomain[b[differs]], torus.edge_keys[edges[triangle, k]], subdomain[triangle]
 
 
 def _assigned(load: Int, neighbours: list[tuple[Int, Int, Int, Int]], n_ranks: int) -> Int:
@@ -218,8 +220,8 @@ def tiled_cell(case: Case, noded: gmsh_mesher.NodedCell) -> tuple[Int, Int, Int]
     """Return the interface numbers, nesting and edge counts of a tiled cell.
 
     Returns:
-        Interface numbers (phases, phases) as from `cell_remarks.pairs_of`; ranks (constituents,) as `Torus.nesting`;
-        and the number (constituents,) of coarse edges that each constituent shares with others.
+        Interface numbers (phases, phases) as from `cell_remarks.pairs_of`; nesting (constituents,) as `Torus.nesting`;
+        and the number (constituents,) of coarse edges between each constituent and others.
 
     Raises:
         CaseError: an interface is between phases that do not touch.

@@ -1,4 +1,4 @@
-"""Parts of subdomains in one body each, and displacements on coarser meshes.
+"""One-body parts of subdomains, and displacements on coarser meshes.
 
 A subdomain in one material is one part; a subdomain across materials has one part for each body.  A coarser mesh has a
 quarter or a sixteenth of the elements, and its nodes are also nodes of the finer mesh.
@@ -21,10 +21,10 @@ from feti_homog.typing import Float, Int
 
 # Number of elements in a group of subdomains: small enough for the processor's cache, large enough for NumPy.
 ELEMENTS_AT_ONCE = 1 << 13
-# Halvings from which a mesh refined twice less gives the error, but across materials and where a phase locks.
+# Halvings from which a mesh with two halvings less gives the error, except across materials and where a phase locks.
 REFINED_OFTEN = 3
-# Largest lambda / mu on that mesh, and in subdomains across materials, for a Poisson's ratio of 0.4: beyond, errors of
-# coarse elements are no guide.
+# Largest lambda / mu on that mesh, and in subdomains across materials, for a Poisson's ratio of 0.4: at larger ratios,
+# errors of coarse elements are no guide.
 LOCKING = 4.0
 # Position of a displacement that is not on a boundary: the last position, where the displacement is zero.
 NONE = -1
@@ -53,9 +53,9 @@ class UniformPart:
 
 def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterator[UniformPart]:
     """Yield the parts of all subdomains, ordered by phase and body; `phase_of` (constituents,) names phases."""
-    for place, s in enumerate(subdomains):
+    for number, s in enumerate(subdomains):
         if s.material is None:
-            yield UniformPart(place, s.submesh, s.mesh, np.arange(s.n_dofs), s.L, s.problem, s.is_mixed)
+            yield UniformPart(number, s.submesh, s.mesh, np.arange(s.n_dofs), s.L, s.problem, s.is_mixed)
             continue
         order = np.lexsort((s.submesh.constituent, s.material))
         bodies = s.submesh.constituent[order]
@@ -64,7 +64,7 @@ def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterat
             submesh = replace(submeshes.part(s.submesh, members), body=body, phase=phase_of[body])
             mesh, classes = _restricted(s.mesh, members)
             is_mixed = bool(np.broadcast_to(s.mixed, len(s.laws))[law])
-            yield UniformPart(place, submesh, mesh, s.problem.dofs(classes), s.laws[law], s.problem, is_mixed)
+            yield UniformPart(number, submesh, mesh, s.problem.dofs(classes), s.laws[law], s.problem, is_mixed)
 
 
 def nodes_of_parts(s: Subdomain) -> int:
@@ -72,12 +72,12 @@ def nodes_of_parts(s: Subdomain) -> int:
     body, nodes = np.repeat(s.submesh.constituent, s.mesh.nodes.shape[1]), s.mesh.nodes.ravel()
     last = np.empty(len(s.mesh.points), np.int64)
     last[nodes] = body
-    more = np.flatnonzero(last[nodes] != body)
-    return len(last) + len(np.unique(nodes[more].astype(np.int64) * (int(body.max()) + 1) + body[more]))
+    repeated = np.flatnonzero(last[nodes] != body)
+    return len(last) + len(np.unique(nodes[repeated].astype(np.int64) * (int(body.max()) + 1) + body[repeated]))
 
 
 def _restricted(mesh: FineMesh, members: Int) -> tuple[FineMesh, Int]:
-    """Return the mesh on some coarse triangles (t,), and its classes (c,) in the whole mesh."""
+    """Restrict a mesh to coarse triangles (t,); return the mesh and the original classes (c,)."""
     nodes, local = periodic_topology.present(mesh.nodes[members], len(mesh.points))
     classes, node_class = periodic_topology.present(mesh.node_class[nodes], mesh.n_classes)
     numbers, curved = (local.astype(np.int32), node_class.astype(np.int32)), mesh.curved[members]
@@ -122,7 +122,7 @@ class ForcesBetweenParts:
         self._inverse = blocks.inverse(np.ones(jumps.owned[1] - jumps.owned[0]))
 
     def multipliers(self, u: Float, loads: Float) -> Float:
-        """Return lam = (B B^T)^-1 B (-K u - Q E) (owned rows,) from u (dofs,).  Collective."""
+        """Return the multipliers lam = (B B^T)^-1 B (-K u - Q E) (owned rows,) for u (dofs,).  Collective."""
         forces = np.zeros(len(u))
         forces[self._dofs] = -self._K @ u[self._dofs] - self._Q @ loads
         return np.asarray(self._inverse @ self._jumps.sum(self._jumps.B @ forces))
@@ -130,7 +130,7 @@ class ForcesBetweenParts:
 
 @dataclass(frozen=True)
 class NestedInterior:
-    """The factored interior of one-phase subdomains on a coarser mesh, with c displacements per node.
+    """The factored interior of one-phase subdomains on a coarser mesh with c displacements per node.
 
     Attributes:
         members: subdomains.
@@ -149,9 +149,9 @@ class NestedInterior:
     loads: Float | None
 
     def displacement(self, u: Float, loads: Float) -> Float:
-        """Return u* (classes, c, k) from u (boundary dofs, k) on all boundaries under the loads (v, k)."""
+        """Extend u (boundary dofs, k) under the loads (v, k) to u* (classes, c, k) at all nodes."""
         problem = self.members[0].problem
-        on_boundary = np.vstack([u, np.zeros((1, u.shape[1]))])[self.place]  # the last row for NONE
+        on_boundary = np.vstack([u, np.zeros((1, u.shape[1]))])[self.place]  # NONE takes the last row
         all_dofs = np.empty((len(self.fixed) + len(self.interior.dofs), u.shape[1]))
         all_dofs[self.fixed], all_dofs[self.interior.dofs] = on_boundary, self.interior.extend(on_boundary)
         if self.loads is not None:
@@ -168,7 +168,7 @@ def locks(subdomains: Sequence[Subdomain | UniformPart], comm: MPI.Intracomm) ->
 def nested_interiors(
     boundary: interface_operators.InterfaceOperators, lattice: ReferenceLattice, coarser: ReferenceLattice
 ) -> Iterator[NestedInterior]:
-    """Refine, assemble and factor this rank's subdomain interiors on the coarser lattice, group by group."""
+    """Refine, assemble and factor this rank's subdomain interiors on a coarser lattice, by group."""
     nested, inside = coarser.within(lattice), NONE - 1
     for group in groups(boundary.subdomains, coarser):
         members = [boundary.subdomains[k] for k in group]
@@ -181,24 +181,24 @@ def nested_interiors(
             fine = np.empty(mesh.n_classes, np.int64)
             fine[mesh.node_class[mesh.nodes]] = s.mesh.node_class[s.mesh.nodes[:, nested]]
             numbers.append(of_fine[s.problem.dofs(fine)])
-        place = np.concatenate(numbers)
-        fixed = np.flatnonzero(place != inside)
+        position = np.concatenate(numbers)
+        fixed = np.flatnonzero(position != inside)
         mesh = refinement.joined(meshes)
         body = assembly.assemble(mesh, first.L, first.problem, first.is_mixed)
         interior = one_subdomain.Interior(body.K, fixed)
         loads = body.Q[interior.dofs] if any(s.submesh.at_void.any() for s in members) else None
-        yield NestedInterior(members, mesh, fixed, place[fixed], interior, loads)
+        yield NestedInterior(members, mesh, fixed, position[fixed], interior, loads)
 
 
 def groups(subdomains: Sequence[Subdomain | UniformPart], lattice: ReferenceLattice) -> Iterator[list[int]]:
-    """Yield consecutive subdomains in one phase, up to ELEMENTS_AT_ONCE elements."""
+    """Yield groups of consecutive one-phase subdomains, up to ELEMENTS_AT_ONCE elements."""
     group, elements = list[int](), 0
-    for place, s in enumerate(subdomains):
+    for number, s in enumerate(subdomains):
         count = len(s.mesh.nodes) * len(lattice.triangles)
         elements += count
         if group and (elements > ELEMENTS_AT_ONCE or s.submesh.phase != subdomains[group[0]].submesh.phase):
             yield group
             group, elements = [], count
-        group.append(place)
+        group.append(number)
     if group:
         yield group

@@ -1,4 +1,4 @@
-"""The torn cell: from a case to subdomains with their solver."""
+"""The torn cell: the subdomains of a case with the solver for their interfaces."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TornCell:
-    """The cell on all ranks; `lattice` refines `subdomains` on each rank.
+    """The cell on all ranks, torn into subdomains.
 
-    `axial` is the cell with the displacement along the fibres, on the same meshes and interface nodes; None unless the
-    plane state is generalized plane strain.
+    `lattice` refines the `subdomains` of each rank.  `axial` is the cell with displacements along the fibres, on the
+    same meshes and interface nodes; None unless the plane state is generalized plane strain.
     """
 
     comm: MPI.Intracomm
@@ -51,17 +51,17 @@ class TornCell:
 
     @property
     def problems(self) -> tuple[TornCell, ...]:
-        """The cell in each of its problems, the plane first."""
+        """The torn cells of all problems, the plane problem first."""
         return (self,) if self.axial is None else (self, self.axial)
 
     @cached_property
     def offsets(self) -> Int:
-        """Each part's first degree of freedom in this rank's vectors."""
+        """The first degree of freedom of each part in this rank's vectors."""
         return np.cumsum([0, *(len(part.dofs) for part in self.parts)])
 
     @cached_property
     def parts(self) -> list[UniformPart]:
-        """This rank's subdomain parts in one body each, numbered over all ranks.  Collective when first read."""
+        """The one-body parts of this rank's subdomains, numbered over all ranks.  Collective when first read."""
         phases = [self.summary.phases[k] for k in self.summary.constituent_phase.tolist()]
         parts = list(uniform_parts.parts_of(self.subdomains, phases))
         if not self.summary.across:
@@ -71,7 +71,7 @@ class TornCell:
 
     @cached_property
     def jumps(self) -> JumpOperator:
-        """B between all parts, also within subdomains.  Collective when first read."""
+        """The jump operator B between all parts, also within subdomains.  Collective when first read."""
         if not self.summary.across:
             return self.solver.jump_operator
         pairs = cell_remarks.pairs_of(self.case, self.summary.phases)
@@ -80,37 +80,44 @@ class TornCell:
 
     @cached_property
     def _forces(self) -> uniform_parts.ForcesBetweenParts:
+        """The operator that finds the multipliers between parts.  Collective when first read."""
         return uniform_parts.ForcesBetweenParts(self.comm, self.parts, self.jumps)
 
     def displacement(self, solution: DualSolution) -> Float:
-        """Return u* (dofs,) on this rank's parts.  Collective."""
+        """Return the displacements u* (dofs,) of this rank's parts.  Collective."""
         u = self.solver.boundary_displacement(solution)
         return np.concatenate([np.zeros(0), *(part for _, part in self.displacements(u, solution.strain))])
 
     def displacements(self, u: Float, loads: Float, keep: bool = True) -> Iterator[tuple[UniformPart, Float]]:
-        """Extend u (boundary dofs, k) under loads (v, k) to each part's u* (dofs, k); `keep` stores factors."""
-        place, extended = -1, np.zeros(0)
+        """Extend the boundary displacements to the displacements u* of each part.
+
+        `u` is (boundary dofs, k), `loads` are (v, k), and u* is (dofs, k); `keep` stores the factors.
+        """
+        number, extended = -1, np.zeros(0)
         for part in self.parts:
-            if part.place != place:
-                place, extended = part.place, self.solver.extended(part.place, u, loads, keep)
+            if part.place != number:
+                number, extended = part.place, self.solver.extended(part.place, u, loads, keep)
             yield part, extended[part.dofs]
 
     def across_bonds(self, solution: DualSolution, u: Float) -> tuple[Float, Float]:
-        """Return lam and openings (owned rows of `jumps`,) for the part displacements u.  Collective."""
-        if not self.summary.across or not self.jumps.global_rows:  # without jumps there is a single part
+        """Return the multipliers and openings between parts.  Collective.
+
+        Both are (owned rows of `jumps`,); `u` has the displacements of all parts on this rank.
+        """
+        if not self.summary.across or not self.jumps.global_rows:  # without jumps the cell is a single part
             return solution.lam, solution.opening
         return self._forces.multipliers(u, solution.strain), self.jumps.sum(self.jumps.B @ u)
 
     @cached_property
     def neighbours(self) -> interface_neighbours.InterfaceNeighbours:
-        """All ranks' interface nodes.  Collective when first read."""
+        """The interface nodes of all ranks with their neighbours.  Collective when first read."""
         from feti_homog.feti.decomposition import interface_neighbours  # most cells have no interfaces
 
         return interface_neighbours.InterfaceNeighbours(self.comm, self.solver.jump_operator, self.subdomains)
 
     @cached_property
     def spring_sides(self) -> SpringSides:
-        """Element sides along springs.  Collective when first read."""
+        """The element sides along springs.  Collective when first read."""
         from feti_homog.homogenization.spring_errors import SpringSides
 
         jumps = self.solver.jump_operator
@@ -118,7 +125,7 @@ class TornCell:
 
     @cached_property
     def class_nodes(self) -> Int:
-        """One plane node (c,) of each class in this rank's parts, part by part."""
+        """One plane node of each node class (c,) in this rank's parts, part by part."""
         nodes, first = [np.zeros(0, np.int64)], 0
         for mesh in (part.mesh for part in self.parts):
             nodes.append(np.empty(mesh.n_classes, np.int64))
@@ -128,12 +135,12 @@ class TornCell:
 
     @cached_property
     def strength_factors(self) -> Float:
-        """The bond strength of each fibre (fibres,) / strength in the case."""
+        """The ratio (fibres,) of each fibre's bond strength to the strength in the case."""
         return phase_laws.strength_factors(self.case, self.summary.fibres)
 
     @cached_property
     def bond_law(self) -> BondLaw:
-        """Bond law at this rank's interface nodes."""
+        """The bond law at this rank's interface nodes."""
         nodes = self.solver.jump_operator.nodes
         varies = not (self.strength_factors == 1.0).all()
         factor = self.strength_factors[self.summary.fibre_number(nodes.fibre) - 1] if varies else 1.0
@@ -147,17 +154,17 @@ class TornCell:
 
     @cached_property
     def nested_lattice(self) -> ReferenceLattice:
-        """The lattice refined once less, or twice less if that is enough.  Collective when first read."""
+        """The lattice of the coarser mesh: one or two halvings less.  Collective when first read."""
         often = not locks(self.subdomains, self.comm) and self.lattice.halvings >= uniform_parts.REFINED_OFTEN
         return self.lattice.coarser(2 if often and not self.summary.across else 1)
 
     @cached_property
     def nested_interiors(self) -> list[uniform_parts.NestedInterior]:
-        """This rank's subdomain interiors on the mesh that is refined less."""
+        """The interiors of this rank's subdomains on the coarser mesh."""
         return list(uniform_parts.nested_interiors(self.solver.interface_operators, self.lattice, self.nested_lattice))
 
     def debonded(self, opening: float | None) -> Bool:
-        """Mark this rank's initially debonded nodes (k,); arcs without an angle have the `opening`."""
+        """Mark this rank's initially debonded nodes (k,); `opening` is the default angle of arcs."""
         nodes = self.solver.jump_operator.nodes
         number = self.summary.fibre_number(nodes.fibre)
         is_debonded = nodes.precracked & bool(self.case.interfaces)
@@ -175,13 +182,13 @@ class TornCell:
         return {phase: self.comm.allreduce(area) for phase, area in local.items()}
 
     def fractions(self) -> dict[str, float]:
-        """Return the area fraction of each phase: of the cell with voids, else of the mesh.  Collective."""
+        """Return the area fraction of each phase, in the cell including voids.  Collective."""
         areas = self.areas()
         total = self.summary.area if self.summary.voids else sum(areas.values())
         return {phase: area / total for phase, area in areas.items()}
 
     def sum_over_ranks(self, number: int) -> int:
-        """Sum a number over ranks.  Collective."""
+        """Sum a number over all ranks.  Collective."""
         return int(self.comm.allreduce(number))
 
     def destroy(self) -> None:
@@ -197,13 +204,13 @@ def tear(
     limits: thresholds.Thresholds = thresholds.DEFAULTS,
     policy: PartitionPolicy = DEFAULT_POLICY,
 ) -> TornCell:
-    """Tear a case's cell and factor its subdomains.  Collective.
+    """Tear the cell of a case, and factor the subdomains.  Collective.
 
     Raises:
         CaseError, MeshError: on every rank.
     """
-    share, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
-    summary, recovers = share.summary, case.output.mesh_error or case.output.fields
+    part, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
+    summary, recovers = part.summary, case.output.mesh_error or case.output.fields
 
     def solver_of(problem: Problem, subdomains: list[Subdomain]) -> FetiSolver:
         applications = partition_policy.applications(case, problem, summary.across)
@@ -214,7 +221,7 @@ def tear(
         solver = solver_of(phase_laws.problems(case)[0], subdomains)
         multipliers, dimension = solver.jump_operator.global_rows, solver.coarse_dimension
         line.append(f"{multipliers} multipliers, coarse dimension {dimension}")
-    cell = TornCell(comm, case, summary, lattice, share.table, subdomains, solver)
+    cell = TornCell(comm, case, summary, lattice, part.table, subdomains, solver)
     if len(phase_laws.problems(case)) == 1:
         return cell
     with progress.stage("assemble") as line:
@@ -236,23 +243,23 @@ def assemble_axial(case: Case, summary: CellSummary, subdomains: Sequence[Subdom
 def assemble_subdomains(
     case: Case, comm: MPI.Intracomm, progress: progress_bar.Progress, policy: PartitionPolicy = DEFAULT_POLICY
 ) -> tuple[RankShare, SharedEntities, ReferenceLattice, list[Subdomain]]:
-    """Mesh and cut the cell; refine and assemble subdomains on their ranks.  Collective.
+    """Mesh, cut and refine the cell, and assemble the subdomains.  Collective.
 
     Returns the part of the cell on this rank, its entities shared with other ranks, the lattice, and the subdomains.
     Raises as `tear`.
     """
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
     with progress.stage("mesh") as line:
-        share = cut(case, lattice, comm, policy)
-        summary = share.summary
-        shared = shared_entities.share_entities(comm, share.submeshes, share.table, share.pairs, lattice)
+        part = cut(case, lattice, comm, policy)
+        summary = part.summary
+        shared = shared_entities.share_entities(comm, part.submeshes, part.table, part.pairs, lattice)
         line.append(f"{summary.coarse_triangles} triangles, {summary.bodies} bodies, {summary.subdomains} subdomains")
     for remark in summary.remarks:
         progress.say(f"remark: {remark}")
 
     def assembled() -> list[Subdomain]:
         problem, subdomains = phase_laws.problems(case)[0], list[Subdomain]()
-        for s in share.submeshes.cut():
+        for s in part.submeshes.cut():
             phase_of = summary.constituent_phase[s.constituent]
             material = None if s.phase else np.unique(phase_of, return_inverse=True)[1]
             mixed = tuple(phase_laws.is_mixed(case, name) for name in _phases(summary, s))
@@ -268,17 +275,17 @@ def assemble_subdomains(
         if summary.voids:
             line.append(f"{summary.voids} voids, porosity {1 - meshed / summary.area:.6g},")
         line.append(f"{dofs} degrees of freedom, refine = {case.cell.refine}, order = {case.cell.order}")
-    return share, shared, lattice, subdomains
+    return part, shared, lattice, subdomains
 
 
 def _laws(case: Case, summary: CellSummary, submesh: Submesh, problem: Problem) -> Float:
-    """Return a subdomain's phase stiffnesses in a problem, as `assemble` takes them."""
+    """Return the phase stiffnesses of a subdomain, in the shape for `assemble`."""
     laws = np.stack([phase_laws.law(case, phase, problem) for phase in _phases(summary, submesh)])
     return np.asarray(laws[0] if submesh.phase else laws)
 
 
 def _phases(summary: CellSummary, submesh: Submesh) -> list[str]:
-    """Return a subdomain's phase names, in their order."""
+    """Return the phase names of a subdomain, in cell order."""
     if submesh.phase:
         return [submesh.phase]
     return [summary.phases[k] for k in np.unique(summary.constituent_phase[submesh.constituent]).tolist()]

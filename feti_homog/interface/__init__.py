@@ -1,4 +1,4 @@
-"""Imperfect bonding: debonded arcs, contact, strengths, and the states along a path of load.
+"""Imperfect bonding: debonded arcs, contact, strengths, and the states along a load path.
 
 Imports `case`, `interface.contact` and `schema`.  Main entries: `contact.contact_problem`, `contact.coupled_interfaces`
 and `path.path_following`.

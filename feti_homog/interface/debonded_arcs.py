@@ -1,4 +1,4 @@
-"""Debonded arcs: their tips, their interface nodes, and chains of nodes at tips.
+"""Debonded arcs with tips and interface nodes, and node chains along interfaces.
 
 Directions are degrees about the centre of a fibre, from x1 towards x2.  The tips of an arc stay bonded.
 """
@@ -17,20 +17,20 @@ from feti_homog.interface.contact import BONDED, Status
 from feti_homog.schema import wording
 from feti_homog.typing import Bool, Float, Int
 
-# A node this close to a tip, in degrees, is the tip: coordinates in files and on circles are rounded.
+# Distance in degrees within which a node is the tip: coordinates in files and on circles are rounded.
 TIP_TOLERANCE_DEGREES = 1e-6
-# Decimals by which directions are sorted and compared, in degrees: rounding must not change their order.
+# Decimals of directions in degrees for sorting and comparison: rounding must not change the order.
 DIRECTION_DIGITS = 9
-# Fibre number and direction of a tip, as `tips` has it -> direction in the mesh.
+# Fibre number and direction of a tip, as from `tips` -> direction of the tip in the mesh.
 MovedTips = Mapping[tuple[int, float], float]
 NOT_MOVED: MovedTips = MappingProxyType({})
 
 
 class InterfaceChains:
-    """Interface nodes with their neighbours along the interface.
+    """The chains of interface nodes, by the neighbours along the interface.
 
     Attributes:
-        neighbours: (n, 2) neighbours of nodes, -1 unless there are two.
+        neighbours: (n, 2) neighbours of each node, -1 unless the node has two.
     """
 
     def __init__(self, adjacency: csr_matrix) -> None:
@@ -40,7 +40,7 @@ class InterfaceChains:
         self.neighbours[two] = adjacency.indices[adjacency.indptr[:-1][two][:, None] + np.arange(2)]
 
     def tips(self, status: Status) -> CrackTips:
-        """Return the tips under the states (n,): bonded nodes with one debonded neighbour."""
+        """Return the tips for node states (n,): bonded nodes with one debonded neighbour."""
         has_two = self.neighbours[:, 0] >= 0
         debonded = (status != BONDED)[self.neighbours] & has_two[:, None]
         node = np.flatnonzero((status == BONDED) & (debonded[:, 0] != debonded[:, 1]))
@@ -48,7 +48,10 @@ class InterfaceChains:
         return CrackTips(node, np.take_along_axis(pair, side[:, None], 1)[:, 0], pair[np.arange(len(node)), 1 - side])
 
     def onward(self, start: Int, through: Int, steps: int) -> Int:
-        """Walk along interfaces from nodes `start` through `through` (t,): chains (t, steps + 1), -1 beyond an end."""
+        """Follow the interfaces from the nodes `start` (t,) through the nodes `through` (t,).
+
+        Return the chains (t, steps + 1) of node numbers, -1 beyond the end of a chain.
+        """
         nodes = [start, through]
         while len(nodes) <= steps:
             before, last = nodes[-2:]
@@ -64,7 +67,7 @@ class CrackTips:
 
     Attributes:
         node: (t,) tips, which are bonded.
-        behind, ahead: (t,) next nodes on the debonded and on the bonded side.
+        behind, ahead: (t,) neighbours of the tips on the debonded and on the bonded side.
     """
 
     node: Int
@@ -72,20 +75,23 @@ class CrackTips:
     ahead: Int
 
     def chosen(self, which: Int | Bool) -> CrackTips:
-        """Return some tips."""
+        """Return the tips selected by an index or a mask."""
         return CrackTips(self.node[which], self.behind[which], self.ahead[which])
 
 
 def closing_work(length: float, before: Float, force: Float, behind: Float, jump: Float) -> Float:
-    """Return the work (2,) of closing the last part of a crack, over its length a, by Irwin's integral:
+    """Return the energy rates (2,) from closing the last part of a crack.
+
+    Irwin's integral over the length a of this part is the work per length
 
         sum_k F_k w(a - s_k) / (2 a)  ->  1 / (2 a) int_0^a t(s) w(a - s) ds,
 
     in opening and in shear, at least zero.
 
     Args:
-        before, force: (j,) distances s from the tip, the tip first, and forces (j, 2) on bonded nodes before it.
-        behind, jump: (k,) rising distances from the tip, the tip first, and jumps (k, 2) behind it.
+        length: closed length a.
+        before, force: (j,) distances s of bonded nodes from the tip, the tip first, and forces (j, 2) on these nodes.
+        behind, jump: (k,) rising distances of nodes behind the tip, the tip first, and jumps (k, 2) at these nodes.
     """
     within = before < length
     w = np.stack([np.interp(length - before[within], behind, jump[:, mode]) for mode in (0, 1)], axis=1)
@@ -93,7 +99,7 @@ def closing_work(length: float, before: Float, force: Float, behind: Float, jump
 
 
 def tips(arcs: Sequence[interface_section.Arc], values: Sequence[float], fibres: int) -> dict[int, list[float]]:
-    """Return tip directions in [0, 360), by fibre number from 0.
+    """Return the tip directions in [0, 360), by fibre number from 0.
 
     An arc without an angle takes all of `values`.  Openings of 0 and 360 degrees have no tips.
     """
@@ -107,23 +113,23 @@ def tips(arcs: Sequence[interface_section.Arc], values: Sequence[float], fibres:
 
 
 def angles(points: Float, fibre: Int, centres: Float, period: Float) -> Float:
-    """Return the directions (k,) of points (k, 2) about their fibre centres, in (-180, 180]; NaN without a centre."""
+    """Return the directions (k,) of points (k, 2) about fibre centres, in (-180, 180]; NaN without a centre."""
     offset = points - centres[fibre]
     offset -= np.round(offset / period) * period
     return np.asarray(np.degrees(np.arctan2(offset[:, 1], offset[:, 0])))
 
 
 def moved_tips(marks: Mapping[int, Sequence[float]], fibre: Int, direction: Float, limit: float) -> MovedTips:
-    """Return the tips that a mesh moves to the nearest vertex, at most `limit` degrees away.
+    """Find the tips that a mesh moves to the nearest vertex, at most `limit` degrees away.
 
-    Vertices lie on the fibres `fibre` (k,), numbered from 1, in the directions (k,).
+    `marks` has the tips; the vertices lie on the fibres `fibre` (k,), numbered from 1, in the directions (k,).
     """
     moved = {}
     for number, ends in marks.items():
         directions = direction[fibre == number + 1]
         for end in ends:
-            away = (directions - end + 180.0) % 360.0 - 180.0
-            nearest = away[np.argmin(np.abs(away))] if len(away) else np.inf
+            offset = (directions - end + 180.0) % 360.0 - 180.0
+            nearest = offset[np.argmin(np.abs(offset))] if len(offset) else np.inf
             if TIP_TOLERANCE_DEGREES < abs(nearest) <= limit:
                 moved[number + 1, end] = end + float(nearest)
     return moved
@@ -132,36 +138,40 @@ def moved_tips(marks: Mapping[int, Sequence[float]], fibre: Int, direction: Floa
 def debonded(
     arcs: Sequence[interface_section.Arc], opening: float | None, fibre: Int, angle: Float, moved: MovedTips = NOT_MOVED
 ) -> Bool:
-    """Mark the nodes (k,) within debonded arcs, on fibres (k,), numbered from 1, in directions (k,).
+    """Mark the nodes (k,) within debonded arcs.
 
-    Arcs without an angle take `opening`; `moved` are the tips that the mesh has moved.
+    Nodes lie on fibres (k,), numbered from 1, in directions `angle` (k,).  Arcs without an angle take `opening`;
+    `moved` are the tips that the mesh has moved.
     """
     inside = np.zeros(len(fibre), bool)
     for arc in arcs:
         width = opening if arc.angle is None else arc.angle
         if width is None:
             raise ValueError("an arc without an angle needs an opening")
-        ends = np.empty((2, len(fibre)))  # of each fibre's arc, not reduced to [0, 360)
+        ends = np.empty((2, len(fibre)))  # of the arc at each node, not reduced to [0, 360)
         for end, half in zip(ends, (-width / 2, width / 2), strict=True):
             end[:], tip = arc.centre + half, _end(arc, half)
             for (number, direction), actual in moved.items():
                 if direction == tip:
                     end[fibre == number] += actual - direction
         start, stop = ends
-        away = (angle - start) % 360.0
-        within = (away > TIP_TOLERANCE_DEGREES) & (away < stop - start - TIP_TOLERANCE_DEGREES)
+        offset = (angle - start) % 360.0
+        within = (offset > TIP_TOLERANCE_DEGREES) & (offset < stop - start - TIP_TOLERANCE_DEGREES)
         within = (within & (0 < width < 360)) | (width >= 360.0)
         inside |= within & (np.isin(fibre, arc.fibre) if isinstance(arc.fibre, tuple) else True)
     return inside
 
 
 def _end(arc: interface_section.Arc, half: float) -> float:
-    """Return the direction in [0, 360) of an arc's tip, `half` away from its centre."""
+    """Return the direction in [0, 360) of an arc tip, `half` away from the arc centre."""
     return round(arc.centre + half, DIRECTION_DIGITS) % 360.0
 
 
 def faults(arcs: Sequence[interface_section.Arc], centres: Float, label: str = "interface") -> list[str]:
-    """List faults in the arcs of interface `label`; centres (fibres, 2) are NaN for fibres without a centre."""
+    """List the faults in debonded arcs of the interface `label`.
+
+    `centres` (fibres, 2) are NaN for fibres without a centre.
+    """
     messages = []
     for number, arc in enumerate(arcs):
         chosen = range(1, len(centres) + 1) if isinstance(arc.fibre, str) else arc.fibre

@@ -1,4 +1,4 @@
-"""Materials: their constants, laws and bounds, Voigt's notation, closed formulas of the mechanics of composites.
+"""Materials: constants, laws, bounds, Voigt's notation, and closed formulas of composite mechanics.
 
 Imports `schema` and `system`.  Main entries: `material_forms`, `laws`, `engineering_constants`, `phase_bounds`,
 `estimates`.

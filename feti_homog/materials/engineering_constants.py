@@ -1,7 +1,7 @@
-"""Compute the named constants of a stiffness, with their records, symbols and axes.
+"""Compute the named constants of a stiffness, and describe their symbols and axes.
 
 Stiffnesses C are (3, 3) in Voigt order [11, 22, 12], or (6, 6) in the order [11, 22, 33, 23, 13, 12] with x3 along the
-fibres; engineering shears, any stress unit.  Expansions are strains per unit of temperature, (6,) in the same order.
+fibres, with engineering shears, in any stress unit.  Expansions (6,), strains per unit of temperature, are likewise.
 
 Axes 1, 2, 3 of a cell are x1 and x2, across the fibres, and x3, along them.  Axes 1, 2, 3 of a ply, of data sheets and
 of cards are x3, x1, x2: names with `axial`, `transverse`, `x1` or `x2` are the same in both.
@@ -20,9 +20,9 @@ from feti_homog.materials.voigt import EXPANSIONS, THERMAL_STRESSES
 from feti_homog.system.runtime import described, records
 from feti_homog.typing import Array, Float
 
-DIRECTIONS = 720  # across the fibres
+DIRECTIONS = 720  # number of directions across the fibres
 
-# Turns the components of a stiffness, (3, 3) or (6, 6), into components of the same Frobenius norm as the tensor.
+# Factors by which the components of a stiffness, (3, 3) or (6, 6), get the Frobenius norm of the tensor.
 _MANDEL = {n: np.sqrt(np.outer(scale, scale)) for n, scale in ((3, [1, 1, 2]), (6, [1, 1, 1, 2, 2, 2]))}
 
 
@@ -30,8 +30,8 @@ _MANDEL = {n: np.sqrt(np.outer(scale, scale)) for n, scale in ((3, [1, 1, 2]), (
 class Moduli:
     """Moduli in the plane; in plane strain E and nu belong to the plane state, not to the bulk material.
 
-    nu_ij = -eps_j/eps_i under stress along i; eta_i = gamma_12/eps_i under the same (mutual influence);
-    `bulk` and `shear` belong to the nearest isotropic stiffness, `anisotropy` is the relative distance to it.
+    nu_ij = -eps_j/eps_i under stress along i; eta_i = gamma_12/eps_i under this stress (mutual influence);
+    `bulk` and `shear` belong to the nearest isotropic stiffness, and `anisotropy` is the relative distance to it.
     """
 
     E1: float = described("Young's modulus along x1", records.STRESS)
@@ -94,9 +94,9 @@ class TransverseModuli:
 def constants(C: Array, heat: Array | None = None) -> dict[str, Any]:
     """Tabulate the constants of a stiffness C, real or complex, by name.
 
-    Entries Cij of the upper half, moduli and ratios: E_i = 1/S_ii, nu_ij = -S_ji/S_ii, G_ij = 1/S_kk with S = C^-1.  In
-    space also the nearest transversely isotropic constants (`about_fibres`) and, with the stress `heat` (6,) under a
-    unit of temperature, normal stresses and strains under it.  Raises numpy.linalg.LinAlgError if C is singular.
+    The table has the entries Cij of the upper half, and E_i = 1/S_ii, nu_ij = -S_ji/S_ii, G_ij = 1/S_kk with S = C^-1;
+    in space also the nearest transversely isotropic constants (`about_fibres`) and, from the stress `heat` (6,) under a
+    unit temperature, normal thermal stresses and strains.  Raises numpy.linalg.LinAlgError if C is singular.
     """
     S, n = np.linalg.inv(C), len(C)
     entries = [(i, j) for i in range(n) for j in range(i, n) if n == 3 or (i, j) not in COUPLINGS]
@@ -113,7 +113,7 @@ def constants(C: Array, heat: Array | None = None) -> dict[str, Any]:
 
 
 def _along_axes(S: Array) -> dict[str, Any]:
-    """Tabulate the moduli and ratios of a compliance along the cell's axes."""
+    """Tabulate the moduli and ratios of a compliance along the axes of the cell."""
     normal, pairs = (2, ((0, 1), (1, 0))) if len(S) == 3 else (3, ((0, 1), (0, 2), (1, 2)))
     table = {f"E{i + 1}": 1 / S[i, i] for i in range(normal)}
     table |= {f"nu{i + 1}{j + 1}": -S[j, i] / S[i, i] for i, j in pairs}
@@ -129,7 +129,7 @@ def about_fibres(C: Array) -> dict[str, Any]:
         k = (C11 + C22 + 2 C12)/4,  l = (C13 + C23)/2,  n = C33,  m = (C11 + C22 - 2 C12 + 4 C66)/8,  p = (C44 + C55)/2,
 
     where Cij is the mean of Cij and Cji: between nearly incompressible phases the rounding of C12 - C21 is not small
-    beside m.  They are the same in all axes turned about x3; E_axial = n - l^2/k, nu_axial = l/(2 k), G_axial = p,
+    beside m.  The moduli are equal in all axes turned about x3; E_axial = n - l^2/k, nu_axial = l/(2 k), G_axial = p,
     G_transverse = m, K_transverse = k (Hill 1964).
     """
     off = C[0, 1] + C[1, 0]
@@ -145,13 +145,13 @@ def about_fibres(C: Array) -> dict[str, Any]:
 
 
 def transverse_constants(E_axial: float, nu_axial: float, bulk: float, shear: float) -> tuple[float, float]:
-    """Return E_T and nu_T: 4/E_T = 1/k + 1/m + 4 nu_A^2/E_A and nu_T = E_T/(2 m) - 1 (Hill 1964)."""
+    """Return both constants E_T and nu_T: 4/E_T = 1/k + 1/m + 4 nu_A^2/E_A and nu_T = E_T/(2 m) - 1 (Hill 1964)."""
     E_transverse = 4 / (1 / bulk + 1 / shear + 4 * nu_axial**2 / E_axial)
     return E_transverse, E_transverse / (2 * shear) - 1
 
 
 def engineering_moduli(stiffness: ArrayLike) -> Moduli:
-    """Return the moduli of a stiffness (3, 3). Raises numpy.linalg.LinAlgError if C is singular."""
+    """Return the moduli of a plane stiffness (3, 3).  Raises numpy.linalg.LinAlgError if C is singular."""
     C = np.asarray(stiffness, dtype=float)
     S, (bulk, shear) = np.linalg.inv(C), isotropic_part(C)
     table = _along_axes(S) | {"eta1": S[2, 0] / S[0, 0], "eta2": S[2, 1] / S[1, 1], "bulk": bulk, "shear": shear}
@@ -159,10 +159,10 @@ def engineering_moduli(stiffness: ArrayLike) -> Moduli:
 
 
 def isotropic_part(stiffness: ArrayLike) -> tuple[float, float]:
-    """Return bulk modulus k and shear modulus mu of the nearest isotropic plane stiffness.
+    """Return the bulk and shear moduli k and mu of the nearest isotropic plane stiffness.
 
     k = (C11 + C22 + C12 + C21)/4, mu = (C11 + C22 - C12 - C21 + 4 C33)/8,
-    nearest in the Frobenius norm. Both are the same in all axes.
+    nearest in the Frobenius norm.  Both moduli are equal in all axes.
     """
     c = np.asarray(stiffness, dtype=float)
     bulk = (c[0, 0] + c[1, 1] + c[0, 1] + c[1, 0]) / 4
@@ -177,26 +177,27 @@ def isotropic_stiffness(bulk: float, shear: float) -> Float:
 
 
 def anisotropy(stiffness: ArrayLike) -> float:
-    """Return ||C - C_iso|| / ||C|| of the tensors, C_iso the nearest isotropic stiffness; equal in all axes."""
+    """Return the distance ||C - C_iso|| / ||C|| to the nearest isotropic stiffness, equal in all axes."""
     c = np.asarray(stiffness, dtype=float)
     return _distance(c, isotropic_stiffness(*isotropic_part(c)))
 
 
 def _distance(C: Float, nearest: Float) -> float:
+    """Return the distance ||C - nearest|| / ||C|| of two stiffnesses as tensors."""
     scale = _MANDEL[len(C)]
     return float(np.linalg.norm(scale * (C - nearest)) / np.linalg.norm(scale * C))
 
 
 def engineering_constants(stiffness: ArrayLike) -> EngineeringConstants:
-    """Return the constants of a stiffness (6, 6). Raises numpy.linalg.LinAlgError if C is singular."""
+    """Return the constants of a spatial stiffness (6, 6).  Raises numpy.linalg.LinAlgError if C is singular."""
     table = _along_axes(np.linalg.inv(np.asarray(stiffness, dtype=float)))
     return EngineeringConstants(**{name: float(value) for name, value in table.items()})
 
 
 def transversely_isotropic_part(stiffness: ArrayLike, expansion: ArrayLike | None = None) -> TransverseIsotropy:
-    """Return the constants of a stiffness C as `about_fibres`, with `deviation` = ||C - C_nearest|| / ||C||.
+    """Return the nearest transversely isotropic constants, with `deviation` = ||C - C_nearest|| / ||C||.
 
-    The expansion is the mean over the same turns, alpha_33 and (alpha_11 + alpha_22)/2.
+    The mean over all turns, as in `about_fibres`, has the expansions alpha_33 and (alpha_11 + alpha_22)/2.
     """
     c = np.asarray(stiffness, dtype=float)
     table = {name: float(value) for name, value in about_fibres(c).items()}
@@ -209,7 +210,7 @@ def transversely_isotropic_part(stiffness: ArrayLike, expansion: ArrayLike | Non
 
 
 def transversely_isotropic_stiffness(constants: TransverseIsotropy) -> Float:
-    """Return the stiffness C (6, 6) of these constants.
+    """Return the stiffness C (6, 6) of transversely isotropic constants.
 
     C11 = C22 = k + m, C12 = k - m, C13 = C23 = 2 nu_A k, C33 = E_A + 4 nu_A^2 k, C44 = C55 = G_A, C66 = m.
     """
@@ -228,8 +229,9 @@ def is_transversely_isotropic(constants: TransverseIsotropy) -> bool:
 
 
 def transverse_moduli(stiffness: ArrayLike) -> TransverseModuli:
-    """Return the ranges of 1/E = sigma:S:sigma, sigma = n n, and 1/G, sigma = n t + t n, n across x3, t across both.
+    """Return the ranges of the moduli E and G over the directions n across x3.
 
+    1/E = sigma:S:sigma with sigma = n n; 1/G with sigma = n t + t n, where t is normal to n and x3.
     Raises numpy.linalg.LinAlgError if C is singular.
     """
     angle = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
@@ -249,7 +251,7 @@ MATERIAL_EXPANSIONS = ("expansion_axial", "expansion_x1", "expansion_x2", *EXPAN
 
 
 class Constant(NamedTuple):
-    """A constant's symbol, its way, and its names on a transversely isotropic material's card."""
+    """The symbol and direction of a constant, and its names on a transversely isotropic material card."""
 
     symbol: str
     way: str
@@ -274,7 +276,7 @@ OF_THE_CELL = {"E1": "E3", "E2": "E1", "E3": "E2", "G12": "G13", "G13": "G23", "
 _PLACES = (("expansion.", EXPANSIONS), ("thermal_stress.", THERMAL_STRESSES), ("alpha", MATERIAL_EXPANSIONS))
 FORMER = {f"{former}{k + 1}": names[k] for former, names in _PLACES for k in range(3)}
 """Removed names, each with its replacement."""
-# Names that a ply reads the other way: kind and way in a cell, and the names of the other way.
+# Names with another meaning in a ply: kind and direction in a cell, and the names for the other direction.
 _READ_EITHER_WAY = {
     "E1": ("Young's modulus", ACROSS, "E_axial"), "E3": ("Young's modulus", ALONG, "E_transverse"),
     "G12": ("shear", ACROSS, "G_axial"), "G23": ("shear", ALONG, "G_transverse"),
@@ -289,7 +291,7 @@ _READ_EITHER_WAY = {
 
 
 def axes_line(names: Iterable[str]) -> str:
-    """Describe the axes of names, such as `S12`, that mean something else in a ply; '' without such names."""
+    """Describe the axes of names, such as `S12`, with another meaning in a ply; '' without such names."""
     bare = dict.fromkeys(name.rpartition("_")[2] for name in names)
     return ". ".join(
         f"{name} is {kind} {way} the fibres; {ALONG if way == ACROSS else ACROSS} them {others}"

@@ -1,7 +1,7 @@
-"""Estimate the constants of a unidirectional composite by closed formulas from its phases and fractions.
+"""Estimate the constants of a unidirectional composite by closed formulas from phases and fractions.
 
 E_A, E_T, nu_A, nu_T: Young's moduli and contractions along and across the fibres; G_A, G_T, k: shear moduli along and
-across them and the bulk modulus across them; alpha: expansions; c: fractions; f, m: fibre and matrix.
+across the fibres and bulk modulus across them; alpha: expansions; c: fractions; f, m: fibre and matrix.
 """
 
 import dataclasses
@@ -17,11 +17,11 @@ from feti_homog.materials.phase_bounds import NOTHING, Estimate, Estimates, Fibr
 
 
 def estimates(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimates:
-    """Return each method's estimates for fibres in a matrix.
+    """Estimate the constants of fibres in a matrix by each method.
 
-    The rule of mixtures and Mori and Tanaka's estimate are defined for any kinds of fibres, the others for one; on
-    springs the last three.  No method gives a constant if a phase is not transversely isotropic about x3, nor an
-    expansion if a phase has none.
+    The rule of mixtures and Mori and Tanaka's estimate hold for any kinds of fibres, the other methods for one kind;
+    only the last three methods allow springs.  No method gives a constant if a phase is not transversely isotropic
+    about x3, nor an expansion if a phase has no expansion.
     """
     if not all(
         map(engineering_constants.is_transversely_isotropic, [matrix, *(family.constants for family in fibres)])
@@ -31,13 +31,13 @@ def estimates(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimates
 
 
 def rule_of_mixtures(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Put phases in parallel along the fibres and in series across them; any number of phases.
+    """Combine any number of phases, in parallel along the fibres and in series across the fibres.
 
         E_A = sum c E_A,  nu_A = sum c nu_A,  1/E_T = sum c/E_T,  1/G_A = sum c/G_A,  1/G_T = sum c/G_T,
         alpha_A = sum c E_A alpha_A / E_A*,  alpha_T = sum c (alpha_T + nu_A alpha_A) - nu_A* alpha_A*,
 
     with a star for the composite; nu_T and k follow: nu_T = E_T/(2 G_T) - 1, 1/k = 4/E_T - 1/G_T - 4 nu_A^2/E_A.
-    Voigt 1889, Reuss 1929; the expansions Schapery 1968, of anisotropic fibres Hashin 1979.
+    Voigt 1889, Reuss 1929; expansions: Schapery 1968, with anisotropic fibres Hashin 1979.
     """
     if any(family.springs is not None for family in fibres):
         return NOTHING
@@ -56,13 +56,13 @@ def rule_of_mixtures(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Es
 
 
 def chamis(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Return Chamis's simplified equations; one kind of fibres.
+    """Estimate the constants for one kind of fibres by Chamis's simplified equations.
 
         E_A, nu_A: rule of mixtures,  M = M_m / (1 - sqrt(c) (1 - M_m/M_f)) for M = E_T, G_A, G_T,
         nu_T = E_T/(2 G_T) - 1,  alpha_A = (c E_f alpha_f + (1 - c) E_m alpha_m)/E_A,
         alpha_T = sqrt(c) alpha_Tf + (1 - sqrt(c)) (alpha_Tm + c nu_m E_f/E_A alpha_m),
 
-    E, nu and alpha in the phases being the axial ones where T does not occur.  Chamis 1984, for an isotropic
+    where E, nu and alpha of a phase are axial values unless the index has a T.  Chamis 1984, for an isotropic
     matrix.
     """
     if len(fibres) != 1 or fibres[0].springs is not None:
@@ -90,12 +90,12 @@ def chamis(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
 
 
 def halpin_tsai(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Return Halpin and Tsai's equations; one kind of fibres.
+    """Estimate the constants for one kind of fibres by Halpin and Tsai's equations.
 
         E_A, nu_A: rule of mixtures,  M = M_m (1 + xi eta c)/(1 - eta c),  eta = (M_f - M_m)/(M_f + xi M_m),
 
-    with xi = 2 for E_T, 1 for G_A, k_m/(k_m + 2 G_m) for G_T and G_m/k_m for k, G_m being across the fibres.
-    E_T is fitted and the others are not, so that E_T/(2 G_T) - 1 may exceed 1: no nu_T is given.
+    with xi = 2 for E_T, 1 for G_A, k_m/(k_m + 2 G_m) for G_T and G_m/k_m for k, where G_m is across the fibres.
+    Only E_T is fitted, so that E_T/(2 G_T) - 1 may exceed 1: the estimate has no nu_T.
     Halpin and Kardos 1976.
     """
     if len(fibres) != 1 or fibres[0].springs is not None:
@@ -120,12 +120,13 @@ def halpin_tsai(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimat
 
 
 def _phases(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> list[tuple[float, TransverseIsotropy]]:
+    """Return the volume fraction and the constants of the matrix and of each kind of fibres."""
     rest = 1 - sum(family.fraction for family in fibres)
     return [(rest, matrix), *((family.fraction, family.constants) for family in fibres)]
 
 
 def _in_parallel(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> dict[str, Any]:
-    """Return E_A, nu_A, alpha_A and alpha_T by the rule of mixtures; alpha if all phases have it."""
+    """Return E_A, nu_A, alpha_A and alpha_T by the rule of mixtures; alpha if all phases have expansions."""
     phases = _phases(matrix, fibres)
     E, nu = sum(c * x.E_axial for c, x in phases), sum(c * x.nu_axial for c, x in phases)
     axial = transverse = 0.0
@@ -138,7 +139,7 @@ def _in_parallel(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> dict[s
 
 
 def cylinders_in_matrix(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> TransverseIsotropy:
-    """Estimate by `aligned_cylinders` with the matrix around, and `equivalent_fibre` for fibres on springs."""
+    """Estimate by `aligned_cylinders` in the matrix, with `equivalent_fibre` for fibres on springs."""
     fractions = [c for c, _ in _phases(matrix, fibres)]
     phases = [matrix, *(phase_bounds.equivalent_fibre(family, matrix) for family in fibres)]
     return phase_bounds.aligned_cylinders(fractions, phases, (matrix.K_transverse, matrix.G_transverse, matrix.G_axial))
@@ -147,18 +148,18 @@ def cylinders_in_matrix(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) ->
 def mori_tanaka(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
     """Put every fibre alone in the matrix, under the mean field of the matrix, by `cylinders_in_matrix`.
 
-    For any kinds of round fibres, on springs too.  Mori and Tanaka 1973, Benveniste 1987; transversely isotropic phases
-    Chen, Dvorak and Benveniste 1992; springs Benveniste 1985.
+    The method allows any kinds of round fibres, also on springs.  Mori and Tanaka 1973, Benveniste 1987; transversely
+    isotropic phases: Chen, Dvorak and Benveniste 1992; springs: Benveniste 1985.
     """
     return Estimate.of(cylinders_in_matrix(matrix, fibres))
 
 
 def composite_cylinders(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Fill space with cylinders of fibre and matrix, alike but for their size; one kind of fibres, on springs too.
+    """Fill space with similar cylinders of fibre and matrix, for one kind of fibres, also on springs.
 
-    k, E_A, nu_A, G_A and the expansions by `cylinders_in_matrix` are exact for this arrangement; for shear across the
-    fibres there are only bounds.  Hashin and Rosen 1964; anisotropic fibres Hashin 1979; expansions
-    Rosen and Hashin 1970; springs, of fibres of equal radius, Hashin 1990.
+    k, E_A, nu_A, G_A and the expansions by `cylinders_in_matrix` are exact for this arrangement; shear across the
+    fibres has only bounds.  Hashin and Rosen 1964; anisotropic fibres: Hashin 1979; expansions: Rosen and Hashin 1970;
+    springs on fibres of equal radius: Hashin 1990.
     """
     if len(fibres) != 1:
         return NOTHING
@@ -167,10 +168,10 @@ def composite_cylinders(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) ->
 
 
 def self_consistent(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Christensen and Lo's estimate; one kind of fibres, on springs too.
+    """Estimate after Christensen and Lo, for one kind of fibres, also on springs.
 
     k, E_A, nu_A, G_A and the expansions come from `composite_cylinders`, G_T from `transverse_shear`;
-    E_T and nu_T follow.  Christensen and Lo 1979; springs, of fibres of equal radius, Hashin 1990.
+    E_T and nu_T follow.  Christensen and Lo 1979; springs on fibres of equal radius: Hashin 1990.
     """
     if len(fibres) != 1:
         return NOTHING
@@ -183,11 +184,11 @@ def self_consistent(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Est
 def transverse_shear(matrix: TransverseIsotropy, family: Fibres) -> float:
     """Return the shear modulus m* of the medium that a coated fibre does not change.
 
-    Under shear across it the coated fibre has the energy of the medium.
+    Under shear across the fibre, the coated fibre stores the energy of the medium.
 
     On a circle, u_1 + i u_2 and the resultant F = phi + z conj(phi') + conj(psi) of Muskhelishvili's potentials have
     two harmonics, exp(-i t) and exp(3 i t).  In the medium phi has no term 1/z, as the energies are equal, and so
-    2 m* u = -F there (Eshelby).  Through the matrix, with P = F + 2 m u, kappa_m = 1 + 2 m/k and m, k its moduli,
+    2 m* u = -F (Eshelby).  In the matrix with moduli m and k, P = F + 2 m u and kappa_m = 1 + 2 m/k,
 
         P_1 ~ 1/r,  P_3 ~ r^3,  F_1 - (3 P_3 + P_1)/(kappa_m + 1) ~ r,  F_3 - (P_3 - P_1)/(kappa_m + 1) ~ 1/r^3,
 
@@ -195,7 +196,7 @@ def transverse_shear(matrix: TransverseIsotropy, family: Fibres) -> float:
     q_i = 1/(k_i a) add m [[-(q_n + q_t), 3 (q_n - q_t)], [-(q_n - q_t), 3 (q_n + q_t)]], and m_e of
     `equivalent_fibre` has m/m_e = V13 V31/(1 + V33) - V11.  With two unknowns y at the fibre, P = A y and F = B y at
     the outer radius, where P = (1 - m/m*) F: det(A - (1 - m/m*) B) = 0, Christensen and Lo's quadratic, has one
-    positive root m*, for V is indefinite as a homogeneous cylinder's is.
+    positive root m*, because V is indefinite, as for a homogeneous cylinder.
     """
     fibre, c, m = family.constants, family.fraction, matrix.G_transverse
     normal, tangential, _ = (0.0, 0.0, 0.0) if family.springs is None else family.springs.compliances

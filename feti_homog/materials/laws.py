@@ -1,7 +1,7 @@
-"""Derive the law of each phase, plane and spatial stiffness and thermal expansion, and the contrast between phases.
+"""Derive the plane and spatial stiffness and the expansion of each phase, and check the stiffness contrast.
 
-Voigt order [11, 22, 12] in the plane, [11, 22, 33, 23, 13, 12] in space, with engineering shears. x3 is normal to a
-plane of symmetry of every phase, so 23 and 13 couple only with each other.
+The Voigt order is [11, 22, 12] in the plane, [11, 22, 33, 23, 13, 12] in space, with engineering shears.  x3 is normal
+to a plane of symmetry of every phase, so 23 and 13 couple only with each other.
 """
 
 import math
@@ -27,7 +27,7 @@ NEEDED: dict[
         voigt.GENERALIZED.name: ("E_axial", "nu_axial", "G_axial"),
     },
 }
-"""Optional constants that each plane state requires."""
+"""Optional constants that each plane state needs."""
 OF_DATA_SHEETS = "axis 3 is along the fibres: with constants of a data sheet give E_axial, E_transverse, nu_axial, ..."
 # Relative rounding in the constants and the stiffness of an isotropic, or transversely isotropic, material.
 ISOTROPY = 1e-9
@@ -48,7 +48,7 @@ def plane_stiffness(material: material_forms.Material, plane: str) -> Float:
     """Return C (3, 3): [S11, S22, S12] = C [E11, E22, gamma12], symmetric positive definite, in stress units.
 
     `plane` is "stress" (S33 = 0), "strain" (E33 = 0), or "generalized", where C is the block at E33 = 0. Raises
-    ValueError, with the keys at fault, if the constants leave C open or no material is stable with them.
+    ValueError, with the keys at fault, if the constants leave C open or belong to no stable material.
     """
     if isinstance(material, material_forms.Isotropic):
         lame, shear = _lame(material, plane)
@@ -71,13 +71,13 @@ def plane_stiffness(material: material_forms.Material, plane: str) -> Float:
 def isotropic_ratio(material: material_forms.Material) -> float | None:
     """Return Poisson's ratio of an isotropic material; None for other materials, and for a given stiffness.
 
-    A transversely isotropic material is isotropic if its constants are, up to ISOTROPY.
+    A transversely isotropic material is isotropic if its constants are isotropic up to ISOTROPY.
     """
     if isinstance(material, material_forms.TransverselyIsotropic):
         young, ratio, shear = material.E_transverse, material.nu_transverse, material.G_axial
         pairs = [(material.E_axial, young), (material.nu_axial, ratio), (shear, young / (2 + 2 * ratio))]
-        known = pairs if shear is not None else pairs[:2]
-        alike = all(first is not None and math.isclose(first, second, rel_tol=ISOTROPY) for first, second in known)
+        compared = pairs if shear is not None else pairs[:2]
+        alike = all(first is not None and math.isclose(first, second, rel_tol=ISOTROPY) for first, second in compared)
         return ratio if alike else None
     return material.poisson if isinstance(material, material_forms.Isotropic) else None
 
@@ -103,7 +103,7 @@ def spatial_stiffness(material: material_forms.Material) -> Float:
 
 
 def expansion(material: material_forms.Material) -> Float | None:
-    """Return the free strains (6,) per unit of temperature in the cell's axes; None if not given.
+    """Return the free strains (6,) per unit of temperature in the cell's axes; None if the case has no expansion.
 
     Raises ValueError, with the keys at fault, if expansions are given twice or by half.
     """
@@ -113,8 +113,8 @@ def expansion(material: material_forms.Material) -> Float | None:
         if pair and free is not None:
             raise ValueError(f"expansion, {', '.join(pair)}: exclude each other; give one or a pair")
         if len(pair) == 1:
-            (absent,) = set(material_forms.EXPANSION_PAIR).difference(pair)
-            raise ValueError(f"{absent}: missing; {pair[0]} needs it")
+            (other,) = set(material_forms.EXPANSION_PAIR).difference(pair)
+            raise ValueError(f"{other}: missing; {pair[0]} needs it")
         axial, transverse = material.expansion_axial, material.expansion_transverse
         if axial is not None and transverse is not None:
             free = (transverse, transverse, axial)
@@ -125,9 +125,9 @@ def expansion(material: material_forms.Material) -> Float | None:
 
 
 def out_of_plane(material: material_forms.Material, plane: str) -> tuple[Float, Float]:
-    """Return s and e (3,): S33 = s . [S11, S22, S12], E33 = e . [S11, S22, S12], in plane strain and stress.
+    """Return the rows s and e (3,): S33 = s . [S11, S22, S12], E33 = e . [S11, S22, S12], in plane strain and stress.
 
-    S33 vanishes in plane stress, E33 in plane strain. NaN if the material's constants leave it open.
+    S33 vanishes in plane stress, E33 in plane strain.  Rows that the constants leave open are NaN.
     """
     # E33 = row . [S11, S22, S12] + S33 / young
     if isinstance(material, material_forms.Isotropic):
@@ -162,11 +162,11 @@ def _angle(material: material_forms.Material) -> float:
 
 def _checked_stiffness(material: material_forms.General) -> Float:
     """Check and return the given stiffness of a phase, (3, 3) or (6, 6)."""
-    given = np.array(material.stiffness)
-    noise = 1e-9 * np.abs(given).max()
-    if not np.allclose(given, given.T, rtol=0.0, atol=noise):
+    matrix = np.array(material.stiffness)
+    noise = 1e-9 * np.abs(matrix).max()
+    if not np.allclose(matrix, matrix.T, rtol=0.0, atol=noise):
         raise ValueError(f"stiffness = {wording.toml_value(material.stiffness)}: expected a symmetric matrix")
-    stiffness = np.asarray((given + given.T) / 2.0)
+    stiffness = np.asarray((matrix + matrix.T) / 2.0)
     if len(stiffness) == 6:
         i, j = max(COUPLINGS, key=lambda entry: float(abs(stiffness[entry])))
         if abs(stiffness[i, j]) > noise:
@@ -180,7 +180,7 @@ def _checked_stiffness(material: material_forms.General) -> Float:
 
 
 def stable_compliance(material: material_forms.Orthotropic | material_forms.TransverselyIsotropic, plane: str) -> Float:
-    """Return the compliance (6, 6) in material axes, with the checks of the plane state."""
+    """Check and return the compliance (6, 6) in material axes, for a plane state."""
     compliance, state = known_compliance(material), voigt.PLANE_STATES[plane]
     if not voigt.is_positive_definite(compliance[:2, :2]):
         if isinstance(material, material_forms.Orthotropic):
@@ -189,9 +189,9 @@ def stable_compliance(material: material_forms.Orthotropic | material_forms.Tran
         else:
             fault = f"nu_transverse = {material.nu_transverse}: expected a number above -1 and below 1"
         raise ValueError(f"{fault}; no material is stable otherwise")
-    absent = [name for name in NEEDED[type(material)].get(plane, ()) if getattr(material, name) is None]
-    if absent:
-        fault = f"{', '.join(absent)}: missing; {state.title} {'needs it' if len(absent) == 1 else 'needs them'}"
+    missing = [name for name in NEEDED[type(material)].get(plane, ()) if getattr(material, name) is None]
+    if missing:
+        fault = f"{', '.join(missing)}: missing; {state.title} {'needs it' if len(missing) == 1 else 'needs them'}"
         raise ValueError(f"{fault}; {OF_DATA_SHEETS}" if isinstance(material, material_forms.Orthotropic) else fault)
     if state.is_sheet or voigt.is_positive_definite(compliance[:3, :3]):
         return compliance
@@ -226,7 +226,7 @@ def _numbers(*constants: float | None) -> list[float]:
 
 
 def contrast_lines(materials: Mapping[str, material_forms.Material], plane: str) -> tuple[list[str], list[str]]:
-    """Return faults and warnings for a large stiffness contrast between two stable phases."""
+    """Return the faults and warnings about a large stiffness contrast between stable phases."""
     with np.errstate(over="ignore"):
         sizes = {phase: float(np.abs(stiffness_of(material, plane)).max()) for phase, material in materials.items()}
     stiffest, softest = max(sizes, key=sizes.__getitem__), min(sizes, key=sizes.__getitem__)

@@ -29,11 +29,11 @@ TURN *= np.pi / 180
 
 @dataclass(frozen=True)
 class LawChange:
-    """Derivatives of a phase's law by one of its constants.
+    """The derivatives of a phase law by one constant.
 
     Attributes:
-        name: the key, for one of several numbers with its place, such as `stiffness.C12` or `expansion.3`.
-        value: the constant.
+        name: key of the constant, with an index in an array, such as `stiffness.C12` or `expansion.3`.
+        value: value of the constant.
         stiffness: dC, (3, 3) or (6, 6).
         expansion: (6,) d alpha.
     """
@@ -60,7 +60,7 @@ def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawCh
             terms = [(f"expansion.{k + 1}", value, np.eye(3)[k]) for k, value in enumerate(material.expansion)]
         elif material.expansion is not None:
             terms = [("expansion", material.expansion, np.ones(3))]
-        else:  # of a transversely isotropic phase
+        else:  # the pair of a transversely isotropic phase
             pair = zip(material_forms.EXPANSION_PAIR, ([0.0, 0.0, 1.0], [1.0, 1.0, 0.0]), strict=True)
             terms = [(name, getattr(material, name), np.array(axes)) for name, axes in pair]
         for name, value, axes in terms:
@@ -75,7 +75,7 @@ def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, fl
     turn = strain_rotation(-getattr(material, "angle", 0.0))
     turn = turn if len(C) == 6 else turn[IN_PLANE_BLOCK]
     for name, value in values.items():
-        moved = {other: complex(known, STEP * (other == name)) for other, known in values.items()}
+        moved = {other: complex(constant, STEP * (other == name)) for other, constant in values.items()}
         varied = replace(material, **moved)
         if isinstance(varied, material_forms.Isotropic):
             named = {entry: getattr(varied, key) for entry, key in ISOTROPIC_COMPLIANCE.items()}
@@ -87,14 +87,14 @@ def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, fl
 
 def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:
     """Yield the derivatives by the entries of a stiffness, on both sides of the diagonal."""
-    given = np.array(material.stiffness)
-    for i, j in zip(*np.triu_indices(len(given)), strict=True):
-        if (i, j) in COUPLINGS and len(given) == 6:
+    matrix = np.array(material.stiffness)
+    for i, j in zip(*np.triu_indices(len(matrix)), strict=True):
+        if (i, j) in COUPLINGS and len(matrix) == 6:
             continue
-        changed = (given + given.T) / 2 + 0j
+        changed = (matrix + matrix.T) / 2 + 0j
         changed[[i, j], [j, i]] += 1j * STEP
-        full = changed.imag / STEP if len(given) == len(C) else _of_plane_state(changed, plane, condensed="stress")
-        yield f"stiffness.C{i + 1}{j + 1}", float((given[i, j] + given[j, i]) / 2), full
+        full = changed.imag / STEP if len(matrix) == len(C) else _of_plane_state(changed, plane, condensed="stress")
+        yield f"stiffness.C{i + 1}{j + 1}", float((matrix[i, j] + matrix[j, i]) / 2), full
 
 
 def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
@@ -111,7 +111,7 @@ def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
 
 
 def constant_changes(C: Float, thermal: Float | None, dC: Float, dthermal: Float | None) -> dict[str, float]:
-    """Return the derivatives of `constants` along the changes dC and dthermal."""
+    """Differentiate the engineering `constants` along the changes dC and dthermal."""
     size = float(np.abs(dC).max() / np.abs(C).max()) or 1.0
     h = STEP / size
     heat = None if thermal is None or dthermal is None else thermal + 1j * h * dthermal

@@ -6,7 +6,6 @@ from feti_homog.schema import key, types
 
 Matrix = tuple[tuple[float, ...], ...]
 
-
 POSITIVE = types.real(above=0.0)
 MATRIX = types.either(
     "a symmetric 3x3 array of numbers in the order 11, 22, 12, or 6x6 in the order 11, 22, 33, 23, 13, 12",

@@ -1,4 +1,4 @@
-"""Compute bounds on composite constants, and the aligned cylinders behind bounds and estimates.
+"""Compute bounds on composite constants, and the model of aligned cylinders for bounds and estimates.
 
 Stiffnesses of the plane are (3, 3) in Voigt order [11, 22, 12] with engineering shear, in any stress unit.  Phases
 of cylinders have Hill's moduli k, l = 2 nu_A k, n = E_A + 4 nu_A^2 k, m = G_T and p = G_A, so that under an axial
@@ -7,7 +7,7 @@ strain e, a change of area theta and a change of temperature T
     s = k theta + l e - b T,  b = 2 k alpha_T + l alpha_A,
     sigma_33 = l theta + n e - g T,  g = 2 l alpha_T + n alpha_A,
 
-s being the mean of sigma_11 and sigma_22.
+where s is the mean of sigma_11 and sigma_22.
 """
 
 from __future__ import annotations
@@ -51,13 +51,13 @@ class FibreBounds:
 
 @dataclass(frozen=True)
 class Springs:
-    """Springs around round fibres of equal radius: positive stiffnesses traction / jump, inf if bonded.
+    """The springs around round fibres of equal radius: positive stiffnesses traction / jump, inf if bonded.
 
     Attributes:
         normal: k_n, for the opening.
         tangential: k_t, for the slip around the fibre.
-        axial: k_a, for the slip along it.
-        radius: a, in the stiffnesses' unit of length.
+        axial: k_a, for the slip along the fibre.
+        radius: a, in the length unit of the stiffnesses.
     """
 
     normal: float
@@ -67,14 +67,14 @@ class Springs:
 
     @property
     def compliances(self) -> tuple[float, float, float]:
-        """1/(k_n a), 1/(k_t a), 1/(k_a a)."""
+        """The compliances 1/(k_n a), 1/(k_t a) and 1/(k_a a)."""
         a = self.radius
         return 1 / (self.normal * a), 1 / (self.tangential * a), 1 / (self.axial * a)
 
 
 @dataclass(frozen=True)
 class Fibres:
-    """Fibres of one phase: volume fraction, constants and, around equal radii, springs."""
+    """The fibres of one phase: volume fraction, constants and, around fibres of equal radius, springs."""
 
     fraction: float
     constants: TransverseIsotropy
@@ -83,7 +83,7 @@ class Fibres:
 
 @dataclass(frozen=True)
 class Estimate:
-    """Constants by one method; null where it gives none."""
+    """The constants by one method; null where the method gives no value."""
 
     E_axial: float | None = described("Young's modulus along the fibres", records.STRESS)
     E_transverse: float | None = described("Young's modulus across the fibres", records.STRESS)
@@ -97,7 +97,7 @@ class Estimate:
 
     @classmethod
     def of(cls, constants: TransverseIsotropy) -> Estimate:
-        """Return the estimate of all constants."""
+        """Make the estimate with all constants of a material."""
         return cls(**{name: getattr(constants, name) for name in CONSTANTS})
 
 
@@ -128,6 +128,7 @@ def reuss(fractions: ArrayLike, stiffnesses: ArrayLike) -> Float:
 
 
 def is_isotropic(stiffness: ArrayLike) -> bool:
+    """Return whether a plane stiffness is isotropic, up to rounding."""
     return engineering_constants.anisotropy(stiffness) < ISOTROPY
 
 
@@ -165,7 +166,7 @@ def aligned_cylinders(
         l* = (k* + m0) L,  L = sum c l/x,  n* = sum c (n - l^2/x) + l* L,
         b* = (k* + m0) B,  B = sum c b/x,  g* = sum c (g - l b/x) + l* B,
 
-    for s + m0 theta is the same in all cylinders.  Hill 1964, Hashin 1965, Walpole 1969; b and g by the same steps.
+    because s + m0 theta is equal in all cylinders.  Hill 1964, Hashin 1965, Walpole 1969; b and g by the same steps.
     """
     c, (k0, m0, p0) = np.asarray(fractions, dtype=float), surroundings
     k, nu, E, m, p = np.array(
@@ -203,7 +204,7 @@ def aligned_cylinders(
 
 
 def expansions(phase: TransverseIsotropy) -> Pair | None:
-    """Return axial and transverse expansion, if the phase has both."""
+    """Return the axial and transverse expansions, if the phase has both."""
     if phase.expansion_axial is None or phase.expansion_transverse is None:
         return None
     return phase.expansion_axial, phase.expansion_transverse
@@ -212,13 +213,13 @@ def expansions(phase: TransverseIsotropy) -> Pair | None:
 def equivalent_fibre(family: Fibres, matrix: TransverseIsotropy) -> TransverseIsotropy:
     """Return the bonded fibre that replaces a fibre on springs, under a uniform far field.
 
-    E_axial, nu_axial and the expansions stay;
+    E_axial, nu_axial and the expansions remain, and
 
         1/k_e = 1/k + 2/(k_n a),  1/p_e = 1/p + 1/(k_a a),
         1/m_e = 1/m + (x (q_n + q_t) + 12 q_n q_t) / (x + 3 (q_n + q_t)),  x = 1/m + 2/k + 1/m_m,  q_i = 1/(k_i a),
 
     with the bulk modulus k, the shear moduli m across and p along the fibre, and m_m for the matrix.  k_e and p_e hold
-    in a composite cylinder too (Hashin 1990); m_e does not, for shear across a coated fibre is not uniform in it.
+    in a composite cylinder too (Hashin 1990); m_e does not, because shear in a coated fibre is not uniform.
     """
     fibre, springs = family.constants, family.springs
     if springs is None:
@@ -242,9 +243,9 @@ def equivalent_fibre(family: Fibres, matrix: TransverseIsotropy) -> TransverseIs
 def fibre_bounds(fractions: Sequence[float], phases: Sequence[TransverseIsotropy]) -> FibreBounds:
     """Bound the constants of bonded, transversely isotropic cylinders along x3, with any section.
 
-    `aligned_cylinders` with the least moduli of the phases around, and with the greatest.  Bounds on nu_A are the
-    values of Hill's relation at the bounds on k, so for two phases only.  All but the bounds on G_T hold for square
-    symmetry too.  Hill 1964, Hashin 1965, Walpole 1969.
+    The bounds are `aligned_cylinders` in a medium with the least, or the greatest, moduli of the phases.  Hill's
+    relation at the bounds on k gives the bounds on nu_A, for two phases only.  All bounds except those on G_T also
+    hold for square symmetry.  Hill 1964, Hashin 1965, Walpole 1969.
     """
 
     def extreme(pick: Callable[[Iterable[float]], float]) -> tuple[float, float, float]:

@@ -1,7 +1,7 @@
-"""Strength criteria of phases, each as its utilisation: 1 at failure, proportional to the stress.
+"""Compute the utilisation of phases by strength criteria: 1 at failure, proportional to the stress.
 
 Maximum principal stress sigma_1 / X; von Mises; Drucker and Prager by both uniaxial strengths; for fibres along x3 the
-four modes of Hashin (J. Appl. Mech. 47 (1980) 329), of which the largest counts.
+largest of Hashin's four modes (J. Appl. Mech. 47 (1980) 329).
 """
 
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ CRITERIA = {
         "transverse_shear",
     ),
 }  # fmt: skip
-"""Criteria, each with the keys that it needs."""
+"""Criteria with the keys that each criterion needs."""
 
 
 def criterion(strength: PhaseStrength) -> str:
@@ -29,16 +29,16 @@ def criterion(strength: PhaseStrength) -> str:
     Raises:
         ValueError: no criterion has exactly these keys.
     """
-    given = [name for names in CRITERIA.values() for name in names if getattr(strength, name) is not None]
+    names_given = [name for names in CRITERIA.values() for name in names if getattr(strength, name) is not None]
     for title, names in CRITERIA.items():
-        if given == list(names):
+        if names_given == list(names):
             return title
     groups = "; ".join(f"{', '.join(names)} ({title})" for title, names in CRITERIA.items())
-    raise ValueError(f"strength: {', '.join(given) or 'empty'}: expected the keys of one criterion: {groups}")
+    raise ValueError(f"strength: {', '.join(names_given) or 'empty'}: expected the keys of one criterion: {groups}")
 
 
 def utilisation(strength: PhaseStrength, stress: Float, principal: Float, von_mises: Float) -> Float:
-    """Compute the utilisation (n,) of a strength.
+    """Compute the utilisation (n,) of a phase strength under stresses.
 
     Args:
         stress: (n, 6) in the order [11, 22, 33, 23, 13, 12], x3 along the fibres.
@@ -47,14 +47,14 @@ def utilisation(strength: PhaseStrength, stress: Float, principal: Float, von_mi
     """
     limits = {name: float(limit) for name, limit in vars(strength).items() if limit is not None}
     if "principal" in limits:
-        share = principal / limits["principal"]
+        ratio = principal / limits["principal"]
     elif "von_mises" in limits:
-        share = von_mises / limits["von_mises"]
+        ratio = von_mises / limits["von_mises"]
     elif "tension" in limits:
-        share = _drucker_prager(limits, stress[:, :3].sum(axis=1), von_mises)
+        ratio = _drucker_prager(limits, stress[:, :3].sum(axis=1), von_mises)
     else:
-        share = _hashin(limits, stress)
-    return np.maximum(share, 0.0)
+        ratio = _hashin(limits, stress)
+    return np.maximum(ratio, 0.0)
 
 
 def _drucker_prager(limits: Mapping[str, float], trace: Float, von_mises: Float) -> Float:

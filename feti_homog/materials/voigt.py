@@ -1,6 +1,6 @@
 """Define Voigt orders with engineering shears: component names, plane states, rotations, stress measures.
 
-[11, 22, 12] in plane strain and plane stress, [11, 22, 33, 23, 13, 12] in space and generalized plane strain.
+The order is [11, 22, 12] in plane strain and stress, [11, 22, 33, 23, 13, 12] in space and generalized plane strain.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ STIFFNESSES = tuple(f"C{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
 SPATIAL_STIFFNESSES = tuple(f"C{i}{j}" for i in range(1, 7) for j in range(1, 7))
 THERMAL_STRESSES = tuple(f"thermal_{name}" for name in SPATIAL_STRESSES)
 EXPANSIONS = ("expansion_x1", "expansion_x2", "expansion_axial", *(f"expansion_{name}" for name in SPATIAL_STRAINS[3:]))
-"""Names of the strains per unit of temperature, x3 along the fibres."""
+"""Names of the strains per unit of temperature, with x3 along the fibres."""
 IN_PLANE = [0, 1, 5]
 """Indices of [11, 22, 12] in the spatial order."""
 IN_PLANE_BLOCK = np.ix_(IN_PLANE, IN_PLANE)
@@ -25,16 +25,16 @@ IN_PLANE_BLOCK = np.ix_(IN_PLANE, IN_PLANE)
 
 @dataclass(frozen=True)
 class PlaneState:
-    """A plane state.
+    """A plane state of the analysis.
 
     Attributes:
         name: value of [analysis] plane.
-        title: its name in words.
+        title: name of the state in words.
         strains, stresses: component names, in Voigt order.
-        is_sheet: whether S33 vanishes; else E33 does, or is a load.
-        is_spatial: whether all six strains are loads, and with them a temperature: then axial shear is a problem of its
-            own, the stiffness is (6, 6), and constants, estimates and bounds are spatial.
-        numbers: i and j in the names Cij of the entries of strains of the plane.
+        is_sheet: whether S33 vanishes; otherwise E33 vanishes or is a load.
+        is_spatial: whether all six strains and a temperature are loads: then axial shear is a separate problem, the
+            stiffness is (6, 6), and constants, estimates and bounds are spatial.
+        numbers: index of each plane strain in the names Cij of stiffness entries.
     """
 
     name: str
@@ -47,7 +47,7 @@ class PlaneState:
 
     @property
     def components(self) -> tuple[tuple[str, str], ...]:
-        """Return strain name and stress name of each component."""
+        """The strain name and the stress name of each component."""
         return tuple(zip(self.strains, self.stresses, strict=True))
 
     @property
@@ -65,12 +65,12 @@ PLANE_STATES = {state.name: state for state in (PLANE_STRAIN, PLANE_STRESS, GENE
 
 
 def plane_state_of(document: Document) -> PlaneState:
-    """Return the plane state of a document of result.json."""
+    """Return the plane state of a result.json document."""
     return PLANE_STATES[document["case"]["analysis"]["plane"]]
 
 
 def voigt_names(count: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names of strains and stresses, 3 in the plane or 6 in space."""
+    """Return the strain names and stress names, 3 in the plane or 6 in space."""
     return (STRAINS, STRESSES) if count == len(STRAINS) else (SPATIAL_STRAINS, SPATIAL_STRESSES)
 
 
@@ -108,14 +108,14 @@ def is_positive_definite(matrix: Float) -> bool:
 
 
 def von_mises(stress: Float, S33: Float) -> Float:
-    """Return sqrt(3/2 s:s) (m,), s the deviator of [S11, S22, S12] (m, 3) and S33 (m,)."""
+    """Return the von Mises stress (m,), sqrt(3/2 s:s) with deviator s, of [S11, S22, S12] (m, 3) and S33 (m,)."""
     S11, S22, S12 = stress.T
     between_11 = np.hypot(S11 - S22, S33 - S11)
     return np.asarray(np.hypot(between_11, np.hypot(S22 - S33, np.sqrt(6) * S12)) / np.sqrt(2))
 
 
 def principal(stress: Float, S33: Float) -> Float:
-    """Return principal stresses (m, 3), largest first, of [S11, S22, S12] and S33; NaN as S33."""
+    """Return the principal stresses (m, 3), largest first, of [S11, S22, S12] and S33; NaN where S33 is NaN."""
     S11, S22, S12 = stress.T
     middle, radius = (S11 + S22) / 2, np.hypot((S11 - S22) / 2, S12)
     ordered = np.sort(np.stack([middle - radius, middle + radius, S33], axis=1), axis=1)[:, ::-1]
@@ -128,7 +128,7 @@ def spatial_von_mises(stress: Float, S33: Float, axial: Float) -> Float:
 
 
 def spatial_principal(stress: Float, S33: Float, axial: Float) -> Float:
-    """Return principal stresses (m, 3), largest first, of the stresses in `spatial_von_mises`."""
+    """Return the principal stresses (m, 3), largest first, with arguments as in `spatial_von_mises`."""
     tensor = np.empty((len(stress), 3, 3))
     tensor[:, :2, :2], tensor[:, 2, 2] = stress[:, [[0, 2], [2, 1]]], S33
     tensor[:, :2, 2] = tensor[:, 2, :2] = axial[:, ::-1]

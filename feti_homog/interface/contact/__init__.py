@@ -1,4 +1,4 @@
-"""Open and closed nodes of debonded interfaces at one load.
+"""Contact of debonded interfaces under one load: open and closed nodes.
 
 Imports `feti`, `interface`, `materials`, `mesh` and `system`.  Main entries: `contact_problem.ContactProblem` and
 `coupled_interfaces.CoupledInterfaces`.

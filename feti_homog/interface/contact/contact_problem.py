@@ -1,19 +1,19 @@
-"""Unilateral, frictionless contact of debonded faces: decide which nodes are open and which are closed.
+"""Unilateral, frictionless contact of debonded faces: the search for open and closed nodes.
 
 With the normal force of a node, tension positive, and its pressure p = -force, the KKT conditions of debonded faces are
 
     gap >= 0,    p >= 0,    gap p = 0.
 
 The dual problem sets p = 0 at an open node and gap = 0 at a closed node, so every solution meets the third condition.
-The inequalities decide (`ContactProblem._violations`): an open node that overlaps and a closed node under tension have
-the wrong status.  Block principal pivoting (Judice & Pires, Computers & Operations Research 21, 1994) on the strictly
-convex dual problem corrects it: all wrong nodes change at once while their number falls, else only the first one
-(Murty's rule).  Without free fibres gap = q + A p with a positive definite A, so that no set of statuses returns and
-the search ends.  With free fibres A is semi-definite, and an end is not proven.
+An open node that overlaps and a closed node under tension violate the inequalities (`ContactProblem._violations`), and
+have the wrong status.  Block principal pivoting (Judice & Pires, Computers & Operations Research 21, 1994) on the
+strictly convex dual problem corrects wrong statuses: all wrong nodes change at once while the number of wrong nodes
+falls, or else only the first wrong node (Murty's rule).  Without free fibres gap = q + A p with a positive definite A,
+so that no set of statuses returns and the search ends.  With free fibres A is semi-definite, and an end is not certain.
 
 A damaged bond is pulled (compliance C, force >= 0) or pressed (compliance C_0 as without damage, force <= 0).  With
 s = jump - C_0 force >= 0 and w = s / (C - C_0) - force >= 0, s w = 0: the conditions of a debonded node, for which C is
-infinite.  So one search finds both.
+infinite.  So one search finds the states of faces and of damaged bonds.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,9 +32,9 @@ from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState,
 from feti_homog.interface.loads import Load
 from feti_homog.typing import Bool, Float, Int
 
-# Block pivots from the last progress on; the literature usually allows ten without progress.
+# Number of block pivots since the last progress; the literature usually allows ten without progress.
 BLOCK_PIVOTS = 11
-# Dual problems after which the search gives up; the certificate then shows the errors.
+# Number of dual problems after which the search gives up; the certificate then shows the errors.
 MAX_CONTACT_SOLVES = 500
 
 
@@ -44,10 +44,10 @@ class ContactProblem:
 
     Attributes:
         solver: dual solver.
-        contact: false lets debonded faces overlap; damaged bonds are stiff under pressure all the same.
+        contact: whether faces resist overlap; if not, damaged bonds are still stiff under pressure.
         size: (2,) cell size, a scale of displacements.
-        softening: maps bonds and (k,) True for tension to C / C_0 (k, 3) of springs, or to None if all are 1.
-        block_pivots: block pivots from the last progress on, before single nodes change; 0 begins with single nodes.
+        softening: maps bonds and a mask (k,) of tension to ratios C / C_0 (k, 3) of springs, or None if all are 1.
+        block_pivots: block pivots since the last progress before single nodes change; 0 begins with single nodes.
     """
 
     solver: FetiSolver
@@ -59,11 +59,14 @@ class ContactProblem:
 
     @property
     def nodes(self) -> constraint_layout.InterfaceNodes:
-        """This rank's interface nodes."""
+        """The interface nodes of this rank."""
         return self.solver.jump_operator.nodes
 
     def active(self, status: Status) -> Float:
-        """Mark active multipliers (owned rows,) by 1: all at bonded nodes, the normal force at closed nodes."""
+        """Mark the active multipliers (owned rows,) by 1.
+
+        All multipliers at bonded nodes, and normal forces at closed nodes, are active.
+        """
         mask = np.ones(self.solver.rows)
         mask[self._pairs] = (status == BONDED)[:, None]
         if self.contact:
@@ -71,11 +74,11 @@ class ContactProblem:
         return mask
 
     def prepare(self, bonds: BondState) -> None:
-        """Set the active multipliers and spring compliances of these bonds.  Collective."""
+        """Set the solver to the active multipliers and spring compliances of the bonds.  Collective."""
         self.solver.set_state(self.active(bonds.status), self.compliance(bonds))
 
     def compliance(self, bonds: BondState) -> Float:
-        """Return the spring compliance C (owned rows,) of these bonds."""
+        """Return the spring compliance C (owned rows,) of the bonds."""
         C, factors = self.solver.intact_compliance, self._factors(bonds)
         if factors is None:
             return C
@@ -86,7 +89,7 @@ class ContactProblem:
         return C
 
     def _factors(self, bonds: BondState) -> tuple[Float, Float] | None:
-        """Return C / C_0 (k, 3) for pulled and for pressed bonds, stored for the last call; None without softening."""
+        """Return C / C_0 (k, 3) for pulled and for pressed bonds; None without softening."""
         if not (self._last and self._last[0][0] is bonds):
             pulled, soft, stiff = np.ones(len(bonds.status), bool), None, None
             if self.softening is not None:
@@ -95,7 +98,7 @@ class ContactProblem:
         return self._last[0][1]
 
     def _gained(self, bonds: BondState) -> Float:
-        """Return C - C_0 (k,) for normal springs of damaged bonds; 0 at other nodes, and along fibres."""
+        """Return C - C_0 (k,) of damaged normal springs; 0 at other nodes and in the axial problem."""
         factors = self._factors(bonds)
         if factors is None or self.solver.jump_operator.components != 2:
             return np.zeros(len(bonds.status))
@@ -103,35 +106,35 @@ class ContactProblem:
         return np.where(bonds.status == BONDED, C * (factors[0] - factors[1])[:, 0], 0.0)
 
     def damaged(self, bonds: BondState) -> Bool:
-        """Mark the damaged bonds (k,), which are softer under tension than under compression."""
+        """Mark the damaged bonds (k,), which are softer in tension than in compression."""
         return self._gained(bonds) > 0.0
 
     def debond(self, status: Status, which: Bool, lam: Float) -> Status:
-        """Debond the bonds `which` (k,): return the statuses, open after tension and closed after compression."""
+        """Return the statuses after bonds `which` (k,) part: open after tension, closed after compression."""
         force = lam[self.nodes.row]
         released = np.where((force < 0) & self.contact, CLOSED, OPEN).astype(np.int8)
         return np.where(which & (status == BONDED), released, status)
 
     def traction(self, solution: DualSolution) -> Float:
-        """Return the traction (k, c): normal, tension positive, and tangential; or along the fibre."""
+        """Return the normal and tangential traction (k, 2), tension positive, or axial traction (k, 1)."""
         return np.asarray(solution.lam[self._pairs] / self.nodes.length[:, None])
 
     def jump(self, solution: DualSolution) -> Float:
-        """Return gap and slip (k, c), matrix minus fibre; or slip along the fibre."""
+        """Return gap and slip (k, 2), matrix minus fibre, or slip along the fibre (k, 1)."""
         return np.asarray(solution.opening[self._pairs])
 
     def stress(self, solution: DualSolution) -> Float:
-        """Return Sigma and the work conjugates of other loads (v,) from multipliers alone.  Collective."""
+        """Return the macroscopic stresses (v,), conjugate to all loads, from multipliers alone.  Collective."""
         return np.asarray(self.solver.stress_integral(solution) / self.size.prod())
 
     @cached_property
     def scales(self) -> LoadScales:
-        """Scales of load effects, computed at the first read, which is collective."""
+        """The scales of load effects.  Collective when first read."""
         return LoadScales(self.solver, self.size)
 
     @cached_property
     def _pairs(self) -> Int:
-        """Return the owned rows (k, c) of the interface nodes."""
+        """The owned rows (k, c) of the interface nodes."""
         return self.nodes.row[:, None] + np.arange(self.solver.jump_operator.components)
 
     def linear(self, load: Load, bonds: BondState, start: Float) -> DualSolution:
@@ -144,18 +147,18 @@ class ContactProblem:
         return mixed_load.solve(self.scales, load, start)
 
     def completed(self, state: Equilibrium) -> Equilibrium:
-        """Add amplitudes and jumps by F lambda to a state without them.  Collective."""
+        """Add amplitudes and jumps, by F lambda, to a state without amplitudes.  Collective."""
         if state.solution.alpha is not None:
             return state
         self.prepare(state.bonds)
         return replace(state, solution=self._place_free_fibres(state.bonds, self.solver.completed(state.solution))[0])
 
     def is_linear(self, status: Status) -> bool:
-        """Return whether contact cannot change: no faces are debonded, or they may overlap.  Collective."""
+        """Return whether contact cannot change: no faces are debonded, or faces may overlap.  Collective."""
         return not (self.contact and self._any(status != BONDED))
 
     def equilibria(self, strains: Float, bonds: BondState, starts: Sequence[Float]) -> list[Equilibrium]:
-        """Solve for all strains (n, 3) together, at fixed statuses.  Collective."""
+        """Solve for equilibrium under all strains (n, 3) together, at fixed statuses.  Collective."""
         self.prepare(bonds)
         solutions = self.solver.solve_many(strains, np.stack(starts, axis=1))
         return [
@@ -164,7 +167,7 @@ class ContactProblem:
         ]
 
     def equilibrium(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
-        """Find statuses and solution under a load, from a first guess `bonds`.  Collective; raises as `linear`."""
+        """Find the statuses and the solution under a load, from guessed `bonds`.  Collective; raises as `linear`."""
         try:
             return self._search(load, bonds, start)
         except NotCarriedError:
@@ -175,7 +178,7 @@ class ContactProblem:
         return self._search(load, bonds.with_status(closed), start)
 
     def _search(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
-        """Flip wrong statuses until none violates the KKT conditions.  Collective; raises as `linear`."""
+        """Flip wrong statuses until no node violates the KKT conditions.  Collective; raises as `linear`."""
         comm, fewest, pivots = self.solver.comm, np.inf, 0
         iterations = solves = 0
         while True:
@@ -190,13 +193,13 @@ class ContactProblem:
             if count < fewest:
                 fewest, pivots = count, self.block_pivots
             if pivots <= 0:
-                # The first wrong node of the first rank that has a wrong node.
+                # Only the first wrong node changes, on the first rank that has a wrong node.
                 rank = comm.allreduce(comm.rank if wrong.any() else comm.size, MPI.MIN)
                 wrong = np.arange(len(wrong)) == (np.argmax(wrong) if rank == comm.rank else -1)
             bonds, start = bonds.flipped(wrong), solution.lam
 
     def undetermined(self, state: Equilibrium) -> Bool:
-        """Mark the strains (v,) that open faces leave free while their stresses are prescribed.  Collective."""
+        """Mark the strains (v,) that open faces leave free under prescribed stresses.  Collective."""
         has_history, by_stress = state.bonds.gap_and_slip is not None, state.load.by_stress
         if has_history or not by_stress.any() or not self._any(state.status != BONDED):
             return np.zeros(len(by_stress), bool)
@@ -206,11 +209,11 @@ class ContactProblem:
         return mixed_load.unresisted(self.solver, by_stress, stiffness)
 
     def _any(self, which: Bool) -> bool:
-        """Return whether any rank has a node in `which`.  Collective."""
+        """Return whether the mask `which` marks a node on any rank.  Collective."""
         return bool(self.solver.comm.allreduce(bool(which.any()), MPI.LOR))
 
     def _place_free_fibres(self, bonds: BondState, solution: DualSolution) -> tuple[DualSolution, Bool]:
-        """Move free fibres until their gaps open, and mark the open nodes (k,) that squeeze a fibre.  Collective."""
+        """Move free fibres until all gaps open, and mark open nodes (k,) that squeeze a fibre.  Collective."""
         coarse = self.solver.natural
         if not (self.contact and coarse.unconstrained_modes.shape[1]):
             return solution, np.zeros(len(bonds.status), bool)
@@ -225,8 +228,8 @@ class ContactProblem:
     def _violations(self, bonds: BondState, solution: DualSolution) -> Bool:
         """Mark the nodes (k,) that violate gap >= 0 or pressure >= 0 beyond the solver's error.  Collective.
 
-        A debonded node has one of these conditions by its status.  A damaged bond needs tension if it counts as pulled,
-        and pressure if it counts as pressed.
+        The status of a debonded node selects the condition.  A damaged bond needs tension if the bond counts as pulled,
+        and pressure if the bond counts as pressed.
         """
         status, damaged = bonds.status, self.damaged(bonds)
         if not self.contact and not self._any(damaged):
@@ -241,10 +244,10 @@ class ContactProblem:
     def _equilibrium(
         self, load: Load, bonds: BondState, solution: DualSolution, iterations: int, solves: int
     ) -> Equilibrium:
-        """Return the final state with its certificate and its number of free rigid motions.  Collective.
+        """Return the final state with the certificate and the number of free rigid motions.  Collective.
 
-        Bonds and faces under compression resist motions.  Closed nodes without a force hold no fibre: they count as
-        open if a fibre is free without them.  The fibre then lies where its faces part least, if it has room there.
+        Bonds and faces under compression resist motions.  Closed nodes without a force hold no fibre, and count as open
+        if a fibre is free without these nodes.  The fibre then moves to where its faces part least, if it has room.
         """
         asked, status, coarse = self.scales.asked(load), bonds.status, self.solver.natural
         motions, idle = coarse.unconstrained_modes, np.zeros(len(status), bool)
@@ -268,10 +271,10 @@ class ContactProblem:
         return Equilibrium(load, bonds, solution, iterations, solves, motions.shape[1], certificate, asked)
 
     def certificate(self, bonds: BondState, solution: DualSolution, asked: Float) -> dict[str, float]:
-        """Measure the errors of the KKT conditions, as `kkt_errors`; `asked` as in `Equilibrium`.  Collective."""
+        """Measure the errors in the KKT conditions by `kkt_errors`; `asked` as in `Equilibrium`.  Collective."""
         status, gained, acting = bonds.status, self._gained(bonds), self.acting(bonds, solution.strain, asked)
         damaged = gained > 0.0
-        # A pulled bond opens by its damage; under pressure it overlaps.
+        # A pulled bond opens by the damage; under pressure the bond would overlap.
         overlap = np.minimum(gained * solution.lam[self.nodes.row], 0.0)
         gap = np.where(damaged & ~bonds.pressed, overlap, solution.jump[self.nodes.row])
         debonded = ((status != BONDED) & self.contact) | damaged
@@ -279,7 +282,7 @@ class ContactProblem:
         return kkt_errors(self.scales, self.traction(solution), gap, debonded, closed, acting)
 
     def acting(self, bonds: BondState, strain: Float, asked: Float) -> Float:
-        """Return `LoadScales.acting` (v,) of the strain and, with friction, of residual jumps.  Collective."""
+        """Return the load sizes (v,) from the strain and, with friction, residual jumps.  Collective."""
         if bonds.gap_and_slip is not None:
             jump = self.solver.comm.allreduce(float(np.abs(bonds.gap_and_slip).max(initial=0.0)), MPI.MAX)
             is_strain = np.arange(len(strain)) < self.solver.problem.strains

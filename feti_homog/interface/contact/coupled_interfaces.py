@@ -1,9 +1,9 @@
-"""A cell under loads of all its problems: in the plane and, in generalized plane strain, along the fibres.
+"""The interfaces of a cell under plane loads and, in generalized plane strain, loads along the fibres.
 
 Phases are symmetric about x3 = 0, so the problems share only the bonds: the plane problem decides contact, and a
 debonded node carries no traction along the fibre.
 
-The damaged fraction of a bond rubs, after Alfano & Sacco (2006).  At damage d, slip s and stiffness K, the fraction
+The damaged fraction of a bond has friction (Alfano & Sacco, 2006).  At damage d, slip s and stiffness K, the fraction
 1 - d bears (1 - d) K s, and the fraction d bears f = K (s - s_i), bounded by Coulomb's law with the full pressure.
 With g = d s_i this is a face with the jump g on the spring 1 / (C - C_0) and the extra force f:
 lam = g / (C - C_0) + f, s = C_0 lam + g.  The solution has r = s - C lam.
@@ -22,14 +22,14 @@ from feti_homog.typing import Float
 
 
 class CoupledInterfaces:
-    """The interfaces of a cell, shared by its plane and axial problems.
+    """The interfaces that the plane and axial problems of a cell share.
 
     Strains and stresses (n,) have the plane components first, then the axial components.
 
     Attributes:
         plane: plane problem, with contact.
         problems: `plane` and, in generalized plane strain, the axial problem, without contact.
-        comm, nodes: all ranks, and the interface nodes of this rank.
+        comm, nodes: communicator of all ranks, and the interface nodes of this rank.
         area: cell area.
         loads: names of the n strains.
     """
@@ -40,7 +40,7 @@ class CoupledInterfaces:
         self.loads: tuple[str, ...] = sum((problem.solver.problem.loads for problem in self.problems), ())
 
     def no_multipliers(self) -> Multipliers:
-        """Return the multipliers of an unloaded cell."""
+        """Return the zero multipliers of an unloaded cell."""
         return tuple(np.zeros(problem.solver.rows) for problem in self.problems)
 
     def linear(self, load: Load, bonds: BondState, start: Multipliers) -> tuple[DualSolution, ...]:
@@ -57,7 +57,7 @@ class CoupledInterfaces:
         return state
 
     def completed(self, state: Equilibrium) -> Equilibrium:
-        """Add amplitudes and jumps by F lambda to a state without them.  Collective."""
+        """Add amplitudes and jumps, by F lambda, to a state without amplitudes.  Collective."""
         axial = None if state.axial is None else self.problems[1].completed(state.axial)
         return replace(self.plane.completed(state), axial=axial)
 
@@ -68,8 +68,8 @@ class CoupledInterfaces:
     def leg_start(self, origin: Macroscopic, before: Load | None, end: Load) -> Load:
         """Return the load at the beginning of a leg to `end`.  Collective.
 
-        Its values are the values of the waypoint `before`; components that change between strain and stress have the
-        values of the last point, `origin`, where a stress within the solver's error is 0.
+        The load has the values of the waypoint `before`.  Components that change between strain and stress take the
+        values of the last point, `origin`, with 0 for a stress within the solver's error.
         """
         parts = np.split(origin.strain, [len(self.plane.solver.problem.loads)])
         pairs = zip(parts, self.problems, strict=False)
@@ -82,7 +82,7 @@ class CoupledInterfaces:
         return Load(values, end.by_stress)
 
     def traction(self, solutions: Sequence[DualSolution]) -> Float:
-        """Return the normal and tangential traction (k, 2), tension positive, or (k, 3) with the axial traction."""
+        """Return the traction (k, c), tension positive: normal, tangential and, if c = 3, axial."""
         pairs = zip(self.problems, solutions, strict=True)
         return np.hstack([problem.traction(solution) for problem, solution in pairs])
 
@@ -92,14 +92,17 @@ class CoupledInterfaces:
         return Macroscopic(np.concatenate([solution.strain for solution in solutions]), np.concatenate(stresses))
 
     def least_bonded_stress(self, strains: Float) -> Float:
-        """Return the stresses (m, n) of strains (m, n) by the smallest bonded stiffness.  Collective."""
+        """Return the stresses (m, n) under strains (m, n) for the least bonded stiffness.  Collective."""
         parts = np.split(strains, [len(self.plane.solver.problem.loads)], axis=1)
         pairs = zip(parts, self.problems, strict=False)
         return np.hstack([strain @ problem.scales.least_bonded_stiffness for strain, problem in pairs])
 
 
 def slipped(interface: ContactProblem, state: Equilibrium) -> Float:
-    """Return r (owned rows,) in the tangential rows of damaged bonds; 0 in other rows, or without friction."""
+    """Return r = s - C lam (owned rows,) in the tangential rows of damaged bonds.
+
+    The result is 0 in other rows, and without friction.
+    """
     r = np.zeros(interface.solver.rows)
     if state.bonds.gap_and_slip is not None and interface.solver.jump_operator.components > 1:
         rows = interface.nodes.row[state.status == BONDED] + 1
@@ -109,14 +112,20 @@ def slipped(interface: ContactProblem, state: Equilibrium) -> Float:
 
 
 def energy_beside_springs(interface: ContactProblem, state: Equilibrium) -> float:
-    """Return C_0 lam^2 + g^2 / (C - C_0) minus lam C lam on this rank: r^2 / (C - C_0) + 2 r lam."""
-    r, more = slipped(interface, state), state.solution.compliance - interface.solver.intact_compliance
+    """Return the energy of damaged bonds on this rank beyond lam C lam.
+
+    C_0 lam^2 + g^2 / (C - C_0) exceeds lam C lam by r^2 / (C - C_0) + 2 r lam.
+    """
+    r, gained = slipped(interface, state), state.solution.compliance - interface.solver.intact_compliance
     rows = np.flatnonzero(r)
-    return float(r[rows] @ (r[rows] / more[rows] + 2.0 * state.solution.lam[rows]))
+    return float(r[rows] @ (r[rows] / gained[rows] + 2.0 * state.solution.lam[rows]))
 
 
 def held_traction(cell: CoupledInterfaces, state: Equilibrium) -> Float:
-    """Return the traction (k, c) at this rank's nodes; the shear of a damaged bond is s / C, in its intact fraction."""
+    """Return the traction (k, c) in the intact fraction of bonds on this rank.
+
+    The shear in the intact fraction of a damaged bond is s / C.
+    """
     traction, r = cell.traction(state.solutions), slipped(cell.plane, state)[cell.nodes.row + 1]
     nodes = np.flatnonzero(r)
     C = state.solution.compliance[cell.nodes.row[nodes] + 1]

@@ -1,6 +1,6 @@
-"""Positions of free fibres: rigid motions that open all their gaps, or the nodes that squeeze them.
+"""Positions of free fibres: rigid motions that open all gaps, or the nodes that squeeze a fibre.
 
-Gaps of a free fibre are unique up to its rigid motions M a.  The fibre has room if amplitudes a exist with
+The gaps of a free fibre are unique up to rigid motions M a.  The fibre has room if amplitudes a exist with
 gap + M a >= 0.  A linear programme for each fibre, solved on rank 0, decides.
 """
 
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-# Rigid motions that change gaps by less, relative to slips, open none: a round fibre turns.
+# Ratio of gaps to slips below which a rigid motion opens no gap: a round fibre turns.
 LARGEST_GAP_OF_SLIDING = 1e-9
-# Largest amplitude of a motion in a linear programme, in largest gaps: a fibre may have unlimited room on one side.
+# Largest motion in a linear programme / largest gap: a fibre may have unlimited room on one side.
 LARGEST_MOTION = 1e3
 # Smallest tolerance of HiGHS, relative to the largest gap; its default of 1e-7 is coarser than the solver's error.
 LP_TOLERANCES = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
@@ -45,7 +45,7 @@ class _Fibres:
         is_open: (k,) open nodes.
         opening: (k, motions) gaps that the free motions open.
         reach: (motions,) largest gap or slip of each motion at any node: open nodes may lie within one rigid group.
-        fibre: (k,) number of the fibre; a fibre and its coating, or neighbouring layers, count as one.
+        fibre: (k,) number of the fibre; a fibre counts with its coating, and neighbouring layers count together.
     """
 
     is_open: Bool
@@ -56,7 +56,7 @@ class _Fibres:
     def nodes_and_motions(self, which: Bool) -> Iterator[tuple[Array, Float, Array, Float]]:
         """Yield the open nodes and gap-opening motions of each fibre with an open node in `which` (k,).
 
-        For each fibre: the nodes (n,), their gaps M (n, m) under m motions, the numbers (c,) of the free motions that
+        The items are the nodes (n,), their gaps M (n, m) under m motions, the numbers (c,) of the free motions that
         move the nodes, and the combinations (c, m) of free motions in M; m = 0 if no free motion opens a gap.
         """
         nodes = np.flatnonzero(self.is_open & np.isin(self.fibre, self.fibre[self.is_open & which]))
@@ -73,7 +73,10 @@ class _Fibres:
             yield nodes[first:last], motions @ modes, columns, modes
 
     def place(self, gap: Float, noise: float) -> tuple[Float, Bool]:
-        """Return amplitudes (motions,) of overlapping fibres, and mark the nodes (k,) that squeeze a fibre."""
+        """Return the motions of overlapping fibres, and mark the nodes that squeeze a fibre.
+
+        `gap` is (k,); return amplitudes (motions,) and a mask (k,).
+        """
         squeezes, amplitudes = np.zeros(len(gap), bool), np.zeros(self.opening.shape[1])
         for node, motion, columns, modes in self.nodes_and_motions(gap < -noise):
             if not modes.shape[1]:
@@ -84,12 +87,12 @@ class _Fibres:
             amplitudes[columns] += modes @ (result.x[:-1] * scale / size)
             if float(result.x[-1] * scale) < -noise:
                 forces = -result.ineqlin.marginals
-                # Smaller forces are not needed for the balance.
+                # The balance does not need smaller forces.
                 squeezes[node[forces > NEGLIGIBLE * forces.max()]] = True
         return amplitudes, squeezes
 
     def shares(self, before: Float, after: Float, noise: float) -> tuple[float, float]:
-        """Return the fractions of the way between gaps (k,), as `FloatingBodies.admissible_share`."""
+        """Return both fractions of the way between gaps (k,), as `FloatingBodies.admissible_share`."""
         shares = [(1.0, 1.0)]
         for node, motion, *_ in self.nodes_and_motions(after < -2 * noise):
             a, b = before[node], after[node]
@@ -114,15 +117,15 @@ class FloatingBodies:
     def place(self, solution: DualSolution) -> tuple[Float, Bool]:
         """Move the free fibres until no open node overlaps by more than noise.  Collective, decided on rank 0.
 
-        A fibre that overlaps moves to the position where its smallest gap is largest.  If even this gap overlaps, the
-        dual solution of the programme is a system of contact forces in balance: the nodes of these forces squeeze the
-        fibre, and have to close.
+        A fibre that overlaps moves to the position with the largest minimum gap.  If even this gap overlaps, the dual
+        solution of the programme is a system of contact forces in balance: the nodes of these forces squeeze the fibre,
+        and have to close.
 
         Returns:
             Amplitudes (dimension,) to add to alpha, and (k,) open nodes that squeeze a fibre.
 
         Raises:
-            ConvergenceError: on every rank; a linear programme was not solved.
+            ConvergenceError: on every rank, if HiGHS does not solve a linear programme.
         """
         gap = solution.jump[self.nodes.row]
         if not self.comm.allreduce(bool((self.is_open & (gap < -self.noise)).any()), MPI.LOR):
@@ -134,17 +137,17 @@ class FloatingBodies:
     def admissible_share(self, before: Float, after: Float) -> tuple[float, float]:
         """Return the fractions of the way between gaps (k,) up to which all fibres have room.
 
-        These are the largest w <= 1 at which all fibres have amplitudes a with
+        The fractions are the largest w <= 1 for which all fibres have amplitudes a with
 
             (1 - w) before + w after + M a >= 0,   and with   >= -2 noise:
 
-        where the first fibre begins to be squeezed, and where its squeezing is beyond doubt.  Collective, decided on
+        where faces begin to squeeze the first fibre, and where the squeezing is beyond doubt.  Collective, decided on
         rank 0; raises as `place`.
         """
         return self._on_root(_Fibres.shares, before, after)
 
     def _on_root(self, decide: Callable[..., T], *gaps: Float) -> T:
-        """Call decide(fibres, *gaps, noise) on rank 0 with all ranks' gaps; return its result.  Collective."""
+        """Call decide(fibres, *gaps, noise) on rank 0, with the gaps of all ranks.  Collective."""
         free = self.coarse.unconstrained_modes.tocsr()
         opening, slip = ((self.coarse.G[self.nodes.row + i] @ free).tocsr() for i in range(2))
         reach = np.zeros(free.shape[1])
@@ -165,9 +168,10 @@ class FloatingBodies:
 
 
 def shares_to_zero(before: Float, after: Float, noise: float | Float) -> tuple[float, float]:
-    """Return the fractions of the way at which the first value (k,) reaches 0 and -2 noise; 1, 1 if none does.
+    """Return the fractions of the way at which the first value (k,) reaches 0 and -2 noise.
 
-    Values that end above -2 noise, a number or (k,), may be the solver's error and do not count.
+    Both fractions are 1 if no value falls that far.  Values that end above -2 noise, a number or (k,), may be the
+    solver's error and do not count.
     """
     falls = after < -2 * noise
     a, b, doubt = before[falls], after[falls], np.broadcast_to(2 * noise, falls.shape)[falls]
@@ -183,7 +187,7 @@ def _last_share(before: Float, after: Float, motion: Float, slack: float) -> flo
 
 
 def _maximised(motions: Float, last: Float, limits: Float, bounds: tuple[float | None, float]) -> OptimizeResult:
-    """Maximize x_-1 within its bounds, with motions x_:-1 + last x_-1 <= limits.
+    """Maximize x_-1 within bounds, subject to motions x_:-1 + last x_-1 <= limits.
 
     Raises:
         ConvergenceError: HiGHS found no solution.

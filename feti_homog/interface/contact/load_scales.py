@@ -1,4 +1,4 @@
-"""Sizes of load effects in the bonded cell, which debonding does not change: scales for tolerances and errors."""
+"""Scales for tolerances and errors: sizes of load effects in the bonded cell, independent of debonding."""
 
 import numpy as np
 from mpi4py import MPI
@@ -8,17 +8,17 @@ from feti_homog.interface.loads import Load
 from feti_homog.materials import phase_bounds
 from feti_homog.typing import Float
 
-# Strains beyond this multiple of the bonded cell's strains are no scale for errors.
+# Multiple of the bonded cell's strains beyond which strains are no scale for errors.
 ABSURD = 1e3
 # Sizes up to this many relative tolerances of the Krylov method, times the largest force or the imposed displacement,
 # may be the solver's error, which in solves from good multipliers was a few hundredths of a tolerance.
 SIGN_NOISE_PER_RTOL = 10.0
-# Smaller fractions of the largest force, stress or squared amplitude are rounding.
+# Fraction of the largest force, stress or squared amplitude below which values are rounding errors.
 NEGLIGIBLE = 1e-6
 
 
 class LoadScales:
-    """The scales of the loads (v,) of a problem: m strains, then actions such as a temperature.
+    """The scales of the loads (v,) in a problem: m strains, then actions such as a temperature.
 
     Attributes:
         mean_stiffness: (v, v) mean stiffness <L>, Voigt's bound for strains.
@@ -60,14 +60,14 @@ class LoadScales:
         self.longest = self.over_interface(nodes.length)
 
     def over_interface(self, values: Float) -> Float:
-        """Return the largest of the values (k,) on the interface of each node, at least 0.  Collective."""
+        """Return, for each node, the largest of the values (k,) on its interface, at least 0.  Collective."""
         inner, largest = self.solver.jump_operator.nodes.bodies[:, 1], np.zeros(self._bodies)
         np.maximum.at(largest, inner, values)
         self.solver.comm.Allreduce(MPI.IN_PLACE, largest, MPI.MAX)
         return np.asarray(largest[inner])
 
     def bond_stress(self, loads: Float) -> Float:
-        """Bound the stress at this rank's bonds, (k,) or (k, n), under loads (v,) or (v, n)."""
+        """Bound the stresses at this rank's bonds, (k,) or (k, n), under loads (v,) or (v, n)."""
         largest: Float = np.multiply.outer(self._bond_stiffness, self.imposed_strain(loads).max(axis=0))
         return largest
 
@@ -77,13 +77,13 @@ class LoadScales:
         return float(np.abs(corners @ self.solver.problem.gradient(self.imposed_strain(loads)).T).max())
 
     def stress_scale(self, loads: Float) -> float:
-        """Return a lower bound of the stress in the bonded cell under loads (v,) of any sign."""
+        """Return a lower bound for the stress in the bonded cell under loads (v,) of any sign."""
         m = self.solver.problem.strains
         return float(np.abs(self.least_bonded_stiffness[:m, :m] @ self.imposed_strain(loads)).max())
 
     @property
     def sign_noise(self) -> float:
-        """Relative size up to which a force, a gap or a stiffness may be the solver's error."""
+        """The relative size up to which a force, a gap or a stiffness may be the solver's error."""
         return SIGN_NOISE_PER_RTOL * self.solver.rtol
 
     def gap_noise(self, strain: Float) -> float:
@@ -93,9 +93,9 @@ class LoadScales:
     def force_noise(self, solution: DualSolution) -> Float:
         """Return the sizes (k,) up to which the nodal forces may be the solver's error.  Collective.
 
-        The error is relative to the largest force on the interface or, if larger, to the force by the imposed strain:
-        errors of jumps change forces by the stiffness of the softer side.  Forces on other interfaces and between the
-        pieces of a cut body do not count.
+        The error is relative to the largest force on the interface or, if larger, to the force that the imposed strain
+        causes: errors in jumps change forces by the stiffness of the softer side.  Forces on other interfaces and
+        between the pieces of a cut body do not count.
         """
         B = self.solver.jump_operator
         pairs = B.nodes.row[:, None] + np.arange(B.components)
@@ -104,7 +104,7 @@ class LoadScales:
         return np.asarray(self.sign_noise * np.maximum(self.over_interface(forces), caused))
 
     def asked(self, load: Load) -> Float:
-        """Return the sizes (v,) of the strains that a load prescribes, or its stresses cause in the bonded cell."""
+        """Return the sizes (v,) of the strains that a load prescribes or causes in the bonded cell."""
         k = self.solver.problem.stresses
         strain = np.abs(np.where(load.by_stress, 0.0, load.values))
         stress = np.abs(np.where(load.by_stress, load.values, 0.0))[:k]
@@ -112,7 +112,7 @@ class LoadScales:
         return np.asarray(strain)
 
     def acting(self, strain: Float, asked: Float) -> Float:
-        """Limit the strain sizes (v,) of a state to ABSURD times `asked`, for use as error scales."""
+        """Limit the strain sizes (v,) of a state to ABSURD times `asked`, as scales for errors."""
         limit = ABSURD * self.imposed_strain(asked).max()
         is_strain = np.arange(len(strain)) < self.solver.problem.strains
         return np.where(is_strain, np.minimum(np.abs(strain), limit), np.abs(strain))

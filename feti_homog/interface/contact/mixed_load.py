@@ -20,7 +20,7 @@ from feti_homog.typing import Bool, Float
 def solve(scales: LoadScales, load: Load, start: Float) -> DualSolution:
     """Solve the dual problem under a load, from multipliers `start` (owned rows,).  Collective.
 
-    Strains whose stresses are noise stay zero.
+    Strains stay zero where the stresses are noise.
 
     Raises:
         NotCarriedError: no stiffness resists the stresses.
@@ -34,17 +34,17 @@ def solve(scales: LoadScales, load: Load, start: Float) -> DualSolution:
     needed = slice(0 if strains[0].any() else 1, None)
     solutions = solver.solve_many(strains[needed], starts[:, needed])
     stresses = np.stack([solver.stress_integral(solution)[unknown] / scales.size.prod() for solution in solutions])
-    missing = load.values[unknown]
+    deficit = load.values[unknown]
     if strains[0].any():
-        missing = missing - stresses[0]
+        deficit = deficit - stresses[0]
     imposed = scales.imposed_strain(strains[0])
     noise = scales.sign_noise * float((scales.roots[: len(imposed)] * imposed).max())
-    # Roots of stiffnesses scale the strains, so that no strain is small beside another.  Scaled stiffnesses below the
+    # Roots of stiffnesses scale the strains, so that all strains have similar sizes.  Scaled stiffnesses below the
     # solver's error, and scaled stresses below `noise`, are zero.
     stiffness, roots = stresses[-len(unknown) :], scales.roots[unknown]
     eigenvalues, vectors = np.linalg.eigh((stiffness + stiffness.T) / (2 * np.outer(roots, roots)))
-    along, resists = vectors.T @ (missing / roots), eigenvalues > scales.sign_noise
-    largest = max(NEGLIGIBLE * np.abs(missing / roots).max(), noise)
+    along, resists = vectors.T @ (deficit / roots), eigenvalues > scales.sign_noise
+    largest = max(NEGLIGIBLE * np.abs(deficit / roots).max(), noise)
     is_carried = not np.abs(along[~resists]).max(initial=0.0) > largest
     answer = vectors[:, resists] @ (along[resists] / eigenvalues[resists]) / roots if is_carried else None
     # Rank 0 decides: where a stiffness nearly vanishes, rounding may differ from processor to processor.
@@ -57,8 +57,8 @@ def solve(scales: LoadScales, load: Load, start: Float) -> DualSolution:
 def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:
     """Mark the strains (v,) of prescribed stresses that contribute to a strain without stiffness.  Collective.
 
-    Such a strain opens debonded faces alone: rigid motions close the jumps of the torn cell, and the torn bodies bear
-    no stress.  `voigt` (v, v) is the stress integral of clamped bodies.
+    Such a strain only opens debonded faces: rigid motions close the jumps of the torn cell, and the torn bodies bear no
+    stress.  `voigt` (v, v) is the stress integral of clamped bodies.
     """
     unknown, undetermined = np.flatnonzero(by_stress), np.zeros(len(by_stress), bool)
     torn = solver.d[:, unknown]
@@ -68,13 +68,13 @@ def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:
     scales = np.sqrt(np.where(largest > 0.0, largest, 1.0))
     pairs = zip((open_jumps, solver.torn_stiffness[np.ix_(unknown, unknown)]), scales, strict=True)
     values, vectors = np.linalg.eigh(sum(matrix / np.outer(scale, scale) for matrix, scale in pairs))
-    # The values are squares.
+    # The eigenvalues are squares of sizes.
     undetermined[unknown] = (np.abs(vectors[:, values < NEGLIGIBLE**2]) > NEGLIGIBLE).any(axis=1)
     return np.asarray(solver.comm.bcast(undetermined))
 
 
 def superposed(solver: FetiSolver, solutions: Sequence[DualSolution], factors: Float) -> DualSolution:
-    """Superpose solutions with equal active rows, times factors.  Collective."""
+    """Superpose solutions with equal active rows, multiplied by factors.  Collective."""
     triples = zip(*((solution.strain, solution.lam, solution.jump) for solution in solutions), strict=True)
     strain, lam, jump = (np.stack(arrays, axis=1) @ factors for arrays in triples)
     total = replace(solutions[0], strain=strain, lam=lam, jump=jump, alpha=None)

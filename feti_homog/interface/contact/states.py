@@ -1,4 +1,4 @@
-"""Interface states: bonds with their memory, the equilibrium under one load, and its certificate.
+"""Interface states: bonds with memory, the equilibrium under one load, and the KKT certificate.
 
 The certificate (`kkt_errors`, `coulomb_errors`) measures how well a state satisfies the conditions of contact and of
 friction, independent of the search that found the state.
@@ -22,7 +22,7 @@ Status = NDArray[np.int8]
 
 
 class Contact(IntEnum):
-    """Contact state of an interface node: bonded, or debonded with faces that touch or are apart."""
+    """The contact state of an interface node: bonded, or debonded with faces that touch or are apart."""
 
     BONDED = 0
     CLOSED = 1
@@ -34,12 +34,12 @@ BONDED, CLOSED, OPEN = Contact
 
 @dataclass(frozen=True)
 class BondState:
-    """State of this rank's k interface nodes.
+    """The state of this rank's k interface nodes.
 
     Attributes:
-        status: (k,) BONDED, CLOSED (debonded faces touch) or OPEN (they do not).
+        status: (k,) BONDED, CLOSED (debonded faces touch) or OPEN (debonded faces are apart).
         history: (k, h) internal variables of the bond law, from its `begin`; h = 0 without memory.
-        pressed: (k,) bonds under compression, whose normal stiffness is that without damage.
+        pressed: (k,) bonds under compression, with the normal stiffness of undamaged bonds.
         gap_and_slip: (k, 2) with friction, jumps of debonded faces and the jumps that damage adds to bonds, 0 at intact
             bonds; None without friction.
         sliding: (k,) sign with which the slip of a closed node grows, 0 if it sticks; None without friction.
@@ -53,27 +53,30 @@ class BondState:
 
     @property
     def sliding_signs(self) -> Status:
-        """Return `sliding` (k,), 0 without friction."""
+        """The signs `sliding` (k,), 0 without friction."""
         return np.zeros(len(self.status), np.int8) if self.sliding is None else self.sliding
 
     def with_status(self, status: Status) -> BondState:
-        """Return these bonds with the status (k,)."""
+        """Return the bonds with other statuses (k,)."""
         return replace(self, status=status)
 
     def flipped(self, which: Bool) -> BondState:
-        """Flip the nodes `which` (k,): debonded nodes open or close, pulled bonds become pressed or the reverse."""
+        """Flip the contact state of the nodes `which` (k,).
+
+        Debonded nodes open or close; pulled bonds become pressed, and pressed bonds pulled.
+        """
         bonded = self.status == BONDED
         status = np.where(which & ~bonded, CLOSED + OPEN - self.status, self.status).astype(np.int8)
         return replace(self, status=status, pressed=self.pressed ^ (which & bonded))
 
     def differs(self, other: BondState) -> Bool:
-        """Mark the nodes (k,) whose contact state differs from the `other` one."""
+        """Mark the nodes (k,) whose contact state differs from the state in `other`."""
         return np.asarray((self.status != other.status) | (self.pressed != other.pressed))
 
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """Equilibrium of the cell under one load.
+    """The equilibrium of the cell under one load.
 
     Attributes:
         load: prescribed load.
@@ -81,8 +84,8 @@ class Equilibrium:
         solution: last dual solution.
         iterations, solves: numbers of Krylov iterations and dual problems.
         free_motions: number of rigid motions that no interface force resists.
-        certificate: errors by `kkt_errors`.
-        asked: (v,) sizes of the strains that the load causes in the bonded cell; with friction, the largest sizes of
+        certificate: errors as from `kkt_errors`.
+        asked: (v,) sizes of the strains that the load causes in the bonded cell; with friction, the largest sizes for
             all loads up to this load.
         axial: equilibrium along the fibres with these bonds, in generalized plane strain.
     """
@@ -99,27 +102,27 @@ class Equilibrium:
 
     @property
     def status(self) -> Status:
-        """Status (k,) of the bonds."""
+        """The contact status (k,) of the nodes."""
         return self.bonds.status
 
     @property
     def problems(self) -> tuple[Equilibrium, ...]:
-        """Equilibrium of each problem, the plane first."""
+        """The equilibrium of each problem, the plane problem first."""
         return (self,) if self.axial is None else (self, self.axial)
 
     @property
     def solutions(self) -> tuple[DualSolution, ...]:
-        """Dual solution of each problem."""
+        """The dual solution of each problem."""
         return tuple(state.solution for state in self.problems)
 
     @property
     def multipliers(self) -> Multipliers:
-        """Multipliers of each problem."""
+        """The multipliers of each problem."""
         return tuple(solution.lam for solution in self.solutions)
 
     @property
     def converged(self) -> bool:
-        """True if the Krylov method converged in all problems."""
+        """Whether the Krylov method converged in all problems."""
         return all(solution.reason > 0 for solution in self.solutions)
 
 
@@ -129,13 +132,13 @@ def kkt_errors(
     """Measure the largest relative violations of the KKT conditions on debonded faces.  Collective.
 
     `kkt_penetration` measures gap >= 0: -gap relative to the imposed displacement.  `kkt_tension` measures force <= 0:
-    normal traction of a closed node relative to the largest traction on its interface.  `kkt_complementarity` measures
-    force gap = 0: |force gap| relative to the largest force on the interface times the displacement.  Scales of
-    traction are at least the imposed stress, because without forces on the faces all tractions are rounding.
+    the normal traction of a closed node relative to the largest traction on the interface.  `kkt_complementarity`
+    measures force gap = 0: |force gap| relative to the largest force on the interface times the displacement.  Scales
+    of traction are at least the imposed stress, because without forces on the faces all tractions are rounding errors.
 
     Args:
         traction, gap: (k, 2) normal and tangential traction at this rank's nodes, tension positive, and (k,) gap.
-        debonded, closed: (k,) nodes that have to satisfy the conditions, and nodes that touch.
+        debonded, closed: (k,) nodes that have to satisfy the conditions, and nodes with faces that touch.
         acting: (v,) sizes of the loads that impose displacement and stress.
     """
     comm, length = scales.solver.comm, scales.solver.jump_operator.nodes.length
@@ -158,9 +161,10 @@ def kkt_errors(
 
 
 def coulomb_errors(force: Float, friction: Float, sliding: Status) -> Float:
-    """Measure the violation (k,) of Coulomb's law: |t| <= mu p in stick, t = s mu p in slip.
+    """Measure the violation (k,) of Coulomb's law.
 
-    Shear along the fibres, where faces have no friction, is a violation too.
+    The law is |t| <= mu p in stick, and t = s mu p in slip.  Shear along the fibres, where faces have no friction, is a
+    violation too.
 
     Args:
         force: (k, c) normal, tangential and axial traction of faces, without the springs of damaged bonds.

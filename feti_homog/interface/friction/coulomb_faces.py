@@ -6,12 +6,12 @@ pressure p = -f_n
 
     g_n >= 0,  p >= 0,  g_n p = 0,        |f_t| <= mu p,  f_t = s mu p where the slip grows with the sign s.
 
-A node is apart (f = 0), sticks (g_n = 0, g_t as it was), or slides (g_n = 0, f_t = s mu p).  S includes springs between
+A node is apart (f = 0), sticks (g_n = 0, g_t unchanged), or slides (g_n = 0, f_t = s mu p).  S includes springs between
 the faces of a node, and f excludes their force: a damaged bond is a node without friction on springs 1 / (C - C_0),
-apart while it is pulled.
+apart while the bond is under tension.
 
-Pivots change all wrong statuses at once while their number falls, and nearly always end.  Otherwise the search tries
-all sets of statuses, if they are few, and then raises the coefficients from a fraction at which pivots find statuses.
+Pivots change all wrong statuses at once while the number of wrong statuses falls, and nearly always end.  Otherwise the
+search tries all sets of statuses, if the sets are few, and then raises mu from a fraction at which pivots succeed.
 """
 
 from collections.abc import Iterator
@@ -46,14 +46,14 @@ class StuckError(NotCarriedError):
 
 @dataclass(frozen=True)
 class StatusSearch:
-    """Search for the admissible statuses (n,) of the faces and their scaled x (m,).
+    """A search for admissible face statuses (n,) and the scaled x (m,).
 
     A method returns None if its search finds no admissible statuses.
 
     Attributes:
         allowed: (n, 4) statuses that a node may have, in the columns [STICK, FORWARD, OPEN_FACE, BACKWARD]; the search
             ignores the conditions for a change to any other status.
-        start: (m,) scaled x before the load; free motions keep their amplitude in it.
+        start: (m,) scaled x before the load, where free motions keep their amplitude.
     """
 
     faces: FaceSystem
@@ -67,7 +67,7 @@ class StatusSearch:
         return result or self.by_trial(status) or self.by_continuation(status)
 
     def by_pivots(self, status: Status, solves: int | None = None) -> Found:
-        """Return the statuses at which the pivots end, if the forces balance."""
+        """Search by pivots, and return the final statuses and x if the forces balance."""
         result, balanced = self._pivoted(status, solves)
         return result if balanced else None
 
@@ -77,9 +77,10 @@ class StatusSearch:
         return result is not None and not balanced
 
     def _pivoted(self, status: Status, solves: int | None = None) -> tuple[Found, bool]:
-        """Pivot at most `solves` times; return the statuses, x, and whether the forces balance.
+        """Correct wrong statuses by at most `solves` pivots.
 
-        After some block pivots without progress, one random node changes at a time: a fixed order may end in a cycle.
+        Return the statuses, x, and whether the forces balance.  After some block pivots without progress, one
+        random node changes at a time: a fixed order may end in a cycle.
         """
         fewest, pivots, random = self.faces.nodes + 1, 0, np.random.default_rng(0)
         for _ in range(solves or SOLVES + self.allowed.size):
@@ -97,7 +98,7 @@ class StatusSearch:
         return None, False
 
     def jammed(self, status: Status) -> Iterator[tuple[Status, Float]]:
-        """Yield other admissible statuses: with all sliding faces stuck, with one face stuck, and by trial."""
+        """Yield other admissible statuses: with all or single sliding faces stuck, then by trial."""
         sliding = np.flatnonzero((np.abs(status) == 1) & self.allowed[:, STICK])
         for stuck in (sliding, *sliding):
             guess = status.copy()
@@ -107,18 +108,18 @@ class StatusSearch:
         yield from self._tried(status)
 
     def by_trial(self, status: Status) -> Found:
-        """Return the admissible statuses closest to a guess; None if there are too many sets to try."""
+        """Return the admissible statuses closest to a guess; None for too many sets of statuses."""
         return next(self._tried(status), None)
 
     def _tried(self, status: Status) -> Iterator[tuple[Status, Float]]:
-        """Yield all admissible statuses, from the closest to a guess; none if there are too many sets."""
-        several = np.flatnonzero(self.allowed.sum(axis=1) > 1)
-        if self.allowed[several].sum(axis=1).astype(float).prod() > MOST_TRIED:
+        """Yield all admissible statuses, the closest to a guess first; nothing for too many sets."""
+        choosers = np.flatnonzero(self.allowed.sum(axis=1) > 1)
+        if self.allowed[choosers].sum(axis=1).astype(float).prod() > MOST_TRIED:
             return
-        choices = np.array(list(product(*(STATUSES[row] for row in self.allowed[several]))), np.int8)
-        for choice in choices[np.argsort((choices != status[several]).sum(axis=1), kind="stable")]:
+        choices = np.array(list(product(*(STATUSES[row] for row in self.allowed[choosers]))), np.int8)
+        for choice in choices[np.argsort((choices != status[choosers]).sum(axis=1), kind="stable")]:
             trial = status.copy()
-            trial[several] = choice
+            trial[choosers] = choice
             x, balanced = self.faces.linear(trial, self.load, self.start)
             if balanced and self.faces.is_balanced(trial, self.load, x) and (self._improved(trial, x) == trial).all():
                 yield trial, x
@@ -152,8 +153,8 @@ class StatusSearch:
             better[over] = sign
             better[back] = STICK
         touches = ~closed & (gap < -noise) & allowed[:, FORWARD]
-        way = np.where(np.abs(moved) > noise, np.sign(moved), STICK)
-        better[touches] = np.where(faces.friction > 0.0, way, FORWARD)[touches]
+        direction = np.where(np.abs(moved) > noise, np.sign(moved), STICK)
+        better[touches] = np.where(faces.friction > 0.0, direction, FORWARD)[touches]
         better[pulled] = OPEN_FACE
         return better
 
@@ -162,7 +163,7 @@ class CoulombFaces(FaceSystem):
     """Debonded faces with Coulomb friction."""
 
     def search(self, status: Status, allowed: Bool, load: Prescribed, start: Float) -> tuple[Status, Float]:
-        """Return admissible statuses (n,) and scaled x from a first guess; arguments as in `StatusSearch`.
+        """Find admissible statuses (n,) and scaled x from a first guess; arguments as in `StatusSearch`.
 
         Raises:
             NotCarriedError: the forces drive a free motion.
@@ -175,7 +176,7 @@ class CoulombFaces(FaceSystem):
         return result
 
     def all_allowed(self) -> Bool:
-        """Allow all statuses (n, 4); a touching face without friction has the status FORWARD alone."""
+        """Allow all statuses (n, 4); a touching face without friction has only the status FORWARD."""
         allowed = np.ones((self.nodes, 4), bool)
         allowed[np.ix_(self.friction == 0.0, [STICK, BACKWARD])] = False
         return allowed
@@ -194,7 +195,7 @@ class CoulombFaces(FaceSystem):
         return self._resisting(status, self._at_limits(status, x), load, np.zeros(len(x)))
 
     def step(self, status: Status, load: Prescribed, start: Float) -> tuple[Status, Float]:
-        """Take an implicit step to a load: return statuses (n,) and x (m,), from a guess and a start.
+        """Take an implicit step to a load, and return the statuses (n,) and x (m,).
 
         Raises:
             StuckError: as `rates`.
@@ -210,7 +211,7 @@ class CoulombFaces(FaceSystem):
         return search.run(self._known(status)) is not None
 
     def _resisting(self, status: Status, allowed: Bool, load: Prescribed, start: Float) -> tuple[Status, Float]:
-        """Return admissible statuses without a negative determinant, and scaled x; arguments as of `search`.
+        """Find admissible statuses without a negative determinant, and x; arguments as in `search`.
 
         A fibre that a few faces pinch jams if all of these faces stick, and snaps through with a negative stiffness if
         one of these faces slides: both sets of statuses are admissible.
@@ -227,7 +228,7 @@ class CoulombFaces(FaceSystem):
         raise StuckError(INDEFINITE)
 
     def _at_limits(self, status: Status, x: Float) -> Bool:
-        """Allow (n, 4) the present statuses and, at limits, the statuses beyond them."""
+        """Mark the allowed statuses (n, 4): present statuses and, at limits, the next statuses."""
         closed, gap = status != OPEN_FACE, x[: 2 * self.nodes : 2]
         (normal, tangential), noise = self.forces(x), self.noise(x)
         allowed = np.zeros((self.nodes, 4), bool)
@@ -253,7 +254,7 @@ class CoulombFaces(FaceSystem):
         return float((np.maximum(margins[ends], 0.0) / -falls[ends]).min(initial=np.inf))
 
     def heat(self, status: Status, before: Float, after: Float) -> float:
-        """Return the frictional heat on the straight path between two states with these statuses."""
+        """Return the frictional heat on the straight path between two states with equal statuses."""
         sliding, tangential = np.abs(status) == 1, (self.forces(before)[1] + self.forces(after)[1]) / 2
         return float((tangential * (after - before)[1 : 2 * self.nodes : 2])[sliding].sum())
 

@@ -68,7 +68,7 @@ class FaceSystem:
         return f[::2], f[1::2]
 
     def follow(self, before: FaceSystem, old: Int, other: Int) -> None:
-        """Take over the response of the faces `before`; arguments as in `FollowedStatuses.grow`."""
+        """Take over the factored response of the faces `before`; arguments as in `FollowedStatuses.grow`."""
         units = before.size / self.size[old]
         if before._followed is None:
             self._factored = before._factored
@@ -76,24 +76,24 @@ class FaceSystem:
             self._followed = before._followed
 
     def terms(self, x: Float) -> Float:
-        """Return sum_j |S_ij x_j| (m,), the scale of the rounding in S x, from sums in single precision."""
+        """Return sum_j |S_ij x_j| (m,), the rounding scale of S x, in single precision."""
         largest = float(np.abs(x).max(initial=0.0)) or 1.0
         return np.asarray(largest * (self._absolute @ np.abs(x / largest).astype(np.float32)), float)
 
     def product(self, x: Float) -> Float:
-        """Return S x (m,), and store it; the caller must not change x later."""
+        """Return and store the product S x (m,); the caller must not change x later."""
         for array, y in self._products:
             if array is x:
                 return y
         return self.keep(x, self.S @ x)
 
     def keep(self, x: Float, y: Float) -> Float:
-        """Store y as the product of x, and return it."""
+        """Store y as the product S x, and return y."""
         self._products.append((x, y))
         return y
 
     def linear(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, bool]:
-        """Solve for the scaled x (m,) with these statuses; return x and whether it is a solution."""
+        """Solve for the scaled x (m,) with given statuses; return x, and whether x is a solution."""
         rows = status_system.free_rows(status, self.friction, load.by_stress)
         x, values = self.prescribed(status, load, start)
         followed = self._turned(*rows)
@@ -106,12 +106,12 @@ class FaceSystem:
         return self._system(*rows).solve(x, values)
 
     def sign(self, status: Status, by_stress: Bool) -> int:
-        """Return the sign of the determinant with these statuses, 0 with free motions."""
+        """Return the sign of the determinant for given statuses, 0 with free motions."""
         rows = status_system.free_rows(status, self.friction, by_stress)
         return (self._turned(*rows) or self._system(*rows)).sign
 
     def _turned(self, free: Bool, slope: Float) -> status_system.FollowedStatuses | None:
-        """Return `FollowedStatuses` with these free rows; None with free motions, or before an update pays."""
+        """Update `FollowedStatuses` to given free rows; None with free motions, or before updates pay."""
         if self._followed is None:
             if self._factored < FACTORIZATIONS:
                 return None
@@ -119,7 +119,7 @@ class FaceSystem:
         return self._followed if self._followed.turn(free, slope) else None
 
     def _system(self, free: Bool, slope: Float) -> status_system.StatusSystem:
-        """Return the factored system of these rows; the last system is stored."""
+        """Factor the system of given rows, or return the stored last system."""
         key = free.tobytes() + slope.tobytes()
         if self._last is None or self._last[0] != key:
             self._last = key, status_system.StatusSystem(self.S, free, slope)
@@ -131,7 +131,7 @@ class FaceSystem:
         return status, self.linear(status, load, x)[0] if self.sign(status, load.by_stress) else x
 
     def is_balanced(self, status: Status, load: Prescribed, x: Float) -> bool:
-        """Return whether no force drives a free motion, such as a fibre that turns in its hole."""
+        """Return whether no force drives a free motion, such as a fibre that turns in a hole."""
         (free, slope), fixed = status_system.free_rows(status, self.friction, load.by_stress), np.zeros(len(x))
         # Only prescribed entries: a free motion in x is as large as its force divided by the stiffness HELD.
         fixed[self.loads] = np.where(load.by_stress, 0.0, load.values)
@@ -145,7 +145,7 @@ class FaceSystem:
         )
 
     def prescribed(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, Float]:
-        """Return x (m,) with its prescribed entries, and the right-hand side S x (m,) in the load rows."""
+        """Return x (m,) with the prescribed entries, and the right-hand side (m,) in the load rows."""
         last, loads, x, rows = 2 * self.nodes, self.loads, start.copy(), np.zeros(len(start))
         x[:last:2] = np.where(status == status_system.OPEN_FACE, x[:last:2], 0.0)
         x[1:last:2] = np.where(status == status_system.STICK, load.slip, x[1:last:2])
@@ -154,6 +154,6 @@ class FaceSystem:
         return x, rows
 
     def noise(self, x: Float) -> Float:
-        """Return the rounding (n,) in the scaled force and jump of each node."""
+        """Return the rounding error (n,) in the scaled force and jump of each node."""
         terms = self.terms(x)[: 2 * self.nodes].reshape(-1, 2)
         return np.asarray(status_system.NOISE * terms.max(axis=1, initial=0.0))

@@ -5,8 +5,8 @@ the inverse of the dual operator of the bonded cell, prescribed jumps g in rows 
 
     lam = H (d E - g),      |UC| Sigma = L E - b^T g,      b = (H d)_D,
 
-L the bonded stiffness times the area: the cell stores x.S x / 2 with x = (g, E), S = [[H_DD, -b], [-b^T, L]].  The
-matrix S of `coulomb_faces` is the plane one; in generalized plane strain `AxialFaces` adds rows and columns behind it.
+where L is the bonded stiffness times the area: the cell stores x.S x / 2 with x = (g, E), S = [[H_DD, -b], [-b^T, L]].
+`coulomb_faces` uses the S of the plane problem; in generalized plane strain `AxialFaces` appends rows and columns.
 """
 
 from collections.abc import Sequence
@@ -37,7 +37,7 @@ from feti_homog.typing import Float, Int
 
 
 class CondensedProblem:
-    """One problem of the cell, condensed to the rows of the last `take`.
+    """One problem of the cell, condensed to the rows from the last call of `take`.
 
     Attributes:
         interface: contact problem of the plane or of the axial displacements.
@@ -63,7 +63,10 @@ class CondensedProblem:
         self._some: tuple[Int, Float] | None = None
 
     def take(self, rows: Int, springs: Float) -> tuple[Float, Float, Float]:
-        """Condense the problem to rows D: return H_DD (n, n) plus springs, b (n, v) and L (v, v).  Collective."""
+        """Condense the problem to the global rows D.  Collective.
+
+        Return H_DD (n, n) plus springs (n,), b (n, v) and L (v, v).
+        """
         self.rows, self._some = rows, None
         self._columns, K = self._inverse.columns(rows)
         K[np.diag_indices(len(K))] += springs
@@ -72,8 +75,8 @@ class CondensedProblem:
     def gained(self, bonds: BondState) -> Float:
         """Return the compliance (k, c) that damage adds to springs under tension."""
         interface, pulled = self.interface, replace(bonds, pressed=np.zeros(len(bonds.status), bool))
-        more = interface.compliance(pulled) - self.solver.intact_compliance
-        return np.asarray(more[self.rows_of(slice(None))])
+        increase = interface.compliance(pulled) - self.solver.intact_compliance
+        return np.asarray(increase[self.rows_of(slice(None))])
 
     def rows_of(self, node: Int | slice) -> Int:
         """Return the owned rows (p, c) of nodes (p,)."""
@@ -84,18 +87,18 @@ class CondensedProblem:
         return np.asarray(self._response @ strain - self._columns @ jump)
 
     def some_multipliers(self, rows: Int, jump: Float, strain: Float) -> Float:
-        """Return lam (k, c) in owned rows (k, c); the last rows keep their columns of H."""
+        """Return the multipliers (k, c) in owned rows (k, c), with stored columns for the last rows."""
         if self._some is None or self._some[0] is not rows:
             self._some = rows, self._columns[rows.ravel()]
         return self._response[rows] @ strain - (self._some[1] @ jump).reshape(rows.shape)
 
     def solution(self, bonds: BondState, jump: Float, strain: Float) -> DualSolution:
-        """Return the multipliers, and their jumps from the dual operator.  Collective."""
+        """Return the dual solution, with jumps from the dual operator.  Collective."""
         solver, lam = self.solver, self.multipliers(jump, strain)
         torn = solver.d @ strain
         jumps, opened = torn - solver.operator.apply(lam), np.zeros(len(lam))
-        mine = (self.rows >= self.first) & (self.rows < self.first + len(lam))
-        opened[self.rows[mine] - self.first] = jump[mine]
+        is_local = (self.rows >= self.first) & (self.rows < self.first + len(lam))
+        opened[self.rows[is_local] - self.first] = jump[is_local]
         alpha = np.zeros(solver.natural.kernel_dimension)
         if len(alpha):
             alpha -= solver.natural.amplitudes(jumps - opened)
@@ -108,9 +111,9 @@ class CondensedProblem:
 
 
 class AxialFaces:
-    """The axial problem in the matrix S of `coulomb_faces`, with its jumps eliminated: g = K^-1 b E.
+    """The axial problem in the matrix S of `coulomb_faces`, with eliminated jumps: g = K^-1 b E.
 
-    HELD times its diagonal entry holds each row without springs: the largest entry may belong to a stiff spring.
+    A stiffness of HELD times the diagonal entry holds each row: the largest entry may belong to a stiff spring.
 
     Attributes:
         problem: condensed axial problem.
@@ -153,24 +156,24 @@ class SlidingCell:
         self.faces = CoulombFaces(np.zeros((0, 0)), np.zeros(0))
 
     def take(self, bonds: BondState) -> None:
-        """Condense the cell to debonded nodes and, on springs, to damaged bonds.  Collective."""
+        """Condense the cell to debonded nodes, and to damaged bonds on springs.  Collective."""
         comm, row, first = self.solver.comm, self.interface.nodes.row, self._plane.first
         problems = (self._plane, *self._axial)
-        more = np.hstack([problem.gained(bonds) for problem in problems])
-        self._more = more[:, 1]
-        self._damaged = (bonds.status == BONDED) & (more[:, :2] > 0.0).any(axis=1)
+        gained = np.hstack([problem.gained(bonds) for problem in problems])
+        self._more = gained[:, 1]
+        self._damaged = (bonds.status == BONDED) & (gained[:, :2] > 0.0).any(axis=1)
         self._face_nodes = np.flatnonzero((bonds.status != BONDED) | self._damaged)
         self._held = np.flatnonzero(bonds.status == BONDED)
         self._held_rows = [problem.rows_of(self._held) for problem in problems]
-        pulled = (more > 0.0) & self._damaged[:, None]
-        self._springs = springs = np.divide(1.0, more, out=np.zeros_like(more), where=pulled)
+        pulled = (gained > 0.0) & self._damaged[:, None]
+        self._springs = springs = np.divide(1.0, gained, out=np.zeros_like(gained), where=pulled)
         self._mu = np.where(self._damaged, self.friction_of_damage, self.friction)
         along = [problem.first + problem.interface.nodes.row for problem in self._axial]
         table = np.column_stack([first + row, self._mu, *along, springs])[self._face_nodes]
         table = np.concatenate(comm.allgather(table))
         table = table[np.argsort(table[:, 0])]
         faces, before, old = self.faces, self.rows, self.springs
-        self.rows, springs = table[:, 0].astype(np.int64), table[:, -more.shape[1] :]
+        self.rows, springs = table[:, 0].astype(np.int64), table[:, -gained.shape[1] :]
         self.springs = springs[:, :2].ravel()
         self._position = np.searchsorted(self.rows, first + row[self._face_nodes])
         K, b, L = self._plane.take((self.rows[:, None] + np.arange(2)).ravel(), self.springs)
@@ -193,8 +196,8 @@ class SlidingCell:
         """
         self.take(bonds)
         jump = np.zeros((len(bonds.status), 2)) if bonds.gap_and_slip is None else bonds.gap_and_slip
-        apart = np.where(self._damaged, ~bonds.pressed, bonds.status == OPEN)
-        table = np.column_stack([np.where(apart, OPEN_FACE, bonds.sliding_signs), jump])[self._face_nodes]
+        is_apart = np.where(self._damaged, ~bonds.pressed, bonds.status == OPEN)
+        table = np.column_stack([np.where(is_apart, OPEN_FACE, bonds.sliding_signs), jump])[self._face_nodes]
         table = np.concatenate(self.solver.comm.allgather(np.column_stack([self._position, table])))
         table = table[np.argsort(table[:, 0])]
         status: Status = table[:, 1].astype(np.int8)
@@ -225,7 +228,7 @@ class SlidingCell:
         return np.asarray((x / self.faces.size)[: self.faces.loads.start])
 
     def traction(self, x: Float) -> Float:
-        """Return the traction in the intact fraction of each bond, (k, 2), or (k, 3) with the axial traction."""
+        """Return the traction in the intact fraction of bonds, (k, 2), or (k, 3) with the axial traction."""
         force = np.zeros((len(self.friction), sum(rows.shape[1] for rows in self._held_rows)))
         parts = zip(self._held_rows, self._parts(x), strict=True)
         force[self._held] = np.hstack([problem.some_multipliers(rows, *answer) for rows, (problem, answer) in parts])
@@ -262,17 +265,17 @@ class SlidingCell:
         """
         states, of_problems = list[Equilibrium](), list(zip(*map(self.cell.parts, loads), strict=True))
         scales, asked = [problem.scales for problem in self.cell.problems], list[Float]()
-        for scale, of in zip(scales, of_problems, strict=True):
-            asked.append(np.max([scale.asked(load) for load in of], axis=0))
+        for scale, problem_loads in zip(scales, of_problems, strict=True):
+            asked.append(np.max([scale.asked(load) for load in problem_loads], axis=0))
         # Rounding in an unloaded problem is as large as in the loaded problem.
         largest = max(scale.imposed_strain(strain).max() for scale, strain in zip(scales, asked, strict=True))
         # The jumps in friction come from x: the jumps of F lambda would be divided by a vanishing compliance.
         stresses, jumps = list[Float](), list[Float]()
-        for of, strains, (problem, (jump, strain)) in zip(of_problems, asked, self._parts(x), strict=True):
+        for problem_loads, strains, (problem, (jump, strain)) in zip(of_problems, asked, self._parts(x), strict=True):
             solution = problem.solution(bonds, jump, strain)
             strains[: problem.solver.problem.strains] = largest
             certificate = problem.interface.certificate(bonds, solution, strains)
-            states.append(Equilibrium(of[-1], bonds, solution, 0, 1, 0, certificate, strains))
+            states.append(Equilibrium(problem_loads[-1], bonds, solution, 0, 1, 0, certificate, strains))
             stresses.append(problem.interface.scales.bond_stress(problem.interface.acting(bonds, strain, strains)))
             jumps.append(jump.reshape(-1, problem.solver.jump_operator.components))
         plane, *axial = states

@@ -1,11 +1,11 @@
 """The linear system of debonded faces with prescribed statuses, factored or updated from neighbouring statuses.
 
-The rows of M x = c are x_j for prescribed entries, (S x)_j for free ones, and (S x)_j + s mu (S x)_n for a slip that
-grows with the sign s.  Row r in place of row j changes R = [M^-1; S M^-1] by rank one,
+The rows of M x = c are x_j for prescribed entries, (S x)_j for free entries, and (S x)_j + s mu (S x)_n for a slip that
+grows with the sign s.  A row r in place of row j changes R = [M^-1; S M^-1] by rank one,
 
     R <- R - R_:j (w - e_j)^T / w_j,      w = r M^-1,      det M <- w_j det M,
 
-w a row of R itself.  Changes are collected, and added to R in blocks.
+where w is a row of R.  Changes wait, and join R in blocks.
 """
 
 from collections.abc import Callable
@@ -20,7 +20,7 @@ from feti_homog.typing import Bool, Float, Int
 
 
 class FaceStatus(IntEnum):
-    """Status of a debonded node: tied, sliding with the sign of its slip rate, or apart."""
+    """The status of a debonded node: stuck, sliding with the sign of the slip rate, or apart."""
 
     STICK = 0
     FORWARD = 1
@@ -33,10 +33,11 @@ STICK, FORWARD, OPEN_FACE, BACKWARD = FaceStatus
 # Stiffness, relative to the stiffness of a node, that holds free motions; iterative refinement removes its effect.  A
 # residual up to this fraction of the terms of its row drives no free motion.
 HELD = 1e-9
-# A smaller pivot belongs to a free motion, and its sign is rounding.
+# Pivot size below which a pivot belongs to a free motion, with a sign from rounding.
 LEAST_PIVOT = 1e-6
-# Pivots below which inverse iteration searches for free motions, and the number of vectors beyond the number of such
-# pivots; iterations, each of which reduces stiff motions by HELD; largest relative stiffness of a free motion.
+# SOFT_PIVOT: pivot size below which inverse iteration searches for free motions.  MORE_MOTIONS: number of vectors
+# beyond the number of soft pivots.  INVERSE_ITERATIONS: number of iterations, each of which reduces stiff motions by
+# HELD.  UNRESISTED: largest relative stiffness of a free motion.
 SOFT_PIVOT, MORE_MOTIONS, INVERSE_ITERATIONS, UNRESISTED = 1e-3, 3, 3, 0.1 * HELD
 # Largest number of refinements, and the residual of each row, relative to its terms, at which refinement ends.
 MOST_REFINEMENTS, ROUNDED = 20, 1e-14
@@ -49,7 +50,7 @@ NOISE = 1e-11
 
 
 def free_rows(status: Status, friction: Float, by_stress: Bool) -> tuple[Bool, Float]:
-    """Return the unknown entries (m,) of x, and s mu (m,) at the slips of sliding nodes, 0 elsewhere."""
+    """Mark the free entries (m,) of x, and return s mu (m,) at sliding slips, 0 elsewhere."""
     free = np.concatenate([np.stack([status == OPEN_FACE, status != STICK], axis=1).ravel(), by_stress])
     slope = np.zeros(len(free))
     slope[1 : 2 * len(status) : 2] = np.where(np.abs(status) == 1, status * friction, 0.0)
@@ -65,7 +66,7 @@ def residual(y: Float, rhs: Float, free: Bool, slope: Float) -> Float:
 
 
 def largest_share(residuals: Float, terms: Float, slope: Float) -> float:
-    """Return the largest residual (m,), relative to the terms (m,) of its row."""
+    """Return the largest residual (m,), relative to the terms (m,) of the row."""
     size, sliding = terms.copy(), np.flatnonzero(slope)
     size[sliding] += np.abs(slope[sliding]) * terms[sliding - 1]
     return float((np.abs(residuals) / np.where(size > 0.0, size, 1.0)).max(initial=0.0))
@@ -74,7 +75,7 @@ def largest_share(residuals: Float, terms: Float, slope: Float) -> float:
 class StatusSystem:
     """The factored system of the free rows, S x = rhs, with x prescribed in all other rows.
 
-    Sliding nodes have the row S_t + s mu S_n: their traction is s mu times the pressure.
+    A sliding node has the row S_t + s mu S_n, because the traction is s mu times the pressure.
 
     Attributes:
         free: (m,) unknown entries of x.
@@ -106,9 +107,8 @@ class StatusSystem:
     def solve(self, x: Float, rhs: Float) -> tuple[Float, bool]:
         """Solve for x (m,), and return whether x is a solution.
 
-        The argument x is the start: it holds the prescribed entries, and free motions keep their amplitude in the
-        start.  If the right-hand side `rhs` (m,) drives a free motion there is no solution: springs of stiffness HELD
-        bear the forces.
+        The start x holds the prescribed entries, and free motions keep their amplitude in x.  If the right-hand side
+        `rhs` (m,) drives a free motion, no solution exists: springs of stiffness HELD bear the forces.
         """
         start, x = x, x.copy()
         if self._factor is None:
@@ -174,16 +174,16 @@ class FollowedStatuses:
         while pending:
             failed = []
             for j in pending:
-                at, count = int(self._index[j]), self._count
-                w = self._row(int(free[j]), at)
+                position, count = int(self._index[j]), self._count
+                w = self._row(int(free[j]), position)
                 if slope[j]:
                     w += slope[j] * self._row(1, int(self._index[j - 1]))
-                pivot = w[at]
+                pivot = w[position]
                 if abs(pivot) < LEAST_PIVOT:
                     failed.append(j)
                     continue
-                w[at] -= 1.0
-                column = self._R[:, :size, at] - self._U[:, :size, :count] @ self._V[:count, at]
+                w[position] -= 1.0
+                column = self._R[:, :size, position] - self._U[:, :size, :count] @ self._V[:count, position]
                 self._U[:, :size, count], self._V[count, :size] = column, w / pivot
                 self._count += 1
                 if self._count == MOST_CHANGES:
@@ -201,6 +201,7 @@ class FollowedStatuses:
         return np.asarray(self._R[kind, at, :size] - self._U[kind, at, :count] @ self._V[:count, :size])
 
     def _flush(self) -> None:
+        """Add the waiting changes to R."""
         size, count = self._size, self._count
         for kind in range(2 if count else 0):
             self._R[kind, :size, :size] -= self._U[kind, :size, :count] @ self._V[:count, :size]
@@ -210,10 +211,10 @@ class FollowedStatuses:
         """Return M^-1 c (m,)."""
         size, permuted = self._size, np.empty(self._size)
         permuted[self._index] = c
-        few = np.flatnonzero(permuted)
-        some = few if len(few) <= FEW else slice(size)
-        change = self._U[0, :size, : self._count] @ (self._V[: self._count, :size][:, some] @ permuted[some])
-        return np.asarray((self._R[0, :size, :size][:, some] @ permuted[some] - change)[self._index])
+        nonzero = np.flatnonzero(permuted)
+        columns = nonzero if len(nonzero) <= FEW else slice(size)
+        change = self._U[0, :size, : self._count] @ (self._V[: self._count, :size][:, columns] @ permuted[columns])
+        return np.asarray((self._R[0, :size, :size][:, columns] @ permuted[columns] - change)[self._index])
 
     def solve(self, x: Float, rhs: Float, terms: Callable[[Float], Float]) -> tuple[Float, Float] | None:
         """Solve for x; return x and S x (m,), from a start with the prescribed entries.
@@ -245,24 +246,24 @@ class FollowedStatuses:
         if len(entries) and not self.turn(free, slope):
             return False
         self._flush()
-        some, at = np.flatnonzero(units != 1.0), self._index[entries]
-        places, unit = self._index[some], units[some]
-        self._R[:, : self._size, places] *= np.where(self.free[some], 1.0 / unit, unit)
-        self._R[:, places, : self._size] *= np.stack([1.0 / unit, unit])[:, :, None]
+        rescaled, changed = np.flatnonzero(units != 1.0), self._index[entries]
+        rescaled_rows, unit = self._index[rescaled], units[rescaled]
+        self._R[:, : self._size, rescaled_rows] *= np.where(self.free[rescaled], 1.0 / unit, unit)
+        self._R[:, rescaled_rows, : self._size] *= np.stack([1.0 / unit, unit])[:, :, None]
         before = self.S[entries[:, None], entries] * np.outer(units[entries], units[entries])
-        self._R[1, at[:, None], at] += S[other[:, None], other] - before
+        self._R[1, changed[:, None], changed] += S[other[:, None], other] - before
         size, m = self._size, len(S)
         new = np.setdiff1d(np.arange(m), old)
-        free, slope, place = np.zeros(m, bool), np.zeros(m), np.empty(m, np.int64)
-        free[old], slope[old], place[old], place[new] = self.free, self.slope, self._index, np.arange(size, m)
-        self.S, self.free, self.slope, self._index = S, free, slope, place
+        free, slope, position = np.zeros(m, bool), np.zeros(m), np.empty(m, np.int64)
+        free[old], slope[old], position[old], position[new] = self.free, self.slope, self._index, np.arange(size, m)
+        self.S, self.free, self.slope, self._index = S, free, slope, position
         if m > self._R.shape[1]:
             # Leave room for more entries.
             R = np.empty((2, m + m // 4, m + m // 4))
             R[:, :size, :size] = self._R[:, :size, :size]
             self._R = R
             self._forget()
-        order = np.argsort(place)
+        order = np.argsort(position)
         first, last = order[:size], order[size:]
         sliding = np.flatnonzero(slope[first])
         coupling = S[first[:, None], last]

@@ -1,4 +1,4 @@
-"""Bond laws: utilisation by tractions, the state after a break, and the fracture energy.
+"""Base classes of bond laws: utilisation by tractions, the state after a break, and the fracture energy.
 
 A law is a dataclass of constants, numbers or arrays (k,) by node; `BondState.history` has the internal variables.
 """
@@ -17,33 +17,33 @@ from feti_homog.case import bond_laws
 from feti_homog.interface.contact import BondState, CoupledInterfaces
 from feti_homog.typing import Bool, Float, Int
 
-# Bonds whose utilisations differ relatively by less break together: in a symmetric cell the solver errs by less.
+# Relative difference of utilisations below which bonds break together: in a symmetric cell the solver errs by less.
 UTILISATION_TIE = 1e-6
 # Number of halvings of a unit interval, or of steps of Newton's method, that exhausts double precision.
 MOST_STEPS = 60
 
 
 class KeyValues(Protocol):
-    """The values of [interface] keys at nodes; without the key a section takes an alternative key, or inf."""
+    """The values of [interface] keys at nodes; a section without the key takes an alternative key, or inf."""
 
     def __call__(self, key: str, *alternatives: str) -> float | Float:
-        """Return one value for all nodes, or values (k,)."""
+        """Return the value of a key, for all nodes or by node (k,)."""
 
     def everywhere(self, key: str, *alternatives: str) -> Float:
-        """Return the values (s,) of all sections, equal on every rank."""
+        """Return the values (s,) of a key in all sections, equal on every rank."""
 
     def common(self, key: str) -> Any:
-        """Return the common value of all sections, as in the case."""
+        """Return the common value of a key in all sections, as in the case."""
 
 
 @dataclasses.dataclass(frozen=True)
 class BondLaw(ABC):
-    """A law for all bonds of a cell; the defaults suit laws without memory.
+    """A law for all bonds of a cell, with defaults for laws without memory.
 
     Attributes:
         has_toughness: whether bonds have a fracture energy, see `fracture`.
         has_tips: whether results compare the fracture energy with the energy release rates at debonding tips.
-        is_convex: whether `share` is convex, and so passes 1 once on a straight path.
+        is_convex: whether `share` is convex, so that the utilisation passes 1 once on a straight path.
         break_names: column names in `breaks`, for tractions with two or three components.
     """
 
@@ -54,7 +54,7 @@ class BondLaw(ABC):
 
     @abstractmethod
     def share(self, traction: Float) -> Float:
-        """Return the utilisation (p,) by tractions (p, c); a bond breaks at 1.
+        """Return the utilisation (p,) of bonds under tractions (p, c); a bond breaks at 1.
 
         The c components are normal, positive in tension, tangential and, if c = 3, along the fibre.  The utilisation is
         homogeneous of degree one.
@@ -62,7 +62,7 @@ class BondLaw(ABC):
 
     @abstractmethod
     def breaks(self, traction: Float) -> Float:
-        """Describe breaks under tractions (p, c) by values (p, d), named by the first d of `break_names`."""
+        """Describe breaks under tractions (p, c) by d values (p, d), named as in `break_names`."""
 
     @classmethod
     @abstractmethod
@@ -75,7 +75,7 @@ class BondLaw(ABC):
         return dataclasses.replace(self, **values)
 
     def begin(self, k: int) -> Float:
-        """Return the internal variables (k, h) of k intact bonds."""
+        """Return the internal variables (k, h) of `k` intact bonds."""
         return np.zeros((k, 0))
 
     def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> BondLaw:
@@ -83,26 +83,32 @@ class BondLaw(ABC):
         return self
 
     def convex(self, p: int) -> Bool:
-        """Return whether `share` is convex at each of the nodes (p,)."""
+        """Return whether `share` is convex, for each of `p` nodes (p,)."""
         return np.full(p, self.is_convex)
 
     def after(self, bonds: BondState, which: Bool, traction: Float) -> tuple[Float, Bool]:
         """Break the bonds `which` (k,) under tractions (k, c).
 
-        Return the internal variables (k, h), and the mask (k,) of bonds that part.
+        Return the new internal variables (k, h), and the mask (k,) of bonds that part.
         """
         return bonds.history, which
 
     def softening(self, bonds: BondState, pulled: Bool) -> Float | None:
-        """Return C / C_0 (k, 3) for springs, `pulled` (k,) or pressed; None if C never changes."""
+        """Return the compliance ratio C / C_0 (k, 3) of springs; None if C never changes.
+
+        Springs are in tension at the nodes `pulled` (k,), else in compression.
+        """
         return None
 
     def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
-        """Return fracture energies per area (p,) for bonds `which` (k,) in the modes of tractions (k, c)."""
+        """Return the fracture energies (p,) of bonds under tractions (k, c).
+
+        The energies are per area, for the bonds `which` (k,), in the modes of the tractions.
+        """
         return np.zeros(int(which.sum()))
 
     def damage(self, bonds: BondState) -> Float | None:
-        """Return the damage (k,), from 0, intact, to 1, broken; None without softening."""
+        """Return the damage (k,), from 0, intact, to 1, broken; None for laws without softening."""
         return None
 
     @property
@@ -111,23 +117,30 @@ class BondLaw(ABC):
         return 0.0
 
     def onset(self) -> BondLaw:
-        """Return the criterion of first damage."""
+        """Return the law that predicts the first damage."""
         return self
 
     def mode_angle(self, traction: Float) -> Float:
-        """Return psi (p,) of tractions (p, c), in radians: 0 is opening, pi/2 shear, also under pressure."""
+        """Return the mode angle psi (p,) of tractions (p, c), in radians.
+
+        The angle is 0 in opening, and pi/2 in shear, also under pressure.
+        """
         shear = np.linalg.norm(traction[:, 1:], axis=1)
         return np.asarray(np.arctan2(shear, np.maximum(traction[:, 0], 0.0)))
 
     def first_factor(self, before: Float, direction: Float) -> Float | None:
-        """Return the smallest f >= 0 (p,) at which `before` + f `direction` (p, c) breaks each bond; inf if none.
+        """Return the smallest load factors (p,) that break each bond, in closed form.
 
-        Return None if the law has no closed form.  `before` must break no bond.
+        A bond breaks under the traction `before` + f `direction` (p, c) with the factor f >= 0, or inf if the bond
+        never breaks.  Return None if the law has no closed form.  `before` must break no bond.
         """
         return None
 
     def crossing(self, before: Float, direction: Float, low: Float, high: Float) -> Float:
-        """Bisect [`low`, `high`] for f (p,) at which `before` + f `direction` (p, c) breaks; double a low `high`."""
+        """Find the load factors (p,) at which bonds break, by bisection of [`low`, `high`].
+
+        A bond breaks under `before` + f `direction` (p, c); a factor `high` that is too low doubles.
+        """
         high = high.copy()
         for _ in range(MOST_STEPS):
             below = self.share(before + high[:, None] * direction) < 1.0
@@ -142,9 +155,9 @@ class BondLaw(ABC):
 
 
 class SpringLaw(BondLaw):
-    """A law for bonds that break at an energy in the undamaged springs.
+    """A law for bonds that break at a certain energy of the undamaged springs.
 
-    A traction along the fibre adds to the slip energy: all shear counts alike.
+    A traction along the fibre adds to the slip energy, because all shear counts alike.
 
     Attributes:
         normal_stiffness, tangential_stiffness, axial_stiffness: k_n, k_t, k_a, stress per length.
@@ -158,7 +171,7 @@ class SpringLaw(BondLaw):
     break_names: ClassVar[Sequence[str]] = ("psi",)
 
     def energies(self, traction: Float) -> tuple[Float, Float]:
-        """Return the spring energies (p,) in opening and in slip, under tractions (p, c)."""
+        """Return the spring energies (p,) of opening and of slip under tractions (p, c)."""
         opening = np.maximum(traction[:, 0], 0.0) ** 2 / (2.0 * self.normal_stiffness)
         slip = traction[:, 1] ** 2 / (2.0 * self.tangential_stiffness)
         if traction.shape[1] == 3:
@@ -166,17 +179,20 @@ class SpringLaw(BondLaw):
         return np.asarray(opening), np.asarray(slip)
 
     def mode_angle(self, traction: Float) -> Float:
-        """Return psi (p,) of tractions (p, c), in radians: sin^2 psi is the slip's fraction of the energy."""
+        """Return the mode angle psi (p,) of tractions (p, c), in radians.
+
+        sin^2 psi is the fraction of the spring energy in slip.
+        """
         opening, slip = self.energies(traction)
         return np.asarray(np.arctan2(np.sqrt(slip), np.sqrt(opening)))
 
     def breaks(self, traction: Float) -> Float:
-        """Return psi (p, 1) of tractions (p, c), in degrees."""
+        """Return the mode angles psi (p, 1) of tractions (p, c), in degrees."""
         return np.degrees(self.mode_angle(traction))[:, None]
 
 
 def law_class(name: str) -> type[BondLaw]:
-    """Return the class of a law by its name in `case.bond_laws`."""
+    """Return the class of the law with a name in `case.bond_laws`."""
     module, cls = bond_laws.LAWS[name].implementation.split(".")
     law: type[BondLaw] = getattr(import_module(f"{__package__}.{module}"), cls)
     return law

@@ -26,13 +26,13 @@ from feti_homog.typing import Bool, Float, Int
 if TYPE_CHECKING:
     from feti_homog.feti.exact import exact_inverse
 
-# Blocks of H are rounding below this fraction of the stiffness beside the bond.
+# Fraction of the stiffness beside a bond below which blocks of H are rounding errors.
 RIGID = 1e-9
 
 
 @dataclass(frozen=True)
 class SpringEnergy(SpringLaw):
-    """A bond breaks when its spring energy reaches the toughness.
+    """The law by which a bond breaks when its spring energy reaches the toughness.
 
     G_I = <t_n>^2 / (2 k_n), G_II = t_t^2 / (2 k_t), tan^2 psi = G_II / G_I;
     G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)].
@@ -41,7 +41,7 @@ class SpringEnergy(SpringLaw):
 
     Attributes:
         toughness: G_Ic, energy per area.
-        mode_sensitivity: lambda; with 1 G_c is independent of the mode, with 0 pure shear breaks no bond.
+        mode_sensitivity: lambda; at 1, G_c is independent of the mode; at 0, pure shear breaks no bond.
     """
 
     normal_stiffness: float | Float
@@ -54,7 +54,7 @@ class SpringEnergy(SpringLaw):
 
     @classmethod
     def of_keys(cls, value: KeyValues) -> Self:
-        """Make the law from stiffnesses and toughness; by default the axial stiffness is the tangential stiffness."""
+        """Make the law from [interface] keys; the axial stiffness defaults to the tangential stiffness."""
         return cls(
             value("normal_stiffness"),
             value("tangential_stiffness"),
@@ -64,34 +64,34 @@ class SpringEnergy(SpringLaw):
         )
 
     def mode_factor(self, traction: Float) -> Float:
-        """Return sqrt(G_Ic / G_c) (p,) under tractions (p, c)."""
+        """Return the factor sqrt(G_Ic / G_c) (p,) of the modes of tractions (p, c)."""
         # 1 / (1 + tan^2 x) = cos^2 x
         return np.asarray(np.cos((1.0 - self.mode_sensitivity) * self.mode_angle(traction)))
 
     def share(self, traction: Float) -> Float:
-        """Return sqrt((G_I + G_II) / G_c) (p,) under tractions (p, c).
+        """Return the utilisation sqrt((G_I + G_II) / G_c) (p,) under tractions (p, c).
 
-        This utilisation is convex, and homogeneous of degree one because psi is independent of the traction's size.
+        The utilisation is convex, and homogeneous of degree one because psi is independent of the size of the traction.
         """
         return np.asarray(np.sqrt(sum(self.energies(traction)) / self.toughness) * self.mode_factor(traction))
 
     def fracture_toughness(self, traction: Float) -> Float:
-        """Return G_c (p,) under tractions (p, c), energy per area."""
+        """Return the toughness G_c (p,) in the modes of tractions (p, c), an energy per area."""
         return np.asarray(self.toughness / self.mode_factor(traction) ** 2)
 
     def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
-        """Return G_c (p,) of bonds `which` (k,) under tractions (k, c)."""
+        """Return the toughness G_c (p,) of the bonds `which` (k,) under tractions (k, c)."""
         return self.at(np.flatnonzero(which)).fracture_toughness(traction[which])
 
 
 @dataclass(frozen=True)
 class TipEnergies:
-    """The tips: this rank's intact bonds beside broken bonds.
+    """The debonding tips of this rank: t intact bonds beside broken bonds.
 
     Attributes:
         H: (t, 2, 2) diagonal blocks of the inverse dual operator.
         length: (t,) tributary lengths.
-        stiffness: (t, c) upper bound of H, as `ExactInverse.stiffness`.
+        stiffness: (t, c) upper bounds of H, as `ExactInverse.stiffness`.
         axial: (t,) H for slip along the fibres; empty without an axial problem.
     """
 
@@ -103,7 +103,7 @@ class TipEnergies:
 
 @dataclass(frozen=True, kw_only=True)
 class ReleasedEnergy(SpringEnergy):
-    """A bond at a tip breaks when its break releases G_c l, with its tributary length l.
+    """The law by which a bond at a tip breaks when the break releases G_c l, with tributary length l.
 
     All other bonds break when the spring energy reaches G_c.
 
@@ -122,29 +122,29 @@ class ReleasedEnergy(SpringEnergy):
         influence: exact_inverse.ExactInverse,
         axial: exact_inverse.ExactInverse | None = None,
     ) -> Self:
-        """Make the law from springs and the inverse dual operators."""
+        """Make the law from a spring law and the inverse dual operators."""
         return cls(**vars(springs), influence=influence, axial=axial)
 
     def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> SpringsAndTips:
-        """Return the law at this rank's nodes in a bond state.  Collective; the methods of the result are not.
+        """Return the law at this rank's nodes in a bond state.  Collective, unlike the methods of the result.
 
         Raises:
             ConvergenceError: rounding hides the released energy.
         """
         self._activate(self.influence, cell.plane, bonds)
         neighbours, first = self.influence.neighbours, self.influence.neighbours.first
-        everywhere = np.concatenate(neighbours.comm.allgather(bonds.status))
-        beside = np.flatnonzero((everywhere == BONDED) & (neighbours.adjacency @ (everywhere != BONDED) > 0))
-        mine = (beside >= first) & (beside < first + len(bonds.status))
-        rows = neighbours.rows[beside][:, None] + np.arange(2)
-        H, axial = self.influence.inverse_blocks(rows)[mine], np.zeros(0)
-        stiffness = self.influence.stiffness[rows[mine]]
-        node, number = beside[mine] - first, np.full(len(bonds.status), -1)
+        all_status = np.concatenate(neighbours.comm.allgather(bonds.status))
+        at_tips = np.flatnonzero((all_status == BONDED) & (neighbours.adjacency @ (all_status != BONDED) > 0))
+        is_local = (at_tips >= first) & (at_tips < first + len(bonds.status))
+        rows = neighbours.rows[at_tips][:, None] + np.arange(2)
+        H, axial = self.influence.inverse_blocks(rows)[is_local], np.zeros(0)
+        stiffness = self.influence.stiffness[rows[is_local]]
+        node, number = at_tips[is_local] - first, np.full(len(bonds.status), -1)
         if self.axial is not None:
             self._activate(self.axial, cell.problems[1], bonds)
-            rows = self.axial.neighbours.rows[beside]
-            axial = self.axial.inverse_blocks(np.stack([rows, rows], axis=1))[mine, 0, 0]
-            stiffness = np.column_stack([stiffness, self.axial.stiffness[rows[mine]]])
+            rows = self.axial.neighbours.rows[at_tips]
+            axial = self.axial.inverse_blocks(np.stack([rows, rows], axis=1))[is_local, 0, 0]
+            stiffness = np.column_stack([stiffness, self.axial.stiffness[rows[is_local]]])
         number[node] = np.arange(len(node))
         tips = TipEnergies(H, cell.nodes.length[node], stiffness, axial)
         springs = {field.name: getattr(self, field.name) for field in fields(SpringEnergy)}
@@ -164,12 +164,12 @@ class ReleasedEnergy(SpringEnergy):
 
 @dataclass(frozen=True, kw_only=True)
 class SpringsAndTips(SpringEnergy):
-    """The law in a bond state: sqrt(released / (G_c l)) at tips, the spring criterion at all other nodes.
+    """The law in one bond state: sqrt(released / (G_c l)) at tips, the spring criterion at other nodes.
 
     Attributes:
         tips: tips of this rank.
-        number: (p,) tip number of a node, or -1.
-        contact: whether contact keeps faces from overlap.
+        number: (p,) tip number of each node, or -1.
+        contact: whether contact prevents overlap of faces.
     """
 
     tips: TipEnergies
@@ -177,29 +177,29 @@ class SpringsAndTips(SpringEnergy):
     contact: bool
 
     def share(self, traction: Float) -> Float:
-        """Return the utilisation (p,) by tractions (p, c)."""
-        used, at = super().share(traction), np.flatnonzero(self.number >= 0)
-        springs, tips, t = self.at(at), self.tips, self.number[at]
+        """Return the utilisation (p,) under tractions (p, c)."""
+        used, at_tips = super().share(traction), np.flatnonzero(self.number >= 0)
+        springs, tips, t = self.at(at_tips), self.tips, self.number[at_tips]
         length, stiffness = tips.length[t], tips.stiffness[t]
-        lam = traction[at] * length[:, None]
+        lam = traction[at_tips] * length[:, None]
         released = released_energy(tips.H[t], lam[:, :2], stiffness[:, :2], self.contact)
         if len(tips.axial):
             gives_way = tips.axial[t] > RIGID * stiffness[:, 2]
             along = lam[:, 2] ** 2 / np.where(gives_way, 2.0 * tips.axial[t], 1.0)
             released = released + np.where(gives_way, along, 0.0)
-        used[at] = np.sqrt(released / (springs.toughness * length)) * springs.mode_factor(traction[at])
+        used[at_tips] = np.sqrt(released / (springs.toughness * length)) * springs.mode_factor(traction[at_tips])
         return used
 
     def convex(self, p: int) -> Bool:
-        """Return False (p,) at tips, because the released energy need not be subadditive."""
+        """Return False (p,) at tips, where the released energy need not be subadditive."""
         return np.asarray(self.number < 0)
 
 
 def released_energy(H: Float, lam: Float, stiffness: Float, contact: bool) -> Float:
-    """Return the released energy (m,) of each break, for blocks H (m, 2, 2) and forces (m, 2).
+    """Return the released energy (m,) of each break, from blocks H (m, 2, 2) and forces `lam` (m, 2).
 
-    `stiffness` (m, 2) bounds H: where H is rounding relative to this bound, as at the last bond of a fibre, no force
-    can act.  With `contact` the faces that would overlap keep the normal force.
+    `stiffness` (m, 2) bounds H.  Where H is a rounding error relative to this bound, as at the last bond of a fibre, no
+    force can act.  With `contact` the faces that would overlap keep the normal force.
     """
     root = np.sqrt(stiffness)
     ratio, vectors = np.linalg.eigh(H / (root[:, :, None] * root[:, None, :]))

@@ -1,4 +1,4 @@
-"""Cohesive laws: damage softens the bonds tooth by tooth, and takes exactly the energy of the law.
+"""Cohesive laws, in which damage softens bonds tooth by tooth and takes exactly the energy of the law.
 
 Camanho, Davila, NASA/TM-2002-211737 (mixed mode); Benzeggagh, Kenane, Compos. Sci. Technol. 56 (1996) 439 (toughness);
 Rots, Belletti, Invernizzi, Eng. Fract. Mech. 75 (2008) 590 (saw teeth).
@@ -37,14 +37,14 @@ NUMBERS = ("normal_stiffness", "tangential_stiffness", "normal_strength", "tange
 
 
 def numbers(value: Callable[..., float | Float]) -> dict[str, Any]:
-    """Return the numbers of a law; by default the axial stiffness is the tangential stiffness."""
+    """Return the constants of a law; the axial stiffness defaults to the tangential stiffness."""
     axial = value("axial_stiffness", "tangential_stiffness")
     return {name: value(name) for name in NUMBERS} | {"axial_stiffness": axial}
 
 
 @dataclass(frozen=True)
 class CohesiveLaw(SpringLaw):
-    """A law with softening; the history of a bond counts the broken teeth.
+    """A law with softening, where the history of a bond counts broken teeth.
 
     Attributes:
         normal_strength, tangential_strength: N and S.
@@ -69,23 +69,23 @@ class CohesiveLaw(SpringLaw):
 
     @classmethod
     def of_keys(cls, value: KeyValues) -> Self:
-        """Make the law from the keys in [interface], with the teeth of the case."""
+        """Make the law and its damage levels from the keys in [interface]."""
         law, branch = cls(**numbers(value), levels=(0.0, 1.0)), cls.branch(value)
         # The levels follow from all sections, so that all ranks agree.
-        everywhere = cls(**numbers(value.everywhere), levels=(0.0, 1.0), **branch)
-        levels = everywhere.levels_for(value.common("teeth"), value.common("softening_tolerance"))
+        law_of_all = cls(**numbers(value.everywhere), levels=(0.0, 1.0), **branch)
+        levels = law_of_all.levels_for(value.common("teeth"), value.common("softening_tolerance"))
         return replace(law, levels=levels, **branch)
 
     @classmethod
     def branch(cls, value: KeyValues) -> dict[str, Any]:
-        """Return the fields of the softening branch."""
+        """Return the dataclass fields that describe the softening branch."""
         return {}
 
     def levels_for(self, teeth: int | None, tolerance: float) -> tuple[float, ...]:
-        """Choose damage levels with a constant ratio of openings in the pure mode of the largest G_c / W_0.
+        """Choose the damage levels between the teeth.
 
-        By default the number of teeth is the smallest one with which the first tooth exceeds the peak traction by at
-        most the fraction `tolerance`.
+        Openings have a constant ratio in the pure mode of the largest G_c / W_0.  By default the number of teeth is the
+        smallest one for which the first tooth exceeds the peak traction by at most the fraction `tolerance`.
 
         Raises:
             CaseError: more than MOST_TEETH teeth are necessary.
@@ -114,28 +114,28 @@ class CohesiveLaw(SpringLaw):
 
     @property
     def overshoot(self) -> float:
-        """The excess of the first tooth over the peak traction, relative to the peak: the largest in pure modes."""
+        """The largest relative excess of the first tooth over the peak traction, in pure modes."""
         return float(np.sqrt(self._taken(self._damages[1:2], self._longest_branch)[0] / self.levels[1])) - 1.0
 
     @property
     @abstractmethod
     def last(self) -> float:
-        """The u at which the last tooth ends, or begins to take the rest."""
+        """The argument u at which the last tooth ends, or takes the remaining energy."""
 
     @abstractmethod
     def shape(self, u: Float) -> Float:
-        """Return tau(u) for u >= 0, which falls from 1."""
+        """Return the relative traction tau(u), which falls from 1, for u >= 0."""
 
     @abstractmethod
     def area(self, u: Float | float) -> Float | float:
-        """Return int_0^u tau."""
+        """Return the integral int_0^u tau."""
 
     @abstractmethod
     def opening(self, d: Float, s: Float | float) -> Float:
-        """Return u (p,) with tau(u) = (1 - d) (1 + s u), for d < 1."""
+        """Return the root u (p,) of tau(u) = (1 - d) (1 + s u), for damage d < 1."""
 
     def begin(self, k: int) -> Float:
-        """Return the numbers (k, 1) of broken teeth in intact bonds, all zero."""
+        """Return the numbers of broken teeth (k, 1), zero for `k` intact bonds."""
         return np.zeros((k, 1))
 
     def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> Self:
@@ -143,38 +143,41 @@ class CohesiveLaw(SpringLaw):
         return replace(self, level=bonds.history[:, 0])
 
     def share(self, traction: Float) -> Float:
-        """Return sqrt(W / W_j) (p,) under tractions (p, c) at bonds with j broken teeth.
+        """Return the utilisation sqrt(W / W_j) (p,) under tractions (p, c) at bonds with j broken teeth.
 
-        This utilisation is homogeneous of degree one because B is independent of the traction's size.
+        The utilisation is homogeneous of degree one because B is independent of the size of the traction.
         """
         first, second = self.energies(traction)
         tooth = np.minimum(np.asarray(self.level, np.int64), len(self.levels) - 2)
         return np.asarray(np.sqrt((first + second) / self._breaking(traction, tooth)) / (1.0 - self._damages[tooth]))
 
     def after(self, bonds: BondState, which: Bool, traction: Float) -> tuple[Float, Bool]:
-        """Add a broken tooth (k, 1) to the bonds `which`; mark (k,) the bonds that lose their last tooth."""
+        """Break the next tooth of the bonds `which` (k,).
+
+        Return the numbers of broken teeth (k, 1), and the mask (k,) of bonds that lose the last tooth.
+        """
         history = bonds.history + which[:, None]
         return history, which & (history[:, 0] >= len(self.levels) - 1)
 
     def damage(self, bonds: BondState) -> Float:
-        """Return the damage d (k,), with 1 for all parted bonds."""
+        """Return the damage d (k,) of bonds, 1 for all parted bonds."""
         d = self._damages[bonds.history[:, 0].astype(np.int64)]
         return np.asarray(np.where(bonds.status == 0, d, 1.0))
 
     def softening(self, bonds: BondState, pulled: Bool) -> Float:
-        """Return C / C_0 = 1 / (1 - d) (k, 3); 1 for pressed normal springs, and for parted bonds."""
+        """Return C / C_0 = 1 / (1 - d) (k, 3) of springs; 1 for pressed normal springs and parted bonds."""
         d = self._damages[bonds.history[:, 0].astype(np.int64)]
         factor = 1.0 / (1.0 - np.where(d < 1.0, d, 0.0))
         return np.column_stack([np.where(pulled, factor, 1.0), factor, factor])
 
     def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
-        """Return the energies W_j (d_j+1 - d_j) (p,) of the breaking teeth."""
+        """Return the energy W_j (d_j+1 - d_j) (p,) of each tooth that breaks."""
         law, selected = self.at(np.flatnonzero(which)), traction[which]
         tooth = bonds.history[which, 0].astype(np.int64)
         return np.asarray(law._breaking(selected, tooth) * np.diff(self._damages)[tooth])
 
     def onset(self) -> QuadraticStrength:
-        """Return the criterion for first damage."""
+        """Return the strength criterion that predicts the first damage."""
         axial = self.tangential_strength * np.sqrt(self.axial_stiffness / np.asarray(self.tangential_stiffness))
         return QuadraticStrength(self.normal_strength, self.tangential_strength, axial)
 
@@ -190,7 +193,10 @@ class CohesiveLaw(SpringLaw):
         return normal**2 / (2.0 * self.normal_stiffness), tangential**2 / (2.0 * self.tangential_stiffness)
 
     def _breaking(self, traction: Float, tooth: Int) -> Float:
-        """Return W_j (p,) under tractions (p, c) for tooth numbers j, one for each bond or for all."""
+        """Return the breaking energies W_j (p,) of teeth j under tractions (p, c).
+
+        `tooth` has a number j for each bond, or one number for all bonds.
+        """
         first, second = self.energies(traction)
         stored = first + second
         B = np.divide(second, stored, out=np.zeros(len(stored)), where=stored > 0.0)
@@ -202,7 +208,7 @@ class CohesiveLaw(SpringLaw):
         return np.asarray(onset * (self._taken(high, s) - self._taken(low, s)) / (high - low))
 
     def _taken(self, d: Float, s: Float | float) -> Float:
-        """Return phi (p,) at the damage d: the energy that damage has taken, divided by W_0."""
+        """Return phi (p,), the energy that the damage d has taken, divided by W_0."""
         d, s = np.asarray(d, float), np.asarray(s)
         inside = d < 1.0
         below = np.where(inside, d, 0.0)
@@ -213,22 +219,22 @@ class CohesiveLaw(SpringLaw):
 
 @dataclass(frozen=True)
 class PiecewiseLinear(CohesiveLaw):
-    """tau is piecewise linear, with `heights` (m,) from 1 to 0 at `knots` (m,)."""
+    """A law with piecewise linear tau, with `heights` (m,) from 1 to 0 at `knots` (m,)."""
 
     knots: tuple[float, ...] = (0.0, 1.0)
     heights: tuple[float, ...] = (1.0, 0.0)
 
     @property
     def last(self) -> float:
-        """First zero of tau."""
+        """The first zero of tau."""
         return self.knots[self.heights.index(0.0)]
 
     def shape(self, u: Float) -> Float:
-        """Return tau(u) for u >= 0."""
+        """Return the relative traction tau(u) for u >= 0."""
         return np.interp(u, self.knots, self.heights)
 
     def area(self, u: Float | float) -> Float | float:
-        """Return int_0^u tau."""
+        """Return the integral int_0^u tau."""
         u = np.minimum(u, self.last)
         knots, heights = np.array(self.knots), np.array(self.heights)
         areas = np.concatenate([[0.0], np.cumsum(np.diff(knots) * (heights[1:] + heights[:-1]) / 2.0)])
@@ -236,7 +242,7 @@ class PiecewiseLinear(CohesiveLaw):
         return np.asarray(areas[k] + (u - knots[k]) * (heights[k] + self.shape(np.asarray(u))) / 2.0)
 
     def opening(self, d: Float, s: Float | float) -> Float:
-        """Return u (p,) with tau(u) = (1 - d) (1 + s u), from the linear piece with a change of sign."""
+        """Return the root u (p,) of tau(u) = (1 - d) (1 + s u), on the linear piece with a sign change."""
         if len(self.knots) == 2:
             return np.asarray(d / ((1.0 - d) * s + 1.0 / self.knots[1]))
         knots, heights = np.array(self.knots), np.array(self.heights)
@@ -255,30 +261,30 @@ class BilinearLaw(PiecewiseLinear):
 
 @dataclass(frozen=True)
 class TableLaw(PiecewiseLinear):
-    """A table has the traction over the opening in mode I; other modes stretch it to their toughness."""
+    """A law with a table of traction over opening in mode I, stretched to the toughness of other modes."""
 
     @classmethod
     def branch(cls, value: KeyValues) -> dict[str, Any]:
-        """Return the knots and heights from a table of openings and tractions that begins at the peak."""
+        """Return the knots and heights of the table, which begins at the peak traction."""
         openings, tractions = np.array(value.common("openings")), np.array(value.common("tractions"))
         return {"knots": tuple(openings / openings[0] - 1.0), "heights": tuple(tractions / tractions[0])}
 
 
 @dataclass(frozen=True)
 class ExponentialLaw(CohesiveLaw):
-    """tau = exp(-u)."""
+    """A law with tau = exp(-u)."""
 
     @property
     def last(self) -> float:
-        """The u at which the traction has fallen to EXPONENTIAL_TAIL."""
+        """The argument u at which the traction has fallen to EXPONENTIAL_TAIL."""
         return -math.log(EXPONENTIAL_TAIL)
 
     def shape(self, u: Float) -> Float:
-        """exp(-u)."""
+        """Return the relative traction exp(-u)."""
         return np.asarray(np.exp(-u))
 
     def area(self, u: Float | float) -> Float | float:
-        """1 - exp(-u)."""
+        """Return the integral 1 - exp(-u)."""
         return np.asarray(-np.expm1(-np.asarray(u)))
 
     def opening(self, d: Float, s: Float | float) -> Float:

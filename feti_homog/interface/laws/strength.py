@@ -1,4 +1,4 @@
-"""Strength criteria: a bond breaks at a limit of its traction, force per area; compression breaks no bond."""
+"""Strength criteria: a bond breaks at a limit of the traction, force per area; compression breaks no bond."""
 
 import math
 from abc import abstractmethod
@@ -26,18 +26,18 @@ class Strength(BondLaw):
 
     @classmethod
     def of_keys(cls, value: KeyValues) -> Self:
-        """Make the law from strengths; by default the axial strength is the tangential strength."""
+        """Make the law from [interface] keys; the axial strength defaults to the tangential strength."""
         return cls(
             value("normal_strength"), value("tangential_strength"), value("axial_strength", "tangential_strength")
         )
 
     def share(self, traction: Float) -> Float:
-        """Return the utilisation (p,) by tractions (p, c)."""
+        """Return the utilisation (p,) under tractions (p, c)."""
         return self.together(self.breaks(traction))
 
     @abstractmethod
     def together(self, shares: Float) -> Float:
-        """Combine the utilisations (p, c) of the traction components to one for each node (p,)."""
+        """Combine the utilisations (p, c) of traction components to node utilisations (p,)."""
 
     def breaks(self, traction: Float) -> Float:
         """Return the traction components (p, c), relative to their strengths."""
@@ -52,14 +52,14 @@ class Strength(BondLaw):
 
 
 class MaxStrength(Strength):
-    """The paper's criterion: a bond breaks at max(<t_n> / R^n, |t_t| / R^t, |t_a| / R^a) = 1."""
+    """The criterion of the paper: a bond breaks at max(<t_n> / R^n, |t_t| / R^t, |t_a| / R^a) = 1."""
 
     def together(self, shares: Float) -> Float:
         """Return the largest utilisation (p,) of the components (p, c)."""
         return np.asarray(shares.max(axis=1, initial=0.0))
 
     def first_factor(self, before: Float, direction: Float) -> Float:
-        """Return the factors (p,) at which the first component reaches its strength."""
+        """Return the load factors (p,) at which the first component reaches its strength."""
         limits = self.limits[..., : before.shape[1]]
         s, ds = before / limits, direction / limits
         towards = np.abs(ds)
@@ -69,14 +69,14 @@ class MaxStrength(Strength):
 
 
 class QuadraticStrength(Strength):
-    """A bond breaks at (<t_n> / R^n)^2 + (t_t / R^t)^2 + (t_a / R^a)^2 = 1."""
+    """The quadratic criterion: a bond breaks at (<t_n> / R^n)^2 + (t_t / R^t)^2 + (t_a / R^a)^2 = 1."""
 
     def together(self, shares: Float) -> Float:
         """Return the root (p,) of the sum of squared utilisations (p, c)."""
         return np.asarray(np.hypot.reduce(shares, axis=1))
 
     def first_factor(self, before: Float, direction: Float) -> Float:
-        """Return the factors (p,) at which the sum of squares is 1, without a compressive normal traction."""
+        """Return the load factors (p,) at which the sum of squares is 1, without compression."""
         limits = self.limits[..., : before.shape[1]]
         s, ds = before / limits, direction / limits
         opening, shear = _largest_root(s, ds), _largest_root(s[:, 1:], ds[:, 1:])

@@ -1,4 +1,4 @@
-"""Paths of load: from event to event, onsets, later legs.
+"""Load paths: from event to event, onsets of breaks, and later legs.
 
 Imports `feti`, `interface`, `interface.contact`, `interface.friction`, `interface.laws` and `system`.  Main entry:
 `path_following`.

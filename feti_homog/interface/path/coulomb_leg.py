@@ -1,7 +1,7 @@
-"""Legs with friction on debonded faces: linear pieces, between which statuses change or bonds break.
+"""Path legs with friction on debonded faces: linear pieces between changes of status and breaks of bonds.
 
-An equal load step is implicit: slips grow with the sign of the traction at its end.  The way within a step is unknown:
-its heat is the work of final forces on slips, and the work of the loads is stored, released or heat.
+An equal load step is implicit: slips grow with the sign of the final traction.  The way within a step is unknown: the
+heat is the work of final forces on slips, and the work of the loads is stored, released or heat.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -31,7 +31,7 @@ CYCLE = "friction: the statuses of the faces change without end at one load (a c
 
 
 class CoulombLeg(Leg):
-    """Leg with statuses (n,) of faces and scaled x (m,), as in `CoulombFaces`.
+    """A leg with face statuses (n,) and scaled x (m,), as in `CoulombFaces`.
 
     Rates solve a complementarity problem, and are constant until a face reaches a limit of its status, a bond its
     strength, or s = 1.
@@ -57,17 +57,18 @@ class CoulombLeg(Leg):
 
     @property
     def state(self) -> Equilibrium:
-        """Equilibrium at s, computed once.  Collective."""
+        """The equilibrium at s, computed once.  Collective."""
         if self._state is None:
             loads = [*self.waypoints[: self.leg], self._load_at(self._share)]
             self._state = self.sliding.equilibrium(loads, self._bonds, self._x)
         return self._state
 
     def _path_state(self) -> PathState:
+        """Return the path state at s, with the spring energy of damaged bonds.  Collective."""
         return replace(super()._path_state(), stretched=self.sliding.stretched(self._x))
 
     def _on_root(self, find: Callable[..., tuple[Status, Float]], *arguments: Any) -> tuple[Status, Float]:
-        """Call `find` on rank 0; return its statuses and x, whose product all ranks store.  Collective."""
+        """Call `find` on rank 0, and return the statuses and x on all ranks.  Collective."""
         faces = self.sliding.faces
 
         def found() -> tuple[Status, Float, Float]:
@@ -84,16 +85,16 @@ class CoulombLeg(Leg):
         return Prescribed(load.by_stress, self.sliding.given(load), x[1 : 2 * len(self.sliding.rows) : 2])
 
     def _stand(self, status: Status, x: Float, mean: Macroscopic, way: Energies) -> None:
-        """Set the state to statuses and scaled x, after a way with these energies."""
+        """Set the current state, and add the energies of the way to this state."""
         self._energies = self._energies.plus(way)
         self._bonds = self.sliding.bonds(self._bonds, status, x)
         self._status, self._x, self._mean, self._state = status, x, mean, None
 
     def _settle(self, begin: PathState) -> None:
-        """Find the state at s with the bonds of `begin`, after a break if `begin` has one.  Collective.
+        """Find the state at s with the bonds of `begin`, after the break in `begin` if any.  Collective.
 
         In a break faces lose the product of jumps and mean forces; slips turn a part into heat by the final forces, and
-        the break has released the rest.
+        the break releases the rest.
         """
         sliding, self._bonds = self.sliding, begin.bonds
         self._status, self._x = status, x = sliding.begin(begin.bonds, begin.last.strain)
@@ -110,19 +111,19 @@ class CoulombLeg(Leg):
         self._first = True
 
     def _go_straight(self, status: Status, x: Float, released: float, heat: float, fracture: float = 0.0) -> None:
-        """Advance straight to scaled x with these statuses and energy losses."""
+        """Advance on a straight path to given statuses and scaled x, with energy losses per area."""
         before, mean = self._mean, self.sliding.macroscopic(x)
         work = 0.5 * float((before.stress + mean.stress) @ (mean.strain - before.strain))
         self._stand(status, x, mean, Energies(work, released, fracture, heat))
 
     def _advance(self) -> Iterator[Point]:
-        """Advance along the rates up to the next change, and past it.
+        """Advance along the rates up to and past the next change.
 
         Raises:
             NotCarriedError: nothing carries more, after a point at the largest load.
-            StuckError: no statuses go on, or they change without end.
+            StuckError: no statuses continue the state, or statuses change without end.
         """
-        sliding, faces, share = self.sliding, self.sliding.faces, self._share
+        sliding, faces, start = self.sliding, self.sliding.faces, self._share
         velocity = sliding.given(self.end) - sliding.given(self.start)
         try:
             status, rate = self._on_root(faces.rates, self._status, self._x, self.end.by_stress, velocity)
@@ -130,8 +131,8 @@ class CoulombLeg(Leg):
             if self._share > self._reported:
                 yield self._point(0, 0, self._path_state())
             raise
-        status, x = self._on_root(faces.settled, status, self._given(share, self._x), self._x)
-        change, rest = self.cell.comm.bcast(faces.next_change(status, x, rate)), 1.0 - share
+        status, x = self._on_root(faces.settled, status, self._given(start, self._x), self._x)
+        change, rest = self.cell.comm.bcast(faces.next_change(status, x, rate)), 1.0 - start
         if change >= rest - ROUNDING:
             change = np.inf
         tractions = (sliding.traction(state) for state in (x, x + min(rest, change) * rate))
@@ -143,13 +144,13 @@ class CoulombLeg(Leg):
         if not rounded.any():
             faces.keep(after, faces.product(x) + way * faces.product(rate))
         self._go_straight(status, after, 0.0, faces.heat(status, x, after) / self.cell.area)
-        self._share = 1.0 if breaks > 1.0 and change >= rest else share + way
+        self._share = 1.0 if breaks > 1.0 and change >= rest else start + way
         if breaks <= 1.0:
             yield from self._break_overloaded(is_due=True)
         elif self._share < 1.0 and (self._first or self._share - self._reported >= LEAST_SHARE):
             self._first = False
             yield self._point(0, 0, self._path_state())
-        self._changes = 0 if self._share > share + ROUNDING else self._changes + 1
+        self._changes = 0 if self._share > start + ROUNDING else self._changes + 1
         if self._changes > MOST_CHANGES_AT_A_LOAD:
             raise StuckError(CYCLE)
 

@@ -1,4 +1,4 @@
-"""Legs without friction: the load is controlled and the response piecewise linear."""
+"""Path legs without friction, where the load is controlled and the response piecewise linear."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -22,19 +22,19 @@ OFF_LINE_ROUNDING = 1e-10
 
 
 class FrictionlessLeg(Leg):
-    """Leg whose equilibria do not depend on the way to them.
+    """A leg with equilibria that are independent of the path.
 
     From the equilibrium at s the transitions are
 
-        overloaded   by a break, or at tips by a change of contact, with which their released energy jumps.  The worst
-                     bonds break: a point; equilibrium at the same s without them.
+        overloaded   by a break, or by a change of contact, at which the released energy of tips jumps.  The worst
+                     bonds break: a point; equilibrium at the same s without these bonds.
         advance      With a linear response, predict the first break, the beginning of a change of contact, and the
                      end of the leg.  Equilibrium at the first of these; if the stress is not on the line, or a bond
-                     is overloaded, an event was missed: halve the way until none is.  The result is
-          a break    the worst bonds break: a point; equilibrium at the same s without them;
+                     is overloaded, an event was missed: halve the way until no event is missed.  The result is
+          a break    the worst bonds break: a point; equilibrium at the same s without these bonds;
           a change   a point; equilibrium a little further, where the change is beyond doubt;
           less       a point if contact states have changed.
-        touch        Open faces do not carry the stresses of the load: a point where they touch.
+        touch        Open faces do not carry the stresses of the load: a point where the faces touch.
         end          s = 1: a point.
 
     A predicted change that does not come is a false alarm: up to the next change only halving finds changes.
@@ -51,7 +51,7 @@ class FrictionlessLeg(Leg):
 
     @property
     def state(self) -> Equilibrium:
-        """Equilibrium at s."""
+        """The equilibrium at s."""
         return self._state
 
     def points(self) -> Iterator[Point]:
@@ -60,20 +60,24 @@ class FrictionlessLeg(Leg):
         yield from super().points()
 
     def _is_over(self) -> bool:
+        """Return whether the leg is at its end, or a solve did not converge."""
         return self._share >= 1.0 or not self._state.converged
 
     def _settle(self, begin: PathState) -> None:
+        """Find the equilibrium at s with the bonds of `begin`.  Collective."""
         self._bends_before, self._false_alarm, self._from = np.inf, False, begin
         self._go_to(self._share)
 
     def _go_to(self, share: float) -> None:
+        """Advance to the equilibrium at a fraction of the leg.  Collective."""
         self._stand(share, self._solve(share, self._from.bonds, self._from.lam))
 
     def _solve(self, share: float, bonds: BondState, lam: Multipliers) -> Equilibrium:
+        """Solve for the equilibrium at a fraction of the leg, from guesses.  Collective."""
         return self.cell.equilibrium(self._load_at(share), bonds, lam)
 
     def _stand(self, share: float, state: Equilibrium) -> None:
-        """Set the state to the equilibrium at a fraction of the leg, and add the energies of the way to it."""
+        """Set the state to an equilibrium at a fraction of the leg, and add the energies of the way."""
         if share >= self._bends_before:
             self._bends_before = np.inf
         self._share, self._state, self._bonds = share, state, state.bonds
@@ -87,14 +91,14 @@ class FrictionlessLeg(Leg):
         Raises:
             NotCarriedError: neither open nor touching faces carry the load's stresses.
         """
-        cell, before, share = self.cell, self._state, self._share
+        cell, before, start = self.cell, self._state, self._share
         try:
             # The solutions at the end of the leg with fixed contact states.
             end = cell.linear(self.end, before.bonds, before.multipliers)
         except NotCarriedError:
-            beyond = min(share + SAME_SHARE, 1.0)
+            beyond = min(start + SAME_SHARE, 1.0)
             touching = self._solve(beyond, before.bonds, before.multipliers)
-            self._stand(share, self._solve(share, touching.bonds, touching.multipliers))
+            self._stand(start, self._solve(start, touching.bonds, touching.multipliers))
             yield self._turn(beyond)
             self._stand(beyond, touching)
             self._false_alarm = False
@@ -103,9 +107,9 @@ class FrictionlessLeg(Leg):
         breaks = first_break(cell, self.law, before.bonds, cell.traction(before.solutions), cell.traction(end))
         begins, certain = (1.0, 1.0) if self._false_alarm else first_change(cell.plane, before, end[0])
         begins, certain = (np.inf, np.inf) if begins == 1.0 else (begins, certain)
-        breaks, begins, certain = (share + (1.0 - share) * way for way in (breaks, begins, certain))
+        breaks, begins, certain = (start + (1.0 - start) * way for way in (breaks, begins, certain))
         target = min(breaks, begins, 1.0)
-        is_here = target - share <= SAME_SHARE and (target == begins or (target == breaks and self._is_due()))
+        is_here = target - start <= SAME_SHARE and (target == begins or (target == breaks and self._is_due()))
         reached = is_here or self._approach(target, end)
         is_due = reached and target == breaks and self._is_due()
         is_reported, turned = self._share <= self._reported + SAME_SHARE, False
@@ -130,7 +134,10 @@ class FrictionlessLeg(Leg):
         return self._used()[1] > 1.0 - UTILISATION_TIE
 
     def _approach(self, target: float, end: Sequence[DualSolution]) -> bool:
-        """Advance to the target, or as far as the response is straight; return whether the target is reached."""
+        """Advance to the target, or as far as the response is straight.
+
+        Return whether the leg has reached the target; `end` has the solutions at the end of the leg.
+        """
         cell, start, begin, reached = self.cell, self._share, self._state, True
         nearest = min(start + SAME_SHARE, 1.0)
         target = max(target, nearest)
@@ -163,7 +170,7 @@ class FrictionlessLeg(Leg):
         return np.where(self.end.by_stress, self.cell.plane.scales.largest_stiffness * state.strain, state.stress)
 
     def _turn(self, position: float) -> Point:
-        """Return the state as a point without a break, from which the path goes on at `position`."""
+        """Return the state as a point without a break; the path goes on at `position`."""
         return self._point(0, 0, replace(self._path_state(), position=position))
 
     def _differs(self, before: Equilibrium) -> bool:

@@ -1,6 +1,6 @@
 """A leg of a path: the load between two waypoints, by events or in equal steps.
 
-Two engines follow the load: `FrictionlessLeg` solves equilibria, `CoulombLeg` rates of faces with friction.
+Two engines follow the load: `FrictionlessLeg` solves for equilibria, `CoulombLeg` for rates of faces with friction.
 """
 
 from abc import ABC, abstractmethod
@@ -14,12 +14,12 @@ from feti_homog.interface.loads import Load, Macroscopic
 from feti_homog.interface.path import path_points
 from feti_homog.typing import Bool, Float
 
-# Fractions of a leg that differ by less are equal.
+# Difference below which fractions of a leg are equal.
 SAME_SHARE = 1e-9
 
 
 class Leg(ABC):
-    """Leg number `leg`, between two loads of the same kinds, at its rising fraction s.
+    """The leg with number `leg` between two loads of equal kinds, at a rising fraction s.
 
     Bonds break at constant load: a point, then the state after the break at the same s.
 
@@ -45,15 +45,15 @@ class Leg(ABC):
     @property
     @abstractmethod
     def state(self) -> Equilibrium:
-        """Equilibrium at s.  Collective."""
+        """The equilibrium at s.  Collective."""
 
     @abstractmethod
     def _settle(self, begin: path_points.PathState) -> None:
-        """Find the state at s with the bonds of `begin`, after a break if `begin` has one.  Collective."""
+        """Find the state at s with the bonds of `begin`, after the break in `begin` if any.  Collective."""
 
     @abstractmethod
     def _advance(self) -> Iterator[path_points.Point]:
-        """Advance to the next event, or part of the way, and yield its points.  Collective."""
+        """Advance to the next event, or part of the way, and yield the points.  Collective."""
 
     @abstractmethod
     def _go_to(self, share: float) -> None:
@@ -85,6 +85,7 @@ class Leg(ABC):
         return replace(point, load_factor=number / steps)
 
     def _load_at(self, share: float) -> Load:
+        """Return the load at a fraction of the leg."""
         return self.start.after(share, self.end)
 
     def _is_over(self) -> bool:
@@ -102,7 +103,7 @@ class Leg(ABC):
         return self._used()[1] > 1.0 + UTILISATION_TIE and self.state.converged
 
     def _break_overloaded(self, is_due: bool = False) -> Iterator[path_points.Point]:
-        """Break the worst bonds at s while they are overloaded, and first if a break is due.  Collective."""
+        """Break the worst bonds at s while bonds are overloaded, and first if a break is due.  Collective."""
         while is_due or self._is_overloaded():
             broke, softened, broken = self._release(self._used()[2])
             yield self._point(broke, softened, broken)
@@ -110,7 +111,10 @@ class Leg(ABC):
             is_due = False
 
     def _release(self, which: Bool) -> tuple[int, int, path_points.PathState]:
-        """Break the bonds `which` (k,): return how many part and how many soften, and the path state.  Collective."""
+        """Break the bonds `which` (k,).  Collective.
+
+        Return the numbers of bonds that part and of bonds that soften, and the path state after the break.
+        """
         return path_points.break_bonds(self.cell, self.law, which, self.state, self._path_state())
 
     def _point(self, broke: int, softened: int, after: path_points.PathState) -> path_points.Point:

@@ -1,4 +1,4 @@
-"""Ends of a straight response: the first bond breaks, or contact begins to change.
+"""Ends of a straight response: the first break of a bond, or the first change of contact.
 
 The first bond of a linear cell breaks under tractions t0 + f t1, with load factor f.  The utilisation u is homogeneous
 of degree one in the tractions, so without t0 the factor is 1 / u(t1).  With t0, some laws have a formula; for others u
@@ -6,7 +6,7 @@ is convex along a ray, passes 1 once, and
 
     (1 - u(t0)) / u(t1)  <=  f  <=  (1 + u(-t0)) / u(t1),
 
-for u is subadditive: only bonds with a lower bound below the smallest upper bound are searched.
+because u is subadditive: only bonds with a lower bound below the smallest upper bound need a search.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ PARTS = 32
 
 @dataclass(frozen=True)
 class Onset:
-    """First break in a cell whose debonded faces do not touch.
+    """The first break in a cell with debonded faces that do not touch.
 
     Attributes:
-        bonds: law at this rank's nodes in their state.
+        bonds: bond law at this rank's nodes in one bond state.
         bonded: (k,) nodes with a bond.
     """
 
@@ -44,14 +44,14 @@ class Onset:
         return cls(law.in_state(cell, bonds), np.asarray(bonds.status == BONDED))
 
     def utilisation(self, traction: Float, node: Int) -> Float:
-        """Return the utilisation (p,) by tractions (p, c) at the nodes (p,), 0 at debonded nodes."""
+        """Return the utilisation (p,) under tractions (p, c) at the nodes (p,), 0 at debonded nodes."""
         return np.where(self.bonded[node], self.bonds.at(node).share(traction), 0.0)
 
     def factors(self, direction: Float, noise: Float, before: Float | None = None) -> Float:
-        """Return the factors f >= 0 (n, k) at which the first bonds break under n rays of tractions; inf for others.
+        """Return the load factors f >= 0 (n, k) that break the first bonds under n traction rays.
 
-        Tractions are `before` (k, c) + f `direction` (n, k, c); `before` alone breaks nothing.  Utilisations by
-        `direction` up to `noise`, (n,) or (n, k), count as zero.
+        Factors of other bonds are inf.  Tractions are `before` (k, c) + f `direction` (n, k, c); `before` alone
+        breaks nothing.  Utilisations under `direction` up to `noise`, (n,) or (n, k), count as zero.
         """
         n, k, c = direction.shape
         ray, node = np.divmod(np.arange(n * k), max(k, 1))
@@ -60,17 +60,19 @@ class Onset:
         if before is None:
             factors[loaded] = 1.0 / used[loaded]
         else:
-            at, along = node[loaded], direction.reshape(-1, c)[loaded]
-            bonds, start, ray, used = self.bonds.at(at), before[at], ray[loaded], used[loaded]
+            nodes, along = node[loaded], direction.reshape(-1, c)[loaded]
+            bonds, start, ray, used = self.bonds.at(nodes), before[nodes], ray[loaded], used[loaded]
             exact = bonds.first_factor(start, along)
             if exact is None:
-                # Bisection, without bonds that break after another one of their ray.
+                # Bisection, without bonds that break after another bond under the same ray.
                 lower, upper = (1.0 - bonds.share(start)) / used, (1.0 + bonds.share(-start)) / used
                 first, is_convex = np.full(n, np.inf), bonds.convex(len(used))
                 np.minimum.at(first, ray[is_convex], upper[is_convex])
-                some = np.flatnonzero((lower <= first[ray] * (1.0 + UTILISATION_TIE)) | ~is_convex)
+                rivals = np.flatnonzero((lower <= first[ray] * (1.0 + UTILISATION_TIE)) | ~is_convex)
                 exact = np.full(len(used), np.inf)
-                exact[some] = bonds.at(some).crossing(start[some], along[some], np.zeros(len(some)), upper[some])
+                exact[rivals] = bonds.at(rivals).crossing(
+                    start[rivals], along[rivals], np.zeros(len(rivals)), upper[rivals]
+                )
             factors[loaded] = exact
         return factors.reshape(n, k)
 
@@ -79,7 +81,7 @@ def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, before:
     """Return the fraction of the way between tractions (k, c) at which the first bond breaks, or inf.  Collective.
 
     A convex utilisation, below 1 at the beginning and above 1 at the end, passes 1 once: bisection.  Without convexity
-    the first part of the way with a utilisation above 1 at its end is bisected.
+    the bisection takes the first part of the way that ends with a utilisation above 1.
     """
     law, bonded = law.in_state(cell, bonds), bonds.status == BONDED
     step, low, high = after - before, np.zeros(len(before)), np.full(len(before), np.inf)
@@ -94,20 +96,20 @@ def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, before:
 
 
 def first_change(interface: ContactProblem, state: Equilibrium, end: DualSolution) -> tuple[float, float]:
-    """Return the fractions of the way at which contact begins to change, and surely has; or 1, 1.
+    """Return the fractions of the way where contact begins to change, and surely has changed.
 
-    A tension or an overlap of twice the solver's error is sure.  A closed node opens when its force vanishes; open
-    nodes of a fixed fibre close when their gap vanishes, open nodes of a free fibre when the fibre has no more room
-    (its gaps are not unique).  Collective.
+    Both are 1 without a change.  A tension or an overlap of twice the solver's error is sure.  A closed node opens
+    when its force vanishes; open nodes of a fixed fibre close when their gap vanishes, open nodes of a free fibre when
+    the fibre has no more room (because gaps are not unique).  Collective.
     """
     solver, nodes = interface.solver, interface.nodes
     tension = np.maximum(interface.scales.force_noise(state.solution), interface.scales.force_noise(end))
     # Damaged bonds change between tension and compression when their force vanishes.
     damaged = interface.damaged(state.bonds)
-    at = (state.status == CLOSED) | damaged
-    pressure = np.where(damaged & ~state.bonds.pressed, 1.0, -1.0)[at]
-    before, after = (pressure * lam[nodes.row][at] for lam in (state.solution.lam, end.lam))
-    shares = [shares_to_zero(before, after, tension[at])]
+    in_contact = (state.status == CLOSED) | damaged
+    pressure = np.where(damaged & ~state.bonds.pressed, 1.0, -1.0)[in_contact]
+    before, after = (pressure * lam[nodes.row][in_contact] for lam in (state.solution.lam, end.lam))
+    shares = [shares_to_zero(before, after, tension[in_contact])]
     # Faces without contact overlap.
     is_open = (state.status == OPEN) & interface.contact
     before, after = state.solution.jump[nodes.row], end.jump[nodes.row]

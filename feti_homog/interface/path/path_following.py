@@ -1,7 +1,7 @@
-"""Load-induced debonding, Section III.F: the load follows a path, bonds over their strength break.
+"""Load-induced debonding, Section III.F: the load follows a path, and overloaded bonds break.
 
 `events` finds every break exactly.  On the first leg from zero, without initial gaps, the response is homogeneous of
-degree one: one solve gives the load of the next break, which may be lower than the last (snap-back).  Later legs
+degree one: one solve gives the load of the next break, which may be lower than the last load (snap-back).  Later legs
 control the load, see `leg`.  `increments` is the paper's loop.
 
 Energy.  A break happens at constant load, at which stresses or strains jump, and releases work minus stored energy;
@@ -19,13 +19,13 @@ from feti_homog.interface.path.leg import Leg
 from feti_homog.interface.path.path_points import Energies, PathState, Point, break_bonds, most_utilised
 
 Engine = Callable[[CoupledInterfaces, BondLaw, Sequence[Load], int, PathState], Leg]
-"""Makes a leg from the cell, the law, the waypoints, the leg's number and its beginning."""
+"""Function that makes a leg from the cell, the law, the waypoints, the leg number and the initial path state."""
 
 
 def events(
     cell: CoupledInterfaces, law: BondLaw, waypoints: Sequence[Load], begin: PathState, engine: Engine = FrictionlessLeg
 ) -> Iterator[Point]:
-    """Yield every break along zero -> waypoints[0] -> ..., and each leg's end.  Collective.
+    """Yield every break along zero -> waypoints[0] -> ..., and the end of each leg.  Collective.
 
     A leg begins with the strains or stresses, as its waypoint prescribes, of the state before.  The state of a point
     precedes its break.  On later legs, and with friction on all, changes of contact are points too, with `broke` = 0:
@@ -56,7 +56,7 @@ def increments(
     begin: PathState,
     engine: Engine = FrictionlessLeg,
 ) -> Iterator[Point]:
-    """Yield the paper's loop: at each of `steps` equal load steps, release all overloaded bonds.  Collective.
+    """Yield the points of the paper's loop, which breaks all overloaded bonds at equal load steps.  Collective.
 
     The state of a point follows its breaks.  `begin.leg` is the number of finished steps.  With `worst_only` the worst
     bonds are released first, alone.  A point without convergence is the last one; with friction the last point may be
@@ -65,17 +65,17 @@ def increments(
     Raises:
         NotCarriedError: nothing carries more, or a step has no admissible statuses.
     """
-    legs, way = len(waypoints), None
+    legs, current = len(waypoints), None
     for step in range(begin.leg + 1, steps + 1):
         leg = (step * legs - 1) // steps
-        if way is None or leg > way.leg:
+        if current is None or leg > current.leg:
             position = begin.position or max((step - 1) * legs / steps - leg, 0.0)
-            way = engine(cell, law, waypoints, leg, replace(begin, leg=leg, position=position))
-        point = way.step(step, steps, worst_only)
+            current = engine(cell, law, waypoints, leg, replace(begin, leg=leg, position=position))
+        point = current.step(step, steps, worst_only)
         begin = point.after
         yield point
-        if way.limit is not None:
-            raise way.limit
+        if current.limit is not None:
+            raise current.limit
         if not point.state.converged:
             return
 
@@ -99,6 +99,6 @@ def _first_leg(cell: CoupledInterfaces, law: BondLaw, load: Load, legs: int, beg
             after = PathState(1, 0.0, state.bonds, lam, reached, reached)
             yield Point(1.0 / legs, 1.0, state, 0, 0, energies, used, after)
             return
-        place = PathState(0, factor, state.bonds, lam, begin.origin, reached)
-        broke, softened, begin = break_bonds(cell, law, worst, state, place)
+        path_state = PathState(0, factor, state.bonds, lam, begin.origin, reached)
+        broke, softened, begin = break_bonds(cell, law, worst, state, path_state)
         yield Point(factor / legs, factor, state, broke, softened, energies, used / largest, begin)

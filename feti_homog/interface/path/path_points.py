@@ -1,4 +1,4 @@
-"""Points of a load path, the states to continue from, and breaks of bonds."""
+"""Points of a load path, the states from which a path continues, and breaks of bonds."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from feti_homog.typing import Bool, Float
 
 @dataclass(frozen=True)
 class PathState:
-    """State from which a path can continue.
+    """The state from which a path can continue.
 
     Attributes:
         leg, position: the load is at the fraction `position`, 0..1, of the way to waypoint `leg`; with increments,
             `leg` is the number of finished steps.
-        bonds, lam: bond states and multipliers to begin with.
-        origin: state at the leg's beginning.
+        bonds, lam: initial bond states and multipliers.
+        origin: state at the beginning of the leg.
         last: state at the last point.
         broken: fracture energy per area at the last point, by the mode in which each bond broke, 0 without toughness;
             None without a break.
@@ -46,7 +46,7 @@ class PathState:
 
 
 class Energies(NamedTuple):
-    """Energies per cell area on a way: work, released energy, fracture energy of breaks, heat of friction."""
+    """The energies per cell area on a way: work, released energy, fracture energy of breaks, heat of friction."""
 
     work: float
     released: float
@@ -63,13 +63,13 @@ NO_ENERGIES = Energies(0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Point:
-    """Path point.
+    """A point of a load path.
 
     Attributes:
         load_factor: position on the path, 0 to 1; all legs count alike.
-        scale: factor from the equilibrium `state` to the point's state.
+        scale: ratio of the point's state to the equilibrium `state`.
         state: equilibrium.
-        broke: number of bonds that part after this state; with increments, in the step before it.
+        broke: number of bonds that part after this state; with increments, in the step before this state.
         softened: number of bonds that lose teeth and hold.
         energies: energies since the last point.
         used: (k,) utilisation of the bonds, 0 without a bond.
@@ -87,7 +87,7 @@ class Point:
 
 
 def unloaded(cell: CoupledInterfaces, bonds: BondState) -> PathState:
-    """Return the beginning of a path with these bonds."""
+    """Return the unloaded path state with given bonds."""
     nothing = Macroscopic(np.zeros(len(cell.loads)), np.zeros(len(cell.loads)))
     return PathState(0, 0.0, bonds, cell.no_multipliers(), nothing, nothing)
 
@@ -114,7 +114,10 @@ def break_bonds(
 
 
 def most_utilised(cell: CoupledInterfaces, law: BondLaw, state: Equilibrium) -> tuple[Float, float, Bool]:
-    """Return the utilisation (k,), 0 if debonded, its largest value, and the most utilised nodes (k,).  Collective."""
+    """Return the utilisations, the largest value, and the most utilised nodes.  Collective.
+
+    The utilisations are (k,), 0 at debonded nodes; the last result is a mask (k,) of nodes.
+    """
     comm = cell.comm
     used = law.in_state(cell, state.bonds).share(held_traction(cell, state))
     used = np.where(state.status == BONDED, used, 0.0)
