@@ -134,8 +134,8 @@ def _of_cell(cell: cell_section.Cell) -> ListedFibres:
     arrangement = arrange.arrange(cell)
     scale = gmsh_mesher.arrangement_scale(cell, arrangement)
     size = scale * arrangement.size
-    own = shapes.elliptic(arrangement.outlines).grown(arrangement.walls)
-    ellipses = Ellipses(scale * own.centres % size, scale * own.frames)
+    conics = shapes.elliptic(arrangement.outlines).grown(arrangement.walls)
+    ellipses = Ellipses(scale * conics.centres % size, scale * conics.frames)
     coatings = scale * (arrangement.coating - arrangement.walls)
     cores = scale * np.where(arrangement.walls > 0, arrangement.radii, 0.0)
     columns = {} if cell.table is None else {name: of[arrangement.row] for name, of in cell.table.columns.items()}

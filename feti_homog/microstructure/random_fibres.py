@@ -130,8 +130,8 @@ def matched(pattern: FibrePattern, gap: float, wanted: Float, generator: np.rand
     """
     count, size = pattern.count, pattern.size
     centres, target = pattern.wrapped.copy(), wanted * (2 * pattern.mean_radius)
-    everyone = np.arange(count)
-    near, who = _two_nearest(centres, everyone, size)
+    numbers = np.arange(count)
+    near, who = _two_nearest(centres, numbers, size)
     error, goal = _mean_square(near, target), (CLOSE * 2 * pattern.mean_radius) ** 2
     reach = sqrt(pattern.area / count)
     for _ in range(min(MOVES_OF_A_FIBRE * count, MOST_MOVES)):
@@ -144,7 +144,7 @@ def matched(pattern: FibrePattern, gap: float, wanted: Float, generator: np.rand
         away[fibre] = np.inf
         if np.any(away < pattern.radii + (pattern.radii[fibre] + gap)):
             continue
-        changed = np.flatnonzero((away < near[:, 1]) | np.any(who == fibre, axis=1) | (everyone == fibre))
+        changed = np.flatnonzero((away < near[:, 1]) | np.any(who == fibre, axis=1) | (numbers == fibre))
         before, centres[fibre] = centres[fibre].copy(), place
         new_near, new_who = near.copy(), who.copy()
         new_near[changed], new_who[changed] = _two_nearest(centres, changed, size)
