@@ -43,7 +43,7 @@ HOMES = {
     "draw_state": "report.plots.deformed_panels",
     "read_state": "results.viewed_states",
 }
-"""Modules of public names; all others are in `api`."""
+"""Modules of public names; other public names are in `api`."""
 
 
 def __dir__() -> list[str]:

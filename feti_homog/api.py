@@ -31,15 +31,15 @@ def run(
     resume: bool = False,
     quiet: bool = True,
 ) -> result.Result:
-    """Return the result of a case on every rank of `comm` (default: all ranks).
+    """Run a case on the ranks of `comm`, by default all ranks.
 
-    Collective over `comm`; ranks outside of it need not call it, nor wait.  PETSc starts without options unless the
-    program has started it: options of the case are in its `petsc`.
+    Collective over `comm`; other ranks need not take part.  PETSc starts without options unless the program has started
+    PETSc before; the section `petsc` of the case has the options of the case.  Returns the result on every rank.
 
     Args:
-        out: a folder for the files that `feti-homog run` writes; without it none is written.
-        fields: whether `result.fields` has mesh, interface and states in memory, each rank its part.
-        resume: with `out`, go on from where a path to the same folder was ended.
+        out: a folder for the files that `feti-homog run` writes; by default the run writes no files.
+        fields: whether `result.fields` holds mesh, interface and states in memory, distributed over the ranks.
+        resume: with `out`, continue an interrupted path in the same folder.
         quiet: print nothing; else as the command line.
 
     Raises:
@@ -68,18 +68,19 @@ def run_sweep(
     retry: bool = False,
     quiet: bool = True,
 ) -> sweep_table.SweepTable:
-    """Run the cases in a file or document with [sweep]; returns their table on every rank.  Collective.
+    """Run the cases of a sweep, given as a file or document.  Collective.
 
-    Finished cases in `out` are kept, so that the same call goes on after an interruption.
+    Returns the table of the cases on every rank.  Finished cases in `out` are kept, so that the same call resumes after
+    an interruption.
 
     Args:
-        ranks_per_case: ranks of a case (default: all); each group of so many ranks runs a case at once.
+        ranks_per_case: ranks of a case (default: all); groups of this size work concurrently.
         retry: compute failed cases again.
         quiet: do not print a line for each case.
 
     Raises:
         CaseError: the cases are faulty, `out` cannot be used, or `ranks_per_case` does not divide the ranks.
-        ConvergenceError: cases failed; `collect_sweep` makes the table of the others.
+        ConvergenceError: cases failed; `collect_sweep` makes the table of the finished cases.
     """
     comm = _started(comm)
     from feti_homog.studies import case_runs, collect, sweep_cases
@@ -93,9 +94,9 @@ def run_sweep(
 
 
 def collect_sweep(out: str | Path, comm: Intracomm | None = None, *, pictures: bool = True) -> list[str]:
-    """Write cases.csv, statistics.csv and the picture of a sweep; returns lines to print.
+    """Write cases.csv, statistics.csv and the picture of a sweep.  Collective.
 
-    Collective; the sweep may still be running.
+    The sweep may still be running.  Returns lines to print.
 
     Raises:
         CaseError: `out` is no folder of a sweep.
@@ -115,9 +116,10 @@ def run_fit(
     retry: bool = False,
     quiet: bool = True,
 ) -> dict[str, Any]:
-    """Fit the unknowns in a file or document; returns the content of fit.json on every rank.  Collective.
+    """Fit the unknowns in a file or document to measured values.  Collective.
 
-    Every evaluation is kept in `out`, so that the same call goes on after an interruption.  Arguments as `run_sweep`.
+    Returns the content of fit.json on every rank.  Every evaluation is kept in `out`, so that the same call resumes
+    after an interruption.  Arguments are as for `run_sweep`.
 
     Raises:
         CaseError: the fit is faulty, or `out` cannot be used.
@@ -138,7 +140,7 @@ def launch(
     parser: argparse.ArgumentParser,
     argv: Sequence[str] | None = None,
 ) -> int:
-    """Run `main(arguments, comm)` as a program; return its exit code for `sys.exit`.
+    """Run `main(arguments, comm)` as a program, and return the exit code for `sys.exit`.
 
     PETSc reads the options in `argv` (default: the process's) with a single dash; `parser` reads the rest.  A
     FetiHomogError is printed once and gives its exit code; any other exception ends the job on all ranks.
@@ -152,9 +154,10 @@ def launch(
 
 
 def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str] | None = None) -> int:
-    """Start PETSc with its options among `argv` (default: the process's) and run command(the rest, all ranks).
+    """Start PETSc and run a command on all ranks.
 
-    Returns the exit code of `run_main`.
+    PETSc takes its options from `argv` (default: the arguments of the process), the command the other words.  Returns
+    the exit code of `run_main`.
     """
     words, petsc = option_values.split_argv(sys.argv[1:] if argv is None else argv)
     standard_streams.prepare()
@@ -184,7 +187,7 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
 
 
 def folder(name: str | Path) -> Path:
-    """Return the folder, or file, of that name.
+    """Convert the name of a folder or file to a path.
 
     Raises CaseError for an empty name, which Path takes for the current folder, and for null characters.
     """
@@ -196,7 +199,7 @@ def folder(name: str | Path) -> Path:
 
 
 def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracomm) -> argparse.Namespace:
-    """Return the arguments; help, version and argparse's own complaints are printed by rank 0. Collective."""
+    """Parse arguments on all ranks; rank 0 alone prints help, version and errors.  Collective."""
     printed = io.StringIO()
     try:
         with contextlib.ExitStack() as redirected:
@@ -210,12 +213,12 @@ def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracom
 
 
 def _started(comm: Intracomm | None) -> Intracomm:
-    """Start PETSc unless it runs; returns the communicator, by default that of all ranks."""
+    """Start PETSc unless it runs, and return the communicator, by default of all ranks."""
     environment.prefer_own_toolkits()
     libraries.require()
     from mpi4py import MPI
 
     if "petsc4py.PETSc" not in sys.modules:
-        # On more ranks it would wait for those that run no case, or have run one; cases bring their own communicator.
+        # On more ranks PETSc would wait for ranks without a case; a case brings its communicator.
         libraries.start_petsc([], MPI.COMM_SELF)
     return MPI.COMM_WORLD if comm is None else comm

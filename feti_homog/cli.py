@@ -1,6 +1,6 @@
 """The command line, `feti-homog COMMAND ...`.
 
-Options with a double dash are ours, with a single dash PETSc's.
+Options with a double dash belong to feti-homog, options with a single dash to PETSc.
 """
 
 import argparse
@@ -15,11 +15,11 @@ from feti_homog.system.petsc import option_values
 from feti_homog.typing import Intracomm
 
 GONE = {"statistics": "is drivers/fibre_statistics.py now", "schema": "is gone: `feti-homog keys` has all keys"}
-"""Removed commands, each with its replacement."""
+"""Removed commands, with their replacements."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command on all ranks, `verify` without MPI; returns the exit code of `errors`."""
+    """Run a command on all ranks, or `verify` without MPI, and return the exit code."""
     words = sys.argv[1:] if argv is None else list(argv)
     ours, _ = option_values.split_argv(words)
     if ours[:1] == ["verify"]:

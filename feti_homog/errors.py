@@ -1,15 +1,15 @@
-"""Errors that are printed for the user, and the exit codes."""
+"""The errors that the program prints for the user, and the exit codes."""
 
 import re
 from enum import IntEnum
 from typing import Any, Self
 
-# Characters of a fault and number of faults: a file may have any number of them, with words of any length.
+# Limits of the length and number of faults, since a file may cause any number of long faults.
 LONGEST_LINE, KEPT_END, MOST_FAULTS = 1000, 200, 30
 
 
 class ExitCode(IntEnum):
-    """Exit codes of the program."""
+    """The exit codes of the program."""
 
     DONE = 0
     DEFECT = 1
@@ -18,14 +18,15 @@ class ExitCode(IntEnum):
 
 
 def escaped(text: str, allowed: str = "") -> str:
-    """Escape all characters but printable and `allowed` ones: a terminal would obey control characters of a file."""
+    """Escape unprintable characters except `allowed`, since a terminal would obey control characters of a file."""
     return re.sub(r"[^ -~]", lambda c: c[0] if c[0].isprintable() or c[0] in allowed else ascii(c[0])[1:-1], text)
 
 
 class FetiHomogError(Exception):
     """An error printed for the user, one line per fault, without a traceback.
 
-    Lines are cut to LONGEST_LINE characters, before their last KEPT_END; beyond MOST_FAULTS the others are counted.
+    Longer lines than LONGEST_LINE keep their beginning and the last KEPT_END characters.  Faults beyond MOST_FAULTS are
+    only counted.
     """
 
     exit_code = ExitCode.DEFECT

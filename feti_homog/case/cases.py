@@ -57,12 +57,12 @@ class Case:
 
     @classmethod
     def load(cls, path: str | Path) -> Case:
-        """Return the case in a file, as the function `load`."""
+        """Load a case from a file, as the function `load`."""
         return load(path)
 
     @classmethod
     def parse(cls, document: Mapping[str, Any], folder: str | Path = ".") -> Case:
-        """Return the case of nested dictionaries, as the function `parse`."""
+        """Build a case from nested dictionaries, as the function `parse`."""
         return parse(document, Path(folder))
 
     @property
@@ -102,13 +102,13 @@ class Case:
         return self.materials[provider(phase, self.materials)]
 
     def warnings(self) -> tuple[str, ...]:
-        """List valid but probably unintended settings, in one line each."""
+        """List valid but probably unintended settings, one per line."""
         of_elements = cell_sizes.warnings(self.materials, self.analysis.plane)
         _, contrast = laws.contrast_lines(self.materials, self.analysis.plane)
         return (*of_elements, *contrast, *idle_friction_keys(self.interfaces))
 
     def remarks(self) -> tuple[str, ...]:
-        """List assumptions about missing settings, in one line each."""
+        """List the assumptions about missing settings, one per line."""
         kind, section, plane = self.analysis.type, self.section, self.analysis.plane
         of_elements = cell_sizes.remarks(self.materials, plane)
         of_table = () if self.cell.table is None else self.cell.table.remarks
@@ -150,12 +150,12 @@ class Case:
 
 
 def load(path: str | Path) -> Case:
-    """Return the case in a file, by default named after the file. Raises CaseError with all faults."""
+    """Load a case from a file, whose name is the default case name.  Raises CaseError with all faults."""
     return parse(read_document(path), Path(path).parent)
 
 
 def parse(values: Mapping[str, Any], folder: Path) -> Case:
-    """Return the case of nested dictionaries; file names are relative to `folder`.
+    """Build a case from nested dictionaries, with file names relative to `folder`.
 
     Values may be NumPy scalars, arrays, tuples and paths, besides TOML types.
 
@@ -177,13 +177,16 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
 
 
 def check_stored(values: Mapping[str, Any]) -> None:
-    """Check the case in a result, without its files. Raises CaseError with all faults."""
+    """Check the case stored in a result, without input files.  Raises CaseError with all faults."""
     if faults := _read_sections(to_document(values), None)[1]:
         raise CaseError(*faults)
 
 
 def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[str, Any], list[str]]:
-    """Return the section contents and their faults; without a folder, leave the files of [cell] unread."""
+    """Read all sections of a document, and return the contents and all faults.
+
+    Without a folder, the files of [cell] remain unread.
+    """
     first = next(iter(interface_tables(document)), None)
     if isinstance(first, dict) and "law" in first:
         first = first | {"criterion": first["law"]}
@@ -228,7 +231,7 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
 
 
 def _read_section(document: Mapping[str, Any], section: str, reader: TableReader) -> Any:
-    """Return the dataclass of a section, None if the section is faulty or absent."""
+    """Read a section to a dataclass; a faulty or absent section gives None."""
     if section not in document and section in (*sections.REQUIRED, *sections.SECTIONS_OF_AN_ANALYSIS):
         return None
     return reader.read(sections.SECTIONS[section], document.get(section, {}), section)

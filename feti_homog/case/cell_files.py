@@ -28,7 +28,7 @@ FEWEST_MATCHED = 10  # fibres: the distances between fewer fibres have no distri
 
 
 def checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """Return the cell with the contents of its files, and add all faults to `faults`."""
+    """Read the files of a cell into its section, and append all faults to `faults`."""
     cell = _with_match(cell, folder, faults)
     if cell.fibre_fraction is not None:
         spacing = (cell.coating or 0.0) + (cell.min_gap if cell.geometry == "random" else 0.0)
@@ -63,7 +63,7 @@ def checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
 
 
 def missing(file: Path) -> str:
-    """Return the reason why a file is missing, empty if the file exists."""
+    """Return the reason why a file is missing, or an empty string if the file exists."""
     if os.path.isfile(file):  # False, not an error, if the name is too long
         return ""
     if not os.path.exists(file):
@@ -72,7 +72,7 @@ def missing(file: Path) -> str:
 
 
 def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """Return the cell with the window that it matches, and add faults to `faults`.
+    """Read the window that a random cell matches, and append faults to `faults`.
 
     Where the cell gives no number of fibres or no fibre fraction, the window provides the value.
     """
@@ -99,7 +99,7 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
 
 
 def _with_table(cell: Cell, faults: list[str]) -> Cell:
-    """Return the cell with its table, which has the cell size."""
+    """Read the fibre table of a cell, which gives the cell size."""
     from feti_homog.microstructure import fibre_table  # which few cases need
     from feti_homog.microstructure.shapes import shapes
 
@@ -148,7 +148,7 @@ HOLLOW_WORDS = f"expected inner_radius / radius from {WIDEST_CORE[0]:g} to {WIDE
 
 
 def check_shapes(table: fibre_table.FibreTable, faults: list[str]) -> None:
-    """Add shape and hollow fibre faults to `faults`."""
+    """Append the faults of shapes and hollow fibres to `faults`."""
     from feti_homog.microstructure.shapes import shapes  # which few cases need
 
     rows, before = table.columns, len(faults)

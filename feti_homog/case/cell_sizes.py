@@ -24,19 +24,19 @@ ROUNDING_POISSON = 0.49999999
 
 
 def is_mixed(order: int, material: material_forms.Material, plane: str) -> bool:
-    """Return whether the elements of a material are mixed in the plane problem."""
+    """Return whether a material has mixed elements in the plane problem."""
     return order == 2 and laws.isotropic_ratio(material) is not None and not voigt.PLANE_STATES[plane].is_sheet
 
 
 def warnings(materials: Mapping[str, material_forms.Material], plane: str) -> list[str]:
-    """List the phases too near to incompressible for the rounding, in one line each."""
+    """List the phases so close to incompressible that rounding errors dominate, one per line."""
     words = "so near to 0.5 that rounding may exceed the tolerance of the checks"
     lines = _above(ROUNDING_POISSON, materials, plane)
     return [f"{line}: {words}; use at most {ROUNDING_POISSON:.10g}" for line in lines]
 
 
 def remarks(materials: Mapping[str, material_forms.Material], plane: str) -> tuple[str, ...]:
-    """List the phases that require quadratic elements, in one line each."""
+    """List the phases that require quadratic elements, one per line."""
     lines = _above(LOCKING_POISSON, materials, plane)
     return tuple(f"{line}: elements are quadratic, for linear ones lock above {LOCKING_POISSON}" for line in lines)
 
@@ -54,7 +54,7 @@ def _above(limit: float, materials: Mapping[str, material_forms.Material], plane
 
 
 CHOSEN = ("mesh_size", "interface_size", "tip_size", "refine")
-"""Keys that an accuracy chooses, and so excludes."""
+"""Keys that the key `accuracy` determines, and therefore excludes."""
 
 # By element order, the error of the coarsest mesh with stiff inclusions / (kappa beta^2), and the factor by which soft
 # inclusions raise it: 1.5 times the largest values that `scripts/measure_accuracy.py` finds.
@@ -73,7 +73,7 @@ def sized(
     free_faces: bool,
     faults: list[str],
 ) -> Cell:
-    """Return the cell with mesh size, refinement and element order for its accuracy.
+    """Set mesh size, refinement and element order of a cell by its accuracy.
 
     For an accuracy eps and elements of order p, the coarsest mesh is refined r times, with the least r such that
     `coarse_error` / 4^(p r) <= eps. Of two orders, the result has the one with fewer nodes, about p^2 4^r. Faults go to
@@ -108,7 +108,7 @@ def sized(
 
 
 def fibres_and_height(cell: Cell) -> tuple[int, float]:
-    """Return the number of fibres and height / width of a cell without its own mesh."""
+    """Return the fibre count and the ratio height / width of a cell without a user mesh."""
     if cell.table is not None:
         assert cell.table.width is not None and cell.table.height is not None
         return len(cell.table.row), cell.table.height / cell.table.width
@@ -189,7 +189,7 @@ def fractions_in_words(cell: Cell) -> str:
 
 
 def mixed_width(cell: Cell) -> float | None:
-    """Return the cell width, None if it follows from `fibre_radius` or is the default.
+    """Return the cell width, or None if it follows from `fibre_radius` or is the default.
 
     With radii and a number of fibres, W^2 = sum n_p pi r_p^2 / sum c_p.
     """

@@ -54,7 +54,7 @@ class MixedLoad:
 
     @property
     def named(self) -> dict[str, float]:
-        """Return the given values by name."""
+        """Return the prescribed components of the load by name."""
         values = ((each.name, getattr(self, each.name)) for each in dataclasses.fields(self))
         return {name: value for name, value in values if value is not None}
 
@@ -87,7 +87,7 @@ def completed(loads: Sequence[Strain | MixedLoad], plane: str) -> tuple[dict[str
 
 
 def first_named(loads: Sequence[Strain | MixedLoad], plane: str) -> dict[str, int]:
-    """Return the first load that names each component, by stress name; len(loads) if none does."""
+    """Return the index of the first load that names a component, by stress name; by default len(loads)."""
     return {
         names[1]: next((k for k, load in enumerate(loads) if not named(load).keys().isdisjoint(names)), len(loads))
         for names in voigt.PLANE_STATES[plane].components

@@ -17,13 +17,13 @@ FORMS_OF = {
     for contents in material_forms.MATERIAL_FORMS.values()
     for name in keys.keys_of(contents)
 }
-"""Material forms that have each constant, by the constant's name."""
+"""The material forms that have a constant, by the name of the constant."""
 
 
 def read_materials(
     document: Mapping[str, Any], plane: str | None, reader: TableReader
 ) -> dict[str, material_forms.Material]:
-    """Return the valid materials by phase, and report faults to the reader.
+    """Read the valid materials by phase, and report faults to the reader.
 
     A faulty geometry, mix or plane state turns off the checks that depend on it. Without a section [material] the
     result is empty: another check reports the missing section.
@@ -82,7 +82,7 @@ def coating_faults(cell: Cell | None, materials: object) -> list[str]:
 def _read_material(
     table: object, section: str, plane: str | None, reader: TableReader
 ) -> material_forms.Material | None:
-    """Return the material of a section, in the form that its keys select; None if faulty."""
+    """Read the material of a section, in the form that the keys select; None if faulty."""
     given: dict[str, list[str]] = {}
     for name, (form, *further) in FORMS_OF.items():
         if isinstance(table, dict) and name in table and not further:

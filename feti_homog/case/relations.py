@@ -59,7 +59,7 @@ def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], pl
 def axes_lines(
     kind: str, section: load_sections.AnalysisSection, materials: Mapping[str, material_forms.Material], plane: str
 ) -> tuple[str, ...]:
-    """Return a line on axes that could be mistaken for ply axes; none in the plane."""
+    """Return a remark on axes that a user could mistake for ply axes, in generalized plane strain alone."""
     if not voigt.PLANE_STATES[plane].is_spatial:
         return ()
     from feti_homog.materials import engineering_constants  # needed in generalized plane strain alone
@@ -77,7 +77,7 @@ def axes_lines(
 def stress_free(
     section: str, placed: Mapping[str, load_sections.Strain | load_sections.MixedLoad], plane: str
 ) -> tuple[str, ...]:
-    """List the components that loads leave free of stress, in one line for each waypoint."""
+    """List the components that loads leave free of stress, one line per waypoint."""
     first = load_sections.first_named(tuple(placed.values()), plane)
     words = ["", *(f"stress-free until {place}" for place in [*placed][1:]), "never named: stress-free"]
     unnamed = {k: [name for name, number in first.items() if number == k] for k in range(1, len(words))}
@@ -85,7 +85,7 @@ def stress_free(
 
 
 def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[InterfaceSection, ...] | None:
-    """Return the interface sections in file order; None if one is faulty.
+    """Read the interface sections in file order; None if a section is faulty.
 
     Each section gets its law as `criterion`, and the numbers that follow from its softening branch.
     """
@@ -121,7 +121,7 @@ def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[I
 
 
 def _written(value: Any) -> str:
-    """Write the value of a common interface key as in TOML."""
+    """Format the value of a common interface key as in TOML."""
     table = keys.to_table(value, {}) if isinstance(value, Scatter) else value
     return "none" if table is None else wording.toml_value(table)
 

@@ -20,7 +20,7 @@ from feti_homog.schema import keys, types, wording
 
 TablePath = tuple[str, ...]
 ITEMS = "items"
-"""Path entry that stands for every item of a list."""
+"""The path entry that denotes every item of a list."""
 CELL, INTERFACE, LOADS = ("cell",), ("interface",), ("strain", "to", "waypoints")
 PLACES_OF_LOADS: tuple[TablePath, ...] = (("path", "to"), ("path", "waypoints", ITEMS), ("load", "to"))
 PLACES_OF_TABLES: tuple[tuple[TablePath, type[Any]], ...] = (

@@ -21,7 +21,7 @@ TomlPath = tuple[str, ...]
 
 
 def read_document(path: str | Path) -> dict[str, Any]:
-    """Return the TOML document in a file, by default named after the file. Raises CaseError."""
+    """Read a TOML document, whose default name is the file name.  Raises CaseError."""
     path = Path(path)
     if "\0" in str(path):
         raise CaseError(f"{str(path)!r}: no file has a name with a null character")
@@ -86,7 +86,7 @@ def _to_toml(value: Any, path: TomlPath, faults: list[str]) -> Any:
 def leaves(
     table: Mapping[str, Any], is_value: Callable[[TomlPath, Any], bool] | None = None, above: TomlPath = ()
 ) -> Iterator[tuple[TomlPath, Any]]:
-    """Yield path and value of each leaf of a nested table.
+    """Yield the paths and values of all leaves in a nested table.
 
     Dotted keys are split. An empty table, or a table that passes `is_value`, is a leaf.
     """
@@ -99,12 +99,12 @@ def leaves(
 
 
 def short_digest(content: bytes) -> str:
-    """Return the first 16 hexadecimal digits of the SHA-256 digest of a content."""
+    """Return the first 16 hexadecimal digits of a SHA-256 digest."""
     return hashlib.sha256(content).hexdigest()[:16]
 
 
 def _named_items(table: Mapping[Any, Any], path: TomlPath, faults: list[str]) -> list[tuple[str, Any]]:
-    """Return the items of a table, and report each key that is no text."""
+    """Return the items of a table, and report all keys that are no text."""
     wrong = [name for name in table if not isinstance(name, str)]
     place = f"[{wording.dotted_key(path)}] " if path else ""
     faults += [f"{place}{name!r}: expected a text as key, not {_article(name)}" for name in wrong]

@@ -1,4 +1,4 @@
-"""Fibres of a case or result, as the table that [cell] geometry = "table" reads."""
+"""List the fibres of a case or result as a table, which [cell] geometry = "table" reads."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -17,13 +17,13 @@ from feti_homog.typing import Float
 
 
 def table(source: Path) -> str:
-    """Return the fibre table of a case file or result folder, with a row for each fibre and void.
+    """Return the fibre table of a case file or result folder as text.  On one rank.
 
-    Fibres are in the order of their numbers.  Ellipses have the columns `a`, `b` and `angle`, coatings `coating`.
-    Numbers are exact, so that the table gives the same cell again.  On one rank.
+    The table has a row for each fibre and void, ordered by fibre number.  Ellipses have the columns `a`, `b` and
+    `angle`, coatings the column `coating`.  Numbers are exact, so that the table reproduces the cell.
 
     Raises:
-        CaseError, MeshError: the source is faulty, or a fibre is neither round nor an ellipse, or voids are not known.
+        CaseError, MeshError: the source is faulty, or a fibre is neither round nor an ellipse, or voids are unknown.
     """
     fibres = read(source)
     if fibres.lacks_voids:
@@ -50,7 +50,7 @@ def table(source: Path) -> str:
 
 
 def _words(values: Float) -> list[str]:
-    """Return exact numbers (N,) as text, empty for NaN."""
+    """Convert numbers (N,) to exact decimal texts; NaN to an empty text."""
     return ["" if np.isnan(value) else repr(value) for value in values.tolist()]
 
 
@@ -61,12 +61,12 @@ class ListedFibres:
     Attributes:
         size: (2,) width and height.
         ellipses: N circles and ellipses about centres within the cell.
-        phases: their names; cells that the program meshes have the voids behind the fibres.
-        coatings: (N,) thickness of the coatings, 0 without one.
+        phases: N phase names; in cells that the program meshes, voids follow the fibres.
+        coatings: (N,) thickness of the coatings, 0 without a coating.
         cores: (N,) radii of the voids within hollow fibres, else 0.
-        lacks_voids: whether there are voids that are not listed.
-        others: columns (N,) of fibres that are neither discs nor ellipses, else NaN; discs of the same areas stand for
-            them among the ellipses.
+        lacks_voids: whether the cell has voids that the list omits.
+        others: columns (N,) of fibres that are neither discs nor ellipses, else NaN; `ellipses` has discs of equal area
+            for these fibres.
     """
 
     size: Float
@@ -79,12 +79,12 @@ class ListedFibres:
 
     @property
     def radii(self) -> Float:
-        """(N,) of circles, and of discs with the ellipses' areas."""
+        """The radii (N,) of circles, and of equal-area discs for ellipses."""
         return np.asarray(np.sqrt(self.ellipses.semi_axes.prod(axis=1)))
 
 
 def read(source: Path) -> ListedFibres:
-    """Return the fibres of a case file or result folder.  On one rank.
+    """Read the fibres of a case file or result folder.  On one rank.
 
     Raises:
         CaseError, MeshError: the source is faulty, or a fibre is neither round nor an ellipse.
@@ -99,7 +99,7 @@ def read(source: Path) -> ListedFibres:
 
 
 def _of_result(directory: Path) -> ListedFibres:
-    """Return the fibres of a result, by its case if outlines are missing: voids, and shapes other than ellipses."""
+    """Read the fibres of a result, from its case if the result lacks voids or outlines."""
     document = stored_result.read(directory)
     fibres, cell = document["fibres"], document["cell"]
     is_complete = all("radius" in fibre or "semi_axes" in fibre for fibre in fibres) and not cell.get("porosity")
@@ -134,8 +134,8 @@ def _of_cell(cell: cell_section.Cell) -> ListedFibres:
     arrangement = arrange.arrange(cell)
     scale = gmsh_mesher.arrangement_scale(cell, arrangement)
     size = scale * arrangement.size
-    own = shapes.elliptic(arrangement.outlines).grown(arrangement.walls)
-    ellipses = Ellipses(scale * own.centres % size, scale * own.frames)
+    conics = shapes.elliptic(arrangement.outlines).grown(arrangement.walls)
+    ellipses = Ellipses(scale * conics.centres % size, scale * conics.frames)
     coatings = scale * (arrangement.coating - arrangement.walls)
     cores = scale * np.where(arrangement.walls > 0, arrangement.radii, 0.0)
     columns = {} if cell.table is None else {name: of[arrangement.row] for name, of in cell.table.columns.items()}

@@ -1,4 +1,4 @@
-"""The parser of the command line: the commands with their options, and the function of each as "module.name"."""
+"""Parse the command line: commands, options, and the name "module.function" of the function to call."""
 
 from __future__ import annotations
 
@@ -49,14 +49,14 @@ SCATTER_HELP = (
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose errors are reported once, with exit code 2, as errors of the case."""
+    """A command-line parser that raises errors as CaseError, printed once with exit code 2."""
 
     def error(self, message: str) -> NoReturn:
         raise CaseError(f"command line: {message} (see --help)")
 
 
 def command_parser() -> Parser:
-    """Return the parser of all commands."""
+    """Build the parser of all commands."""
     parser = Parser(
         prog="feti-homog",
         description="Effective stiffness of fibre composites by FETI, on any number of MPI ranks.",
@@ -151,14 +151,14 @@ def _add_studies(commands: argparse._SubParsersAction[Parser]) -> None:
 def _command(
     commands: argparse._SubParsersAction[Parser], action: str, summary: str, description: str | None = None
 ) -> Parser:
-    """Add the command of the function `action`, "module.name", and return its parser."""
+    """Add a command that calls the function `action`, "module.function", and return its parser."""
     parser = commands.add_parser(action.partition(".")[2], help=summary, description=description)
     parser.set_defaults(action=action)
     return parser
 
 
 def integer(word: str) -> int:
-    """Return the integer in a word without the underscores that Python allows. Raises ValueError."""
+    """Convert a word to an integer, without underscores.  Raises ValueError."""
     if not re.fullmatch(r"[+-]?[0-9]{1,9}", word):
         raise ValueError
     return int(word)

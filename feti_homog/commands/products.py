@@ -14,7 +14,7 @@ from feti_homog.typing import Intracomm
 
 
 def plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Make the pictures of a result again."""
+    """Draw the pictures of a stored result again."""
     from feti_homog.report.plots import figures
 
     directory = _result_folder(arguments)
@@ -38,7 +38,7 @@ def report(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def fields(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Write the states of a result for VTK."""
+    """Write the states of a result to files for VTK."""
     from feti_homog.results import viewed_states
 
     directory = _result_folder(arguments)
@@ -48,7 +48,7 @@ def fields(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def export(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Print a result as the card of a material, or write it to a file."""
+    """Print the material card of a result, or write it to a file."""
     from feti_homog.report.cards import export
 
     directory = _result_folder(arguments)
@@ -70,7 +70,7 @@ def fibres(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def _result_folder(arguments: argparse.Namespace) -> Path:
-    """Return the result folder; CaseError for a file, or a sweep's folder, whose cases have results."""
+    """Return the result folder in the arguments.  Raises CaseError for a file, or the folder of a sweep."""
     directory: Path = arguments.directory
     if os.path.isfile(directory):
         raise CaseError(f"{directory}: expected the folder of a result, not a file")

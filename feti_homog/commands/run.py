@@ -11,7 +11,7 @@ from feti_homog.typing import Intracomm
 
 
 def run(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Run a case.  Collective."""
+    """Run the case file in the arguments.  Collective."""
     from feti_homog.analysis import runner
     from feti_homog.results import output_folder
 
@@ -37,7 +37,7 @@ def check(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Print the reference of a section, or of the whole case file."""
+    """Print the reference of the keys in a section, or in the whole case file."""
     from feti_homog.case import reference
 
     tables = mpi_errors.on_root_only(comm, reference.tables, arguments.section)
@@ -45,5 +45,5 @@ def keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def options(_: argparse.Namespace, comm: Intracomm) -> None:
-    """Print PETSc's options that the solver takes."""
+    """Print the PETSc options that the solver accepts."""
     mpi_errors.on_root_only(comm, standard_streams.print_product, option_table.help_text())

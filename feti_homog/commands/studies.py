@@ -11,7 +11,7 @@ from feti_homog.typing import Intracomm
 
 
 def sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """List the cases of a sweep, or run all or one of them.  Collective."""
+    """List the cases of a sweep, or run all cases or a single case.  Collective."""
     if arguments.out is None and not arguments.list:
         raise CaseError("command line: the following arguments are required: --out (see --help)")
     cases = mpi_errors.on_root(comm, sweep_cases.load, arguments.case)
@@ -41,7 +41,7 @@ def fit(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def uncertainty(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Find the scatter of results by uncertain numbers.  Collective."""
+    """Compute the scatter of results that uncertain numbers cause.  Collective."""
     from feti_homog.studies import uncertainty as scatter
 
     study = mpi_errors.on_root(comm, scatter.load, arguments.case)

@@ -10,7 +10,7 @@ from feti_homog.system.runtime import standard_streams
 
 
 def verify(words: Sequence[str]) -> int:
-    """Print the certificate of a result; returns the exit code."""
+    """Verify a result, print the certificate, and return the exit code."""
     standard_streams.prepare()
     standard_streams.end_on_signals()
     prints = standard_streams.launched_rank() == 0

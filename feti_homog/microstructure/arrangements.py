@@ -1,4 +1,4 @@
-"""Fibres on the torus: outlines, phases, places where the cell's sides pass, and pairs of near fibres."""
+"""Arrange fibres on the torus: outlines and phases, the position of the cell sides, and pairs of near fibres."""
 
 from __future__ import annotations
 
@@ -14,33 +14,33 @@ from feti_homog.microstructure.phase_names import COATING, MATRIX, VOID
 from feti_homog.microstructure.shapes import Discs, Outlines, convex_sums, directions
 from feti_homog.typing import Bool, Float, Int
 
-# Decimals in which lengths / width of the cell are compared.
+# Decimals of lengths relative to the cell width in comparisons.
 DECIMALS = 10
 # Decimals of coordinates and sizes that gmsh is given. The last bits differ from machine to machine, and with them gmsh
 # would make other triangles.
 GMSH_DECIMALS = 12
 # Radius / width of the cell above which positions on a circle differ by more than rounding.
 SMALLEST_RADIUS = 1e-6
-# Gaps between tangents that are looked at, and the narrowest of them / the widest.
+# The largest number of candidate gaps between tangents, and the least ratio of a candidate to the widest gap.
 MOST_GAPS, NARROWEST = 4, 0.7
 # Fibres beside each other have three pairs each; those on top of each other would fill the memory.
 MOST_PAIRS = 100_000_000
-# Periods from a cell to those around it.
+# Periods from a cell to the neighbouring cells.
 STEPS = np.array([step for step in product((-1, 0, 1), repeat=2) if any(step)])
 
 
 @dataclass(frozen=True)
 class Arrangement:
-    """N fibres and voids on the torus with periods `width`, `height`; none touch.
+    """N separate fibres and voids on the torus with periods `width` and `height`.
 
     Attributes:
-        outlines: without rings. Fibre k + 1 in a case is number k; voids come after fibres.
-        phase: (N,) phase of each.
-        coating: (N,) ring thickness around each outline, 0 without one.
-        is_hollow: (N,) which are voids within rings of the fibre's own phase; other rings are coatings.
-        mesh_order: (N,) meshing order, on which a few triangles depend; by number if None.
-        row: (N,) place of each in its table; None without one.
-        remarks: how the cell differs from its table, a line each.
+        outlines: N outlines without rings. Fibre k + 1 of a case has the index k; voids follow the fibres.
+        phase: (N,) phases of the outlines.
+        coating: (N,) thickness of the rings around the outlines, 0 without a ring.
+        is_hollow: (N,) mask of voids in hollow fibres, whose ring has the fibre phase; other rings are coatings.
+        mesh_order: (N,) meshing order, on which a few triangles depend; by index if None.
+        row: (N,) row indices in the table of fibres; None for cells without a table.
+        remarks: lines on the differences between the cell and the table.
     """
 
     width: float
@@ -69,82 +69,85 @@ class Arrangement:
 
     @property
     def centres(self) -> Float:
-        """(N, 2)."""
+        """The centres (N, 2)."""
         return self.outlines.centres
 
     @cached_property
     def radii(self) -> Float:
-        """(N,) radii of equal-area discs, without rings."""
+        """The radii (N,) of equal-area discs, without rings."""
         return self.outlines.radii
 
     @property
     def size(self) -> Float:
-        """(2,) width and height."""
+        """The width and height (2,)."""
         return np.array([self.width, self.height])
 
     @property
     def phases(self) -> tuple[str, ...]:
-        """The cell's phases: the matrix, fibre phases in the order of their first fibres, coatings."""
+        """The phases of the cell: matrix, fibre phases in the order of first occurrence, coating."""
         named = dict.fromkeys(name for name in self.phase if name != VOID)
         return (MATRIX, *named, *((COATING,) if (self.coated & ~self.is_hollow).any() else ()))
 
     @property
     def is_void(self) -> Bool:
-        """(N,) which are voids."""
+        """The mask (N,) of voids."""
         return np.array([name == VOID for name in self.phase], bool)
 
     @property
     def voids(self) -> int:
-        """Number of voids, also within hollow fibres."""
+        """The number of voids, including those within hollow fibres."""
         return int(self.is_void.sum() + self.is_hollow.sum())
 
     @property
     def within(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Phases within each outline (N,), and in the ring around it if there is one (N,)."""
+        """The phases (N,) within the outlines, and the phases (N,) of the rings around the outlines."""
         pairs = list(zip(self.phase, self.is_hollow.tolist(), strict=True))
         rings = tuple(name if is_hollow else COATING for name, is_hollow in pairs)
         return tuple(VOID if is_hollow else name for name, is_hollow in pairs), rings
 
     def precedence(self, fibre: Int, is_ring: Bool) -> Int:
-        """Return numbers (k,) from 1 for the rings of fibres (k,), or for their insides.
+        """Return the region numbers (k,), from 1, of the insides or rings of fibres (k,).
 
-        Coatings come behind all fibres, in the same order.
+        Coatings follow all fibres, in the same order.
         """
         return np.asarray(fibre + 1 + np.where(is_ring & ~self.is_hollow[fibre], self.fibres, 0))
 
     @property
     def order(self) -> Int:
-        """(N,) numbers in meshing order."""
+        """The indices (N,) in meshing order."""
         return np.arange(len(self.phase)) if self.mesh_order is None else self.mesh_order
 
     @property
     def fibres(self) -> int:
-        """Number of fibres."""
+        """The number of fibres."""
         return int((~self.is_void).sum())
 
     @property
     def walls(self) -> Float:
-        """(N,) thickness of hollow fibres, 0 for others."""
+        """The wall thickness (N,) of hollow fibres, 0 for other outlines."""
         return np.where(self.is_hollow, self.coating, 0.0)
 
     @property
     def coated(self) -> Bool:
-        """(N,) which have a ring."""
+        """The mask (N,) of outlines with a ring."""
         return np.asarray(self.coating > 0)
 
     @cached_property
     def outer(self) -> Outlines:
-        """(N,) the outlines with their rings."""
+        """The N outlines enlarged by their rings."""
         return self.outlines.grown(self.coating)
 
     @property
     def outer_radii(self) -> Float:
-        """(N,) radii of equal-area discs, with rings."""
+        """The radii (N,) of equal-area discs, with rings."""
         return np.asarray(self.radii + self.coating)
 
     @cached_property
     def shells(self) -> tuple[Outlines, Int]:
-        """All outlines (k,) and their fibres (k,): of each the outer outline, then the one within a ring."""
+        """All k outlines, and the indices (k,) of their fibres.
+
+        The outer outline of a fibre precedes the inner outline of its ring.
+        """
         coated = np.flatnonzero(self.coated)
         fibre = np.concatenate([np.arange(len(self.phase)), coated])
         order = np.argsort(fibre, kind="stable")
@@ -152,18 +155,18 @@ class Arrangement:
 
 
 def clearance(arrangement: Arrangement) -> float:
-    """Return the distance of the cell's sides from tangency with an outline."""
+    """Return the least distance between a cell side and a line tangent to an outline."""
     touching = _tangents(arrangement) / arrangement.size[:, None]
     return float(np.abs((touching - np.round(touching)) * arrangement.width).min())
 
 
 def clear_shift(arrangement: Arrangement) -> Arrangement:
-    """Shift an arrangement such that the cell's sides are tangent to no outline.
+    """Shift an arrangement such that no cell side is tangent to an outline.
 
-    Along each axis the candidates are the middles of the widest gaps between positions of tangency. Of their
-    combinations the corner farthest from an outline is chosen. In cells with a symmetry, as any two discs have, several
-    corners are equal but for rounding: the first one is chosen, so that the unit of length does not matter. Corners in
-    voids are left out (`in_voids`).
+    The candidates along an axis are the middles of the widest gaps between tangents. Among the combinations of both
+    axes the corner farthest from all outlines is selected. In symmetric cells, as of two discs, several corners are
+    equal except for rounding errors: the first is selected, so that the unit of length does not matter. Corners in
+    voids are excluded (`in_voids`).
     """
     size, outlines = arrangement.size, arrangement.shells[0]
     for narrowest in (NARROWEST, 0.0):
@@ -185,9 +188,9 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
 
 
 def in_voids(arrangement: Arrangement, corners: Float) -> Bool:
-    """Return which corners (n, 2) are in voids, for cells with polygons.
+    """Return the mask (n,) of corners (n, 2) within voids, for cells with polygons.
 
-    Other meshes need no node at a corner.
+    Meshes of other cells need no node at a corner.
     """
     result = np.zeros(len(corners), bool)
     if isinstance(arrangement.outlines, convex_sums.ConvexSums):
@@ -201,23 +204,24 @@ def in_voids(arrangement: Arrangement, corners: Float) -> Bool:
 
 
 def _away(outlines: Outlines, places: Float, size: Float) -> Float:
-    """Return vectors (n, k, 2) from places (n, 2) to the nearest images of the centres."""
+    """Return the vectors (n, k, 2) from points (n, 2) to the nearest images of the centres."""
     return np.asarray((outlines.centres - places[:, None] + size / 2) % size - size / 2)
 
 
 def _tangents(arrangement: Arrangement) -> Float:
-    """Return where lines across each axis touch each outline (k, 2, 2), on either side."""
+    """Return the coordinates (k, 2, 2) of the tangents to k outlines across both axes, on either side."""
     outlines, _ = arrangement.shells
     return np.asarray(outlines.centres[:, :, None] + outlines.extents * [-1.0, 1.0])
 
 
 def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Float]:
-    """Find all pairs i <= j nearer than `reach`, and vectors (k, 2) to that image of j.
+    """Find all pairs i <= j of centres and images closer than `reach`.
 
-    Images of one disc are pairs i = j; each image pair comes once or, where i = j, from both ends.
+    A centre and its image form a pair i = j, which occurs from both ends; other pairs of images occur once.  Returns
+    i (k,), j (k,), and the vectors (k, 2) from i to the image of j.
 
     Raises:
-        MeshError: there are more than MOST_PAIRS.
+        MeshError: there are more pairs than MOST_PAIRS.
     """
     inside = centres % size
     images = inside + STEPS[:, None] * size
@@ -233,7 +237,7 @@ def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Flo
                 f"[cell] about {count:.2g} pairs of fibres are nearer to each other than {reach:.2g}; expected at most "
                 f"{MOST_PAIRS}: they lie on top of each other, or one is much larger than the others"
             )
-    # A tree that is used once is not worth being balanced.
+    # Balancing does not pay for a single query.
     tree = cKDTree(place, balanced_tree=False, compact_nodes=False)
     first, second = tree.query_pairs(reach, output_type="ndarray").T
     keep = np.flatnonzero((first < len(centres)) & (who[first] <= who[second]))

@@ -1,4 +1,4 @@
-"""A window cut from a micrograph, made periodic: fibres that overlap across its border are moved apart."""
+"""Make a window of a micrograph periodic: move fibres apart that overlap across the border."""
 
 import numpy as np
 from scipy.optimize import nnls
@@ -8,28 +8,28 @@ from feti_homog.microstructure.arrangements import neighbours
 from feti_homog.microstructure.shapes.outlines import Outlines
 from feti_homog.typing import Float
 
-# Gap / sum of the radii of fibres across the border, at least and at most.
+# Least and largest ratio of gap to radius sum for fibres across the border.
 LEAST_GAP, MOST_GAP = 0.01, 0.05
-# Overlap / sum of the radii that counts as none; distances are made larger by it.
+# Ratio of overlap to radius sum that counts as no overlap; distances are enlarged by it.
 TOLERANCE = 1e-6
-# Moves differ from the smallest ones by less than this, / mean radius.
+# Tolerance of the smallest moves, relative to the mean radius.
 SETTLED = 1e-4
 MAX_STEPS = 100
 
 
 def moves(outlines: Outlines, size: Float) -> Float:
-    """Return the moves d (N, 2) that part outlines overlapping across the torus border.
+    """Compute the moves d (N, 2) that separate outlines across the border of the torus.
 
     The torus has the periods `size` (2,). The moves are a local minimum of sum |d|^2 such that no gap becomes less than
     the smallest gap within the border. Gaps are relative to the sum of the radii, and the smallest one is taken between
     LEAST_GAP and MOST_GAP. Each step replaces the distances |v| >= r by n . v >= r, with the present directions n;
     since n . v <= |v|, its solution keeps the distances.
 
-    Outlines that are no discs have radii of equal-area discs; n is the direction of the largest n . v - r, the gap,
-    where r is the reach of both along n.
+    Outlines that are no discs have the radii of equal-area discs; n is the direction of the largest gap
+    n . v - r, where r is the sum of both supports along n.
 
     Raises:
-        MeshError: there is no room.
+        MeshError: the torus has no room for such moves.
     """
     centres, radii, parting = outlines.centres, outlines.radii, outlines.parting
     reach, unit = 3 * float(outlines.longest.max()), float(radii.mean())
@@ -40,7 +40,7 @@ def moves(outlines: Outlines, size: Float) -> Float:
     gap, moved = float(np.clip(within.min(initial=MOST_GAP), LEAST_GAP, MOST_GAP)), np.zeros_like(centres)
     pairs = np.zeros((0, 5))
     for _ in range(MAX_STEPS):
-        # Different fibres that are, or soon may be, nearer than they must be.
+        # Pairs of different fibres that are closer than allowed, or may become so.
         places = centres + moved
         first, second, vector = neighbours(places, size, reach)
         differ = first != second
@@ -53,7 +53,7 @@ def moves(outlines: Outlines, size: Float) -> Float:
         present = places[second] - places[first] + shift * size
         normal, least = parting(first, second, present)
         short = (normal * present).sum(axis=1) < (least + needed) * (1 - TOLERANCE)
-        # A row for each pair that was too near in any step: both fibres, periods between them, least gap.
+        # A row for each pair that was too close in any step: both fibres, periods between them, least gap.
         pairs = np.concatenate([pairs, np.column_stack([first, second, shift, needed])[short]])
         pairs = pairs[np.unique(pairs[:, :4], axis=0, return_index=True)[1]]
         last, moved = moved, _least_moves(outlines, pairs, moved, size) if len(pairs) else moved
@@ -63,9 +63,9 @@ def moves(outlines: Outlines, size: Float) -> Float:
 
 
 def _least_moves(outlines: Outlines, pairs: Float, moved: Float, size: Float) -> Float:
-    """Return the d (N, 2) of least sum |d|^2 that keep all pairs (k, 5) apart.
+    """Return the moves d (N, 2) of least sum |d|^2 that keep all pairs (k, 5) apart.
 
-    Each pair has n . (v + d_second - d_first) >= r, with the present direction n.
+    Every pair satisfies n . (v + d_second - d_first) >= r, with the present direction n.
 
     By non-negative least squares: C. L. Lawson, R. J. Hanson, Solving Least Squares Problems, 1974, chapter 23.
     """

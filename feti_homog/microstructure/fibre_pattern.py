@@ -1,4 +1,4 @@
-"""Round fibres in a rectangle: a periodic cell, or a window of something larger, such as a micrograph."""
+"""Patterns of round fibres in a rectangle: a periodic cell, or a window of a micrograph."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,13 +17,12 @@ from feti_homog.typing import Bool, Float, Int
 
 @dataclass(frozen=True)
 class FibrePattern:
-    """Discs with centres within the rectangle [0, width] x [0, height].
+    """A pattern of N discs with centres within the rectangle [0, width] x [0, height].
 
     Attributes:
-        width, height: of the rectangle.
-        centres, radii: (N, 2) and (N,) for the discs.
-        periodic: whether discs that leave the rectangle on one side return on the other; otherwise it is a window with
-            unknown surroundings.
+        width, height: size of the rectangle.
+        centres, radii: (N, 2) and (N,) centres and radii of the discs.
+        periodic: whether the pattern repeats; otherwise the rectangle is a window with unknown surroundings.
     """
 
     width: float
@@ -34,40 +33,43 @@ class FibrePattern:
 
     @property
     def size(self) -> Float:
-        """(2,) width and height."""
+        """The width and height (2,)."""
         return np.array([self.width, self.height])
 
     @property
     def area(self) -> float:
-        """Rectangle area."""
+        """The area of the rectangle."""
         return self.width * self.height
 
     @property
     def count(self) -> int:
-        """N."""
+        """The number N of discs."""
         return len(self.radii)
 
     @property
     def mean_radius(self) -> float:
-        """Mean radius."""
+        """The mean radius of the discs."""
         return fsum(self.radii) / self.count
 
     @property
     def fibre_fraction(self) -> float:
-        """sum_i pi R_i^2 / area over the centres in the rectangle.
+        """The area fraction sum_i pi R_i^2 / area of the discs with centres in the rectangle.
 
-        Of a window unbiased: areas that leave it are met, in the mean, by areas that come in.
+        For a window the value is unbiased: disc parts outside and foreign parts inside are equal in the mean.
         """
         return pi * fsum(self.radii * self.radii) / self.area
 
     @cached_property
     def wrapped(self) -> Float:
-        """(N, 2) centres within [0, width) x [0, height)."""
+        """The centres (N, 2), wrapped to [0, width) x [0, height)."""
         inside = self.centres % self.size
         return np.asarray(np.where(inside < self.size, inside, 0.0))
 
     def images(self, reach: float) -> tuple[Float, Int]:
-        """Return centres (m, 2), first the N in the rectangle, then images within `reach`; owners."""
+        """Return the centres (m, 2) of discs and images within `reach`, and the disc indices (m,).
+
+        The N discs in the rectangle come first.
+        """
         number = np.arange(self.count)
         if not self.periodic:
             return self.centres, number
@@ -79,15 +81,14 @@ class FibrePattern:
 
 
 def read_window(path: Path, size: tuple[float, float] | None = None) -> FibrePattern:
-    """Read the fibres, at least two, in a window with this width and height.
+    """Read the fibre pattern of a window, at least two fibres, from a table.
 
-    Without these, the window is the one in the table; ellipses count as discs with the same centres and areas.
-
-    Voids are left out. The window begins at the table's `left` and `bottom`, else at 0.
+    `size` is the width and height of the window, by default the size in the table. The lower left corner is `left` and
+    `bottom` of the table, by default 0. Ellipses count as equal-area discs; voids are excluded.
 
     Raises:
-        CaseError: the table is faulty, or its size unknown; a fibre has its centre outside the window, or is there
-            twice.
+        CaseError: the table is faulty, or its size unknown; a fibre has its centre outside the window, or
+            occurs twice.
     """
     table = read_table(path)
     table = table.rows(np.flatnonzero(~table.is_void))

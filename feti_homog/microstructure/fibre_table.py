@@ -1,4 +1,4 @@
-"""A table of fibres, as micrographs are measured: one row for each, with columns x, y, radius and others."""
+"""Read a table of fibres, as measured in a micrograph: a row per fibre, with columns x, y, radius and others."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ COLUMNS = (*list(table_columns.NUMBERS)[:3], "phase", *list(table_columns.NUMBER
 SIZES = ("width", "height", "left", "bottom")
 """Names in comment lines about the cell: its size, and the coordinates of its lower left corner."""
 OF_FIBRES = ("coating", "inner_radius")
-# Errors of centres and radii in tables / radius: rows nearer to each other are one fibre, and overlaps up to it can be
+# Error of centres and radii in tables, relative to the radius: closer rows are one fibre, and smaller overlaps can be
 # repaired.
 SAME_FIBRE = 0.01
 SIZE = re.compile(r"\b(width|height|left|bottom)\s*[=:]\s*([^\s;=]+?)(?=,?\s|,?$|;|,[a-z])")
@@ -31,16 +31,17 @@ SIZE = re.compile(r"\b(width|height|left|bottom)\s*[=:]\s*([^\s;=]+?)(?=,?\s|,?$
 
 @dataclass(frozen=True)
 class FibreTable:
-    """N fibres in one unit of length, any of whose periodic images may stand for them.
+    """A table of N fibres in one unit of length; a row may list any periodic image of its fibre.
 
     Attributes:
-        name: of the file or list, for faults.
-        row: (N,) line in the file, counted from 1, or place in the list: the fibre's name in faults.
-        columns: (N,) numbers for all NUMBERS, and which of them the table has.
-        phase: N names, "fibre" where the table gives none, "void" for voids.
-        width, height: of the cell; None if the table does not give it.
-        left, bottom: coordinates of its lower left corner; None if the table does not give it.
-        remarks: unused parts of the table, a line each.
+        name: name of the file or list, for messages.
+        row: (N,) line in the file or position in the list, from 1, for messages.
+        columns: numbers (N,) of all NUMBERS, by name.
+        given: names of the columns in the table.
+        phase: N names, "fibre" by default, "void" for voids.
+        width, height: size of the cell; None if the table lacks it.
+        left, bottom: coordinates of the lower left corner; None if the table lacks them.
+        remarks: lines on unused parts of the table.
     """
 
     name: str
@@ -56,57 +57,57 @@ class FibreTable:
 
     @cached_property
     def outlines(self) -> Outlines:
-        """(N,) without coatings, in the table's unit; for tables without faults."""
+        """The N outlines without coatings, in the unit of the table, for tables without faults."""
         return outlines_of(self.columns)
 
     @property
     def radius(self) -> Float:
-        """(N,) of discs, and of equal-area discs for other outlines."""
+        """The radii (N,) of discs, and of equal-area discs for other outlines."""
         return self.outlines.radii
 
     @property
     def coating(self) -> Float:
-        """(N,) coating thickness / radius, 0 without one."""
+        """The ratios (N,) of coating thickness to radius, 0 without coating."""
         return self.columns["coating"]
 
     @property
     def inner_radius(self) -> Float:
-        """(N,) of the void within hollow fibres, 0 for others."""
+        """The radii (N,) of the voids within hollow fibres, 0 for other fibres."""
         return self.columns["inner_radius"]
 
     @property
     def strength(self) -> Float:
-        """(N,) each fibre's bond strength / the case's bond strength, 1 where the table gives none."""
+        """The bond strengths (N,) of the fibres relative to the bond strength of the case, 1 by default."""
         return self.columns["strength"]
 
     @property
     def centres(self) -> Float:
-        """(N, 2)."""
+        """The centres (N, 2)."""
         return np.column_stack([self.columns["x"], self.columns["y"]])
 
     @property
     def is_void(self) -> Bool:
-        """(N,) which rows are voids."""
+        """The mask (N,) of voids."""
         return np.array([name == VOID for name in self.phase], bool)
 
     def rows(self, kept: Int) -> FibreTable:
-        """Return the table with the rows `kept` (k,)."""
+        """Restrict the table to the rows with indices `kept` (k,)."""
         columns = {name: values[kept] for name, values in self.columns.items()}
         return replace(self, row=self.row[kept], columns=columns, phase=tuple(self.phase[k] for k in kept.tolist()))
 
     @property
     def outer_radius(self) -> Float:
-        """(N,) with the coating."""
+        """The radii (N,) with coating."""
         return self.radius * (1 + self.coating)
 
 
 def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
-    """Read the table in a text file; fibres may overlap.
+    """Read a table of fibres from a text file.  Fibres may overlap.
 
-    The first line, or `columns`, has the names: x, y, radius (or a, b), then phase, coating, angle and other names that
-    `understood` takes. Each fibre has a line. Commas, semicolons, tabs or else spaces divide columns; without commas
-    between columns, decimals may have them. "#" begins a comment; "# width = 120, height = 80" has the cell size, and
-    "left" and "bottom" have its corner.
+    The first line, or `columns`, lists the names: x, y, radius (or a, b), phase, coating, angle and other names that
+    `understood` accepts. A line per fibre follows. Commas, semicolons, tabs or else spaces separate columns; commas may
+    be decimal marks if other characters separate columns. "#" begins a comment; "# width = 120, height = 80" gives the
+    cell size, and "left" and "bottom" give the lower left corner.
 
     Raises:
         CaseError: the table is faulty; a line for each fault, with its line in the file.
@@ -147,7 +148,7 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
 
 
 def table_of(entries: Sequence[Mapping[str, Any]], name: str) -> FibreTable:
-    """Return the table of a fibre list, whose keys are columns; faults count rows from 1.
+    """Build the table of a list of fibres, whose keys are columns; faults count rows from 1.
 
     Raises:
         CaseError: the list is faulty; a line for each fault.
@@ -162,7 +163,7 @@ def table_of(entries: Sequence[Mapping[str, Any]], name: str) -> FibreTable:
 
 
 class _Faults:
-    """The faults of a table, each with its row."""
+    """The list of faults in a table, with row numbers."""
 
     def __init__(self, name: str) -> None:
         self.lines: list[str] = []
@@ -172,7 +173,7 @@ class _Faults:
         self.lines.append(f"{self._name}: row {row}: {words}")
 
     def throw(self) -> None:
-        """Raise the faults, if there are any."""
+        """Raise a CaseError with all faults, if any."""
         if self.lines:
             raise CaseError(*self.lines)
 
@@ -180,7 +181,7 @@ class _Faults:
 def _check_names(
     words: Sequence[str], read: Sequence[table_columns.SourceColumn], unread: Sequence[str], row: int, faults: _Faults
 ) -> None:
-    """Add the faults in a name line: no known name, doubled, misspelt or missing names."""
+    """Check the column names: add unknown, doubled, misspelt and missing names to the faults."""
     names = [column.name for column in read]
     if not names:
         given = wording.toml_value(", ".join(words))
@@ -193,7 +194,7 @@ def _check_names(
         if meant := table_columns.misspelt(word, [name for name in COLUMNS if name not in names]):
             faults.add(row, f"column {wording.toml_value(word)}: unknown; did you mean {meant}?")
     ignored = f"; not read: {', '.join(map(wording.toml_value, unread))}" if unread else ""
-    # The radius, or the sizes of a shape in its place.
+    # The radius, or the sizes of a shape that replace it.
     sizes = next((sizes for sizes in (("radius",), *REPLACING) if {*names} & {*sizes}), ("radius",))
     for name in ("x", "y", *sizes):
         if name not in names:
@@ -203,7 +204,7 @@ def _check_names(
 def _table(
     name: str, rows: Mapping[int, Mapping[str, Any]], names: set[str], sizes: Mapping[str, float], faults: _Faults
 ) -> FibreTable:
-    """Return the table of rows whose cells are numbers, or texts if they are faulty."""
+    """Check the cells of all rows and build the table; a faulty cell is a text.  Raises CaseError with all faults."""
     for row, cells in rows.items():
         has_size = any(set(replacing) <= cells.keys() for replacing in REPLACING)
         for key in ("x", "y", *([] if has_size else ["radius"])):

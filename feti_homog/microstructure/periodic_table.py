@@ -1,4 +1,4 @@
-"""The arrangement of a table's fibres: images of one fibre, and faults."""
+"""Arrange the fibres of a table on the torus, with images of one fibre merged; report faults."""
 
 from dataclasses import replace
 
@@ -13,27 +13,27 @@ from feti_homog.typing import Bool, Float, Int
 
 # Directions in which outlines are compared.
 COMPARED = directions(np.linspace(0.0, 2 * np.pi, 24, endpoint=False))
-# Gap / mean radius of two fibres below which they touch: elements between them would be too many.
+# Ratio of gap to mean radius below which two fibres touch: a smaller gap would need too many elements.
 LEAST_GAP = 1e-4
-# Thickness / radius of the thinnest and of the thickest coating.
+# The least and the largest ratio of coating thickness to radius.
 COATINGS = 0.01, 1.0
-# Distance of the sides of a cell from tangency with an outline / mean radius, below which elements there are needles.
+# Distance between a cell side and a tangent, relative to the mean radius, below which elements are needles.
 LEAST_CLEARANCE = 1e-3
 
 
 def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> Arrangement:
-    """Arrange a table's fibres, in row order, then its voids.
+    """Arrange the fibres of a table, in row order, and then the voids.
 
-    Periodic images count as one fibre, the first row. In a cut window, fibres that overlap across its border are
+    Of the periodic images of a fibre the first row counts. In a cut window, fibres that overlap across the border are
     moved apart.
 
-    The given corner of a cell stays if no side touches a disc and the corner is in no void (`in_voids`); so the
-    table of a random cell gives the mesh of that cell. Otherwise fibres are shifted (`clear_shift`), their
-    coordinates rounded and sorted: tables that differ by a shift, the order of rows or units have one mesh.
+    The corner that the table gives remains if no cell side touches a disc and the corner lies in no void (`in_voids`),
+    so that the table of a random cell gives the mesh of that cell. Otherwise fibres are shifted (`clear_shift`), and
+    coordinates are rounded and sorted: tables that differ by a shift, the row order or units have the same mesh.
     Coordinates of fibres that are not discs are always rounded.
 
     Raises:
-        MeshError: rows lie outside, come twice, overlap or touch; a line for each fault.
+        MeshError: rows lie outside, occur twice, overlap or touch; a line for each fault.
     """
     table, remarks = _repaired(table, window) if repairs else (table, ())
     retained, centres, moves, size = on_torus(table, window)
@@ -69,9 +69,10 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
 
 
 def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ...]]:
-    """Shrink fibres that overlap slightly; return the table, and a remark with their rows.
+    """Shrink the fibres of a table that overlap slightly.
 
-    Fibres that touch or overlap by up to SAME_FIBRE of a radius shrink until they part.
+    Fibres that touch or overlap by up to SAME_FIBRE of a radius shrink until they separate.  Returns the table, and a
+    remark with the rows of the smaller fibres.
     """
     assert table.width is not None and table.height is not None
     size, centres = np.array([table.width, table.height]), table.centres - _corner(table)
@@ -86,7 +87,7 @@ def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ..
         sizes = np.stack([table.columns[name][retained[fibre]] for name in ("radius", "a", "b")])
         np.maximum.at(share, retained[fibre], (least - gap)[near] / np.nanmin(sizes, axis=0))
     names = {"radius", *(name for shape in SHAPES for name in shape.sizes if name != "sides")}
-    # A little more than enough, for the gap is compared with the radii that are left.
+    # Slightly more than half, because a later check compares the gap with the reduced radii.
     columns = {name: values * (1 - 0.51 * share) if name in names else values for name, values in table.columns.items()}
     rows = table.row[share > 0]
     listed = f"rows {', '.join(map(str, rows[:MOST_FAULTS]))}{', ...' if len(rows) > MOST_FAULTS else ''}"
@@ -109,15 +110,16 @@ def _rounded(arrangement: Arrangement) -> Arrangement:
 
 
 def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
-    """Return the rows (k,), centres (k, 2) and moves (k, 2) of fibres, and the cell size (2,).
+    """Check the fibres of a table and place them on the torus.
 
-    Raises as `table_arrangement`.
+    Returns the rows (k,), centres (k, 2) and moves (k, 2) of fibres, and the cell size (2,).  Raises as
+    `table_arrangement`.
     """
     assert table.width is not None and table.height is not None
     size = np.array([table.width, table.height])
     centres = table.centres - _corner(table)
     is_cut = window == "cut"
-    # The largest of the lengths that each row gives, and its column.
+    # The largest length of every row, and the column of this length.
     names = ["radius", *(name for shape in SHAPES for name in shape.sizes if name != "radius")]
     sizes = np.nan_to_num(np.stack([table.columns[name] for name in names]))
     radius, column, faults = sizes.max(axis=0), sizes.argmax(axis=0), list[str]()
@@ -164,14 +166,14 @@ def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
 
 
 def fibre_rows(table: FibreTable, window: str) -> Int:
-    """Return the index (fibres,) in the table of each fibre of its cell."""
+    """Return the table indices (fibres,) of the fibres in the cell, without voids and images."""
     size = np.array([table.width, table.height], float)
     first, _ = _without_images(table, table.centres - _corner(table), size, window == "cut")
     return np.flatnonzero(first & ~table.is_void)
 
 
 def _corner(table: FibreTable) -> Float:
-    """Return the cell's lower left corner (2,), by default the lowest coordinates."""
+    """Return the lower left corner (2,) of the cell, by default the least coordinates of the centres."""
     given = np.array([table.left, table.bottom], float)
     return np.where(np.isnan(given), table.centres.min(axis=0), given)
 
@@ -182,7 +184,7 @@ def _raise_faults(table: FibreTable, faults: list[str]) -> None:
 
 
 def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> tuple[Bool, list[str]]:
-    """Return which rows (N,) are the first of their fibre, and faults of the other rows."""
+    """Return the mask (N,) of rows that are the first image of a fibre, and faults of other images."""
     first, second, vector = arrangements.neighbours(centres, size, SAME_FIBRE * table.radius.max())
     radius, strength, distance = table.radius, table.strength, np.linalg.norm(vector, axis=1)
     smaller = np.minimum(radius[first], radius[second])
@@ -207,7 +209,7 @@ def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool
 def _gaps(table: FibreTable, kept: Int, outer: Outlines, size: Float) -> tuple[Int, Int, Float, Float, Bool]:
     """Find the pairs of near fibres among the rows `kept` (k,).
 
-    Returns (p,) indices into `kept` of both, gaps, sums of radii, and True across the border.
+    Returns, all (p,): indices into `kept` of both fibres, gaps, radius sums, and the mask of pairs across the border.
     """
     centres, radius = outer.centres, table.outer_radius[kept]
     first, second, vector = arrangements.neighbours(centres, size, 2 * outer.longest.max() * (1 + LEAST_GAP))

@@ -1,4 +1,4 @@
-"""Random discs that do not overlap, and discs moved until their neighbours are as far as in a measured pattern."""
+"""Place random discs without overlap, and move discs until neighbour distances match a measured pattern."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -12,32 +12,32 @@ from feti_homog.microstructure.arrangements import neighbours
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 from feti_homog.typing import Float, Int
 
-# Nearest and second nearest.
+# Neighbours whose distances are matched: nearest and second nearest.
 SHELLS = 2
-# Moves that are tried: for each fibre, and in all.
+# Limits of the trial moves: per fibre, and in total.
 MOVES_OF_A_FIBRE, MOST_MOVES = 100, 40_000
-# A distance of distributions, in mean diameters, at which no more moves are tried.
+# Distance of distributions, in mean diameters, at which the search stops.
 CLOSE = 0.002
-# Relative excess of the radii that push, with which the descent ends in finite time.
+# Relative enlargement of the radii, so that the descent ends in finite time.
 RADIUS_EXCESS = 1e-3
 # Steps of the descent after which an arrangement counts as jammed; others take less than 200.
 MAX_STEPS = 2000
 ATTEMPTS = 3
-# Area fraction of discs grown by half the gap above which there are no patterns: that of touching equal discs.
+# Largest area fraction of discs enlarged by half the gap: the densest packing of equal discs.
 DENSEST = pi / sqrt(12)
 
 
 @dataclass(frozen=True)
 class NearestNeighbours:
-    """The k fibres nearest to each of N, between centres.
+    """The k nearest neighbours of N fibres, by the distance between centres.
 
     Attributes:
-        distances: (N, k), the nearest first; infinite where a window has no more fibres.
+        distances: (N, k), in ascending order; infinite if a window has too few fibres.
         directions: (N, k) degrees from x1 towards x2, in [0, 360).
-        weights: (N, k), of each distance in the distribution; each column has the sum 1.  In a periodic cell they are
-            1/N.  In a window a distance d counts if the circle of that radius lies within, so that no fibre outside can
-            be nearer, with the weight 1 / ((width - 2 d) (height - 2 d)) [Hanisch 1984], for the longer the fewer
-            count.  A column is zero if none of its distances counts.
+        weights: (N, k), weights of the distances in their distribution; a column has the sum 1.  In a periodic cell
+            weights are 1/N.  In a window a distance d counts if the circle of radius d lies within, so that no fibre
+            outside can be closer.  Its weight 1 / ((width - 2 d) (height - 2 d)) [Hanisch 1984] compensates that
+            fewer long distances count.  A column is zero if none of its distances counts.
     """
 
     distances: Float
@@ -46,20 +46,21 @@ class NearestNeighbours:
 
     @cached_property
     def means(self) -> Float:
-        """(k,) mean distances, NaN where none counts."""
+        """The mean distances (k,), NaN for columns without a counted distance."""
         total = (self.weights * np.where(self.weights > 0, self.distances, 0.0)).sum(axis=0)
         return np.where(self.weights.any(axis=0), total, np.nan)
 
     @cached_property
     def deviations(self) -> Float:
-        """(k,) standard deviations of the distances, NaN where none counts."""
+        """The standard deviations (k,) of the distances, NaN for columns without a counted distance."""
         counted = np.where(self.weights > 0, self.distances - self.means, 0.0)
         return np.where(self.weights.any(axis=0), np.sqrt((self.weights * counted**2).sum(axis=0)), np.nan)
 
     def quantiles(self, levels: Float, column: int) -> Float:
-        """Return the least distances d (m,) of one column with F(d) >= levels (m,).
+        """Return the quantiles of the distances in one column.
 
-        F is the weighted distribution. Raises ValueError if none of its distances counts.
+        The quantiles (m,) are the least distances d with F(d) >= levels (m,) for the weighted distribution F. Raises
+        ValueError if no distance of the column counts.
         """
         order = np.argsort(self.distances[:, column], kind="stable")
         order = order[self.weights[order, column] > 0]
@@ -71,8 +72,8 @@ class NearestNeighbours:
 
 
 def nearest_neighbours(pattern: FibrePattern, count: int = 3) -> NearestNeighbours:
-    """Find each fibre's neighbours; in a periodic cell images count, also its own."""
-    # Within `reach` each fibre in a periodic cell has so many neighbours.
+    """Find the nearest neighbours of all fibres; in a periodic cell images of all fibres count."""
+    # Within `reach` every fibre in a periodic cell has `count` neighbours.
     reach = (count + 1) // 2 * pattern.size.min()
     if pattern.periodic and pattern.count > count:
         away, _ = cKDTree(pattern.wrapped, boxsize=pattern.size).query(pattern.wrapped, count + 1)
@@ -97,21 +98,21 @@ def nearest_neighbours(pattern: FibrePattern, count: int = 3) -> NearestNeighbou
 
 
 def knows_neighbours(measured: FibrePattern) -> bool:
-    """Return whether a pattern has distances of nearest and second neighbours that count."""
+    """Return whether distances to nearest and second nearest neighbours count in a pattern."""
     return bool(nearest_neighbours(measured, SHELLS).weights.any(axis=0).all())
 
 
 def wanted_distances(measured: FibrePattern, count: int) -> Float:
-    """Return the quantiles (count, SHELLS) of a pattern's neighbour distances.
+    """Return the quantiles (count, SHELLS) of the neighbour distances in a pattern.
 
-    Their levels are (i + 1/2) / count, and their unit is the mean diameter. Raises ValueError if a window is too small.
+    The levels are (i + 1/2) / count; the unit is the mean diameter. Raises ValueError if a window is too small.
     """
     near, levels = nearest_neighbours(measured, SHELLS), (np.arange(count) + 0.5) / count
     return np.stack([near.quantiles(levels, k) for k in range(SHELLS)], axis=1) / (2 * measured.mean_radius)
 
 
 def match_distance(pattern: FibrePattern, wanted: Float) -> float:
-    """Compare the neighbour distances of a periodic pattern with `wanted` (N, SHELLS).
+    """Compare neighbour distances in a periodic pattern with the target `wanted` (N, SHELLS).
 
     Returns the root mean square difference between the sorted distances, in mean diameters. This is the quadratic
     Wasserstein distance of the distributions, over both neighbours.
@@ -121,16 +122,16 @@ def match_distance(pattern: FibrePattern, wanted: Float) -> float:
 
 
 def matched(pattern: FibrePattern, gap: float, wanted: Float, generator: np.random.Generator) -> Float:
-    """Move the fibres of a periodic pattern such that `match_distance` to `wanted` falls.
+    """Move the fibres of a periodic pattern to reduce `match_distance` to the target `wanted`.
 
-    Returns their centres (N, 2), N at least 3. One random fibre after the other moves to a random place around it, near
-    or far, if it keeps `gap` to all other fibres there and the distance of the distributions does not grow. Sums are
-    made one term after the other, so that every machine takes the same moves.
+    A trial move takes a random fibre to a random position around its centre, near or far. The move is accepted if the
+    fibre keeps `gap` to all other fibres and the distance between the distributions does not increase. Sums have a
+    fixed order of terms, so that every machine takes the same moves. Returns the centres (N, 2), N at least 3.
     """
     count, size = pattern.count, pattern.size
     centres, target = pattern.wrapped.copy(), wanted * (2 * pattern.mean_radius)
-    everyone = np.arange(count)
-    near, who = _two_nearest(centres, everyone, size)
+    numbers = np.arange(count)
+    near, who = _two_nearest(centres, numbers, size)
     error, goal = _mean_square(near, target), (CLOSE * 2 * pattern.mean_radius) ** 2
     reach = sqrt(pattern.area / count)
     for _ in range(min(MOVES_OF_A_FIBRE * count, MOST_MOVES)):
@@ -143,7 +144,7 @@ def matched(pattern: FibrePattern, gap: float, wanted: Float, generator: np.rand
         away[fibre] = np.inf
         if np.any(away < pattern.radii + (pattern.radii[fibre] + gap)):
             continue
-        changed = np.flatnonzero((away < near[:, 1]) | np.any(who == fibre, axis=1) | (everyone == fibre))
+        changed = np.flatnonzero((away < near[:, 1]) | np.any(who == fibre, axis=1) | (numbers == fibre))
         before, centres[fibre] = centres[fibre].copy(), place
         new_near, new_who = near.copy(), who.copy()
         new_near[changed], new_who[changed] = _two_nearest(centres, changed, size)
@@ -156,14 +157,14 @@ def matched(pattern: FibrePattern, gap: float, wanted: Float, generator: np.rand
 
 
 def _distances(places: Float, centres: Float, size: Float) -> Float:
-    """Return distances (m, N) from places (m, 2) to the nearest images of centres (N, 2)."""
+    """Return the distances (m, N) from points (m, 2) to the nearest images of centres (N, 2)."""
     x, y = (np.abs(places[:, None, axis] - centres[:, axis]) for axis in (0, 1))
     x, y = np.minimum(x, size[0] - x), np.minimum(y, size[1] - y)
     return np.asarray(np.sqrt(x * x + y * y))
 
 
 def _two_nearest(centres: Float, fibres: Int, size: Float) -> tuple[Float, Int]:
-    """Find the two nearest neighbours of fibres (m,): distances (m, 2), then numbers (m, 2)."""
+    """Find the two nearest neighbours of fibres (m,).  Returns distances (m, 2) and indices (m, 2)."""
     away = _distances(centres[fibres], centres, size)
     rows = np.arange(len(fibres))
     away[rows, fibres] = np.inf
@@ -175,17 +176,17 @@ def _two_nearest(centres: Float, fibres: Int, size: Float) -> tuple[Float, Int]:
 
 
 def _mean_square(distances: Float, wanted: Float) -> float:
-    """Return the mean square difference of sorted distances (N, SHELLS) from the target."""
+    """Return the mean square difference between sorted distances and the target, both (N, SHELLS)."""
     difference = np.sort(distances, axis=0) - wanted
     return float(np.cumsum(difference * difference)[-1]) / wanted.size
 
 
 def relax(centres: Float, radii: Float, max_steps: int, size: tuple[float, float] = (1.0, 1.0)) -> tuple[Float, float]:
-    """Move centres (N, 2) until discs on the torus `size` do not overlap.
+    """Move centres (N, 2) until discs do not overlap on the torus with periods `size`.
 
-    Returns the centres and the clearance, the smallest ratio of distance to radius sum; at least 1 is success. The
-    heavy-ball descent x += 0.25 f + 0.9 dx has no reductions over the discs, so that every machine gets the same
-    numbers.
+    Returns the centres and the clearance, the smallest ratio of distance to radius sum; success is a clearance of at
+    least 1. The heavy-ball descent x += 0.25 f + 0.9 dx has no reductions over the discs, so that every machine gets
+    the same numbers.
     """
     periods, target = np.array(size), radii * (1 + RADIUS_EXCESS)
     step, clearance = np.zeros_like(centres), 0.0
@@ -203,16 +204,16 @@ def relax(centres: Float, radii: Float, max_steps: int, size: tuple[float, float
 
 
 def _sum_at(rows: Int, vectors: Float, count: int) -> Float:
-    """Sum the vectors (k, 2) of each row (count, 2), one after the other."""
+    """Sum vectors (k, 2) by row to (count, 2), in a fixed order of terms."""
     return np.stack([np.bincount(rows, vectors[:, axis], count) for axis in (0, 1)], axis=1)
 
 
 def placed(
     pattern: FibrePattern, gap: float, generator: np.random.Generator, max_steps: int = MAX_STEPS
 ) -> FibrePattern:
-    """Place the same fibres at random, at least `gap` from each other.
+    """Place the fibres of a pattern at random, with a distance of at least `gap`.
 
-    Raises MeshError if no places are found.
+    Raises MeshError if the search finds no such pattern.
     """
     grown = pattern.radii + gap / 2
     attempts = ATTEMPTS if np.pi * np.sum(grown**2) < DENSEST * pattern.area else 0
@@ -226,6 +227,6 @@ def placed(
 
 
 def distance_of(window: FibrePattern, width: float, height: float, centres: Float, radii: Float) -> float:
-    """Return the distance, in mean diameters, of a cell's pattern from the window it matches."""
+    """Return the `match_distance`, in mean diameters, between a periodic pattern and a measured window."""
     pattern = FibrePattern(width, height, centres, radii, periodic=True)
     return match_distance(pattern, wanted_distances(window, pattern.count))

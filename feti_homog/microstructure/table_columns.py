@@ -1,6 +1,6 @@
-"""Fibre tables as spreadsheets and other programs write them: their lines and column names.
+"""Read the lines and column names of fibre tables that spreadsheets and image programs write.
 
-Columns have units in brackets, diameters, areas and axes of ellipses.
+Columns may have units in brackets; diameters, areas and axes of ellipses may replace radii.
 """
 
 import difflib
@@ -16,7 +16,7 @@ from feti_homog.microstructure.shapes.shapes import SHAPES
 from feti_homog.schema import types
 from feti_homog.system.runtime import input_files
 
-# Of an empty cell, and the bounds, of the columns that are numbers.
+# Numeric columns, with the value of an empty cell and the bounds.
 NUMBERS = {
     "x": ColumnRange(math.nan),
     "y": ColumnRange(math.nan),
@@ -40,7 +40,9 @@ UNITS_OF_EXCEL = bytes.maketrans(b"\xb5\xb0\xb2", b"uo2")
 
 
 def lines_of(path: Path) -> Iterator[tuple[int, str, str]]:
-    """Yield each line's number, its cells, empty without any, and the comment behind "#".
+    """Yield the lines of a text file without comments.
+
+    A line is its number from 1, its content or an empty string, and the comment behind "#".
 
     Raises:
         CaseError: the file cannot be read, or is no text.
@@ -65,17 +67,17 @@ def lines_of(path: Path) -> Iterator[tuple[int, str, str]]:
 
 
 def delimiter_of(line: str) -> str | None:
-    """Return a table's column delimiter by its first line; None for spaces."""
+    """Return the delimiter of columns in the first line of a table; None for spaces."""
     return next((mark for mark in ";\t," if mark in line), None)
 
 
 def cells_of(line: str, delimiter: str | None) -> list[str]:
-    """Return a row's cells, without quotation marks."""
+    """Split a row into cells without quotation marks."""
     return [word.strip().strip('"').strip() for word in line.split(delimiter)]
 
 
 def row_fault(line: str, cells: Sequence[str], count: int) -> str:
-    """Return the fault of a row with more or fewer cells than names; empty without one."""
+    """Return the fault of a row whose number of cells is not `count`, or an empty string."""
     if line.count('"') % 2:
         return "a quotation mark is not closed"
     return "" if len(cells) == count else f"has {len(cells)} columns; expected {count}, as there are names"
@@ -111,19 +113,19 @@ OTHERS: tuple[tuple[tuple[str, ...], str, Callable[[float], float]], ...] = (
 
 
 INSTEAD = {"radius": "a"}
-"""Columns that are not made where another is given."""
+"""Columns that are not derived if another column is present."""
 
 
 @dataclass(frozen=True)
 class SourceColumn:
-    """A column of the file: its place in the rows, its name, and the conversion of its numbers."""
+    """A column of a file: position in the rows, name, and conversion of the numbers."""
 
     place: int
     name: str
     value: Callable[[float], float]
 
     def read(self, word: str, delimiter: str | None) -> float | str:
-        """Return a cell's number, or its text if it is no number."""
+        """Convert a cell to a number; a cell that is no number remains a text."""
         number = None if self.name == "phase" else number_of(word, delimiter)
         return word if number is None else self.value(number)
 
@@ -134,7 +136,7 @@ def _bare(word: str) -> str:
 
 
 def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceColumn], list[str]]:
-    """Find the `known` columns in a name line, in any case, and the other words."""
+    """Recognize `known` columns in a line of names, in upper or lower case; return unknown words as well."""
     bare = list(map(_bare, words))
     if MATLABS_AXIS in bare:
         # MATLAB's orientation is an angle; other programs' are in radians, or from another axis.
@@ -153,18 +155,18 @@ def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceC
 
 
 def are_units(words: Sequence[str]) -> bool:
-    """Return whether a line has units alone, as some programs write below the names."""
+    """Return whether a line has units alone, which some programs write below the names."""
     return bool(set(words) - {"", "-"}) and all(ROW_UNIT.fullmatch(word) for word in words if word)
 
 
 def misspelt(word: str, missing: Sequence[str]) -> str:
-    """Find the `missing` column whose name a word nearly is; empty without one."""
+    """Return the missing column whose name resembles a word, or an empty string."""
     near = difflib.get_close_matches(_bare(word), missing, n=1, cutoff=0.75)
     return near[0] if near else ""
 
 
 def number_of(word: str, delimiter: str | None) -> float | None:
-    """Return the number of a word, also with a decimal comma; None without one."""
+    """Convert a word to a number, with a decimal point or comma; None if it is no number."""
     try:
         value = float(word if delimiter == "," else word.replace(",", "."))
     except ValueError:

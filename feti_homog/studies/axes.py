@@ -1,4 +1,4 @@
-"""Points of a sweep: axis values combined to a grid, row by row, or sampled."""
+"""Read the points of a sweep: axis values combined to a grid or row by row, or random samples."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike
 from feti_homog.case import sections, toml_files
 from feti_homog.schema import TableReader, keys, types, wording
 
-DIGITS = 12  # of a computed value, so that its rounding makes no other case
+DIGITS = 12  # of a computed value, so that rounding errors do not change the identity of a case
 Assignment = dict[toml_files.TomlPath, Any]
 
 
 @dataclass(frozen=True)
 class Axis:
-    """A key that varies, with its values or, if it is sampled, both ends of its range."""
+    """A key that varies, with a list of values or, for samples, both ends of a range."""
 
     path: toml_files.TomlPath
     values: tuple[Any, ...] = ()
@@ -27,7 +27,7 @@ class Axis:
 
     @classmethod
     def of(cls, path: toml_files.TomlPath, value: Any) -> Self:
-        """Return the axis of a valid list or range."""
+        """Build the axis of a valid list or range."""
         if isinstance(value, list):
             return cls(path, tuple(value))
         low, high, step, count = float(value["from"]), float(value["to"]), value.get("step"), value.get("count")
@@ -38,17 +38,17 @@ class Axis:
         return axis if count is None else cls(path, tuple(axis.at(np.linspace(0, 1, count))))
 
     def at(self, fractions: ArrayLike) -> list[Any]:
-        """Return the values at fractions in [0, 1] of the way from the first end to the second."""
+        """Interpolate the range at fractions in [0, 1], on a logarithmic scale if `log`."""
         low, high = np.log(self.ends) if self.log else self.ends
         values = low + (high - low) * np.asarray(fractions)
         return [_of_key(value, self.path) for value in (np.exp(values) if self.log else values).tolist()]
 
 
 def read_points(table: Mapping[str, Any], faults: list[str]) -> tuple[list[Assignment], sections.SweepSection]:
-    """Return the points of a table [sweep] as values by key, in their order, and its settings.
+    """Read the points and settings of a table [sweep].
 
-    In a grid the last key in the file runs fastest; all sampled keys are one axis, the last.  A faulty table has no
-    points, and adds a line for each fault to `faults`.
+    A point is a value for every key that varies.  In a grid the last key in the file runs fastest; all sampled keys
+    together are the last axis.  A faulty table has no points; a line for each fault is appended to `faults`.
     """
     names = keys.keys_of(sections.SweepSection)
     reader = TableReader()
@@ -90,10 +90,10 @@ def read_points(table: Mapping[str, Any], faults: list[str]) -> tuple[list[Assig
 
 
 def _samples(axes: Sequence[Axis], settings: sections.SweepSection) -> list[Assignment]:
-    """Return a Latin hypercube, or independent samples, in the box of the axes."""
+    """Draw a Latin hypercube, or independent samples, from the box of the axes."""
     count = settings.samples or 1
     if settings.sampling == "latin":
-        from scipy.stats import qmc  # which takes most of a second, and few sweeps need it
+        from scipy.stats import qmc  # a slow import that few sweeps need
 
         fractions = qmc.LatinHypercube(len(axes), seed=settings.seed).random(count)
     else:
@@ -103,17 +103,17 @@ def _samples(axes: Sequence[Axis], settings: sections.SweepSection) -> list[Assi
 
 
 def _is_foreign(path: toml_files.TomlPath) -> bool:
-    """Return whether a path begins with no section whose keys can vary."""
+    """Return whether a path lies outside the sections whose keys can vary."""
     return path[0] not in sections.TOP_LEVEL or path[0] in ("name", sections.SWEEP)
 
 
 def _is_range(path: toml_files.TomlPath, value: Any) -> bool:
-    """Return whether a value is meant as a range; a section may have a key "to", but is no range."""
+    """Return whether a value is a range rather than a section with a key "to"."""
     return len(path) > 1 and isinstance(value, dict) and bool(value.keys() & {"from", "to"})
 
 
 def _value_fault(path: toml_files.TomlPath, value: Any, is_sampled: bool) -> str:
-    """Return the fault of an axis, empty if there is none; sampled ranges need no step and no count."""
+    """Return the fault of an axis, or an empty string; sampled ranges need no step and no count."""
     if _is_foreign(path):
         names = [*keys.keys_of(sections.SweepSection), *sections.SECTIONS, "material", "petsc"]
         return f"unknown key; {wording.suggestion(path[0], names, {})}"
@@ -144,12 +144,12 @@ def _value_fault(path: toml_files.TomlPath, value: Any, is_sampled: bool) -> str
 
 
 def rounded(value: float) -> float:
-    """Return the number without the noise of its last digits."""
+    """Round a number to DIGITS significant digits."""
     return float(f"{value:.{DIGITS}g}")
 
 
 def _of_key(value: float, path: toml_files.TomlPath) -> Any:
-    """Return the rounded number; an integer where the key takes nothing else."""
+    """Round a value, to an integer if the key accepts integers alone."""
     value = rounded(value)
     section = sections.SECTIONS.get(path[0])
     entry = keys.keys_of(section).get(path[1]) if section is not None and len(path) == 2 else None

@@ -1,9 +1,9 @@
 """The folder of a sweep: its case list, a folder for each case, and their progress.
 
-DIR/sweep.json, cases.csv     the cases; collected, cases.csv has their results too
-DIR/case-0001/case.toml       the case with its defaults, which `feti-homog run` runs too
-DIR/case-0001/result.json     as of any run
-DIR/case-0001/error.txt       why it failed, if it did
+DIR/sweep.json, cases.csv     the cases; `feti-homog collect` adds the results to cases.csv
+DIR/case-0001/case.toml       the case with its defaults, as `feti-homog run` reads it
+DIR/case-0001/result.json     the result, as of a single run
+DIR/case-0001/error.txt       the reason of a failure
 """
 
 import csv
@@ -35,10 +35,10 @@ INDEX_LOCK_FILE, INDEX_LOCK_TIMEOUT_S = "index.lock", 30.0
 
 
 class Status(StrEnum):
-    """Progress of a case.
+    """The progress of a case.
 
-    UNCONVERGED has a result that its checks refuse, FAILED an error instead; DAMAGED has a result that cannot be
-    read or belongs to another case; WAITING has neither.
+    An UNCONVERGED case has a result that its checks refuse, a FAILED case an error instead of a result.  The result of
+    a DAMAGED case is unreadable or belongs to another case.  A WAITING case has neither a result nor an error.
     """
 
     DONE = "done"
@@ -50,13 +50,13 @@ class Status(StrEnum):
 
     @property
     def is_failure(self) -> bool:
-        """Return whether the case was computed in vain; --retry computes it again."""
+        """Whether the computation ended without a valid result; --retry repeats such a case."""
         return self in (Status.UNCONVERGED, Status.FAILED)
 
 
 @dataclass(frozen=True)
 class CaseState:
-    """Case progress, the reason for a failure, and result.json if there is one."""
+    """The progress of a case, the reason for a failure, and the content of result.json if the file exists."""
 
     status: Status
     reason: str = ""
@@ -65,7 +65,7 @@ class CaseState:
 
 @dataclass(frozen=True)
 class SweepIndex:
-    """Content of sweep.json."""
+    """The content of sweep.json: the list of all cases."""
 
     name: str
     stress_unit: str
@@ -73,10 +73,10 @@ class SweepIndex:
 
 
 def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str) -> None:
-    """Refuse a folder without a study whose files have the names of a study.  On one rank.
+    """Refuse a folder with foreign files under names that a study would write.  On one rank.
 
     Raises:
-        CaseError: a file that is not empty, or such a folder.
+        CaseError: such a file or subfolder is not empty.
         OSError: the folder cannot be read.
     """
     for path in sorted(directory.iterdir()):
@@ -85,11 +85,11 @@ def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str)
 
 
 def prepare_folder(directory: Path, sweep: Sweep) -> None:
-    """Make the folder of a sweep, or check a folder that has its cases, or the first of them.  On one rank.
+    """Make the folder of a sweep, or extend its list of cases.  On one rank.
 
     Raises:
-        CaseError: the folder has another sweep, or foreign files under a sweep's names.
-        FetiHomogError: it cannot be written.
+        CaseError: the folder holds another sweep, or foreign files under the file names of a sweep.
+        FetiHomogError: the folder cannot be written.
     """
     try:
         directory.mkdir(parents=True, exist_ok=True)
@@ -132,14 +132,14 @@ def _stored_entries(directory: Path) -> tuple[SweepCase, ...]:
 
 
 def csv_text(rows: Iterable[Iterable[Any]]) -> str:
-    """Return a table as CSV."""
+    """Return the rows of a table as CSV text."""
     stream = io.StringIO()
     csv.writer(stream, lineterminator="\n").writerows(rows)
     return stream.getvalue()
 
 
 def read_index(directory: Path) -> SweepIndex:
-    """Return the cases in a sweep's folder.  Raises CaseError without a readable case list."""
+    """Read the list of cases in the folder of a sweep.  Raises CaseError for an unreadable list."""
     path = directory / INDEX_FILE
     try:
         document = result_json.loads(input_files.read(path).decode("utf-8"))
@@ -155,7 +155,7 @@ def read_index(directory: Path) -> SweepIndex:
 
 
 def _replaced(value: Any, old: Any, new: Any) -> Any:
-    """Return the value with `new` in place of `old` in its tables and lists: JSON has no infinite numbers."""
+    """Replace `old` by `new` in nested tables and lists, since JSON has no infinite numbers."""
     if isinstance(value, dict):
         return {key: _replaced(item, old, new) for key, item in value.items()}
     if isinstance(value, list):
@@ -164,14 +164,14 @@ def _replaced(value: Any, old: Any, new: Any) -> Any:
 
 
 def case_state(directory: Path, entry: SweepCase) -> CaseState:
-    """Return the progress of a case; RUNNING while a process holds its lock.  On one rank."""
+    """Return the progress of a case, RUNNING while a process holds its lock.  On one rank."""
     state = stored_state(directory, entry)
     is_open = state.status in (Status.WAITING, Status.FAILED)
     return CaseState(Status.RUNNING) if is_open and file_locks.holder(directory / entry.folder / LOCK_FILE) else state
 
 
 def stored_state(directory: Path, entry: SweepCase) -> CaseState:
-    """Return the progress of a case by its files alone, for the holder of its lock.  On one rank."""
+    """Return the progress of a case from its files alone, for the lock holder.  On one rank."""
     folder = directory / entry.folder
     path = folder / result_json.NAME
     try:
@@ -192,9 +192,9 @@ def stored_state(directory: Path, entry: SweepCase) -> CaseState:
 
 
 def write_case_file(directory: Path, entry: SweepCase, case: Case) -> None:
-    """Write case.toml of a case that is to be computed.  On one rank.  Raises FetiHomogError if it cannot be written.
+    """Write case.toml of a case, without empty sections.  On one rank.
 
-    Sections without keys are left out.
+    Raises FetiHomogError if the file cannot be written.
     """
     document = {name: table for name, table in case.resolved().items() if table != {}}
     folder = directory / entry.folder
@@ -203,7 +203,7 @@ def write_case_file(directory: Path, entry: SweepCase, case: Case) -> None:
 
 
 def reset(directory: Path, entry: SweepCase, status: Status) -> None:
-    """Make a failed or damaged case wait again, without its error and events.  On one rank.  Raises as `set_aside`."""
+    """Reset a failed or damaged case to WAITING, without its error and events.  On one rank.  Raises as `set_aside`."""
     folder = directory / entry.folder
     with atomic.write_errors(folder):
         (folder / ERROR_FILE).unlink(missing_ok=True)
@@ -212,7 +212,7 @@ def reset(directory: Path, entry: SweepCase, status: Status) -> None:
 
 
 def set_aside(directory: Path, entry: SweepCase, status: Status) -> None:
-    """Rename the result.json of a case, which then waits, and remove its other files.  On one rank.
+    """Rename the result.json of a case, and remove the other result files.  On one rank.
 
     Raises:
         FetiHomogError: the folder cannot be written.
@@ -226,13 +226,13 @@ def set_aside(directory: Path, entry: SweepCase, status: Status) -> None:
 
 
 def write_error(directory: Path, entry: SweepCase, error: FetiHomogError) -> None:
-    """Write error.txt of a failed case.  On one rank.  Raises FetiHomogError if it cannot be written."""
+    """Write error.txt of a failed case.  On one rank.  Raises FetiHomogError if the file cannot be written."""
     lines = [f"{type(error).__name__}: {fault}" for fault in error.faults]
     atomic.replace_text(directory / entry.folder / ERROR_FILE, "\n".join(lines) + "\n")
 
 
 def failure_lines(cases: Sequence[tuple[SweepCase, CaseState]], stress_unit: str) -> list[str]:
-    """Return the count, then folder, inputs and reason for each failed case; nothing without any."""
+    """Return printed lines with the inputs of the failed cases and the reasons of their failures."""
     lines = ["", f"{len(cases)} failed:"] if cases else []
     for entry, state in cases:
         lines += [f"  {entry.folder}  {entry.describe(stress_unit)}", f"    {state.reason}"]

@@ -1,4 +1,4 @@
-"""Check a sweep and describe its first case; run all cases by rank groups, or one case in a job array."""
+"""Run the cases of a sweep: all cases in groups of ranks, or a single case in a job array."""
 
 import json
 import time
@@ -21,7 +21,7 @@ from feti_homog.typing import Intracomm
 
 
 def list_cases(sweep: Sweep, directory: Path | None) -> list[str]:
-    """Return the cases in a table, with their status if a folder is given. On one rank."""
+    """Return a line for each case of a sweep, with its status if there is a folder.  On one rank."""
     statuses = ["" if directory is None else case_folders.case_state(directory, e).status for e in sweep.entries]
     width = max(map(len, statuses))
     return [
@@ -31,7 +31,7 @@ def list_cases(sweep: Sweep, directory: Path | None) -> list[str]:
 
 
 def group_size(comm: Intracomm, ranks_per_case: int | None) -> int:
-    """Return the number of ranks of a case, by default all.  Raises CaseError unless they make such groups."""
+    """Return the number of ranks per case, by default all.  Raises CaseError if it does not divide the rank count."""
     size = comm.size if ranks_per_case is None else ranks_per_case
     if size < 1 or comm.size % size:
         raise CaseError(f"--ranks-per-case {size}: expected a divisor of the {comm.size} ranks")
@@ -41,13 +41,15 @@ def group_size(comm: Intracomm, ranks_per_case: int | None) -> int:
 def run_all(
     sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int | None, retry: bool, quiet: bool
 ) -> None:
-    """Run all cases, each on `ranks_per_case` ranks, by default all; groups of ranks run at once.  Collective.
+    """Run all cases of a sweep.  Collective.
+
+    A group of `ranks_per_case` ranks, by default all, runs one case; the groups work concurrently.
 
     Raises:
         CaseError: PETSc options are faulty, `ranks_per_case` does not divide the rank count, or the folder
-            cannot be used: it holds another sweep, or another process runs this one.
-        ConvergenceError: cases failed; they are printed.
-        FetiHomogError: a result could not be written; the finished ones are kept.
+            cannot be used: it holds another sweep, or another process runs this sweep.
+        ConvergenceError: cases failed; rank 0 prints the failures.
+        FetiHomogError: a result could not be written; finished results are kept.
     """
     size = group_size(comm, ranks_per_case)
     check_options(sweep)
@@ -78,12 +80,14 @@ def run_all(
 
 
 def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: bool, quiet: bool) -> None:
-    """Run one case, by its number from 1, on all ranks.  Collective; other jobs may run other cases at the same time.
+    """Run the case of a sweep with a number, from 1, on all ranks.  Collective.
+
+    Other jobs may run other cases of the sweep at the same time.
 
     Raises:
-        CaseError: as `run_all`, or there is no such case, or another process has it.
+        CaseError: as `run_all`, or the number is out of range, or another process runs the case.
         ConvergenceError: the case failed, now or before.
-        FetiHomogError: its result could not be written.
+        FetiHomogError: the result could not be written.
     """
     if not 1 <= number <= len(sweep.entries):
         raise CaseError(f"--index {number}: expected the number of a case, 1 to {len(sweep.entries)}")
@@ -103,7 +107,7 @@ def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: 
 
 @contextmanager
 def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) -> Iterator[None]:
-    """Make the folder of a sweep and hold its lock, which single cases share.  Collective."""
+    """Make the folder of a sweep and hold its lock, which jobs of single cases share.  Collective."""
     lock = file_locks.Lock(directory / case_folders.LOCK_FILE, shared)
 
     def prepare() -> None:
@@ -132,7 +136,7 @@ class Outcome(Enum):
 
 @dataclass(frozen=True)
 class CaseRunner:
-    """Runs the cases of a sweep on the ranks of `comm`; `retry` repeats failed cases, `quiet` prints nothing."""
+    """A group of ranks that runs cases of a sweep; `retry` repeats failed cases, `quiet` prints nothing."""
 
     comm: Intracomm
     directory: Path
@@ -141,9 +145,10 @@ class CaseRunner:
     quiet: bool
 
     def run_free(self) -> FetiHomogError | None:
-        """Run cases until no other is free; returns the error that stopped the group.  Collective in the group.
+        """Run cases until no free case remains.  Collective in the group.
 
-        Cases that other groups hold are passed over at once; a last round waits for their locks, as `Lock` does.
+        The group skips cases that other groups hold; in a last round it waits for the locks of these cases.
+        Returns the error that stopped the group, or None.
         """
         timeouts = [0.0, file_locks.LOCK_TIMEOUT_S]
         try:
@@ -159,10 +164,10 @@ class CaseRunner:
         return None
 
     def run(self, entry: SweepCase, timeout: float = file_locks.LOCK_TIMEOUT_S) -> tuple[Outcome, str]:
-        """Run a case unless it is finished, has failed, or is held by another process.  Collective.
+        """Run a case unless it has finished or failed, or another process holds it.  Collective.
 
-        Waits `timeout` seconds for the lock.  Returns the outcome, and the other process that holds the case, if any.
-        Raises FetiHomogError if the folder cannot be written.
+        The group waits `timeout` seconds for the lock of the case.  Returns the outcome, and the name of another
+        process that holds the case.  Raises FetiHomogError if the folder cannot be written.
         """
         case, folder = self.sweep.cases[entry.number - 1], self.directory / entry.folder
         lock = file_locks.Lock(folder / case_folders.LOCK_FILE, timeout=timeout)
@@ -172,12 +177,12 @@ class CaseRunner:
                 start, status = time.perf_counter(), str(case_folders.Status.DONE)
                 try:
                     runner.run(case, folder, self.comm, quiet=True, resume=case.section.is_followed)
-                except (CaseError, MeshError, ConvergenceError) as error:  # the case's own
+                except (CaseError, MeshError, ConvergenceError) as error:  # a failure of this case alone
                     if not mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
                         raise
                     mpi_errors.on_root_only(self.comm, case_folders.write_error, self.directory, entry, error)
                     status = f"failed ({error.faults[0]})"
-                except FetiHomogError:  # a file could not be written: the case is to be computed again
+                except FetiHomogError:  # a file could not be written: the next run computes the case again
                     if mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
                         mpi_errors.on_root_only(
                             self.comm, case_folders.set_aside, self.directory, entry, case_folders.Status.DAMAGED
@@ -190,7 +195,7 @@ class CaseRunner:
             lock.release()
 
     def _claim(self, lock: file_locks.Lock, entry: SweepCase, case: Case) -> tuple[Outcome, str]:
-        """Take the case's lock, and keep it if the case is to be computed."""
+        """Acquire the lock of a case, and keep the lock if the case must run.  On one rank."""
         folder = self.directory / entry.folder
         try:
             folder.mkdir(exist_ok=True)
@@ -216,7 +221,9 @@ class CaseRunner:
 
 
 def describe(document: dict[str, Any], folder: Path, comm: Intracomm) -> str:
-    """Describe a case, or a sweep with its first case; empty except on rank 0.  Collective.
+    """Return the description of a case, or of a sweep and its first case.  Collective.
+
+    The text is empty except on rank 0.
 
     Raises:
         CaseError, MeshError: the document is faulty, or the cell of its first case.

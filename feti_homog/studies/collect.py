@@ -1,4 +1,4 @@
-"""`feti-homog collect DIR`: tables of a sweep, finished or not, and its picture."""
+"""Write the tables and the picture of a sweep, finished or not, for `feti-homog collect DIR`."""
 
 import json
 import math
@@ -21,16 +21,16 @@ CASE = ("folder", "point", "realisation", "status", "reason")
 
 
 def read(directory: Path) -> SweepTable:
-    """Return the table of a sweep's folder, with all cases, finished or not. On one rank.
+    """Read the folder of a sweep to a table of all cases, finished or not.  On one rank.
 
     Raises:
-        CaseError: it is no folder of a sweep, or its list of cases is damaged.
+        CaseError: the folder holds no sweep, or its list of cases is damaged.
     """
     return _table(*_index_and_states(directory))
 
 
 def collect(directory: Path, pictures: bool) -> list[str]:
-    """Write cases.csv, statistics.csv and the picture; returns the lines to print.  On one rank.
+    """Write the tables and the picture of a sweep to its folder.  On one rank.  Returns the lines to print.
 
     Raises:
         CaseError: as `read`.
@@ -77,7 +77,7 @@ def write(directory: Path, table: SweepTable) -> list[Path]:
             if count:
                 statistics.append([*at_point, name, tables.unit(name, table.stress_unit), int(count), *moments])
 
-    def cell(value: Any) -> Any:  # nothing for None and NaN, JSON for lists and tables
+    def cell(value: Any) -> Any:  # empty for None and NaN, JSON for lists and tables
         is_nothing = value is None or (isinstance(value, float) and math.isnan(value))
         return "" if is_nothing else json.dumps(value) if isinstance(value, list | dict) else value
 
@@ -110,6 +110,6 @@ def _table(index: case_folders.SweepIndex, states: Sequence[case_folders.CaseSta
 
 
 def _columns(rows: Sequence[Mapping[str, Any]], missing: Any) -> dict[str, list[Any]]:
-    """Return the values of each name in all rows."""
+    """Transpose rows of named values to columns, with a substitute for missing values."""
     names = dict.fromkeys(name for row in rows for name in row)
     return {name: [row.get(name, missing) for row in rows] for name in names}

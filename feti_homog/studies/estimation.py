@@ -1,7 +1,7 @@
-"""Weighted least squares: estimates, their covariance, and unknowns that the data do not determine.
+"""Estimate unknowns by weighted least squares, with covariances and undetermined directions.
 
 Data y have independent errors with standard deviations s, so that residuals are r_i = (f_i(x) - y_i) / s_i.  With
-J = dr/dx the estimate is the minimum of r^T r within bounds, and its covariance (J^T J)^-1.
+J = dr/dx the estimate is the minimizer of r^T r within bounds, and its covariance is (J^T J)^-1.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,7 +14,7 @@ from scipy.stats import chi2, norm
 from feti_homog.typing import Array, Float
 
 CONFIDENCE = 0.95
-# No datum sees directions with smaller singular values / the largest; smaller entries of a direction are rounding.
+# The data do not determine directions below this relative singular value; smaller entries of a direction are rounding.
 RANK_TOLERANCE, ENTRY = 1e-6, 1e-2
 STEP, MOST_EVALUATIONS = 1e-8, 60
 Model = Callable[[Float], Float]
@@ -22,17 +22,17 @@ Model = Callable[[Float], Float]
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterEstimates:
-    """Estimates for n unknowns from m data.
+    """The estimates of n unknowns from m data.
 
     Attributes:
         x: (n,) estimates.
         computed, residuals: (m,) f(x) and (f(x) - y) / s.
         jacobian: (m, n) of the residuals.
         at_bound: (n,) -1 at the lower bound, 1 at the upper one, else 0.
-        singular_values: of the Jacobian for unknowns relative to their estimates.
-        directions: (n, n) its right singular vectors in rows.
-        evaluations: how often f was evaluated.
-        converged: whether the minimum is found.
+        singular_values: (n,) of the Jacobian for unknowns relative to their estimates.
+        directions: (n, n) right singular vectors of the same Jacobian, in rows.
+        evaluations: number of evaluations of f.
+        converged: whether the search reached a minimum.
     """
 
     x: Float
@@ -47,24 +47,24 @@ class ParameterEstimates:
 
     @property
     def rank(self) -> int:
-        """Number of directions that the data determine."""
+        """The number of directions that the data determine."""
         return int(np.count_nonzero(self.singular_values > RANK_TOLERANCE * self.singular_values.max(initial=0.0)))
 
     @property
     def undetermined(self) -> list[list[int]]:
-        """The unknowns in each direction that the data do not determine."""
+        """The indices of the unknowns in each direction that the data do not determine."""
         return [[int(k) for k in np.flatnonzero(np.abs(row) > ENTRY)] for row in self.directions[self.rank :]]
 
     @property
     def influence(self) -> Float:
-        """(n, m) change in each estimate per standard deviation in each datum."""
+        """The change of each estimate per standard deviation of each datum, (n, m)."""
         size, V = _sizes(self.x), self.directions[: self.rank]
         pseudo = V.T @ ((V @ (self.jacobian * size).T) / self.singular_values[: self.rank, None] ** 2)
         return np.asarray(size[:, None] * pseudo)
 
     @property
     def covariance(self) -> Float:
-        """(n, n); infinite variances of unknowns that the data do not determine."""
+        """The covariance (n, n) of the estimates; undetermined unknowns have infinite variances."""
         covariance = self.influence @ self.influence.T
         for row in self.undetermined:
             covariance[row, row] = np.inf
@@ -72,30 +72,30 @@ class ParameterEstimates:
 
     @property
     def std(self) -> Float:
-        """(n,) standard deviations of the estimates."""
+        """The standard deviations (n,) of the estimates."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     @property
     def half_width(self) -> Float:
-        """(n,) of the confidence intervals."""
+        """Half the widths (n,) of the confidence intervals."""
         return np.asarray(norm.ppf((1 + CONFIDENCE) / 2) * self.std)
 
     @property
     def correlation(self) -> Float:
-        """(n, n); NaN of unknowns that the data do not determine."""
+        """The correlation (n, n) of the estimates; NaN for undetermined unknowns."""
         with np.errstate(invalid="ignore"):
             return np.asarray(self.covariance / np.outer(self.std, self.std))
 
     @property
     def shares(self) -> Float:
-        """(n, m) share of each datum in each estimate's variance."""
+        """The fraction of the variance of each estimate that each datum contributes, (n, m)."""
         squares = self.influence**2
         total = squares.sum(axis=1, keepdims=True)
         return np.asarray(np.divide(squares, total, out=np.zeros_like(squares), where=total > 0))
 
     @property
     def chance(self) -> float | None:
-        """Probability that a right model has residuals as large; None without a degree of freedom."""
+        """The probability of residuals as large under a correct model; None without degrees of freedom."""
         freedom = len(self.residuals) - self.rank
         return float(chi2.sf(self.residuals @ self.residuals, freedom)) if freedom else None
 
@@ -103,16 +103,23 @@ class ParameterEstimates:
 def estimate(
     model: Model, jacobian: Model, measured: tuple[Float, Float], start: Float, bounds: tuple[Float, Float]
 ) -> ParameterEstimates:
-    """Return the estimates from the values (m,) that `model` gives for unknowns (n,), and their derivatives (m, n).
+    """Estimate unknowns within bounds from measured data.
 
-    `measured` are the data and their standard deviations.  The search is a dogleg in the box of the bounds; where no
-    datum sees a direction, by a trust region, whose steps do not go along it.
+    The search is a dogleg in the box of the bounds.  If the data do not determine all directions, it is a trust-region
+    method, whose steps have no component along an undetermined direction.
+
+    Args:
+        model: computes the values (m,) at unknowns (n,).
+        jacobian: computes the derivatives (m, n) of the values.
+        measured: data (m,) and their standard deviations (m,).
+        start: (n,) unknowns at the start.
+        bounds: lower and upper bounds (n,).
     """
     y, std = measured
     size = _sizes(start)
     singular = np.linalg.svd(jacobian(start) / std[:, None] * size, compute_uv=False)
     is_full = len(y) >= len(start) and singular.min() > RANK_TOLERANCE * singular.max()
-    # Every unknown relative to its start, so that no unit decides where the search ends.
+    # Unknowns are relative to their starts, so that the search does not depend on units.
     minimum = least_squares(
         lambda z: (model(z * size) - y) / std,
         start / size,
@@ -136,7 +143,7 @@ def summarize(
     evaluations: int = 0,
     converged: bool = True,
 ) -> ParameterEstimates:
-    """Return the estimates x (n,) with the computed values (m,) and their derivatives (m, n) there."""
+    """Gather estimates x (n,) with the computed values (m,) and derivatives (m, n) at x."""
     y, std = measured
     J = derivatives / std[:, None]
     _, s, V = np.linalg.svd(J * _sizes(x), full_matrices=True)
@@ -149,11 +156,11 @@ def summarize(
 
 
 def names_of(rows: Sequence[Sequence[int]], names: Sequence[str]) -> list[str]:
-    """Return a line for each direction that the data do not determine, with its unknowns."""
+    """Return a message for each direction that the data do not determine."""
     reasons = {True: "no measured value depends on it", False: "the measured values do not determine them together"}
     return [f"[unknown] {', '.join(names[k] for k in row)}: {reasons[len(row) == 1]}" for row in rows]
 
 
 def _sizes(x: Float) -> Float:
-    """(n,) magnitudes of unknowns; 1 for zeros."""
+    """Return the magnitudes (n,) of unknowns; 1 for zeros."""
     return np.where(x == 0.0, 1.0, np.abs(x))

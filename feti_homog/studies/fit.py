@@ -1,6 +1,6 @@
-"""Fit unknown constants to measured values; each evaluation is a sweep over its tests, in its own folder.
+"""Fit unknown constants to measured values; every evaluation is a sweep over the tests, in a separate folder.
 
-DIR/evaluation-0001           as of a sweep: a case for each test
+DIR/evaluation-0001           folder of a sweep: a case for each test
 DIR/differences-0001          cases for finite differences, where no derivative is exact
 DIR/fit.json, measured.csv, fit.png
 """
@@ -26,19 +26,19 @@ from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.runtime import standard_streams
 from feti_homog.typing import Float
 
-DIFFERENCE = 0.01  # of a value, or of the width of its bounds where it is 0: meshes differ on both sides
+DIFFERENCE = 0.01  # step relative to the value, or to the width of its bounds at 0; a small one sees the mesh
 Point = tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class Fit(Study):
-    """A fit.
+    """A least-squares fit of unknown constants to measured values.
 
     Attributes:
-        unknowns: by dotted key.
+        unknowns: starts and bounds of the unknowns, by dotted key.
         paths: keys of the unknowns.
-        tests: document changes by each test.
-        data: measured values, test after test.
+        tests: changes that each test makes to the case document.
+        data: measured values, ordered by test.
     """
 
     KIND, FILE = "fit", "fit.json"
@@ -50,18 +50,18 @@ class Fit(Study):
     data: Sequence[Datum]
 
     def at(self, x: Sequence[float]) -> Sweep:
-        """Return the cases of all tests at unknowns x (n,). Raises CaseError as `cases`."""
+        """Return the cases of all tests at the unknowns x (n,).  Raises CaseError as `cases`."""
         return self.cases([(test, x) for test in range(len(self.tests))])
 
     def cases(self, places: Sequence[tuple[int, Sequence[float]]]) -> Sweep:
-        """Return the cases for pairs of a test and unknowns (n,).
+        """Return the cases for pairs of a test number and unknowns (n,).
 
         Raises:
             CaseError: with the faults of all cases.
         """
 
         def set_output(document: dict[str, Any]) -> None:
-            """Let a case write its numbers alone, and a stiffness its derivatives unless debonded faces may touch."""
+            """Restrict the output to numbers, and derivatives of a stiffness unless debonded faces may touch."""
             cell, analysis, output = (document.get(name, {}) for name in ("cell", "analysis", "output"))
             if isinstance(output, dict):
                 is_stiffness = isinstance(analysis, dict) and analysis.get("type") == "stiffness"
@@ -79,16 +79,16 @@ class Fit(Study):
         return self.at([unknown.start for unknown in self.unknowns.values()])
 
     def data_of(self, test: int) -> list[Datum]:
-        """Return the data of a test."""
+        """Return the measured values of a test."""
         return [datum for datum in self.data if datum.test == test]
 
     def rows_of(self, test: int) -> slice:
-        """Return the slice of a test's data in all data."""
+        """Return the slice of all data that holds the data of a test."""
         first = next(k for k, datum in enumerate(self.data) if datum.test == test)
         return slice(first, first + len(self.data_of(test)))
 
     def axes(self) -> str:
-        """Return a line on measured names that ply axes define differently; empty without any."""
+        """Return a line on measured names whose meaning differs in ply axes, or an empty string."""
         cases = self.first_cases().cases
         spatial = [datum for datum in self.data if voigt.PLANE_STATES[cases[datum.test].analysis.plane].is_spatial]
         line = engineering_constants.axes_line(name for datum in spatial for name in (datum.name, datum.strain_name))
@@ -122,13 +122,13 @@ class Fit(Study):
 
 
 def _rounded(x: Sequence[float] | Float) -> Point:
-    """Return x to the digits of its cases."""
+    """Round unknowns to the digits that the case documents have."""
     return tuple(map(rounded, x))
 
 
 @dataclass(frozen=True)
 class Answer:
-    """The result.json of a test, and its values (m,) for the data of the test."""
+    """The result.json of a test, and the computed values (m,) of the data of the test."""
 
     document: Mapping[str, Any]
     values: Float
@@ -136,10 +136,12 @@ class Answer:
 
 @dataclass
 class Evaluations:
-    """Data and their derivatives as computed at given unknowns; rank 0 asks, all ranks compute.
+    """The evaluations of a fit: computed data and derivatives.
+
+    Rank 0 runs the search and asks for evaluations; all ranks compute.
 
     Attributes:
-        answers: on rank 0 all test results by unknowns, in evaluation order.
+        answers: on rank 0 the results of all tests by unknowns, in the order of the evaluations.
     """
 
     fit: Fit
@@ -147,7 +149,7 @@ class Evaluations:
     answers: dict[Point, list[Answer]] = field(default_factory=dict)
 
     def estimate(self) -> estimation.ParameterEstimates | None:
-        """Return the estimates on rank 0.  Collective: the other ranks serve its questions."""
+        """Estimate the unknowns.  Collective.  Returns the estimates on rank 0, which directs the other ranks."""
         comm = self.evaluator.comm
         if comm.rank:
             while (question := comm.bcast(None)) is not None:
@@ -161,7 +163,7 @@ class Evaluations:
         return estimates
 
     def values(self, x: Float) -> Float:
-        """(m,) computed data at unknowns x (n,).  On rank 0."""
+        """Return the computed data (m,) at the unknowns x (n,).  On rank 0."""
         key = _rounded(x)
         if key not in self.answers:
             number = len(self.answers) + 1
@@ -174,7 +176,7 @@ class Evaluations:
         return np.concatenate([answer.values for answer in self.answers[key]])
 
     def jacobian(self, x: Float) -> Float:
-        """(m, n) derivatives of the values: exact, or differences where a result has none.  On rank 0."""
+        """Return the derivatives (m, n) of the data at x (n,), if need be by finite differences.  On rank 0."""
         key, names = _rounded(x), [*self.fit.unknowns]
         J = np.zeros((len(self.values(x)), len(key)))
         missing = list[tuple[int, int]]()
@@ -186,7 +188,7 @@ class Evaluations:
                 J[self.fit.rows_of(test), k] = column
         if missing:
             places = list[tuple[int, Point]]()
-            for test, k in missing:  # its k-th value less and more, within its bounds
+            for test, k in missing:  # a step down and a step up, within the bounds
                 unknown = [*self.fit.unknowns.values()][k]
                 step = DIFFERENCE * (abs(key[k]) or unknown.upper - unknown.lower)
                 ends = max(key[k] - step, unknown.lower), min(key[k] + step, unknown.upper)
@@ -202,7 +204,7 @@ class Evaluations:
         return self._run(name, places)
 
     def _run(self, name: str, places: Sequence[tuple[int, Point]]) -> list[Answer]:
-        """Run the cases at `places`; returns their results on rank 0.  Collective."""
+        """Run cases for pairs of a test number and unknowns.  Collective.  Returns the answers on rank 0 alone."""
         comm = self.evaluator.comm
         documents = self.evaluator.results(name, mpi_errors.on_root(comm, self.fit.cases, places))
         data = [self.fit.data_of(test) for test, _ in places]

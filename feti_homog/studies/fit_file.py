@@ -1,4 +1,4 @@
-"""A fit file: cases with unknown constants, and measured values; all their faults."""
+"""Read a fit file: a case with unknown constants, and measured values; and report all faults."""
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -15,16 +15,16 @@ from feti_homog.studies.fit import Fit
 from feti_homog.studies.predictions import Datum, data_faults
 
 MOST_ROWS = 10_000
-LEAST_STD = 1e-12  # of the value: below it are the roundings of what is computed
+LEAST_STD = 1e-12  # relative to the value: smaller deviations are below rounding errors
 
 
 def load(path: Path) -> Fit:
-    """Return the fit in a file. Raises CaseError with all faults in its tables, or else in its cases."""
+    """Load a fit from a file.  Raises CaseError with all faults of the tables, or else of the cases."""
     return parse(toml_files.read_document(path), path.parent)
 
 
 def parse(values: Mapping[str, Any], folder: Path) -> Fit:
-    """Return the fit of nested dictionaries; its files are relative to `folder`. Raises CaseError as `load`."""
+    """Build a fit from a document whose files are relative to `folder`.  Raises CaseError as `load`."""
     document = {"name": "fit", **toml_files.to_document(values)}
     reader = FitReader(folder)
     unknowns = reader.unknowns(document.pop(sections.UNKNOWN, None))
@@ -60,13 +60,13 @@ def parse(values: Mapping[str, Any], folder: Path) -> Fit:
 
 @dataclass
 class FitReader:
-    """Reads the tables of a fit and gathers their faults, a line each."""
+    """A reader of the tables in a fit file, with a list of all faults."""
 
     folder: Path
     faults: list[str] = field(default_factory=list)
 
     def unknowns(self, table: object) -> dict[toml_files.TomlPath, sections.Unknown]:
-        """Return the unknowns by key."""
+        """Read the table of unknowns, and return the unknowns by key."""
         if not isinstance(table, dict) or not table:
             self.faults.append(f"[{sections.UNKNOWN}]: expected a table of SECTION.KEY = {{start, lower, upper}}")
             return {}
@@ -86,7 +86,7 @@ class FitReader:
     def tests(
         self, measured: object, tests: object, unknowns: set[toml_files.TomlPath]
     ) -> tuple[list[Assignment], list[Datum]]:
-        """Return each test's changes, and all data."""
+        """Read the changes that the tests make to the case document, and the measured values of all tests."""
         if (measured is None) == (tests is None):
             self.faults.append(
                 f"expected [{sections.MEASURED}] for one test or [[{sections.TEST}]] for each of several, with measured"
@@ -123,7 +123,7 @@ class FitReader:
             self.faults.append(f"{place} = {wording.toml_value(std)}: expected at least {LEAST_STD:g} of {value:g}")
 
     def _curve(self, value: object, test: int, place: str) -> list[Datum]:
-        """Return the points of a measured curve."""
+        """Read the points of a measured curve from its file."""
         measured = self._read(sections.MeasuredCurve, value, place, sections.CURVE, "{file, std}")
         if measured is None:
             return []
@@ -138,7 +138,7 @@ class FitReader:
         return [Datum(test, names[1], stress, measured.std, strain, names[0]) for strain, stress in rows]
 
     def _read(self, kind: type[Any], value: object, section: str, name: str, form: str) -> Any:
-        """Return the dataclass of a table named `name`, None if it is faulty."""
+        """Read a table to a dataclass; a faulty table gives None."""
         if not isinstance(value, dict):
             self.faults.append(f"[{section}] {name} = {wording.toml_value(value)}: expected a table {form}")
             return None
@@ -149,12 +149,12 @@ class FitReader:
 
 
 def _entries(table: Mapping[str, Any], keys: Collection[str]) -> Iterator[tuple[toml_files.TomlPath, Any]]:
-    """Yield paths and values in a nested table; a table with one of the keys is a value."""
+    """Yield the paths and values of a nested table; a table that has one of `keys` is a value."""
     return toml_files.leaves(table, lambda path, value: bool(value.keys() & {*keys}))
 
 
 def _curve_rows(path: Path) -> tuple[tuple[str, str], list[tuple[float, float]]]:
-    """Return the strain's and stress's names, and the rows, of a measured curve. Raises CaseError."""
+    """Read the strain and stress names and the rows of a measured curve.  Raises CaseError."""
     lines = [(number, line) for number, line, _ in table_columns.lines_of(path) if line]
     head = lines[0][1] if lines else ""
     delimiter = table_columns.delimiter_of(head)

@@ -1,4 +1,4 @@
-"""A fit's result: the content of fit.json, and the table of measured values."""
+"""Build the result of a fit: the content of fit.json, and the table of measured values."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -16,7 +16,7 @@ HEAD = ("test", "name", "strain", "value", "std", "computed", "residual")
 def content(
     unknowns: Mapping[str, sections.Unknown], data: Sequence[Datum], estimates: ParameterEstimates
 ) -> dict[str, Any]:
-    """Return the content of fit.json after its name; numbers that are not finite are None."""
+    """Return the content of fit.json without its name; numbers that are not finite are None."""
     faults = [] if estimates.converged else [f"no minimum after {estimates.evaluations} evaluations"]
     faults += names_of(estimates.undetermined, [*unknowns])
     faults += [
@@ -60,5 +60,5 @@ def _finite(value: float) -> float | None:
 
 
 def measured_csv(document: Mapping[str, Any]) -> str:
-    """Return the table of measured values."""
+    """Return the table of measured and computed values as CSV text."""
     return csv_text([HEAD, *([datum[name] for name in HEAD] for datum in document["measured"])])

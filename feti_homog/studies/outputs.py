@@ -1,4 +1,4 @@
-"""Case outputs: numbers in result.json by their column in cases.csv; the meaning of all columns."""
+"""Outputs of a case: the numbers of result.json that fill cases.csv, and the meaning of all columns."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -17,15 +17,15 @@ Column = result_json.DescribedColumn
 
 
 def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
-    """Return the numbers i and j of names Cij in a sweep with these plane states.
+    """Return the indices i and j in the column names Cij of a sweep.
 
-    Where some cases are in space, Cij is the same entry in all.
+    If one of the plane states is generalized plane strain, Cij denotes the same entry in all cases.
     """
     return (voigt.GENERALIZED if voigt.GENERALIZED.name in planes else voigt.PLANE_STRAIN).numbers
 
 
 def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numbers) -> dict[str, float]:
-    """Return the numbers in a result.json by column name; `numbers` as in Cij for strains in the plane."""
+    """Return the numbers of a result.json by column name; `numbers` are i and j in Cij of a stiffness (3, 3)."""
     solver = document["solver"]
     cell, fractions = document["cell"], document["cell"].get("fractions", {})
     values = {"fraction_meshed": cell["fibre_fraction"], "elements": cell["elements"], "nodes": cell["nodes"]}
@@ -41,7 +41,7 @@ def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numb
             _entries(point["stiffness"], numbers) if "stiffness" in point else _named(voigt.STRESSES, point["stress"])
         )
         values |= {f"angle_{point['angle']:g}_{name}": value for name, value in entries.items()}
-    if path := document.get("path"):  # the first break or softening, the end, the largest stresses, the peak
+    if path := document.get("path"):  # onset, end, largest stresses and peak
         stress = np.array([point["stress"] for point in path])
         stresses = voigt.voigt_names(stress.shape[1])[1]
         if (onset := next((p for p in path if p["broke"] or p.get("softened")), None)) is not None:
@@ -52,7 +52,7 @@ def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numb
         peak = landmarks.peak_of(document)
         values |= {f"peak_{peak[f'{kind}_name']}": peak[kind] for kind in ("stress", "strain")}
         values |= {f"end_{state}": path[-1][state] for state in point_tables.STATES}
-    if envelope := document.get("envelope"):  # along the first axis, the least, the largest if every direction has one
+    if envelope := document.get("envelope"):  # first axis, least and largest factor
         first, second = document["case"]["envelope"]["plane"]
         factors = sorted(point["factor"] for point in envelope if "factor" in point)
         values |= {f"envelope_{first}": point["factor"] for point in envelope[:1] if "factor" in point}
@@ -68,7 +68,7 @@ def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numb
 
 
 def _constants(document: Document, numbers: Sequence[int]) -> dict[str, float]:
-    """Return stiffnesses and constants, their estimated errors, and bounds."""
+    """Return the stiffnesses and constants of a result, with mesh errors and bounds."""
     values = _linear(document, numbers)
     if (stiffness := document.get("effective_stiffness")) is not None:
         C = np.asarray(stiffness)
@@ -88,7 +88,7 @@ def _constants(document: Document, numbers: Sequence[int]) -> dict[str, float]:
 
 
 def _linear(section: Document, numbers: Sequence[int]) -> dict[str, float]:
-    """Return stiffness, thermal stress and expansion in a section, of a result or its mesh errors."""
+    """Return stiffness, thermal stress and expansion, or their mesh errors, by column name."""
     values = _entries(section.get("effective_stiffness", ()), numbers)
     values |= _entries(section.get("effective_stiffness_compression", ()), numbers, "_compression")
     values |= _named(voigt.THERMAL_STRESSES, section.get("thermal_stress", ()))
@@ -100,13 +100,16 @@ def _named(names: Iterable[str], values: Iterable[float]) -> dict[str, float]:
 
 
 def _entries(stiffness: Any, numbers: Sequence[int], suffix: str = "") -> dict[str, float]:
-    """C11, C12, ... for a stiffness (6, 6), or (3, 3) with the `numbers`; none without entries."""
+    """Return the entries C11, C12, ... of a stiffness (6, 6), (3, 3) with row indices `numbers`, or empty."""
     rows = range(1, 7) if len(stiffness) == len(voigt.SPATIAL_STRESSES) else numbers
     return _named((f"C{i}{j}{suffix}" for i in rows for j in rows), np.ravel(stiffness).tolist())
 
 
 def _phases(document: Document) -> dict[str, float]:
-    """Return the largest stresses of the phases under each load; of angles and paths those of all states."""
+    """Return the largest stresses of the phases by column name.
+
+    Columns belong to a load, but for angles and paths to the largest stress of all states.
+    """
     values, is_curve = dict[str, float](), "angle" in document or "path" in document
     for phase in document.get("phase_stresses", ()):
         for measure in (name for name in MEASURES if name in phase):

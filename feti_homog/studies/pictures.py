@@ -1,4 +1,4 @@
-"""moduli.png of a sweep, over the fibre fraction and between bounds; fit.png, with computed and measured values."""
+"""Draw moduli.png, the moduli of a sweep over the fibre fraction, and fit.png, the residuals and curves of a fit."""
 
 from collections.abc import Mapping
 from itertools import cycle
@@ -35,7 +35,7 @@ NAMES = {
 
 
 def draw_moduli(directory: Path, table: SweepTable) -> list[Path]:
-    """Draw moduli.png of a sweep over fibre fractions; returns its path, or nothing without moduli.  On one rank."""
+    """Draw the moduli of a sweep over fibre fractions to moduli.png.  Returns its path, if any.  On one rank."""
     if not varies(table, FRACTION) or not panels_of(table):
         return []
     with mpl.rc_context(plot_helpers.STYLE):
@@ -43,7 +43,7 @@ def draw_moduli(directory: Path, table: SweepTable) -> list[Path]:
 
 
 def panels_of(table: SweepTable) -> tuple[str, ...]:
-    """Return the drawn outputs; none if the cases have no moduli."""
+    """Return the names of the outputs to draw; empty for cases without moduli."""
     spatial = {voigt.plane_state_of(document).is_spatial for document in table.finished}
     in_space = (COMMON_PANELS,) if False in spatial else (SPATIAL_PANELS, SECANTS)
     choices = in_space if True in spatial else (PANELS,)
@@ -51,9 +51,9 @@ def panels_of(table: SweepTable) -> tuple[str, ...]:
 
 
 def moduli_figure(table: SweepTable) -> Figure:
-    """Moduli over the fibre fraction, between the bounds in the results if there are any.
+    """Draw the moduli over the fibre fraction, with the bounds that the results have.
 
-    In space there are also Poisson's ratios and thermal expansions.
+    Generalized plane strain has further panels for Poisson's ratios and thermal expansions.
     """
     series = series_over(table, FRACTION)[: len(MARKERS)]
     ratios = RATIOS if panels_of(table) == SPATIAL_PANELS else ()
@@ -76,7 +76,7 @@ def moduli_figure(table: SweepTable) -> Figure:
     for axes in panels[::-1]:
         handles, labels = axes.get_legend_handles_labels()
         legend |= dict(zip(labels, handles, strict=True))
-    for columns in range(min(len(legend), 5), 0, -1):  # the most that are not wider than the picture
+    for columns in range(min(len(legend), 5), 0, -1):  # as many columns as the width of the picture allows
         box = picture.legend([*legend.values()], [*legend], loc="outside lower center", ncols=columns, frameon=False)
         if columns == 1 or box.get_window_extent().width <= picture.bbox.width:
             break
@@ -85,7 +85,7 @@ def moduli_figure(table: SweepTable) -> Figure:
 
 
 def bounds_of(document: Document) -> dict[str, tuple[float, float]]:
-    """Return the bounds in a result by panel: Reuss' and Voigt's for stiffnesses, tighter ones for constants."""
+    """Return the bounds of a result by panel: Reuss and Voigt for stiffnesses, tighter bounds for constants."""
     bounds = document.get("bounds") or {}
     pairs = {f"C{k + 1}{k + 1}": (bounds["reuss"][k][k], bounds["voigt"][k][k]) for k in (0, 2) if bounds}
     pairs |= (bounds.get("hashin_shtrikman") or {}) | (document.get("fibre_bounds") or {})
@@ -93,9 +93,10 @@ def bounds_of(document: Document) -> dict[str, tuple[float, float]]:
 
 
 def _plot_series(axes: Axes, table: SweepTable, series: Series, name: str, style: int) -> None:
-    """Draw realisations as faint marks, means with confidence intervals, and mean mesh errors as wide pale bars.
+    """Draw a series of one output.
 
-    Bounds are a grey band.
+    Faint marks are realisations, a line the means with their confidence intervals, wide pale bars the mean mesh errors,
+    and a grey band the bounds.
     """
     colour, marker = plot_helpers.INK[style], MARKERS[style]
     statistics, values = table.statistics[name], table.outputs[name]
@@ -121,13 +122,17 @@ def _plot_series(axes: Axes, table: SweepTable, series: Series, name: str, style
 
 
 def draw_fit(path: Path, document: Mapping[str, Any]) -> Path:
-    """Draw a fit: residuals, and curves over their strain.  Raises FetiHomogError if it cannot be written."""
+    """Draw the residuals and curves of a fit to a file.  Raises FetiHomogError if it cannot be written."""
     with mpl.rc_context(plot_helpers.STYLE):
         return plot_helpers.save(fit_figure(document), path)
 
 
 def fit_figure(document: Mapping[str, Any]) -> Figure:
-    """Residuals in standard deviations, a row for each value, and the points of curves with the computed curves."""
+    """Draw the residuals and curves of a fit.
+
+    The first panel has a row for each single value, with its residual in standard deviations; the second has measured
+    and computed curves.
+    """
     single = [row for row in document["measured"] if row["strain"] is None]
     points = [row for row in document["measured"] if row["strain"] is not None]
     count = bool(single) + bool(points)

@@ -1,4 +1,4 @@
-"""Measured values, and the values of a result.json in their place, with derivatives where they are exact."""
+"""Measured values of a fit, the computed values in a result.json, and their exact derivatives."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -23,10 +23,12 @@ class Datum:
     """A measured value.
 
     Attributes:
-        test: number of its test, from 0.
-        name: of the value, or of the stress of a curve.
-        strain: at a point of a curve, else None.
-        strain_name: component of that strain.
+        test: number of the test, from 0.
+        name: name of the value, or of the stress component of a curve.
+        value: the measurement, in the unit of the computed value.
+        std: its standard deviation.
+        strain: strain at a point of a curve, else None.
+        strain_name: component of the strain.
     """
 
     test: int
@@ -38,7 +40,7 @@ class Datum:
 
 
 def data_faults(case: Case, data: Sequence[Datum], place: str) -> Iterator[str]:
-    """Yield the reasons why results of a case lack values for the data; `place` precedes each reason."""
+    """Yield the reasons why a case cannot compute measured values; a reason begins with `place`."""
     state, kind = voigt.PLANE_STATES[case.analysis.plane], case.analysis.type
     strains, stresses = voigt.voigt_names(6 if state.is_spatial else 3)
     if kind == "stiffness":
@@ -61,9 +63,9 @@ def data_faults(case: Case, data: Sequence[Datum], place: str) -> Iterator[str]:
 
 
 def _curve_faults(case: Case, points: Sequence[Datum]) -> Iterator[str]:
-    """Yield faults of a measured curve beside its test's analysis.
+    """Yield the conflicts between a measured curve and the analysis of its test.
 
-    The strain that rises along a leg is the largest, or that of the only loaded component: a strain or a stress.
+    The strain that rises along a leg is the largest strain, or the strain of the only loaded component.
     """
     state = voigt.PLANE_STATES[case.analysis.plane]
     names = {name for datum in points for name in (datum.strain_name, datum.name)}
@@ -81,7 +83,7 @@ def _curve_faults(case: Case, points: Sequence[Datum]) -> Iterator[str]:
         return
     rising, _, end = max(loads, key=lambda load: abs(load[2]))
     if not is_strain and target.get(load_sections.TEMPERATURE):
-        end = 0.0  # the temperature beside the stress decides the sign
+        end = 0.0  # a temperature may reverse the sign of the strain
     values = [datum.strain or 0.0 for datum in points]
     if rising != points[0].strain_name:
         yield f"expected the strain that rises along the path, {rising}"
@@ -92,7 +94,10 @@ def _curve_faults(case: Case, points: Sequence[Datum]) -> Iterator[str]:
 
 
 def responses(document: path_curves.Document) -> dict[str, float]:
-    """Return a result's constants, or its loads and onsets: the numbers whose scatter matters."""
+    """Return the numbers of a result whose scatter matters, by name.
+
+    A stiffness has its constants, a path its onset and peak, other analyses the numbers of their kind.
+    """
     values, kind = _values(document), document["case"]["analysis"]["type"]
     if kind == "stiffness" or "sensitivities" in document:
         return values
@@ -101,7 +106,7 @@ def responses(document: path_curves.Document) -> dict[str, float]:
 
 
 def _values(document: path_curves.Document) -> dict[str, float]:
-    """Return the numbers in a result by their names in a fit."""
+    """Return the numbers of a result by their names in a fit file."""
     if "sensitivities" in document:
         sensitivities = document["sensitivities"]
         return dict(zip(sensitivities["constants"], sensitivities["constant_values"], strict=True))
@@ -114,10 +119,10 @@ def _values(document: path_curves.Document) -> dict[str, float]:
 
 
 def predicted(document: path_curves.Document, data: Sequence[Datum]) -> Float:
-    """(m,) result values in place of the data.
+    """Return the computed values (m,) that correspond to the data.
 
     Raises:
-        CaseError: the result has no such value.
+        CaseError: the result lacks a value.
     """
     values = _values(document)
     missing = [datum.name for datum in data if datum.strain is None and datum.name not in values]
@@ -129,11 +134,12 @@ def predicted(document: path_curves.Document, data: Sequence[Datum]) -> Float:
 
 
 def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], name: str) -> Float | None:
-    """(m,) derivatives of the values by an unknown; None where the result does not give them.
+    """Return the exact derivatives (m,) of the computed values by an unknown, or None.
 
-    Constants have none by strengths, and by expansions in a plane.  Loads at breaks are homogeneous in a key of the
-    only interface: of degree 1 in the only strength, of degree 1/2 in the toughness of springs that do not soften.  All
-    loads up to the onset must grow alike; a temperature that comes before them does not.
+    Elastic constants do not depend on strengths, nor on expansions in a plane.  With a single interface the loads at
+    breaks are homogeneous: of degree 1 in its only strength, of degree 1/2 in the toughness of springs that do not
+    soften.  This holds if all loads grow in proportion up to the onset, without a temperature that precedes them.
+    The result is None if result.json does not determine the derivatives.
     """
     tables = path_curves.interface_sections(document)
     name = name.replace("interface.1.", "interface.") if len(tables) == 1 else name
@@ -155,7 +161,7 @@ def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], nam
     is_toughness = key == TOUGHNESS and key in law.keys and not law.softens
     if not is_toughness and strengths != [key]:
         return None
-    # S(E; s R) = s S(E / s; R), unless a value depends on the end of the load.
+    # S(E; s R) = s S(E / s; R), unless a value depends on the final load.
     relative = (0.5 if is_toughness else 1.0) / float(tables[0][key])
     numbers, derivatives = _values(document), list[float]()
     for datum in data:
@@ -172,10 +178,10 @@ def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], nam
 
 
 def _on_curve(document: path_curves.Document, datum: Datum) -> tuple[float, float]:
-    """Return the stress of a path at a strain, and its slope.
+    """Interpolate the stress of a path, and the slope dS/dE, at the strain of a datum.
 
     Raises:
-        CaseError: the strain is not that which rises, or the path ends before it.
+        CaseError: another strain component rises along the path, or the path ends below the strain.
     """
     curve = path_curves.rising_strain(document)
     strains, stresses = voigt.voigt_names(len(document["path"][0]["stress"]))

@@ -1,9 +1,9 @@
-"""A study: cases that one file describes, a folder with their results, and the document that follows.
+"""Run a study: compute the cases that one file describes, and derive one document from their results.
 
 DIR/NAME.json                 digest of the study from the start, its answer at the end
-DIR/EVALUATION                as of a sweep: a folder for each case
+DIR/EVALUATION                folder of a sweep, with a folder for each case
 
-Finished cases are kept, so that the same command resumes.
+Finished cases are kept, so that the same command resumes the study.
 """
 
 import json
@@ -29,7 +29,7 @@ SILENT = {"fields": False, "pictures": False, "report": False}
 
 @dataclass(frozen=True)
 class Evaluator:
-    """Runs a study's cases in folders below its own, in groups of `ranks_per_case` ranks at once."""
+    """A runner of the cases of a study, in subfolders; groups of `ranks_per_case` ranks work concurrently."""
 
     directory: Path
     comm: Intracomm
@@ -38,7 +38,9 @@ class Evaluator:
     quiet: bool
 
     def results(self, name: str, sweep: Sweep) -> list[dict[str, Any]]:
-        """Run the cases of a sweep in folder `name` and return their results on rank 0, none elsewhere.  Collective.
+        """Run the cases of a sweep in the subfolder `name`.  Collective.
+
+        Returns the contents of result.json for all cases on rank 0; an empty list elsewhere.
 
         Raises:
             ConvergenceError: cases failed.
@@ -53,17 +55,17 @@ class Evaluator:
 
 @dataclass(frozen=True)
 class Study(ABC):
-    """A study of a case document, whose files are relative to `folder`."""
+    """A study of a case document; file names in the document are relative to `folder`."""
 
     document: Mapping[str, Any]
     folder: Path
 
     KIND: ClassVar[str]
-    """Name of such a study in messages."""
+    """Name of this kind of study in messages."""
     FILE: ClassVar[str]
-    """Name of its document."""
+    """File name of the document of the study."""
     ENTRIES: ClassVar[re.Pattern[str]]
-    """Names of all its files and folders."""
+    """Names of all files and subfolders of the study."""
 
     @property
     def name(self) -> str:
@@ -71,15 +73,15 @@ class Study(ABC):
 
     @abstractmethod
     def first_cases(self) -> Sweep:
-        """Return the cases that any run of the study computes first."""
+        """Return the cases that every run of the study computes first."""
 
     @abstractmethod
     def identity(self, cases: list[str]) -> Any:
-        """Return the first cases' identities with all other inputs to the study, in JSON's types."""
+        """Return all inputs of the study in JSON types, with the identities of its first cases."""
 
     @abstractmethod
     def heading(self) -> str:
-        """Return the lines of `check` that come before the first case."""
+        """Return the text that `feti-homog check` prints before the first case."""
 
     @abstractmethod
     def answer(self, evaluator: Evaluator) -> dict[str, Any]:
@@ -87,15 +89,15 @@ class Study(ABC):
 
     @abstractmethod
     def text(self, document: Mapping[str, Any]) -> str:
-        """Return the tables of a finished study."""
+        """Return the printed tables of a finished study."""
 
     def digest(self) -> str:
-        """Short name of the study: equal for equal cases and inputs."""
+        """Return the digest of the study: studies of equal cases and inputs have equal digests."""
         cases = [entry.identity for entry in self.first_cases().entries]
         return toml_files.short_digest(json.dumps(self.identity(cases)).encode())
 
     def describe(self, comm: Intracomm) -> str:
-        """Describe the study and its first case; empty except on rank 0.  Collective.
+        """Return a description of the study and its first case; empty except on rank 0.  Collective.
 
         Raises:
             CaseError, MeshError: the cell of the first case is faulty.
@@ -106,11 +108,13 @@ class Study(ABC):
     def run(
         self, directory: Path, comm: Intracomm, ranks_per_case: int | None, retry: bool, quiet: bool
     ) -> dict[str, Any]:
-        """Run the study, or resume it, and return its document on every rank.  Collective.  Arguments as `run_all`.
+        """Run or resume the study.  Collective.
+
+        Arguments are as for `case_runs.run_all`.  Returns the document of the study on every rank.
 
         Raises:
-            CaseError: the folder has another study or files of others, another run writes there, or a result lacks a
-                value that the study asks for.
+            CaseError: the folder holds another study or foreign files, another run writes to the folder, or a result
+                lacks a value that the study needs.
             ConvergenceError: a case failed, or the study has no sound answer; then its files are written.
         """
         size = case_runs.group_size(comm, ranks_per_case)
@@ -118,7 +122,7 @@ class Study(ABC):
         head = {"version": __version__, "digest": mpi_errors.on_root(comm, self.digest)}
         path = directory / self.FILE
 
-        def begin() -> None:  # the document has the study's digest from the start
+        def begin() -> None:  # the document has the digest from the start
             if is_new := not path.exists():
                 with atomic.write_errors(directory):
                     case_folders.refuse_files_of_others(directory, self.ENTRIES, self.KIND)

@@ -1,4 +1,4 @@
-"""Expand a sweep file to numbered cases, and check all of them."""
+"""Expand a sweep file to numbered cases, and check every case."""
 
 import copy
 import json
@@ -19,13 +19,13 @@ MAX_NAMED_CASES = 4  # in one fault
 
 @dataclass(frozen=True)
 class SweepCase:
-    """Place of a case in a sweep.
+    """The identity and inputs of a case in a sweep.
 
     Attributes:
-        number: from 1.
-        point: number of its point, from 1: realisations share the point's values.
-        realisation: from 1.
-        inputs: the keys that vary, dotted, with their values.
+        number: number of the case, from 1.
+        point: number of the sweep point, from 1: all realisations of a point have its values.
+        realisation: number of the realisation, from 1.
+        inputs: values of the keys that vary, by dotted key.
         identity: digest of the computation; empty before the case is checked.
     """
 
@@ -40,7 +40,7 @@ class SweepCase:
         return f"case-{self.number:04d}"
 
     def describe(self, stress_unit: str) -> str:
-        """Return the inputs in one line, with their units."""
+        """Return a line with the inputs of the case and their units."""
         values = [
             (f"{name} = {wording.toml_value(value)}", tables.unit(name, stress_unit))
             for name, value in self.inputs.items()
@@ -62,7 +62,7 @@ class Sweep:
 
 
 def load(path: str | Path) -> Sweep:
-    """Return the sweep in a file. Raises CaseError with all faults in [sweep], or else in all cases."""
+    """Load a sweep from a file.  Raises CaseError with all faults of [sweep], or else of all cases."""
     document = toml_files.read_document(path)
     if sections.SWEEP not in document:
         raise CaseError(f"{path}: [{sections.SWEEP}]: missing section; `feti-homog run` runs a single case")
@@ -70,10 +70,10 @@ def load(path: str | Path) -> Sweep:
 
 
 def expand(values: Mapping[str, Any], folder: Path) -> Sweep:
-    """Return the sweep of nested dictionaries with a table "sweep"; its files are relative to `folder`.
+    """Expand a document with a table "sweep" to its cases.
 
-    A realisation of all points precedes the next one, so that more realisations add cases at the end.
-    Raises CaseError as `load` does.
+    The cases run through all points before the next realisation, so that more realisations add cases at the end.
+    File names in the document are relative to `folder`.  Raises CaseError as `load`.
     """
     document = toml_files.to_document(values)
     if sections.SWEEP not in document:
@@ -96,14 +96,16 @@ def cases_at(
     faults: Sequence[str] = (),
     complete: Callable[[dict[str, Any]], None] | None = None,
 ) -> Sweep:
-    """Return the cases of a document at some points, which `section` gives.
+    """Build and check the cases of a document at points of a sweep.
 
     Args:
+        folder: file names in the document are relative to this folder.
+        section: name of the section that defines the points, for messages.
         faults: faults of the points.
-        complete: sets keys of each case's document.
+        complete: sets further keys in the document of every case.
 
     Raises:
-        CaseError: with faults of the points, or else of all cases, each with the cases that have it.
+        CaseError: with the faults of the points, or else of all cases, with the numbers of the faulty cases.
     """
     lines = [*faults]
     unchecked = case_documents(document, points, realisations, lines, section)
@@ -128,13 +130,13 @@ def cases_at(
 
 
 def identity_of(digest: str, petsc: Mapping[str, Any]) -> str:
-    """Digest of a case with its options, but for options that only print."""
+    """Return the digest of a case and its PETSc options, except options that only print."""
     chosen = {name: value for name, value in petsc.items() if not option_table.only_prints(name)}
     return toml_files.short_digest((digest + json.dumps(chosen, sort_keys=True)).encode())
 
 
 def case_names(numbers: list[int]) -> str:
-    """Return the names of some cases, in words."""
+    """Return a phrase that names cases by their numbers."""
     names = ", ".join(f"case-{number:04d}" for number in numbers[:MAX_NAMED_CASES])
     rest = len(numbers) - MAX_NAMED_CASES
     return names if rest <= 0 else f"{names} and {rest} more"
@@ -147,9 +149,10 @@ def case_documents(
     faults: list[str],
     section: str = sections.SWEEP,
 ) -> list[tuple[SweepCase, dict[str, Any]]]:
-    """Return the cases and their documents: all points, then the next realisation of points with a random cell.
+    """Return the cases of a sweep, unchecked, with their documents.
 
-    Faults of the points in a section, and of their realisations, are added to `faults`.
+    The cases run through all points; further realisations follow, of points with a random cell alone.  Faults of the
+    points and of the realisations are appended to `faults`.
     """
     documents = [_with_values(base, point, faults, section) for point in points]
     if realisations is not None and not any(map(_is_random, documents)):
@@ -163,7 +166,7 @@ def case_documents(
         for number, (point, document) in enumerate(zip(points, documents, strict=True), start=1):
             inputs, varied = _inputs(point), document
             if realisations is not None and _is_random(document):
-                first = document["cell"].get("seed", 0)  # seeds count up from it, unless it is faulty
+                first = document["cell"].get("seed", 0)  # of realisation 1; a later check reports a faulty seed
                 inputs["cell.seed"] = first + realisation - 1 if isinstance(first, int) else first
                 varied = document | {"cell": document["cell"] | {"seed": inputs["cell.seed"]}}
             elif realisation > 1:
@@ -173,9 +176,10 @@ def case_documents(
 
 
 def _with_values(base: Mapping[str, Any], point: Assignment, faults: list[str], section: str) -> dict[str, Any]:
-    """Return the base with a point's values; a table is merged into its section.
+    """Return a copy of the base document with the values of a point.
 
-    A section that is missing is made; of several sections a number, from 1, names one.
+    A table is merged into its section; a missing section is made.  A number, from 1, selects one of several sections
+    of the same name.  Faults are appended to `faults`.
     """
     document = copy.deepcopy(dict(base))
     for path, value in point.items():
@@ -206,7 +210,7 @@ def _is_random(document: Mapping[str, Any]) -> bool:
 
 
 def _inputs(point: Assignment) -> dict[str, Any]:
-    """Return a point's values by dotted key, tables taken apart."""
+    """Return the values of a point by dotted key, with tables split into their entries."""
     inputs: dict[str, Any] = {}
     for path, value in point.items():
         parts = {(*path, name): part for name, part in value.items()} if isinstance(value, dict) else {path: value}

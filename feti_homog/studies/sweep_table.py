@@ -1,4 +1,4 @@
-"""The table of a sweep: inputs, outputs and results of all cases, and statistics over realisations."""
+"""The table of a sweep: inputs, outputs and results of all cases, with statistics over realisations."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,9 +19,10 @@ CURVE_POINTS = 401  # strains at which curves are averaged
 
 @dataclass(frozen=True)
 class Statistics:
-    """Statistics over finished realisations, (points, ...).
+    """The statistics of outputs over finished realisations, (points, ...).
 
-    `ci95` is the mean's half 95 % confidence interval by Student's t; it and `std` are NaN for fewer than two.
+    `ci95` is half the width of the 95 % confidence interval of the mean, by Student's t.  `ci95` and `std` are NaN for
+    fewer than two realisations.
     """
 
     count: Float
@@ -31,7 +32,7 @@ class Statistics:
 
     @classmethod
     def of(cls, samples: Float) -> Self:
-        """Return statistics over the first axis of samples (n, ...), without NaN."""
+        """Compute statistics over the first axis of samples (n, ...), without NaN entries."""
         is_known = np.isfinite(samples)
         count = is_known.sum(axis=0)
         several = np.where(count > 1, count, np.nan)
@@ -46,10 +47,10 @@ class SweepTable:
 
     Attributes:
         name, stress_unit: as in the sweep.
-        folder, point, realisation, status, reason: for each case; `reason` of a failure.
-        inputs: by dotted key each case's value, None where the key does not vary.
-        outputs: by name (cases,), NaN where there is none.
-        documents: result.json for finished cases, else None.
+        folder, point, realisation, status, reason: values for each case; `reason` explains a failure.
+        inputs: by dotted key the value of each case, None if the key does not vary in the case.
+        outputs: by name the values (cases,), NaN for cases without the output.
+        documents: result.json of finished cases, else None.
     """
 
     name: str
@@ -69,7 +70,7 @@ class SweepTable:
         return sorted(set(self.point))
 
     def rows(self, point: int) -> list[int]:
-        """Return the rows with a point's realisations."""
+        """Return the table rows of the realisations of a point."""
         return [row for row, number in enumerate(self.point) if number == point]
 
     @cached_property
@@ -83,19 +84,19 @@ class SweepTable:
 
     @property
     def finished(self) -> list[Document]:
-        """result.json of the finished cases."""
+        """The contents of result.json for all finished cases."""
         return [document for document in self.documents if document is not None]
 
     def input_of(self, point: int, name: str) -> Any:
-        """Return the value of an input at a point, None if it does not vary there."""
+        """Return the value of an input at a point, or None if the point does not set it."""
         return self.inputs[name][self.rows(point)[0]]
 
     def results_of(self, point: int) -> list[Document]:
-        """Return result.json for a point's finished realisations."""
+        """Return the contents of result.json for the finished realisations of a point."""
         return [document for row in self.rows(point) if (document := self.documents[row]) is not None]
 
     def label(self, point: int, without: Sequence[str] = ()) -> str:
-        """Return the inputs of a point in words, but for some keys and for seeds."""
+        """Return a label with the inputs of a point, except seeds and the keys in `without`."""
         keys = [name for name in self.inputs if name not in without and name != "cell.seed"]
         varied = [name for name in keys if len({repr(value) for value in self.inputs[name]}) > 1]
         labels = []
@@ -115,9 +116,11 @@ class SweepTable:
         return ", ".join(labels)
 
     def curves(self, point: int) -> tuple[Float, Float]:
-        """Strains (g,), g = CURVE_POINTS, and the c stresses of each finished realisation there, (n, g, c).
+        """Return the stress-strain curves of a point on a common grid of strains.
 
-        Both are empty if the cases are no straight paths, or none whose strain rises with the load.
+        Returns:
+            Strains (g,), g = CURVE_POINTS, and c stresses of n finished realisations, (n, g, c).  Both are empty if
+            the cases are no straight paths, or no strain rises with the load.
         """
         paths = [path for path in map(path_curves.rising_strain, self.results_of(point)) if path is not None]
         if not paths:
@@ -130,7 +133,7 @@ class SweepTable:
 
 @dataclass(frozen=True)
 class Series:
-    """Points that differ by one key only: their numbers, and that key's values `x`, rising."""
+    """A series of sweep points that differ by one key only; `x` are the rising values of the key."""
 
     label: str
     points: list[int]
@@ -138,9 +141,9 @@ class Series:
 
 
 def series_over(table: SweepTable, key: str) -> list[Series]:
-    """Return the series over a key, of the points with finished cases.
+    """Group the points with finished cases into series over a key.
 
-    A key that varies along with it, one value to one, makes no other series.
+    A second key with a one-to-one relation to the first does not split a series.
     """
     points = [p for p in table.points if table.results_of(p) and table.input_of(p, key) is not None]
     along = list[str]()

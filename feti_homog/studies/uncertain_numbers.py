@@ -1,4 +1,4 @@
-"""Uncertain numbers in a case: KEY = {mean, std} or {mean, cv} in place of a number, and their correlation."""
+"""Read the uncertain numbers of a case, KEY = {mean, std} or {mean, cv}, and their correlation."""
 
 import copy
 import re
@@ -19,13 +19,13 @@ EXPECTED = "expected {mean, std} or {mean, cv}, numbers, std and cv above 0"
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """Standard deviations of numbers by dotted key, and correlations of pairs."""
+    """The standard deviations of p numbers by dotted key, and the correlations of pairs."""
 
     std: Mapping[str, float]
     correlation: tuple[tuple[str, str, float], ...] = ()
 
     def matrix(self) -> Float:
-        """(p, p) correlation between all numbers."""
+        """Return the correlation matrix (p, p) of all numbers."""
         names, result = [*self.std], np.eye(len(self.std))
         for first, second, value in self.correlation:
             i, j = names.index(first), names.index(second)
@@ -33,11 +33,12 @@ class Uncertainty:
         return result
 
     def propagated(self, J: Float) -> tuple[Float, Float]:
-        """(n,) first-order standard deviations for n results with derivatives J (n, p), and the shares (n, p) of each.
+        """Propagate the covariance V to n results with derivatives J (n, p), to first order.
 
-        The variances are the diagonal of J V J^T; a constant's share is J_k (V J^T)_k, which may be negative.
+        Returns the standard deviations (n,) of the results, and the fraction (n, p) of each variance that each number
+        contributes.  The variances are the diagonal of J V J^T; number k adds J_k (V J^T)_k, which may be negative.
         """
-        A = J * np.array([*self.std.values()])  # changes by one standard deviation of each
+        A = J * np.array([*self.std.values()])  # change of the results per standard deviation
         scale = np.abs(A).max(axis=1, initial=np.finfo(float).tiny)  # so that no square over- or underflows
         A = A / scale[:, None]
         parts = A * (A @ self.matrix())
@@ -46,13 +47,13 @@ class Uncertainty:
         return scale * np.sqrt(variance), shares
 
     def to_table(self) -> dict[str, Any]:
-        """Return a case's section [uncertainty] with means in place of numbers; empty without any."""
+        """Return the section [uncertainty] of a document whose numbers are the means."""
         pairs = {sections.CORRELATION: [list(pair) for pair in self.correlation]} if self.correlation else {}
         return {**self.std, **pairs}
 
 
 def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty:
-    """Take the uncertain numbers out of a document, which keeps their means."""
+    """Extract the uncertain numbers from a document, in which their means remain."""
     table = document.pop(sections.UNCERTAINTY, {})
     if not isinstance(table, dict):
         faults.append(
@@ -78,7 +79,7 @@ def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty
     if faults:
         return Uncertainty({})
     result = Uncertainty(named, tuple((first, second, float(value)) for first, second, value in pairs))
-    # Rounding of an eigenvalue: at most the order of the matrix times its norm, which is no more than the order.
+    # The rounding error of an eigenvalue is at most the matrix order times the norm, which the order bounds.
     if named and np.linalg.eigvalsh(result.matrix()).min() < -(len(named) ** 2) * np.finfo(float).eps:
         place = f"[{sections.UNCERTAINTY}] {sections.CORRELATION}"
         faults.append(f"{place}: no constants are so correlated; expected a positive matrix")
@@ -86,7 +87,7 @@ def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty
 
 
 def _pair_faults(pairs: Any, named: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the faults in pairs of correlated constants."""
+    """Yield the faults of the correlated pairs."""
     words = f"expected [KEY, KEY, VALUE] of two uncertain constants, {' and '.join(named)}, from -1 to 1"
     known = set[frozenset[str]]()
     for pair in pairs if isinstance(pairs, list) else [pairs]:
@@ -104,7 +105,7 @@ def _pair_faults(pairs: Any, named: Mapping[str, Any]) -> Iterator[str]:
 def _means(
     value: Any, path: toml_files.TomlPath, given: list[tuple[toml_files.TomlPath, Any]], faults: list[str]
 ) -> Any:
-    """Return a value with the means for uncertain numbers; their deviations are appended to `given`."""
+    """Replace uncertain numbers in a value by their means; append paths and deviations to `given`."""
     if isinstance(value, list):
         numbers = [()] if len(value) == 1 else [(str(k + 1),) for k in range(len(value))]
         return [_means(item, (*path, *number), given, faults) for item, number in zip(value, numbers, strict=True)]
@@ -127,13 +128,13 @@ def _means(
 
 
 def _in_lists(path: toml_files.TomlPath) -> toml_files.TomlPath:
-    """Return the path to a stiffness entry Cij with its row and column."""
+    """Split the last name Cij of a stiffness path into row and column."""
     result = re.fullmatch(r"C([1-6])([1-6])", path[-1]) if path[-2:-1] == (STIFFNESS,) else None
     return path if result is None else (*path[:-1], *result.groups())
 
 
 def number_at(document: Mapping[str, Any], path: toml_files.TomlPath) -> float | None:
-    """Return the number at a path; None for other values, and in a section of which the case has several."""
+    """Return the number at a path; None for other values, and for a path into one of several sections."""
     result = _at(document, _in_lists(path))
     return float(result) if types.is_number(result) else None
 
@@ -141,7 +142,7 @@ def number_at(document: Mapping[str, Any], path: toml_files.TomlPath) -> float |
 def with_number(
     document: Mapping[str, Any], path: toml_files.TomlPath, value: float
 ) -> tuple[toml_files.TomlPath, Any]:
-    """Return the key of a number with a new value; of a number in a list, the key of the list and the new list."""
+    """Return the key and new value of a number; for a number in a list, the key of the list and the new list."""
     full = _in_lists(path)
     for k in range(1, len(full)):
         result = _at(document, full[:k])
@@ -159,7 +160,7 @@ def _at(document: Any, path: toml_files.TomlPath) -> Any:
     result = document
     for name in path:
         result = result[0] if isinstance(result, list) and len(result) == 1 else result
-        if isinstance(result, list):  # sections of one name, from 1
+        if isinstance(result, list):  # numbers of sections with one name, from 1
             result = {str(number): each for number, each in enumerate(result, start=1)}
         result = result.get(name) if isinstance(result, dict) else None
     return result

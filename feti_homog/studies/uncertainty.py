@@ -1,10 +1,11 @@
-"""Scatter in results by uncertain inputs, beside the scatter of random cells and the mesh error.
+"""Compute the scatter of results by uncertain inputs, to compare with the scatter of random cells and the mesh error.
 
-Derivatives are exact where results have them; else differences of whole runs, one standard deviation less and more.
-Random cells of one seed may have other arrangements then: their slopes have a standard error over the cells.
+Derivatives are exact where results have derivatives, else central differences between runs one standard deviation
+below and above the mean.  A random cell may change its arrangement between these runs: the standard error of the
+slopes over the cells shows this.
 
-DIR/means                     as of a sweep: the case, or each realisation of a random cell
-DIR/differences               the cases with each number without derivatives less and more
+DIR/means                     folder of a sweep: the case, or all realisations of a random cell
+DIR/differences               two cases for each number without exact derivatives
 DIR/uncertainty.json
 """
 
@@ -33,7 +34,7 @@ Documents = Sequence[Mapping[str, Any]]
 
 @dataclass(frozen=True)
 class ScatterStudy(Study):
-    """A case at the means of its uncertain numbers, and its realisations if it is a random cell."""
+    """A study of the scatter that the uncertain numbers of a case cause."""
 
     KIND, FILE = "study of scatter", "uncertainty.json"
     ENTRIES = re.compile(r"uncertainty\.json|means|differences")
@@ -43,7 +44,7 @@ class ScatterStudy(Study):
     realisations: int | None
 
     def cases(self, points: Sequence[Assignment], **output: bool) -> Sweep:
-        """Return all realisations of the cases at some points. Raises CaseError with their faults."""
+        """Return all realisations of the cases at points of the inputs.  Raises CaseError with all faults."""
         document = {**self.document, "output": self.document["output"] | output}
         return cases_at(document, points, self.folder, self.realisations, section=sections.UNCERTAINTY)
 
@@ -51,7 +52,7 @@ class ScatterStudy(Study):
         return self.cases([{}])
 
     def differing(self, names: Sequence[str]) -> Sweep:
-        """Return two cases for each number: one standard deviation below and above its mean."""
+        """Return the cases one standard deviation below and above the mean of each number."""
         ends = [(name, self.means[name] + sign * self.uncertainty.std[name]) for name in names for sign in (-1, 1)]
         points = [dict([with_number(self.document, _path(name), end)]) for name, end in ends]
         return self.cases(points, mesh_error=False)
@@ -83,7 +84,10 @@ class ScatterStudy(Study):
         return study_tables.scatter_text(document)
 
     def _content(self, means: Documents, inexact: Sequence[str], ends: Documents) -> dict[str, Any]:
-        """Return the content of uncertainty.json after its digest."""
+        """Return the content of uncertainty.json without its digest.
+
+        `ends` are results one standard deviation below and above the means of the `inexact` numbers.
+        """
         data, uncertainty, count = _data([*means, *ends]), self.uncertainty, len(means)
         values, mesh_errors = _values(means, data), [constant_tables.mesh_errors(document) for document in means]
         sides = _values(ends, data).reshape(count, len(inexact), 2, len(data))
@@ -126,12 +130,12 @@ class ScatterStudy(Study):
 
 
 def load(path: Path) -> ScatterStudy:
-    """Return the study of a file. Raises CaseError with its faults."""
+    """Load a study of scatter from a file.  Raises CaseError with the faults of the file."""
     return parse(toml_files.read_document(path), path.parent)
 
 
 def parse(values: Mapping[str, Any], folder: Path) -> ScatterStudy:
-    """Return the study of nested dictionaries. Raises CaseError as `load`."""
+    """Build a study of scatter from a document whose files are relative to `folder`.  Raises CaseError as `load`."""
     document, faults = {"name": "case", **toml_files.to_document(values)}, list[str]()
     table, settings = document.pop(sections.SWEEP, None), sections.SweepSection()
     if isinstance(table, dict):
@@ -180,12 +184,12 @@ def _path(name: str) -> toml_files.TomlPath:
 
 
 def _data(documents: Documents) -> list[Datum]:
-    """Return the names common to all results, as data without values."""
+    """Return placeholder data for the numbers that all results have."""
     named = [responses(document) for document in documents]
     return [Datum(0, name, 0.0, 1.0) for name in named[0] if all(name in values for values in named)]
 
 
 def _values(documents: Documents, data: Sequence[Datum]) -> Float:
-    """(r, n) values of n data in r results."""
+    """Return the values (r, n) of n data in r results."""
     named = [responses(document) for document in documents]
     return np.array([[values[datum.name] for datum in data] for values in named], float)

@@ -12,7 +12,7 @@ from feti_homog.microstructure.shapes.ellipses import Ellipses
 from feti_homog.microstructure.shapes.outlines import ColumnRange, Columns, ConvexCurves, directions, widest
 from feti_homog.typing import Bool, Float, Int
 
-# Points of each outline from which distances, curvatures and lengths are taken.
+# Points that represent an outline for distances, curvatures and lengths.
 POINTS = 256
 # The fewest and the most sides.
 SIDES = 3, 12
@@ -20,10 +20,10 @@ SIDES = 3, 12
 
 @dataclass(frozen=True)
 class ConvexSums(ConvexCurves):
-    """The k sums c + V + F D with convex hulls V and the unit disc D, as `Outlines`.
+    """k Minkowski sums c + V + F D of a polygon V and an ellipse F D, with the unit disc D, as `Outlines`.
 
-    V is the hull of `cores` (k, m, 2), about the origin; `frames` F (k, 2, 2); `centres` c (k, 2). The core of circles
-    and ellipses is the origin; a core of fewer corners than m repeats one of them.
+    `centres` c (k, 2); V is the hull of `cores` (k, m, 2) about the origin; `frames` F (k, 2, 2).  The core of a circle
+    or an ellipse is the origin; a core with fewer corners than m repeats a corner.
     """
 
     cores: Float
@@ -31,7 +31,7 @@ class ConvexSums(ConvexCurves):
 
     @property
     def radii(self) -> Float:
-        """See `Outlines`; by Steiner's formula A + P r + pi r^2 of a core around which the disc of radius r runs."""
+        """The radii (k,) of equal-area discs, by Steiner's formula A + P r + pi r^2 for a core and disc of radius r."""
         onward = np.roll(self.cores, -1, axis=1)
         area = (self.cores[..., 0] * onward[..., 1] - self.cores[..., 1] * onward[..., 0]).sum(axis=1) / 2
         around = np.linalg.norm(onward - self.cores, axis=2).sum(axis=1)
@@ -40,18 +40,18 @@ class ConvexSums(ConvexCurves):
 
     @property
     def longest(self) -> Float:
-        """See `Outlines`."""
+        """Upper bounds (k,) on the distances between points and centres."""
         core = np.linalg.norm(self.cores, axis=2).max(axis=1)
         return np.asarray(core + np.linalg.norm(self.frames, axis=1).max(axis=1))
 
     @property
     def extents(self) -> Float:
-        """See `Outlines`."""
+        """The extents (k, 2, 2) along the axes, backwards and forwards."""
         axes = np.broadcast_to([[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]], (len(self), 4, 2))
         return self.support(axes).reshape(-1, 2, 2)
 
     def grown(self, thickness: Float) -> ConvexSums:
-        """See `Outlines`."""
+        """Enlarge the outlines by rings of thickness (k,)."""
         frames, some = self.frames.copy(), thickness > 0
         is_sharp = some & ~frames.any(axis=(1, 2))
         frames[is_sharp] = thickness[is_sharp, None, None] * np.eye(2)
@@ -60,12 +60,12 @@ class ConvexSums(ConvexCurves):
         return replace(self, frames=frames)
 
     def support(self, normal: Float) -> Float:
-        """Return max_v v . n + |F^T n| (k, ...) for unit vectors n (k, ..., 2), as in `Outlines`."""
+        """Return the support functions max_v v . n + |F^T n| (k, ...) at unit vectors n (k, ..., 2)."""
         core = np.einsum("kmi,k...i->k...m", self.cores, normal).max(axis=-1)
         return np.asarray(core + np.linalg.norm(np.einsum("kij,k...i->k...j", self.frames, normal), axis=-1))
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Maximise v . n - h_1(n) - h_2(-n), h the supports of both, as in `Outlines`."""
+        """Maximise v . n - h_1(n) - h_2(-n) for the supports h of both outlines, as `Outlines.parting`."""
         one, other = self[first], self[second]
 
         def gap(angle: Float) -> Float:
@@ -76,14 +76,14 @@ class ConvexSums(ConvexCurves):
         return normal, one.support(normal) + other.support(-normal)
 
     def distances(self, offsets: Float) -> Float:
-        """Return distances as in `Outlines`, from POINTS points or more."""
+        """Return distances (n, k) at vectors (n, k, 2) from the centres, by at least POINTS boundary points."""
         points, _, which = self.at(np.zeros_like(self.centres)).boundary(POINTS)
         first = np.flatnonzero(np.diff(which, prepend=-1))
         each = [np.minimum.reduceat(np.linalg.norm(vectors[which] - points, axis=1), first) for vectors in offsets]
         return np.stack(each)
 
     def facing(self, normal: Float) -> Float:
-        """Return points (k, q, 2) whose outward normals are n (k, q, 2)."""
+        """Return the points (k, q, 2) whose outward normals are n (k, q, 2)."""
         corner = np.einsum("kmi,kqi->kqm", self.cores, normal).argmax(axis=2)
         turned = np.einsum("kij,kqi->kqj", self.frames, normal)
         length = np.linalg.norm(turned, axis=2, keepdims=True)
@@ -92,9 +92,10 @@ class ConvexSums(ConvexCurves):
         return np.asarray(self.centres[:, None] + core + round_part)
 
     def boundary(self, count: int) -> tuple[Float, Float, Int]:
-        """Return points (q, 2) all around, their unit normals (q, 2), and their shapes (q,).
+        """Return q points along all outlines (q, 2), unit normals (q, 2), and outline numbers (q,).
 
-        The points have `count` even normals; on straight sides they are at most 1 / count of the circumference apart.
+        The normals have `count` equidistant directions.  Points on straight sides are at most 1 / count of the
+        circumference apart.
         """
         normal = directions(np.linspace(0, 2 * np.pi, count, endpoint=False))
         points = self.facing(np.broadcast_to(normal, (len(self), count, 2)))
@@ -111,10 +112,10 @@ class ConvexSums(ConvexCurves):
 
 
 class PolygonalRows:
-    """Rows with `sides`, as `Shape`.
+    """The `Shape` of table rows with `sides`: regular polygons with rounded corners.
 
-    Regular polygons with that circumradius, the first corner at `angle`, rounded by circles that touch both sides at a
-    corner; `corner` is their radius / the incircle's radius.
+    `radius` is the circumradius; the first corner lies at `angle`.  The rounding circles touch both sides of a corner;
+    `corner` is the ratio of their radius to the radius of the incircle.
     """
 
     name, sizes, has_tips = "polygons", ("radius",), False
@@ -125,7 +126,7 @@ class PolygonalRows:
         return np.asarray(rows["sides"] != 0)
 
     def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:
-        """See `Shape`."""
+        """Yield the faults of rows with this shape: a mask of rows (N,), and a message."""
         (least, most), sides, corner, given = SIDES, rows["sides"], rows["corner"], self.given(rows)
         are_odd = given & ((sides != np.round(sides)) | (sides < least) | (sides > most))
         yield are_odd, f"expected sides from {least} to {most}, a whole number, or 0"
@@ -135,10 +136,10 @@ class PolygonalRows:
             yield given & (np.nan_to_num(rows[name]) > 0), f"has sides and {name}; give one"
 
     def outlines(self, rows: Columns, centres: Float) -> ConvexSums:
-        """See `Shape`."""
+        """Build the outlines of rows (k,) with this shape about centres (k, 2)."""
         sides, radius = np.maximum(rows["sides"].astype(np.intp), SIDES[0]), rows["radius"]
         rounding = rows["corner"] * radius * np.cos(np.pi / sides)
-        # Corners of the polygon of the centres of the rounding circles.
+        # The centres of the rounding circles are the corners of the core.
         core = radius - rounding / np.cos(np.pi / sides)
         corner = np.minimum(np.arange(sides.max()), sides[:, None] - 1)
         turn = np.radians(rows["angle"])[:, None] + 2 * np.pi * corner / sides[:, None]

@@ -1,4 +1,4 @@
-"""Discs, and ellipses as affine images of the unit circle: points, tangency with lines, curvature, and distances."""
+"""Discs, and ellipses as affine images of the unit circle: points, tangents, curvature and distances."""
 
 from __future__ import annotations
 
@@ -13,85 +13,85 @@ from feti_homog.typing import Bool, Float, Int
 
 # Relative difference of the squares of semi-axes of a circle.
 SAME_AXES = 1e-12
-# Shorter / longer semi-axis of a fibre, at least: elements at the tips would be too small.
+# The least ratio of shorter to longer semi-axis; thinner tips would need too small elements.
 THINNEST = 0.05
 
 
 @dataclass(frozen=True)
 class Ellipses(ConvexCurves):
-    """The k images c + F p of the unit circle |p| = 1, as `Outlines`; `centres` (k, 2), `frames` (k, 2, 2)."""
+    """k ellipses c + F p with |p| = 1, as `Outlines`; `centres` c (k, 2), `frames` F (k, 2, 2)."""
 
     frames: Float
 
     @classmethod
     def of(cls, centres: Float, a: Float, b: Float, angle: Float) -> Ellipses:
-        """Return ellipses with semi-axes a, b (k,), the first at `angle` (k,) in degrees."""
+        """Build ellipses with semi-axes a, b (k,); a lies at `angle` (k,) in degrees."""
         cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
         axes = np.stack([np.stack([cosine, sine], axis=1), np.stack([-sine, cosine], axis=1)], axis=2)
         return cls(centres, axes * np.stack([a, b], axis=1)[:, None])
 
     @classmethod
     def round(cls, circles: Float) -> Ellipses:
-        """Return the circles (k, 3) of centre and radius as ellipses."""
+        """Build ellipses from circles (k, 3) of centre and radius."""
         return cls(circles[:, :2], circles[:, 2, None, None] * np.eye(2))
 
     @property
     def circles(self) -> Float:
-        """(k, 3) centre and radius, NaN unless the ellipse is round."""
+        """The centres and radii (k, 3); the radius is NaN unless the ellipse is round."""
         return np.column_stack([self.centres, np.where(self.are_round, self.radii, np.nan)])
 
     @property
     def cores(self) -> Float:
-        """The origin."""
+        """The cores (k, 1, 2): the origin."""
         return np.zeros((len(self), 1, 2))
 
     @property
     def radii(self) -> Float:
-        """See `Outlines`."""
+        """The radii (k,) of equal-area discs."""
         return np.asarray(np.sqrt(np.abs(np.linalg.det(self.frames))))
 
     @property
     def extents(self) -> Float:
-        """See `Outlines`."""
+        """The extents (k, 2, 2) along the axes, backwards and forwards."""
         return np.repeat(np.linalg.norm(self.frames, axis=2)[:, :, None], 2, axis=2)
 
     def grown(self, thickness: Float) -> Ellipses:
-        """Return ellipses whose semi-axes are longer by `thickness` (k,)."""
+        """Lengthen both semi-axes by `thickness` (k,)."""
         lengths = np.linalg.norm(self.frames, axis=1)
         return Ellipses(self.centres, self.frames * (1 + thickness[:, None] / lengths)[:, None])
 
     @property
     def squares(self) -> Float:
-        """(k, 2, 2) F F^T, which determine an ellipse but for its place."""
+        """The matrices F F^T (k, 2, 2), which determine the ellipses except for the centres."""
         return np.asarray(self.frames @ self.frames.transpose(0, 2, 1))
 
     @property
     def are_round(self) -> Bool:
-        """(k,) which are circles."""
+        """The mask (k,) of circles."""
         squares, radius = self.squares, np.abs(np.linalg.det(self.frames))
         away = np.abs(squares - radius[:, None, None] * np.eye(2)).max(axis=(1, 2))
         return np.asarray(away < SAME_AXES * radius)
 
     @property
     def semi_axes(self) -> Float:
-        """(k, 2) their lengths, for frames whose columns are along them."""
+        """The lengths (k, 2) of the semi-axes, if the columns of F are the semi-axes."""
         return np.asarray(np.linalg.norm(self.frames, axis=1))
 
     @property
     def perimeters(self) -> Float:
-        """(k,) by Ramanujan's second formula, short by at most 0.04 %."""
+        """The perimeters (k,) by Ramanujan's second formula, too small by at most 0.04 %."""
         a, b = self.semi_axes.T
         h = 3 * ((a - b) / (a + b)) ** 2
         return np.asarray(np.pi * (a + b) * (1 + h / (10 + np.sqrt(4 - h))))
 
     @property
     def angles(self) -> Float:
-        """(k,) from x to the first semi-axis, in degrees."""
+        """The angles (k,) from x to the first semi-axis, in degrees."""
         return np.asarray(np.degrees(np.arctan2(self.frames[:, 1, 0], self.frames[:, 0, 0])))
 
     @property
     def longest(self) -> Float:
-        """(k,) the longer semi-axes."""
+        """The longer semi-axes (k,)."""
         return np.asarray(self.semi_axes.max(axis=1))
 
     def points(self, angle: Float) -> Float:
@@ -99,24 +99,23 @@ class Ellipses(ConvexCurves):
         return np.asarray(self.centres + np.einsum("kij,kj->ki", self.frames, directions(angle)))
 
     def unit(self, offsets: Float) -> Float:
-        """Return F^-1 d (k, 2) of vectors d (k, 2)."""
+        """Map vectors d (k, 2) to F^-1 d (k, 2), where the ellipses are unit circles."""
         return np.asarray(np.linalg.solve(self.frames, offsets[:, :, None])[:, :, 0])
 
     def parameter(self, offsets: Float) -> Float:
-        """Return the parameters (k,) at which rays from the centres along d (k, 2) meet ellipses."""
+        """Return the parameters (k,) at which rays from the centres along d (k, 2) intersect the ellipses."""
         unit = self.unit(offsets)
         return np.arctan2(unit[:, 1], unit[:, 0])
 
     def parameter_at(self, angle: Float) -> Float:
-        """Return the parameters (k,) of points that centres see at angles (k,) in radians."""
+        """Return the parameters (k,) of the points at polar angles (k,) about the centres, in radians."""
         return self.parameter(directions(angle))
 
     def chord(self, axis: int) -> tuple[Float, Float]:
-        """Return the middles (k,) and half lengths (k,) of chords on the coordinate `axis`.
+        """Return the middles (k,) and half lengths (k,) of the chords on the coordinate `axis`.
 
-        A miss has the half length 0.
-
-        d = x - c with the known component v obeys d . (F F^T)^-1 d = 1.
+        An ellipse that does not intersect the axis has the half length 0.  The points d = x - c, with a known
+        component v, satisfy d . (F F^T)^-1 d = 1.
         """
         inverse, other = np.linalg.inv(self.squares), 1 - axis
         v = -self.centres[:, other]
@@ -125,17 +124,17 @@ class Ellipses(ConvexCurves):
         return self.centres[:, axis] - q / p, np.sqrt(np.maximum(root, 0.0)) / p
 
     def support(self, normal: Float) -> Float:
-        """Return |F^T n| (k, ...) for unit vectors n (k, ..., 2), as in `Outlines`."""
+        """Return the support functions |F^T n| (k, ...) at unit vectors n (k, ..., 2)."""
         return np.asarray(np.linalg.norm(np.einsum("kij,k...i->k...j", self.frames, normal), axis=-1))
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """See `Outlines`."""
+        """Find the directions that best separate pairs, as `Outlines.parting`."""
         one, other = self[first], self[second]
         normal = directions(gaps(one, other.at(one.centres + vector))[1])
         return normal, one.support(normal) + other.support(normal)
 
     def distances(self, offsets: Float) -> Float:
-        """Return ||F^-1 d| - 1| times the mean radius, as in `Outlines`."""
+        """Return approximate distances (n, k) at vectors d (n, k, 2): ||F^-1 d| - 1| times the mean radius."""
         unit = np.einsum("kij,nkj->nki", np.linalg.inv(self.frames), offsets)
         return np.asarray(np.abs(np.linalg.norm(unit, axis=2) - 1) * self.radii)
 
@@ -155,7 +154,7 @@ class Ellipses(ConvexCurves):
 
 
 def gaps(first: Ellipses, second: Ellipses) -> tuple[Float, Float]:
-    """Return the gaps (k,) between paired ellipses, and their directions (k,) in radians.
+    """Return the gaps (k,) between pairs of ellipses, and the gap directions (k,) in radians.
 
     The gap is max_n (c_2 - c_1) . n - |F_1^T n| - |F_2^T n|: the distance, or minus the penetration depth.
     """
@@ -171,7 +170,7 @@ def gaps(first: Ellipses, second: Ellipses) -> tuple[Float, Float]:
 
 
 class EllipticRows:
-    """Rows with semi-axes in place of a radius, as `Shape`."""
+    """The `Shape` of table rows that have semi-axes in place of a radius."""
 
     name, sizes, has_tips = "ellipses", ("a", "b"), True
     columns = MappingProxyType(
@@ -183,84 +182,84 @@ class EllipticRows:
         return np.asarray(~np.isnan(rows["a"]) & (rows["a"] != rows["b"]))
 
     def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:
-        """See `Shape`."""
+        """Yield the faults of rows with this shape: a mask of rows (N,), and a message."""
         a, b = rows["a"], rows["b"]
         thin = np.minimum(a, b) < THINNEST * np.maximum(a, b)
         yield thin, f"expected a / b from {THINNEST:g} to {1 / THINNEST:g}"
         yield self.given(rows) & (rows["inner_radius"] > 0), "has an inner_radius, which only round fibres may have"
 
     def outlines(self, rows: Columns, centres: Float) -> Ellipses:
-        """See `Shape`."""
+        """Build the outlines of rows (k,) with this shape about centres (k, 2)."""
         return Ellipses.of(centres, rows["a"], rows["b"], rows["angle"])
 
 
 @dataclass(frozen=True)
 class Discs(ConvexCurves):
-    """k discs, as `Outlines`; `centres` (k, 2), `radii` (k,)."""
+    """k discs, as `Outlines`, with `centres` (k, 2) and `radii` (k,)."""
 
     radii: Float
 
     @property
     def cores(self) -> Float:
-        """The origin."""
+        """The cores (k, 1, 2): the origin."""
         return np.zeros((len(self), 1, 2))
 
     @property
     def circles(self) -> Float:
-        """(k, 3) centre and radius."""
+        """The centres and radii (k, 3)."""
         return np.column_stack([self.centres, self.radii])
 
     @property
     def frames(self) -> Float:
-        """See `Outlines`."""
+        """The frames F = r I (k, 2, 2)."""
         return np.asarray(self.radii[:, None, None] * np.eye(2))
 
     @property
     def longest(self) -> Float:
-        """The radii."""
+        """The radii (k,), which bound the distances between points and centres."""
         return self.radii
 
     @property
     def extents(self) -> Float:
-        """The radii."""
+        """The extents (k, 2, 2) along the axes: the radii."""
         return np.broadcast_to(self.radii[:, None, None], (len(self), 2, 2))
 
     def grown(self, thickness: Float) -> Discs:
-        """See `Outlines`."""
+        """Enlarge the outlines by rings of thickness (k,)."""
         return replace(self, radii=self.radii + thickness)
 
     def points(self, angle: Float) -> Float:
-        """Return the points (k, 2) at angles (k,) in radians, which are their parameters."""
+        """Return the points (k, 2) at parameters (k,), which are angles in radians."""
         return on_circle(self.circles, angle)
 
     def unit(self, offsets: Float) -> Float:
-        """Return d / r (k, 2) of vectors d (k, 2)."""
+        """Map vectors d (k, 2) to d / r (k, 2), where the discs are unit discs."""
         return np.asarray(offsets / self.radii[:, None])
 
     def parameter(self, offsets: Float) -> Float:
-        """Return the angles (k,) of d (k, 2)."""
+        """Return the angles (k,) of vectors d (k, 2), in radians."""
         return np.arctan2(offsets[:, 1], offsets[:, 0])
 
     def parameter_at(self, angle: Float) -> Float:
-        """Return these angles (k,)."""
+        """Return the parameters (k,) at angles (k,), which are the angles themselves."""
         return angle
 
     def chord(self, axis: int) -> tuple[Float, Float]:
-        """See `Ellipses`."""
+        """Return the middles (k,) and half lengths (k,) of the chords on the coordinate `axis`."""
         return self.centres[:, axis], np.sqrt(np.maximum(self.radii**2 - self.centres[:, 1 - axis] ** 2, 0.0))
 
     def support(self, normal: Float) -> Float:
-        """See `Outlines`."""
+        """Return the radii (k, ...), the supports in all directions."""
         return np.broadcast_to(self.radii.reshape(-1, *[1] * (normal.ndim - 2)), normal.shape[:-1])
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Return gaps as in `Outlines`, along the vectors, or along x where these are 0."""
+        """Separate pairs along the vectors between centres, or along x for zero vectors, as `Outlines.parting`."""
         length = np.linalg.norm(vector, axis=1)
         normal = np.where(length[:, None] > 0, vector / np.maximum(length, 1e-300)[:, None], [1.0, 0.0])
         return normal, self.radii[first] + self.radii[second]
 
     def distances(self, offsets: Float) -> Float:
-        """See `Outlines`."""
+        """Return the distances (n, k) between circles and points at vectors (n, k, 2) from the centres."""
         return np.asarray(np.abs(np.linalg.norm(offsets, axis=2) - self.radii))
 
 

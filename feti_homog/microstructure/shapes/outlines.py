@@ -1,4 +1,4 @@
-"""Protocols for fibre outlines and row shapes, and the common base for curves of any shape."""
+"""Protocols for fibre outlines and for shapes of table rows, and the base class of all outlines."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
@@ -8,78 +8,79 @@ import numpy as np
 
 from feti_homog.typing import Bool, Float, Int, Int32
 
-# Directions in which the distance of two outlines is first looked for, and how often the best are looked between.
+# Directions at the start of the search for the widest gap, then refinements and directions of a refinement.
 DIRECTIONS, ZOOMS, ZOOM = 180, 12, 9
 
-# Numbers (N,) of the rows of a table by column; NaN, or what the column takes for it, where a row has none.
+# Numbers (N,) of the rows of a table by column; an empty cell has NaN or the default of the column.
 Columns = Mapping[str, Float]
 
 
 class Outlines(Protocol):
-    """k closed convex curves, each a sum c + V + F D of the hull V of a core and the unit disc D in a frame F."""
+    """k closed convex curves c + V + F D: centre c, hull V of a core, frame F and unit disc D."""
 
     @property
     def centres(self) -> Float:
-        """(k, 2)"""
+        """The centres c (k, 2)."""
 
     @property
     def cores(self) -> Float:
-        """(k, m, 2) corners of V about the centres; the origin where there is no V."""
+        """The corners of V about the centres, (k, m, 2); the origin for outlines without a core."""
 
     @property
     def frames(self) -> Float:
-        """(k, 2, 2) F."""
+        """The frames F (k, 2, 2)."""
 
     @property
     def radii(self) -> Float:
-        """(k,) radii of equal-area discs."""
+        """The radii (k,) of equal-area discs."""
 
     @property
     def longest(self) -> Float:
-        """(k,) a bound on the distance of the points from the centres."""
+        """Upper bounds (k,) on the distances between points and centres."""
 
     @property
     def extents(self) -> Float:
-        """(k, 2, 2) reach from the centre along each axis, backwards and forwards."""
+        """The extents (k, 2, 2) from the centre along the two axes, backwards and forwards."""
 
     def __len__(self) -> int: ...
 
     def __getitem__(self, rows: Int | Bool) -> Self: ...
 
     def at(self, centres: Float) -> Self:
-        """Return outlines with the same shapes about other centres (k, 2)."""
+        """Move the outlines to other centres (k, 2)."""
 
     def per(self, unit: float) -> Self:
-        """Divide all lengths, and the centres, by a unit."""
+        """Divide all lengths and centres by a unit of length."""
 
     def rounded(self, decimals: int) -> Self:
-        """Round the coordinates to `decimals`."""
+        """Round all coordinates to a number of decimals."""
 
     def grown(self, thickness: Float) -> Self:
-        """Return the outlines with rings of this `thickness` (k,) around them."""
+        """Enlarge the outlines by rings of thickness (k,)."""
 
     def joined(self, others: Self) -> Self:
-        """Return these outlines, then the others."""
+        """Append other outlines."""
 
     def support(self, normal: Float) -> Float:
-        """Return the reach (k, ...) from the centre along unit vectors n (k, ..., 2)."""
+        """Evaluate the support functions (k, ...) about the centres at unit vectors n (k, ..., 2)."""
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Return normals n (p, 2) that best part pairs (p,), and the reach r (p,) along n.
+        """Find the directions that best separate pairs of outlines.
 
-        v (p, 2) are the vectors from first to second; the gap, negative if they overlap, is n . v - r.
+        `vector` v (p, 2) goes from the first centres to the second.  Returns the normals n (p, 2), and the sums r (p,)
+        of both supports along n: the gap n . v - r is negative for an overlap.
         """
 
     def distances(self, offsets: Float) -> Float:
-        """Return distances (n, k) from the outlines to points at vectors (n, k, 2) from centres.
+        """Return the distances (n, k) between outlines and points at vectors (n, k, 2) from the centres.
 
-        Approximate unless the outline is round.
+        Distances from outlines that are not round are approximate.
         """
 
 
 @dataclass(frozen=True)
 class ConvexCurves:
-    """Curves about the centres (k, 2): the common base of all `Outlines`."""
+    """The common base of all `Outlines`: curves about centres (k, 2)."""
 
     centres: Float
 
@@ -90,33 +91,33 @@ class ConvexCurves:
         return self._each(lambda array: array[rows])
 
     def at(self, centres: Float) -> Self:
-        """See `Outlines`."""
+        """Move the curves to other centres (k, 2)."""
         return replace(self, centres=centres)
 
     def per(self, unit: float) -> Self:
-        """See `Outlines`."""
+        """Divide all lengths and centres by a unit of length."""
         return self._each(lambda array: array / unit)
 
     def scaled(self, factor: float) -> Self:
-        """Multiply all lengths by a factor."""
+        """Multiply all lengths and centres by a factor."""
         return self._each(lambda array: factor * array)
 
     def rounded(self, decimals: int) -> Self:
-        """See `Outlines`."""
+        """Round all coordinates to a number of decimals."""
         return self._each(lambda array: array.round(decimals))
 
     def joined(self, others: Self) -> Self:
-        """See `Outlines`; cores need as many corners."""
+        """Append other outlines, whose cores have the same number of corners."""
         return self._each(lambda *arrays: np.concatenate(arrays), others)
 
     def _each(self, function: Callable[..., Float], *others: Self) -> Self:
-        """Apply a function to each field, or to the same field of several curves together."""
+        """Apply a function to every field, jointly with the same field of other curves."""
         names = [field.name for field in fields(self)]
         return type(self)(*(function(*(getattr(each, name) for each in (self, *others))) for name in names))
 
 
 class ColumnRange(NamedTuple):
-    """A column of numbers: the value of an empty cell, and the bounds of numbers."""
+    """The numbers that a table column allows: value of an empty cell, and bounds."""
 
     empty: float
     least: float = -np.inf
@@ -128,9 +129,9 @@ class Shape(Protocol):
 
     Attributes:
         name: plural name of the shape, as "ellipses".
-        columns: columns that other shapes do not need.
-        sizes: columns of the largest lengths; without "radius" they replace it.
-        has_tips: whether its mesh may have nodes at debonded arc tips.
+        columns: columns that this shape alone needs.
+        sizes: columns of the largest lengths, in place of "radius" unless they include it.
+        has_tips: whether the mesh of the shape may have nodes at debonded arc tips.
     """
 
     @property
@@ -149,10 +150,10 @@ class Shape(Protocol):
         """Return which rows (N,) have this shape."""
 
     def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:
-        """Yield faults of rows that have this shape or seem to: which rows (N,), and the words."""
+        """Yield the faults of rows with this shape: a mask of rows (N,), and a message."""
 
     def outlines(self, rows: Columns, centres: Float) -> Outlines:
-        """Return the outlines for rows (k,) with the shape, about centres (k, 2)."""
+        """Build the outlines of rows (k,) with this shape about centres (k, 2)."""
 
 
 def directions(angle: Float) -> Float:
@@ -166,9 +167,10 @@ def on_circle(circles: Float, angle: Float) -> Float:
 
 
 def widest(vector: Float, gap: Callable[[Float], Float]) -> tuple[Float, Float]:
-    """Return the largest gap (k,) of pairs and its direction (k,) in radians.
+    """Find the direction of the largest gap between k pairs of curves.
 
-    Vectors (k, 2) go from the first to the second; gap(a) are the gaps across directions a (k, m).
+    `vector` (k, 2) goes from the first centres to the second; gap(a) returns the gaps across directions a (k, m).
+    Returns the gaps (k,) and directions (k,) in radians.
     """
     step = 2 * np.pi / DIRECTIONS
     around = np.arctan2(vector[:, 1], vector[:, 0])[:, None] + step * np.arange(DIRECTIONS)

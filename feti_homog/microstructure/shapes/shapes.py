@@ -10,21 +10,21 @@ from feti_homog.microstructure.shapes.outlines import Columns, Outlines, Shape
 from feti_homog.typing import Bool, Float
 
 SHAPES: tuple[Shape, ...] = (EllipticRows(), PolygonalRows())
-"""All but discs, which rows are that have none of them."""
+"""All shapes but discs, the shape of all other rows."""
 BOTH_SIZES = "has a radius and semi-axes; give one"
 
 
 REPLACING = tuple(shape.sizes for shape in SHAPES if "radius" not in shape.sizes)
-"""Columns that stand in place of the radius."""
+"""Columns that replace the radius."""
 
 
 def given_shapes(rows: Columns, has_tips: bool) -> list[Shape]:
-    """Return the shapes of some rows whose meshes have, or do not have, nodes at tips."""
+    """Return the shapes that occur in a table, those with tip nodes in their meshes or those without."""
     return [shape for shape in SHAPES if shape.has_tips == has_tips and shape.given(rows).any()]
 
 
 def columns_without_tips(rows: Columns) -> dict[str, Float]:
-    """Return columns (N,) of shapes without tips, NaN in other rows; none without such rows."""
+    """Return the columns (N,) of shapes without tips by name, NaN in other rows; empty without such rows."""
     shapes = given_shapes(rows, has_tips=False)
     mask = np.logical_or.reduce([np.zeros(len(rows["x"]), bool), *(shape.given(rows) for shape in shapes)])
     names = {name for shape in shapes for name in (*shape.sizes, *shape.columns, "angle")}
@@ -32,13 +32,13 @@ def columns_without_tips(rows: Columns) -> dict[str, Float]:
 
 
 def have_both_sizes(rows: Columns) -> Bool:
-    """Return which rows (N,) have a radius and also lengths in place of it."""
+    """Return the mask (N,) of rows with both a radius and sizes that replace the radius."""
     others = [~np.isnan(rows[sizes[0]]) for sizes in REPLACING]
     return np.asarray(~np.isnan(rows["radius"]) & np.logical_or.reduce(others))
 
 
 def outlines_of(rows: Columns) -> Outlines:
-    """Return the outlines (N,), without coatings, of rows without faults."""
+    """Build the outlines of N valid rows, without coatings."""
     centres = np.column_stack([rows["x"], rows["y"]])
     radius = np.where(np.isnan(rows["radius"]), rows["a"], rows["radius"])
     parts: list[tuple[Bool, Outlines]] = []
@@ -50,10 +50,10 @@ def outlines_of(rows: Columns) -> Outlines:
 
 
 def with_parts(outlines: Outlines, parts: Sequence[tuple[Bool, Outlines]]) -> Outlines:
-    """Replace the outlines in the rows that each part selects.
+    """Replace parts of N outlines.
 
-    A part has a mask (N,) of rows and their outlines.  Returns `Discs` or `Ellipses` where these suffice, otherwise
-    `ConvexSums`.
+    A part is a mask (N,) and the new outlines of the masked rows.  Returns `Discs` or `Ellipses` if the class can
+    represent all outlines, else `ConvexSums`.
     """
     parts = [(mask, part) for mask, part in parts if mask.any()]
     if not parts:
@@ -77,5 +77,5 @@ def elliptic(outlines: Outlines) -> Ellipses:
 
 
 def _padded(cores: Float, corners: int) -> Float:
-    """Repeat the last corners of cores (k, m, 2) up to this number of corners."""
+    """Pad cores (k, m, 2) to a number of corners by copies of the last corner."""
     return np.pad(cores, ((0, 0), (0, corners - cores.shape[1]), (0, 0)), mode="edge")
