@@ -22,7 +22,7 @@ def fit_text(document: Document) -> str:
     heads += [tables.Column("  determined by", -40)]
     rows = list[list[Any]]()
     for name, unknown in document["unknowns"].items():
-        order = np.argsort(-np.array(unknown["shares"]), kind="stable")[:3]  # the data that determine it best
+        order = np.argsort(-np.array(unknown["shares"]), kind="stable")[:3]  # the three most informative data
         best = [f"{data[k]} {unknown['shares'][k]:.0%}" for k in order if unknown["shares"][k] >= LEAST_SHARE]
         bound = "" if unknown["at_bound"] is None else f"at its {unknown['at_bound']} bound; "
         numbers = [unknown["estimate"], *map(_dash, [unknown["std"], *unknown["interval"]])]
@@ -52,7 +52,7 @@ def _dash(value: float | None) -> float | str:
 
 
 def scatter_text(document: Document) -> str:
-    """Return the table with results, their scatter and each input's share, and remarks on noisy slopes."""
+    """Return the table of results with scatter and input contributions, and remarks on noisy slopes."""
     inputs, of_cells = document["parameters"], {"+- cells": "std_cells", "+- both": "std"}
     heads = {"value": "value", "+- inputs": "std_inputs", **(of_cells if document["cells"] > 1 else {})}
     heads["+- mesh"] = "mesh_error"
