@@ -99,7 +99,7 @@ def _cost_lines(
 
 
 def _fibre_lines(case: Case, summary: domain_partition.CellSummary) -> Iterator[str]:
-    """Yield lines about fibre counts and sizes, interfaces, a fibre table, mixed phases and a match."""
+    """Yield lines about the fibres: counts and sizes, mixed phases, and the match of positions."""
     if case.interface is not None or case.cell.table is not None:
         frames, sizes = summary.frames[summary.fibre_bodies], ""
         is_hollow = case.cell.table is not None and bool((case.cell.table.inner_radius > 0).any())

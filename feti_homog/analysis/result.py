@@ -202,7 +202,7 @@ class Result:
 
     @property
     def points(self) -> dict[str, NDArray[Any]]:
-        """Return the values at n angle or path points as arrays by name.
+        """Return the values at n angle or path points, as arrays by name.
 
         `angle` or `load_factor` (n,), `strain` and `stress` (n, 3) or (n, 6), `stiffness` (n, 3, 3) or (n, 6, 6),
         `debonded_length` (n, f), `bonded`, `open`, `closed`, ... (n,), without tips; NaN where a point has no number.

@@ -20,7 +20,7 @@ from feti_homog.report.text.summary import reported
 from feti_homog.results import landmarks
 from feti_homog.typing import Array, Document
 
-SPIKES = 2.0  # percentage of the nodes that may exceed the value range, at either end
+SPIKES = 2.0  # percentage of the nodes that the range estimate ignores, at either end
 SHADE: dict[str, Any] = {"alpha": 0.18, "linewidth": 0}
 INK = ("#1f4e9c", "#2a7f3f", "#c44e00")
 NAMES = {"traction": (r"$t_\mathrm{n}$", r"$t_\mathrm{t}$", r"$t_\mathrm{a}$"), "jump": ("gap", "slip", "axial slip")}
@@ -45,11 +45,11 @@ def figure(cell: drawn_cell.DrawnCell, document: Document) -> Figure:
         fibre_name = f"fibre {file['interface/fibre_number'][place.nodes[0]]}"
         is_fibre = body in file["fibre/body"][:]
         row[0].set_title(fibre_name if is_fibre else f"coating of {fibre_name}", fontsize=10, loc="left")
-    for first, *others in grid.T:
+    for first, *lower_axes in grid.T:
         first.legend(frameon=False, fontsize=9, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=3)
         # The shared range ends where a few nodes at singular tips exceed all others.
         values = np.concatenate(
-            [np.asarray(line.get_ydata(), float) for axes in (first, *others) for line in axes.lines]
+            [np.asarray(line.get_ydata(), float) for axes in (first, *lower_axes) for line in axes.lines]
         )
         low, high = np.percentile(values, (SPIKES, 100.0 - SPIKES))
         low, high = 2.0 * low - high, 2.0 * high - low

@@ -12,7 +12,7 @@ LEAST_SHARE, MOST_DEVIATIONS = 0.01, 3.0
 
 
 def fit_text(document: Document) -> str:
-    """Return the tables of a fit: unknowns, their correlation, and measured beside computed values."""
+    """Return the tables of a fit: unknowns, correlations, and measured and computed values."""
     measured, is_single = document["measured"], len({datum["test"] for datum in document["measured"]}) == 1
     tests = ["" if is_single else f"test {datum['test']} " for datum in measured]
     strains = ["" if d["strain"] is None else f"({d['strain_name']} = {d['strain']:g})" for d in measured]
@@ -62,7 +62,7 @@ def scatter_text(document: Document) -> str:
     kinds, sizes, results = [name.rstrip("0123456789") for name in names], dict[str, float](), list[Document]()
     for kind, result in zip(kinds, document["results"], strict=True):
         sizes[kind] = max(sizes.get(kind, 0.0), abs(result["value"]), result["std"])
-    # More scatter than solver noise beside the largest of their kind.
+    # Only results whose scatter exceeds the solver noise of the largest result of the same kind.
     for kind, result in zip(kinds, document["results"], strict=True):
         if result["name"] in listed and tables.without_noise(result["std"], sizes[kind]) > 0:
             results.append(result)

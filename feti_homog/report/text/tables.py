@@ -89,7 +89,7 @@ class Table:
     Attributes:
         above, below: lines of the text before the heads, and after the rows; notes in HTML.
         title_in_head: in text the title stands where the first column has its head.
-        abreast: rows that stand beside each other in text, without heads; 0 for one row a line.
+        abreast: rows per line of text, without heads; 0 for one row per line with heads.
         most_columns: columns behind the first in text; more are blocks below each other, without unknown rows.
     """
 
