@@ -47,6 +47,6 @@ def _label(phase: Document, k: int) -> str:
 
 
 def _entry(phase: Document, name: str, k: int) -> tuple[Any, str]:
-    """Return an extreme value of a phase in state `k`, with its position in words."""
+    """Return the largest value of a phase quantity in state `k`, with the position as text."""
     x, y = phase[f"{name}_at"][k]
     return without_noise(phase[name][k]), f"{x:.4g}, {y:.4g}"

@@ -62,7 +62,7 @@ def scatter_text(document: Document) -> str:
     kinds, sizes, results = [name.rstrip("0123456789") for name in names], dict[str, float](), list[Document]()
     for kind, result in zip(kinds, document["results"], strict=True):
         sizes[kind] = max(sizes.get(kind, 0.0), abs(result["value"]), result["std"])
-    # Only results whose scatter exceeds the solver noise of the largest result of the same kind.
+    # Listed results have more scatter than the solver noise of the largest result of their kind.
     for kind, result in zip(kinds, document["results"], strict=True):
         if result["name"] in listed and tables.without_noise(result["std"], sizes[kind]) > 0:
             results.append(result)
