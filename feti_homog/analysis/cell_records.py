@@ -46,7 +46,7 @@ class CellInfo:
 
 @dataclass(frozen=True, kw_only=True)
 class FibreInfo:
-    """One fibre, as `fibre = N` in a case file selects it."""
+    """One fibre, with the number N of `fibre = N` in case files."""
 
     number: int = described("number in `fibre = N` of case files, from 1")
     phase: str = described("name of its phase")
@@ -198,7 +198,7 @@ class Sensitivities:
 
     @property
     def elasticities(self) -> Float:
-        """(n, p) d ln constant / d ln parameter; NaN if zero."""
+        """Return the elasticities d ln constant / d ln parameter (n, p); NaN if a value is zero."""
         values = np.where(self.constant_values == 0.0, np.nan, self.constant_values)
         return np.asarray(self.derivatives * self.parameter_values / values[:, None])
 

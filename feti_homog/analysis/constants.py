@@ -31,8 +31,8 @@ OFF = 3.0  # largest ratio of the true energy error to the estimated one
 def constants(cell: unit_cell.TornCell, secants: Mapping[str, Any]) -> dict[str, Any]:
     """Return the `Result` entries that follow from `effective_stiffness` and `thermal_stress`.  Collective.
 
-    There are no entries where faces touch without tension, because each column is then a secant under its own load,
-    nor for a plane cell with interfaces.
+    The result is empty if faces touch without tension, because each stiffness column is then a secant under a different
+    load, and for a plane cell with interfaces.
     """
     case, is_spatial = cell.case, len(cell.problems) > 1
     if "effective_stiffness_compression" in secants or (case.interfaces and not is_spatial):
@@ -52,7 +52,7 @@ def constants(cell: unit_cell.TornCell, secants: Mapping[str, Any]) -> dict[str,
 
 
 def stiffness_constants(stiffness: Float, thermal: Float | None) -> dict[str, Any]:
-    """Return the constants of a stiffness as `Result` entries.
+    """Compute the constants of a stiffness, as `Result` entries.
 
     The stiffness is (3, 3) or (6, 6), the thermal stress (6,).
     """
@@ -75,7 +75,7 @@ def _comparisons(cell: unit_cell.TornCell, fractions: Mapping[str, float]) -> di
     Estimates exist for round fibres without coatings, held in the matrix by the same bonds; springs need fibres of
     one radius.  Bounds exist for rigid bonds between transversely isotropic phases.
     """
-    from feti_homog.materials import estimates  # bonded cells in the plane have no estimates
+    from feti_homog.materials import estimates  # unused for bonded cells in the plane
 
     summary, case, has_springs = cell.summary, cell.case, phase_laws.has_springs(cell.case)
     matrix, *fibre_phases = summary.phases
@@ -88,7 +88,7 @@ def _comparisons(cell: unit_cell.TornCell, fractions: Mapping[str, float]) -> di
     entries: dict[str, Any] = {}
     is_plain = phase_names.COATING not in phases and all(bond.between is None for bond in case.interfaces)
     is_round = not any(np.isnan(radii[phase]).any() for phase in fibre_phases)  # the radii of other fibres are NaN
-    # Fibres of users' meshes are fitted to nodes: equal radii differ by rounding.
+    # Circles are fitted to the nodes of users' meshes: equal radii differ by rounding.
     is_like = not has_springs or all(np.allclose(radii[phase], radii[phase][0], atol=0.0) for phase in fibre_phases)
     if is_plain and is_round and is_like:
         fibres = []
@@ -110,8 +110,8 @@ def unit_errors(
 ) -> tuple[list[mesh_estimate.EnergyErrors], list[averaging.Response]]:
     """Estimate the mesh errors of the unit loads, problem by problem.  Collective.
 
-    Also returns the responses, with the error of each element where a later step uses it.  There are no errors if the
-    case has `mesh_error = false`.
+    Also returns the responses, with element errors if a later step uses these errors.  The list of errors is empty if
+    the case has `mesh_error = false`.
     """
     if not context.case.output.mesh_error:
         return [], responses
@@ -132,7 +132,7 @@ def mesh_error(
     of_plus: list[mesh_estimate.EnergyErrors],
     of_minus: list[mesh_estimate.EnergyErrors],
 ) -> dict[str, Any]:
-    """Return the `Result` entry `mesh_error`; nothing without estimated errors.  Collective.
+    """Return the `Result` entry `mesh_error`, or nothing without estimated errors.  Collective.
 
     The error of a constant f(C) is max(|f(C - signed) - f(C)|, |f(C - least) - f(C)|).  Notes an energy error above
     the accuracy of the case and constants outside their bounds.
@@ -162,7 +162,7 @@ def mesh_error(
 
 
 def note_accuracy(context: AnalysisContext, energy: float) -> None:
-    """Note a sufficient mesh if the energy error exceeds `accuracy`.  Collective."""
+    """Note which mesh would suffice if the energy error exceeds `accuracy`.  Collective."""
     cell = context.case.cell
     if cell.accuracy is None or (energy := context.cell.comm.bcast(energy)) <= cell.accuracy:
         return
@@ -176,7 +176,7 @@ def note_accuracy(context: AnalysisContext, energy: float) -> None:
 def _note_bounds(
     context: AnalysisContext, secants: Mapping[str, Any], values: Named, errors: Named, energy: float
 ) -> None:
-    """Note constants outside their bounds; faults beyond any mesh error.
+    """Note constants outside their bounds; record faults beyond any mesh error.
 
     No relative error of a constant exceeds `energy`, the largest relative error of the strain energy; the true error
     is at most OFF times the estimate.  A bound applies to a cell with its symmetry.
@@ -209,8 +209,8 @@ def state_error(
 ) -> tuple[dict[str, float], list[averaging.Response]]:
     """Estimate the mesh error of the energy of one state.  Collective.
 
-    Returns `mesh_error`, the error over the energy, by its name (nothing if the case has `mesh_error = false`), and the
-    responses, with the error of each element where a later step uses it.
+    Returns the entry `mesh_error`, error / energy (nothing if the case has `mesh_error = false`), and the responses,
+    with element errors if a later step uses these errors.
     """
     if not context.case.output.mesh_error:
         return {}, list(responses)
@@ -239,12 +239,12 @@ def check_accuracy(context: AnalysisContext) -> None:
 
 
 def energy_error(stiffness: Float, errors: list[mesh_estimate.EnergyErrors]) -> dict[str, float]:
-    """Return `mesh_error`, the largest relative strain energy error of a secant stiffness."""
+    """Return the entry `mesh_error`, the largest relative strain energy error of a secant stiffness."""
     return {"mesh_error": _energy(stiffness, {name: _secants(errors, name) for name in PARTS})} if errors else {}
 
 
 def _secants(errors: Sequence[mesh_estimate.EnergyErrors], name: str) -> dict[str, Float]:
-    """Return one part of the errors, `name` of PARTS, in `effective_stiffness` and `thermal_stress`."""
+    """Return the errors of `effective_stiffness` and `thermal_stress`, for one part `name` of PARTS."""
     if not errors:
         return {}
     entries = phase_laws.secants(*(getattr(error, name) for error in errors))
@@ -258,7 +258,7 @@ def _constants(stiffness: Float, heat: Float | None) -> dict[str, Float]:
     named: dict[str, Any] = {}
     for key, record in entries.items():
         named |= {key: record} if key == "thermal_expansion" else records.plain(record)
-    if compliance is not None:  # nu12 and nu13 in the axes of a ply
+    if compliance is not None:  # nu12 and nu13 in ply axes
         named |= {f"nu3{k + 1}": -compliance[2, k] / compliance[2, 2] for k in range(2)}
     return {name: np.asarray(value) for name, value in named.items() if value is not None}
 

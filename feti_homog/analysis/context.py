@@ -1,4 +1,4 @@
-"""Everything that one run of an analysis uses: the cell under its loads, checks, recorders and progress."""
+"""The context of an analysis run: the cell under its loads, checks, recorders and progress."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class CellLoads:
         return Load(np.array(values), np.array([name not in target for name in self.names]))
 
     def zero_multipliers(self) -> list[Float]:
-        """Return zero multipliers for each unit load, to start from."""
+        """Return zero multipliers for each unit load, as first iterates."""
         return [np.zeros(problem.cell.solver.rows) for problem in self.problems for _ in problem.loads]
 
     def by_problem(self, responses: Sequence[averaging.Response]) -> list[list[averaging.Response]]:
@@ -65,13 +65,13 @@ class CellLoads:
         return [problem.response(part, scale, brief) for problem, part in pairs]
 
     def undetermined(self, responses: Sequence[averaging.Response]) -> list[str]:
-        """Return the names of strains that a load leaves undetermined.  Collective."""
+        """Name the strains that a load leaves undetermined.  Collective."""
         pairs = zip(self.problems, responses, strict=True)
         masks = np.concatenate([problem.interface.undetermined(response.state) for problem, response in pairs])
         return [name for name, is_free in zip(self.names, masks, strict=True) if is_free]
 
     def excess(self, responses: Sequence[averaging.Response]) -> float:
-        """Return the ratio of strains to strains of the bonded cell.  Collective."""
+        """Return the ratio of the strains to the strains of the bonded cell.  Collective."""
         pairs = zip((problem.interface.scales for problem in self.problems), (r.state for r in responses), strict=True)
         return max(scales.excess(state.solution.strain, state.asked) for scales, state in pairs)
 
@@ -94,7 +94,7 @@ class CellLoads:
 
 @dataclass
 class AnalysisContext:
-    """One analysis run.
+    """The context of one analysis run.
 
     Attributes:
         loads: the cell under its loads.
@@ -102,8 +102,8 @@ class AnalysisContext:
         states: recorder of states.
         progress: printed lines and bars.
         directory: folder of the result, if any, where path events are stored.
-        resume: whether a path goes on from the checkpoint.
-        log: function that is called with a line about each path event.
+        resume: whether a path continues from the checkpoint.
+        log: function that receives a line about each path event.
         events: name of the file with all these lines.
         undetermined: undetermined strains at each point under one load.
         excess: largest ratio of the strains under one load to the strains of the bonded cell.
@@ -133,22 +133,22 @@ class AnalysisContext:
 
     @property
     def plane(self) -> averaging.Homogenization:
-        """The plane problem."""
+        """Return the plane problem."""
         return self.loads.problems[0]
 
     @property
     def cell(self) -> unit_cell.TornCell:
-        """The torn cell in the plane problem."""
+        """Return the torn cell of the plane problem."""
         return self.plane.cell
 
     @property
     def case(self) -> Case:
-        """The case of the cell."""
+        """Return the case of the cell."""
         return self.cell.case
 
     @property
     def recovers_again(self) -> bool:
-        """Whether interior displacements are solved for repeatedly, so that factors pay."""
+        """Return whether the run recovers interior displacements repeatedly, so that factors pay."""
         return self.states.has_place or self.case.output.sensitivities or self.case.analysis.type == "angle"
 
     def bonds(self, opening: float | None) -> BondState:
@@ -178,11 +178,11 @@ class AnalysisContext:
 
     @cached_property
     def checkpoint(self) -> checkpoints.EventsInMemory:
-        """The store of path events, in the folder or in memory.  Collective when first read."""
-        from feti_homog.results import checkpoints  # paths alone have events
+        """Return the store of path events, in the folder or in memory.  Collective when first read."""
+        from feti_homog.results import checkpoints  # only paths have events
 
         comm, jumps, room = self.cell.comm, self.cell.solver.jump_operator, checkpoints.room_of(self.case)
-        if self.directory is None:  # without fields and tips a path reads no event again
+        if self.directory is None:  # without fields and tips, a path never rereads an event
             reads_again = self.states.has_place or self.plane.law.has_toughness
             return checkpoints.EventsInMemory(comm, room if reads_again else 0)
         pieces = f"{self.cell.summary.subdomains} subdomains on {comm.size} ranks, {jumps.global_rows} multipliers"
@@ -191,18 +191,18 @@ class AnalysisContext:
 
     @cached_property
     def release_rates(self) -> energy_release.EnergyReleaseRates:
-        """Energy release rates at the tips of debonded arcs.  Collective when first read."""
+        """Return the energy release rates at the tips of debonded arcs.  Collective when first read."""
         from feti_homog.homogenization import energy_release  # bonded cells have no tips
 
         return energy_release.EnergyReleaseRates(self.cell, self.plane.interface)
 
     @cached_property
     def fibre_interfaces(self) -> averaging.FibreInterfaces:
-        """The fibre interfaces of the cell.  Collective when first read."""
+        """Return the fibre interfaces of the cell.  Collective when first read."""
         return averaging.FibreInterfaces(self.cell)
 
     def point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
-        """Return the debonding under the last plane strain, and all iterations.  Collective."""
+        """Return the entries of a point: debonding under the last plane strain, iterations.  Collective."""
         last = responses[: len(voigt.STRAINS)][-1]
         length = self.fibre_interfaces.length(last.state.status != BONDED)
         debonding = {
@@ -215,7 +215,7 @@ class AnalysisContext:
         return debonding | last.counts | {"iterations": sum(r.state.iterations for r in responses)}
 
     def loaded_point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
-        """Return means, energies and debonding of a point under one load.  Collective."""
+        """Return the means, energies and debonding of a point under one load.  Collective."""
         self.undetermined.append(self.loads.undetermined(responses))
         self.excess = max(self.excess, self.loads.excess(responses))
         energies = {
@@ -226,7 +226,7 @@ class AnalysisContext:
         return self.loads.means(responses) | energies | self.point(responses[:1]) | {"iterations": iterations}
 
     def remarks(self) -> list[str]:
-        """Return the notes and remarks on undetermined and absurd strains."""
+        """Return the notes, and remarks on undetermined and absurd strains."""
         lines, label = [*self.notes], f"[{self.case.analysis.type}]"
         if places := sorted(self.states.singularities):
             lines.append(f"largest stresses of the phases: beside {' and '.join(places)} they rise with finer elements")

@@ -1,4 +1,4 @@
-"""Text for `feti-homog check`: the run of a case on these ranks, with its cost."""
+"""The text of `feti-homog check`, which describes the run of a case on these ranks and its cost."""
 
 from collections.abc import Iterator, Sequence
 
@@ -65,9 +65,9 @@ def _cost_lines(
     subdomains: Sequence[int],
     nodes: Sequence[int],
 ) -> Iterator[str]:
-    """Yield lines about the solver, ranks and memory, of a path also to complete debonding.
+    """Yield lines about the solver, ranks and memory; for a path, also up to complete debonding.
 
-    `subdomains` and `nodes` are counted on each rank; pieces are dense by default.
+    `subdomains` and `nodes` have a count for each rank; pieces are dense by default.
 
     Raises:
         CaseError: as `solver_plan.choose`; or with friction there are no influence columns.
@@ -99,11 +99,11 @@ def _cost_lines(
 
 
 def _fibre_lines(case: Case, summary: domain_partition.CellSummary) -> Iterator[str]:
-    """Yield fibre counts and sizes: with interfaces or a table, by mixed phases, of a match."""
+    """Yield lines about the fibres: counts and sizes, mixed phases, and the match of positions."""
     if case.interface is not None or case.cell.table is not None:
         frames, sizes = summary.frames[summary.fibre_bodies], ""
         is_hollow = case.cell.table is not None and bool((case.cell.table.inner_radius > 0).any())
-        if len(frames) and np.isfinite(frames).all() and not is_hollow:  # polygons have none
+        if len(frames) and np.isfinite(frames).all() and not is_hollow:  # polygons have no frame
             radii = np.sqrt(np.abs(np.linalg.det(frames)))
             fraction = np.pi * (radii**2).sum() / (summary.width * summary.height)
             sizes = f", mean radius {radii.mean():.4g}, fraction {fraction:.4f}"

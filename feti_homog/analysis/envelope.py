@@ -22,13 +22,13 @@ from feti_homog.interface.path import onsets
 from feti_homog.materials import voigt
 from feti_homog.typing import Float, Int
 
-# Bonds times directions that are evaluated together, to bound memory.
+# Largest number of bonds times directions in one evaluation, to bound memory.
 CHUNK = 200_000
 
 
 @dataclass(frozen=True)
 class Rays:
-    """Macroscopic states on n rays, start + f direction, f >= 0.
+    """The macroscopic states on n rays, start + f direction, f >= 0.
 
     Attributes:
         strain, stress: (n, m) directions.
@@ -96,7 +96,7 @@ def rays_of(
 
 
 class _Finder:
-    """Search for the first bond that breaks on each ray."""
+    """A search for the first bond that breaks on each ray."""
 
     def __init__(
         self, context: AnalysisContext, responses: Sequence[averaging.Response], law: BondLaw, onset: onsets.Onset
@@ -113,7 +113,7 @@ class _Finder:
             tractions += [np.pad(problem.interface.traction(r.state.solution), padding) for r in group]
             column += c
         self._unit = np.stack(tractions)
-        # The law's numbers of a break, as many as tractions have components.
+        # The numbers with which the law describes a break; their count follows from the traction components.
         self._break_names = tuple(law.break_names)[: self._unit.shape[2]]
         self._chunk = max(1, CHUNK // max(1, self._comm.allreduce(self._unit.shape[1], MPI.MAX)))
         nodes = cell.solver.jump_operator.nodes
@@ -122,7 +122,7 @@ class _Finder:
         self._order = np.lexsort((np.round(self._direction, DIRECTION_DIGITS), self._pair, self._fibre))
 
     def points(self, rays: Rays) -> Iterator[dict[str, Any]]:
-        """Yield the fields of each ray's `EnvelopePoint` but its angle.  Collective."""
+        """Yield the fields of `EnvelopePoint` for each ray, without the angle.  Collective."""
         names = voigt.voigt_names(rays.strain.shape[1])[0]
         start = np.tensordot(self._unit_loads(rays.strain_before[None], rays.temperature, names), self._unit, axes=1)[0]
         used = self._onset.utilisation(start, np.arange(len(start)))
@@ -158,7 +158,7 @@ class _Finder:
                 yield point | section | dict(zip(self._break_names, shares, strict=True))
 
     def _unit_loads(self, strain: Float, temperature: float, names: Sequence[str]) -> Float:
-        """(n, l) coefficients of unit loads in strains (n, m) and temperature."""
+        """Return the coefficients (n, l) of the unit loads in strains (n, m) and temperature."""
         column = {name: strain[:, number] for number, name in enumerate(names)}
         column["temperature"] = np.full(len(strain), temperature)
         return np.stack([column[load] for load in self._loads], axis=1)

@@ -21,7 +21,7 @@ from feti_homog.interface.path import coulomb_leg, frictionless_leg, path_follow
 from feti_homog.materials import voigt
 from feti_homog.results import checkpoints, landmarks, path_curves
 
-NAMED_FIBRES = 8  # in a remark
+NAMED_FIBRES = 8  # most fibre names in a remark
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
@@ -49,7 +49,7 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
             else:
                 work.arrive(point)
                 if point.state.converged:
-                    # Teeth are many and found again at once.
+                    # The many small drops are cheap to compute again.
                     light = point.broke == 0 < point.softened
                     event = path_events.stored(point, responses, work, context.loads.interfaces)
                     context.checkpoint.write(number, *event, light=light)
@@ -62,7 +62,7 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
             bonds = f"{entry['bonded']} bonded, {entry['open'] + entry['closed']} broken"
             progress.advance(point.load_factor, f"{len(entries)} {path.method}, {bonds}")
             last = point
-            if not point.state.converged:  # an unconverged state chose the next break
+            if not point.state.converged:  # the next break would follow from an unconverged state
                 break
             if len(entries) == path.max_events and point.load_factor < 1.0:
                 context.checks.faults.append(
@@ -78,9 +78,8 @@ def _points(
 ) -> Iterator[tuple[path_points.Point, tuple[path_points.Energies, float] | None, list[averaging.Response]]]:
     """Yield each point with its responses.  Collective.
 
-    Points come first from the checkpoint, then from the load path.  Points from the checkpoint also have the energies
-    up to them.  The path ends with a fault where the cell carries the stresses no longer, or where friction has no
-    equilibrium.
+    Points come first from the checkpoint, with the energies up to each point, then from the load path.  The path ends
+    with a fault where the cell no longer carries the stresses, or where friction has no equilibrium.
 
     Raises:
         NotCarriedError: the cell carries the stresses of no point.
@@ -91,7 +90,7 @@ def _points(
     for number in range(stored_events):
         event = context.checkpoint.read(number)
         point, energies = path_events.restored(event, cell)
-        if number == stored_events - 1 and not checkpoints.has_multipliers(event):  # from which the path goes on
+        if number == stored_events - 1 and not checkpoints.has_multipliers(event):  # the path continues from this point
             point = path_events.found_again(point, cell, law)
         begin, responses = point.after, path_events.averages(event, point, context.loads)
         yield point, energies, responses
@@ -122,9 +121,9 @@ def _points(
 
 
 def _with_advice(error: NotCarriedError, place: str, path: load_sections.LoadPath) -> NotCarriedError:
-    """Return the error that ends a path, with a remedy.
+    """Add a remedy to the error that ends a path.
 
-    `place` is empty before the first point.
+    `place` names the position on the path; it is empty before the first point.
     """
     if isinstance(error, coulomb_faces.StuckError):
         more = "" if path.method == "events" else " or more increments"
@@ -143,7 +142,7 @@ def _entry(
     responses: Sequence[averaging.Response],
     work: path_events.Work,
 ) -> dict[str, Any]:
-    """Return the fields of a point's `PathPoint`.  Collective."""
+    """Return the fields of the `PathPoint` record of a point.  Collective."""
     energies, damage = work.all_equilibria, law.damage(point.state.bonds)
     entry: dict[str, Any] = {
         "load_factor": point.load_factor,
@@ -171,9 +170,10 @@ def _completed(
     entries: list[dict[str, Any]],
     last: path_points.Point,
 ) -> dict[str, Any]:
-    """Mark main points, record tips and fields, and return the entries.  Collective.
+    """Complete the entries of a finished path.  Collective.
 
-    Tips and fields belong to the kept points, all but the last of which are read from the checkpoint.
+    The function marks the main points, and records tips and fields at the kept points.  The checkpoint provides all
+    kept points but the last.
     """
     document = {"case": context.case.resolved(), "path": entries}
     marks, states = landmarks.marks(document), dict[str, Any]()
@@ -212,7 +212,7 @@ def _completed(
 def _checked(
     context: AnalysisContext, point: path_points.Point, name: str
 ) -> tuple[path_points.Point, Sequence[averaging.Response]]:
-    """Complete a point by F lambda, and check its responses.  Collective."""
+    """Complete a path point by F lambda, and check the responses.  Collective."""
     point = replace(point, state=context.loads.interfaces.completed(point.state))
     responses = context.loads.responses(point.state, point.scale)
     for response in responses:

@@ -1,4 +1,4 @@
-"""Path events: accumulated energies, arrays in the checkpoint, printed lines and progress bar."""
+"""The events of a path: accumulated energies, checkpoint arrays, printed lines and progress bar."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -19,13 +19,13 @@ from feti_homog.results import checkpoints
 from feti_homog.system.runtime import progress_bar
 
 SECONDS_A_LINE = 1.0
-# Equal steps tell the time left; the number of events is unknown.
+# Equal steps predict the remaining time; the number of events is unknown.
 STEPS_BAR = "{l_bar}{bar}| {elapsed}, {remaining} left{postfix}"
 EVENTS_BAR = "{l_bar}{bar}| {elapsed}{postfix}"
 BARS = {"events": EVENTS_BAR, "increments": STEPS_BAR}
 # Errors of the contact conditions; the last exists only with friction.
 KKT_LAWS = ("kkt_complementarity", "kkt_penetration", "kkt_tension", "kkt_friction")
-# Laws that a response may have been checked against.
+# Laws for which the responses of an event may have errors.
 LAWS = ("strain", "hill", "jump", "stress", *KKT_LAWS)
 UNCHECKED = -1.0  # the error of a law that was not checked
 EMPTY = np.zeros(0)
@@ -35,14 +35,14 @@ SUFFIXES = ("", "_axial")
 
 @dataclass
 class Work:
-    """Energies per cell area up to a point.
+    """The energies per cell area up to a path point.
 
-    Breaks lose the work of the loads less the stored energy.
+    Breaks lose the work of the loads minus the stored energy.
 
     Attributes:
-        all_equilibria: energies where every bond breaks at its own load, through the snap-back of the first leg.
-        load_controlled: loss where the load only rises on the first leg, as in a test.  A bond in a snap-back then
-            breaks at the largest load t so far and loses (t / its own load)^2 times as much, because the response
+        all_equilibria: energies if every bond breaks at its break load, through the snap-back of the first leg.
+        load_controlled: loss if the load only rises on the first leg, as in a test.  A bond in a snap-back then
+            breaks at the largest load t so far and loses (t / break load)^2 times the energy, because the response
             has degree one in the load.
     """
 
@@ -52,7 +52,7 @@ class Work:
     _largest_load: float = 0.0
 
     def arrive(self, point: path_points.Point) -> None:
-        """Add the energies between the last point and this one."""
+        """Add the energies between the last point and `point`."""
         # Loads never fall after the first leg.
         rise = self._largest_load / self._load if self._load else 1.0
         controlled = self.load_controlled + rise**2 * point.energies.released
@@ -61,7 +61,7 @@ class Work:
     def resume_from(
         self, all_equilibria: path_points.Energies, load_controlled: float, point: path_points.Point
     ) -> None:
-        """Continue from a point with the energies up to it."""
+        """Continue from a stored point, with the energies up to this point."""
         self.all_equilibria, self.load_controlled = all_equilibria, load_controlled
         self._load, self._largest_load = point.load_factor, max(point.load_factor, self._largest_load)
 
@@ -74,7 +74,7 @@ def stored(
 ) -> tuple[dict[str, Any], checkpoints.Arrays]:
     """Split a point into plain numbers and distributed arrays for the checkpoint.
 
-    A path goes on from the multipliers of its last state.
+    A resumed path continues from the multipliers of the last state.
     """
     after = point.after
     numbers: dict[str, Any] = {
@@ -113,9 +113,9 @@ def stored(
 def restored(
     event: checkpoints.Arrays, cell: coupled_interfaces.CoupledInterfaces
 ) -> tuple[path_points.Point, tuple[path_points.Energies, float]]:
-    """Rebuild a point, and the energies up to it, from its event.
+    """Rebuild a path point and the energies up to this point from an event.
 
-    Arrays that the checkpoint has no room for are empty; `found_again` computes them.
+    Arrays beyond the room of the checkpoint are empty; `found_again` computes them.
     """
     states = list[Equilibrium]()
     for suffix, interface in zip(SUFFIXES, cell.problems, strict=False):
@@ -178,16 +178,16 @@ def found_again(
 
 
 def read(context: AnalysisContext, law: BondLaw, number: int) -> tuple[checkpoints.Arrays, path_points.Point]:
-    """Read an event and its point; solve for missing multipliers.  Collective."""
+    """Read an event and rebuild its path point; solve for missing multipliers.  Collective."""
     event, cell = context.checkpoint.read(number), context.loads.interfaces
     point, _ = restored(event, cell)
     return event, point if checkpoints.has_multipliers(event) else found_again(point, cell, law)
 
 
 def resumable(context: AnalysisContext, law: BondLaw) -> int:
-    """Count the checkpoint events from which the run goes on, and drop all others.  Collective.
+    """Count the checkpoint events that a run can reuse, and drop all other events.  Collective.
 
-    A run that does not resume drops all; otherwise the events before the first invalid one count.
+    A run that does not resume drops all events; otherwise the events before the first invalid event count.
 
     Raises:
         CaseError: the checkpoint cannot be used.
@@ -241,7 +241,7 @@ def _bond_state(event: checkpoints.Arrays, suffix: str) -> BondState:
 
 
 class EventProgress:
-    """Context manager that prints path events and a progress bar.
+    """A context manager that prints path events and a progress bar.
 
     The first, the last and urgent lines are always printed, other lines at most once a second.  The bar appears only
     on a terminal.
@@ -250,20 +250,20 @@ class EventProgress:
     def __init__(
         self, progress: progress_bar.Progress, layout: str, file: str, clock: Callable[[], float] = time.monotonic
     ) -> None:
-        """Set the bar layout, STEPS_BAR or EVENTS_BAR, and the event file's name."""
+        """Set the bar layout, STEPS_BAR or EVENTS_BAR, and the name of the event file."""
         self._progress, self._layout, self._file, self._clock = progress, layout, file, clock
         self._next_line, self._held_back, self._left_out = float("-inf"), "", 0
         self._bar: Any = None
 
     def __enter__(self) -> Self:
         if self._progress.on_terminal:
-            from tqdm import tqdm  # of no use to most runs, and slow to import
+            from tqdm import tqdm  # unused in most runs, and slow to import
 
             self._bar = tqdm(total=1.0, desc="path", bar_format=self._layout, leave=False)
         return self
 
     def report(self, line: str, urgent: bool) -> None:
-        """Print or hold back a line about an event."""
+        """Print a line about an event, or hold the line back."""
         now = self._clock()
         self._left_out += bool(self._held_back)
         self._held_back = ""
@@ -274,7 +274,7 @@ class EventProgress:
             self._held_back = line
 
     def advance(self, share: float, text: str) -> None:
-        """Move the bar to a fraction of the path, with a text."""
+        """Move the bar to the fraction `share` of the path, and show a text."""
         if self._bar is not None:
             self._bar.set_postfix_str(text, refresh=False)
             self._bar.update(max(share - self._bar.n, 0.0))

@@ -49,7 +49,7 @@ def scaled(
 
 
 def _scaled(old: Record, names: tuple[str, ...], factor: float) -> Record:
-    """Multiply the fields `names` of a record by a factor; None stays."""
+    """Multiply the fields `names` of a record by a factor; None stays None."""
     values = {name: getattr(old, name) for name in names}
     changes = {name: _times(value, factor) for name, value in values.items() if value is not None}
     return replace(old, **changes)

@@ -1,4 +1,4 @@
-"""Recorders of a run: convergence and law errors of responses, states with fields."""
+"""Recorders of a run: checks of the responses (convergence, law errors), and states with fields."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -25,7 +25,7 @@ CONTACT_TOLERANCE = 1e-6
 
 @dataclass
 class CheckRecorder:
-    """Recorder of the checks of all responses.
+    """A recorder of the checks of all responses.
 
     Attributes:
         rtol: relative tolerance of the Krylov method.
@@ -78,7 +78,7 @@ class CheckRecorder:
         return min(CHECK_ERROR_PER_RTOL * self.rtol, MAX_CHECK_ERROR)
 
     def warnings(self) -> list[str]:
-        """Return a line if the solver's tolerance is looser than the checks."""
+        """Return a warning line if the solver tolerance is looser than the checks."""
         if CHECK_ERROR_PER_RTOL * self.rtol <= MAX_CHECK_ERROR:
             return []
         return [
@@ -88,13 +88,13 @@ class CheckRecorder:
 
 
 class StateRecorder:
-    """Recorder of states: their fields in a file, in memory, or nowhere, and the largest stresses of the phases.
+    """A recorder of states: fields in a file, in memory or nowhere, and the largest phase stresses.
 
     Attributes:
         has_place: whether fields are recorded.
         has_use: whether states of a path are recorded: for fields, or for the utilisation of strengths.
-        singularities: places beside which the largest stresses have no limit.
-        error: the error at which the file was given up; the run goes on without the file.
+        singularities: descriptions of points near which the largest stresses have no limit.
+        error: the write error, if any, after which the run continues without the file.
     """
 
     def __init__(
@@ -111,7 +111,7 @@ class StateRecorder:
     def record(
         self, responses: Sequence[averaging.Response | None], load_factor: float, label: str, point: int
     ) -> None:
-        """Record the next state from its response in each problem, or None.  Collective."""
+        """Record the next state from the response, or None, in each problem.  Collective."""
         plane, axial = (*responses, None)[:2]
         if self.has_use or self._cell.case.output.mesh_error:
             self._largest.append(recovered_fields.largest_stresses(self._cell, plane, axial))
@@ -135,7 +135,7 @@ class StateRecorder:
         return None if self._file is None else mpi_errors.on_root(self._cell.comm, result_json.seal, self._file.path)
 
     def _write(self, write: Callable[[field_file.FieldFile], object]) -> None:
-        """Write to the file if there is one; give it up on errors."""
+        """Write to the file, if any; after an error, continue without the file."""
         if self._file is not None:
             try:
                 write(self._file)
@@ -144,7 +144,7 @@ class StateRecorder:
                 self._say(f"warning: {error}; the remaining results are computed without it")
 
     def phase_stresses(self) -> tuple[PhaseStresses, ...] | None:
-        """Return the largest stresses of each phase in all states; None without any."""
+        """Return the largest stresses of each phase in all states; None without recorded stresses."""
         phases = dict.fromkeys(phase for state in self._largest for phase in state)
         return tuple(map(self._of_phase, phases)) or None
 

@@ -1,4 +1,4 @@
-"""The result of a case: a Python object, the content of result.json, and fields in memory."""
+"""The result of a case as a Python object: the content of result.json, and fields in memory."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Fields:
         return f"Fields({len(self.mesh.points)} nodes, {len(self.mesh.triangles)} elements, {len(self.states)} states)"
 
     def gathered(self) -> Fields | None:
-        """Gather all parts as one on rank 0; None on other ranks.  Collective."""
+        """Join the parts of all ranks on rank 0; return None on other ranks.  Collective."""
         first = self.comm.exscan(len(self.mesh.points)) or 0
         mesh = _gathered(self.comm, replace(self.mesh, triangles=self.mesh.triangles + np.int64(first)))
         fibres, interface = _gathered(self.comm, self.fibres), _gathered(self.comm, self.interface)
@@ -57,7 +57,7 @@ class Fields:
 
 
 def _gathered(comm: Intracomm, part: Part) -> Part | None:
-    """Gather all rows on rank 0, in rank order; None elsewhere.  Collective."""
+    """Gather the rows of a part on rank 0, in rank order; return None on other ranks.  Collective."""
     parts = {name: comm.gather(getattr(part, name)) for name in field_layout.tables(part)}
     if comm.rank:
         return None
@@ -67,10 +67,10 @@ def _gathered(comm: Intracomm, part: Part) -> Part | None:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)  # arrays have no single answer to "equal"
 class Result:
-    """Result of a case, equal on all ranks except for `fields`.
+    """The result of a case, equal on all ranks except for `fields`.
 
-    A printed result is a short summary, in a notebook it is tables.  The manual lists all keys of result.json; entries
-    that the analysis does not compute are None.
+    `print` shows a short summary, a notebook shows tables.  The manual lists all keys of result.json; entries that the
+    analysis does not compute are None.
 
     Attributes:
         effective_stiffness: L^ef, (3, 3) or in generalized plane strain (6, 6); its columns are the stresses under the
@@ -196,13 +196,13 @@ class Result:
 
     @property
     def document(self) -> dict[str, Any]:
-        """The content of result.json, in its order, with NumPy arrays."""
+        """Return the content of result.json in the order of the file, with NumPy arrays."""
         document: dict[str, Any] = records.plain(self)
         return document
 
     @property
     def points(self) -> dict[str, NDArray[Any]]:
-        """Arrays over n angle or path points by name.
+        """Return the values at n angle or path points, as arrays by name.
 
         `angle` or `load_factor` (n,), `strain` and `stress` (n, 3) or (n, 6), `stiffness` (n, 3, 3) or (n, 6, 6),
         `debonded_length` (n, f), `bonded`, `open`, `closed`, ... (n,), without tips; NaN where a point has no number.
@@ -215,11 +215,11 @@ class Result:
     def rising_strain(self) -> dict[str, Float]:
         """Return the response of a one-leg path to a rising load.
 
-        These are corners (v,) of the curves by name: the leading strain comes first, then all stresses.  As in a test,
-        the stress drops where bonds break, or under a prescribed stress the strain jumps, to the next stable branch.
+        The arrays (v,) by name have the corners of the curves: first the leading strain, then all stresses.  As in a
+        test, the stress drops to the next stable branch where bonds break; under a prescribed stress the strain jumps.
         Raises ValueError for any other result, and if the strain does not rise with the load.
         """
-        from feti_homog.results import path_curves  # of no use to other analyses
+        from feti_homog.results import path_curves  # unused in other analyses
 
         curve = path_curves.rising_strain(self.document)
         if curve is None or self.peak is None:
@@ -234,10 +234,10 @@ class Result:
 
         With s = sqrt(toughness / toughness in the case), s times the loads and s^2 times the toughness of every
         interface, the same events have s times the strains and stresses and s^2 times the energies, provided that
-        bonds break by energy on springs of fixed stiffness.  Fields, states and digest are left out, for no run made
-        them.  Raises ValueError for any other result, and for a toughness that is not positive.
+        bonds break by energy on springs of fixed stiffness.  The result has no fields, states and digest, which only a
+        run makes.  Raises ValueError for any other result, and for a toughness that is not positive.
         """
-        from feti_homog.analysis import path_scaling  # of paths by energy alone
+        from feti_homog.analysis import path_scaling  # used only for paths by energy
 
         case, path, peak = path_scaling.scaled(self.document, self.path or (), self.peak, toughness)
         changed = replace(self, case=case, digest="", path=path, peak=peak)

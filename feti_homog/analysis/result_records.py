@@ -1,4 +1,4 @@
-"""Records of points, tips and mesh errors in result.json; fields of `result.Result`.
+"""Records of points, tips and mesh errors in result.json, the fields of `result.Result`.
 
 Strains are [E11, E22, gamma12], stresses [S11, S22, S12], in the moduli's unit, per unit depth; in generalized
 plane strain [E11, E22, E33, gamma23, gamma13, gamma12] and [S11, S22, S33, S23, S13, S12].
@@ -26,7 +26,7 @@ DEBONDED_SHARES = "the same of the interfaces of each section [[interface]], in 
 
 @dataclass(frozen=True, kw_only=True, eq=False)  # arrays have no single answer to "equal"
 class MeshErrors:
-    """Estimated mesh errors, from the distance between recovered and element stresses."""
+    """The estimated mesh errors, from the distance between recovered and element stresses."""
 
     effective_stiffness: Float = described("error of each entry", records.STRESS, EITHER_STIFFNESS)
     effective_stiffness_compression: Float | None = described(
@@ -63,9 +63,9 @@ class Tips:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TipRates:
-    """Energy release rates at tips of arcs, at constant macroscopic strain.
+    """The energy release rates at tips of arcs, at constant macroscopic strain.
 
-    The fibres are round.  There are t pairs of a load and a tip, by load, fibre, interface and direction.
+    The fibres are round.  The t pairs of a load and a tip are sorted by load, fibre, interface and direction.
     """
 
     load: tuple[str, ...] = described(
@@ -199,7 +199,7 @@ class PathPoint:
 class Peak:
     """The largest stress on a path up to its deepest fall.
 
-    The component is that of the leading strain, the largest strain that the loads change.
+    The stress component belongs to the leading strain, the largest strain that the loads change.
     """
 
     stress_name: str = described("name of the component")
@@ -227,7 +227,7 @@ class Peak:
 
 @dataclass(frozen=True, kw_only=True)
 class LoadPoint:
-    """The equilibrium under one load, with faces debonded from the start."""
+    """The equilibrium under one load, with prescribed debonded faces."""
 
     strain: Float = described("macroscopic strain", "", EITHER, voigt.STRAINS, spatial_components=voigt.SPATIAL_STRAINS)
     stress: Float = described(
@@ -253,9 +253,9 @@ class LoadPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class EnvelopePoint:
-    """Debonding onset along one direction in a plane of stresses or strains.
+    """The debonding onset along one direction in a plane of stresses or strains.
 
-    Only `angle` is there if no load in this direction breaks a bond.
+    All fields but `angle` are missing if no load in this direction breaks a bond.
     """
 
     angle: float = described(

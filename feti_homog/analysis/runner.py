@@ -23,7 +23,7 @@ from feti_homog.system.petsc import options_database
 from feti_homog.system.runtime import process_memory, progress_bar
 from feti_homog.version import __version__
 
-# Bytes that a process keeps between cases; to release them costs a small case 10 % of its time.
+# Bytes that a process keeps between cases: their release would cost a small case 10 % of its time.
 SPARE_BYTES = 256 << 20
 AROUND_FIBRES = ("matrix", "coating")
 REMARKABLE_LOSS = 0.005  # fraction of the fibre area that straight edges cut off
@@ -34,7 +34,7 @@ def run(
 ) -> Result:
     """Run a case, write its result to `directory`, and return the result.  Collective.
 
-    `resume` goes on from the checkpoint of a path, or reads the finished result; `keep_fields` adds the fields.
+    `resume` continues from the checkpoint of a path, or reads the finished result; `keep_fields` adds the fields.
 
     Raises:
         CaseError, MeshError: before any result is written; also for another run's checkpoint and a folder in use.
@@ -42,7 +42,7 @@ def run(
     """
     progress = _begun(case, comm, quiet)
     if resume:
-        from feti_homog.analysis import stored_result  # with readers that most runs do not use
+        from feti_homog.analysis import stored_result  # loads readers that most runs do not use
 
         if mpi_errors.on_root(comm, stored_result.finished, directory, case):
             progress.say(f"{directory} holds the finished result of this case: nothing to do")
@@ -75,7 +75,7 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
 
 
 def _begun(case: Case, comm: MPI.Intracomm, quiet: bool) -> progress_bar.Progress:
-    """Print warnings and remarks about a case; return the run's progress."""
+    """Print the warnings and remarks about a case; return the progress display of the run."""
     progress = progress_bar.Progress(comm, quiet)
     for label, lines in (("warning", case.warnings()), ("remark", case.remarks())):
         for line in lines:
@@ -129,12 +129,12 @@ def _run_and_write(
         context.checkpoint.clear()
 
     def draw() -> list[Path]:
-        from feti_homog.report.plots import figures  # with Matplotlib, which other ranks do not load
+        from feti_homog.report.plots import figures  # loads Matplotlib, on this rank only
 
         return figures.plot(directory)
 
     def report() -> list[Path]:
-        from feti_homog.report import page  # with tables that other ranks do not load
+        from feti_homog.report import page  # loads tables, on this rank only
 
         return [page.write(directory)]
 
@@ -147,7 +147,7 @@ def _run_and_write(
 
 
 def _write(result: Result, directory: Path, cell: unit_cell.TornCell) -> None:
-    """Write result.json and its companions; remove files of earlier results.  Collective."""
+    """Write result.json and the other result files; remove files of earlier results.  Collective."""
     mpi_errors.on_root_only(cell.comm, result_json.write, directory, result.document)
     written = {result_json.NAME}
     if result.result_h5 is not None:
@@ -175,7 +175,7 @@ def _analyse(context: AnalysisContext) -> dict[str, Any]:
 
 
 def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields | None) -> Result:
-    """Build the result from the entries of an analysis, counts and timings.  Collective."""
+    """Build the result from the entries of an analysis, with counts and timings.  Collective."""
     cell, progress, checks = context.cell, context.progress, context.checks
     fractions = cell.fractions()
     # Straight edges cut off a part of the fibres.
@@ -224,7 +224,7 @@ def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Field
 
 
 def _print_summary(result: Result, progress: progress_bar.Progress) -> None:
-    """Print the summary on rank 0, which alone loads the tables.  Collective."""
+    """Print the summary on rank 0; other ranks do not load the tables.  Collective."""
     timings = progress.timings()
     if progress.prints:
         from feti_homog.report.text import summary

@@ -1,4 +1,4 @@
-"""Derivatives by the constants of the case, of a stiffness with its constants or of one state."""
+"""Derivatives of a stiffness and its constants, or of one state, by the constants of the case."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -79,7 +79,7 @@ def load_sensitivities(context: AnalysisContext, load: Load, responses: Sequence
 def _entry(
     values: Mapping[str, float], columns: Mapping[Constant, Sequence[float]], at_fixed_status: bool
 ) -> dict[str, Any]:
-    """Build the `Result` entry `sensitivities` from values and, for each parameter, their derivatives."""
+    """Build the `Result` entry `sensitivities` from values and their derivatives by each parameter."""
     matrix = np.array([*columns.values()]).T
     record = Sensitivities(
         parameters=tuple(name for name, _ in columns),
@@ -97,13 +97,13 @@ def _cells(context: AnalysisContext) -> list[unit_cell.TornCell]:
 
 
 def _secants(energies: Sequence[Float]) -> tuple[Float, Float | None]:
-    """Return stiffness and thermal stress from the energies in each problem."""
+    """Assemble the stiffness and the thermal stress from the energies in each problem."""
     changed = phase_laws.secants(*energies)
     return changed["stiffness"], changed.get("thermal_stress")
 
 
 def _entries(C: Float, thermal: Float | None) -> dict[str, float]:
-    """Name all entries of an unsymmetric stiffness, and normal thermal stresses."""
+    """Return the entries of an unsymmetric stiffness, and the normal thermal stresses, by name."""
     entries = {f"C{i + 1}{j + 1}": float(value) for (i, j), value in np.ndenumerate(C)}
     return entries | dict(zip(voigt.THERMAL_STRESSES[:3], map(float, [] if thermal is None else thermal), strict=False))
 

@@ -12,7 +12,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 
     Contact between debonded faces adds `effective_stiffness_compression`, with columns -Sigma(-E); debonded arcs add
     `tips` under each load; a temperature among the loads adds `thermal_stress` under a unit temperature, with contact
-    `thermal_stress_compression`.  `mesh_error` and `sensitivities` are there if the case asks for them.
+    `thermal_stress_compression`.  The case may also ask for `mesh_error` and `sensitivities`.
     """
     bonds = context.bonds(None)
     starts = context.loads.zero_multipliers()
@@ -38,7 +38,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
         document["tips"] = tip_rates(context, under, loads)
     document |= constants(context.cell, document)
     if context.case.output.sensitivities:
-        from feti_homog.analysis.sensitivities import sensitivities  # few runs ask for them
+        from feti_homog.analysis.sensitivities import sensitivities  # few runs need sensitivities
 
         document |= sensitivities(context, document, first, one_sided)
     return document | mesh_error(context, document, errors, errors_of_minus)

@@ -1,4 +1,4 @@
-"""Results in a folder: read them again, and check that they are complete and from one run."""
+"""Read stored results, and check that the files of a folder are complete and from one run."""
 
 import os
 from collections.abc import Mapping
@@ -25,14 +25,14 @@ def read(directory: Path) -> dict[str, Any]:
 
 
 def check_to_draw(directory: Path) -> None:
-    """Check that the files in `directory` can be drawn: they belong to one run.  Call on one rank.
+    """Check that the plottable files in `directory` belong to one run.  Call on one rank.
 
     The file result.h5 is required, result.json is optional.
 
     Raises:
         CaseError: result.h5 is missing, or a file is damaged, or from another program or run.
     """
-    if os.path.lexists(directory / result_json.NAME):  # a link in a circle is there, too
+    if os.path.lexists(directory / result_json.NAME):  # also true for a circular link
         read(directory)
     elif not (directory / field_file.NAME).is_file():
         raise CaseError(f"cannot read {directory / field_file.NAME}: No such file or directory")

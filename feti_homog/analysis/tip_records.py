@@ -16,14 +16,14 @@ from feti_homog.typing import Float, Int
 
 # Loads under which tips have energy release rates; "strain" is a prescribed strain.
 IN_PLANE_LOADS = (*voigt.STRAINS, "strain")
-# Decimals by which directions are sorted: rounding differs from rank to rank, and must not change the order.
+# Decimals of directions in sorts: rounding differs from rank to rank, and must not change the order.
 DIRECTION_DIGITS = 9
 
 
 def criterion_of(cell: unit_cell.TornCell, grows: bool = False) -> BondLaw:
     """Return the bond law of a cell.  Collective.
 
-    The law of released energies needs tips: debonding that `grows` makes tips, prescribed debonded faces have them.
+    The law of released energies needs tips: debonding that `grows` creates tips, prescribed debonded faces have tips.
 
     Raises:
         CaseError: tips need the inverse dual operator, which the solver does not have.
@@ -92,9 +92,9 @@ def _sections(cell: unit_cell.TornCell, pair: Float | Int) -> tuple[int, ...] | 
 
 
 def bond_directions(cell: unit_cell.TornCell) -> Float:
-    """(k,) directions from fibre centres to this rank's interface nodes.
+    """Return the directions (k,) from fibre centres to this rank's interface nodes.
 
-    In degrees above -180.  The nodes of a fibre without centre have the directions of their normals.
+    Directions are in degrees, above -180.  A node of a fibre without centre has the direction of its normal.
     """
     normal = cell.solver.jump_operator.nodes.normal
     of_normals = np.degrees(np.arctan2(normal[:, 1], normal[:, 0]))

@@ -31,7 +31,7 @@ PICTURES = {
     "sensitivities": "Relative changes of constants with each parameter",
 }
 MOST_ROWS = 60  # of a table of points
-# The page can fetch nothing, whatever is in it.
+# The policy lets the page fetch nothing, whatever the content.
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 
 
@@ -58,7 +58,7 @@ def write(directory: Path) -> Path:
 
 
 def page(document: Document, directory: Path) -> str:
-    """Return the page of a result.  Raises OSError or KeyError where its files are damaged."""
+    """Return the HTML page of a result.  Raises OSError or KeyError if the result files are damaged."""
     title, status, files = escape(title_of(document)), document["status"], resources.files("feti_homog.report")
     style = files.joinpath("page.css").read_text(encoding="utf-8")
     captions = {directory / f"{name}.png": caption for name, caption in PICTURES.items()}

@@ -37,7 +37,7 @@ def replace(path: Path, write: Callable[[Path], object]) -> Path:
 
 
 def replace_text(path: Path, text: str) -> Path:
-    """Replace a file by a text, as `replace`."""
+    """Replace a file by a text, in one step as `replace` does."""
     return replace(path, lambda part: part.write_text(text, encoding="utf-8"))
 
 
@@ -89,7 +89,7 @@ def remove_unfinished(folder: Path, names: re.Pattern[str], alone: bool = True) 
 
 
 def write_errors(path: Path) -> contextlib.AbstractContextManager[None]:
-    """Turn write errors in a block into FetiHomogError, as `file_errors`."""
+    """Turn write errors in a block into FetiHomogError, as `file_errors` does."""
     return file_errors("write", path)
 
 

@@ -28,7 +28,7 @@ from feti_homog.errors import CaseError
 from feti_homog.results import atomic
 from feti_homog.system.parallel import mpi_errors
 
-FOLDER, DROPPED, NAME = "checkpoint", "checkpoint.dropped", "events"  # the second folder while it is removed
+FOLDER, DROPPED, NAME = "checkpoint", "checkpoint.dropped", "events"  # DROPPED is the folder name during its removal
 FORMAT = 11  # raise when the content of an event changes
 HEAD = re.compile(rb"feti-homog checkpoint, format (\d+)\n")
 # Formats up to 10 had one file for each event; the pattern matches them too, and their unfinished files.
@@ -43,15 +43,15 @@ Arrays = dict[str, NDArray[Any]]
 
 
 def room_of(case: Case) -> int | None:
-    """Return the bytes of events up to which checkpoints have multipliers.
+    """Return the size limit in bytes for events with multipliers.
 
-    There is no limit, None, if all fields are kept, and with friction, where one load has many equilibria.
+    The limit is None, for no limit, if all fields are kept, and with friction, where one load has many equilibria.
     """
     return None if case.has_friction or case.output.states == "all" else WHOLE_BYTES
 
 
 class EventsInMemory:
-    """Keep distributed events in memory, for runs without files; every method is collective.
+    """A store of distributed events in memory, for runs without files; every method is collective.
 
     Attributes:
         room: bytes of events, after which further events have no multipliers; None without a limit.
@@ -61,12 +61,12 @@ class EventsInMemory:
         self.comm, self.room, self._events, self._bytes = comm, room, list[bytes](), 0
 
     def clear(self) -> int:
-        """Remove all events; return their number."""
+        """Remove all events; return the number of removed events."""
         number, self._events, self._bytes = len(self._events), [], 0
         return number
 
     def count(self) -> int:
-        """Check all events, and return their number.
+        """Check all events; return the number of events.
 
         Raises:
             CaseError: an event is unreadable or of another run.
@@ -98,16 +98,16 @@ class EventsInMemory:
         self._bytes += len(self._events[number])
 
     def _kept(self, event: Arrays, size: int) -> Arrays:
-        """Return the arrays of an event to keep after `size` bytes of events."""
+        """Select the arrays of an event to store after `size` bytes of events."""
         has_room = self.room is None or size < self.room
         return event if has_room else {name: v for name, v in event.items() if not FOUND_AGAIN.fullmatch(name)}
 
 
 class Checkpoint(EventsInMemory):
-    """Keep events in the file `directory`/checkpoint/events; rank 0 writes the file.
+    """A store of events in the file `directory`/checkpoint/events, which rank 0 writes.
 
     Attributes:
-        signature: text of case, subdomains and ranks; a run resumes only from events with its own signature.
+        signature: text of case, subdomains and ranks; a run resumes only from events with the same signature.
     """
 
     def __init__(self, directory: Path, comm: MPI.Intracomm, signature: str, room: int | None = WHOLE_BYTES) -> None:
@@ -182,12 +182,12 @@ def has_multipliers(event: Arrays) -> bool:
 
 
 def begin(signature: str) -> bytes:
-    """Return the beginning of an event file: the format, and the signature as a record."""
+    """Return the first bytes of an event file: the format, and the signature as a record."""
     return b"feti-homog checkpoint, format %d\n" % FORMAT + record(signature.encode())
 
 
 def record(content: bytes) -> bytes:
-    """Return a record: a content after its prefix."""
+    """Build a record: a prefix, then the content."""
     numbers = len(content), zlib.crc32(content)
     return PREFIX.pack(*numbers, zlib.crc32(b"%d %d" % numbers)) + content
 
@@ -243,7 +243,7 @@ def packed(event: Arrays) -> bytes:
 
 
 def unpacked(content: bytes) -> Arrays:
-    """Return the event in the content of a record."""
+    """Decompress the content of a record into an event."""
     layout, _, data = zlib.decompress(content).partition(b"\n")
     event, start = Arrays(), 0
     for name, kind, shape in json.loads(layout):
@@ -253,7 +253,7 @@ def unpacked(content: bytes) -> Arrays:
 
 
 def refuse_others(directory: Path) -> None:
-    """Check that `directory`/checkpoint is free, or holds events alone.  Call on one rank.
+    """Check that `directory`/checkpoint is missing, or contains only events.  Call on one rank.
 
     Raises:
         CaseError: the name belongs to a file, or the folder has files other than events.
@@ -274,7 +274,7 @@ def refuse_others(directory: Path) -> None:
 
 
 def remove(directory: Path) -> None:
-    """Rename the checkpoint folder, then remove it: no run finds a part.  Call on one rank.
+    """Remove the checkpoint folder, after a renaming: no run finds a partial folder.  Call on one rank.
 
     Raises:
         FetiHomogError: the folder cannot be renamed.

@@ -31,7 +31,7 @@ RESERVE = 1 << 17  # bytes of disk space for the headers that HDF5 adds
 
 @dataclass(frozen=True)
 class _Rows:
-    """Range of this rank's rows in a shared table, which has the ranks in order."""
+    """The range of this rank's rows in a shared table, ordered by rank."""
 
     start: int
     count: int
@@ -142,7 +142,7 @@ class FieldFile:
     def _bytes(self, part: Any) -> int:
         """Return the total size of the tables of a part, in bytes, over all ranks."""
         return sum(
-            (1 << 12)  # HDF5's header of a table; 0.6 KB were measured
+            (1 << 12)  # bound of HDF5's table header; the measured size is 0.6 KB
             + np.dtype(d.dtype).itemsize
             * int(np.prod(np.shape(getattr(part, name))[1:]))
             * self._rows[field_layout.rows_of(d)].total

@@ -16,7 +16,7 @@ PROGRAM = "feti_homog"
 
 @dataclass(frozen=True)
 class Header:
-    """Attributes of the file."""
+    """The attributes of the file."""
 
     title: str = described("name of the case")
     version: str = described("version of the program")
@@ -32,7 +32,7 @@ class Header:
 
 @dataclass(frozen=True)
 class MeshPart:
-    """This rank's n nodes and m triangles, one subdomain after the other; nodes are torn between these and bodies.
+    """This rank's n nodes and m triangles, one subdomain after the other; nodes are torn between subdomains and bodies.
 
     Each group of 4**refine consecutive triangles fills one coarse triangle.
     """
@@ -147,12 +147,12 @@ class StatePart:
 
 
 def tables(part: Any) -> dict[str, records.Description]:
-    """Return the fields of a part with rows, which are datasets."""
+    """Return the fields of a part that become datasets, because they have rows."""
     return {name: d for name, d in records.descriptions(part).items() if rows_of(d)}
 
 
 def attributes(part: Any) -> dict[str, Any]:
-    """Return the fields of a part without rows, which are attributes: values by name."""
+    """Return the fields of a part that become attributes, because they have no rows: values by name."""
     return {d.name or name: getattr(part, name) for name, d in records.descriptions(part).items() if not rows_of(d)}
 
 

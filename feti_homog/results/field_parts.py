@@ -1,4 +1,4 @@
-"""Convert the torn cell and its responses into the parts of result.h5 from this rank."""
+"""Convert the torn cell and its responses into this rank's parts of result.h5."""
 
 import json
 import os
@@ -170,7 +170,7 @@ def _relative(shares: Float, *responses: averaging.Response | None) -> Float32:
 
 
 def _in_axes(normal: Float, pairs: Float) -> Float:
-    """Turn normal and tangential components (k, 2) into components along x and y (k, 2)."""
+    """Rotate normal and tangential components (k, 2) into components along x and y (k, 2)."""
     tangent = np.column_stack([-normal[:, 1], normal[:, 0]])
     return np.asarray(pairs[:, :1] * normal + pairs[:, 1:] * tangent)
 

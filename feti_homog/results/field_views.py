@@ -22,7 +22,7 @@ class View:
     Attributes:
         components: number of columns; 0 for a dataset with one dimension.
         source: dataset that provides type and unit.
-        columns: for each column that is not zero, its dataset and the column there; None for all of the dataset.
+        columns: for each nonzero column, the source dataset and source column; None for the whole dataset.
         meaning: description in words.
     """
 

@@ -84,19 +84,19 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
 
 
 def stresses_of(document: path_curves.Document, peak: path_curves.Document) -> list[float]:
-    """Return the stress at each point, in the component of the peak."""
+    """Return the stress component of the peak at each point of a path."""
     component = voigt.voigt_names(len(document["path"][0]["stress"]))[1].index(peak["stress_name"])
     return [float(point["stress"][component]) for point in document["path"]]
 
 
 def fall_of(document: path_curves.Document, peak: path_curves.Document) -> float:
-    """Return the stress fall, to the valley or the end, / the largest stress."""
+    """Return the stress fall after the peak, to the valley or the end, divided by the largest stress."""
     remaining = (stresses_of(document, peak)[-1], peak.get("stress_left", peak["stress"]))
     return max(1.0 - stress / peak["stress"] for stress in remaining) if peak["stress"] else 0.0
 
 
 def name_of(document: path_curves.Document, peak: path_curves.Document) -> str:
-    """Return PEAK if the stress falls afterwards, SO_FAR for an unfinished path, else LARGEST."""
+    """Name the largest stress: PEAK if the stress falls afterwards, SO_FAR on an unfinished path, else LARGEST."""
     if "so_far" in peak:
         return SO_FAR
     return LARGEST if fall_of(document, peak) < LEAST_FALL else PEAK
@@ -139,7 +139,7 @@ def kept(points: Sequence[path_curves.Point], states: int | str, legs: int, mark
     for _, *pair in sorted(around, key=lambda drop: -drop[0]):
         if len(chosen.union(pair)) <= room:
             chosen = chosen.union(pair)
-    # Each further point divides the widest gap anew.
+    # Each further point divides the widest remaining gap.
     gaps: list[tuple[float, int, int, int]] = [(a - b, 1, a, b) for a, b in pairwise(sorted(chosen))]
     heapify(gaps)
     for _ in range(states - len(chosen)):
@@ -187,7 +187,7 @@ def _norm(values: Float, shear: float) -> Float:
 
 
 def chosen(document: path_curves.Document, rows: int, among: Sequence[int] | None = None) -> list[int]:
-    """Choose at most `rows` points of a path, or of its points `among` (rising).
+    """Choose at most `rows` points of a path, or of the path points `among` (rising).
 
     The choice has the first and last point, then landmarks, deepest drop and leg ends, each group if it fits, and
     further points at evenly spaced numbers of broken bonds.

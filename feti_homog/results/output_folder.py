@@ -69,7 +69,7 @@ def refuse_files_of_others(directory: Path) -> None:
     """Check that a run may replace the files in `directory`.  Call on one rank.
 
     Raises:
-        CaseError: a folder has the name of a result file, or the reverse, or a file with such a name is foreign.
+        CaseError: a folder has the name of a result file, or the reverse, or a foreign file has such a name.
     """
     if not directory.is_dir():
         return
@@ -80,16 +80,16 @@ def refuse_files_of_others(directory: Path) -> None:
             if kind:
                 raise CaseError(f"--out {directory}: {path.name} is {kind}, and a run writes a file of that name")
         if any(path.name.startswith("checkpoint") for path in directory.iterdir()):
-            from feti_homog.results import checkpoints  # paths alone have checkpoints
+            from feti_homog.results import checkpoints  # only paths have checkpoints
 
             checkpoints.refuse_others(directory)
         signs = [path for path in paths if path.name in SIGNS]
         # Without any sign of a run, all files that are not empty are foreign.
-        others = [path for path in signs or paths if path.stat().st_size and not (signs and _is_own(path))]
+        foreign_files = [path for path in signs or paths if path.stat().st_size and not (signs and _is_own(path))]
     except OSError as error:
         raise CaseError(f"--out {directory}: its files cannot be read: {error.strerror}") from error
-    if others:
-        raise foreign(directory, others[0].name, "run")
+    if foreign_files:
+        raise foreign(directory, foreign_files[0].name, "run")
 
 
 def foreign(directory: Path, name: str, kind: str) -> CaseError:
@@ -117,10 +117,10 @@ def _is_own(path: Path) -> bool:
 
 @contextmanager
 def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iterator[None]:
-    """Create and lock the result folder during a block.  Collective.
+    """Create the result folder, and lock the folder during a block.  Collective.
 
-    Unfinished files from earlier runs are removed, and at the end new folders that stayed empty.  On a file system
-    without locks, `say` gets a warning and the run continues without a lock.
+    Removes unfinished files from earlier runs, and at the end new folders that stayed empty.  On a file system without
+    locks, `say` gets a warning and the run continues without a lock.
 
     Raises:
         CaseError: the folder cannot be made, or another run has locked it.
@@ -162,7 +162,7 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
 
 
 def remove_other_results(directory: Path, written: Collection[str]) -> None:
-    """Remove result files with names that are not in `written`.  Call on one rank."""
+    """Remove the result files whose names are not in `written`.  Call on one rank."""
     for path in directory.iterdir():
         if RESULT_FILE.fullmatch(path.name) and path.name not in written and not path.is_dir():
             with contextlib.suppress(OSError):
@@ -203,7 +203,7 @@ def _busy(directory: Path, who: str) -> CaseError:
 
 
 class EventLog:
-    """The event log in `directory`, which rank 0 writes; the first line replaces an earlier log.
+    """The event log in a result folder, which rank 0 writes; the first line replaces an earlier log.
 
     After a write error `say` gets one warning, and the path continues without the log, which holds no results.
     """

@@ -35,7 +35,7 @@ def named_components(document: Document) -> list[int]:
 
 
 def _given(document: Document) -> list[load_sections.Strain | load_sections.MixedLoad]:
-    """Return the loads as the case in `document` gives them, with no component filled in."""
+    """Return the loads of the case in `document`, without default components."""
     section = document["case"].get("path") or document["case"]["load"]
     as_written = section.get("waypoints") or [section[name] for name in ("strain", "to") if name in section]
     return [load_sections.MixedLoad(**load) if isinstance(load, Mapping) else tuple(load) for load in as_written]
@@ -76,7 +76,7 @@ def shown_stresses(document: Document) -> list[int]:
 
 
 def what_rises(document: Document) -> str:
-    """Return "strain" if only strains rise on the first leg of a path, else "load"."""
+    """Name the rising quantity on the first leg of a path: "strain" if only strains rise, else "load"."""
     first = targets(document)[0]
     other_loads = {*voigt.plane_state_of(document).stresses, load_sections.TEMPERATURE}
     return "load" if any(first[name] for name in other_loads & first.keys()) else "strain"
@@ -127,9 +127,9 @@ def scales_with_toughness(document: Document) -> bool:
 def load_controlled(points: Sequence[Point]) -> Float:
     """Return stresses and strains (v, 2 c) at the corners of a proportional path under a rising load.
 
-    At a load t where bonds break, all bonds break that cannot carry t without the first ones. The cell then follows the
-    next stable branch, with a point at load t'. Each branch is a ray through zero, Sigma(t) = Sigma(t') t / t', and so
-    for the strains. Under a prescribed strain the stress falls; under a prescribed stress the strain jumps.
+    At a load t where bonds break, all bonds break that cannot carry t without the first bonds.  The cell then follows
+    the next stable branch, with a point at load t'.  Each branch is a ray through zero, Sigma(t) = Sigma(t') t / t', as
+    for the strains.  Under a prescribed strain the stress falls; under a prescribed stress the strain jumps.
     """
     load = np.array([point["load_factor"] for point in points])
     values = np.array([[*point["stress"], *point["strain"]] for point in points])

@@ -24,11 +24,11 @@ from feti_homog.system.runtime import described, input_files, records
 NAME = "result.json"
 KEY = "checksum"
 BLOCK = 1 << 26  # bytes of one read
-SCHEMA = 1  # version of the layout: raise when a key changes its name or meaning, or goes
+SCHEMA = 1  # version of the layout: raise when a key changes name or meaning, or disappears
 
 
 def write(directory: Path, document: Mapping[str, Any]) -> Path:
-    """Write `directory`/result.json, with its folder if needed; return its path.
+    """Write `directory`/result.json, and the folder if needed; return the file path.
 
     NumPy arrays and scalars become lists and numbers, tuples lists, paths text. The file is replaced in one
     step: a reader finds the old document or the new one. Call on one rank.
@@ -36,7 +36,7 @@ def write(directory: Path, document: Mapping[str, Any]) -> Path:
     Raises:
         FetiHomogError: a number is not finite (one line for each, with its place in the document), or the
             file cannot be written.
-        TypeError: a value has no form in JSON.
+        TypeError: a value has no JSON type.
     """
     faults = list[str]()
     content = _json_value(document, "", faults)
@@ -96,7 +96,7 @@ class DescribedColumn(NamedTuple):
 
 
 def columns(kind: type) -> Iterator[DescribedColumn]:
-    """Yield the columns of a CSV file with records of a class, for the reference."""
+    """Yield the CSV columns for records of a class, for the reference manual."""
     for name, description in _in_columns(kind).items():
         # The components in the plane are among the spatial components, in the same order.
         for component in description.spatial_components or description.components or (name,):
@@ -166,7 +166,7 @@ def loads(text: str) -> dict[str, Any]:
         return document
     stored = document.pop(KEY)
     end = _sealed("{\n}", stored)[1:]
-    if text.endswith(end) and _checksum(text[: -len(end)] + "\n}") == stored:  # as it was written
+    if text.endswith(end) and _checksum(text[: -len(end)] + "\n}") == stored:  # the text is unchanged
         return document
     if stored != _checksum(_text(document)):
         raise ValueError("it is damaged: its checksum is wrong")
@@ -175,14 +175,14 @@ def loads(text: str) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class FileSeal:
-    """Size and checksum of a file."""
+    """The size and checksum of a file."""
 
     bytes: int = described("size", records.BYTES)
     checksum: str = described("CRC-32, in hexadecimal, of the CRC-32s (32 bits, little-endian) of its blocks of 64 MiB")
 
 
 def seal(path: Path, block: int = BLOCK) -> FileSeal:
-    """Return size and checksum of a file.
+    """Return the size and checksum of a file.
 
     Call on the rank that completed the file: other ranks may still see an earlier file of that name.
 

@@ -1,4 +1,4 @@
-"""Write result.xdmf and interface.xdmf, by which ParaView reads result.h5.
+"""Write result.xdmf and interface.xdmf, which let ParaView read result.h5.
 
 The files use only features that all XDMF readers of ParaView and VTK support: whole datasets, points with a
 connectivity, tensors with nine components, one collection per file.  Readers load no texts: a state label is therefore
@@ -48,7 +48,7 @@ LISTED = {*CELL_ELEMENTS.values(), *INTERFACE_POINTS.values(), *SPATIAL_POINTS.v
 
 
 def _described(*shapes: str) -> dict[str, str]:
-    """Return the datasets of further state fields, with these shapes, by field name."""
+    """Return the datasets of the further state fields with one of the `shapes`, by field name."""
     fields = {name: d.shape for name, d in tables(StatePart).items() if f"state/K/{name}" not in LISTED}
     return {name: f"state/K/{name}" for name, shape in fields.items() if shape in shapes}
 

@@ -1,4 +1,4 @@
-"""The effective material of a result in card axes, axis 1 along the fibre; comments, numbers and names of all cards."""
+"""The effective material of a result in card axes (axis 1 along the fibre), and the text parts of all cards."""
 
 import re
 from collections.abc import Mapping
@@ -58,21 +58,21 @@ class EffectiveMaterial:
 
     @property
     def is_orthotropic(self) -> bool:
-        """Return whether the compliance and the expansion have no coupling of shears."""
+        """Return whether shears are uncoupled in the compliance and absent from the expansion."""
         shears = np.zeros(3) if self.expansion is None else self.expansion[3:]
         return not self.compliance[COUPLINGS].any() and not shears.any()
 
     @property
     def stiffness(self) -> Float:
-        """(6, 6) inverse of the compliance, symmetric."""
+        """Return the symmetric stiffness (6, 6), the inverse of the compliance."""
         inverse = np.linalg.inv(self.compliance)
         return np.asarray((inverse + inverse.T) / 2.0)
 
     @property
     def constants(self) -> dict[str, float]:
-        """E_i = 1/S_ii, nu_ij = -S_ij/S_ii (-eps_j/eps_i under stress along i) and G_ij.
+        """Return the engineering constants by name, in the order of an Abaqus card.
 
-        In the order in which Abaqus takes them.
+        E_i = 1/S_ii, nu_ij = -S_ij/S_ii (-eps_j/eps_i under stress along i) and G_ij.
         """
         S = self.compliance
         return {
@@ -83,11 +83,13 @@ class EffectiveMaterial:
 
 
 def in_axes_of_the_cell(document: Document) -> EffectiveMaterial:
-    """Return the material with stiffness and expansion as computed; orthotropic if the other entries are negligible.
+    """Return the material of a result with stiffness and expansion as computed.
+
+    The material is orthotropic if the other entries are negligible.
 
     Raises:
         CaseError: the result has no linear spatial stiffness, or did not converge.
-        KeyError, TypeError, ValueError: it is damaged.
+        KeyError, TypeError, ValueError: the result is damaged.
     """
     C = _stiffness(document)[np.ix_(ORDER, ORDER)]
     computed = document.get("thermal_expansion")
@@ -118,8 +120,8 @@ def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
     """Return the nearest transversely isotropic material of a result.
 
     Raises:
-        CaseError: the result has none, or did not converge.
-        KeyError, TypeError, ValueError: it is damaged.
+        CaseError: the result has no such material, or did not converge.
+        KeyError, TypeError, ValueError: the result is damaged.
     """
     _stiffness(document)
     computed = document["transversely_isotropic"]
@@ -151,13 +153,13 @@ def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
 
 
 def _origin(document: Document) -> dict[str, Any]:
-    """Return the attributes of a material that result.json has as they are."""
+    """Return the attributes of a material that result.json contains unchanged."""
     case = document["case"]
     return {"name": case["name"], "version": document["version"], "stress_unit": case["output"]["stress_unit"]}
 
 
 def _stiffness(document: Document) -> Float:
-    """(6, 6) in the axes of the cell, symmetric positive definite."""
+    """Return the symmetric positive definite stiffness (6, 6) in cell axes."""
     analysis = document["case"]["analysis"]
     if document["status"] != "done":
         faults = document["faults"] or ["it was not finished"]
@@ -180,7 +182,7 @@ def _stiffness(document: Document) -> Float:
 
 
 def _numbers(value: Any, shape: tuple[int, ...]) -> Float:
-    """Return the value as an array (shape).  Raises TypeError or ValueError unless it is one, with finite numbers."""
+    """Convert a value to a finite array of shape `shape`.  Raises TypeError or ValueError if that is impossible."""
     array = np.array(value, float)
     if array.shape != shape or not np.isfinite(array).all():
         raise ValueError(f"expected {' x '.join(map(str, shape))} finite numbers")
@@ -188,7 +190,7 @@ def _numbers(value: Any, shape: tuple[int, ...]) -> Float:
 
 
 def comments(material: EffectiveMaterial, mark: str) -> list[str]:
-    """Return the first lines of a card in ASCII, each behind the comment mark."""
+    """Return the comment lines at the start of a card, in ASCII."""
     stress = material.stress_unit or "the unit of the moduli in the case file"
     paragraphs = [
         f"Effective material of {material.name}, by feti_homog {material.version}.",
@@ -206,16 +208,16 @@ def comments(material: EffectiveMaterial, mark: str) -> list[str]:
 
 
 def number(value: float, width: int = 24) -> str:
-    """Return the value in at most `width` characters, at least 12, rounded if 17 digits do not fit."""
+    """Write a value in at most `width` characters, rounded if 17 digits do not fit.  `width` is at least 12."""
     value = float(value) + 0.0  # no -0.0
     forms = [repr(value), *(f"{value:.{digits}E}" for digits in range(16, 3, -1))]
     return next(form for form in forms if len(form) <= width)
 
 
 def identifier(name: str) -> str:
-    """Return the name in letters, digits and single underscores.
+    """Convert a name to letters, digits and single underscores.
 
-    It has at most 60 characters, the first of them a letter.
+    The identifier begins with a letter and has at most 60 characters.
     """
     word = re.sub(r"[\W_]+", "_", name, flags=re.ASCII)[:60].strip("_")
     return word if word[:1].isalpha() else f"material_{word}".strip("_")

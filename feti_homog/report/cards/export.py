@@ -51,7 +51,7 @@ COMPONENTS = ("11", "22", "33", "gamma23", "gamma13", "gamma12")
 
 
 def abaqus(material: effective_material.EffectiveMaterial) -> str:
-    """Return the card. Raises CaseError for an expansion with shears."""
+    """Return the Abaqus card.  Raises CaseError for an expansion with shears."""
     if material.expansion is not None and material.expansion[3:].any():
         # Abaqus' guide leaves open whether alpha12 of TYPE=ANISO is the tensor's shear or the engineering one.
         raise CaseError(
@@ -65,7 +65,10 @@ def abaqus(material: effective_material.EffectiveMaterial) -> str:
 
 
 def elastic(material: effective_material.EffectiveMaterial, anisotropic: str) -> Iterator[str]:
-    """Yield the lines of *MATERIAL and *ELASTIC; `anisotropic` is the TYPE of all 21 entries."""
+    """Yield the card lines of *MATERIAL and *ELASTIC.
+
+    An anisotropic material has TYPE=`anisotropic` and 21 entries.
+    """
     yield f"*MATERIAL, NAME={effective_material.identifier(material.name)}"
     if material.is_orthotropic:
         yield "*ELASTIC, TYPE=ENGINEERING CONSTANTS"
@@ -83,18 +86,18 @@ def elastic(material: effective_material.EffectiveMaterial, anisotropic: str) ->
 
 
 def expansion(kind: str, values: Float) -> list[str]:
-    """Return the lines of *EXPANSION with TYPE `kind`."""
+    """Return the card lines of *EXPANSION with TYPE=`kind` for the expansions `values`."""
     return [f"*EXPANSION, TYPE={kind}", *data_lines(values)]
 
 
 def data_lines(values: Iterable[float]) -> list[str]:
-    """Return the numbers, separated by commas, eight to a line."""
+    """Write the values as card lines of eight numbers, separated by commas."""
     fields = [effective_material.number(value, FIELD) for value in values]
     return [", ".join(fields[k : k + FIELDS]) for k in range(0, len(fields), FIELDS)]
 
 
 def calculix(material: effective_material.EffectiveMaterial) -> str:
-    """Return the card of CalculiX, with TYPE=ANISO for all 21 entries."""
+    """Return the CalculiX card; an anisotropic material has TYPE=ANISO."""
     lines = [*effective_material.comments(material, "**"), *elastic(material, "ANISO")]
     if material.expansion is not None and material.is_orthotropic:
         lines += expansion("ORTHO", material.expansion[:3])
@@ -104,7 +107,7 @@ def calculix(material: effective_material.EffectiveMaterial) -> str:
 
 
 def ansys(material: effective_material.EffectiveMaterial) -> str:
-    """Return the card. Raises CaseError for an expansion with shears."""
+    """Return the ANSYS card.  Raises CaseError for an expansion with shears."""
     alpha = material.expansion
     if alpha is not None and alpha[3:].any():
         raise CaseError(
@@ -132,7 +135,7 @@ def ansys(material: effective_material.EffectiveMaterial) -> str:
 
 
 def moose(material: effective_material.EffectiveMaterial) -> str:
-    """Return the card: a block [Materials]."""
+    """Return the MOOSE card, a block [Materials]."""
     name, C = effective_material.identifier(material.name), material.stiffness
     method, entries = ("symmetric9", SYMMETRIC9) if material.is_orthotropic else ("symmetric21", SYMMETRIC21)
     lines = [*effective_material.comments(material, "#"), "[Materials]"]
@@ -172,7 +175,10 @@ def _quoted(values: Iterable[float]) -> str:
 
 
 def csv_table(material: effective_material.EffectiveMaterial) -> str:
-    """Return the table: engineering constants, expansions, and the stiffness in the order [11, 22, 33, 23, 13, 12]."""
+    """Write the material as a table in CSV format.
+
+    Rows: engineering constants, expansions, and the stiffness in the order [11, 22, 33, 23, 13, 12].
+    """
     rows, unit = [CSV_COLUMNS], material.stress_unit
     for name, value in material.constants.items():
         axes = [int(digit) for digit in name if digit.isdigit()]
@@ -218,11 +224,16 @@ SYMMETRIES: dict[str, Callable[[Document], effective_material.EffectiveMaterial]
 
 
 def card(directory: Path, form: str, symmetry: str) -> str:
-    """Return the card of a result folder in format `form` (`FORMATS`) and material symmetry `symmetry` (`SYMMETRIES`).
+    """Return the material card of a result folder.
+
+    Args:
+        directory: the result folder.
+        form: the card format, a key of `FORMATS`.
+        symmetry: the material symmetry, a key of `SYMMETRIES`.
 
     Raises:
-        CaseError: there is no such format or result, it is damaged, or it has no material that the format can carry;
-            one line.
+        CaseError: the format or the result does not exist, or the result is damaged or has no material that the
+            format can carry; the message has one line.
     """
     if form not in FORMATS:
         raise CaseError(f"--format {form}".rstrip() + f": expected one of {', '.join(FORMATS)}")

@@ -1,4 +1,4 @@
-"""Pictures of the cell: cell.png, partition.png and mesh_error.png; deformed under each load.
+"""Pictures of the cell: cell.png, partition.png, mesh_error.png, and the deformed cell under each load.
 
 Fibres have the numbers N of `fibre = N` in case files.
 """
@@ -21,19 +21,22 @@ from scipy.spatial import cKDTree
 from feti_homog.report.plots import decimation, drawn_cell, plot_helpers
 from feti_homog.typing import Array, Document
 
-IN_LEGEND = 12  # phases of the legend, which would cover the cell
+IN_LEGEND = 12  # most phases in the legend, which would otherwise cover the cell
 MATRIX = "#ece8df"
 FIBRES = ("Blues", "Oranges", "Greens", "Purples", "Reds", "Greys")  # one colour map for each phase
-LEAST_SIZE = 3.0  # of the letters, in points
-LEVEL_INK, LEVEL_WIDTH = "0.15", 0.6  # of lines of equal displacement along the fibres
+LEAST_SIZE = 3.0  # points; smallest font size
+LEVEL_INK, LEVEL_WIDTH = "0.15", 0.6  # style of the contour lines of u_3
 UNDEFORMED = "0.5"
 
 
 def figure(cell: drawn_cell.DrawnCell) -> Figure:
-    """Return the materials with the fibres' numbers and, where they differ, the factors of their strengths."""
+    """Draw the materials of the cell with the fibre numbers.
+
+    The figure also has the strength factors of the fibres if these factors differ.
+    """
     drawn, attributes, fibres = cell.drawn, cell.file.attrs, cell.file["fibre"]
     phases = list(attributes["phases"])
-    # A colour map for each of the first phases, which differ most; then other tones.
+    # The first phases have a colour map each, for the largest contrast; further phases have other tones.
     tones = [0.55 - 0.25 * (k // len(FIBRES) * 0.618 % 1.0) for k in range(len(phases) - 1)]
     materials = [mpl.colormaps[FIBRES[k % len(FIBRES)]](tone) for k, tone in enumerate(tones)]
     inks = np.array([mpl.colors.to_rgba(MATRIX), *materials])
@@ -52,10 +55,13 @@ def figure(cell: drawn_cell.DrawnCell) -> Figure:
 
 
 def partition(cell: drawn_cell.DrawnCell) -> Figure:
-    """Return the parts into which the bodies are cut; a subdomain across materials has one in each body."""
+    """Draw the parts of the bodies in the subdomains.
+
+    A subdomain across several materials has one part in each body.
+    """
     drawn = cell.drawn
     parts = drawn.subdomain.max() + 1
-    # Colours of which those with near numbers differ most.
+    # Parts with close numbers get very different colours.
     colours: Array = mpl.colormaps["tab20"](np.arange(parts) * 7 % 20)
     colours[:, :3] = 0.3 + 0.7 * colours[:, :3]
     picture, axes = _outlined(cell, colours[drawn.subdomain])
@@ -66,10 +72,10 @@ def partition(cell: drawn_cell.DrawnCell) -> Figure:
 
 
 def mesh_error(cell: drawn_cell.DrawnCell) -> Figure | None:
-    """Return the cell coloured by its mesh error density; None without estimates.
+    """Draw the cell coloured by its mesh error density; return None without error estimates.
 
     Density: fraction of the strain energy error / fraction of the area, the largest over all states.  Singular tips
-    lie above the colour range, otherwise the rest would have one colour.
+    lie above the colour range: otherwise the rest of the cell would have one colour.
     """
     file, drawn = cell.file, cell.drawn
     tables = [state["mesh_error"] for state in file.get("state", {}).values() if "mesh_error" in state]
@@ -87,7 +93,7 @@ def mesh_error(cell: drawn_cell.DrawnCell) -> Figure | None:
         return None
     picture, axes = drawn_cell.figure_of(file.attrs)
     top = float(plot_helpers.value_range(density, area)[0].vmax or highest)
-    lowest = top / 10.0**4  # less, on hardly any area, is one colour
+    lowest = top / 10.0**4  # smaller densities, on hardly any area, have one colour
     colours = ScalarMappable(LogNorm(lowest, top), "magma_r")
     plot_helpers.fill_triangles(
         axes, drawn, drawn.points, np.asarray(colours.to_rgba(np.maximum(density, lowest))), edges=False
@@ -103,7 +109,7 @@ def mesh_error(cell: drawn_cell.DrawnCell) -> Figure | None:
 
 
 def _outlined(cell: drawn_cell.DrawnCell, colours: Array) -> tuple[Figure, Axes]:
-    """Return the cell with triangle colours (q, 4) and body outlines."""
+    """Draw the cell with triangle colours (q, 4) and body outlines."""
     picture, axes = drawn_cell.figure_of(cell.file.attrs)
     plot_helpers.fill_triangles(axes, cell.drawn, cell.drawn.points, colours, len(cell.drawn.triangles) <= 6000)
     plot_helpers.draw_segments(axes, cell.drawn.points[cell.borders], "black", 0.9)
@@ -120,25 +126,27 @@ def _count(number: int, one: str, many: str) -> str:
 
 
 def write_fibre_numbers(axes: Axes, cell: drawn_cell.DrawnCell, inches: float, factors: Array | None = None) -> None:
-    """Write each fibre's number on it, and on every part of a round fibre that the cell sides cut.
+    """Write the fibre numbers onto the drawn fibres.
+
+    The cell sides may cut a round fibre; every part of the fibre then gets the number.
 
     Args:
         inches: inches in the picture per unit of length.
         factors: (f,) values to write below the numbers, if any.
     """
     fibres, drawn = cell.file["fibre"], cell.drawn
-    if len(fibres["number"]) > 2000:  # none could be read
+    if len(fibres["number"]) > 2000:  # such small numbers would be illegible
         return
     period, low = np.array([cell.file.attrs[name] for name in ("width", "height")]), drawn.points.min(axis=0)
     outline = cKDTree(drawn.points[np.unique(cell.borders)])
     shifts = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2)
     tables = (fibres[name][:] for name in ("number", "body", "centre", "radius"))
     for k, (number, body, centre, radius) in enumerate(zip(*tables, strict=True)):
-        if np.isfinite(radius):  # image centres near the cell, moved into it
+        if np.isfinite(radius):  # the centres of the periodic images, moved into the cell
             images, margin = centre + shifts * period, np.minimum(0.4 * radius, 0.4 * period)
             moved = np.clip(images, low + margin, low + period - margin)
             places, room = moved[np.linalg.norm(moved - images, axis=1) <= 0.85 * radius], radius
-        else:  # the place in the body farthest from the outlines
+        else:  # the point of the body farthest from its outlines
             middles = drawn.points[drawn.triangles[drawn.body == body]].mean(axis=1)
             distance = outline.query(middles)[0]
             places, room = middles[[distance.argmax()]], distance.max()
@@ -151,10 +159,11 @@ def write_fibre_numbers(axes: Axes, cell: drawn_cell.DrawnCell, inches: float, f
 
 
 def deformed(cell: drawn_cell.DrawnCell, state: Any, document: Document) -> Figure:
-    """Return the cell in a state with a stress component in colour, and the states of its interface.
+    """Draw the deformed cell in a state, coloured by a stress component.
 
-    In the plane it is magnified, with its undeformed outline.  A shear along the fibres moves nothing in the plane:
-    lines of equal axial displacement u_3 show it.
+    The figure also has the states of the interface.  Displacements in the plane are magnified, beside the undeformed
+    outline.  A shear along the fibres moves nothing in the plane: contour lines of the axial displacement u_3 show the
+    shear.
     """
     drawn, attributes, output = cell.drawn, cell.file.attrs, document.get("case", {}).get("output", {})
     displacement, load = decimation.drawn_displacement(state, drawn), drawn_cell.LoadLabels.of(document)
@@ -195,14 +204,14 @@ def deformed(cell: drawn_cell.DrawnCell, state: Any, document: Document) -> Figu
 
 
 def is_axial(state: Any) -> bool:
-    """Return whether a state shears the cell along the fibres alone."""
+    """Return whether the only load of a state is a shear along the fibres."""
     strain = state.attrs["strain"]
     components = [*strain[[0, 1, -1]], strain[2], state.attrs["temperature"]] if len(strain) > 3 else strain
     return not np.any(components) and bool(np.any(strain))
 
 
 def draw_levels(axes: Axes, state: Any, drawn: decimation.DrawnMesh) -> float:
-    """Draw about twelve lines of equal axial displacement; returns the step between them."""
+    """Draw about twelve contour lines of the axial displacement; return the displacement step."""
     displacement: Array = decimation.nodal_values(state["axial_displacement"], drawn)
     levels = MaxNLocator(12, steps=(1, 2, 5, 10)).tick_values(displacement.min(), displacement.max())
     x, y = drawn.points.T

@@ -1,6 +1,6 @@
-"""A coarse mesh of result.h5 for pictures, with fields on it.
+"""A coarse mesh of result.h5 for pictures, with the fields on this mesh.
 
-At most about TRIANGLE_LIMIT triangles, read in blocks; outlines, values, displacements and their largest scale.
+The mesh has at most about TRIANGLE_LIMIT triangles and is read in blocks.
 """
 
 from collections.abc import Callable
@@ -14,20 +14,20 @@ from scipy.spatial import cKDTree
 from feti_homog.materials import voigt
 from feti_homog.typing import Array
 
-LEAST_AREA = 0.5  # area of a triangle in a picture / its own: at zero it would be turned over
+LEAST_AREA = 0.5  # deformed / undeformed triangle area: a triangle turns over at zero
 TRIANGLE_LIMIT = 100_000  # triangles in a picture
-SAME_PLACE = 1e-6  # distance of nodes at one place / size of the cell
+SAME_PLACE = 1e-6  # largest distance of coincident nodes / size of the cell
 QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # of a six-node triangle
 
 
 @dataclass(frozen=True)
 class DrawnMesh:
-    """Triangles of a picture: from the file, or coarser, `group` file triangles in each."""
+    """The triangles of a picture: file triangles, or coarse triangles of `group` file triangles."""
 
     block: int  # rows of a table read at once
     group: int
     pieces: int  # drawn triangles per element: 4 for a curved one
-    nodes: Array  # (p,) numbers in the file of the nodes drawn, ascending
+    nodes: Array  # (p,) file numbers of the drawn nodes, ascending
     points: Array  # (p, 2)
     triangles: Array  # (q, 3) into points
     body: Array  # (q,)
@@ -36,17 +36,17 @@ class DrawnMesh:
 
     @cached_property
     def areas(self) -> Array:
-        """(q,) areas of the triangles."""
+        """Return the areas of the triangles (q,)."""
         return np.asarray(np.abs(_determinant(_sides(self.points, self))) / 2)
 
     @cached_property
     def node_areas(self) -> Array:
-        """(p,) a third of the triangle areas around each node."""
+        """Return the nodal areas (p,), a third of the triangle areas around each node."""
         return np.bincount(self.triangles.ravel(), np.repeat(self.areas / 3, 3), len(self.points))
 
     @cached_property
     def places(self) -> Array:
-        """(p,) place number of each node in its body, whose subdomains have nodes at the same places."""
+        """Number the node positions in each body (p,): torn nodes at the same position have the same number."""
         tolerance = SAME_PLACE * np.ptp(self.points, axis=0).max()
         body = np.zeros(len(self.points), np.int64)
         body[self.triangles] = self.body[:, None]
@@ -55,9 +55,9 @@ class DrawnMesh:
 
 
 def drawn_mesh(file: Any, limit: int = TRIANGLE_LIMIT, block: int = 1 << 18) -> DrawnMesh:
-    """Return the finest nested mesh of an open result.h5 with at most `limit` triangles, or else its coarsest.
+    """Read a mesh for pictures from an open result.h5, `block` table rows at a time.
 
-    Its tables are read `block` rows at a time.
+    The mesh is the finest nested mesh with at most `limit` triangles, or else the coarsest nested mesh.
     """
     table = file["mesh/triangles"]
     refine, curved = int(file.attrs["refine"]), table.shape[1] == 6
@@ -82,29 +82,29 @@ def drawn_mesh(file: Any, limit: int = TRIANGLE_LIMIT, block: int = 1 << 18) -> 
 
 
 def nodal_values(table: Any, drawn: DrawnMesh) -> Array:
-    """Return the rows (p, 2) of a nodal table at the nodes drawn."""
+    """Return the rows (p, 2) of a nodal table at the drawn nodes."""
     return _picked(table, drawn.nodes, drawn.block)
 
 
 def triangle_means(table: Any, column: int | None, drawn: DrawnMesh) -> Array:
-    """Return element values (q,) averaged over each triangle drawn: a table column, or a table without columns."""
+    """Average a table column, or a table without columns, over the drawn triangles (q,)."""
     selection = ... if column is None else (..., column)
     means = _blocks(table, drawn.group, drawn.block, lambda rows: rows[selection].mean(axis=1))
     return np.repeat(means, drawn.pieces)
 
 
 def node_means(values: Array, drawn: DrawnMesh) -> Array:
-    """Average triangle values (q,) at the nodes drawn (p,), weighted by area, within each body."""
+    """Average triangle values (q,) at the drawn nodes (p,), weighted by area, within each body."""
     place, weights = drawn.places[drawn.triangles].ravel(), np.repeat(drawn.areas, 3)
     sums = np.bincount(place, np.repeat(values * drawn.areas, 3)) / np.bincount(place, weights)
     return np.asarray(sums[drawn.places])
 
 
 def outline_edges(drawn: DrawnMesh, label: Array) -> Array:
-    """Return the edges (e, 2) between triangles with different labels, from both sides, and along the cell border.
+    """Return the outline edges (e, 2) of the triangles with equal labels.
 
-    Nodes are torn, so an edge with one triangle is on the border of a subdomain; it has a twin in the same
-    place across the border, and none on the border of the cell.
+    An edge between two labels occurs once on either side.  Nodes are torn, so an edge with one triangle is on a
+    subdomain border; the edge has a coincident twin across that border, but no twin on the cell border.
     """
     edges = np.concatenate([drawn.triangles[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
     owner = np.tile(label, 3)
@@ -120,7 +120,7 @@ def outline_edges(drawn: DrawnMesh, label: Array) -> Array:
 
 
 def _blocks(table: Any, group: int, block: int, function: Callable[[Array], Array]) -> Array:
-    """Return `function` of each table block, with rows in groups (g, group, columns)."""
+    """Apply `function` to the blocks of a table, with rows in groups (g, group, columns); join the results."""
     step = max(group, block - block % group)
     blocks = (table[start : start + step] for start in range(0, len(table), step))
     return np.concatenate([function(rows.reshape(-1, group, *rows.shape[1:])) for rows in blocks])
@@ -136,9 +136,9 @@ def _picked(table: Any, numbers: Array, block: int) -> Array:
 
 
 def drawn_displacement(state: Any, drawn: DrawnMesh) -> Array:
-    """(p, 2) displacements u of a state at the nodes drawn.
+    """Return the displacements u of a state at the drawn nodes (p, 2).
 
-    Shifted to zero mean of u* = u - E x over the triangles drawn: the solution leaves the translation open.
+    The solution leaves the translation open; here u* = u - E x has zero mean over the drawn triangles.
     """
     displacement = nodal_values(state["displacement"], drawn)
     loads = dict(zip(voigt.voigt_names(len(state.attrs["strain"]))[0], state.attrs["strain"], strict=True))
@@ -149,11 +149,10 @@ def drawn_displacement(state: Any, drawn: DrawnMesh) -> Array:
 
 
 def largest_scale(displacement: Array, drawn: DrawnMesh) -> float:
-    """Return the largest s with det(I + s' grad u) >= LEAST_AREA in every triangle drawn for all s' up to s.
+    """Return the largest displacement factor s at which no drawn triangle turns over.
 
-    Infinity if there is none.
-
-    In each the determinant is 1 + s tr(grad u) + s^2 det(grad u).
+    For all s' up to s, det(I + s' grad u) = 1 + s' tr(grad u) + s'^2 det(grad u) >= LEAST_AREA in every drawn triangle.
+    The result is infinity without a limit.
     """
     sides, moves = _sides(drawn.points, drawn), _sides(displacement, drawn)
     area = _determinant(sides)
@@ -168,11 +167,11 @@ def largest_scale(displacement: Array, drawn: DrawnMesh) -> float:
 
 
 def _sides(values: Array, drawn: DrawnMesh) -> Array:
-    """(q, 2, 2) differences of nodal values (p, 2) along two sides of each triangle."""
+    """Return the differences (q, 2, 2) of nodal values (p, 2) along two sides of each triangle."""
     first, second, third = np.moveaxis(values[drawn.triangles], 1, 0)
     return np.stack([second - first, third - first], axis=1)
 
 
 def _determinant(rows: Array) -> Array:
-    """(q,) determinants of (q, 2, 2)."""
+    """Return the determinants (q,) of matrices (q, 2, 2)."""
     return np.asarray(rows[:, 0, 0] * rows[:, 1, 1] - rows[:, 0, 1] * rows[:, 1, 0])

@@ -1,4 +1,4 @@
-"""The deformed cell along an angle or path, side by side and animated, in one colour range."""
+"""Pictures of the deformed cell along an angle or a path: panels side by side and an animation, in one colour range."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from feti_homog.typing import Array, Document
 MAX_PANELS = 6
 MAX_FRAMES, FRAME_TIME = 24, 250  # of the animation; milliseconds
 PANEL_LIMIT = 30_000  # triangles in a panel
-WIDTH, FRAME, MOST_HEIGHT = 8.0, 3.6, 6.0  # of panels, of a cell in the animation, of a cell in either; inches
-LOADS_IN_PANEL = 2  # in a line of its title
+WIDTH, FRAME, MOST_HEIGHT = 8.0, 3.6, 6.0  # inches: all panels, an animated cell, the highest cell
+LOADS_IN_PANEL = 2  # loads in one line of a panel title
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,10 @@ class DeformedCell(drawn_cell.DrawnCell):
 
     @classmethod
     def of_states(cls, file: Any, numbers: Sequence[int], document: Document, scale: float, limit: int) -> DeformedCell:
-        """Choose a stress, by the case or to suit all states, and one colour range."""
+        """Choose one stress component and one colour range for all given states.
+
+        The case may name the component; otherwise the component suits all states.
+        """
         cell, states = drawn_cell.DrawnCell.of(file, limit), [file[f"state/{n}"] for n in numbers]
         component = plot_helpers.stress_component(document["case"]["output"].get("stress", "auto"), states)
         mark_of = landmarks.marks(document) if reported(document).is_followed else {}
@@ -54,16 +57,16 @@ class DeformedCell(drawn_cell.DrawnCell):
         return cls(**parts, labels=drawn_cell.LoadLabels.of(document))
 
     def state(self, number: int) -> Any:
-        """Return a state of the file."""
+        """Return the group of state `number` in the open result.h5."""
         return self.file[f"state/{number}"]
 
     def moved(self, number: int) -> Array:
-        """(p, 2) places of the drawn nodes."""
+        """Return the positions (p, 2) of the drawn nodes in a deformed state."""
         places: Array = self.drawn.points + self.scale * decimation.drawn_displacement(self.state(number), self.drawn)
         return places
 
     def draw(self, axes: Axes, number: int, moved: Array) -> Any:
-        """Draw the cell of a state with nodes at `moved` (p, 2); returns the coloured triangles."""
+        """Draw the cell in a state, with its nodes at `moved` (p, 2); return the coloured triangles."""
         state, (norm, colours, _) = self.state(number), self.colours
         stress = plot_helpers.nodal_stress(state, self.component, self.drawn)
         shapes = plot_helpers.shade_triangles(axes, self.drawn, moved, stress, norm, colours)
@@ -79,14 +82,14 @@ class DeformedCell(drawn_cell.DrawnCell):
         return shapes
 
     def bar(self, axes: Axes, shapes: Any) -> None:
-        """Draw the common colour bar beside axes."""
+        """Draw the common colour bar beside the axes."""
         bar = drawn_cell.bar_beside(axes, shapes, self.colours[2])
         bar.ax.tick_params(labelsize=8)
         bar.locator = MaxNLocator(6)
 
     @property
     def caption(self) -> str:
-        """Stress symbol, unit and displacement scale in words."""
+        """Describe the stress, its unit and the displacement scale in words."""
         scale = "true scale" if self.scale == 1 else f"displacement × {self.scale:g}"
         symbol = plot_helpers.STRESS_SYMBOLS[self.component]
         return f"${symbol}$ {plot_helpers.stress_label(self.file.attrs['stress_unit'])}, {scale}"
@@ -95,10 +98,12 @@ class DeformedCell(drawn_cell.DrawnCell):
 def draw_state(
     axes: Axes, out: str | Path, number: int = 0, stress: str = "auto", scale: float = 1.0, most: float | None = None
 ) -> str:
-    """Draw the deformed cell in a state of `out`/result.h5 into Matplotlib's axes; returns the caption.  On one rank.
+    """Draw the deformed cell in one stored state into Matplotlib's axes.
+
+    The state has index `number` in `out`/result.h5.  Call on one rank.  Returns the caption.
 
     `stress` is "S11", "S22" or "S12", by default along the largest strain; `scale` multiplies displacements.  Colours
-    go from minus `most` to `most`, so that pictures beside each other have one scale; by default they suit the state.
+    go from minus `most` to `most`, so that several pictures can have the same scale; by default they suit the state.
 
     `axes.get_legend_handles_labels()` has the marks of bonded, open and closed interfaces.
 
@@ -127,8 +132,8 @@ def draw_state(
 def shown_scale(file: Any, document: Document) -> float:
     """Return the displacement factor for all pictures of an angle or a path.
 
-    The case may give it; by default the largest displacement and opening are visible and no triangle turns over, but
-    it is at least 1 under a load of the case.
+    The case may give the factor; by default the largest displacement and opening are visible and no triangle turns
+    over, but the factor is at least 1 under a load of the case.
     """
     chosen = document.get("case", {}).get("output", {}).get("deformation_scale")
     if chosen is not None:
@@ -149,25 +154,28 @@ def shown_scale(file: Any, document: Document) -> float:
 
 
 def shown_states(document: Document, most: int, count: int) -> list[int]:
-    """Return the numbers of at most `most` states among `count`: by the landmarks of a path, or evenly spaced."""
+    """Choose at most `most` of the `count` states for the pictures.
+
+    The states are at the landmarks of a path, or else evenly spaced.
+    """
     if reported(document).is_followed:
         return landmarks.chosen_states(document, most, count)
     return sorted({round(k) for k in np.linspace(0, count - 1, min(most, count))})
 
 
 def panels(file: Any, document: Document, scale: float) -> Figure:
-    """Draw states beside each other: those at the landmarks of a path, or some angles."""
+    """Draw panels of several states: landmarks of a path, or angles."""
     count, analysis = len(file["state"]), reported(document)
     if analysis.is_followed:
         numbers = landmarks.landmark_states(document, MAX_PANELS, count)
-    else:  # the first of the unit loads, if there are several an angle
+    else:  # the first unit load, if an angle has several
         every = range(0, count, count // len(document[analysis.name]) or 1)
         numbers = [every[k] for k in shown_states(document, MAX_PANELS, len(every))]
     cell = DeformedCell.of_states(file, numbers, document, scale, PANEL_LIMIT)
     places = [cell.moved(number) for number in numbers]
     size = np.subtract(*_corners(places)[::-1])
     rows, columns = _grid(len(numbers), size[0] / size[1])
-    height = _inches(size, (WIDTH - 0.5) / columns)[1] + 0.55  # beside a colour bar, with a title
+    height = _inches(size, (WIDTH - 0.5) / columns)[1] + 0.55  # with room for a colour bar and a title
     figure = Figure(figsize=(WIDTH, rows * height + 0.7), layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     shapes = [cell.draw(axes, number, moved) for axes, number, moved in zip(grid, numbers, places, strict=False)]
@@ -186,13 +194,19 @@ def panels(file: Any, document: Document, scale: float) -> Figure:
 
 
 def _inches(size: Array, width: float) -> tuple[float, float]:
-    """Inches of a drawn cell with sides `size` (2,): `width` wide, but at most MOST_HEIGHT high."""
+    """Return width and height in inches for a cell with sides `size` (2,).
+
+    The drawn cell is `width` wide, but at most MOST_HEIGHT high.
+    """
     scale = min(width / size[0], MOST_HEIGHT / size[1])
     return float(scale * size[0]), float(scale * size[1])
 
 
 def _grid(panels: int, ratio: float) -> tuple[int, int]:
-    """Return rows and columns for panels with width / height `ratio`: about square, few places empty."""
+    """Choose the numbers of rows and columns for panels with width / height `ratio`.
+
+    The grid is about square and has few empty positions.
+    """
     ideal = min(math.sqrt(0.7 * panels * ratio), panels)
     grids = [(rows, -(-panels // rows)) for rows in {max(1, math.floor(ideal)), math.ceil(ideal)}]
     grids = [grid for grid in grids if grid[1] <= 3] or grids
@@ -200,7 +214,7 @@ def _grid(panels: int, ratio: float) -> tuple[int, int]:
 
 
 def animation(file: Any, document: Document, scale: float, path: Path) -> Path:
-    """Write states along the path as a film, whose frames have the layout for the last state."""
+    """Write the states along a path as an animation.  All frames have the layout for the last state."""
     numbers = shown_states(document, MAX_FRAMES, len(file["state"]))
     cell = DeformedCell.of_states(file, numbers, document, scale, 8000)
     places = [cell.moved(number) for number in numbers]
@@ -225,7 +239,7 @@ def animation(file: Any, document: Document, scale: float, path: Path) -> Path:
 
 
 def _corners(places: Sequence[Array]) -> tuple[Array, Array]:
-    """Lower left and upper right corner around all states, with a margin."""
+    """Return the lower left and upper right corners around all states, with a margin."""
     low, high = np.min([p.min(axis=0) for p in places], axis=0), np.max([p.max(axis=0) for p in places], axis=0)
     margin = 0.02 * (high - low)
     return low - margin, high + margin

@@ -1,4 +1,4 @@
-"""A cell as pictures show it: its triangles, its frame with a colour bar, its interface, and labels of its load."""
+"""The cell in pictures: triangles, frame with a colour bar, interface, and load labels."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from feti_homog.typing import Array, Document
 
 
 class NodeState(IntEnum):
-    """State of an interface node: its status in result.h5, or damaged if its bond is, but holds."""
+    """The state of an interface node: the status in result.h5, or DAMAGED for a damaged bond that holds."""
 
     BONDED = 0
     CLOSED = 1
@@ -34,20 +34,23 @@ BONDED, CLOSED, OPEN, DAMAGED = NodeState
 STATE_NAMES = {BONDED: "bonded", DAMAGED: "damaged", CLOSED: "in contact", OPEN: "open"}
 STATE_COLOURS = {BONDED: "black", CLOSED: "#ff7f0e", OPEN: "#00a14b", DAMAGED: "#9467bd"}
 STATE_WIDTHS = {BONDED: 0.8, CLOSED: 2.6, OPEN: 2.0, DAMAGED: 2.0}
-# An edge has the later of its ends' states in this order.
+# An edge has the state of that end which comes later in this order.
 ORDER = np.array(list(STATE_NAMES))
 
 
 @dataclass(frozen=True)
 class InterfaceEdges:
-    """Drawn edges on both faces of fibre-matrix interfaces, with the interface nodes at their ends."""
+    """The drawn edges on both faces of the fibre-matrix interfaces, with the interface nodes at their ends."""
 
     edges: Array  # (e, 2) drawn nodes
     nodes: Array  # (e, 2) rows of /interface
 
     @classmethod
     def of(cls, file: Any, drawn: DrawnMesh, borders: Array) -> InterfaceEdges:
-        """Find interface edges among the body outlines; /interface has one node for all its periodic images."""
+        """Find the interface edges among the body outlines.
+
+        All periodic images of an interface node have one row in /interface.
+        """
         points, period = file["interface/points"][:], np.array([file.attrs["width"], file.attrs["height"]])
         if not len(points):
             return cls(borders[:0], borders[:0])
@@ -59,18 +62,18 @@ class InterfaceEdges:
         return cls(borders[is_present], nearest.reshape(-1, 2)[is_present])
 
     def state(self, status: Array) -> Array:
-        """(e,) edge states from node states: open if an end is open, else in contact or damaged if an end is."""
+        """Return the edge states (e,) for node states (k,): open if an end is open, else in contact or damaged."""
         return np.asarray(ORDER[np.argsort(ORDER)[status[self.nodes]].max(axis=1, initial=0)])
 
     def mark(self, axes: Axes, points: Array, status: Array, magnified: float = 1.0) -> list[Line2D]:
-        """Draw the edges with nodes at `points` (p, 2); returns legend lines for the states present."""
+        """Draw the interface edges, with nodes at `points` (p, 2); return legend lines for the drawn states."""
         states = self.state(status)
         present = [kind for kind in STATE_NAMES if (states == kind).any()]
         for kind in present:
             segments = points[self.edges[states == kind]]
             cap: Literal["butt", "round"] = "butt" if kind == BONDED else "round"
             if kind != BONDED:
-                # Seen on every colour: magenta and orange are not, on red.
+                # This ink shows on every colour; magenta and orange vanish on red.
                 draw_segments(axes, segments, "white", magnified * (STATE_WIDTHS[kind] + 1.6), cap)
             draw_segments(axes, segments, STATE_COLOURS[kind], magnified * STATE_WIDTHS[kind], cap)
         return state_legend(present)
@@ -78,7 +81,7 @@ class InterfaceEdges:
 
 @dataclass(frozen=True)
 class DrawnCell:
-    """An open result.h5 with its drawn triangles, the outlines of its bodies, and its interface."""
+    """An open result.h5 with drawn triangles, body outlines and interface."""
 
     file: Any
     drawn: DrawnMesh
@@ -87,14 +90,14 @@ class DrawnCell:
 
     @classmethod
     def of(cls, file: Any, limit: int = TRIANGLE_LIMIT) -> DrawnCell:
-        """Read a cell from an open result.h5 in at most about `limit` triangles."""
+        """Read the cell of an open result.h5, coarsened to about `limit` triangles at most."""
         drawn = drawn_mesh(file, limit)
         borders = outline_edges(drawn, drawn.body)
         return cls(file, drawn, borders, InterfaceEdges.of(file, drawn, borders))
 
 
 def states_of_nodes(state: Any) -> Array:
-    """(k,) interface node states in a group of result.h5: status, or DAMAGED for damaged bonds that hold."""
+    """Return the interface node states (k,) in a state of result.h5, with DAMAGED for damaged bonds that hold."""
     status = state["status"][:]
     damage = state["damage"][:] if "damage" in state else np.zeros(len(status))
     return np.asarray(np.where((status == BONDED) & (damage > 0.0), DAMAGED, status))
@@ -105,26 +108,26 @@ def state_legend(kinds: Iterable[NodeState]) -> list[Line2D]:
 
 
 def _wrapped(points: Array, period: Array, tolerance: float) -> Array:
-    """Return the points' images in [0, period); within `tolerance` below the period they are 0."""
+    """Move points by whole periods into [0, period).  Coordinates within `tolerance` below the period become 0."""
     inside = np.mod(points, period)
     inside[inside > period - tolerance] = 0.0
     return np.asarray(inside)
 
 
 def figure_of(attributes: Any) -> tuple[Figure, Axes]:
-    """Return a figure with axes for the cell, and room for words, a legend and a colour bar."""
+    """Return a figure with axes for the cell, and room for text, a legend and a colour bar."""
     width, height = cell_size(attributes)
     figure = Figure(figsize=(width + 1.9, max(height, width / 4) + 1.2), layout="compressed")
     return figure, figure.subplots()
 
 
 def cell_scale(attributes: Any) -> float:
-    """Inches in the picture for a length unit of the cell."""
+    """Return the inches in the picture per length unit of the cell."""
     return 4.8 / max(float(attributes["width"]), float(attributes["height"]))
 
 
 def cell_size(attributes: Any) -> tuple[float, float]:
-    """Width and height of the cell in the picture, inches."""
+    """Return the width and height of the cell in the picture, in inches."""
     scale = cell_scale(attributes)
     return scale * float(attributes["width"]), scale * float(attributes["height"])
 
@@ -140,7 +143,7 @@ def label_cell_axes(axes: Axes, attributes: Any) -> None:
 
 
 def bar_beside(axes: Axes, shapes: Any, extend: str) -> Any:
-    """Return a colour bar for `shapes`, at the right of their axes.
+    """Add a colour bar for `shapes` at the right of the axes; return the bar.
 
     The bar is 1/25 of the longer side of the cell wide, as high as the cell, and at least 1/4 of the longer side high.
     """
@@ -153,11 +156,11 @@ def bar_beside(axes: Axes, shapes: Any, extend: str) -> Any:
 
 @dataclass(frozen=True)
 class LoadLabels:
-    """Load labels for the states of a result.
+    """The load labels for the states of a result.
 
     Attributes:
-        leading: component whose strain leads a path; None for other analyses.
-        least_stress: stresses up to this size are rounding.
+        leading: component of the leading strain of a path; None for other analyses.
+        least_stress: stresses up to this size are rounding errors.
         given: load of analysis "load", by name.
     """
 
@@ -167,7 +170,7 @@ class LoadLabels:
 
     @classmethod
     def of(cls, document: Document) -> LoadLabels:
-        """Make the load labels from the document of a result.json."""
+        """Create the load labels from the document of a result.json."""
         analysis = reported(document)
         if analysis.is_followed:
             largest = np.abs([point["stress"] for point in document[analysis.name]]).max()
@@ -175,9 +178,9 @@ class LoadLabels:
         return cls(given=document["case"][analysis.name]["to"] if analysis.picture else None)
 
     def words(self, attributes: Any) -> list[str]:
-        """Return visible strains and temperature of a state as formulas.
+        """Return the visible strains and the temperature of a state as formulas.
 
-        A path with many strains has the leading one and its stress, a load the components it gives.
+        A path with many strains shows the leading strain and its stress; a load shows the components in its section.
         """
         if self.given is not None:
             return [_formula(name, value) for name, value in self.given.items()]
@@ -194,7 +197,7 @@ class LoadLabels:
         return [_formula(name, value) for name, value in loads] or ["no strain"]
 
     def label(self, attributes: Any, in_line: int = 4) -> str:
-        """Join the formulas of a state, `in_line` per line."""
+        """Join the formulas of a state to a label, with `in_line` formulas per line."""
         formulas = self.words(attributes)
         return ",\n".join(", ".join(formulas[k : k + in_line]) for k in range(0, len(formulas), in_line))
 

@@ -1,4 +1,4 @@
-"""The pictures of a result folder: the modules of this package draw them, each loaded where a result needs it."""
+"""All pictures of a result folder; each module of this package is loaded only for results with its pictures."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from feti_homog.typing import Document
 
 
 def plot(directory: Path) -> list[Path]:
-    """Draw the pictures of a result folder beside its files; returns their paths.
+    """Draw the pictures of a result folder into the folder; return the picture paths.
 
     - cell.png: materials; partition.png: body parts; mesh_error.png: estimated mesh error;
     - each load: case_E11.png, case_minus_E11.png, ... (unit strains), case_temperature.png or state_K.png;
@@ -48,7 +48,7 @@ def plot(directory: Path) -> list[Path]:
 
 
 def of_fields(directory: Path, cell: drawn_cell.DrawnCell, document: Document) -> list[Path]:
-    """Draw the pictures that show the mesh or a field; returns their paths."""
+    """Draw the pictures that show the mesh or a field; return the picture paths."""
     file, report = cell.file, reported(document)
     pictures = {"cell": cell_picture.figure, "partition": cell_picture.partition, "mesh_error": cell_picture.mesh_error}
     figures = ((name, draw(cell)) for name, draw in pictures.items())
@@ -66,8 +66,8 @@ def of_fields(directory: Path, cell: drawn_cell.DrawnCell, document: Document) -
         strain = state.attrs["strain"]
         loads = dict(zip(voigt.voigt_names(len(strain))[0], strain, strict=True))
         loads["temperature"] = state.attrs.get("temperature", 0.0)
-        (load, value), *others = [load for load in loads.items() if load[1]] or [("", 0.0)]
-        is_unit = abs(value) == 1.0 and not others
+        (load, value), *further_loads = [load for load in loads.items() if load[1]] or [("", 0.0)]
+        is_unit = abs(value) == 1.0 and not further_loads
         name = f"case_{'minus_' if value < 0 else ''}{load}" if is_unit else f"state_{number}"
         figure = cell_picture.deformed(cell, state, document)
         paths.append(plot_helpers.save(figure, directory / f"{report.picture or name}.png"))

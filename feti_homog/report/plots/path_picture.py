@@ -13,11 +13,11 @@ from feti_homog.report.plots import drawn_cell, plot_helpers
 from feti_homog.results import landmarks, path_curves
 from feti_homog.typing import Array, Document
 
-ARROWS = 6  # at most, along a path
-LEGIBLE = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5}  # numbers on curves
+ARROWS = 6  # most arrows along a path
+LEGIBLE = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5}  # background of numbers on curves
 STATES = {drawn_cell.BONDED: "bonded", drawn_cell.OPEN: "open", drawn_cell.CLOSED: "closed"}
-UNLOADED = np.linspace(0.0, 1.0, 16, endpoint=False)  # shares of the first load, drawn before it
-# Of the parts of the energy.
+UNLOADED = np.linspace(0.0, 1.0, 16, endpoint=False)  # fractions of the first load, before the first point
+# Colours of the parts of the energy.
 AREAS = {
     "stored in the bodies": "#9db8de",
     "stored in springs": "#5d86c4",
@@ -29,10 +29,10 @@ AREAS = {
 
 
 def figure(document: Document) -> Figure:
-    """Draw stresses against the leading strain.
+    """Draw stresses against the leading strain, and the path against point numbers.
 
-    Below: stresses, and counts of bonded, open and closed nodes, against point numbers, as the first curve folds back.
-    Some points are numbered in all three.
+    The lower panels show stresses, and counts of bonded, open and closed nodes, against point numbers, because the
+    upper curve folds back.  All three panels number the same selected points.
     """
     points, case = document["path"], document["case"]
     component, components = path_curves.leading_component(document), path_curves.shown_stresses(document)
@@ -69,7 +69,7 @@ def figure(document: Document) -> Figure:
         plot_helpers.finish_curves(axes)
     upper.margins(y=0.12)  # room for numbers
     _number_points(upper, (middle, lower), curve, numbers, plot_helpers.INK[component])
-    if "damaged_length" in points[0]:  # of damaged bonds that hold, by softening laws
+    if "damaged_length" in points[0]:  # softening laws have damaged bonds that hold
         label = f"damaged length {plot_helpers.unit_label(case.get('output', {}).get('length_unit', ''))}".rstrip()
         _beside(lower, [sum(point["damaged_length"]) for point in points], label, style)
         lower.legend(frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.12, 1.0))
@@ -79,7 +79,10 @@ def figure(document: Document) -> Figure:
 def _stress_curves(
     axes: Axes, document: Document, strain: Array, components: Sequence[int], style: Mapping[str, Any]
 ) -> None:
-    """Draw the first leg with its snap-back; thick lines: the response to a controlled load, on all legs."""
+    """Draw the stress curves of a path.
+
+    Thin lines show the first leg with its snap-back; thick lines show the response to a controlled load, on all legs.
+    """
     points, first = document["path"], path_curves.first_leg(document)
     stress = np.array([point["stress"] for point in points])
     names = voigt.voigt_names(stress.shape[1])[1]
@@ -104,10 +107,10 @@ def _stress_curves(
 
 
 def _beside(axes: Axes, values: Sequence[float], label: str, style: Mapping[str, Any]) -> None:
-    """Draw values along a path, on an axis at the right."""
+    """Draw values along a path against a second axis at the right."""
     right = axes.twinx()
     right.plot(values, color="0.5", linestyle="--", linewidth=1.0, **style)
-    right.axhline(0.0, linestyle="none")  # from which they are measured
+    right.axhline(0.0, linestyle="none")  # extends the axis to zero
     right.set_ylabel(label, color="0.4", fontsize=8)
     right.tick_params(colors="0.4", labelsize=8)
     right.spines["top"].set_visible(False)
@@ -125,12 +128,15 @@ def _count_curves(axes: Axes, points: Sequence[Mapping[str, Any]], style: Mappin
 
 
 def _number_points(upper: Axes, below: Sequence[Axes], curve: Array, numbers: Sequence[int], ink: str) -> None:
-    """Write point numbers along a curve (points, 2), with arrows in its ink and lines in the panels below."""
+    """Write point numbers along a curve (points, 2).
+
+    The numbers have arrows in the colour `ink` to the curve, and lines in the panels below.
+    """
     style: dict[str, Any] = {"color": "0.3", "fontsize": 7, "ha": "center", "va": "center"}
     pointer: dict[str, Any] = {"arrowstyle": "-", "color": "0.3", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
     span, level = max(len(curve) - 1, 1), 0
     for number, rise in zip(numbers, np.diff(curve[numbers, 1], prepend=0.0), strict=True):
-        offset = (-6, 16) if rise >= 0.0 else (16, -12)  # off the curve at peaks and at feet of drops
+        offset = (-6, 16) if rise >= 0.0 else (16, -12)  # clear of the curve at peaks and at the ends of drops
         frame = style | {"textcoords": "offset points", "arrowprops": pointer, "bbox": LEGIBLE}
         upper.annotate(str(number), curve[number], offset, **frame)
     for place, number in enumerate(numbers):
@@ -149,10 +155,10 @@ def _number_points(upper: Axes, below: Sequence[Axes], curve: Array, numbers: Se
 
 
 def energies(document: Document) -> Figure | None:
-    """Draw energies per area, stacked over the path position; None for results without energies.
+    """Draw the energies per area as a stack over the path position.
 
-    The position is the number of earlier legs plus the load share on the leg; where the load falls, the point number,
-    below 0 before the first point.
+    The position is the number of earlier legs plus the load fraction on the leg.  If the load falls along the path, the
+    position is the point number, below 0 before the first point.  Returns None for results without energies.
     """
     points = document.get("path") or [{}]
     if "work" not in points[0]:
@@ -162,7 +168,7 @@ def energies(document: Document) -> Figure | None:
     work, stored, springs, lost, fracture, heat = (_column(points, name) for name in names)
     fracture = np.minimum(fracture, lost)
     rest = "lost in breaks" + (" beyond it" if fracture.any() else "")
-    # Their sum is the work, but for rounding.
+    # The sum of the parts is the work, except for rounding.
     parts = {"stored in the bodies": stored - springs, "stored in springs": springs, "fracture energy": fracture}
     parts |= {rest: lost - fracture, "heat of friction": heat}
     threshold = path_curves.ZERO * np.abs(stored).max()
@@ -189,6 +195,9 @@ def energies(document: Document) -> Figure | None:
 
 
 def _column(points: Sequence[Mapping[str, Any]], name: str, power: int = 2) -> Array:
-    """Return a number along the path, from the unloaded cell on; up to the first point all is linear."""
+    """Return the values of a point entry along the path, from the unloaded cell onwards.
+
+    Up to the first point the response is linear, and the values grow with the load to the power `power`.
+    """
     values = [float(point.get(name) or 0.0) for point in points]
     return np.append(values[0] * UNLOADED**power, values)

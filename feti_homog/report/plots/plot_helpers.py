@@ -1,4 +1,4 @@
-"""Parts that pictures share: their style, triangles and lines, colour ranges, labels."""
+"""Helpers of all pictures: style, triangles and lines, colour ranges, labels."""
 
 import math
 import warnings
@@ -35,17 +35,14 @@ STRESS_TABLES: dict[str, tuple[str, int | None]] = {
     "S33": ("stress_33", None),
     **{name: ("axial_stress", column) for column, name in enumerate(voigt.AXIAL_STRESSES)},
 }
-OUTLIERS = 0.005  # fraction of the area that may lie outside of a colour range, at either end
+OUTLIERS = 0.005  # area fraction that may lie outside a colour range, at either end
 INK = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d", "#8a6d00", "#0f7c8c", "#8c1d40")  # of curves
 STYLE = {"font.size": 10, "axes.titlesize": 11, "axes.linewidth": 0.8}
 DPI = 200
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write the figure as PNG without white margins.
-
-    Raises FetiHomogError if it cannot be written.
-    """
+    """Write the figure as PNG without white margins.  Raises FetiHomogError if it cannot be written."""
     with missing_letters_as_boxes():
         return atomic.replace(path, lambda part: figure.savefig(part, format="png", dpi=DPI, bbox_inches="tight"))
 
@@ -59,7 +56,7 @@ def missing_letters_as_boxes() -> Iterator[None]:
 
 
 def finish_curves(axes: Axes) -> None:
-    """Draw a faint grid behind the curves, and their legend at the right."""
+    """Add a faint grid behind the curves, and a legend at the right."""
     faint_grid(axes)
     handles, names = axes.get_legend_handles_labels()
     if handles:
@@ -67,7 +64,7 @@ def finish_curves(axes: Axes) -> None:
 
 
 def faint_grid(axes: Axes) -> None:
-    """Draw a faint grid behind axes content, and no box around."""
+    """Draw a faint grid behind the content of the axes, and remove the box."""
     axes.grid(color="0.92", linewidth=0.6)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
@@ -83,7 +80,7 @@ def fill_triangles(axes: Axes, drawn: DrawnMesh, points: Array, colours: Array, 
 
 
 def shade_triangles(axes: Axes, drawn: DrawnMesh, points: Array, values: Array, norm: Normalize, colours: str) -> Any:
-    """Draw triangles with nodes at `points` (p, 2), in smooth colours for nodal values (p,)."""
+    """Draw triangles in smooth colours for the nodal values (p,).  The nodes are at `points` (p, 2)."""
     x, y = points.T
     mesh = Triangulation(x, y, drawn.triangles)
     return axes.tripcolor(mesh, values, shading="gouraud", norm=norm, cmap=colours)
@@ -101,9 +98,13 @@ def draw_segments(
 
 
 def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, str, str]:
-    """Return colour range, colour map and the ends with values outside; zero is white if both signs matter.
+    """Choose the colour range and the colour map of a field.
 
-    Values (n,) have weights `areas` (n,), 1 by default: meshes are fine at tips, where stresses are singular.
+    Zero is white if both signs matter.  Values (n,) have weights `areas` (n,), 1 by default: meshes are fine at tips,
+    where stresses are singular.
+
+    Returns:
+        colour range, colour map, and the ends of the range beyond which values lie.
     """
     norm, extend = value_range(values, areas)
     bottom, top = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
@@ -114,16 +115,19 @@ def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, 
 
 
 def value_range(values: Array, areas: Array | None = None) -> tuple[Normalize, str]:
-    """Return the colour range and the ends beyond which values lie, at most 0.5 % of the area each.
+    """Choose the colour range of a field.
 
-    A field uniform to 1 % has one colour.
+    At most 0.5 % of the area lies beyond either end.  A field uniform to 1 % has one colour.
+
+    Returns:
+        colour range, and the ends of the range beyond which values lie.
     """
     low, high = float(values.min()), float(values.max())
     if _is_uniform(values):
         middle = 0.5 * (low + high)
         half = 0.5 * (abs(middle) or 1.0)
         return Normalize(middle - half, middle + half), "neither"
-    # As by numpy.percentile, of areas in place of values.
+    # Like numpy.percentile, weighted by area.
     order, weights = np.argsort(values), np.ones_like(values) if areas is None else areas
     below = np.cumsum(weights[order]) - weights[order]
     bottom, top = np.interp([OUTLIERS, 1.0 - OUTLIERS], below / max(float(below[-1]), 1e-300), values[order]).tolist()
@@ -142,7 +146,7 @@ def _outside(values: Array, bottom: float, top: float) -> str:
 
 
 def magnification(displacement: float, size: float, opening: float = 0.0, largest: float = math.inf) -> float:
-    """Return a displacement factor, 1, 2 or 5 times a power of ten, at most `largest`.
+    """Choose a displacement factor: 1, 2 or 5 times a power of ten, at most `largest`.
 
     The largest displacement is drawn as about a tenth of the cell size, or up to a quarter to show a narrow opening.
     """
@@ -163,7 +167,7 @@ def largest_length(vectors: Array) -> float:
 
 
 def stress_component(chosen: str, states: Sequence[Any]) -> str:
-    """Return the chosen stress, else the stress paired with the largest strain in these states.
+    """Return the chosen stress, else the stress conjugate to the largest strain of the states.
 
     Only strains with a macroscopic stress count, or all if no stress acts.
     """
@@ -175,18 +179,18 @@ def stress_component(chosen: str, states: Sequence[Any]) -> str:
 
 
 def drawn_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
-    """Return a stress component of a state in each triangle drawn (q,)."""
+    """Return a stress component of a state in the drawn triangles (q,)."""
     table, column = STRESS_TABLES[component]
     return triangle_means(state[table], column, drawn)
 
 
 def nodal_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
-    """Return a stress component at the nodes drawn (p,), averaged over triangles in the same body."""
+    """Return a stress component at the drawn nodes (p,), averaged over triangles in the same body."""
     return node_means(drawn_stress(state, component, drawn), drawn)
 
 
 def bond_limits(case: Document) -> list[str]:
-    """Describe each interface law in one line; with its phases if there are several laws."""
+    """Describe every interface law in one line, with its phases if the case has several laws."""
     bonds, output = path_curves.interface_sections({"case": case}) or [{}], case.get("output", {})
     stress, length = output.get("stress_unit", ""), output.get("length_unit", "")
     units = stress, f"{stress} {length}" if stress and length else ""
@@ -196,7 +200,7 @@ def bond_limits(case: Document) -> list[str]:
 
 
 def _limits(bond: Document, units: tuple[str, str]) -> str:
-    """Describe a law; `units` are for stresses and for energies per area."""
+    """Describe an interface law; `units` are for stresses and for energies per area."""
     criterion = bond.get("criterion", bond_laws.DEFAULT)
     symbols = [entry for entry in bond_laws.LAWS[criterion].symbols if bond.get(entry[1])]
     constants = [(symbol, key, units[0 if of_stress else 1]) for symbol, key, of_stress in symbols]
@@ -206,7 +210,7 @@ def _limits(bond: Document, units: tuple[str, str]) -> str:
 
 
 def plain(text: str) -> str:
-    """Return a user's text with dollars escaped, between which Matplotlib reads formulas."""
+    """Escape the dollar signs of a user's text, which Matplotlib would read as formula marks."""
     return text.replace("$", r"\$")
 
 
@@ -225,5 +229,5 @@ def stress_unit(case: Document) -> str:
 
 
 def title_of(case: Document, phrase: str) -> str:
-    """Return case name, if any, and `phrase`."""
+    """Return a title of the case name, if any, and `phrase`."""
     return f"{plain(case.get('name', ''))}: {phrase}".lstrip(": ")

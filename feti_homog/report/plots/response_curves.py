@@ -19,12 +19,12 @@ from feti_homog.results import path_curves
 from feti_homog.typing import Array, Document
 
 MARKS = ("o", "s", "^", "D", "v", "P", "X")
-CELL = (0.95, 0.42)  # inches of an entry
-FAINTEST = 0.005  # below which an entry has no number
+CELL = (0.95, 0.42)  # width and height of an entry, inches
+FAINTEST = 0.005  # smaller entries have no number
 
 
 def plot(directory: Path, document: Document) -> list[Path]:
-    """Draw sensitivities.png, energy.png, and angle.png, path.png or envelope.png, as far as the document has them."""
+    """Draw all pictures that need only result.json; return their paths."""
     name = reported(document).name
     pictures = {"sensitivities": sensitivities(document), "energy": path_picture.energies(document)}
     pictures |= {name: CURVES[name](document)} if name in CURVES else {}
@@ -102,14 +102,14 @@ def envelope(document: Document) -> Figure:
 
 
 def loads(points: Sequence[Document]) -> Array:
-    """(n, 2) both components at onset, NaN for directions without one."""
+    """Return both load components (n, 2) at onset; NaN in directions without onset."""
     angle = np.radians([point["angle"] for point in points])
     factor = np.array([point.get("factor", np.nan) for point in points])
     return np.asarray(factor[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1))
 
 
 def modes(points: Sequence[Document]) -> Array:
-    """(n,) mode in degrees, 0 opens and 90 shears: psi, or by traction / strength; NaN without onset."""
+    """Return the modes (n,) in degrees, 0 opening, 90 shear: psi, or from traction / strength; NaN without onset."""
     if any("psi" in point for point in points):
         return np.array([point.get("psi", np.nan) for point in points])
     normal, tangential, axial = (
@@ -120,7 +120,7 @@ def modes(points: Sequence[Document]) -> Array:
 
 
 def _limit(axes: Axes, places: Array) -> list[str]:
-    """Limit the axes to zero and loads (n, 2) not far beyond the median; returns a note on hidden loads."""
+    """Limit the axes to zero and the loads (n, 2) near the median; return a note on hidden loads."""
     size = np.linalg.norm(places, axis=1)
     usual = float(np.median(size))
     far = size > 6.0 * usual  # directions that hardly open a bond

@@ -20,14 +20,14 @@ from feti_homog.report.text.summary import reported
 from feti_homog.results import landmarks
 from feti_homog.typing import Array, Document
 
-SPIKES = 2.0  # per cent of the nodes, at either end
+SPIKES = 2.0  # percentage of the nodes that the range estimate ignores, at either end
 SHADE: dict[str, Any] = {"alpha": 0.18, "linewidth": 0}
 INK = ("#1f4e9c", "#2a7f3f", "#c44e00")
 NAMES = {"traction": (r"$t_\mathrm{n}$", r"$t_\mathrm{t}$", r"$t_\mathrm{a}$"), "jump": ("gap", "slip", "axial slip")}
 
 
 def figure(cell: drawn_cell.DrawnCell, document: Document) -> Figure:
-    """Draw tractions and jumps around the most debonded fibres, a row each."""
+    """Draw tractions and jumps around the most debonded fibres, one row per fibre."""
     file, labels, names = cell.file, drawn_cell.LoadLabels.of(document), _chosen_states(cell.file, document)
     fibre, status = file["interface/fibre"][:], file[f"state/{names[-1]}/status"][:]
     bodies, count = np.unique(fibre[status != drawn_cell.BONDED], return_counts=True)
@@ -45,11 +45,11 @@ def figure(cell: drawn_cell.DrawnCell, document: Document) -> Figure:
         fibre_name = f"fibre {file['interface/fibre_number'][place.nodes[0]]}"
         is_fibre = body in file["fibre/body"][:]
         row[0].set_title(fibre_name if is_fibre else f"coating of {fibre_name}", fontsize=10, loc="left")
-    for first, *others in grid.T:
+    for first, *lower_axes in grid.T:
         first.legend(frameon=False, fontsize=9, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=3)
         # The shared range ends where a few nodes at singular tips exceed all others.
         values = np.concatenate(
-            [np.asarray(line.get_ydata(), float) for axes in (first, *others) for line in axes.lines]
+            [np.asarray(line.get_ydata(), float) for axes in (first, *lower_axes) for line in axes.lines]
         )
         low, high = np.percentile(values, (SPIKES, 100.0 - SPIKES))
         low, high = 2.0 * low - high, 2.0 * high - low
@@ -73,11 +73,14 @@ def figure(cell: drawn_cell.DrawnCell, document: Document) -> Figure:
 
 
 def _chosen_states(file: Any, document: Document) -> list[str]:
-    """Return the states to draw: of a path its peak, and the valley after it or a late state; else one state."""
+    """Choose the states to draw.
+
+    A path has its peak, and the valley after the peak or a late state; another analysis has one state.
+    """
     names, total = sorted(file["state"], key=int), len(file["interface/points"])
     status = {name: file[f"state/{name}/status"][:] for name in names}
     partly = [name for name in names if 0 < np.count_nonzero(status[name]) < total]
-    # After all bonds are gone there is not much left to see, unless the faces touch.
+    # After the last break the tractions vanish, unless the faces touch.
     worthwhile = [name for name in names if name in partly or (status[name] == drawn_cell.CLOSED).any()]
     last = (worthwhile or names)[-1]
     if not reported(document).is_followed:
@@ -89,8 +92,11 @@ def _chosen_states(file: Any, document: Document) -> list[str]:
 
 
 def _panel(axes: Axes, states: list[Any], quantity: str, place: Coordinate) -> None:
-    """Draw tractions or jumps around a fibre, earlier states dashed, on the debonded part of the last state."""
-    # Each debonded node stands for half the distance to its neighbours.
+    """Draw tractions or jumps around a fibre, with earlier states dashed.
+
+    The background marks the debonded part in the last state.
+    """
+    # Each debonded node represents half the distance to either neighbour.
     bounds = np.r_[place.ends[0], (place.values[1:] + place.values[:-1]) / 2, place.ends[1]]
     for k, kind in enumerate(states[-1]["status"][:][place.nodes]):
         if kind != drawn_cell.BONDED:
@@ -100,7 +106,7 @@ def _panel(axes: Axes, states: list[Any], quantity: str, place: Coordinate) -> N
         if f"axial_{quantity}" in state and (axial := state[f"axial_{quantity}"][:]).any():
             values = np.column_stack([values, axial])
         values, at, turn = values[place.nodes], place.values, place.ends[1] - place.ends[0]
-        # A closed curve if nodes are all around: the gap between last and first is less than twice the others.
+        # The curve closes if the gap between the last and the first node is less than twice the other gaps.
         if place.is_direction and len(at) > 1 and at[0] + turn - at[-1] < 2.0 * np.diff(at).max():
             at = np.concatenate([at[-1:] - turn, at, at[:1] + turn])
             values = np.concatenate([values[-1:], values, values[:1]])
@@ -117,7 +123,7 @@ def _panel(axes: Axes, states: list[Any], quantity: str, place: Coordinate) -> N
 
 @dataclass(frozen=True)
 class Coordinate:
-    """Interface nodes in order along a fibre outline."""
+    """The interface nodes in order along a fibre outline, with their coordinate."""
 
     nodes: Array  # (k,) rows of /interface
     values: Array  # (k,) ascending
@@ -127,10 +133,10 @@ class Coordinate:
 
 
 def coordinate(cell: drawn_cell.DrawnCell, body: int) -> Coordinate:
-    """Return the coordinate along a body outline: on round fibres and their coatings the normal direction (degrees).
+    """Return the coordinate of the interface nodes along a body outline.
 
-    Other bodies have the arc length, counterclockwise from the node whose normal is nearest to x1; several boundaries
-    follow each other.
+    On round fibres and their coatings the coordinate is the normal direction (degrees).  On other bodies it is the arc
+    length, counterclockwise from the node whose normal is nearest to x1; several boundaries follow each other.
     """
     file, edges = cell.file, cell.interface.nodes
     of_body = np.flatnonzero(file["interface/fibre"][:] == body)
@@ -163,7 +169,7 @@ def coordinate(cell: drawn_cell.DrawnCell, body: int) -> Coordinate:
 
 
 def _lines(chain: Array, normal: Array, points: Array, period: Array) -> list[Array]:
-    """Chain edges (e, 2) to boundaries, each a counterclockwise node list.
+    """Chain edges (e, 2) to boundaries, as counterclockwise node lists.
 
     A closed boundary repeats its first node, whose normal is nearest to x1; an open one begins at an end.
     """
@@ -187,5 +193,5 @@ def _lines(chain: Array, normal: Array, points: Array, period: Array) -> list[Ar
 
 
 def _shortest(vectors: Array, period: Array) -> Array:
-    """Return vectors (..., 2) shortened by whole periods."""
+    """Shorten vectors (..., 2) by whole periods."""
     return np.asarray(vectors - period * np.round(vectors / period))

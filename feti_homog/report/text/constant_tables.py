@@ -34,7 +34,7 @@ def in_material_axes(numbers: Mapping[str, float]) -> dict[str, float]:
 
 
 def table(document: Document) -> Table:
-    """Return the constants in material axes, with their mesh errors."""
+    """Return the table of constants in material axes, with mesh errors."""
     errors = in_material_axes(mesh_errors(document))
     title = f"{engineering_constants.MATERIAL_AXES}{stress_label(document)}{'; +- error of the mesh' if errors else ''}"
     computed = constants(document)
@@ -50,7 +50,7 @@ MOST = 9  # of other constants
 
 
 def sensitivities(document: Document) -> list[Table]:
-    """Return elasticities d ln c / d ln p and derivatives dc / dp, if the case asks for sensitivities."""
+    """Return tables of elasticities d ln c / d ln p and derivatives dc / dp; none without sensitivities."""
     if (section := document.get("sensitivities")) is None:
         return []
     constants, width = section["constants"], max(map(len, section["parameters"]), default=0) + 4

@@ -15,7 +15,7 @@ ROWS = 15  # of the table
 
 
 def path_table(document: Document, limit: int | None = None) -> Table:
-    """Return totals of the path above at most `limit` rows of points, by default `ROWS`.
+    """Return the table of a path: totals above at most `limit` rows of points, by default `ROWS`.
 
     Columns: leading strain, stresses that waypoints name or that act, temperature, strains under prescribed stresses.
     """
@@ -80,10 +80,10 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
 
 
 def _path_energies(document: Document, label: str) -> list[str]:
-    """Return lines about energies along a path.
+    """Describe the energies along a path.
 
     Work of the loads, energy stored at the end, energy lost by breaks along all equilibria and under a rising load,
-    and the debonded share.
+    and the debonded fraction.
     """
     points, legs = document["path"], path_curves.legs(document)
     last = points[-1]

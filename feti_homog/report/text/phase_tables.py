@@ -11,7 +11,7 @@ STRESSES = {"principal": "principal", "von_mises": "von Mises", "hydrostatic": "
 
 
 def phase_tables(document: Document) -> list[Table]:
-    """Return the stresses and the utilisations under all loads, or in some states of a curve; nothing without them."""
+    """Return tables of phase stresses and utilisations, for all loads or selected states of a curve."""
     phases = document.get("phase_stresses", ())
     count = max((len(phase["state"]) for phase in phases), default=0)
     states: Sequence[int] = range(count)
@@ -47,6 +47,6 @@ def _label(phase: Document, k: int) -> str:
 
 
 def _entry(phase: Document, name: str, k: int) -> tuple[Any, str]:
-    """Return a value and its position in words."""
+    """Return the largest value of a phase quantity in state `k`, with the position as text."""
     x, y = phase[f"{name}_at"][k]
     return without_noise(phase[name][k]), f"{x:.4g}, {y:.4g}"

@@ -37,12 +37,12 @@ Point = Mapping[str, Any]
 
 
 def shown_entries(points: Sequence[Point]) -> dict[str, tuple[int, int]]:
-    """Return names and places of the stiffness entries that tables of an angle show."""
+    """Return the stiffness entries in angle tables: names, with row and column."""
     return ENTRIES if len(points[0]["stiffness"]) == len(voigt.STRAINS) else SPATIAL_ENTRIES
 
 
 def angle_table(document: Document, limit: int | None = None) -> Table:
-    """Return stiffnesses or stresses and interface node counts, at most `limit` angles."""
+    """Return the table of stiffnesses or stresses and interface node counts at up to `limit` angles."""
     points, stiff = document["angle"], "stiffness" in document["angle"][0]
     entries = shown_entries(points) if stiff else {}
     counted = COUNTS if len(entries) <= len(ENTRIES) else []
@@ -60,14 +60,14 @@ def angle_table(document: Document, limit: int | None = None) -> Table:
 
 
 def columns_without_noise(values: Sequence[Sequence[float]]) -> Any:
-    """Return values (n, c) with zeros in columns that hold nothing but solver noise."""
+    """Set the columns of values (n, c) to zero that contain only solver noise."""
     columns = np.array(values, float)
     is_there = np.isin(np.arange(columns.shape[1]), path_curves.components_above(path_curves.ZERO, columns))
     return np.where(is_there, columns, 0.0)
 
 
 def load_table(document: Document) -> Table:
-    """Return the equilibrium under one load: strains, stresses, energies, interface node counts."""
+    """Return the table of a load: strains, stresses, energies, interface node counts."""
     point, label = document["load"], stress_label(document)
     strain, sigma = (map(without_noise, columns_without_noise([point[name]])[0]) for name in ("strain", "stress"))
     strains, stresses = voigt.voigt_names(len(point["strain"]))
@@ -88,7 +88,7 @@ def energies(point: Point, label: str) -> list[str]:
 
 
 def debonded(document: Document, point: Point) -> list[str]:
-    """Return the debonded percentage of the interfaces, and of each phase pair if there are several."""
+    """Describe the debonded percentage of all interfaces, and of each phase pair if the case has several."""
     text = f"Debonded: {100 * point['debonded_share']:.1f} % of the interfaces"
     if "debonded_shares" in point:
         shares = zip(document["case"]["interface"], point["debonded_shares"], strict=True)
@@ -102,7 +102,7 @@ def counts(point: Point) -> list[int]:
 
 
 def envelope_table(document: Document, limit: int | None = None) -> Table:
-    """Return least and largest onset load, and the first bond to break in at most `limit` directions."""
+    """Return the table of onset loads and first breaks in at most `limit` directions."""
     section, points = document["case"]["envelope"], document["envelope"]
     axes, temperature = section["plane"], section.get("temperature")
     title = f"Onset of debonding in the plane {', '.join(axes)}"
@@ -139,14 +139,14 @@ def components(point: Point) -> tuple[float, float]:
 
 
 def tip_table(document: Document, tips: Document) -> Table:
-    """Return the tip with the largest G for each load."""
+    """Return the table with the largest-G tip for each load."""
     largest = _largest(tips)
     rows = [list(tip.values()) for tip in largest.values()]
     return Table(f"{TIP_TITLE}{toughness_label(document)}", [Column("load", 9), *_rate_columns(largest)], rows)
 
 
 def angle_tip_table(document: Document) -> list[Table]:
-    """Return the largest G for each angle and load, with all tip numbers under a single load."""
+    """Return tables of the largest G for each angle and load; a single load has all numbers of the tip."""
     largest = [(point["angle"], tips) for point in document["angle"] if (tips := _largest(point.get("tips")))]
     loads, title = dict.fromkeys(load for _, tips in largest for load in tips), TIP_TITLE + toughness_label(document)
     if len(loads) == 1:
@@ -162,7 +162,7 @@ def _largest(tips: Document | None) -> dict[str, Document]:
     names = ["load", *(column.name for column in RATES), *([SECTION.name] if tips and SECTION.name in tips else [])]
     for values in zip(*(tips[name] for name in names), strict=True) if tips else ():
         tip = dict(zip(names, values, strict=True))
-        # Of tips that are alike but for rounding, the first.
+        # The first tip wins where several differ only by rounding.
         if tip["load"] not in best or tip["G"] > best[tip["load"]]["G"] * (1 + 1e-6):
             best[tip["load"]] = tip
     return best

@@ -14,7 +14,7 @@ from feti_homog.typing import Document
 
 NAMES = Column("", -28)
 STIFF = ("C11", "C22", "C33")
-STRESS_MODULI = ("E1", "E2", "G12", "bulk", "shear")  # in the unit of the stresses; the others are ratios
+STRESS_MODULI = ("E1", "E2", "G12", "bulk", "shear")  # in the stress unit; other moduli are ratios
 ENGINEERING = ("E1", "E2", "E3", "G12", "G13", "G23", "nu12", "nu13", "nu23")
 THERMAL = {
     "thermal_stress": "thermal stress",
@@ -23,11 +23,11 @@ THERMAL = {
 }
 THIS_CELL, ITS_ERROR, LOWER, UPPER = "this cell", "error of its mesh", "lower bound", "upper bound"
 MESH_ERROR = "Mesh error, estimated"
-PAIRS = 2  # constants beside each other in text
+PAIRS = 2  # constants per line of text
 
 
 def stiffnesses(document: Document) -> list[Table]:
-    """Return L^ef, also under minus the unit strains, all entries to the last digit of the largest."""
+    """Return tables of L^ef, also under minus the unit strains.  All entries have the decimals of the largest entry."""
     titles = {"effective_stiffness": "Effective stiffness", "effective_stiffness_compression": "Under minus E"}
     tables, errors, label = list[Table](), _errors(document), stress_label(document)
     for key, title in titles.items():
@@ -46,7 +46,7 @@ def _errors(document: Document) -> Document:
 
 
 def value_and_error(value: float, error: float | None, form: str) -> tuple[str, str]:
-    """Return a constant and its error as texts.
+    """Write a constant and its mesh error as texts.
 
     The error has two digits, the constant as many decimals; without an error the constant has format `form`.
     """
@@ -83,7 +83,7 @@ def _matrix(title: str, rows: Sequence[Sequence[float]], fixed: str = "") -> Tab
 
 
 def thermal(document: Document) -> list[Table]:
-    """Return thermal constants: a row per component, a column per known quantity."""
+    """Return tables of the thermal constants: a row per component, a column per known quantity."""
     present = {key: title for key, title in THERMAL.items() if document.get(key) is not None}
     names = [stress[1:] for stress in voigt.SPATIAL_STRESSES]
     errors = {key: _errors(document)[key] for key in present if _errors(document).get(key) is not None}
@@ -97,7 +97,7 @@ def thermal(document: Document) -> list[Table]:
 
 
 def moduli(document: Document) -> Table:
-    """Return engineering moduli of the plane state: in text moduli left, ratios right."""
+    """Return a table of the engineering moduli in the plane; text has moduli at the left, ratios at the right."""
     values, errors = document["moduli"], _errors(document).get("constants", {})
     sides = [name for name in values if name in STRESS_MODULI], [name for name in values if name not in STRESS_MODULI]
     names = [name for pair in zip_longest(*sides) for name in pair if name is not None]
@@ -106,7 +106,7 @@ def moduli(document: Document) -> Table:
 
 
 def bounds(document: Document) -> Table:
-    """Return lower bound, computed value and upper bound; values outside are marked."""
+    """Return a table of computed constants between their bounds; values outside are marked."""
     if not document.get("bounds"):
         return Table("Bounds: none of cells with voids", [], [])
     limits, computed, rows = document["bounds"], document["effective_stiffness"], []
@@ -114,7 +114,7 @@ def bounds(document: Document) -> Table:
         lower, value, upper = limits["reuss"][i][i], computed[i][i], limits["voigt"][i][i]
         inside = lower - 1e-9 * abs(lower) <= value <= upper + 1e-9 * abs(upper)
         rows.append([f"{name} Reuss, Voigt", lower, value, upper, *([] if inside else ["outside"])])
-    # These hold for isotropic cells only, so a value outside is no fault.
+    # These bounds hold for isotropic cells only, so a value outside is no fault.
     for name, (lower, upper) in (limits["hashin_shtrikman"] or {}).items():
         rows.append([f"{name} Hashin-Shtr.", lower, document["moduli"][name], upper])
     columns = [NAMES, *(Column(name, 14, ".7g") for name in ("lower", "computed", "upper"))]
@@ -123,7 +123,10 @@ def bounds(document: Document) -> Table:
 
 
 def constants(document: Document) -> list[Table]:
-    """Return engineering constants in space; constants about the fibres with estimates and bounds."""
+    """Return tables of the engineering constants in space.
+
+    Constants about the fibre axis have estimates and bounds.
+    """
     tables, values = list[Table](), document.get("constants")
     errors, label = _errors(document).get("constants", {}), stress_label(document)
     if values is not None:
@@ -131,7 +134,7 @@ def constants(document: Document) -> list[Table]:
         tables.append(with_errors(title, {name: values[name] for name in ENGINEERING if name in values}, errors, 3))
     if (cell := document.get("transversely_isotropic")) is None:
         return tables
-    # A row for each source, a column for each constant that any source knows.
+    # A row for each source, a column for each constant known to at least one source.
     limits, estimates = _known(document.get("fibre_bounds") or {}), document.get("estimates")
     sources: dict[str, Document] = {THIS_CELL: cell, ITS_ERROR: errors}
     sources |= {name.replace("_", " "): row for name, row in (estimates or {}).items()}
@@ -158,7 +161,7 @@ def constants(document: Document) -> list[Table]:
 
 
 def _with_estimates(document: Document) -> str:
-    """Return the kind of cell that has estimates, unlike this cell."""
+    """Name the kind of cell that has estimates, unlike this cell."""
     case, cell = document.get("case", {}), document.get("cell", {})
     if len(cell.get("fractions", ())) == 1:
         return "composites"

@@ -12,7 +12,7 @@ LEAST_SHARE, MOST_DEVIATIONS = 0.01, 3.0
 
 
 def fit_text(document: Document) -> str:
-    """Return the tables of a fit: unknowns, their correlation, and measured beside computed values."""
+    """Return the tables of a fit: unknowns, correlations, and measured and computed values."""
     measured, is_single = document["measured"], len({datum["test"] for datum in document["measured"]}) == 1
     tests = ["" if is_single else f"test {datum['test']} " for datum in measured]
     strains = ["" if d["strain"] is None else f"({d['strain_name']} = {d['strain']:g})" for d in measured]
@@ -22,7 +22,7 @@ def fit_text(document: Document) -> str:
     heads += [tables.Column("  determined by", -40)]
     rows = list[list[Any]]()
     for name, unknown in document["unknowns"].items():
-        order = np.argsort(-np.array(unknown["shares"]), kind="stable")[:3]  # the data that determine it best
+        order = np.argsort(-np.array(unknown["shares"]), kind="stable")[:3]  # the three most informative data
         best = [f"{data[k]} {unknown['shares'][k]:.0%}" for k in order if unknown["shares"][k] >= LEAST_SHARE]
         bound = "" if unknown["at_bound"] is None else f"at its {unknown['at_bound']} bound; "
         numbers = [unknown["estimate"], *map(_dash, [unknown["std"], *unknown["interval"]])]
@@ -52,7 +52,7 @@ def _dash(value: float | None) -> float | str:
 
 
 def scatter_text(document: Document) -> str:
-    """Return the table with results, their scatter and each input's share, and remarks on noisy slopes."""
+    """Return the table of results with scatter and input contributions, and remarks on noisy slopes."""
     inputs, of_cells = document["parameters"], {"+- cells": "std_cells", "+- both": "std"}
     heads = {"value": "value", "+- inputs": "std_inputs", **(of_cells if document["cells"] > 1 else {})}
     heads["+- mesh"] = "mesh_error"
@@ -62,7 +62,7 @@ def scatter_text(document: Document) -> str:
     kinds, sizes, results = [name.rstrip("0123456789") for name in names], dict[str, float](), list[Document]()
     for kind, result in zip(kinds, document["results"], strict=True):
         sizes[kind] = max(sizes.get(kind, 0.0), abs(result["value"]), result["std"])
-    # More scatter than solver noise beside the largest of their kind.
+    # Listed results have more scatter than the solver noise of the largest result of their kind.
     for kind, result in zip(kinds, document["results"], strict=True):
         if result["name"] in listed and tables.without_noise(result["std"], sizes[kind]) > 0:
             results.append(result)

@@ -17,21 +17,21 @@ from feti_homog.report.text.stiffness_tables import bounds, constants, moduli, s
 from feti_homog.report.text.tables import ERROR, WIDTH, Column, Table
 from feti_homog.typing import Document
 
-LABEL = 12  # columns of the labels at the left
-NAME = 28  # columns of the names of checks
-GLUE = "\N{NO-BREAK SPACE}"  # at which no line is broken
+LABEL = 12  # characters of the labels at the left
+NAME = 28  # characters of the check names
+GLUE = "\N{NO-BREAK SPACE}"  # prevents a line break
 REMARKS = ("Remark", "Warning", "Fault")
 
 
 @dataclass(frozen=True)
 class ReportedAnalysis:
-    """An analysis; its entry in result.json has its name, except for the stiffness.
+    """An analysis for the reports; its entry in result.json has its name, except for the stiffness.
 
     Attributes:
         title: the name in words.
-        is_curve: whether its states are points of a curve, shown side by side.
+        is_curve: whether the states are points of a curve, shown side by side.
         is_followed: whether first and last states matter most.
-        picture: picture name of a state, "" for the name of its unit load.
+        picture: picture name of a state; "" stands for the name of the unit load.
     """
 
     name: str
@@ -50,24 +50,25 @@ ANALYSES = {entry.name: entry for entry in (ANGLE, PATH, LOAD, ENVELOPE, STIFFNE
 
 
 def reported(document: Document) -> ReportedAnalysis:
-    """Return the analysis of a result.json; the stiffness for an empty one, which has states alone."""
+    """Return the analysis of a result.json; for an empty document, the stiffness."""
     return next((analysis for name, analysis in ANALYSES.items() if document.get(name)), STIFFNESS)
 
 
 def summary(document: Document) -> str:
-    """Return the printed summary of a result, lines up to 79 columns, tables up to 100 (but for long names).
+    """Return the printed summary of a result.
 
-    Cell, solver, tables of the analysis, checks, timings, memory, remarks, warnings, faults and status.
+    Cell, solver, tables of the analysis, checks, timings, memory, remarks, warnings, faults and status.  Lines have up
+    to 79 characters, tables up to 100, except for long names.
 
     Raises:
-        KeyError: a key of these is missing.
+        KeyError: the document lacks a required key.
     """
     size, solver = document["memory"], document["solver"]
     names = {"ranks": "rank", "subdomains": "subdomain", "dofs": "dof"}
     dual = [_number(solver["multipliers"], "multiplier"), f"kernel {solver['kernel_dim']}"]
     settings = _cell(document) + _field("Solver", [_number(solver[key], name) for key, name in names.items()])
     settings += _field("Dual", [*dual, f"coarse problem {solver['coarse_dim']}"])
-    if (count := solver.get("factorizations")) is not None:  # of the axial problem too
+    if (count := solver.get("factorizations")) is not None:  # includes the axial problem
         coarse = f"coarse problem {_number(solver.get('coarse_factorizations', 0), 'time')}"
         settings += _field("Factorized", [f"{count} {'matrix' if count == 1 else 'matrices'} of subdomains", coarse])
     settings += _field("Method", [solver["method"]]) if "method" in solver else []
@@ -98,7 +99,7 @@ def summary(document: Document) -> str:
 
 
 def short_summary(document: Document) -> str:
-    """Return the tables of a result, its largest check error, and its status."""
+    """Return the tables, the largest check error and the status of a result."""
     law, error = max(document["checks"].items(), key=lambda check: check[1])
     verdict = _field("Checks", [f"largest relative error {error:.1e} ({law})"])
     return _joined(
@@ -111,13 +112,16 @@ def short_summary(document: Document) -> str:
 
 
 def notebook(document: Document) -> str:
-    """Return title, tables, checks and status as HTML."""
+    """Return the title, tables, checks and status of a result as HTML."""
     tables = [table.html for table in (*answers(document, 20), checks(document))]
     return "\n".join([f"<h4>{escape(title_of(document))}</h4>", *tables, f"<p>{escape(document['status'])}</p>"])
 
 
 def answers(document: Document, most: int | None = None) -> list[Table]:
-    """Return the tables of a result, with at most `most` rows of points; None for the rows of the summary."""
+    """Return the tables of a result.
+
+    Tables of points have at most `most` rows, by default as many as in the summary.
+    """
     name, tables = reported(document).name, list[Table]()
     if name == "path":
         from feti_homog.report.text.path_table import path_table  # with the landmarks of a path
@@ -143,7 +147,7 @@ def answers(document: Document, most: int | None = None) -> list[Table]:
 
 
 def title_of(document: Document) -> str:
-    """Return case name, analysis and plane state."""
+    """Return a title of case name, analysis and plane state."""
     case = document["case"]
     what = reported(document).title
     return f"{case.get('name', '')}: {what}, plane {case['analysis']['plane']}".lstrip(": ")
@@ -185,7 +189,10 @@ def _cell(document: Document) -> list[str]:
 
 
 def checks(document: Document) -> Table:
-    """Return the largest relative error of each law; laws of contact need an interface."""
+    """Return a table of the largest relative error in every checked law.
+
+    Contact laws apply only to cells with an interface.
+    """
     limit, has_interface = document.get("check_tolerance"), bool(document["case"].get("interface"))
     contact, rows, title = document.get("kkt_tolerance", limit), list[list[Any]](), "Checks"
     for law, error in document["checks"].items():
@@ -202,7 +209,7 @@ def checks(document: Document) -> Table:
 
 
 def _field(label: str, phrases: Iterable[str]) -> list[str]:
-    """Return a label and its words, joined by commas and wrapped to WIDTH columns."""
+    """Join the phrases by commas after a label, and wrap them to WIDTH characters."""
     text = ", ".join(phrases).replace(", (", " (")
     return wrap(
         text,

@@ -1,4 +1,4 @@
-"""Tables of a result, written as text for a terminal and as HTML; units of their columns."""
+"""Tables of a result as text for a terminal and as HTML, and the units of table columns."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -17,8 +17,8 @@ MODULI = re.compile(
 FIXED = {"angle": "degrees", "centre": "degrees", "values": "degrees", "memory": "bytes"}
 ERROR = ".1e"
 SAME_IN_HTML = re.compile(rf"\.\d+f|{re.escape(ERROR)}")
-WIDTH = 79  # of text
-NOISE = 1e-12  # what the solver leaves of a zero
+WIDTH = 79  # characters in a line of text
+NOISE = 1e-12  # relative size of a zero with solver noise
 UNKNOWN = "-"
 
 
@@ -33,12 +33,12 @@ def unit(name: str, stress_unit: str) -> str:
 
 
 def with_unit(name: str, stress_unit: str) -> str:
-    """Return the name with its unit, if any, in brackets."""
+    """Append the unit of a name, if any, in brackets."""
     return name + in_brackets(unit(name, stress_unit))
 
 
 def in_brackets(unit: str) -> str:
-    """Return a unit in brackets after a space; empty without a unit."""
+    """Put a unit in brackets, after a space; empty without a unit."""
     return f" ({unit})" if unit else ""
 
 
@@ -59,9 +59,9 @@ class Column:
     """A column of a table.
 
     Attributes:
-        name: its head.
+        name: the head of the column.
         width: characters in text; negative for texts, which stand on the left.
-        form: format of its numbers in text.
+        form: format of numbers in text.
         indent: spaces before texts on the left.
     """
 
@@ -72,11 +72,11 @@ class Column:
 
     @property
     def head(self) -> str:
-        """The head in text."""
+        """Return the head of the column in text."""
         return f"{self.name:<{-self.width}}" if self.width < 0 else f"{self.name:>{self.width}}"
 
     def cell(self, value: Any) -> str:
-        """Return a cell as text: texts as they are, numbers in column format."""
+        """Write a cell as text: texts unchanged, numbers in column format."""
         if self.width < 0:
             return f"{' ' * self.indent + value:<{-self.width}}"
         return f" {number(value, self.form):>{self.width - 1}}"
@@ -84,12 +84,12 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of texts and numbers, each as long as `columns` or shorter.
+    """A table of texts and numbers; rows are as long as `columns` or shorter.
 
     Attributes:
         above, below: lines of the text before the heads, and after the rows; notes in HTML.
         title_in_head: in text the title stands where the first column has its head.
-        abreast: rows that stand beside each other in text, without heads; 0 for one row a line.
+        abreast: rows per line of text, without heads; 0 for one row per line with heads.
         most_columns: columns behind the first in text; more are blocks below each other, without unknown rows.
     """
 
@@ -104,7 +104,7 @@ class Table:
 
     @property
     def lines(self) -> list[str]:
-        """The table as text."""
+        """Return the lines of the table as text."""
         title, blocks = [self.title, *self.above], list[str]()
         step = self.most_columns
         for first in range(1, len(self.columns), step):
@@ -128,10 +128,10 @@ class Table:
 
     @property
     def cells(self) -> list[list[str]]:
-        """The rows as texts: numbers with the column decimals, or seven digits."""
+        """Return the rows as texts: numbers with the column decimals, or seven digits."""
         forms = [column.form if SAME_IN_HTML.fullmatch(column.form) else ".7g" for column in self.columns]
         return [
-            # Zero in place of noise, but errors as they are, small ones too.
+            # Noise becomes zero, but even small errors stay unchanged.
             [
                 number(without_noise(value) if form != ERROR else value, "d" if isinstance(value, int) else form)
                 for value, form in zip(row, forms, strict=False)
@@ -141,7 +141,7 @@ class Table:
 
     @property
     def html(self) -> str:
-        """The table as HTML."""
+        """Return the table as HTML."""
         head = _row((column.name for column in self.columns), "col", 'th scope="col"')
         rows = "\n".join(_row(row, "row", "td") for row in self.cells)
         notes = "".join(f"<small>{escape(line)}</small>" for line in (*self.above, *self.below))
@@ -150,7 +150,7 @@ class Table:
 
 
 def number(value: Any, form: str) -> str:
-    """Return a number in a format, without the sign of a rounded zero; texts as they are."""
+    """Format a number, without the sign of a rounded zero; texts stay unchanged."""
     if isinstance(value, str):
         return value
     text = format(value, form)
@@ -158,7 +158,7 @@ def number(value: Any, form: str) -> str:
 
 
 def without_noise(value: Any, size: float = 1.0) -> Any:
-    """Return the value, or zero for a number that is solver noise relative to `size`."""
+    """Replace a number by zero if the number is solver noise relative to `size`."""
     return 0.0 if isinstance(value, float) and abs(value) <= NOISE * size else value
 
 
