@@ -191,7 +191,7 @@ def _completed(
                     entries[number] |= error
                     context.states.record(responses, point.load_factor, _label(path, number), number)
             line.append(f"{len(numbers)} of {len(entries)} points")
-        states = {"states": numbers} if context.states.has_place else {}
+        states = {"states": numbers} if context.states.has_use else {}
     else:
         _checked(context, last, _label(path, len(entries) - 1))
     if context.case.has_friction and (loose := context.fibre_interfaces.loose(last.after.bonds.status)):

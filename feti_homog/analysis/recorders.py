@@ -113,7 +113,7 @@ class StateRecorder:
     ) -> None:
         """Record the next state from the response, or None, in each problem.  Collective."""
         plane, axial = (*responses, None)[:2]
-        if self.has_use or self._cell.case.output.mesh_error:
+        if self.has_use:
             self._largest.append(recovered_fields.largest_stresses(self._cell, plane, axial))
             self._labels.append(label)
             self.singularities |= recovered_fields.singularities(self._cell, plane)

@@ -5,9 +5,11 @@ from contextlib import suppress
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from feti_homog.case.cell_section import CIRCULAR, GEOMETRY, Cell
 from feti_homog.case.section_values import FRACTIONS
-from feti_homog.materials import laws, material_forms, strength
+from feti_homog.materials import laws, material_forms, strength, voigt
 from feti_homog.microstructure import phase_names
 from feti_homog.schema import TableReader, keys, wording
 
@@ -95,13 +97,25 @@ def _read_material(
     material: material_forms.Material | None = reader.read(material_forms.MATERIAL_FORMS[forms[0]], table, section)
     if material is not None:
         checks: list[Callable[[Any], object]] = [] if plane is None else [partial(laws.stiffness_of, plane=plane)]
-        checks += [] if material.strength is None else [lambda material: strength.criterion(material.strength)]
+        if material.strength is not None:
+            checks += [lambda material: strength.criterion(material.strength), partial(_known_stress, plane=plane)]
         for check in (*checks, laws.expansion):
             try:
                 check(material)
             except ValueError as error:
                 reader.faults.append(f"[{section}] {error}")
     return material
+
+
+def _known_stress(material: material_forms.Material, plane: str | None) -> None:
+    """Refuse a strength where the constants leave S33 open.
+
+    Raises:
+        ValueError: the constants are not sufficient.
+    """
+    is_plane = plane is not None and not voigt.PLANE_STATES[plane].is_spatial
+    if is_plane and np.isnan(laws.out_of_plane(material, str(plane))[0]).any():
+        raise ValueError("strength: needs S33, which the constants leave open; give a 6x6 stiffness or more constants")
 
 
 def missing_expansions(materials: Mapping[str, material_forms.Material], needed_by: str) -> list[str]:

@@ -13,7 +13,7 @@ from feti_homog.case import Case, bond_laws
 from feti_homog.fem import AXIAL, Problem
 from feti_homog.feti import thresholds
 from feti_homog.feti.decomposition import partition
-from feti_homog.homogenization import phase_laws, uniform_parts
+from feti_homog.homogenization import phase_laws
 from feti_homog.materials import laws
 from feti_homog.mesh import ReferenceLattice
 from feti_homog.mesh.tiles import tiling
@@ -21,6 +21,8 @@ from feti_homog.microstructure import phase_names
 from feti_homog.system.petsc import option_table, options_database
 from feti_homog.typing import Int
 
+# Poisson's ratio up to which single nodes of mixed elements are hardly stiffer than mu makes them (`SCALED_LAME`).
+MOST_POISSON = 0.45
 # Stiffness ratio up to which a subdomain may have several phases: at larger ratios, rounding in dense matrices costs
 # accuracy (4e-7 at 1e6, 2e-10 at 9e3) and then convergence.
 MOST_CONTRAST = 1e3
@@ -113,9 +115,7 @@ def can_be_cut_across(case: Case) -> bool:
     pairs = [(problem, phase) for problem in phase_laws.problems(case) for phase in case.materials]
     sizes = np.array([np.abs(phase_laws.law(case, phase, problem)[:4, :4]).max() for problem, phase in pairs])
     sizes = sizes.reshape(-1, len(case.materials))
-    # Up to LOCKING single nodes of mixed elements are hardly stiffer than mu makes them (`SCALED_LAME`).
-    is_compressible = max(ratios) <= uniform_parts.LOCKING / (2.0 + 2.0 * uniform_parts.LOCKING)
-    return is_compressible and float((sizes.max(axis=1) / sizes.min(axis=1)).max()) <= MOST_CONTRAST
+    return max(ratios) <= MOST_POISSON and float((sizes.max(axis=1) / sizes.min(axis=1)).max()) <= MOST_CONTRAST
 
 
 def wanted_pieces(

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import pi, sqrt
+from math import sqrt
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -23,8 +23,8 @@ RADIUS_EXCESS = 1e-3
 # Steps of the descent after which an arrangement counts as jammed; others take less than 200.
 MAX_STEPS = 2000
 ATTEMPTS = 3
-# Largest area fraction of discs enlarged by half the gap: the densest packing of equal discs.
-DENSEST = pi / sqrt(12)
+# Area fraction of discs grown by half the gap above which there are no random patterns.
+DENSEST = 0.9
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,8 @@ SAME_VALUE, SAME_PLACE = 1e-5, 1e-9
 def check_phases(findings: Findings, cell: DiscreteCell, state: State, number: int) -> None:
     """Check the largest stresses that result.json has for the phases in state `number`, and their positions."""
     table = cell.files.document.get("phase_stresses", [])
+    limits = {name: phase_constants(cell.files.case, name).get("strength") for name in cell.files.phases}
+    findings.require(LAW, bool(table) or not any(limits.values()), "phase_stresses, which strengths need")
     if not table:
         return
     stress, points = _stresses(cell, state)
@@ -35,16 +37,22 @@ def check_phases(findings: Findings, cell: DiscreteCell, state: State, number: i
         name = entry["phase"]
         if name not in known:
             continue
-        findings.require(LAW, state.name.endswith(f"({entry['state'][number]})"), f"{state.name}: its label")
+        labels = [str(label) for label in entry["state"]]
+        is_labelled = number < len(labels) and state.name.endswith(f"({labels[number]})")
+        findings.require(LAW, is_labelled and len(labels) == len(cell.files.file["state"]), f"{state.name}: its label")
         rows = phase_of == cell.files.phases.index(name)
-        strength = phase_constants(cell.files.case, name).get("strength")
+        strength = limits[name]
         values, scale = _measures(stress[rows], strength), float(np.abs(stress[rows]).max())
         for measure, column in values.items():
             place = f"{state.name}, {measure} of {name}"
-            reported = float(entry[measure][number])
+            columns = [entry.get(key, []) for key in (measure, f"{measure}_at")]
+            if any(len(column) != len(labels) for column in columns):
+                findings.require(LAW, False, f"{place}: missing")
+                continue
+            reported = float(columns[0][number])
             size = 1.0 if measure == "utilisation" else scale
             findings.compare(LAW, reported, column.max(), max(size, cell.scales_of(state).stress), place)
-            away = from_centre(points[rows], np.array(entry[f"{measure}_at"][number]), cell.files.size)
+            away = from_centre(points[rows], np.array(columns[1][number]), cell.files.size)
             at = np.hypot(*away.T) < SAME_PLACE * cell.files.size.max()
             least = column.max() - SAME_VALUE * max(abs(column.max()), cell.scales_of(state).stress)
             findings.require(LAW, bool((column[at] >= least).any()), f"{place}: another position")

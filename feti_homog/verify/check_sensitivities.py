@@ -37,7 +37,7 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
     material, sections, needed = cell.files.case["material"], cell.files.interfaces, set[str]()
     for phase in {*cell.files.phases} & material.keys():
         for key, value in material[phase].items():
-            if "thermal_stress" in document or not key.startswith("expansion"):
+            if key != "strength" and ("thermal_stress" in document or not key.startswith("expansion")):
                 numbers = np.array(value, float)
                 ends = [f".{k + 1}" for k in range(len(numbers))] if numbers.ndim else [""]
                 if numbers.ndim > 1:

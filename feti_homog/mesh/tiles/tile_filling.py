@@ -174,8 +174,10 @@ def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int], f
             # A polygon turns once around an inner point. Of nested polygons, the smallest surrounds the hole.
             offsets = [loops[k][1] - polygon[0] for k in outer_and_holes]
             turns = [np.angle(np.roll(vectors, -1) / vectors).sum() for vectors in offsets]
-            _, around = min((loops[k][0], k) for k, turn in zip(outer_and_holes, turns, strict=True) if turn > np.pi)
-            outer_and_holes[around].append(line_tags)
+            around = [(loops[k][0], k) for k, turn in zip(outer_and_holes, turns, strict=True) if turn > np.pi]
+            if not around:
+                raise _unfilled(tile, "a hole lies in no surface")
+            outer_and_holes[min(around)[1]].append(line_tags)
         for group in outer_and_holes.values():
             surfaces.append(geo.addPlaneSurface([geo.addCurveLoop(line_tags) for line_tags in group]))
             circle.append(region)

@@ -3,50 +3,59 @@
 from collections.abc import Sequence
 from typing import Any
 
+from feti_homog.materials import voigt
 from feti_homog.report.text.tables import Column, Table, stress_label, without_noise
 from feti_homog.typing import Document
 
-STATES = 4  # of a curve
+POINTS = 4  # of a curve
 STRESSES = {"principal": "principal", "von_mises": "von Mises", "hydrostatic": "hydrostatic"}
 
 
 def phase_tables(document: Document) -> list[Table]:
-    """Return tables of phase stresses and utilisations, for all loads or selected states of a curve."""
+    """Return the stresses and the utilisations in the states; at some points of a curve; nothing without them."""
     phases = document.get("phase_stresses", ())
-    count = max((len(phase["state"]) for phase in phases), default=0)
-    states: Sequence[int] = range(count)
-    if "path" in document and "states" in document:
-        from feti_homog.results import landmarks  # of paths alone
-
-        states = landmarks.chosen_states(document, STATES, count)
-    elif "path" in document or "angle" in document:
-        states = states[:: -(-count // STATES) or 1]
-    rows = [
-        [_label(phase, k), *(value for name in STRESSES for value in _entry(phase, name, k))]
-        for k in states
-        for phase in phases
-    ]
-    columns = [Column("", -18, indent=0)]
+    if not phases:
+        return []
+    labels, states = phases[0]["state"], _states(document, len(phases[0]["state"]))
+    pairs = [(phase, k) for k in states for phase in phases]
+    names = [f"{labels[k]} {phase['phase']}" if len(labels) > 1 else phase["phase"] for phase, k in pairs]
+    first = Column("", -max(16, *(len(name) + 2 for name in names)), indent=0)
+    columns = [first]
     for title in STRESSES.values():
-        columns += [Column(title, 12), Column("at", 15)]
+        columns += [Column(title), Column("at", 16)]
+    rows = [
+        [name, *(value for measure in STRESSES for value in _entry(phase, measure, k))]
+        for name, (phase, k) in zip(names, pairs, strict=True)
+    ]
     used = [
-        [_label(phase, k), phase["criterion"], *_entry(phase, "utilisation", k)]
-        for k in states
-        for phase in phases
+        [name, phase["criterion"], *_entry(phase, "utilisation", k)]
+        for name, (phase, k) in zip(names, pairs, strict=True)
         if "criterion" in phase
     ]
-    title = f"Largest stresses of the phases{stress_label(document)}, tension positive"
-    strength_columns = [Column("", -18, indent=0), Column("criterion", 20), Column("utilisation", 12), Column("at", 15)]
-    tables = [Table(title, columns, rows), Table("Utilisation of the strengths", strength_columns, used)]
+    loads = ", under unit loads" if labels[0].split()[-1] in voigt.SPATIAL_STRAINS else ""
+    tables = [
+        Table(f"Largest stresses of the phases{stress_label(document)}, tension positive{loads}", columns, rows),
+        Table(
+            f"Utilisation of the strengths{loads}",
+            [first, Column("criterion", 20), Column("utilisation"), Column("at", 16)],
+            used,
+        ),
+    ]
     return [table for table in tables if table.rows]
 
 
-def _label(phase: Document, k: int) -> str:
-    """Return the names of state and phase; the phase alone if there is a single state."""
-    return f"{phase['state'][k]} {phase['phase']}" if len(phase["state"]) > 1 else str(phase["phase"])
+def _states(document: Document, count: int) -> Sequence[int]:
+    """Return the numbers of the states that the tables show."""
+    if "path" in document and "states" in document:
+        from feti_homog.results import landmarks  # of paths alone
+
+        return landmarks.chosen_states(document, POINTS, count)
+    points = len(document.get("angle", ())) or (count if "path" in document else 1)
+    step, loads = -(-points // POINTS), count // points
+    return [point * loads + load for point in range(0, points, step) for load in range(loads)]
 
 
 def _entry(phase: Document, name: str, k: int) -> tuple[Any, str]:
-    """Return the largest value of a phase quantity in state `k`, with the position as text."""
-    x, y = phase[f"{name}_at"][k]
-    return without_noise(phase[name][k]), f"{x:.4g}, {y:.4g}"
+    """Return a value and its position in words, none of a value that is zero."""
+    value, (x, y) = without_noise(phase[name][k]), phase[f"{name}_at"][k]
+    return value, f"{x:.3g}, {y:.3g}" if value else "-"
