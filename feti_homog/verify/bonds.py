@@ -41,7 +41,7 @@ class BondLaw(ABC):
 
     @abstractmethod
     def utilisation(self, traction: Float) -> Float:
-        """(k,) fraction of the strength that tractions (k, c) use; compression uses none."""
+        """Return the fraction (k,) of the strength that tractions (k, c) use; compression uses none."""
 
     @abstractmethod
     def breaks(self, traction: Float) -> dict[str, float]:
@@ -70,11 +70,11 @@ class BondLaw(ABC):
         return low, high
 
     def onset(self, traction: Float) -> Float:
-        """(k,) utilisation of intact bonds, 1 at break or first damage."""
+        """Return the utilisation (k,) of intact bonds, 1 at break or first damage."""
         return self.utilisation(traction)
 
     def energies(self, traction: Float) -> Float:
-        """(k, 2) spring energies per area, opening and shear, of tractions (k, c)."""
+        """Return the spring energies per area (k, 2), opening and shear, of tractions (k, c)."""
         energies = pulled(traction) ** 2 / (2 * self._components("stiffness", traction))
         return np.column_stack([energies[:, 0], energies[:, 1:].sum(axis=1)])
 
@@ -124,7 +124,7 @@ class SpringEnergy(BondLaw):
         return np.asarray(np.sqrt(self.energies(traction).sum(axis=1) / self.lost(self.mode(traction))))
 
     def lost(self, psi: Float) -> Float:
-        """(k,) G_c in the modes psi (k,)."""
+        """Return the toughness G_c (k,) in the modes psi (k,)."""
         turned = (1 - np.asarray(self.section["mode_sensitivity"], float)) * psi
         return np.asarray(np.asarray(self.section["toughness"], float) * (1 + np.tan(turned) ** 2))
 
