@@ -41,14 +41,14 @@ class BondLaw(ABC):
 
     @abstractmethod
     def utilisation(self, traction: Float) -> Float:
-        """(k,) fraction of the strength that tractions (k, c) use; compression uses none."""
+        """Return the fraction (k,) of the strength that tractions (k, c) use; compression uses none."""
 
     @abstractmethod
     def breaks(self, traction: Float) -> dict[str, float]:
         """Describe how a traction (1, c) breaks a bond, by the names in an envelope's points."""
 
     def jumps(self, traction: Float) -> Float:
-        """(k, c) jumps of elastic bonds: traction / stiffness."""
+        """Return the jumps (k, c) of elastic bonds: traction / stiffness."""
         return np.asarray(traction / self._components("stiffness", traction))
 
     def mode(self, traction: Float) -> Float:
@@ -57,7 +57,7 @@ class BondLaw(ABC):
         return np.asarray(np.arctan2(np.sqrt(np.square(pulls[:, 1:]).sum(axis=1)), pulls[:, 0]))
 
     def lost(self, psi: Float) -> Float:
-        """(k,) fracture energies per area in the modes psi (k,)."""
+        """Return the fracture energies per area (k,) in the modes psi (k,)."""
         return np.zeros(len(psi))
 
     def absorbed(self, psi: Float, before: Float, after: Float) -> Float:
@@ -65,21 +65,21 @@ class BondLaw(ABC):
         return self.lost(psi)
 
     def absorbed_range(self, before: Float, after: Float) -> tuple[Float, Float]:
-        """(k,) lower and upper bound of `absorbed` over all modes."""
+        """Return the lower and upper bounds (k,) of `absorbed` over all modes."""
         low, high = (self.lost(np.full(len(after), psi)) for psi in (0.0, np.pi / 2))
         return low, high
 
     def onset(self, traction: Float) -> Float:
-        """(k,) utilisation of intact bonds, 1 at break or first damage."""
+        """Return the utilisation (k,) of intact bonds, 1 at break or first damage."""
         return self.utilisation(traction)
 
     def energies(self, traction: Float) -> Float:
-        """(k, 2) spring energies per area, opening and shear, of tractions (k, c)."""
+        """Return the spring energies per area (k, 2), opening and shear, of tractions (k, c)."""
         energies = pulled(traction) ** 2 / (2 * self._components("stiffness", traction))
         return np.column_stack([energies[:, 0], energies[:, 1:].sum(axis=1)])
 
     def shares(self, traction: Float) -> Float:
-        """(k, c) traction components / strengths."""
+        """Return the ratios (k, c) of traction components to strengths."""
         return np.asarray(pulled(traction) / self._components("strength", traction))
 
     def _components(self, kind: str, traction: Float) -> Float:
@@ -124,7 +124,7 @@ class SpringEnergy(BondLaw):
         return np.asarray(np.sqrt(self.energies(traction).sum(axis=1) / self.lost(self.mode(traction))))
 
     def lost(self, psi: Float) -> Float:
-        """(k,) G_c in the modes psi (k,)."""
+        """Return the toughness G_c (k,) in the modes psi (k,)."""
         turned = (1 - np.asarray(self.section["mode_sensitivity"], float)) * psi
         return np.asarray(np.asarray(self.section["toughness"], float) * (1 + np.tan(turned) ** 2))
 
@@ -134,12 +134,12 @@ class SpringEnergy(BondLaw):
 
 
 def pulled(traction: Float) -> Float:
-    """(k, c) magnitudes of the traction components, 0 in compression."""
+    """Return the magnitudes (k, c) of traction components, 0 in compression."""
     return np.column_stack([np.maximum(traction[:, 0], 0.0), np.abs(traction[:, 1:])])
 
 
 def law_of(section: Mapping[str, Any]) -> BondLaw:
-    """Law that a section [[interface]] names, or the default law."""
+    """Return the law that a section [[interface]] names, or the default law."""
     module, name = bond_laws.LAWS[section.get("criterion", bond_laws.DEFAULT)].implementation.split(".")
     home = import_module(f"{__package__}.{module if module == 'softening' else 'bonds'}")
     law: BondLaw = getattr(home, name)(section)
@@ -147,9 +147,9 @@ def law_of(section: Mapping[str, Any]) -> BondLaw:
 
 
 def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None), damage: Float | None = None) -> BondLaw:
-    """Law of the bonds at some interface nodes, with the damage (k,) at all nodes if it is known.
+    """Return the bond law at some interface nodes.
 
-    If there are several sections or fibre strengths, numbers in its section are (p,), one a node.
+    `damage` (k,) is at all nodes. With several sections or fibre strengths the law has numbers (p,), one for each node.
     """
     sections, strength = files.interfaces, files.fibres.strength
     section = {**sections[0]} if sections else {}
@@ -163,14 +163,14 @@ def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None), damag
 
 
 def friction_at(files: ResultFiles, on_damage: bool = False) -> Float:
-    """(k,) friction coefficients on debonded faces, or on the damaged fraction of bonds."""
+    """Return friction coefficients (k,) on debonded faces, or on the damaged fraction of bonds."""
     key = "friction_on_damage" if on_damage else "friction"
     mu = [float(section.get("friction", 0.0)) * bool(section.get(key)) for section in files.interfaces or [{}]]
     return np.asarray(np.array(mu)[np.minimum(files.interface.pair, len(mu) - 1)])
 
 
 def rubbing_force(files: ResultFiles, state: State) -> Float:
-    """(k,) shear traction on the damaged fraction of unbroken bonds with friction, else 0.
+    """Return the shear traction (k,) on the damaged fraction of unbroken bonds with friction, else 0.
 
     The slip is C_0 traction + g, the force is traction - g / (C - C_0).
     """
@@ -182,14 +182,14 @@ def rubbing_force(files: ResultFiles, state: State) -> Float:
 
 
 def cohesive_traction(files: ResultFiles, state: State) -> Float:
-    """(k, c) tractions without friction on the damaged fraction."""
+    """Return tractions (k, c) without friction on the damaged fraction."""
     traction = state.traction.copy()
     traction[:, 1] -= state.damage * rubbing_force(files, state)
     return traction
 
 
 def pairs_of(files: ResultFiles) -> Int:
-    """(phases, phases) index of the section between two phases, -1 where bonds never part."""
+    """Return the section index (phases, phases) between two phases, -1 where bonds never part."""
     pairs = np.full((len(files.phases),) * 2, -1)
     for number, section in enumerate(files.interfaces or [{}]):
         if "between" not in section:

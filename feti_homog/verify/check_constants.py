@@ -11,7 +11,7 @@ from feti_homog.verify.reading import Status
 
 RTOL = 1e-8  # of the dual problems, by default
 DIRECTIONS = 720  # across the fibres, in half a turn
-SECTIONS = {"moduli", "constants", "transversely_isotropic", "transverse_moduli"}
+SECTIONS = "moduli", "constants", "transversely_isotropic", "transverse_moduli"
 NOISE = 1e-3  # share of the largest constant of a kind, and Poisson's ratio, below which constants are noise
 # The scale of constants whose names begin so is 1 at least.
 RATIOS = ("eta", "anisotropy", "deviation")
@@ -44,7 +44,7 @@ def check_reciprocity(findings: Findings, cell: DiscreteCell, states: States) ->
         if cell.files.contact and any((state.status != Status.BONDED).any() for state in of_table):
             continue
         place = f"angle[{number}]." if number >= 0 else ""
-        for name in {"effective_stiffness", "stiffness"} & table.keys():
+        for name in [name for name in ("effective_stiffness", "stiffness") if name in table]:
             C = np.array(table[name])
             findings.compare("symmetry", C, C.T, np.abs(C).max(), place + name)
         if "thermal_stress" in table:
@@ -85,7 +85,7 @@ def check_constants(findings: Findings, cell: DiscreteCell) -> None:
         if "thermal_expansion" in document and heat is not None:
             strains, place = -np.linalg.solve(C, heat), "thermal_expansion"
             findings.compare("compliance", document[place], strains, np.abs(strains).max(), place)
-    for section in SECTIONS & document.keys():
+    for section in [name for name in SECTIONS if name in document]:
         constants = {} if document[section] is None else constants_of(C, heat)
         for name in document[section] or ():
             value, expected, place = document[section][name], constants.get(name), f"{section}.{name}"
@@ -138,13 +138,13 @@ def constants_of(C: Float, heat: Float | None) -> dict[str, float]:
 
 
 def _isotropic_part(c: Float) -> tuple[float, float]:
-    """Moduli k, mu of the nearest isotropic stiffness: its invariants C_iijj / 4 and (C_ijij - C_iijj / 2) / 4."""
+    """Return k, mu of the nearest isotropic stiffness: the invariants C_iijj / 4 and (C_ijij - C_iijj / 2) / 4."""
     spherical, full = c[:2, :2].sum(), c[0, 0] + c[1, 1] + 2 * c[2, 2]
     return float(spherical / 4), float((full - spherical / 2) / 4)
 
 
 def _distance(C: Float, other: Float) -> float:
-    """||C - C'|| / ||C|| of the tensors C_ijkl."""
+    """Return the relative distance ||C - C'|| / ||C|| of two tensors C_ijkl."""
     voigt = VOIGT[len(C)]
     off, size = (np.linalg.norm(M[voigt[:, :, None, None], voigt[None, None]]) for M in (C - other, C))
     return float(off / size)

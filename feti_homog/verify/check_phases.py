@@ -15,9 +15,7 @@ from feti_homog.verify.torus import from_centre
 
 LAW = "phases"
 # Criteria by a key that they have alone.
-CRITERIA = {
-    "principal": "maximum principal", "von_mises": "von Mises", "tension": "Drucker-Prager", "axial_shear": "Hashin",
-}  # fmt: skip
+CRITERIA = dict(principal="maximum principal", von_mises="von Mises", tension="Drucker-Prager", axial_shear="Hashin")
 # Values within this of the largest are at its position, too; positions are those of quadrature points, to rounding.
 SAME_VALUE, SAME_PLACE = 1e-5, 1e-9
 
@@ -61,7 +59,7 @@ def check_phases(findings: Findings, cell: DiscreteCell, state: State, number: i
 
 
 def _stresses(cell: DiscreteCell, state: State) -> tuple[Float, Float]:
-    """Return tensors (n, 3, 3) and points (n, 2) at the quadrature points of all elements."""
+    """Return the stress tensors (n, 3, 3) at the quadrature points (n, 2) of all elements, and the points."""
     mesh, v = cell.files.mesh, len(state.strain)
     free = state.temperature * cell.expansions
     answers = [answer for *_, answer in cell.elements.responses(state.displacement, state.along, free)]

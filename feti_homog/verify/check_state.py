@@ -41,7 +41,7 @@ def check_state(findings: Findings, cell: DiscreteCell, state: State, fields: El
 
 
 def interface_forces(cell: DiscreteCell, state: State) -> Float:
-    """(k, c) forces on the fibre in x1, x2 and x3: traction times tributary length."""
+    """Return the forces (k, c) on the fibre in x1, x2 and x3: traction times tributary length."""
     return cell.in_axes(state.traction * cell.files.interface.length[:, None])
 
 

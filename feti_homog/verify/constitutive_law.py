@@ -90,7 +90,7 @@ def phase_constants(case: Mapping[str, Any], phase: str) -> Constants:
 
 
 def _given_stiffness(constants: Constants) -> Float:
-    """Stiffness among the constants, (3, 3) or (6, 6); (0, 0) if there is none."""
+    """Return the stiffness among the constants, (3, 3) or (6, 6); (0, 0) without one."""
     stiffness = np.array(constants.get("stiffness", np.zeros((0, 0))), float)
     return np.asarray((stiffness + stiffness.T) / 2)
 
@@ -134,7 +134,7 @@ def turned(stiffness: Float, degrees: float) -> Float:
 
 
 def _turn(degrees: float, axes: int) -> Float:
-    """(axes, axes) R of a turn from x1 to x2."""
+    """Return the rotation matrix R (axes, axes) of a turn from x1 to x2."""
     angle, turn = np.radians(degrees), np.eye(axes)
     turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     return turn

@@ -46,7 +46,7 @@ class Faces:
     place: Int
 
     def sums(self, values: Float, of_fibre: bool) -> Float:
-        """(k, c) sums of values (b, c) over the copies on one face."""
+        """Return the sums (k, c) of values (b, c) over the copies on one face."""
         on_face = (self.row >= 0) & (self.is_fibre == of_fibre)
         k = len(self.place)
         return np.stack([np.bincount(self.row[on_face], column, k) for column in values[on_face].T], axis=1)
@@ -133,12 +133,12 @@ class DiscreteCell:
 
     @cached_property
     def reuss(self) -> Float:
-        """(v, v) <L^-1>^-1, the least stiffness of the bonded cell."""
+        """Return <L^-1>^-1 (v, v), the least stiffness of the bonded cell."""
         return np.asarray(np.linalg.inv(np.einsum("p,pij->ij", self.fractions, np.linalg.inv(self.stiffnesses))))
 
     @cached_property
     def inner_rows(self) -> Int:
-        """(s, 2 or 3) interface nodes on the inner torn sides, -1 for other nodes."""
+        """Return the interface nodes (s, 2 or 3) on the inner torn sides, -1 for other nodes."""
         row_of = np.full(len(self.files.mesh.points), -1)
         row_of[self.nodes.node] = self.faces.row
         return np.asarray(row_of[self.sides.nodes[self.inner]])
@@ -154,14 +154,14 @@ class DiscreteCell:
 
     @cached_property
     def directions(self) -> Float:
-        """(k,) directions of the interface nodes from their fibres' centres, in degrees."""
+        """Return the directions (k,) from fibre centres to interface nodes, in degrees."""
         rows = self.files.interface
         x, y = torus.from_centre(rows.points, self.files.fibres.centre[rows.fibre - 1], self.files.size).T
         return np.asarray(np.degrees(np.arctan2(y, x)))
 
     @cached_property
     def bond_directions(self) -> Float:
-        """(k,) `directions` in (-180, 180], or normal directions on fibres without a centre."""
+        """Return `directions` (k,) in (-180, 180], or normal directions on fibres without a centre."""
         n1, n2 = self.files.interface.normal.T
         angle = np.where(np.isnan(self.directions), np.degrees(np.arctan2(n2, n1)), self.directions)
         return np.asarray(angle + 360.0 * (angle <= -180.0 + ROUNDING))
@@ -182,7 +182,7 @@ class DiscreteCell:
         return sums
 
     def loads(self, strain: Float, temperature: float) -> Float:
-        """(v,) strain plus the largest thermal strain of a phase."""
+        """Return the strain (v,) plus the largest thermal strain of a phase."""
         return np.asarray(strain + np.abs(self.expansions * temperature).max(axis=0))
 
     def scales(self, strain: Float, temperature: float, slip: float = 0.0) -> Scales:

@@ -2,7 +2,6 @@
 
 Displacements have c = 2 components, or 3 in generalized plane strain; strains and stresses have v = 3 or 6, in the
 orders [11, 22, 12] and [11, 22, 33, 23, 13, 12].
-
 Written for the certificate alone, from barycentric coordinates r: N_a = r_a, or r_a (2 r_a - 1) and 4 r_a r_b on curved
 (isoparametric) sides.
 """
@@ -63,7 +62,7 @@ class Elements:
 
     @cached_property
     def area(self) -> Float:
-        """(m,) areas; negative where an element is inverted."""
+        """Return the element areas (m,), negative for inverted elements."""
         return np.concatenate([weights.sum(axis=1) for _, _, weights in self._parts()])
 
     @cached_property
@@ -74,7 +73,7 @@ class Elements:
 
     @cached_property
     def node_integrals(self) -> Float:
-        """(n, 2) int dN/dx over all elements of each node."""
+        """Return int dN/dx (n, 2) over all elements of each node."""
         sums = np.zeros_like(self._mesh.points)
         for part, gradients, weights in self._parts():
             add_at_nodes(sums, self._mesh.triangles[part], np.einsum("eqad,eq->ead", gradients, weights))
@@ -162,7 +161,7 @@ def quadrature_points() -> Float:
 
 
 def _strains(slope: Float, v: int, along: float) -> Float:
-    """(e, q, v) from du_i/dx_d (e, q, c, 2), or of the plane (e, q, 2, 2), and E33."""
+    """Return strains (e, q, v) from du_i/dx_d (e, q, c, 2), or in the plane (e, q, 2, 2), and E33."""
     local = np.zeros((*slope.shape[:2], v))
     for (i, d), place in np.ndenumerate(PLACES[v][: slope.shape[2]]):
         local[..., place] += slope[..., i, d]

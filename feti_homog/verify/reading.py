@@ -116,7 +116,7 @@ class State:
 
 
 def gradient(strain: Float) -> Float:
-    """(c, 2) displacement gradient H, symmetric in the plane, of a strain (v,)."""
+    """Return the displacement gradient H (c, 2) of a strain (v,), symmetric in the plane."""
     E11, E22, gamma12 = strain[[0, 1, -1]]
     plane = [[E11, gamma12 / 2], [gamma12 / 2, E22]]
     return np.array(plane if len(strain) == 3 else [*plane, strain[[4, 3]]])

@@ -80,7 +80,7 @@ def wrapped(points: Float, size: Float) -> Float:
 
 
 def from_centre(points: Float, centres: Float, size: Float) -> Float:
-    """(k, 2) vectors from the nearest images of centres to points."""
+    """Return the vectors (k, 2) from the nearest images of centres to points."""
     away = points - centres
     return np.asarray(away - np.round(away / size) * size)
 

@@ -43,7 +43,6 @@ def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
     """Start PETSc with the words of a command line, the program's name first.  Collective over `comm`.
 
     Files .petscrc and petscrc, which lie in the current folder without being asked for, are not read.
-
     PETSc ends when Python does; a rank on which it cannot, for its logs cannot be written, ends the job: the others
     would wait for it.  At its end PETSc does not list options that nobody read, unless -options_left asks for it: the
     program refuses misspelt ones, and one set of options serves all runs.

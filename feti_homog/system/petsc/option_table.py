@@ -35,6 +35,7 @@ def _coarse_solver(prefix: str, matrix: str) -> tuple[Option, ...]:
     )
 
 
+PC_TYPES = "auto|none|lumped|dirichlet|influence"
 OPTIONS = (
     Option("feti_ksp_type", "cg|fcg|gmres|...", "cg", "Krylov method on the projected dual operator"),
     Option("feti_ksp_rtol", "<real>", "1e-8", "relative tolerance of the dual and the primal residuals"),
@@ -44,12 +45,7 @@ OPTIONS = (
     Option("feti_ksp_converged_reason", "", "", "print why each solve ended"),
     Option("feti_ksp_view", "", "", "print the solver's settings"),
     Option("feti_ksp_view_singularvalues", "", "", "print the estimated condition number"),
-    Option(
-        "feti_pc_type",
-        "auto|none|lumped|dirichlet|influence",
-        "auto",
-        "dual preconditioner; influence: exact, by unit jumps",
-    ),
+    Option("feti_pc_type", PC_TYPES, "auto", "dual preconditioner; influence: exact, by unit jumps"),
     Option("feti_dual_operator", "auto|implicit|explicit", "auto", "subdomains by triangular solves or dense matrices"),
     Option("feti_coarse_space", "auto|natural|adaptive", "auto", "rigid-body motions only, or soft modes too"),
     Option("feti_coarse_threshold", "<real>", "0.35", "softer modes join the coarse space; fewer iterations if larger"),
@@ -72,9 +68,7 @@ OPTIONS = (
 """Every option that a run accepts whether or not it makes the solver which reads it."""
 TABLE = {option.name: option for option in OPTIONS}
 
-DIRECT_PREFIXES = (
-    "feti_sub_", "feti_interior_", "feti_schur_", "feti_natural_", "feti_coarse_", "feti_bonded_",
-)  # fmt: skip
+DIRECT_PREFIXES = tuple(f"feti_{name}_" for name in ("sub", "interior", "schur", "natural", "coarse", "bonded"))
 """Prefixes of PETSc's direct solvers."""
 
 MUMPS_PREFIXES = ("feti_schur_",)

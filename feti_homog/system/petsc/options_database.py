@@ -11,9 +11,7 @@ from feti_homog.system.petsc import option_values as values
 from feti_homog.system.petsc.c_functions import error_words, option_was_used
 
 # Options that PETSc looks for only in KSPSolve.
-READ_WHEN_SOLVING = {
-    f"feti_ksp_{name}" for name in ("converged_reason", "converged_rate", "view", "view_final_residual")
-}
+READ_WHEN_SOLVING = {f"feti_ksp_{key}" for key in ("converged_reason", "converged_rate", "view", "view_final_residual")}
 
 
 @contextmanager
@@ -50,7 +48,7 @@ def case_options(options: Mapping[str, values.Value]) -> Iterator[None]:
 
 
 def _set(database: PETSc.Options, name: str, value: values.Value | None) -> None:
-    """Set an option, without a value if that is empty; None takes it out."""
+    """Set an option, with no value for an empty text, or delete the option for None."""
     if value is None:
         database.delValue(name)
     else:
@@ -58,7 +56,7 @@ def _set(database: PETSc.Options, name: str, value: values.Value | None) -> None
 
 
 def given_options() -> dict[str, str]:
-    """Return PETSc's options by name, in small letters, with an empty text where there is no value."""
+    """Return the PETSc options by lower-case name; an option without a value has an empty text."""
     return {name.lower(): value or "" for name, value in PETSc.Options().getAll().items()}
 
 
@@ -74,9 +72,9 @@ def without_iterations() -> str:
 
 
 def refuse_unused() -> None:
-    """Call when all solvers are set up.
+    """Refuse options that no solver has read, after the setup of all solvers.
 
-    Options of the table, and of direct solvers that the run does not make, or only when it writes fields, are accepted.
+    Accepts options in the table, and options of direct solvers that the run makes only for fields or not at all.
 
     Raises:
         CaseError: an option with our prefix is no option of any solver.
@@ -116,44 +114,46 @@ def faults_of_solvers(options: Mapping[str, str]) -> list[str]:
     print are hidden meanwhile.
     """
     faults, viewers, database, comm = [], [*filter(values.is_viewer, options)], PETSc.Options(), PETSc.COMM_SELF
-    for name in viewers:
-        database.delValue(name)
-    for prefix, prefixes in SOLVERS.items():
-        names = [name for name in options if table.solver_prefix(name) in prefixes and name not in (*OWN, *viewers)]
-        if not names and "help" not in options:
-            continue
-        is_krylov, A = prefix == "feti_", PETSc.Mat()
-        if is_krylov:
-            A.createPython((1, 1), _Identity(), comm=comm)
-        else:
-            A.createAIJ((1, 1), csr=([0, 1], [0], [1.0]), comm=comm)
-        A.setOption(PETSc.Mat.Option.SYMMETRIC if is_krylov else PETSc.Mat.Option.SPD, True)
-        A.setUp()
-        ksp, (x, b) = PETSc.KSP().create(comm), A.createVecs()
-        ksp.setOptionsPrefix(prefix)
-        ksp.setOperators(A)
-        try:
-            ksp.setType(PETSc.KSP.Type.CG if is_krylov else PETSc.KSP.Type.PREONLY)
-            pc = ksp.getPC()
-            pc.setType(PETSc.PC.Type.PYTHON if is_krylov else PETSc.PC.Type.CHOLESKY)
+    try:
+        for name in viewers:
+            database.delValue(name)
+        for prefix, prefixes in SOLVERS.items():
+            names = [name for name in options if table.solver_prefix(name) in prefixes and name not in (*OWN, *viewers)]
+            if not names and "help" not in options:
+                continue
+            is_krylov, A = prefix == "feti_", PETSc.Mat()
             if is_krylov:
-                ksp.setNormType(PETSc.KSP.NormType.PRECONDITIONED)
-                pc.setOptionsPrefix("feti_projected_")
-                pc.setPythonContext(_Identity())
-            if prefix in table.MUMPS_PREFIXES:
-                pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
-            ksp.setFromOptions()
-            ksp.setUp()
-            b.set(1.0)
-            ksp.solve(b, x)
-        except PETSc.Error as error:
-            fault = error_words(error)
-            names.sort(key=lambda name: not name.endswith("_type"))  # types first: they decide what others mean
-            words = " ".join(values.in_words(name, options[name]) for name in names)
-            faults.append(f"{words}: {'PETSc has no such Krylov method' if NO_SUCH_METHOD in fault else fault}")
-        finally:
-            for petsc_object in (ksp, A, x, b):
-                petsc_object.destroy()
-    for name in viewers:
-        _set(database, name, options[name])
+                A.createPython((1, 1), _Identity(), comm=comm)
+            else:
+                A.createAIJ((1, 1), csr=([0, 1], [0], [1.0]), comm=comm)
+            A.setOption(PETSc.Mat.Option.SYMMETRIC if is_krylov else PETSc.Mat.Option.SPD, True)
+            A.setUp()
+            ksp, (x, b) = PETSc.KSP().create(comm), A.createVecs()
+            ksp.setOptionsPrefix(prefix)
+            ksp.setOperators(A)
+            try:
+                ksp.setType(PETSc.KSP.Type.CG if is_krylov else PETSc.KSP.Type.PREONLY)
+                pc = ksp.getPC()
+                pc.setType(PETSc.PC.Type.PYTHON if is_krylov else PETSc.PC.Type.CHOLESKY)
+                if is_krylov:
+                    ksp.setNormType(PETSc.KSP.NormType.PRECONDITIONED)
+                    pc.setOptionsPrefix("feti_projected_")
+                    pc.setPythonContext(_Identity())
+                if prefix in table.MUMPS_PREFIXES:
+                    pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
+                ksp.setFromOptions()
+                ksp.setUp()
+                b.set(1.0)
+                ksp.solve(b, x)
+            except PETSc.Error as error:
+                fault = error_words(error)
+                names.sort(key=lambda name: not name.endswith("_type"))  # types first: they decide what others mean
+                words = " ".join(values.in_words(name, options[name]) for name in names)
+                faults.append(f"{words}: {'PETSc has no such Krylov method' if NO_SUCH_METHOD in fault else fault}")
+            finally:
+                for petsc_object in (ksp, A, x, b):
+                    petsc_object.destroy()
+    finally:
+        for name in viewers:
+            _set(database, name, options[name])
     return faults

@@ -54,10 +54,7 @@ def require_limits() -> None:
     Raises:
         FetiHomogError: one is too small; a line for each.
     """
-    limits = (
-        ("stack (ulimit -s)", resource.RLIMIT_STACK, STACK),
-        ("memory (ulimit -v)", resource.RLIMIT_AS, ADDRESSES),
-    )
+    limits = ("stack (ulimit -s)", resource.RLIMIT_STACK, STACK), ("memory (ulimit -v)", resource.RLIMIT_AS, ADDRESSES)
     faults = [
         f"the {name} of the process is limited to {limit >> 10} KiB; expected at least {needed >> 10} KiB"
         for name, kind, needed in limits

@@ -27,7 +27,7 @@ KEPT = "\n\t"  # of the characters that are not printable; others may come from 
 
 
 def end_on_signals() -> None:
-    """From now on SIGINT, SIGTERM and SIGXCPU end the process with exit code 128 + signal: 130, 143 and 152.
+    """Let SIGINT, SIGTERM and SIGXCPU end the process with the exit code 128 + signal: 130, 143 and 152.
 
     Files of locks and unfinished ones are removed before.  Rank 0 reports it on standard error.  Signals that are
     ignored, as in a background job of a shell, stay so.  Call it before any other thread starts.
@@ -50,10 +50,7 @@ def end_on_signals() -> None:
 
 
 def launched_rank() -> int:
-    """Return the rank of this process among all that a launcher started, if it gives ranks.
-
-    Does not need MPI.
-    """
+    """Return the rank that the launcher gives this process, 0 without one; needs no MPI."""
     return int(next((os.environ[name] for name in RANK_VARIABLES if os.environ.get(name, "").isdecimal()), 0))
 
 
