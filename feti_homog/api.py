@@ -34,7 +34,7 @@ def run(
     """Run a case on the ranks of `comm`, by default all ranks.
 
     Collective over `comm`; other ranks need not take part.  PETSc starts without options unless the program has started
-    PETSc before; the section `petsc` of the case has the options of the case.  Returns the result on every rank.
+    PETSc before; the section `petsc` of the case has the case options.  Returns the result on every rank.
 
     Args:
         out: a folder for the files that `feti-homog run` writes; by default the run writes no files.
@@ -68,7 +68,7 @@ def run_sweep(
     retry: bool = False,
     quiet: bool = True,
 ) -> sweep_table.SweepTable:
-    """Run the cases of a sweep, given as a file or document.  Collective.
+    """Run the sweep cases, given as a file or document.  Collective.
 
     Returns the table of the cases on every rank.  Finished cases in `out` are kept, so that the same call resumes after
     an interruption.
@@ -94,12 +94,12 @@ def run_sweep(
 
 
 def collect_sweep(out: str | Path, comm: Intracomm | None = None, *, pictures: bool = True) -> list[str]:
-    """Write cases.csv, statistics.csv and the picture of a sweep.  Collective.
+    """Write cases.csv, statistics.csv and the sweep picture.  Collective.
 
     The sweep may still be running.  Returns lines to print.
 
     Raises:
-        CaseError: `out` is no folder of a sweep.
+        CaseError: `out` is no sweep folder.
     """
     comm = _started(comm)
     from feti_homog.studies import collect

@@ -1,3 +1,3 @@
-"""The version of the program."""
+"""The program version."""
 
 __version__ = "1.0.0"

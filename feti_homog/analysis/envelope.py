@@ -32,8 +32,8 @@ class Rays:
 
     Attributes:
         strain, stress: (n, m) directions.
-        strain_before, stress_before: (m,) starts, after the change of temperature.
-        temperature: change of temperature.
+        strain_before, stress_before: (m,) starts, after the temperature change.
+        temperature: temperature change.
     """
 
     strain: Float
@@ -79,7 +79,7 @@ def rays_of(
 ) -> Rays:
     """Return the rays at angles (n,), in degrees, from the first axis.
 
-    `plane` names both axes.  Stress rays have E = C^-1 S and begin at zero stress after the change of temperature;
+    `plane` names both axes.  Stress rays have E = C^-1 S and begin at zero stress after the temperature change;
     strain rays begin at zero strain.
     """
     strains, stresses = voigt.voigt_names(len(stiffness))

@@ -30,7 +30,7 @@ class Fields:
         fibres: number as in case files (f,), body, phase, centre (f, 2) and radius (f,), on rank 0.
         interface: points (k, 2), normal (k, 2), length (k,) and fibre (k,) at the fibre-matrix interface nodes, and
             the numbers of these nodes in the gathered mesh.
-        states: for each load, angle or kept point of a path: displacement (n, 2), stress (m, 3), traction and jump
+        states: for each load, angle or kept path point: displacement (n, 2), stress (m, 3), traction and jump
             (k, 2), status (k,), with strain, mean stress, load factor and label.
     """
 
@@ -171,7 +171,8 @@ class Result:
         "of a path: the numbers, from 0, of the points whose fields are kept; /state/K is that of entry K", default=None
     )
     phase_stresses: tuple[cell_records.PhaseStresses, ...] | None = described(
-        "largest stresses of each phase under each load and at each kept point", default=None
+        "largest stresses of each phase in each state with fields; also without fields if a phase has a strength",
+        default=None,
     )
     resumed: int | None = described("points of a path that were taken from a checkpoint", default=None)
     result_h5: result_json.FileSeal | None = described(

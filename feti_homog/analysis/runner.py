@@ -34,7 +34,7 @@ def run(
 ) -> Result:
     """Run a case, write its result to `directory`, and return the result.  Collective.
 
-    `resume` continues from the checkpoint of a path, or reads the finished result; `keep_fields` adds the fields.
+    `resume` continues from the checkpoint, or reads the finished result; `keep_fields` adds the fields.
 
     Raises:
         CaseError, MeshError: before any result is written; also for another run's checkpoint and a folder in use.

@@ -74,7 +74,7 @@ def missing(file: Path) -> str:
 def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     """Read the window that a random cell matches, and append faults to `faults`.
 
-    Where the cell gives no number of fibres or no fibre fraction, the window provides the value.
+    Where the cell gives no fibre count or no fibre fraction, the window provides the value.
     """
     if cell.match is None:
         return cell

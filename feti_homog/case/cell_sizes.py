@@ -145,7 +145,7 @@ def coarse_error(materials: Mapping[str, material_forms.Material], plane: str, o
 
 
 def fibre_counts(cell: Cell) -> dict[str, int]:
-    """Return the number of fibres of each phase in a random cell.
+    """Return the fibre count of each phase in a random cell.
 
     A phase with fraction c_p and radius r_p has the expected number e_p ~ c_p / r_p^2. Each phase gets one fibre, and
     each further fibre goes to the phase with the largest e_p / (2 n_p + 1), where n_p is its number so far: the method
@@ -168,7 +168,7 @@ def _expected_counts(cell: Cell) -> dict[str, float]:
 
 
 def void_count(cell: Cell, fibre_radius: float) -> int:
-    """Return the number of voids in a random cell of width 1.
+    """Return the void count in a random cell of width 1.
 
     The result is the whole number nearest to the void fraction, at least one.
     """
@@ -191,7 +191,7 @@ def fractions_in_words(cell: Cell) -> str:
 def mixed_width(cell: Cell) -> float | None:
     """Return the cell width, or None if it follows from `fibre_radius` or is the default.
 
-    With radii and a number of fibres, W^2 = sum n_p pi r_p^2 / sum c_p.
+    With radii and a fibre count, W^2 = sum n_p pi r_p^2 / sum c_p.
     """
     if cell.radii is None or cell.fibres is None:
         return cell.width

@@ -30,7 +30,7 @@ class KeyRow:
     """A row of the reference: one key of the case file, in words.
 
     Attributes:
-        key: name of the key.
+        key: key name.
         accepts: requirement on the value.
         unit: unit of the value, may be empty.
         default: default as in TOML or in words, or "required"; may be empty.

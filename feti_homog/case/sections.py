@@ -1,4 +1,4 @@
-"""Define the sections of a case file, with [sweep] and the tables of a fit: keys, values and meanings.
+"""Define the sections of a case file, with [sweep] and the fit tables: keys, values and meanings.
 
 [petsc] has the PETSc options of the solver without their dash.  PETSc reads its own options, such as -log_view, when it
 starts, so they belong on the command line.
@@ -233,7 +233,7 @@ class SectionTable:
     Attributes:
         section: name of its section.
         place: position in the file, in words, with the form if there are several.
-        contents: dataclass with the keys of the table.
+        contents: dataclass with the table keys.
     """
 
     section: str

@@ -38,7 +38,7 @@ def report(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def fields(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Write the states of a result to files for VTK."""
+    """Write the result states to files for VTK."""
     from feti_homog.results import viewed_states
 
     directory = _result_folder(arguments)
@@ -70,7 +70,7 @@ def fibres(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def _result_folder(arguments: argparse.Namespace) -> Path:
-    """Return the result folder in the arguments.  Raises CaseError for a file, or the folder of a sweep."""
+    """Return the result folder in the arguments.  Raises CaseError for a file, or the sweep folder."""
     directory: Path = arguments.directory
     if os.path.isfile(directory):
         raise CaseError(f"{directory}: expected the folder of a result, not a file")

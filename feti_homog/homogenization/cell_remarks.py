@@ -84,7 +84,7 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
 
 
 def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles: int) -> tuple[str, ...]:
-    """Explain a number of subdomains that differs from the requested number."""
+    """Explain a subdomain count that differs from the requested number."""
     asked = case.decomposition.subdomains
     if asked is None or asked == subdomains:
         return ()

@@ -34,7 +34,7 @@ class CellSummary:
         centres, radii: (constituents, 2) and (constituents,) centres in the cell and radii of fibres, else NaN.
         frames: (constituents, 2, 2) as in `Ellipses`, for fibres that are circles or ellipses; else NaN.
         snapped: largest distance that a node in a user's mesh was moved to make sides match.
-        voids: number of voids.
+        voids: void count.
         match_distance: distance between the fibres and a matched table, see `random_fibres`; None without a table.
         remarks: lines about unexpected cell properties.
         across: whether subdomains reach across materials.
@@ -69,7 +69,7 @@ class CellSummary:
 
     @property
     def fibres(self) -> int:
-        """The number of fibres."""
+        """The fibre count."""
         return int(self.is_fibre.sum())
 
     @property

@@ -1,4 +1,4 @@
-"""The number of pieces, and estimates of memory, useful ranks and dual operator applications.
+"""The piece count, and estimates of memory, useful ranks and dual operator applications.
 
 The memory is linear in the degrees of freedom, because bodies are cut into equally large pieces.
 `scripts/measure_cost.py` measures the constants.
@@ -85,7 +85,7 @@ class PartitionPolicy:
     strip_dofs: int = 30_000
 
     def across_pieces(self, dofs: int, n_ranks: int) -> int:
-        """Return the number of pieces across materials, a multiple of `n_ranks`; 0 for other cuts."""
+        """Return the piece count across materials, a multiple of `n_ranks`; 0 for other cuts."""
         if dofs > self.across_dofs:
             return 0
         if n_ranks <= self.whole_ranks and dofs <= self.whole_dofs:
@@ -126,7 +126,7 @@ def wanted_pieces(
     n_ranks: int,
     policy: PartitionPolicy = DEFAULT_POLICY,
 ) -> Int:
-    """Choose the number of pieces (b,) of each body.
+    """Choose the piece count (b,) of each body.
 
     The case or else the policy determines the numbers; each rank gets at least one piece.
 
@@ -194,7 +194,7 @@ def memory_to_the_end(case: Case, few: float, multipliers: int, columns: int, ra
 
 
 def recommended_ranks(dofs: int, bodies: int) -> int:
-    """Return the number of ranks that a cell can use.
+    """Return the rank count that a cell can use.
 
     The number is at most the number of bodies, because more ranks would cut bodies, which costs iterations.  In cells
     that are cut across materials, `bodies` counts coarse triangles.

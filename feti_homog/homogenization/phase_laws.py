@@ -162,7 +162,7 @@ class SectionValues:
         return np.array(values or [math.inf], float)
 
     def common(self, key: str) -> Any:
-        """Return the common value of a key in all sections."""
+        """Return the value of a key that all sections share."""
         return getattr(self.bonds[0], key)
 
 

@@ -1,4 +1,4 @@
-"""The fields of a response, and the largest stresses in each phase.
+"""The response fields, and the largest stresses in each phase.
 
 Fields are nodal displacements, element means of strains and stresses, tractions and jumps.  The largest stresses are
 those at the integration points: one point in a linear element, six points in a quadratic element.
@@ -26,7 +26,7 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class RecoveredFields:
-    """The fields of a response on this rank, with c displacements and v loads.
+    """The response fields on this rank, with c displacements and v loads.
 
     Attributes:
         displacement, fluctuation: (n, c) total H y + u*, Eq. (14), and u* at the plane nodes of the parts.
@@ -45,7 +45,7 @@ class RecoveredFields:
 
 
 def recover(cell: TornCell, response: Response | None) -> RecoveredFields:
-    """Recover the fields of a response; all fields are zero without a response.  Collective."""
+    """Recover the response fields; all fields are zero without a response.  Collective."""
     nodes, problem = cell.jumps.nodes, cell.solver.problem
     m, (c, v) = problem.strains, (problem.components, len(problem.loads))
     if response is None:

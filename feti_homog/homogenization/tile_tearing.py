@@ -2,7 +2,7 @@
 
 Rank 0 begins the coarse mesh; all ranks place nodes on lines, and fill the tiles of large cells.  Each rank cuts its
 tiles, and no rank has all tiles.  A piece of the matrix, or a fibre, lies in one tile: subdomains depend on the case
-and the number of ranks, not on the rank that filled a tile.
+and the rank count, not on the rank that filled a tile.
 """
 
 from collections.abc import Sequence

@@ -2,7 +2,7 @@
 
 Stiffnesses of the plane are (3, 3) in Voigt order [11, 22, 12] with engineering shear, in any stress unit.  Phases
 of cylinders have Hill's moduli k, l = 2 nu_A k, n = E_A + 4 nu_A^2 k, m = G_T and p = G_A, so that under an axial
-strain e, a change of area theta and a change of temperature T
+strain e, a change of area theta and a change T of temperature
 
     s = k theta + l e - b T,  b = 2 k alpha_T + l alpha_A,
     sigma_33 = l theta + n e - g T,  g = 2 l alpha_T + n alpha_A,

@@ -39,7 +39,7 @@ class Arrangement:
         coating: (N,) thickness of the rings around the outlines, 0 without a ring.
         is_hollow: (N,) mask of voids in hollow fibres, whose ring has the fibre phase; other rings are coatings.
         mesh_order: (N,) meshing order, on which a few triangles depend; by index if None.
-        row: (N,) row indices in the table of fibres; None for cells without a table.
+        row: (N,) row indices in the fibre table; None for cells without a table.
         remarks: lines on the differences between the cell and the table.
     """
 
@@ -95,7 +95,7 @@ class Arrangement:
 
     @property
     def voids(self) -> int:
-        """The number of voids, including those within hollow fibres."""
+        """The void count, including those within hollow fibres."""
         return int(self.is_void.sum() + self.is_hollow.sum())
 
     @property
@@ -119,7 +119,7 @@ class Arrangement:
 
     @property
     def fibres(self) -> int:
-        """The number of fibres."""
+        """The fibre count."""
         return int((~self.is_void).sum())
 
     @property
@@ -165,7 +165,7 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
 
     The candidates along an axis are the middles of the widest gaps between tangents. Among the combinations of both
     axes the corner farthest from all outlines is selected. In symmetric cells, as of two discs, several corners are
-    equal except for rounding errors: the first is selected, so that the unit of length does not matter. Corners in
+    equal except for rounding errors: the first is selected, so that the length unit does not matter. Corners in
     voids are excluded (`in_voids`).
     """
     size, outlines = arrangement.size, arrangement.shells[0]

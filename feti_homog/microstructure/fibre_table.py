@@ -1,4 +1,4 @@
-"""Read a table of fibres, as measured in a micrograph: a row per fibre, with columns x, y, radius and others."""
+"""Read a fibre table, as measured in a micrograph: a row per fibre, with columns x, y, radius and others."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SIZE = re.compile(r"\b(width|height|left|bottom)\s*[=:]\s*([^\s;=]+?)(?=,?\s|,?$
 
 @dataclass(frozen=True)
 class FibreTable:
-    """A table of N fibres in one unit of length; a row may list any periodic image of its fibre.
+    """A table of N fibres in one length unit; a row may list any periodic image of its fibre.
 
     Attributes:
         name: name of the file or list, for messages.
@@ -102,7 +102,7 @@ class FibreTable:
 
 
 def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
-    """Read a table of fibres from a text file.  Fibres may overlap.
+    """Read a fibre table from a text file.  Fibres may overlap.
 
     The first line, or `columns`, lists the names: x, y, radius (or a, b), phase, coating, angle and other names that
     `understood` accepts. A line per fibre follows. Commas, semicolons, tabs or else spaces separate columns; commas may

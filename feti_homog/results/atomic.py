@@ -53,10 +53,10 @@ def commit(part: Path, path: Path) -> None:
 
 
 def append(path: Path, start: int, content: bytes, lasts: bool) -> None:
-    """Write bytes at position `start` of a file, and drop the former end of the file.
+    """Write bytes at position `start` of a file, and drop the former file end.
 
     If the content `lasts`, the function waits until the bytes are on the disk. A killed writer leaves unfinished bytes
-    at the end of the file, which a reader must recognize.
+    at the file end, which a reader must recognize.
 
     Raises:
         FetiHomogError: the file cannot be written.

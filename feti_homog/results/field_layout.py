@@ -95,7 +95,7 @@ class InterfacePart:
 
 @dataclass(frozen=True, repr=False)
 class StatePart:
-    """One state of the cell and this rank's part of its fields."""
+    """One cell state and this rank's part of its fields."""
 
     strain: Float = described(f"macroscopic strain {', '.join(voigt.STRAINS)}", shape="(3,)")
     stress_mean: Float = described(

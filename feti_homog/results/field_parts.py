@@ -82,7 +82,7 @@ def interface_part(cell: unit_cell.TornCell) -> InterfacePart:
 def state_part(
     cell: unit_cell.TornCell, response: averaging.Response, load_factor: float, label: str, point: int
 ) -> StatePart:
-    """Return the fields of a response in plane strain or stress. Collective when first called."""
+    """Return the response fields in plane strain or stress. Collective when first called."""
     fields = recovered_fields.recover(cell, response)
     return StatePart(
         strain=response.strain,

@@ -20,7 +20,7 @@ class View:
     """A virtual dataset /`kind`/GROUP/`name` over datasets of /GROUP.
 
     Attributes:
-        components: number of columns; 0 for a dataset with one dimension.
+        components: column count; 0 for a dataset with one dimension.
         source: dataset that provides type and unit.
         columns: for each nonzero column, the source dataset and source column; None for the whole dataset.
         meaning: description in words.

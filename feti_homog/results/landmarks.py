@@ -1,4 +1,4 @@
-"""Find the landmarks of a path, and choose the points to keep and to show.
+"""Find the path landmarks, and choose the points to keep and to show.
 
 Landmarks are first break, peak, valley after the peak, and end.  The peak is the largest stress before a fall, in the
 component with the largest strain.  Points are entries of `path` in result.json.  At the end of a path, fields are kept
@@ -84,7 +84,7 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
 
 
 def stresses_of(document: path_curves.Document, peak: path_curves.Document) -> list[float]:
-    """Return the stress component of the peak at each point of a path."""
+    """Return the stress component of the peak at each path point."""
     component = voigt.voigt_names(len(document["path"][0]["stress"]))[1].index(peak["stress_name"])
     return [float(point["stress"][component]) for point in document["path"]]
 
@@ -187,7 +187,7 @@ def _norm(values: Float, shear: float) -> Float:
 
 
 def chosen(document: path_curves.Document, rows: int, among: Sequence[int] | None = None) -> list[int]:
-    """Choose at most `rows` points of a path, or of the path points `among` (rising).
+    """Choose at most `rows` path points, or of the points `among` (rising).
 
     The choice has the first and last point, then landmarks, deepest drop and leg ends, each group if it fits, and
     further points at evenly spaced numbers of broken bonds.

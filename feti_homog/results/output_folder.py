@@ -1,7 +1,7 @@
 """Lock and check the result folder, and write its events.log.
 
 One run at a time writes to the folder, and replaces no foreign file.  A run recognizes result files by content, not by
-a marker in the folder: a user may add a foreign file with the name of a result file later.
+a marker in the folder: a user may add a foreign file of such a name later.
 """
 
 import contextlib

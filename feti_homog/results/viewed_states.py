@@ -46,7 +46,7 @@ class ViewedState:
 
 
 def read_state(out: str | Path, number: int = 0) -> ViewedState:
-    """Read a state of the cell from a result folder.  Call on one rank.
+    """Read a cell state from a result folder.  Call on one rank.
 
     `nodes` has displacement and fluctuation, the periodic part of the displacement (length).  `elements` has element
     means: the tensors stress and strain; S11, S22, S12, S33, von_mises, and principal_1 to principal_3, largest first
@@ -68,7 +68,7 @@ def read_state(out: str | Path, number: int = 0) -> ViewedState:
 
 
 def cell_state(file: Any, state: int) -> ViewedState:
-    """Read a state of the cell from an open result.h5, as `read_state`."""
+    """Read a cell state from an open result.h5, as `read_state`."""
     group = file[f"state/{state}"]
     more = xdmf.SPATIAL_ELEMENTS if AXIAL_DISPLACEMENT in group else {}
     nodes, elements = (_tables(file, state, names) for names in (xdmf.CELL_NODES, xdmf.CELL_ELEMENTS | more))

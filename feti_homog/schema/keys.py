@@ -19,7 +19,7 @@ T = TypeVar("T")
 class Selector:
     """A key whose value decides which other keys belong to the case.
 
-    `word` is the name of the key in messages, if different.
+    `word` is the key name in messages, if different.
     """
 
     section: str
@@ -65,7 +65,7 @@ class Key:
         only: conditions; the key belongs to the table if all hold.
         required: whether a table must have the key if the conditions hold.
         instead: replacement if a condition fails, may be empty.
-        unless: other keys of the table, any of which makes the key optional.
+        unless: other table keys, any of which makes the key optional.
         by_pair: whether several [[interface]] sections may differ in the key.
         presentation: whether the key changes only how results look, and no number.
     """
@@ -138,7 +138,7 @@ class TableReader:
     def read(self, table_class: type[T], table: object, section: str, prefix: str = "") -> T | None:
         """Return the table as a `table_class` instance; None if the table is faulty.
 
-        Each fault adds a line to `faults`, where `prefix` precedes the keys of a table within a section.
+        Each fault adds a line to `faults`, where `prefix` precedes the table keys within a section.
         """
         if not isinstance(table, dict):
             self.faults.append(f"{section} = {toml_value(table)}: expected a section [{section}]")

@@ -1,4 +1,4 @@
-"""The folder of a sweep: its case list, a folder for each case, and their progress.
+"""The sweep folder: its case list, a folder for each case, and their progress.
 
 DIR/sweep.json, cases.csv     the cases; `feti-homog collect` adds the results to cases.csv
 DIR/case-0001/case.toml       the case with its defaults, as `feti-homog run` reads it
@@ -85,7 +85,7 @@ def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str)
 
 
 def prepare_folder(directory: Path, sweep: Sweep) -> None:
-    """Make the folder of a sweep, or extend its list of cases.  On one rank.
+    """Make the sweep folder, or extend its case list.  On one rank.
 
     Raises:
         CaseError: the folder holds another sweep, or foreign files under the file names of a sweep.
@@ -139,7 +139,7 @@ def csv_text(rows: Iterable[Iterable[Any]]) -> str:
 
 
 def read_index(directory: Path) -> SweepIndex:
-    """Read the list of cases in the folder of a sweep.  Raises CaseError for an unreadable list."""
+    """Read the case list in the sweep folder.  Raises CaseError for an unreadable list."""
     path = directory / INDEX_FILE
     try:
         document = result_json.loads(input_files.read(path).decode("utf-8"))

@@ -1,4 +1,4 @@
-"""Run the cases of a sweep: all cases in groups of ranks, or a single case in a job array."""
+"""Run the sweep cases: all cases in groups of ranks, or a single case in a job array."""
 
 import json
 import time
@@ -41,7 +41,7 @@ def group_size(comm: Intracomm, ranks_per_case: int | None) -> int:
 def run_all(
     sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int | None, retry: bool, quiet: bool
 ) -> None:
-    """Run all cases of a sweep.  Collective.
+    """Run all sweep cases.  Collective.
 
     A group of `ranks_per_case` ranks, by default all, runs one case; the groups work concurrently.
 
@@ -107,7 +107,7 @@ def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: 
 
 @contextmanager
 def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) -> Iterator[None]:
-    """Make the folder of a sweep and hold its lock, which jobs of single cases share.  Collective."""
+    """Make the sweep folder and hold its lock, which jobs of single cases share.  Collective."""
     lock = file_locks.Lock(directory / case_folders.LOCK_FILE, shared)
 
     def prepare() -> None:
@@ -136,7 +136,7 @@ class Outcome(Enum):
 
 @dataclass(frozen=True)
 class CaseRunner:
-    """A group of ranks that runs cases of a sweep; `retry` repeats failed cases, `quiet` prints nothing."""
+    """A group of ranks that runs sweep cases; `retry` repeats failed cases, `quiet` prints nothing."""
 
     comm: Intracomm
     directory: Path

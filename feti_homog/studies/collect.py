@@ -1,4 +1,4 @@
-"""Write the tables and the picture of a sweep, finished or not, for `feti-homog collect DIR`."""
+"""Write the tables and the sweep picture, finished or not, for `feti-homog collect DIR`."""
 
 import json
 import math
@@ -21,16 +21,16 @@ CASE = ("folder", "point", "realisation", "status", "reason")
 
 
 def read(directory: Path) -> SweepTable:
-    """Read the folder of a sweep to a table of all cases, finished or not.  On one rank.
+    """Read the sweep folder to a table of all cases, finished or not.  On one rank.
 
     Raises:
-        CaseError: the folder holds no sweep, or its list of cases is damaged.
+        CaseError: the folder holds no sweep, or its case list is damaged.
     """
     return _table(*_index_and_states(directory))
 
 
 def collect(directory: Path, pictures: bool) -> list[str]:
-    """Write the tables and the picture of a sweep to its folder.  On one rank.  Returns the lines to print.
+    """Write the tables and the sweep picture to its folder.  On one rank.  Returns the lines to print.
 
     Raises:
         CaseError: as `read`.

@@ -1,6 +1,6 @@
 """Fit unknown constants to measured values; every evaluation is a sweep over the tests, in a separate folder.
 
-DIR/evaluation-0001           folder of a sweep: a case for each test
+DIR/evaluation-0001           sweep folder: a case for each test
 DIR/differences-0001          cases for finite differences, where no derivative is exact
 DIR/fit.json, measured.csv, fit.png
 """

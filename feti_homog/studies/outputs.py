@@ -25,7 +25,7 @@ def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
 
 
 def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numbers) -> dict[str, float]:
-    """Return the numbers of a result.json by column name; `numbers` are i and j in Cij of a stiffness (3, 3)."""
+    """Return the numbers in result.json by column name; `numbers` are i and j in Cij of a stiffness (3, 3)."""
     solver = document["solver"]
     cell, fractions = document["cell"], document["cell"].get("fractions", {})
     values = {"fraction_meshed": cell["fibre_fraction"], "elements": cell["elements"], "nodes": cell["nodes"]}

@@ -1,4 +1,4 @@
-"""Draw moduli.png, the moduli of a sweep over the fibre fraction, and fit.png, the residuals and curves of a fit."""
+"""Draw moduli.png, moduli of a sweep over the fibre fraction, and fit.png, residuals and fit curves."""
 
 from collections.abc import Mapping
 from itertools import cycle
@@ -122,13 +122,13 @@ def _plot_series(axes: Axes, table: SweepTable, series: Series, name: str, style
 
 
 def draw_fit(path: Path, document: Mapping[str, Any]) -> Path:
-    """Draw the residuals and curves of a fit to a file.  Raises FetiHomogError if it cannot be written."""
+    """Draw the residuals and fit curves to a file.  Raises FetiHomogError if it cannot be written."""
     with mpl.rc_context(plot_helpers.STYLE):
         return plot_helpers.save(fit_figure(document), path)
 
 
 def fit_figure(document: Mapping[str, Any]) -> Figure:
-    """Draw the residuals and curves of a fit.
+    """Draw the residuals and fit curves.
 
     The first panel has a row for each single value, with its residual in standard deviations; the second has measured
     and computed curves.

@@ -94,7 +94,7 @@ def _curve_faults(case: Case, points: Sequence[Datum]) -> Iterator[str]:
 
 
 def responses(document: path_curves.Document) -> dict[str, float]:
-    """Return the numbers of a result whose scatter matters, by name.
+    """Return the result numbers whose scatter matters, by name.
 
     A stiffness has its constants, a path its onset and peak, other analyses the numbers of their kind.
     """
@@ -106,7 +106,7 @@ def responses(document: path_curves.Document) -> dict[str, float]:
 
 
 def _values(document: path_curves.Document) -> dict[str, float]:
-    """Return the numbers of a result by their names in a fit file."""
+    """Return the result numbers by their names in a fit file."""
     if "sensitivities" in document:
         sensitivities = document["sensitivities"]
         return dict(zip(sensitivities["constants"], sensitivities["constant_values"], strict=True))

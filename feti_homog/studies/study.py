@@ -1,7 +1,7 @@
 """Run a study: compute the cases that one file describes, and derive one document from their results.
 
 DIR/NAME.json                 digest of the study from the start, its answer at the end
-DIR/EVALUATION                folder of a sweep, with a folder for each case
+DIR/EVALUATION                sweep folder, with a folder for each case
 
 Finished cases are kept, so that the same command resumes the study.
 """
@@ -38,7 +38,7 @@ class Evaluator:
     quiet: bool
 
     def results(self, name: str, sweep: Sweep) -> list[dict[str, Any]]:
-        """Run the cases of a sweep in the subfolder `name`.  Collective.
+        """Run the sweep cases in the subfolder `name`.  Collective.
 
         Returns the contents of result.json for all cases on rank 0; an empty list elsewhere.
 

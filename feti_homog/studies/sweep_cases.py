@@ -149,7 +149,7 @@ def case_documents(
     faults: list[str],
     section: str = sections.SWEEP,
 ) -> list[tuple[SweepCase, dict[str, Any]]]:
-    """Return the cases of a sweep, unchecked, with their documents.
+    """Return the sweep cases, unchecked, with their documents.
 
     The cases run through all points; further realisations follow, of points with a random cell alone.  Faults of the
     points and of the realisations are appended to `faults`.
@@ -176,7 +176,7 @@ def case_documents(
 
 
 def _with_values(base: Mapping[str, Any], point: Assignment, faults: list[str], section: str) -> dict[str, Any]:
-    """Return a copy of the base document with the values of a point.
+    """Return a copy of the base document with the point values.
 
     A table is merged into its section; a missing section is made.  A number, from 1, selects one of several sections
     of the same name.  Faults are appended to `faults`.
@@ -210,7 +210,7 @@ def _is_random(document: Mapping[str, Any]) -> bool:
 
 
 def _inputs(point: Assignment) -> dict[str, Any]:
-    """Return the values of a point by dotted key, with tables split into their entries."""
+    """Return the point values by dotted key, with tables split into their entries."""
     inputs: dict[str, Any] = {}
     for path, value in point.items():
         parts = {(*path, name): part for name, part in value.items()} if isinstance(value, dict) else {path: value}

@@ -1,10 +1,10 @@
-"""Compute the scatter of results by uncertain inputs, to compare with the scatter of random cells and the mesh error.
+"""Compute the result scatter by uncertain inputs, to compare with the scatter of random cells and the mesh error.
 
 Derivatives are exact where results have derivatives, else central differences between runs one standard deviation
 below and above the mean.  A random cell may change its arrangement between these runs: the standard error of the
 slopes over the cells shows this.
 
-DIR/means                     folder of a sweep: the case, or all realisations of a random cell
+DIR/means                     sweep folder: the case, or all realisations of a random cell
 DIR/differences               two cases for each number without exact derivatives
 DIR/uncertainty.json
 """

@@ -60,7 +60,7 @@ def targets(case: Document) -> list[Prescribed]:
 
 
 def at_points(case: Document, points: Sequence[Document]) -> Iterator[Prescribed]:
-    """Yield the prescribed load at every point of a path.
+    """Yield the prescribed load at every path point.
 
     The first leg has a share of its end. Later legs are straight from the last prescribed load to their end. A
     component that changes its kind begins at its value in the last point.

@@ -15,7 +15,7 @@ from feti_homog.report.cards.export import csv_table
 from feti_homog.report.text import constant_tables, stiffness_tables
 from feti_homog.report.text.summary import summary
 from feti_homog.studies.outputs import outputs
-from feti_homog.studies.predictions import available
+from feti_homog.studies.predictions import responses
 from feti_homog.system.runtime.records import plain
 
 pytestmark = pytest.mark.parallel
@@ -43,10 +43,10 @@ def result():
 
 def test_every_constant_has_one_name(result):
     """No two names, of tables, sweeps, fits and sensitivities, have one value; no name has two."""
-    case, found = result
+    _, found = result
     document = plain(found.document)
     own = dict(zip(found.sensitivities.constants, map(float, found.sensitivities.constant_values), strict=True))
-    assert {*available(case)} == {*constants(np.eye(6), np.zeros(6))} == {*own}
+    assert {*responses(found.document)} == {*constants(np.eye(6), np.zeros(6))} == {*own}
     sources = {"sensitivities": own, "sweep": outputs(document)}
     sources["axes of the cell"] = dict(row[:2] for row in stiffness_tables.constants(document)[0].rows)
     about = stiffness_tables.constants(document)[1]

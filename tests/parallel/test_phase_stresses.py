@@ -27,7 +27,7 @@ def phases_of(comm, load, order=1, plane="generalized", fibre=FIBRE, strengths=(
         "analysis": {"type": "load", "plane": plane},
         "load": {"to": load},
     }
-    return {phase.phase: phase for phase in run(Case.parse(document | more), comm).phase_stresses}
+    return {phase.phase: phase for phase in run(Case.parse(document | more), comm, fields=True).phase_stresses}
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -75,7 +75,7 @@ def test_stresses_rise_beside_tips_and_corners(comm):
             "material": {"matrix": MATRIX, "fibre": FIBRE},
             "analysis": {"type": "stiffness", "plane": "strain"},
         }
-        return " ".join(run(Case.parse(document | more), comm).remarks)
+        return " ".join(run(Case.parse(document | more), comm, fields=True).remarks)
 
     arc = {"interface": {"debonded": [{"fibre": "all", "centre": 0.0, "angle": 90.0}]}}
     assert "beside tips of debonding they rise with finer elements" in remarks(CELL, **arc)

@@ -73,8 +73,17 @@ class Units:
 
 def numbers(result: Result) -> Iterator[tuple[str, tuple[int, int, int], np.ndarray]]:
     """Place, powers and values of all numbers of result.json that belong to the response."""
-    powers = powers_of_keys(result.document)
-    for path, value in _leaves(result.document, ""):
+    powers, document = powers_of_keys(result.document), dict(result.document)
+    # A unit of temperature is another one in other units.
+    document["phase_stresses"] = [
+        {
+            name: np.array(column)[np.array(phase["state"]) != "temperature"]
+            for name, column in phase.items()
+            if len(column) == len(phase["state"])
+        }
+        for phase in document.get("phase_stresses", ())
+    ]
+    for path, value in _leaves(document, ""):
         if path.split(".")[0] not in APART:
             kind = _kind(path)
             yield path, powers[kind if kind in powers else kind.rpartition(".")[0] + ".PHASE"], value

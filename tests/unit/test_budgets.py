@@ -16,26 +16,26 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 # Lines, of the modules beside the packages under "."; the second numbers are for the largest stresses of the phases.
 LINES = {
     ".": 470,
-    "analysis": 3000 + 30,
+    "analysis": 3000 + 40,
     "case": 2880,
     "commands": 560,
     "fem": 1150,
     "feti": 6300,
     "homogenization": 3230 + 55,
     "interface": 4000,
-    "materials": 1430 + 90,
-    "mesh": 5600,
+    "materials": 1430 + 95,
+    "mesh": 5500,
     "microstructure": 2140,
-    "report": 3420,
+    "report": 3420 + 10,
     "results": 2430,
     "schema": 430,
     "studies": 2950,
-    "system": 1780,
-    "verify": 3120 + 140,
+    "system": 1770,
+    "verify": 3100 + 145,
 }
 FILES, TOTAL = 310, 45000
 # Percent of all lines: private functions that are called once, and imports.
-CALLED_ONCE, IMPORTS = 6.0, 6.1
+CALLED_ONCE, IMPORTS = 6.0, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.
 CONSTANTS, SHARED = 335, 215
 # Of 1 000 words of docstrings: "those", "what", "that of"; "of".  Percent of bound names that are pronouns or adverbs.

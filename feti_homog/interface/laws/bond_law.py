@@ -27,13 +27,13 @@ class KeyValues(Protocol):
     """The values of [interface] keys at nodes; a section without the key takes an alternative key, or inf."""
 
     def __call__(self, key: str, *alternatives: str) -> float | Float:
-        """Return the value of a key, for all nodes or by node (k,)."""
+        """Return the key value, for all nodes or by node (k,)."""
 
     def everywhere(self, key: str, *alternatives: str) -> Float:
         """Return the values (s,) of a key in all sections, equal on every rank."""
 
     def common(self, key: str) -> Any:
-        """Return the common value of a key in all sections, as in the case."""
+        """Return the value of a key that all sections share, as in the case."""
 
 
 @dataclasses.dataclass(frozen=True)

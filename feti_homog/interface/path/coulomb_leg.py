@@ -80,7 +80,7 @@ class CoulombLeg(Leg):
         return status, x
 
     def _given(self, share: float, x: Float) -> Prescribed:
-        """Prescribe the load at a fraction of the leg, and the slips in scaled x."""
+        """Prescribe the load at a leg fraction, and the slips in scaled x."""
         load = self._load_at(share)
         return Prescribed(load.by_stress, self.sliding.given(load), x[1 : 2 * len(self.sliding.rows) : 2])
 
@@ -155,7 +155,7 @@ class CoulombLeg(Leg):
             raise StuckError(CYCLE)
 
     def _go_to(self, share: float) -> None:
-        """Advance in one step to a fraction of the leg, or as far as the cell carries the load.  Collective.
+        """Advance in one step to a leg fraction, or as far as the cell carries the load.  Collective.
 
         Raises:
             NotCarriedError: the cell carries nothing beyond the last step.
@@ -163,7 +163,7 @@ class CoulombLeg(Leg):
         sliding, x, faces = self.sliding, self._x, self.sliding.faces
 
         def carried() -> tuple[float, NotCarriedError | None]:
-            """Return the fraction of the leg that the cell carries, and the error that limits this fraction or None."""
+            """Return the leg fraction that the cell carries, and the error that limits this fraction or None."""
             low, high = self._share, share
             try:
                 faces.step(self._status, self._given(share, x), x)

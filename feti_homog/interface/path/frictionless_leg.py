@@ -26,9 +26,9 @@ class FrictionlessLeg(Leg):
 
     From the equilibrium at s the transitions are
 
-        overloaded   by a break, or by a change of contact, at which the released energy of tips jumps.  The worst
+        overloaded   by a break, or by a contact change, at which the released energy of tips jumps.  The worst
                      bonds break: a point; equilibrium at the same s without these bonds.
-        advance      With a linear response, predict the first break, the beginning of a change of contact, and the
+        advance      With a linear response, predict the first break, the beginning of a contact change, and the
                      end of the leg.  Equilibrium at the first of these; if the stress is not on the line, or a bond
                      is overloaded, an event was missed: halve the way until no event is missed.  The result is
           a break    the worst bonds break: a point; equilibrium at the same s without these bonds;
@@ -69,15 +69,15 @@ class FrictionlessLeg(Leg):
         self._go_to(self._share)
 
     def _go_to(self, share: float) -> None:
-        """Advance to the equilibrium at a fraction of the leg.  Collective."""
+        """Advance to the equilibrium at a leg fraction.  Collective."""
         self._stand(share, self._solve(share, self._from.bonds, self._from.lam))
 
     def _solve(self, share: float, bonds: BondState, lam: Multipliers) -> Equilibrium:
-        """Solve for the equilibrium at a fraction of the leg, from guesses.  Collective."""
+        """Solve for the equilibrium at a leg fraction, from guesses.  Collective."""
         return self.cell.equilibrium(self._load_at(share), bonds, lam)
 
     def _stand(self, share: float, state: Equilibrium) -> None:
-        """Set the state to an equilibrium at a fraction of the leg, and add the energies of the way."""
+        """Set the state to an equilibrium at a leg fraction, and add the energies of the way."""
         if share >= self._bends_before:
             self._bends_before = np.inf
         self._share, self._state, self._bonds = share, state, state.bonds

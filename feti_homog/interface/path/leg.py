@@ -85,7 +85,7 @@ class Leg(ABC):
         return replace(point, load_factor=number / steps)
 
     def _load_at(self, share: float) -> Load:
-        """Return the load at a fraction of the leg."""
+        """Return the load at a leg fraction."""
         return self.start.after(share, self.end)
 
     def _is_over(self) -> bool:
@@ -99,7 +99,7 @@ class Leg(ABC):
         return self._utilisation[1]
 
     def _is_overloaded(self) -> bool:
-        """Return whether a break or a change of contact has overloaded bonds.  Collective."""
+        """Return whether a break or a contact change has overloaded bonds.  Collective."""
         return self._used()[1] > 1.0 + UTILISATION_TIE and self.state.converged
 
     def _break_overloaded(self, is_due: bool = False) -> Iterator[path_points.Point]:

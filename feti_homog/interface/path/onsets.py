@@ -1,4 +1,4 @@
-"""Ends of a straight response: the first break of a bond, or the first change of contact.
+"""Ends of a straight response: the first break of a bond, or the first contact change.
 
 The first bond of a linear cell breaks under tractions t0 + f t1, with load factor f.  The utilisation u is homogeneous
 of degree one in the tractions, so without t0 the factor is 1 / u(t1).  With t0, some laws have a formula; for others u

@@ -40,7 +40,7 @@ class PathState:
     stretched: float = 0.0
 
     def energies_to(self, after: Macroscopic) -> Energies:
-        """Return the energies of the way from the last point to a state; a change of contact loses no energy."""
+        """Return the energies of the way from the last point to a state; a contact change loses no energy."""
         lost = 0.0 if self.broken is None else self.last.released_to(after)
         return Energies(after.stored - self.last.stored + lost, lost, self.broken or 0.0)
 

@@ -1,4 +1,4 @@
-"""The lines of a cell, with nodes: sides, fibre arcs, and bridges between fibres.
+"""The cell lines, with nodes: sides, fibre arcs, and bridges between fibres.
 
 Imports `mesh.sizes`, `microstructure` and `system`.  Main entries: `bare_outline` and `outline`.
 """

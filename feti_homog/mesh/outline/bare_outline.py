@@ -1,4 +1,4 @@
-"""The lines of a cell with discs and ellipses, cut at crossings, before all ranks place nodes on the lines."""
+"""The cell lines with discs and ellipses, cut at crossings, before all ranks place nodes on the lines."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NO_BRIDGES = outline.Bridges(np.zeros((0, 2), np.int64), np.zeros(0))
 
 @dataclass(frozen=True)
 class BareOutline:
-    """The lines of a cell before the placement of nodes.
+    """The cell lines before the placement of nodes.
 
     Attributes:
         size: (2,) width and height of the cell.

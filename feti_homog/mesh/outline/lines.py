@@ -1,4 +1,4 @@
-"""The lines of a cell (pieces of sides, arcs and bridges), and the placement of nodes by edge sizes."""
+"""The cell lines (pieces of sides, arcs and bridges), and the placement of nodes by edge sizes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The lines of a cell with nodes, and the steps before: images, vertices, arcs and pieces of sides."""
+"""The cell lines with nodes, and the steps before: images, vertices, arcs and pieces of sides."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ class Bridges:
 
 @dataclass(frozen=True)
 class Outline:
-    """The lines of a cell.
+    """The cell lines.
 
     Attributes:
         points: (n, 2) exact positions of the nodes on all lines.

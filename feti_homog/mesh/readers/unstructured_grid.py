@@ -43,7 +43,7 @@ class Grid:
         points: (n, 3) coordinates.
         types: (m,) VTK cell types.
         nodes: nodes of all cells, cell after cell, numbered from 0.
-        counts: (m,) number of nodes of each cell.
+        counts: (m,) node count of each cell.
         data: cell data, (m,) or (m, k), by name.
         first: number of the first node and the first cell in the file.
     """

@@ -179,7 +179,7 @@ class Scanner:
         return words
 
     def word(self) -> str:
-        """Read the next word; empty at the end of the file."""
+        """Read the next word; empty at the file end."""
         match = WORD.search(self.content, self.place)
         self.place = len(self.content) if match is None else match.end()
         return "" if match is None else match[0].decode(errors="replace")

@@ -1,4 +1,4 @@
-"""Estimate the number of triangles before the program makes a mesh."""
+"""Estimate the triangle count before the program makes a mesh."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ POSITIONS = 200
 
 @dataclass(frozen=True)
 class ElementEstimate:
-    """The quantities of a cell of width 1 that determine the number of triangles.
+    """The quantities of a cell of width 1 that determine the triangle count.
 
     Attributes:
         cell: the cell section, with element sizes.
-        fibres: number of fibres.
+        fibres: fibre count.
         mean_radius: mean radius of the fibres, in tables also of voids.
         height: cell height / cell width.
         interfaces: total length of the interfaces.
@@ -69,7 +69,7 @@ class ElementEstimate:
 
     @property
     def triangles(self) -> float:
-        """The estimated number of triangles in a cell without debonded arcs.
+        """The estimated triangle count in a cell without debonded arcs.
 
         Triangles of one size fill the cell. Additional triangles are around fibres, at the ends of ellipses, and on
         both sides of interfaces of length P: 2 P int dx / (A (h + g x)^2) = 2 P / (A g h).

@@ -1,6 +1,6 @@
 """Tiles of a large cell: parts of the outline that ranks fill independently, with common nodes on common borders.
 
-Tiles depend on the cell alone, so that the mesh is the same on any number of ranks.  A rank has the torus of the tiles
+Tiles depend on the cell alone, so that the mesh is the same on any rank count.  A rank has the torus of the tiles
 that the rank has filled: outline numbers identify nodes on lines, the following numbers identify nodes within tiles,
 tile by tile, and the two classes of a torus edge determine the number of the edge.
 """
@@ -158,7 +158,7 @@ class Regions:
         ellipses: the k circles, as in `CoarseMesh`.
         constituent: (k + 1,) the constituent directly within each circle, -1 in a void; the last entry is the matrix.
         phase, precedence: (constituents,) phase number and ascending precedence, as in `CoarseMesh`.
-        nodes: number of nodes on the lines.
+        nodes: node count on the lines.
     """
 
     width: float
@@ -237,7 +237,7 @@ def tile_mesh(regions: Regions, tiles: Sequence[FilledTile]) -> tuple[CoarseMesh
 def tile_torus(regions: Regions, tiles: Sequence[FilledTile], all_nodes: int) -> tuple[Torus, Int]:
     """Make the torus of filled tiles, without voids; also return the tile (m,) of each triangle.
 
-    `all_nodes` is the number of nodes in the cell.
+    `all_nodes` is the node count in the cell.
     """
     mesh, classes, tile = tile_mesh(regions, tiles)
     plane, triangle_edges = plane_edges_of(mesh)

@@ -50,7 +50,7 @@ class Outlines(Protocol):
         """Move the outlines to other centres (k, 2)."""
 
     def per(self, unit: float) -> Self:
-        """Divide all lengths and centres by a unit of length."""
+        """Divide all lengths and centres by a length unit."""
 
     def rounded(self, decimals: int) -> Self:
         """Round all coordinates to a number of decimals."""
@@ -95,7 +95,7 @@ class ConvexCurves:
         return replace(self, centres=centres)
 
     def per(self, unit: float) -> Self:
-        """Divide all lengths and centres by a unit of length."""
+        """Divide all lengths and centres by a length unit."""
         return self._each(lambda array: array / unit)
 
     def scaled(self, factor: float) -> Self:

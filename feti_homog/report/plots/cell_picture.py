@@ -131,7 +131,7 @@ def write_fibre_numbers(axes: Axes, cell: drawn_cell.DrawnCell, inches: float, f
     The cell sides may cut a round fibre; every part of the fibre then gets the number.
 
     Args:
-        inches: inches in the picture per unit of length.
+        inches: inches in the picture per length unit.
         factors: (f,) values to write below the numbers, if any.
     """
     fibres, drawn = cell.file["fibre"], cell.drawn

@@ -156,7 +156,7 @@ def shown_scale(file: Any, document: Document) -> float:
 def shown_states(document: Document, most: int, count: int) -> list[int]:
     """Choose at most `most` of the `count` states for the pictures.
 
-    The states are at the landmarks of a path, or else evenly spaced.
+    The states are at the path landmarks, or else evenly spaced.
     """
     if reported(document).is_followed:
         return landmarks.chosen_states(document, most, count)
@@ -164,7 +164,7 @@ def shown_states(document: Document, most: int, count: int) -> list[int]:
 
 
 def panels(file: Any, document: Document, scale: float) -> Figure:
-    """Draw panels of several states: landmarks of a path, or angles."""
+    """Draw panels of several states: path landmarks, or angles."""
     count, analysis = len(file["state"]), reported(document)
     if analysis.is_followed:
         numbers = landmarks.landmark_states(document, MAX_PANELS, count)

@@ -156,7 +156,7 @@ def bar_beside(axes: Axes, shapes: Any, extend: str) -> Any:
 
 @dataclass(frozen=True)
 class LoadLabels:
-    """The load labels for the states of a result.
+    """The load labels for the result states.
 
     Attributes:
         leading: component of the leading strain of a path; None for other analyses.

@@ -195,7 +195,7 @@ def energies(document: Document) -> Figure | None:
 
 
 def _column(points: Sequence[Mapping[str, Any]], name: str, power: int = 2) -> Array:
-    """Return the values of a point entry along the path, from the unloaded cell onwards.
+    """Return the values of an entry along the path, from the unloaded cell onwards.
 
     Up to the first point the response is linear, and the values grow with the load to the power `power`.
     """

@@ -1,4 +1,4 @@
-"""Text of studies: the tables of a fit from fit.json, and of scatter from uncertainty.json."""
+"""Text of studies: tables of a fit from fit.json, and of scatter from uncertainty.json."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ LEAST_SHARE, MOST_DEVIATIONS = 0.01, 3.0
 
 
 def fit_text(document: Document) -> str:
-    """Return the tables of a fit: unknowns, correlations, and measured and computed values."""
+    """Return the fit tables: unknowns, correlations, and measured and computed values."""
     measured, is_single = document["measured"], len({datum["test"] for datum in document["measured"]}) == 1
     tests = ["" if is_single else f"test {datum['test']} " for datum in measured]
     strains = ["" if d["strain"] is None else f"({d['strain_name']} = {d['strain']:g})" for d in measured]

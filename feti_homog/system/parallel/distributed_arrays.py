@@ -75,7 +75,7 @@ def allgather_rows(comm: MPI.Intracomm, part: Array, counts: Int) -> Array:
 
     Args:
         part: (counts[rank],) or (counts[rank], k) rows of this rank.
-        counts: (ranks,) number of rows of each rank.
+        counts: (ranks,) row count of each rank.
 
     Returns:
         (sum of counts,) or (sum of counts, k).
