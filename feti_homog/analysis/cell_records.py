@@ -86,7 +86,7 @@ class FibreInfo:
         )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class SolverInfo:
     """Sizes, iterations and convergence of the dual problem."""
 
@@ -100,15 +100,15 @@ class SolverInfo:
     coarse_dim: int = described("vectors of the coarse space, rigid-body motions included")
     factorizations: int = described("subdomains that were factored, each once")
     coarse_factorizations: int = described("factorizations of the coarse problem")
+    rtol: float = described("relative tolerance of the dual problem")
+    solves: int = described("dual problems solved")
+    iterations: tuple[int, ...] = described("Krylov iterations of each state")
+    converged_reason: tuple[int, ...] = described("PETSc's KSPConvergedReason of each state, negative if it failed")
     method: str | None = described("how the cell is cut, and by which preconditioner it is solved", default=None)
     condition: float | None = described(
         "largest condition number of the projected, preconditioned dual operator, estimated by the iterations",
         default=None,
     )
-    rtol: float = described("relative tolerance of the dual problem")
-    solves: int = described("dual problems solved")
-    iterations: tuple[int, ...] = described("Krylov iterations of each state")
-    converged_reason: tuple[int, ...] = described("PETSc's KSPConvergedReason of each state, negative if it failed")
 
     @classmethod
     def of(cls, cell: unit_cell.TornCell, iterations: Sequence[int], reasons: Sequence[int]) -> SolverInfo:

@@ -132,7 +132,7 @@ FALSE = {
     "an angle": ("angle", document("angle", 1, "angle", to=170.0), {"arcs"}),
     "a mean stress": ("bonded", attribute("stress"), {"mean stress", "tables"}),
     "a strain": ("bonded", attribute("strain"), {"periodicity", "load"}),
-    "a missing state": ("path", delete_state, {"load", "tables"}),
+    "a missing state": ("path", delete_state, {"load", "tables", "phases"}),
     "not a number": ("bonded", shift("stress", np.nan), {"numbers", "stress", "stress 33"}),
     "Poisson's ratio": ("bonded", document("case", *MATRIX, "poisson", factor=1 + 1e-4), MATERIAL_33),
     "the plane state": ("plane", document("case", "analysis", "plane", to="strain"), MATERIAL_33),
