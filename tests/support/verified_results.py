@@ -25,6 +25,10 @@ SPRINGS = {"normal_stiffness": 900.0, "tangential_stiffness": 300.0}
 STRENGTHS = {"normal_strength": 5.0, "tangential_strength": 5.0}
 WAYPOINTS = [[0.2, 0.0, 0.0], [0.1, 0.05, 0.05], [0.0, 0.0, 0.0], [-0.1, 0.0, 0.1]]
 
+HASHIN = {
+    "axial_tension": 3.5, "axial_compression": 2.5, "axial_shear": 0.08, "transverse_tension": 0.06,
+    "transverse_compression": 0.15, "transverse_shear": 0.07,
+}  # fmt: skip
 IN_SPACE = {"matrix": WARM, "fibre": CARBON, "plane": "generalized"}
 BY_ENERGY = SPRINGS | {"criterion": "energy", "toughness": 0.02}
 LEGS = {"waypoints": WAYPOINTS}
@@ -147,13 +151,23 @@ MIXED_PATHS: dict[str, dict[str, Any]] = {
     },
 }
 LOADS: dict[str, dict[str, Any]] = {
-    "load": WARM_SQUARE | {"load": {"to": {"E11": 0.02, "S13": 0.1, "temperature": -50.0}}},
+    "load": WARM_SQUARE
+    | {
+        "matrix": WARM | {"strength": {"tension": 0.08, "compression": 0.12}},
+        "fibre": CARBON | {"strength": HASHIN},
+        "load": {"to": {"E11": 0.02, "S13": 0.1, "temperature": -50.0}},
+    },
     "load with contact": {"cell": SQUARE, "interface": debonded(110.0), "load": {"to": {"E11": -0.02, "S22": 0.5}}},
 }
 # Derivatives of constants, and those of energies under contact.
 DERIVATIVES: dict[str, dict[str, Any]] = {
     "derivatives": WARM_SQUARE
-    | {"interface": SPRINGS, "output": {"sensitivities": True}, "petsc": {"feti_ksp_rtol": 1e-10}},
+    | {
+        "matrix": WARM | {"strength": {"principal": 0.08}},
+        "interface": SPRINGS,
+        "output": {"sensitivities": True},
+        "petsc": {"feti_ksp_rtol": 1e-10},
+    },
     "derivatives under contact": {
         "cell": SQUARE,
         "interface": SPRINGS | debonded(90.0),

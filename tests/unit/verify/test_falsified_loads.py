@@ -76,6 +76,15 @@ FALSE = {
     "bonds that broke": ("axial", document("path", 4, "broke", factor=2), {"breaks", "strength"}),
     "a strain of a load": ("load", document("load", "strain", 0), {"tables"}),
     "a stress of a load": ("load", document("load", "stress", 0), {"tables"}),
+    "a utilisation": ("load", document("phase_stresses", 0, "utilisation", 0), {"phases"}),
+    "a position of a utilisation": (
+        "load", document("phase_stresses", 1, "utilisation_at", 0, 0, factor=1.01), {"phases"},
+    ),
+    "a criterion": ("load", document("phase_stresses", 1, "criterion", to="von Mises"), {"phases"}),
+    "a strength": (
+        "load", document("case", "material", "fibre", "strength", "axial_shear", factor=1.01), {"phases"},
+    ),
+    "no stresses of phases": ("load", document("phase_stresses", to=[]), {"phases"}),
     "a temperature of a load": ("load", document("load", "temperature"), {"tables"}),
     "an energy of a load": ("load", document("load", "stored", factor=1.01), {"energy"}),
     "an energy of springs of a load": ("load", document("load", "stored_in_springs", to=1e-3), {"energy"}),
