@@ -39,7 +39,7 @@ class ArcSides:
 
     @classmethod
     def of(cls, body: RecoveredStress, submeshes: Sequence[Submesh], lattice: ReferenceLattice) -> ArcSides:
-        """Find the sides of the refined elements along the arcs of a body."""
+        """Find the refined element sides along the body's arcs."""
         corners = lattice.nodes[lattice.triangles[:, :3]]
         is_zero = np.stack([corners, np.roll(corners, -1, axis=1)]) == 0
         # On side k, from vertex k to the next vertex, the barycentric coordinate of the third vertex is zero.
@@ -73,7 +73,7 @@ class ArcSides:
 
     @property
     def ends(self) -> Int:
-        """Return the element corners (f, 2), 0 to 2, at the start and the end of the sides."""
+        """Return the element corners (f, 2), 0 to 2, at which the sides start and end."""
         return np.stack([self.side, (self.side + 1) % 3], axis=1)
 
 
@@ -121,7 +121,7 @@ def arc_energy(body: RecoveredStress, sides: ArcSides) -> Float:
 
 
 def _at(body: RecoveredStress, sides: ArcSides, fraction: float) -> Float:
-    """Evaluate the recovered stresses (f, m, k) at a fraction of the length of every side."""
+    """Evaluate the recovered stresses (f, m, k) at a length fraction along every side."""
     result = np.empty((len(sides.element), body.problem.strains, body.loads.shape[1]))
     for k in range(3):
         members = np.flatnonzero(sides.side == k)

@@ -29,7 +29,7 @@ def lame(L: Float) -> tuple[float, float]:
 
 
 def affine_couples(L: Float, inverse: Float, determinant: Float) -> Float:
-    """Compute the bubble contribution X (t, 9, 4) to the stiffness of affine elements.
+    """Compute the bubble contribution X (t, 9, 4) to the affine element stiffness.
 
     It adds H_a,r H_b,s X_(r s)(i j) to K_(a i)(b j) for the `HESSIANS` H.  The stress of a quadratic u has a constant
     divergence f on an affine element, and div u is linear.  So the bubble force is -int b f, and pressure changes only

@@ -29,7 +29,7 @@ def quadrature(functions: int) -> tuple[Float, Float]:
 
 
 def gradients(corners: Float, with_bubble: bool = False) -> tuple[Float, Float]:
-    """Compute the physical gradients (e, q, a, 2) of the shape functions in elements with nodes (e, a, 2).
+    """Compute the physical shape function gradients (e, q, a, 2) in elements with nodes (e, a, 2).
 
     The second result is the quadrature weights times the Jacobian determinant (e, q).
     """

@@ -27,7 +27,7 @@ LINEAR_AT_ONCE = 1 << 12
 
 @dataclass(frozen=True)
 class ElementStresses:
-    """The stresses at q points in a slice of the elements, under k loads.
+    """The stresses at q points in a slice of elements, under k loads.
 
     Attributes: the slice `part`, `points` (e, q, 2), `weights` (e, q), `stress` (e, q, m, k).
     """
@@ -74,12 +74,12 @@ class RecoveredStress:
 
     @property
     def order(self) -> int:
-        """Return the polynomial order of the elements and of the fits."""
+        """Return the polynomial order of elements and fits."""
         return 1 if self.triangles.shape[1] == 3 else 2
 
     @cached_property
     def _rows(self) -> Int:
-        """Return the plane vertices (3, e) of the elements."""
+        """Return the plane element vertices (3, e)."""
         return np.ascontiguousarray(self.triangles[:, :3].T, np.int64)
 
     @cached_property
@@ -89,7 +89,7 @@ class RecoveredStress:
 
     @cached_property
     def vertices(self) -> Int:
-        """Return the vertex numbers (e, 3) of the elements; periodic images have the same number."""
+        """Return the element vertex numbers (e, 3); periodic images have the same number."""
         return np.asarray(np.take(self.numbers, np.take(self.node_class, self._rows)).T)
 
     @cached_property
@@ -113,7 +113,7 @@ class RecoveredStress:
         return [self._uniform(part) if self.order == 1 else self._varying(part) for part in parts]
 
     def _varying(self, part: slice) -> ElementStresses:
-        """Compute the stresses at the integration points of quadratic elements."""
+        """Compute the stresses at the integration points in quadratic elements."""
         m, nodes = self.problem.strains, self.triangles[part]
         corners, u = self.points[nodes], self.u[self.node_class[nodes]]
         if self.is_mixed:
