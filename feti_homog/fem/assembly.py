@@ -91,7 +91,7 @@ def assemble(
 def element_strain(
     points: Float, triangles: Int32, node_class: Int32, u: Float, problem: Problem = PLANE
 ) -> tuple[Float, Float]:
-    """Compute the mean strains (e, m) under displacements u (classes, c), and the areas (e,), of elements."""
+    """Compute the mean element strains (e, m) under displacements u (classes, c), and the element areas (e,)."""
     strain, area = np.empty((len(triangles), problem.strains)), np.empty(len(triangles))
     parts_of = [np.nonzero(problem.voigt == number) for number in range(problem.strains)]
     for part in _chunks(np.arange(len(triangles)), ELEMENTS_AT_ONCE):

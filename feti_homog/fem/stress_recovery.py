@@ -2,8 +2,8 @@
 
 After Zienkiewicz and Zhu (IJNME 33 (1992) 1331), a polynomial of the element order is fitted about every vertex to the
 stresses at the integration points of the surrounding elements.  Barycentric coordinates blend the three vertex fits of
-an element; in order 1, the fit values at the vertices.  A subdomain has one phase, so that no fit reaches across an
-interface, where stresses jump.  At a vertex that several pieces of a body share, the fit includes all of these pieces.
+a quadratic element, or the fit values at the vertices of a linear element.  A subdomain has one phase, so that no fit
+reaches across an interface, where stresses jump.  A fit includes all body pieces around its vertex.
 """
 
 from __future__ import annotations
