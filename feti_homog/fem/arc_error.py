@@ -1,7 +1,7 @@
-"""Energy error from element sides along arcs.
+"""Energy error of straight or parabolic element sides that replace circular arcs.
 
-Element sides take area from a body or add to it, and their displacements follow polynomials between nodes.
-Each body has its energy alone, without communication; the share that two glued bodies have in common cancels.
+The sides take area from a body or add area to it, and displacements along a side are polynomials between its nodes.
+Every body computes its error without communication; the contributions of two glued bodies cancel on their interface.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from feti_homog.typing import Bool, Float, Int
 
 @dataclass(frozen=True)
 class ArcSides:
-    """The f element sides of order p on arcs; the body is on their left.
+    """The f element sides of order p that replace arcs; the body lies to the left of every side.
 
     Attributes:
-        element, side: (f,) element, and its side from corner `side` to the next corner.
+        element, side: (f,) element number, and number of the corner at which the side starts.
         nodes: (f, p + 1) plane nodes along the side.
         points: (f, p + 1, 2) node positions.
         normals: (f, p + 1, 2) unit normals of the arc at the nodes, out of the body.
-        area: (f,) area between side and arc that the body lacks.
+        area: (f,) area between the side and the arc that the body lacks.
         at_void: (f,) whether a void is on the right.
     """
 
@@ -39,19 +39,19 @@ class ArcSides:
 
     @classmethod
     def of(cls, body: RecoveredStress, submeshes: Sequence[Submesh], lattice: ReferenceLattice) -> ArcSides:
-        """Find the subdomain sides that the lattice refines."""
+        """Find the refined element sides along the body's arcs."""
         corners = lattice.nodes[lattice.triangles[:, :3]]
         is_zero = np.stack([corners, np.roll(corners, -1, axis=1)]) == 0
-        # Side k of the lattice, from its vertex k to the next, is where the coordinate of the third vanishes.
-        place, side = np.nonzero(np.roll(is_zero.all(axis=0), 1, axis=2).transpose(2, 0, 1))[1:]
-        place, side = place.reshape(3, -1), side.reshape(3, -1)
-        n = place.shape[1]
+        # On side k, from vertex k to the next vertex, the barycentric coordinate of the third vertex is zero.
+        fine, side = np.nonzero(np.roll(is_zero.all(axis=0), 1, axis=2).transpose(2, 0, 1))[1:]
+        fine, side = fine.reshape(3, -1), side.reshape(3, -1)
+        n = fine.shape[1]
         edges = np.cumsum([0, *(len(submesh.turns) for submesh in submeshes)])
         numbers = [submesh.triangle_edges + first for submesh, first in zip(submeshes, edges, strict=False)]
         triangle_edges, turns = np.concatenate(numbers), np.concatenate([submesh.turns for submesh in submeshes])
         centres = np.concatenate([submesh.circles[:, :2] for submesh in submeshes])
         coarse, k = np.nonzero(turns[triangle_edges] > 0)
-        element = (coarse[:, None] * len(corners) + place[k]).ravel()
+        element = (coarse[:, None] * len(corners) + fine[k]).ravel()
         side, edge = side[k].ravel(), np.repeat(triangle_edges[coarse, k], n)
         triangles = body.triangles[element]
         middle = [3 + side] if lattice.order == 2 else []
@@ -60,9 +60,9 @@ class ArcSides:
         spokes = points - centres[edge, None]
         doubled = _cross(spokes[:, 0], spokes[:, -1])
         area = doubled / 2 * (turn / np.sin(turn) - 1)
-        if lattice.order == 2:  # the parabola has two thirds of the parallelogram around it
+        if lattice.order == 2:  # the segment of a parabola covers two thirds of the parallelogram around it
             area -= 2 / 3 * _cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
-        # On an arc about c the place y obeys y'' = -turn^2 y.
+        # On an arc, the vector y from the centre obeys y'' = -turn^2 y.
         cosine = np.cos(turn)[:, None]
         first, last = spokes[:, -1] - cosine * spokes[:, 0], cosine * spokes[:, -1] - spokes[:, 0]
         tangents = [first, *([last + first] if lattice.order == 2 else []), last]
@@ -73,22 +73,24 @@ class ArcSides:
 
     @property
     def ends(self) -> Int:
-        """(f, 2) element corners, 0 to 2, at the start and the end of each side."""
+        """Return the element corners (f, 2), 0 to 2, at which the sides start and end."""
         return np.stack([self.side, (self.side + 1) % 3], axis=1)
 
 
 def arc_energy(body: RecoveredStress, sides: ArcSides) -> Float:
-    """Estimate the excess (k, k) of int sigma_i : eps_j by sides in place of arcs; i = j is twice the energy.
+    """Estimate the error (k, k) in int sigma_i : eps_j from sides that replace arcs.
+
+    Diagonal entries are twice the energy error.  The estimate is
 
         -int V (sigma_i : eps_j - t_i . du_j/dn - t_j . du_i/dn) ds - c sum_sides h (D t_i . D u_j + D t_j . D u_i)
 
-    with V the distance from the side to the arc, outwards, and t = sigma n: the energy changes at the rate of a
-    boundary that moves.  D are differences of order p between the nodes on a side of length h, c = 1/12 or of order 2
-    1/60: t does work on how far interpolation is from u, -h^2 / 12 int t' . u' ds or -h^4 / 960 int t'' . u'' ds.
+    where V is the outward distance from the side to the arc, and t = sigma n.  The first integral is the energy rate of
+    a moving boundary.  D is the difference of order p between the nodes on a side of length h, and c = 1/12 or, in
+    order 2, 1/60: t does work on the interpolation error, -h^2 / 12 int t' . u' ds or -h^4 / 960 int t'' . u'' ds.
     """
     if not len(sides.element):
         return np.zeros((body.loads.shape[1],) * 2)
-    # sum over the sides of area (sigma_i : eps_j - t_i . du_j/dn - t_j . du_i/dn) in their middle
+    # The first integral by the midpoint rule: area (sigma_i : eps_j - t_i . du_j/dn - t_j . du_i/dn) at the midpoints.
     m, stress = body.problem.strains, _at(body, sides, 0.5)
     macroscopic = np.stack([body.problem.gradient(load[:m]) for load in body.loads.T], axis=-1)  # (c, 2, k)
     loads = np.tile(body.loads, (len(stress), 1, 1))
@@ -98,7 +100,7 @@ def arc_energy(body: RecoveredStress, sides: ArcSides) -> Float:
     tangent = chord / h
     normal = np.column_stack([tangent[:, 1], -tangent[:, 0]])
     gradient = loads[:, body.problem.voigt]
-    if body.problem.components == 2:  # of which the strains have the symmetric part, and the nodes du/ds along the side
+    if body.problem.components == 2:  # strains give its symmetric part, and nodes give du/ds along the side
         gradient[:, [0, 1], [1, 0]] /= 2
         u = body.u[body.node_class[sides.nodes]]
         along = (u[:, -1] - u[:, 0]) / h[..., None] + np.einsum("cdk,fd->fck", macroscopic, tangent)
@@ -109,37 +111,37 @@ def arc_energy(body: RecoveredStress, sides: ArcSides) -> Float:
     work = _summed(sides.area, _along(stress[:, body.problem.voigt], normal), _along(gradient, normal))
     rate = _summed(sides.area, loads, body.L @ loads) - work - work.T
     order, last = body.order, len(sides.nodes[0]) - 1
-    stress = np.stack([_at(body, sides, place) for place in np.arange(last + 1) / last], axis=1)
+    stress = np.stack([_at(body, sides, fraction) for fraction in np.arange(last + 1) / last], axis=1)
     tractions = np.diff(_along(stress[:, :, body.problem.voigt], sides.normals), n=order, axis=1)[:, 0]
     imposed = np.einsum("cdk,fpd->fpck", macroscopic, sides.points)
     u = np.diff(body.u[body.node_class[sides.nodes]] + imposed, n=order, axis=1)[:, 0]
-    share = h[:, 0] / {1: 12, 2: 60}[order]
-    between = _summed(share, tractions, u)
-    return -np.asarray(rate + between + between.T)
+    weights = h[:, 0] / {1: 12, 2: 60}[order]
+    interpolation = _summed(weights, tractions, u)
+    return -np.asarray(rate + interpolation + interpolation.T)
 
 
-def _at(body: RecoveredStress, sides: ArcSides, place: float) -> Float:
-    """Evaluate recovered stresses (f, m, k) at the fraction `place` of each side."""
+def _at(body: RecoveredStress, sides: ArcSides, fraction: float) -> Float:
+    """Evaluate the recovered stresses (f, m, k) at a length fraction along every side."""
     result = np.empty((len(sides.element), body.problem.strains, body.loads.shape[1]))
     for k in range(3):
         members = np.flatnonzero(sides.side == k)
-        lam = np.roll([[1 - place, place, 0.0]], k, axis=1)
+        lam = np.roll([[1 - fraction, fraction, 0.0]], k, axis=1)
         result[members] = body.recovered(sides.element[members], lam)[:, 0]
     return result
 
 
 def _along(tensors: Float, vectors: Float) -> Float:
-    """Multiply tensors (.., c, 2, k) by vectors (.., 2): (.., c, k)."""
+    """Multiply tensors (.., c, 2, k) by vectors (.., 2), and return the products (.., c, k)."""
     x, y = vectors[..., None, 0, None], vectors[..., None, 1, None]
     return np.asarray(tensors[..., 0, :] * x + tensors[..., 1, :] * y)
 
 
 def _summed(weights: Float, left: Float, right: Float) -> Float:
-    """Sum w_f left_f^T right_f over f, (k, k), for factors (f, c, k)."""
+    """Sum the weighted products w_f left_f^T right_f (k, k) over f, for factors (f, c, k)."""
     k = left.shape[2]
     return np.asarray((left * weights[:, None, None]).reshape(-1, k).T @ right.reshape(-1, k))
 
 
 def _cross(a: Float, b: Float) -> Float:
-    """Compute cross products a x b (f,) of vectors (f, 2)."""
+    """Compute the cross products a x b (f,) of plane vectors (f, 2)."""
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

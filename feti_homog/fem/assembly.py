@@ -1,8 +1,7 @@
 """Assembly in one subdomain: stiffness, unit strain loads, averages, integrals along voids.
 
-Engineering shears; degrees of freedom are (node, displacement), node-major.  Elements
-are summed triangle by coarse triangle first: a refined one is an element of its own, `MacroElement`, and affine ones
-share its integrals.
+Shears are engineering shears, and degrees of freedom are node-major.  The elements of a coarse triangle are summed
+first, to one `MacroElement`; all affine coarse triangles have the same reference integrals.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from feti_homog.fem.shape_functions import gradients
 from feti_homog.mesh import FineMesh, ReferenceLattice, Submesh
 from feti_homog.typing import Bool, Float, Int, Int32
 
-# Elements that are integrated at once: bounds the memory of their gradients, about 100 MB of quadratic ones.
+# Number of elements in a chunk; the gradients of a quadratic chunk take about 100 MB.
 ELEMENTS_AT_ONCE = 1 << 16
 # int N_i dN_j along a side with two nodes, and along a side with a third node in the middle.
 LINEAR = np.array([[-0.5, 0.5], [-0.5, 0.5]])
@@ -29,13 +28,12 @@ Mixed = bool | tuple[bool, ...]
 
 @dataclass(frozen=True)
 class Assembly:
-    """The matrices of a subdomain with area |Omega| and materials L.
+    """The assembled matrices of a subdomain with the area |Omega| and the material stiffnesses L.
 
     Attributes:
         K: (dofs, dofs) stiffness, Eq. (28), force per length.
-        Q: (dofs, v) int B^T L, so that the macroscopic strain E has the load f = -Q E, Eq. (29), and the
-            stress integral is |Omega| L E + Q^T u*.
-        slopes: (classes, 2) int dN/dx.
+        Q: (dofs, v) int B^T L; a strain E has the load -Q E, Eq. (29), and the stress integral |Omega| L E + Q^T u*.
+        slopes: (classes, 2) int dN/dx of the shape functions.
         areas: (materials,) areas of the materials, with the sum |Omega|.
     """
 
@@ -48,14 +46,14 @@ class Assembly:
 def assemble(
     mesh: FineMesh, laws: Float, problem: Problem = PLANE, mixed: Mixed = False, material: Int | None = None
 ) -> Assembly:
-    """Assemble a subdomain with one material stiffness L (v, v) or with several.
+    """Assemble the matrices of a subdomain with one or several materials.
 
     The first rows and columns of L belong to displacement strains, the last to uniform strains.  Quadratic elements
     with isotropic stiffness in the plane may be mixed: with a bubble and a pressure (`fem.bubble`).
 
     Args:
-        laws: L (v, v), or (materials, v, v) with each coarse triangle's `material` (t,).
-        mixed: whether elements are mixed, or whether each material has mixed ones.
+        laws: stiffness L (v, v), or (materials, v, v) with the `material` (t,) of every coarse triangle.
+        mixed: whether the elements are mixed, for all materials or material by material.
     """
     macro, c = MacroElement.of(mesh.lattice), problem.components
     classes, n = mesh.node_class[mesh.nodes], mesh.n_classes
@@ -75,25 +73,25 @@ def assemble(
         # sum_k int dN/dx_k L[(i,k), :]
         Q += (slope @ np.concatenate(L[problem.voigt], axis=1)).reshape(Q.shape)
         slopes += slope
-    # K sums the couples (t, p, c^2) between the classes `rows` and `columns` (t, p).
+    # K is the sum of the couples (t, p, c^2) between the classes `rows` and `columns` (t, p).
     rows, columns = classes[:, macro.rows], classes[:, macro.columns]
     by_row = csc_matrix((columns.ravel(), rows.ravel(), np.arange(rows.size + 1)), shape=(n, rows.size)).tocsr()
-    places = csr_matrix((by_row.indices, by_row.data, by_row.indptr), shape=(n, n))
-    places.sort_indices()
-    is_first = np.diff(places.indices, prepend=-1) != 0
-    is_first[places.indptr[:-1]] = True  # each class has couples
+    pattern = csr_matrix((by_row.indices, by_row.data, by_row.indptr), shape=(n, n))
+    pattern.sort_indices()
+    is_first = np.diff(pattern.indices, prepend=-1) != 0
+    is_first[pattern.indptr[:-1]] = True  # every class has couples
     first = np.flatnonzero(is_first)
-    sums = csr_matrix((np.ones(rows.size), places.data, np.append(first, rows.size)), shape=(len(first), rows.size))
+    sums = csr_matrix((np.ones(rows.size), pattern.data, np.append(first, rows.size)), shape=(len(first), rows.size))
     blocks = (sums @ couples.reshape(rows.size, c * c)).reshape(-1, c, c)
-    begin = np.searchsorted(first, places.indptr)
-    K = bsr_matrix((blocks, places.indices[first], begin), shape=(c * n,) * 2).tocsr()
+    begin = np.searchsorted(first, pattern.indptr)
+    K = bsr_matrix((blocks, pattern.indices[first], begin), shape=(c * n,) * 2).tocsr()
     return Assembly(K, Q, slopes, areas)
 
 
 def element_strain(
     points: Float, triangles: Int32, node_class: Int32, u: Float, problem: Problem = PLANE
 ) -> tuple[Float, Float]:
-    """Compute mean strains (e, m) of elements under displacements u (classes, c), and element areas (e,)."""
+    """Compute the mean element strains (e, m) under displacements u (classes, c), and the element areas (e,)."""
     strain, area = np.empty((len(triangles), problem.strains)), np.empty(len(triangles))
     parts_of = [np.nonzero(problem.voigt == number) for number in range(problem.strains)]
     for part in _chunks(np.arange(len(triangles)), ELEMENTS_AT_ONCE):
@@ -106,7 +104,7 @@ def element_strain(
 
 
 def _chunks(numbers: Int, size: int) -> list[Int]:
-    """Cut numbers into chunks that keep memory bounded."""
+    """Cut an array of numbers into chunks of at most `size` numbers."""
     return [numbers[first : first + max(size, 1)] for first in range(0, len(numbers), max(size, 1))]
 
 
@@ -116,11 +114,10 @@ def _affine(
     """Integrate affine coarse triangles on the unit triangle; `mixed` is the stiffness of mixed elements.
 
     Returns:
-        Stiffness blocks (t, p, c^2) of the p coupled pairs of nodes, integrals (t, q, 2) of the shape function
-        gradients, and the total area.
+        Stiffness blocks (t, p, c^2) of the node couples, integrals (t, q, 2) of the gradients, and the total area.
     """
     g, w = gradients(mesh.points[mesh.nodes[part, :3]])
-    # The last two of the three linear functions are the reference coordinates: inverse_rk = dr_r / dx_k.
+    # The last two linear functions are the reference coordinates, so that inverse_rk = dr_r / dx_k.
     inverse, determinant = g[:, 0, 1:], 2 * w[..., None]
     pulled = determinant * (np.einsum("trk,tsl->trskl", inverse, inverse).reshape(-1, 4, 4) @ tensor)
     products = macro.products
@@ -146,11 +143,11 @@ def _curved(
 
 @dataclass(frozen=True)
 class GroupedSum:
-    """Sums over element matrix entries that belong together in one coarse triangle.
+    """A rule that sums groups of element entries in every coarse triangle.
 
     Attributes:
-        entries: all entry numbers, flat, sum after sum.
-        first: first position of each sum in `entries`.
+        entries: all entry numbers, flat, group after group.
+        first: position in `entries` at which every group starts.
     """
 
     entries: Int
@@ -158,27 +155,26 @@ class GroupedSum:
 
     @classmethod
     def of(cls, target: Int) -> GroupedSum:
-        """Group entries by `target`, the sum number of each entry."""
+        """Group element entries by `target`, the sum number of every entry."""
         entries = np.argsort(target, axis=None, kind="stable")
         return cls(entries, np.unique(target.ravel()[entries], return_index=True)[1])
 
     def __call__(self, values: Float) -> Float:
-        """Sum the entries (.., k) of t coarse triangles: (t, sums, k)."""
-        each = values.reshape(-1, len(self.entries), values.shape[-1])
-        return np.add.reduceat(each[:, self.entries], self.first, axis=1)
+        """Sum the entries (.., k) of t coarse triangles, and return the sums (t, sums, k)."""
+        by_triangle = values.reshape(-1, len(self.entries), values.shape[-1])
+        return np.add.reduceat(by_triangle[:, self.entries], self.first, axis=1)
 
 
 @dataclass(frozen=True)
 class MacroElement:
-    """The lattice with q nodes as one element: p ordered pairs of nodes have a common element, and couple.
+    """A refined coarse triangle as one element; p ordered node pairs (couples) have an element in common.
 
     Attributes:
-        rows, columns: (p,) lattice nodes of each couple, in row-major order.
-        couples: from the entries (4**refine, a, a) of the element matrices to the couples.
-        nodes: from the nodes (4**refine, a) of the elements to the lattice nodes.
+        rows, columns: (p,) lattice nodes of the couples, in row-major order.
+        couples: sums of the entries (4**refine, a, a) of the element matrices to the couples.
+        nodes: sums over the element nodes (4**refine, a) to the q lattice nodes.
         products: (p, 4) int dN_A/dr_k dN_B/dr_l over the unit triangle, with (k, l) flat.
-        hessians: (p, 9) products of second derivatives of the element functions, summed over elements (`fem.bubble`)
-            if they are quadratic.
+        hessians: (p, 9) products of second derivatives (`fem.bubble`), summed over quadratic elements; else 0.
         integrals: (q, 2) int dN_A/dr_k over the unit triangle.
     """
 
@@ -193,22 +189,22 @@ class MacroElement:
     @classmethod
     @lru_cache(maxsize=4)
     def of(cls, lattice: ReferenceLattice) -> MacroElement:
-        """Build the element of a lattice."""
+        """Build the macro element of a lattice."""
         elements, q = lattice.triangles, len(lattice.nodes)
         pair = elements[:, :, None] * q + elements[:, None, :]
-        couples, nodes, each = GroupedSum.of(pair), GroupedSum.of(elements), np.unique(pair)
+        couples, nodes, pairs = GroupedSum.of(pair), GroupedSum.of(elements), np.unique(pair)
         g, w = gradients(lattice.nodes[elements][..., 1:] / lattice.intervals)
         second = np.einsum("ar,bs->abrs", bubble.HESSIANS, bubble.HESSIANS).reshape(-1, 9)
-        # Two-dimensional stiffness does not change with the size: every element has that of the coarse triangle.
+        # Plane stiffness does not depend on the size, so that every element has the stiffness of the coarse triangle.
         of_all = np.tile(second, (len(elements), 1)) if lattice.order == 2 else np.zeros((pair.size, 9))
         return cls(
-            each // q, each % q, couples, nodes, couples(products(g, w))[0], couples(of_all)[0],
+            pairs // q, pairs % q, couples, nodes, couples(products(g, w))[0], couples(of_all)[0],
             nodes(integrals(g, w))[0],
         )  # fmt: skip
 
 
 def products(g: Float, w: Float) -> Float:
-    """Integrate dN_a/dx_k dN_b/dx_l, (e, a, a, 4), from gradients (e, q, a, 2) and weights (e, q); (k, l) flat."""
+    """Integrate dN_a/dx_k dN_b/dx_l (e, a, a, 4), (k, l) flat, by gradients (e, q, a, 2) and weights (e, q)."""
     e, q, a, _ = g.shape
     flat = g.reshape(e, q, 2 * a)
     outer = np.matmul((flat * w[..., None]).transpose(0, 2, 1), flat)
@@ -216,13 +212,13 @@ def products(g: Float, w: Float) -> Float:
 
 
 def integrals(g: Float, w: Float) -> Float:
-    """Integrate dN_a/dx_k, (e, a, 2), from gradients (e, q, a, 2) and weights (e, q)."""
+    """Integrate dN_a/dx_k (e, a, 2) by gradients (e, q, a, 2) and weights (e, q)."""
     integral: Float = np.einsum("eqak,eq->eak", g, w)
     return integral
 
 
 def void_integrals(submesh: Submesh, mesh: FineMesh) -> Float:
-    """Integrate N n ds along void sides, (classes, 2), n outward from the void; u^T times this is int grad u."""
+    """Integrate N n (classes, 2) along void sides; n points out of the void, so that u^T int N n ds = int grad u."""
     sums, nodes = np.zeros((mesh.n_classes, 2)), nodes_along(submesh, mesh, submesh.at_void)
     products = LINEAR if mesh.lattice.triangles.shape[1] == 3 else QUADRATIC
     step = len(products) - 1
@@ -236,7 +232,7 @@ def void_integrals(submesh: Submesh, mesh: FineMesh) -> Float:
 
 
 def nodes_along(submesh: Submesh, mesh: FineMesh, edges: Bool) -> Int:
-    """Return the nodes (sides, M + 1) of triangle sides on marked torus `edges`, with the body on the left."""
+    """Return the nodes (sides, M + 1) along the marked torus edges, with the body on the left."""
     triangle, side = np.nonzero(edges[submesh.edge_class[submesh.triangle_edges]])
     lattice, sides = mesh.lattice.nodes, []
     for k in range(3):  # from vertex k to vertex k + 1

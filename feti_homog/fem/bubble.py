@@ -1,9 +1,9 @@
 """Quadratic triangles with a cubic bubble and a discontinuous linear pressure (Crouzeix and Raviart 1973).
 
-The pressure p = lambda Pi div u, with Pi the projection on linear functions in reference coordinates, and the
-bubble are eliminated element by element.  So the element has a quadratic one's nodes, does not lock where lambda
-exceeds the shear modulus mu, and its mean strains, its mean stresses and its loads under uniform strains equal the
-quadratic ones: the bubble vanishes on the boundary, and Pi keeps means.
+The pressure is p = lambda Pi div u, where Pi projects on linear functions in reference coordinates.  Pressure and
+bubble are eliminated element by element, so that the element has the nodes of a quadratic triangle.  It does not lock
+where lambda exceeds the shear modulus mu.  Mean strains, mean stresses and loads under uniform strains equal the values
+of the quadratic triangle, because the bubble vanishes on the boundary and Pi keeps means.
 """
 
 from __future__ import annotations
@@ -18,8 +18,7 @@ from feti_homog.typing import Float
 BUBBLE = 6
 # Second derivatives (6, 3) of the shape functions by the reference coordinates: 11, 22 and 12.
 HESSIANS = np.array([[4, 4, 4], [4, 0, 0], [0, 4, 0], [-8, 0, -4], [0, 0, 4], [0, -8, -4]], float)
-# Of the bubble over the unit triangle, with T = [[2, 1], [1, 2]]: its integral; int db/dr_r db/dr_s = GRADIENTS T_rs;
-# and that of the projections of its derivatives, relative to GRADIENTS.
+# INTEGRAL = int b and int db/dr_r db/dr_s = GRADIENTS T_rs on the unit triangle; with Pi, PROJECTED times the latter.
 INTEGRAL, GRADIENTS, PROJECTED = 9 / 40, 81 / 40, 3 / 5
 T = np.array([[2.0, 1.0], [1.0, 2.0]])
 
@@ -30,16 +29,15 @@ def lame(L: Float) -> tuple[float, float]:
 
 
 def affine_couples(L: Float, inverse: Float, determinant: Float) -> Float:
-    """Compute X (t, 9, 4), with the bubble part H_a,r H_b,s X_(r s)(i j) of K_(a i)(b j) for the `HESSIANS` H.
+    """Compute the bubble contribution X (t, 9, 4) to the affine element stiffness.
 
-    The stress of a quadratic u has a constant divergence f on an affine element, and div u is linear.  So the bubble's
-    force is -int b f, and its stiffness alone differs from that without pressure:
-
-        K_bb = det GRADIENTS (mu tr m I + (mu + PROJECTED lambda) m),  m = inverse^T T inverse.
+    It adds H_a,r H_b,s X_(r s)(i j) to K_(a i)(b j) for the `HESSIANS` H.  The stress of a quadratic u has a constant
+    divergence f on an affine element, and div u is linear.  So the bubble force is -int b f, and pressure changes only
+    the bubble stiffness:  K_bb = det GRADIENTS (mu tr m I + (mu + PROJECTED lambda) m),  m = inverse^T T inverse.
 
     Args:
         L: (v, v) stiffness, isotropic in the plane.
-        inverse, determinant: (t, 2, 2) dr_r / dx_k and (t,) det dx/dr.
+        inverse, determinant: dr_r / dx_k (t, 2, 2) and det dx/dr (t,).
     """
     first, shear = lame(L)
     metric = inverse.transpose(0, 2, 1) @ T @ inverse
@@ -57,11 +55,11 @@ def affine_couples(L: Float, inverse: Float, determinant: Float) -> Float:
 
 @dataclass(frozen=True)
 class Elements:
-    """Elements of any shape with their bubble; their stiffness is isotropic in the plane.
+    """Mixed elements of any shape, with a stiffness that is isotropic in the plane.
 
     Attributes:
         lame: lambda and mu.
-        gradients, weights: (e, q, 7, 2) for the shape functions, the bubble's last, and (e, q).
+        gradients, weights: gradients (e, q, 7, 2) of the shape functions, the bubble last, and weights (e, q).
         projected: (e, q, 7, 2) Pi dN_a/dx_i at the quadrature points: Pi div u = projected : u.
     """
 
@@ -72,7 +70,7 @@ class Elements:
 
     @classmethod
     def of(cls, points: Float, L: Float) -> Elements:
-        """Integrate the elements with nodes (e, 6, 2)."""
+        """Compute the gradients and weights of mixed elements with the nodes (e, 6, 2)."""
         g, w = gradients(points, with_bubble=True)
         linear, (e, q, a, _) = barycentric(BUBBLE), g.shape
         mass = np.einsum("eq,qm,qn->emn", w, linear, linear, optimize=True)
@@ -86,7 +84,7 @@ class Elements:
         return np.asarray(nodes.reshape(-1, BUBBLE, 2, BUBBLE, 2).transpose(0, 1, 3, 2, 4).reshape(-1, 6, 6, 4))
 
     def with_bubble(self, u: Float) -> Float:
-        """Append the bubble displacement to nodal displacements (e, 6, 2, k): (e, 7, 2, k)."""
+        """Append the bubble displacement to nodal displacements (e, 6, 2, k), and return all (e, 7, 2, k)."""
         K, n = self._stiffness(slice(BUBBLE, None)), 2 * BUBBLE
         bubble = np.linalg.solve(K[:, :, n:], K[:, :, :n] @ u.reshape(len(u), n, -1))
         return np.concatenate([u, -bubble[:, None]], axis=1)
@@ -112,15 +110,15 @@ class Elements:
         return np.asarray(stress)
 
     def _stiffness(self, functions: slice) -> Float:
-        """Compute stiffness rows (e, 2n, 14) of some functions, before the bubble is eliminated:
+        """Compute the stiffness rows (e, 2n, 14) of n shape functions, with the bubble:
 
         mu (delta_ij dN_a/dx_k dN_b/dx_k + dN_a/dx_j dN_b/dx_i) + lambda Pi dN_a/dx_i dN_b/dx_j.
         """
         (first, shear), (e, q, a, _) = self.lame, self.gradients.shape
         flat, weights = self.gradients.reshape(e, q, 2 * a), self.weights[..., None, None]
         weighted, projected = (
-            (weights * of[:, :, functions]).reshape(e, q, -1).transpose(0, 2, 1)
-            for of in (self.gradients, self.projected)
+            (weights * field[:, :, functions]).reshape(e, q, -1).transpose(0, 2, 1)
+            for field in (self.gradients, self.projected)
         )
         products = (weighted @ flat).reshape(e, -1, 2, a, 2)
         K = shear * products.transpose(0, 1, 4, 3, 2)

@@ -1,6 +1,6 @@
-"""Polynomials fitted to element values around each vertex, by least squares weighted with areas.
+"""Polynomial fits to the element values around every vertex, by least squares weighted with areas.
 
-On a boundary, where fits have elements on one side alone, known tractions correct them.
+A boundary vertex has elements on one side only, so that known tractions correct its fit.
 """
 
 from __future__ import annotations
@@ -13,22 +13,21 @@ from scipy.sparse import csc_matrix
 
 from feti_homog.typing import Float, Int
 
-# Weight of the elements around the neighbours of a vertex on the boundary, whose own are few, by the order of elements:
-# of `scripts/measure_mesh_error.py` over all its cells.
+# Weight of the elements around the neighbours of a boundary vertex, by element order.  The values are measured with
+# `scripts/measure_mesh_error.py` over all its cells.
 NEIGHBOURS = {1: 0.1, 2: 0.001}
-# Of the moments of a fit, whose diagonal is 1: where all points lie on a line, a fit does not vary across it.
+# Term on the unit diagonal of the scaled moments: where all points lie on a line, a fit does not vary across the line.
 RIDGE = 1e-9
-# Length of the mean of the normals of the sides at a vertex below which it has no direction: sides meet in a cusp, as
-# where two fibres touch.
+# Length of the mean side normal below which a vertex has no normal, for example in a cusp where two fibres touch.
 NO_NORMAL = 0.1
 
 
 @dataclass(frozen=True)
 class PatchNeighbours:
-    """Pairs of a boundary vertex, which has few elements, and a neighbour vertex.
+    """The n pairs of a boundary vertex, which has few elements, and a neighbour vertex.
 
     Attributes:
-        at, other: (n,) boundary vertex and neighbour.
+        at, other: (n,) boundary vertex and neighbour vertex.
         vector: (n, 2) vector from the boundary vertex to the neighbour.
     """
 
@@ -38,10 +37,10 @@ class PatchNeighbours:
 
     @classmethod
     def of(cls, vertices: Int, corners: Float) -> PatchNeighbours:
-        """Find the neighbours of boundary vertices, in elements of vertices (e, 3) at `corners` (e, 3, 2)."""
+        """Find the neighbours of all boundary vertices, in elements with vertices (e, 3) at corners (e, 3, 2)."""
         start, stop = vertices.T.ravel(), vertices.T[[1, 2, 0]].ravel()
         size, e = int(vertices.max()) + 1, len(vertices)
-        # Elsewhere the sides around a vertex lead to the vertices that they come from; such numbers add up exactly.
+        # Sides form a closed chain around an inner vertex, so that marks cancel; integers below 2^53 cancel exactly.
         mark = np.random.default_rng(0).integers(1 << 40, size=size).astype(float)
         around = np.take(mark, vertices.T)
         at_boundary = np.bincount(start, (around[[1, 2, 0]] - around[[2, 0, 1]]).ravel()) != 0.0
@@ -55,12 +54,12 @@ class PatchNeighbours:
         return cls(at[is_start], other[is_start], np.concatenate([vector, -vector])[is_start])
 
     def shared(self, sums: Float, order: int) -> Float:
-        """Return the parts (vertices, p, k) that boundary vertices add from neighbour `sums` (vertices, p, k)."""
+        """Return the weighted neighbour contributions (vertices, p, k) to the sums (vertices, p, k)."""
         moved = _translations(self.vector, order) @ sums[self.other]
         return NEIGHBOURS[order] * gathered(self.at, moved, len(sums))
 
     def shared_moments(self, moments: Float) -> Float:
-        """Return the parts (6, vertices) that boundary vertices add from neighbour `moments` (6, vertices)."""
+        """Return the weighted neighbour contributions (6, vertices) to linear moments (6, vertices)."""
         one, x, y, xx, xy, yy = moments[:, self.other]
         a, b = self.vector.T
         moved_x, moved_y = x + a * one, y + b * one
@@ -68,21 +67,20 @@ class PatchNeighbours:
         return NEIGHBOURS[1] * np.stack([np.bincount(self.at, row, moments.shape[1]) for row in moved])
 
     def shared_matrices(self, moments: Float, order: int) -> Float:
-        """Sum neighbour moments (vertices, p, p) after a translation to each boundary vertex."""
+        """Return the weighted neighbour contributions (vertices, p, p) to moments (vertices, p, p)."""
         T = _translations(self.vector, order)
         moved = T @ moments[self.other] @ T.transpose(0, 2, 1)
         return NEIGHBOURS[order] * gathered(self.at, moved, len(moments))
 
 
 def linear_values(vertices: Int, away: Float, weights: Float, values: Float, neighbours: PatchNeighbours) -> Float:
-    """Fit linear functions at vertices (vertices, k) to uniform element values (e, k).
+    """Fit a linear function about every vertex to uniform element values (e, k).
 
-    Each fit is a weighted mean of the values around the vertex, so that sums over elements are needed only for
-    neighbours.
+    The fit values (vertices, k) at the vertices are weighted means of element values; only neighbours need sums.
 
     Args:
         vertices: (3, e) vertices of the elements.
-        away: (2, 3, e) vectors from the vertices to the middle of the element.
+        away: (2, 3, e) vectors from the vertices to the element centres.
         weights: (e,) areas.
     """
     at, size, e = vertices.ravel(), int(vertices.max()) + 1, len(weights)
@@ -98,14 +96,14 @@ def linear_values(vertices: Int, away: Float, weights: Float, values: Float, nei
     cofactors = np.stack([xx * yy - xy * xy, xy * my - mx * yy, mx * xy - xx * my])
     determinant = (1.0 + RIDGE) * cofactors[0] + mx * cofactors[1] + my * cofactors[2]
     first = cofactors * scale * (scale[0] / determinant)
-    share = sum(np.take(row, vertices) * part for row, part in zip(first, basis, strict=True))
-    result = csc_matrix((share.T.ravel(), vertices.T.ravel(), np.arange(0, 3 * e + 1, 3)), (size, e)) @ values
+    means = sum(np.take(row, vertices) * part for row, part in zip(first, basis, strict=True))
+    result = csc_matrix((means.T.ravel(), vertices.T.ravel(), np.arange(0, 3 * e + 1, 3)), (size, e)) @ values
     is_shared = np.zeros(size, bool)
     is_shared[neighbours.other] = True
     near = np.flatnonzero(np.take(is_shared, at))
-    each = np.stack([part.ravel()[near] for part in basis], axis=1)
+    terms = np.stack([part.ravel()[near] for part in basis], axis=1)
     rows = at[near, None] + size * np.arange(3)
-    sums = csc_matrix((each.ravel(), rows.ravel(), np.arange(0, 3 * len(near) + 1, 3)), (3 * size, len(near)))
+    sums = csc_matrix((terms.ravel(), rows.ravel(), np.arange(0, 3 * len(near) + 1, 3)), (3 * size, len(near)))
     zero, one, two = (sums @ values[near % e]).reshape(3, size, -1)[:, neighbours.other]
     (a, b), (f, g, h) = neighbours.vector.T, first[:, neighbours.at]
     moved = (f + a * g + b * h)[:, None] * zero + g[:, None] * one + h[:, None] * two
@@ -113,14 +111,14 @@ def linear_values(vertices: Int, away: Float, weights: Float, values: Float, nei
 
 
 def polynomials(x: Float, order: int) -> Float:
-    """Evaluate 1, x, y, and for order 2 also x^2, x y, y^2, at positions x (.., 2): (.., p)."""
+    """Evaluate the monomials (.., p), 1, x, y and for order 2 x^2, x y, y^2, at positions (.., 2)."""
     one, first, second = np.ones(x.shape[:-1]), x[..., 0], x[..., 1]
     quadratic = (first * first, first * second, second * second) if order == 2 else ()
     return np.stack([one, first, second, *quadratic], axis=-1)
 
 
 def _translations(d: Float, order: int) -> Float:
-    """Compute T (n, p, p) with polynomials(x + d) = T polynomials(x) for d (n, 2)."""
+    """Compute the translations T (n, p, p): polynomials(x + d) = T polynomials(x) for d (n, 2)."""
     x, y = d.T
     T = np.tile(np.eye(3 * order), (len(d), 1, 1))
     T[:, 1, 0], T[:, 2, 0] = x, y
@@ -132,7 +130,7 @@ def _translations(d: Float, order: int) -> Float:
 
 
 def gathered(place: Int, values: Float, size: int) -> Float:
-    """Sum values (n, .., p, q) at the positions `place` (n, ..): (size, p, q)."""
+    """Sum the values (n, .., p, q) with equal positions `place` (n, ..) to an array (size, p, q)."""
     n, shape = place.size, values.shape[-2:]
     sums = csc_matrix((np.ones(n), place.ravel(), np.arange(n + 1)), (size, n)) @ values.reshape(n, math.prod(shape))
     return np.asarray(sums.reshape(size, *shape))
@@ -147,7 +145,7 @@ def fitted(moments: Float, sums: Float) -> Float:
 
 @dataclass(frozen=True)
 class KnownTractions:
-    """Tractions under k loads at n vertices.
+    """The known tractions under k loads at n boundary vertices.
 
     Attributes:
         node: (n,) node classes of the vertices.
@@ -161,18 +159,17 @@ class KnownTractions:
 
     @classmethod
     def at(cls, node: Int, mean: Float, traction: Float) -> KnownTractions:
-        """Make tractions from the mean side normals (n, 2) at vertices; leave out vertices where normals cancel."""
+        """Build tractions from the mean side normals (n, 2), without vertices at which the normals cancel."""
         length = np.hypot(*mean.T)
         rows = length > NO_NORMAL
         return cls(node[rows], mean[rows] / length[rows, None], traction[rows])
 
     def imposed(self, stress: Float, vertex: Int, voigt: Int, flexibility: Float) -> Float:
-        """Change stresses (vertices, m, k) at `vertex` (n,) to the known tractions.
+        """Change the stresses (vertices, m, k) at n vertices to match the known tractions.
 
-        Components are `voigt` (c, 2), and the flexibility is (m, m).
-
-        sigma + d n + n d - (d . n) n n + a t t in the plane, with d = traction - sigma n and a such that the strain
-        along the boundary stays, as it is known on both its sides; along the fibres sigma + d n.
+        With d = traction - sigma n, the result in the plane is sigma + d n + n d - (d . n) n n + a t t, where a keeps
+        the strain along the boundary, which both sides have in common; along the fibres the result is sigma + d n.
+        `voigt` (c, 2) has the component numbers, and the flexibility is (m, m).
         """
         n, before = self.normal, stress[vertex]
         d = self.traction - np.einsum("ncdk,nd->nck", before[:, voigt], n)
@@ -186,8 +183,8 @@ class KnownTractions:
             t = np.column_stack([-n[:, 1], n[:, 0]])
             along = np.stack([t[:, i] * t[:, j] for i, j in entries], axis=1)
             strain = along @ flexibility
-            share = np.einsum("nv,nvk->nk", strain, result) / (strain * along).sum(axis=1)[:, None]
-            result -= along[..., None] * share[:, None]
+            ratio = np.einsum("nv,nvk->nk", strain, result) / (strain * along).sum(axis=1)[:, None]
+            result -= along[..., None] * ratio[:, None]
         full = stress.copy()
         full[vertex] += result
         return full

@@ -1,4 +1,4 @@
-"""Element fields at quadrature points, with bubble and pressure of mixed elements, and energies of moved nodes.
+"""Element fields at quadrature points, also of mixed elements, and the energy change of moved nodes.
 
 A growing crack releases the energy that elements lose if their nodes move.
 """
@@ -14,12 +14,12 @@ from feti_homog.typing import Float
 
 @dataclass(frozen=True)
 class PointFields:
-    """Fields in e elements at q points each, in the order [11, 22, 12].
+    """The fields in e elements at q quadrature points, with components in the order [11, 22, 12].
 
     Attributes:
-        gradients, weights: (e, q, a, 2) for the shape functions, in mixed elements the bubble's last, and (e, q).
-        u: (e, a, 2) displacements, in mixed elements also the bubble's.
-        strain, stress: (e, q, 3).
+        gradients, weights: gradients (e, q, a, 2) of the shape functions, a bubble last, and weights (e, q).
+        u: (e, a, 2) displacements, in mixed elements also of the bubble.
+        strain, stress: (e, q, 3) strains and stresses.
         density: (e, q) W whose integral is the strain energy: sigma : eps / 2, and p (div u - p / lambda) / 2 in
             mixed elements.
     """
@@ -33,7 +33,7 @@ class PointFields:
 
 
 def point_fields(points: Float, u: Float, L: Float, is_mixed: bool = False) -> PointFields:
-    """Compute fields in elements with nodes and displacements (e, a, 2) and the stiffness L (3, 3)."""
+    """Compute the fields in elements with nodes and displacements (e, a, 2), and with the stiffness L (3, 3)."""
     if not is_mixed:
         g, weights = gradients(points)
         strain = voigt(np.einsum("eai,eqad->eqid", u, g))
@@ -48,18 +48,20 @@ def point_fields(points: Float, u: Float, L: Float, is_mixed: bool = False) -> P
 
 
 def voigt(gradient: Float) -> Float:
-    """Return strains [11, 22, 12], (e, q, 3), of displacement gradients (e, q, 2, 2)."""
+    """Return the strains [11, 22, 12] (e, q, 3) of displacement gradients (e, q, 2, 2)."""
     shear = gradient[..., 0, 1] + gradient[..., 1, 0]
     return np.stack([gradient[..., 0, 0], gradient[..., 1, 1], shear], axis=-1)
 
 
 def energy_change(points: Float, u: Float, L: Float, moved: Float, changed: Float, is_mixed: bool = False) -> float:
-    """d/ds of sum_e int W at s = 0 where nodes lie at x + s dx and have the displacements u + s du:
+    """Compute the energy rate of elements whose nodes and displacements change.
 
-        int sigma : (grad du - grad u grad dx) + W div dx.
+    With nodes at x + s dx and displacements u + s du, the rate d/ds sum_e int W at s = 0 is
 
-    The derivative is exact for the discrete elements (deLorenzi, Int. J. Fract. 19 (1982) 183): bubble and pressure of
-    mixed elements stay constant, for the energy is stationary in both.
+        int sigma : (grad du - grad u grad dx) + W div dx,
+
+    exact for the discrete elements (deLorenzi, Int. J. Fract. 19 (1982) 183): the bubble and the pressure of mixed
+    elements stay constant, because the energy is stationary in both.
 
     Args:
         points, u: (e, a, 2) element nodes and their displacements.

@@ -1,4 +1,4 @@
-"""Shape functions of linear and quadratic triangles and of the bubble, and gradients at quadrature points."""
+"""Shape functions of linear and quadratic triangles and of the bubble, with gradients at the quadrature points."""
 
 from functools import cache
 
@@ -6,8 +6,8 @@ import numpy as np
 
 from feti_homog.typing import Float
 
-# Linear: exact for constants.  Quadratic: degree 4 with 6 points (Dunavant 1985), so that stiffness and
-# area are exact on straight elements, with a bubble too, and of full order on curved ones.
+# The 6-point rule for quadratic triangles is exact to degree 4 (Dunavant 1985): it integrates the stiffness and the
+# area of straight elements exactly, also with a bubble, and curved elements with the full order.
 _C = np.array([0.445948490915965, 0.091576213509771])
 _P2_POINTS = np.stack([np.r_[1 - 2 * _C, _C, _C], np.r_[_C, 1 - 2 * _C, _C]], axis=1)
 _P2_WEIGHTS = np.tile([0.223381589678011, 0.109951743655322], 3) / 2
@@ -15,7 +15,10 @@ _P2_WEIGHTS = np.tile([0.223381589678011, 0.109951743655322], 3) / 2
 
 @cache
 def quadrature(functions: int) -> tuple[Float, Float]:
-    """Return reference gradients (q, a, 2) and weights (q,) for 3, 6 or, with bubble 27 r_0 r_1 r_2, 7 functions."""
+    """Return the reference gradients (q, a, 2) of a shape functions, and the quadrature weights (q,).
+
+    The functions are 3 linear, 6 quadratic, or 7: the quadratic functions and the bubble 27 r_0 r_1 r_2.
+    """
     if functions == 3:
         return np.array([[[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]]), np.array([0.5])
     x, y = _P2_POINTS.T
@@ -26,7 +29,10 @@ def quadrature(functions: int) -> tuple[Float, Float]:
 
 
 def gradients(corners: Float, with_bubble: bool = False) -> tuple[Float, Float]:
-    """Compute physical gradients (e, q, a, 2) and weights times Jacobian (e, q) for nodes (e, a, 2)."""
+    """Compute the physical shape function gradients (e, q, a, 2) in elements with nodes (e, a, 2).
+
+    The second result is the quadrature weights times the Jacobian determinant (e, q).
+    """
     nodes = corners.shape[1]
     reference, weights = quadrature(nodes + with_bubble)
     (xr, xs), (yr, ys) = np.moveaxis(np.tensordot(corners, reference[:, :nodes], (1, 1)), (1, 3), (0, 1))
@@ -39,7 +45,7 @@ def gradients(corners: Float, with_bubble: bool = False) -> tuple[Float, Float]:
 
 
 def barycentric(nodes: int) -> Float:
-    """Return barycentric coordinates (q, 3) of the quadrature points in the 3- or 6-node triangle."""
+    """Return the barycentric coordinates (q, 3) of the quadrature points in a triangle with 3 or 6 nodes."""
     if nodes == 3:
         return np.full((1, 3), 1 / 3)
     return np.column_stack([1 - _P2_POINTS.sum(axis=1), _P2_POINTS])

@@ -1,9 +1,9 @@
-"""Recovered stresses in each subdomain from element stresses, and the energy of their difference.
+"""Recovered stresses in the subdomains, and the energy of their difference to the element stresses.
 
-Zienkiewicz and Zhu (IJNME 33 (1992) 1331): about each vertex a polynomial of the elements' order is fitted to the
-stresses at the integration points in the elements around it; within an element its three vertices' fits are
-blended by its barycentric coordinates, in order 1 their values there.  A subdomain has one phase, so that no fit
-reaches across an interface, where stresses jump; about a vertex that pieces of one body share it is one of the body.
+After Zienkiewicz and Zhu (IJNME 33 (1992) 1331), a polynomial of the element order is fitted about every vertex to the
+stresses at the integration points of the surrounding elements.  Barycentric coordinates blend the three vertex fits of
+a quadratic element, or the fit values at the vertices of a linear element.  A subdomain has one phase, so that no fit
+reaches across an interface, where stresses jump.  A fit includes all body pieces around its vertex.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from feti_homog.fem.shape_functions import barycentric, gradients, shape_functio
 from feti_homog.mesh import FineMesh
 from feti_homog.typing import Float, Int, Int32
 
-# Linear elements that are looked at together: few enough for the processor's cache.
+# Number of linear elements in a chunk, small enough for the processor cache.
 LINEAR_AT_ONCE = 1 << 12
 
 
 @dataclass(frozen=True)
 class ElementStresses:
-    """Stresses in the elements `part` at q points under k loads.
+    """The stresses at q points in a slice of elements, under k loads.
 
-    `points` (e, q, 2), `weights` (e, q), `stress` (e, q, m, k).
+    Attributes: the slice `part`, `points` (e, q, 2), `weights` (e, q), `stress` (e, q, m, k).
     """
 
     part: slice
@@ -40,18 +40,18 @@ class ElementStresses:
 
 @dataclass(frozen=True)
 class RecoveredStress:
-    """Element stresses and recovered stresses in some one-phase subdomains under k loads.
+    """The element stresses and recovered stresses in subdomains of one phase, under k loads.
 
     Attributes:
-        points: (n, 2) plane nodes of the subdomains.
-        triangles: (e, 3 or 6) plane nodes of each element.
-        node_class: (n,) class of each plane node.
+        points: (n, 2) positions of the plane nodes.
+        triangles: (e, 3 or 6) plane nodes of the elements.
+        node_class: (n,) class of every plane node.
         L, problem: as in `Subdomain`; m displacement strains, v loads.
         u: (classes, c, k) fluctuating displacements.
-        loads: (v, k) the strains and other loads.
+        loads: (v, k) macroscopic strains and other loads.
         is_mixed: whether the elements have a bubble and a pressure.
         known: tractions that the recovered stresses in linear elements obey.
-        shared: (n,) vertex classes, and their fits (n, p, m k), which include elements of other pieces of the body.
+        shared: vertex classes (n,) and fits (n, p, m k) that include the elements of other pieces of the body.
     """
 
     points: Float
@@ -69,51 +69,51 @@ class RecoveredStress:
     def on(
         cls, mesh: FineMesh, L: Float, problem: Problem, u: Float, loads: Float, is_mixed: bool = False
     ) -> RecoveredStress:
-        """Set up the stress recovery on one mesh, with arguments named as the attributes."""
+        """Set up the stress recovery on one mesh; arguments are as the attributes."""
         return cls(mesh.points, mesh.triangles, mesh.node_class, L, problem, u, loads, is_mixed)
 
     @property
     def order(self) -> int:
-        """Order of both elements and fits."""
+        """Return the polynomial order of elements and fits."""
         return 1 if self.triangles.shape[1] == 3 else 2
 
     @cached_property
     def _rows(self) -> Int:
-        """(3, e) plane vertices of the elements."""
+        """Return the plane element vertices (3, e)."""
         return np.ascontiguousarray(self.triangles[:, :3].T, np.int64)
 
     @cached_property
     def _coordinates(self) -> Float:
-        """(2, n) plane node coordinates."""
+        """Return the plane node coordinates (2, n)."""
         return self.points.T.copy()
 
     @cached_property
     def vertices(self) -> Int:
-        """(e, 3) element vertices, numbered from 0; periodic images are one."""
+        """Return the element vertex numbers (e, 3); periodic images have the same number."""
         return np.asarray(np.take(self.numbers, np.take(self.node_class, self._rows)).T)
 
     @cached_property
     def numbers(self) -> Int:
-        """(classes,) vertex numbers."""
+        """Return the vertex numbers (classes,), counted from 0 over the vertex classes."""
         is_vertex = np.zeros(len(self.u), bool)
         is_vertex[self.node_class[self.triangles[:, :3]]] = True
         return np.asarray(np.cumsum(is_vertex) - 1)
 
     @cached_property
     def flexibility(self) -> Float:
-        """(m, m) inverse of the stiffness for displacement strains."""
+        """Return the inverse (m, m) of the stiffness for displacement strains."""
         m = self.problem.strains
         return np.asarray(np.linalg.inv(self.L[:m, :m]))
 
     @cached_property
     def elements(self) -> list[ElementStresses]:
-        """The element stresses at their integration points, in chunks."""
+        """Return the element stresses at the integration points, in chunks."""
         at_once, size = LINEAR_AT_ONCE if self.order == 1 else ELEMENTS_AT_ONCE, len(self.triangles)
         parts = (slice(first, min(first + at_once, size)) for first in range(0, size, at_once))
         return [self._uniform(part) if self.order == 1 else self._varying(part) for part in parts]
 
     def _varying(self, part: slice) -> ElementStresses:
-        """Compute the stresses in quadratic elements."""
+        """Compute the stresses at the integration points in quadratic elements."""
         m, nodes = self.problem.strains, self.triangles[part]
         corners, u = self.points[nodes], self.u[self.node_class[nodes]]
         if self.is_mixed:
@@ -131,7 +131,7 @@ class RecoveredStress:
         return ElementStresses(part, points, weights, stress + self.L[:m] @ self.loads)
 
     def _uniform(self, part: slice) -> ElementStresses:
-        """Compute the stresses in linear elements; NumPy loops run over the elements."""
+        """Compute the uniform stresses in linear elements, with the elements on the last array axis."""
         (c, k), m, triangles = self.u.shape[1:], self.problem.strains, self._rows[:, part]
         (x, y), at = (np.take(row, triangles) for row in self._coordinates), np.take(self.node_class, triangles)
         by_node = self.u.reshape(len(self.u), -1).T.copy()
@@ -140,8 +140,8 @@ class RecoveredStress:
         second -= zero
         (x1, x2), (y1, y2) = x[1:] - x[0], y[1:] - y[0]
         doubled = x1 * y2 - x2 * y1
-        by_place = (y2 * first - y1 * second) / doubled, (x1 * second - x2 * first) / doubled
-        gradient, strain = [row.reshape(c, k, -1) for row in by_place], np.zeros((m, k, len(doubled)))
+        slopes = (y2 * first - y1 * second) / doubled, (x1 * second - x2 * first) / doubled
+        gradient, strain = [row.reshape(c, k, -1) for row in slopes], np.zeros((m, k, len(doubled)))
         for (i, d), number in np.ndenumerate(self.problem.voigt):
             strain[number] += gradient[d][i]
         stress = (self.L[:m, :m] @ strain.reshape(m, -1)).reshape(m * k, -1)
@@ -153,7 +153,7 @@ class RecoveredStress:
 
     @cached_property
     def fits(self) -> Float:
-        """(vertices, p, m k) polynomial coefficients about each vertex, see `polynomials`; p = 1 in order 1."""
+        """Return the coefficients (vertices, p, m k) of `polynomials` about every vertex; p = 1 in order 1."""
         neighbours = PatchNeighbours.of(self.vertices, self.points[self.triangles[:, :3]])
         if self.order == 1:
             chunks = [(chunk.points[:, 0], chunk.weights[:, 0], chunk.stress[:, 0]) for chunk in self.elements]
@@ -171,7 +171,7 @@ class RecoveredStress:
         return self._with_shared(fitted(moments, sums + neighbours.shared(sums, self.order)))
 
     def patch_sums(self) -> tuple[Float, Float]:
-        """Sum moments (vertices, p, p) and stress moments (vertices, p, m k) of elements around each vertex."""
+        """Sum the moments (vertices, p, p) and stress moments (vertices, p, m k) around every vertex."""
         moments, sums, size = np.zeros(()), np.zeros(()), int(self.vertices.max()) + 1
         for chunk in self.elements:
             corners = self.points[self.triangles[chunk.part, :3]]
@@ -183,13 +183,13 @@ class RecoveredStress:
         return moments, sums
 
     def _with_shared(self, fits: Float) -> Float:
-        """Replace fits (vertices, p, m k) at shared vertices by the shared fits."""
+        """Replace the fits (vertices, p, m k) at shared vertices by the shared fits."""
         if self.shared is not None:
             fits[self.numbers[self.shared[0]]] = self.shared[1][:, : fits.shape[1]]
         return fits
 
     def recovered(self, part: Int | slice, lam: Float) -> Float:
-        """Evaluate recovered stresses (e, q, m, k) in elements `part` at barycentric coordinates lam (q, 3)."""
+        """Evaluate the recovered stresses (e, q, m, k) in elements, at barycentric coordinates lam (q, 3)."""
         vertices, shape = self.vertices[part], (self.problem.strains, self.loads.shape[1])
         if self.order == 1:
             return np.asarray((lam @ self.fits[:, 0][vertices]).reshape(len(vertices), len(lam), *shape))
@@ -201,23 +201,24 @@ class RecoveredStress:
         return result.reshape(*points.shape[:2], *shape)
 
     def difference(self, with_shares: bool = True) -> tuple[Float, Float]:
-        """Integrate ds_i : S : ds_j, (k, k), for recovered less element stresses ds; also diagonals of elements (e, k).
+        """Compute the energy of the difference ds between recovered and element stresses.
 
-        Without shares, the diagonals are (0, k).
+        Returns:
+            int ds_i : S : ds_j (k, k), and the element contributions (e, k) to its diagonal, (0, k) without shares.
         """
         m, k = self.problem.strains, self.loads.shape[1]
         total, shares = np.zeros((m * k, m * k)), [np.zeros((0, k))]
         for chunk in self.elements:
-            # (q, e, m, k) at places in the elements, times the root of their weights.
+            # Differences (q, e, m, k) at points in the elements, times the roots of the weights.
             if self.order == 2:
                 difference = self.recovered(chunk.part, barycentric(6)) - chunk.stress
                 difference = (difference * np.sqrt(chunk.weights)[..., None, None]).swapaxes(0, 1)
             else:
-                # Linear less uniform stresses d, of which d_i at the vertices have the sum s:
+                # With the values d_i of the linear difference d at the vertices, and their sum s:
                 # int d d = w/12 (sum_i d_i d_i + s s) = w/12 sum_i (d_i + s/3)^2.
                 e = len(chunk.stress)
                 corners, difference = self.vertices[chunk.part].T, np.empty((3, e, m * k))
-                np.take(self.fits[:, 0], corners, axis=0, out=difference, mode="clip")  # which needs no buffer
+                np.take(self.fits[:, 0], corners, axis=0, out=difference, mode="clip")  # clip needs no buffer
                 difference += (difference[0] + difference[1] + difference[2]) / 3 - 2 * chunk.stress.reshape(e, m * k)
                 difference = (difference * np.sqrt(chunk.weights / 12)).reshape(3, e, m, k)
             flat = difference.reshape(-1, m * k)

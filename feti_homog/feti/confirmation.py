@@ -1,4 +1,4 @@
-"""Solutions by influence columns, which F lambda confirms from time to time."""
+"""Dual solutions by influence columns, which products F lambda confirm from time to time."""
 
 import numpy as np
 from mpi4py import MPI
@@ -15,9 +15,9 @@ from feti_homog.typing import Float
 
 
 class InfluenceSolutions:
-    """Solves by influence columns, most of them without F lambda.
+    """A solver by influence columns that computes F lambda only from time to time.
 
-    After n solves without F lambda, one with it confirms them; then 2 n + 1 go without, at most MOST_UNCONFIRMED.
+    A solve with F lambda confirms n solves without F lambda; the next min(2 n + 1, MOST_UNCONFIRMED) solves omit it.
     """
 
     def __init__(
@@ -30,17 +30,17 @@ class InfluenceSolutions:
     ) -> None:
         self._comm, self._inverse, self._operator, self._natural, self._jumps = comm, inverse, operator, natural, jumps
         self._granted = self._left = 0
-        # Multipliers and jumps on inactive rows, (owned rows, k) each, that F lambda will confirm, and the sums of the
-        # absolute multipliers under single strains.
+        # Unconfirmed multipliers and jumps on inactive rows, both (owned rows, k), and the sums of the absolute
+        # multipliers under single strains.
         self._expected: tuple[Float, Float, Float] | None = None
         self._residual, self._rounding, self._squares = 0.0, 0.0, np.zeros((2, 0, 0))
 
     def solutions(self, strains: Float, d: Float) -> list[DualSolution] | None:
-        """Solve by influence columns for loads (k, v), unless F lambda is due.
+        """Solve by influence columns for loads (k, v), or return None if F lambda is due.  Collective.
 
-        Return None if it is: always for loads whose jump on the active rows may be rounding, and where the columns find
-        another number of free motions than the coarse space.  d (owned rows, v) are the jumps of the torn cell under
-        the unit loads.  Collective.
+        F lambda is always due if the jump of a load on the active rows may be rounding, and if the columns and the
+        coarse space disagree about the number of free motions.  The argument d (owned rows, v) is the jumps of the torn
+        cell under the unit loads.
         """
         self._expected = None
         if not self._granted:
@@ -54,9 +54,9 @@ class InfluenceSolutions:
             return None
         lam, jumps = answer
         if not self._left:
-            of_strains = self._inverse.answer(d, np.eye(d.shape[1]), free)
-            assert of_strains is not None
-            self._expected = lam, jumps, np.abs(of_strains[0]) @ np.abs(strains.T)
+            unit_answer = self._inverse.answer(d, np.eye(d.shape[1]), free)
+            assert unit_answer is not None
+            self._expected = lam, jumps, np.abs(unit_answer[0]) @ np.abs(strains.T)
             return None
         self._left -= 1
         reason, C = int(PETSc.KSP.ConvergedReason.CONVERGED_RTOL), self._operator.compliance
@@ -64,24 +64,24 @@ class InfluenceSolutions:
         return [DualSolution(E, x, jump, None, 0, reason, self._residual, C) for E, x, jump in rows]
 
     def closing(self, d: Float, E: Float, weights: Float) -> Float:
-        """Compute the multipliers H d E for loads E (v, k), which F lambda will confirm.
+        """Compute the multipliers H d E for loads E (v, k), which F lambda will confirm.  Collective.
 
-        Multipliers that `solutions` left to be confirmed, times `weights` (k,), need no new columns.  Collective.
+        Unconfirmed multipliers of `solutions`, times `weights` (k,), need no new columns.
         """
         return self._inverse.multipliers(d, E) if self._expected is None else self._expected[0] * weights
 
     def record(self, solutions: list[DualSolution], d: Float) -> None:
-        """Record solutions by F lambda, and grant more solves without it if no iterations were needed.
+        """Record solutions by F lambda, and grant new solves without F lambda if no solution needed iterations.
 
-        `solutions` is empty if the active rows do not see a load.  Expected multipliers with more error than rounding
-        are renewed.  Collective.
+        `solutions` is empty if a load causes no jump on the active rows.  The method renews expected multipliers whose
+        error exceeds rounding.  Collective.
 
         Raises:
             ConvergenceError: the multipliers by columns have a larger error than the checks of a run allow.
         """
         if solutions and self._expected is not None:
             lam, opening = (np.stack(x, axis=1) for x in zip(*((s.lam, s.jump) for s in solutions), strict=True))
-            # Multipliers that F lambda confirms are off by no less than their residuals.
+            # The error of a confirmed multiplier is at least its residual.
             lam_error, drift = self._errors(lam, opening, np.array([solution.residual for solution in solutions]))
             if not lam_error <= thresholds.MOST_UNCONFIRMED_ERROR:
                 raise ConvergenceError(
@@ -103,11 +103,11 @@ class InfluenceSolutions:
             self._squares = distributed_arrays.allreduce_sum(self._comm, np.stack([seen.T @ seen, d.T @ d]))
 
     def _errors(self, lam: Float, opening: Float, residuals: Float | float = 0.0) -> tuple[float, float]:
-        """Compare the expected multipliers and jumps on inactive rows with `lam` and `opening`, (owned rows, k) each.
+        """Compute the errors of the expected multipliers and jumps against `lam` and `opening` (owned rows, k).
 
         Both errors are relative to the largest entry of a load.  Jumps count only if no body is free to move.
         Multipliers of a load may cancel, for example where bonds are pressed: then a fraction of the multipliers under
-        single strains is the scale.  `residuals` (k,) are relative errors of lam.  Collective.
+        single strains is the scale.  The `residuals` (k,) are relative errors of lam.  Collective.
         """
         assert self._expected is not None
         expected, jumps, terms = self._expected

@@ -1,4 +1,4 @@
-"""Solutions of the dual problem, and the jumps on the active rows that rigid-body motions cannot close."""
+"""Solutions of the dual problem, and projected jumps on the active rows."""
 
 from dataclasses import dataclass
 
@@ -16,16 +16,16 @@ from feti_homog.typing import Float
 
 @dataclass(frozen=True)
 class DualSolution:
-    """Multipliers under one load, and the jumps that follow from them.
+    """The multipliers under one load, with the resulting jumps.
 
     Attributes:
-        strain: (v,) E, the macroscopic strain first, then the other loads of the problem.
+        strain: (v,) load E, the macroscopic strain first, then the other loads of the problem.
         lam: (owned rows,) multipliers, nodal forces between the faces; 0 on inactive rows.
-        jump: (owned rows,) B u* - C lam, 0 up to tolerance on active rows, gap and slip on the others.
+        jump: (owned rows,) B u* - C lam, 0 up to tolerance on active rows, gap and slip on inactive rows.
         alpha: (kernel dimension,) rigid-body amplitudes; None if F lambda did not confirm the multipliers.
-        iterations, reason: of the Krylov method (PETSc's KSPConvergedReason).
-        residual: |B u* - C lam| on the active rows, relative to the jump of the torn cell; of the last solution
-            that F lambda confirmed, if not of this one.
+        iterations, reason: iterations of the Krylov method, and PETSc's KSPConvergedReason.
+        residual: |B u* - C lam| on the active rows, relative to the jump of the torn cell; without alpha, the residual
+            of the last confirmed solution.
         compliance: (owned rows,) C of the springs in this state.
     """
 
@@ -40,12 +40,12 @@ class DualSolution:
 
     @property
     def opening(self) -> Float:
-        """(owned rows,) B u*: elongation of the springs, and the jump of rows without multipliers."""
+        """Return B u* (owned rows,): spring elongations on active rows, jumps on inactive rows."""
         return self.jump + self.compliance * self.lam
 
 
 class ActiveRows:
-    """The owned rows that carry multipliers: `mask` (owned rows,) is 1 there, else 0."""
+    """The owned rows that carry multipliers: `mask` (owned rows,) is 1 on active rows, else 0."""
 
     def __init__(self, rows: int) -> None:
         self.mask = np.ones(rows)
@@ -56,7 +56,7 @@ class ActiveRows:
 
 
 class ActiveJumps:
-    """P of jumps on the active rows, and norms over all ranks.  All calls are collective."""
+    """The projection of jumps on the active rows, and norms over all ranks.  All calls are collective."""
 
     def __init__(
         self, comm: MPI.Intracomm, operator: DualOperator, natural: NaturalCoarseSpace, active: ActiveRows
@@ -70,20 +70,20 @@ class ActiveJumps:
         return norms
 
     def projected(self, x: Float) -> Float:
-        """Project jumps x (owned rows, k) on the active rows, twice.
+        """Project the jumps x (owned rows, k) on the active rows.
 
-        One projection leaves rounding of rigid-body motions.  No multipliers remove it, so that a Krylov method stalls.
+        A single projection leaves rounding of rigid-body motions, on which a Krylov method stalls.
         """
         return self.natural.project(self.natural.project(self.active.restrict(x)))
 
     def rounding(self, displacement: Float, loads: Float, seen: Float, torn: Float) -> Float:
-        """Bound the rounding (k,) in jumps of the torn cell under k loads (v, k), on the active rows.
+        """Bound the rounding (k,) in the torn cell's active jumps under loads (v, k).
 
-        The bound is estimated only if a jump may be rounding.
+        Only a jump that may be rounding needs the estimate of `jump_rounding`.
 
         Args:
-            displacement: (boundary dofs, v) of the torn cell under the unit loads, equal at every call.
-            seen: (k,) norms of the jumps on the active rows, projected.
+            displacement: (boundary dofs, v) displacements of the torn cell under the unit loads, equal at every call.
+            seen: (k,) norms of the projected jumps on the active rows.
             torn: (k,) norms of the jumps on all rows.
         """
         rounding = ZERO_JUMP * torn
@@ -97,7 +97,7 @@ class ActiveJumps:
     def solutions(
         self, strains: Float, lam: Float, jump: Float, iterations: int, reason: int, scale: Float
     ) -> list[DualSolution]:
-        """Make solutions from multipliers `lam` (owned rows, k): amplitudes, jumps and residuals.
+        """Complete the multipliers `lam` (owned rows, k) to solutions with amplitudes, jumps and residuals.
 
         `jump` (owned rows, k) is d E - F lam, without rigid-body motions; residuals are relative to `scale` (k,).
         """
@@ -105,7 +105,7 @@ class ActiveJumps:
         if self.natural.kernel_dimension:
             alpha -= self.natural.amplitudes(self.active.restrict(jump))
             jump = jump + self.natural.G @ alpha
-        # Free bodies lie where faces part least, however they are cut.
+        # A free body takes the position of the least jump, so that cuts do not change the result.
         if (Z := self.natural.unconstrained_modes).shape[1]:
             M = self.natural.G @ Z
             squares = allreduce_sparse(self.comm, (M.T @ M).tocsr())
@@ -118,9 +118,9 @@ class ActiveJumps:
         return [DualSolution(E, x, g, a, iterations, reason, float(size), C) for E, x, g, a, size in rows]
 
     def completed(self, solution: DualSolution, d: Float) -> DualSolution:
-        """Complete a solution of the present state: amplitudes, jumps and residual by F lambda.
+        """Complete a solution of the present state by the product F lambda.
 
-        d (owned rows, v) are the jumps of the torn cell.
+        The argument d (owned rows, v) is the jumps of the torn cell under the unit loads.
         """
         torn = (d @ solution.strain)[:, None]
         jump = torn - self.operator.apply(solution.lam[:, None])
@@ -130,10 +130,10 @@ class ActiveJumps:
 
 
 def jump_rounding(operator: DualOperator, displacement: Float) -> Float:
-    """Estimate the rounding (owned rows, v) in jumps B u of displacements u = K+ f (boundary dofs, v).  Collective.
+    """Estimate the rounding (owned rows, v) in jumps B u of displacements u (boundary dofs, v).  Collective.
 
-    The estimate is B K+ (eps diag(K) |u|) with random signs, the jumps by forces as large as the rounding of K u: each
-    subdomain has its own scale, and a soft subdomain beside stiff ones moves far.
+    For u = K+ f, the estimate is B K+ (eps diag(K) |u|) with random signs: the jumps under forces as large as the
+    rounding of K u.  Every subdomain has a scale, and a soft subdomain beside stiff subdomains moves far.
     """
     signs = np.random.default_rng(0).choice([-1.0, 1.0], displacement.shape)
     forces = operator.boundary.body_diagonal[:, None] * np.abs(displacement) * signs

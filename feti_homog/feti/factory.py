@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
 
 def construct(name: str, operators: InterfaceOperators) -> Preconditioner:
-    """Construct a preconditioner by its name.  Collective.
+    """Construct the preconditioner with a given name.  Collective.
 
-    Modules of exact inverses are imported only if they are needed.
+    Only a solver with an exact inverse imports the modules of exact inverses.
     """
     if name == "influence":
         from feti_homog.feti.exact.exact_inverse import ExactInverse
@@ -43,12 +43,12 @@ def construct(name: str, operators: InterfaceOperators) -> Preconditioner:
 
 @dataclass(frozen=True)
 class SolverParts:
-    """The parts of the solver.
+    """The boundary operators, preconditioner and coarse spaces of a solver.
 
     Attributes:
-        adaptive: the coarse space of the preconditioner, if it has one.
-        exact_inverse: the preconditioner, if it leaves nothing to iterate.
-        method: the choice in words.
+        adaptive: the coarse space of the preconditioner, or None.
+        exact_inverse: the preconditioner, if it leaves nothing to iterate; else None.
+        method: the preconditioner and the coarse space in words.
     """
 
     operators: InterfaceOperators
@@ -60,7 +60,7 @@ class SolverParts:
 
     @property
     def coarse_dimension(self) -> int:
-        """Number of coarse displacements; of rigid-body motions without an adaptive coarse space."""
+        """Return the number of coarse displacements, or of rigid-body motions without `adaptive`."""
         return self.natural.kernel_dimension if self.adaptive is None else self.adaptive.coarse_dimension
 
     def describe(self, comm: MPI.Intracomm) -> str:
@@ -110,11 +110,10 @@ def build(
     thresholds: Thresholds = DEFAULTS,
     recovers: bool = False,
 ) -> SolverParts:
-    """Factor the subdomains and set up the parts that options and sizes ask for.  Collective.
+    """Factor the subdomains, and set up the solver parts that options and sizes select.  Collective.
 
-    `compliance` (owned rows,) is C, which may grow if the springs `soften`.  If the run `recovers`
-    displacements inside, a rank with one subdomain keeps its factor: a later factor of the interior would take as much
-    memory.
+    `compliance` (owned rows,) is C, which may grow if the springs `soften`.  If the run `recovers` interior
+    displacements, a rank with one subdomain keeps the factor, because a later factor would take the same memory.
 
     Options: `feti_dual_operator`, `feti_pc_type`, `feti_coarse_space`, `feti_coarse_threshold`.
 
@@ -153,9 +152,9 @@ def build(
         with PETSc.Log.Event("FETICoarseSetUp"):
             adaptive = AdaptiveCoarseSpace(operators, preconditioner, options.threshold, thresholds)
         preconditioner = Balanced(preconditioner, adaptive)
-    left_out = operators.compliance if plan.preconditioner == "dirichlet" else np.zeros(len(compliance))
+    neglected = operators.compliance if plan.preconditioner == "dirichlet" else np.zeros(len(compliance))
     followed = plan.preconditioner == "influence" or not soften
-    if not followed or comm.allreduce(bool(left_out.any()), MPI.LOR):
-        preconditioner = SpringUpdated(comm, preconditioner, jump_operator.owned[0], left_out)
+    if not followed or comm.allreduce(bool(neglected.any()), MPI.LOR):
+        preconditioner = SpringUpdated(comm, preconditioner, jump_operator.owned[0], neglected)
     inverse = cast("ExactInverse", preconditioner) if plan.preconditioner == "influence" else None
     return SolverParts(operators, preconditioner, natural, adaptive, inverse, plan.in_words)

@@ -2,8 +2,8 @@
 
 H is the preconditioner: M^-1, or H_0 of `coarse.adaptive.Balanced`.
 
-A vector holds k multiplier vectors, the k values of a row side by side, so that load cases are solved together.
-Errors that the contexts raise are kept until PETSc has returned (`CallbackErrors`).
+A PETSc vector holds the multipliers of k load cases, with the k values of a row side by side, so that one iteration
+serves all load cases.  `CallbackErrors` keeps errors of the contexts until PETSc has returned.
 """
 
 from collections.abc import Callable
@@ -18,18 +18,18 @@ from feti_homog.system.parallel import distributed_arrays
 from feti_homog.system.petsc import c_functions
 from feti_homog.typing import Float
 
-# Reasons for which PETSc gives up where rounding is at work.
+# PETSc's reasons to stop where rounding prevents progress.
 REASON = PETSc.KSP.ConvergedReason
 BREAKDOWNS = (REASON.DIVERGED_INDEFINITE_PC, REASON.DIVERGED_INDEFINITE_MAT, REASON.DIVERGED_BREAKDOWN)
-# Methods that apply the preconditioner to the residual itself, so that the jump can be read off there.  With others
-# the convergence test sees only the forces; the checks of a response test the jump.
+# Methods that apply the preconditioner to the residual itself, which gives the jump.  With other methods, the
+# convergence test has only the forces; the checks of a response test the jump.
 PRECONDITION_TRUE_RESIDUAL = (PETSc.KSP.Type.CG, PETSc.KSP.Type.FCG)
 
 ESTIMATES_SINGULAR_VALUES = (PETSc.KSP.Type.CG, PETSc.KSP.Type.GMRES, PETSc.KSP.Type.FGMRES)
 
 
 class ProjectedProblem:
-    """The products y = P F x and z = P H r on the active rows; r, the jump of the iterate, is kept."""
+    """The shell matrix P F and the shell preconditioner P H on the active rows, which keeps the last residual r."""
 
     def __init__(
         self,
@@ -38,60 +38,60 @@ class ProjectedProblem:
         jumps: ActiveJumps,
         columns: int,
     ) -> None:
-        """Set up for vectors with this number of `columns`."""
+        """Set up the products for vectors with a number of load `columns`."""
         self._errors, self._preconditioner, self._jumps = errors, preconditioner, jumps
         self._residual = np.zeros((0, columns))
         self._events = PETSc.Log.Event("FETIDual"), PETSc.Log.Event("FETIPrecond")
 
     def mult(self, mat: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Set y = P F x.  Collective."""
+        """Compute the matrix product y = P F x.  Collective."""
         with self._events[0]:
             values = x.getArray(readonly=True).reshape(-1, self._residual.shape[1])
             y.setArray(self._projected(lambda: self._jumps.active.restrict(self._jumps.operator.apply(values))))
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, z: PETSc.Vec) -> None:
-        """Set z = P H r.  Collective."""
+        """Apply the preconditioner: z = P H r.  Collective."""
         with self._events[1]:
             self._residual = r.getArray(readonly=True).reshape(-1, self._residual.shape[1])
             z.setArray(self._projected(lambda: self._preconditioner.apply(self._residual)))
 
     def _projected(self, vectors: Callable[[], Float]) -> Float:
-        """Project `vectors()` and flatten the result; NaN if `vectors` raises."""
+        """Project the result of `vectors()` and flatten it; return NaN if `vectors` raises."""
         nothing = np.full((len(self._jumps.active.mask), self._residual.shape[1]), np.nan)
         return self._errors.call(lambda: self._jumps.natural.project(vectors()), nothing).ravel()
 
     def jump_norm(self) -> float:
-        """Compute |P r| of the last r, the jump that no rigid-body motion closes.  Collective."""
+        """Compute the norm |P r| of the last jump r, without rigid-body motions.  Collective."""
         r = self._jumps.natural.project(self._residual)
         return float(np.sqrt(distributed_arrays.allreduce_sum(self._jumps.comm, np.array([(r * r).sum()]))[0]))
 
 
 class Stall:
-    """Test for a norm that has not halved for `patience` iterations."""
+    """A test for a norm that has not halved for `patience` iterations."""
 
     def __init__(self, patience: int) -> None:
         self._patience = patience
         self.reset()
 
     def reset(self) -> None:
-        self._smallest, self._found_at = np.inf, 0
+        self._smallest, self._smallest_at = np.inf, 0
 
     def is_reached(self, iteration: int, norm: float) -> bool:
-        """Record the norm at this iteration, and return whether it stalls."""
+        """Record the norm at an iteration, and return whether the norm stalls."""
         if norm < self._smallest / 2:
-            self._smallest, self._found_at = norm, iteration
-        return iteration - self._found_at >= self._patience
+            self._smallest, self._smallest_at = norm, iteration
+        return iteration - self._smallest_at >= self._patience
 
 
 class PrimalTest:
-    """PETSc's convergence test: converged when both primal residuals, the jump and the forces, are below rtol.
+    """A convergence test for PETSc on two primal residuals, which must both fall below rtol.
 
-    The jump is |P r| relative to the jump of the torn cell; the forces that would close it are |P H r| relative to
-    the forces of the torn cell, |P M^-1 P d|.  A small dual residual alone can hide a large one of these.
+    The residuals are the jump |P r| relative to the jump of the torn cell, and the forces |P H r| that would close the
+    jump relative to the torn cell's forces |P M^-1 P d|.  A small dual residual can hide a large primal residual.
 
     Attributes:
         ends_on_stall: whether a stall is a breakdown.
-        jump_scale, force_scale: norms of the torn cell's jump and of the forces that close it, for the next solve.
+        jump_scale, force_scale: norms of the torn cell's jump and closing forces, for the next solve.
     """
 
     def __init__(self, problem: ProjectedProblem) -> None:
@@ -100,7 +100,7 @@ class PrimalTest:
         self._jump_stall, self._force_stall = Stall(STALL_ITERATIONS), Stall(FORCE_STALL_ITERATIONS)
 
     def is_met(self, rtol: float, jump: float, forces: float) -> bool:
-        """Return whether norms of the jump and of the forces are both below rtol, or the jump is zero."""
+        """Return whether the norms of jump and forces are below rtol, or the jump is zero."""
         return jump == 0.0 or (jump <= rtol * self.jump_scale and forces <= rtol * self.force_scale)
 
     def __call__(self, ksp: PETSc.KSP, iteration: int, residual: float) -> PETSc.KSP.ConvergedReason:
@@ -125,7 +125,7 @@ class PrimalTest:
         return self._go_on(self._jump_stall.is_reached(iteration, jump))
 
     def _go_on(self, stalled: bool) -> PETSc.KSP.ConvergedReason:
-        """Return DIVERGED_BREAKDOWN for a stall that ends the solve, else ITERATING."""
+        """Return DIVERGED_BREAKDOWN if a stall ends the solve, else ITERATING."""
         if stalled and self.ends_on_stall:
             return REASON.DIVERGED_BREAKDOWN
         return REASON.ITERATING
@@ -134,8 +134,8 @@ class PrimalTest:
 class Krylov:
     """PETSc's Krylov method for k load cases at once.
 
-    Options have the prefix `feti_`.  The preconditioner's own prefix is `feti_projected_`, because `feti_pc_type` names
-    a preconditioner of this program, not of PETSc; options under that prefix are refused.
+    Options have the prefix `feti_`.  The PETSc preconditioner has the prefix `feti_projected_`, because `feti_pc_type`
+    names a preconditioner of this program; the program refuses options with the prefix `feti_projected_`.
     """
 
     def __init__(
@@ -143,7 +143,7 @@ class Krylov:
     ) -> None:
         """Create the KSP for `columns` load cases, each with the layout of `vector`.  Collective.
 
-        With `restarts`, a stall ends the iteration, which begins again with the residual of its last multipliers.
+        With `restarts`, a stalled iteration restarts with the residual of the last multipliers.
         """
         self._preconditioner, self._jumps, self._columns, self._restarts = preconditioner, jumps, columns, restarts
         owned_rows, all_rows = vector.getSizes()
@@ -170,22 +170,22 @@ class Krylov:
         self.ksp.setFromOptions()
 
     def solve(self, lam: Float, right: Float) -> tuple[Float, Float, int, int]:
-        """Solve P F lam = right, for projected jumps (rows, k), beginning with multipliers lam (rows, k).  Collective.
+        """Solve P F lam = right for projected jumps (rows, k) from multipliers lam (rows, k).  Collective.
 
-        With an adaptive coarse space the condition number is small: proven with all rows active, measured with others.
-        So only rounding stalls the iteration.  Then it restarts from its last multipliers, with their residual computed
-        anew; after MAX_RESTARTS restarts of this kind a stall does not end it any more.
+        With an adaptive coarse space the condition number is small: proven with all rows active, measured otherwise.
+        So only rounding stalls the iteration.  A stalled iteration restarts from the last multipliers with a newly
+        computed residual; after MAX_RESTARTS restarts, the iteration continues through a stall.
 
-        Errors in the operator, the preconditioner or the test are raised again if all ranks raise them; otherwise the
-        job ends.
+        An error in the operator, the preconditioner or the test is raised again if it occurs on all ranks; otherwise
+        the job ends.
 
         Returns:
-            Multipliers lam, F lam on all rows, the number of iterations, and the reason for their end.
+            Multipliers lam, F lam on all rows, the number of iterations, and PETSc's converged reason.
         """
         iterations, jumps = 0, self._jumps
         for restart in range(MAX_RESTARTS + 2):
             self.test.ends_on_stall = self._restarts and restart <= MAX_RESTARTS
-            # Loads of which `lam` leaves a larger residual than 0 begin with 0.
+            # A load starts from 0 if `lam` leaves a larger residual.
             applied, residual = np.zeros_like(lam), right
             if jumps.norms(lam).any():
                 applied = jumps.operator.apply(lam)
@@ -208,7 +208,7 @@ class Krylov:
         return lam, jumps.operator.apply(lam), iterations, reason
 
     def describe(self, iterations: int) -> str:
-        """Describe the last solve for -feti_view: iterations and estimated condition number."""
+        """Describe the iterations and the condition number of the last solve for -feti_view."""
         line = f"FETI: {self._columns} load case{'s' * (self._columns > 1)}, {iterations} iterations"
         if self.extreme_values is None:
             return line
@@ -217,13 +217,13 @@ class Krylov:
 
     @property
     def extreme_values(self) -> tuple[float, float] | None:
-        """The extreme singular values of P H P F in the last solve; None without an estimate."""
+        """Return the extreme singular values of P H P F in the last solve, or None without an estimate."""
         if not self.ksp.getIterationNumber() or self.ksp.getType() not in ESTIMATES_SINGULAR_VALUES:
             return None
         largest, smallest = self.ksp.computeExtremeSingularValues()
         return (smallest, largest) if smallest > 0.0 else None
 
     def destroy(self) -> None:
-        """Free the shell matrix and the Krylov method; collective."""
+        """Free the shell matrix and the Krylov method.  Collective."""
         self.ksp.getOperators()[0].destroy()
         self.ksp.destroy()

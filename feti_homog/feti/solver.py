@@ -1,10 +1,10 @@
-"""The FETI solver: set up once for a mesh, then one projected Krylov solve a load and a set of active rows.
+"""The FETI solver: one set-up for a mesh, then a projected Krylov solve for every load and set of active rows.
 
 With f = -Q E for the v unit loads E, the macroscopic strain first, Eqs. (34), (36), (37) read on the active rows
 
     (F + C) lam - G alpha = d E,  G^T lam = 0,  u* = K+ (-Q E - B^T lam) + R alpha,  d = -B K+ Q.
 
-C is the compliance of elastic bonds, 0 of glue; then the faces part by B u* = C lam.
+C is the compliance of elastic bonds, across which the faces part by B u* = C lam; glue has C = 0.
 """
 
 import weakref
@@ -32,24 +32,24 @@ from feti_homog.typing import Float
 
 
 class FetiSolver:
-    """The dual problem of a torn cell: set up once, solved for many loads and states.
+    """A solver for the dual problem of a torn cell under many loads and in many interface states.
 
     The set-up factors every subdomain; `displacement` may factor interiors.  Options have the prefix `feti_`.
 
     Attributes:
         problem: the displacements and the unit loads.
         jump_operator: B and the layout of the multipliers.
-        interface_operators: S and S+ of this rank's subdomains.
-        intact_compliance: (owned rows,) C of the springs before any has softened.
+        interface_operators: S and S+ of the local subdomains.
+        intact_compliance: (owned rows,) C of the intact springs.
         operator: F + C.
         preconditioner: M^-1, or H_0 with the adaptive coarse space.
-        exact_inverse: the preconditioner, if it is the inverse of the dual operator; else None.
+        exact_inverse: the preconditioner, if it inverts the dual operator; else None.
         natural: the rigid-body motions, G and P.
-        adaptive: the coarse space of the preconditioner, if it has one.
+        adaptive: the coarse space of the preconditioner, or None.
         coarse_dimension: number of coarse displacements, or of rigid-body motions without `adaptive`.
         active: the rows that carry multipliers.
-        solves: number of dual problems so far, one for each load.
-        condition: largest condition number of P H P F so far, estimated by the iterations; 0 without any.
+        solves: number of dual problems so far, counted load by load.
+        condition: largest condition number of P H P F so far, estimated by the iterations; 0 without iterations.
         method: the preconditioner and the coarse space in words.
     """
 
@@ -65,7 +65,7 @@ class FetiSolver:
         problem: Problem = PLANE,
         recovers: bool = False,
     ) -> None:
-        """Set up; `applications` is the expected number of applications of F, `recovers` as in `factory.build`.
+        """Set up the solver for `applications` expected products with F; `recovers` is as in `factory.build`.
 
         Collective.
 
@@ -104,51 +104,51 @@ class FetiSolver:
 
     @property
     def rows(self) -> int:
-        """Number of multipliers that this rank owns."""
+        """Return the number of multipliers that this rank owns."""
         return self.jump_operator.owned[1] - self.jump_operator.owned[0]
 
     @property
     def ksp(self) -> PETSc.KSP:
-        """The Krylov method for one load case."""
+        """Return PETSc's Krylov method for one load case."""
         return self._krylov_for(1).ksp
 
     @property
     def rtol(self) -> float:
-        """Relative tolerance of the Krylov method."""
+        """Return the relative tolerance of the Krylov method."""
         return float(self.ksp.getTolerances()[0])
 
     @property
     def condensed(self) -> CondensedLoads:
-        """The unit loads condensed to the boundaries."""
+        """Return the unit loads, condensed to the subdomain boundaries."""
         return self.interface_operators.condensed
 
     @cached_property
     def _torn_displacement(self) -> Float:
-        """Displacements -K+ Q (boundary dofs, v) of the torn cell under the unit loads."""
+        """Return the displacements -K+ Q (boundary dofs, v) of the torn cell under the unit loads."""
         operators, u = self.interface_operators, self.interface_operators.apply_flexibility(-self.condensed.boundary)
         parts = zip(self.subdomains, operators.dofs, operators.slices, strict=True)
         return np.concatenate([u[:0], *(s.without_rounding(u[span], dofs) for s, dofs, span in parts)])
 
     @cached_property
     def d(self) -> Float:
-        """Jumps d = -B K+ Q (owned rows, v) of the torn cell under the unit loads."""
+        """Return the jumps d = -B K+ Q (owned rows, v) of the torn cell under the unit loads."""
         return self.operator.jump(self._torn_displacement)
 
     @cached_property
     def torn_stiffness(self) -> Float:
-        """Stress integral (v, v) of the torn cell under the unit loads: sum |Omega_s| L_s - Q^T K+ Q."""
+        """Return the torn cell's stress integrals (v, v) sum |Omega_s| L_s - Q^T K+ Q under the unit loads."""
         local = self.condensed.stiffness + self.condensed.boundary.T @ self._torn_displacement
         return np.asarray(self.comm.allreduce(local))
 
     def stress_integral(self, solution: DualSolution) -> Float:
-        """Compute |UC| Sigma = int sigma (v,): the stress integral of the torn cell plus d^T lam.  Collective."""
+        """Compute the stress integral |UC| Sigma = int sigma (v,): torn cell plus d^T lam.  Collective."""
         forces = self.comm.allreduce(self.d.T @ solution.lam)
         return np.asarray(self.torn_stiffness @ solution.strain + forces)
 
     def set_state(self, active: Float, compliance: Float) -> None:
-        """Set the rows that carry multipliers, where `active` is 1, and the compliance C (owned rows,).  Collective.
+        """Set the active rows, where `active` is 1, and the compliance C (owned rows,).  Collective.
 
-        C must not fall below its first value.  Only the coarse problem is factored anew.  Raises as
+        C must not fall below the intact compliance.  Only the coarse problem needs a new factor.  Raises as
         `Preconditioner.soften`.
         """
         changed = bool((active != self.active.mask).any()) + 2 * bool((compliance != self.operator.compliance).any())
@@ -163,13 +163,13 @@ class FetiSolver:
             self.preconditioner.activate(active)
 
     def solve(self, strain: Float, start: Float) -> DualSolution:
-        """Solve for one load (v,), beginning with the multipliers `start` (owned rows,).  Collective."""
+        """Solve the dual problem for a load (v,) from initial multipliers (owned rows,).  Collective."""
         return self.solve_many(strain[None], start[:, None])[0]
 
     def solve_many(self, strains: Float, starts: Float) -> list[DualSolution]:
-        """Solve for k loads (k, v) together, beginning with the multipliers `starts` (owned rows, k).  Collective.
+        """Solve the dual problems for loads (k, v) from initial multipliers (owned rows, k).  Collective.
 
-        One Krylov method solves for all loads, each scaled by the jump that it makes in the torn cell.
+        One Krylov method solves all k problems together.  The scale of a load is its jump in the torn cell.
         """
         k = len(strains)
         self.solves += k
@@ -183,7 +183,7 @@ class FetiSolver:
         torn = self._jumps.norms(torn_jump)
         right = self._jumps.projected(torn_jump)
         jump = self._jumps.norms(right)
-        # A load that the active rows do not see has no multipliers.
+        # A load without a jump on the active rows has no multipliers.
         rounding = self._jumps.rounding(self._torn_displacement, strains.T, jump, torn)
         is_seen = jump > rounding
         scale = np.where(is_seen, jump, 1.0)
@@ -210,30 +210,36 @@ class FetiSolver:
         return solutions
 
     def completed(self, solution: DualSolution) -> DualSolution:
-        """Complete a solution of the present state by F lambda, if F lambda did not confirm it.  Collective."""
+        """Complete a solution of the present state by the product F lambda, if alpha is missing.  Collective."""
         return solution if solution.alpha is not None else self._jumps.completed(solution, self.d)
 
     def boundary_displacement(self, solution: DualSolution) -> Float:
-        """Compute u* (boundary dofs,), Eq. (34), of a complete or a present solution.  Collective."""
+        """Compute the boundary displacements u* (boundary dofs,), Eq. (34), of a solution.  Collective.
+
+        The solution must be complete or belong to the present state.
+        """
         solution = self.completed(solution)
         assert solution.alpha is not None
         u = self._torn_displacement @ solution.strain - self.operator.displacement(solution.lam)
         return np.asarray(u + self.natural.rigid_body_motion(solution.alpha))
 
     def displacement(self, solution: DualSolution) -> Float:
-        """Compute u* (local dofs,) of a solution; the first call may factor interiors.  Collective."""
-        u, places = self.boundary_displacement(solution), range(len(self.subdomains))
-        return np.concatenate([np.zeros(0), *(self.extended(place, u, solution.strain) for place in places)])
+        """Compute the displacements u* (local dofs,); the first call may factor interiors.  Collective."""
+        u, positions = self.boundary_displacement(solution), range(len(self.subdomains))
+        return np.concatenate([np.zeros(0), *(self.extended(i, u, solution.strain) for i in positions)])
 
     def extended(self, place: int, u: Float, loads: Float, keep: bool = True) -> Float:
-        """Extend u (boundary dofs, k) to one subdomain: (dofs, k); see `InterfaceOperators.extend`."""
+        """Extend boundary displacements u (boundary dofs, k) to all (dofs, k) of the subdomain at `place`.
+
+        The other arguments are as of `InterfaceOperators.extend`.
+        """
         operators = self.interface_operators
         return operators.extend(place, u[operators.slices[place]], loads, keep)
 
     def destroy(self) -> None:
         """Free the Krylov methods and the coarse factor, after the last solve; collective.
 
-        Otherwise each rank frees its Krylov methods with the last reference to the solver.
+        Without this call, a rank frees its Krylov methods with the last reference to the solver.
         """
         self._destroy_krylov()
         self.natural.destroy()
@@ -241,7 +247,7 @@ class FetiSolver:
             self.adaptive.destroy()
 
     def _krylov_for(self, columns: int) -> Krylov:
-        """Return the Krylov method for this number of load cases, set up at the first call."""
+        """Return the Krylov method for a number of load cases; the first call sets it up."""
         if columns not in self._krylov:
             parts = self.jump_operator.vector, self.preconditioner, self._jumps, columns
             self._krylov[columns] = Krylov(*parts, restarts=self.adaptive is not None)

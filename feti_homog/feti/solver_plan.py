@@ -11,7 +11,7 @@ from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 
 PRECONDITIONERS = ("auto", "none", "lumped", "dirichlet", "influence")
 BONDED = "bonded"
-"""The preconditioner of bonded cells with few large subdomains; no option names it."""
+"""The preconditioner of bonded cells with few large subdomains, which no option selects."""
 COARSE_SPACES = ("auto", "natural", "adaptive")
 WITHOUT_INVERSE = (
     f"[interface] friction: needs influence columns, which are taken up to {DEFAULTS.assembled_schur_dofs} degrees of "
@@ -22,13 +22,13 @@ WITHOUT_INVERSE = (
 
 @dataclass(frozen=True)
 class SolverOptions:
-    """Values of the options.
+    """The values of the solver options.
 
     Attributes:
-        preconditioner: of PRECONDITIONERS, `-feti_pc_type`.
-        operator: of KINDS, `-feti_dual_operator`.
-        coarse_space: of COARSE_SPACES, `-feti_coarse_space`.
-        threshold: tau, `-feti_coarse_threshold`.
+        preconditioner: `-feti_pc_type`, a value in PRECONDITIONERS.
+        operator: `-feti_dual_operator`, a value in KINDS.
+        coarse_space: `-feti_coarse_space`, a value in COARSE_SPACES.
+        threshold: `-feti_coarse_threshold`, tau.
     """
 
     preconditioner: str = "auto"
@@ -40,7 +40,7 @@ class SolverOptions:
     def read(
         cls, text: Callable[[str, str], str], number: Callable[[str, float], float], thresholds: Thresholds = DEFAULTS
     ) -> SolverOptions:
-        """Read the options by text(name, default) and number(name, default), names without `feti_`.
+        """Read the options by text(name, default) and number(name, default), with names without `feti_`.
 
         Raises:
             CaseError: an option has no such value.
@@ -61,16 +61,16 @@ class SolverOptions:
         )
 
     def want_soft_modes(self, bodies_are_cut: bool) -> bool:
-        """Return whether to search for soft modes: by option, or where bodies are cut (webs by METIS have some)."""
+        """Return whether to search for soft modes: by option, or where METIS cuts bodies into soft webs."""
         return self.coarse_space == "adaptive" or (self.coarse_space == "auto" and bodies_are_cut)
 
 
 @dataclass(frozen=True)
 class ProblemSizes:
-    """Sizes that the choice depends on, over all ranks.
+    """The sizes that determine the choice, over all ranks.
 
     Attributes:
-        applications: how many times the dual operator is expected to be applied.
+        applications: expected number of products with the dual operator.
         bodies_are_cut: whether there are more subdomains than bodies.
         all_dense: whether all boundary operators are dense.
         all_searchable: whether all subdomains can be searched for soft modes, as a whole or face by face.
@@ -91,11 +91,11 @@ class ProblemSizes:
 
 @dataclass(frozen=True)
 class SolverPlan:
-    """Chosen parts of the solver.
+    """The chosen preconditioner and coarse space.
 
     Attributes:
-        preconditioner: of PRECONDITIONERS, not auto; or BONDED.
-        adaptive: whether the coarse space has soft modes beside the rigid-body motions.
+        preconditioner: a value in PRECONDITIONERS except auto, or BONDED.
+        adaptive: whether the coarse space has soft modes as well as rigid-body motions.
     """
 
     preconditioner: str
@@ -103,7 +103,7 @@ class SolverPlan:
 
     @property
     def in_words(self) -> str:
-        """The text that `check` prints."""
+        """Return the words for preconditioner and coarse space, which `check` prints."""
         if self.preconditioner == "influence":
             return "influence columns, an inverse of the bonded cell"
         if self.preconditioner == BONDED:
@@ -119,7 +119,7 @@ def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds =
     """
     preconditioner = options.preconditioner
     if preconditioner == "influence" and not sizes.shared_dofs:
-        preconditioner = "none"  # a whole body by itself has no multipliers
+        preconditioner = "none"  # a single whole body has no multipliers
     if preconditioner == "influence" and not sizes.all_dense:
         raise CaseError("-feti_pc_type influence: needs -feti_dual_operator explicit")
     if preconditioner == "auto":

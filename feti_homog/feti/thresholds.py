@@ -10,28 +10,27 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Thresholds:
-    """Sizes at which the solver changes its methods.  Tests and studies pass others than the defaults.
+    """The sizes at which the solver changes its methods.  Tests and studies pass other values than the defaults.
 
-    "Measured" is by `scripts/measure_thresholds.py NAME VALUE...` for the values in brackets.
+    "Measured" means by `scripts/measure_thresholds.py NAME VALUE...` for the values in brackets.
 
     Attributes:
-        dense_boundary_dofs: boundary dofs of a subdomain up to which `-feti_dual_operator auto` ever
-            makes dense matrices, of 8 n^2 bytes; rows of the largest dense assembled Schur complement.
+        dense_boundary_dofs: most boundary dofs of a subdomain for which `-feti_dual_operator auto` makes dense
+            matrices, of 8 n^2 bytes; rows of the largest dense assembled Schur complement.
         soft_mode: tau, no unit; displacements p with S p = theta N p, theta < tau, are soft.  The default of
             `-feti_coarse_threshold`; the condition number is about 1 / tau.  Measured [0.1, 0.24, 0.35, 0.5]:
             30, 20, 17, 14 iterations, 4.4, 5.4, 6.3, 7.3 vectors a subdomain.
-        face_factor: tau of a face's own eigenproblem over tau, no unit: the energy that other faces and the rest of
-            the body add is not in it.  Measured [0.6, 0.8, 1, 1.25]: 20, 17, 16, 16 iterations; 7.5, 8.8, 9.5, 10.7
-            vectors.
+        face_factor: tau of a face eigenproblem over tau, no unit: a face eigenproblem lacks the energy of the rest
+            of the body.  Measured [0.6, 0.8, 1, 1.25]: 20, 17, 16, 16 iterations; 7.5, 8.8, 9.5, 10.7 vectors.
         face_layers: coarse triangles from a face to the far side of its neighbourhood.  Measured [1, 2, 3]: 15,
-            16, 17 iterations; 14.5, 10.7, 10.2 vectors: one layer finds modes that are none of the body's.
-        decayed: displacements on the rest of the boundary, relative to the largest of a face's mode, that are taken for
-            0.  Measured [1e-3, 0.01, 0.03, 0.1]: 16, 16, 16, 18 iterations.
-        min_trace_dofs: dofs that a trace space on a boundary or a face keeps at least.  Measured
+            16, 17 iterations; 14.5, 10.7, 10.2 vectors: one layer finds modes that the body does not have.
+        decayed: displacements outside the face that are set to 0, relative to the largest of a face mode.
+            Measured [1e-3, 0.01, 0.03, 0.1]: 16, 16, 16, 18 iterations.
+        min_trace_dofs: least number of dofs in the trace space of a boundary or a face.  Measured
             [30, 60, 100, 250]: 18, 18, 18, 16 iterations; 6.7, 6.8, 6.9, 7.3 vectors.
-        whole_boundary_dofs: boundary dofs of a whole body above which its soft modes come from a dense
-            eigenproblem for each face, not from one.  Measured [1000, 5000] with a boundary of 3644: 1.0 and 3.4 s.
-        influence_applications: applications of the dual operator from which on influence columns pay
+        whole_boundary_dofs: boundary dofs of a whole body above which every face has a dense eigenproblem for soft
+            modes, not the boundary.  Measured [1000, 5000] with a boundary of 3644: 1.0 and 3.4 s.
+        influence_applications: least number of products with the dual operator for which influence columns pay
             (`scripts/benchmark_path`).
         assembled_schur_dofs: largest cell that is factored for influence columns, in degrees of freedom on shared nodes
             with all bonds intact.

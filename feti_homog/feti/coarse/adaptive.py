@@ -33,13 +33,13 @@ from feti_homog.typing import Float, Int
 class AdaptiveCoarseSpace:
     """The adaptive coarse space: S Z_0 on the local subdomains, and a factor of Z_0^T S Z_0.
 
-    Of all n coarse displacements, a rank has the u that reach its subdomains.  S Z_0 of a subdomain is dense: an uncut
+    A rank stores only the u coarse displacements that reach its subdomains.  S Z_0 is dense on a subdomain: an uncut
     outer body has a column for every mode of every inner body.
 
     Attributes:
         threshold: tau.
-        counts: number of soft modes for each local subdomain.
-        coarse_dimension: number n of coarse displacements.
+        counts: soft mode counts of the local subdomains.
+        coarse_dimension: number n of all coarse displacements.
         factorizations: number of factorizations of Z_0^T S Z_0.
         solver: solver for the scaled matrix Z_0^T S Z_0.
     """
@@ -51,9 +51,9 @@ class AdaptiveCoarseSpace:
         threshold: float,
         thresholds: Thresholds = DEFAULTS,
     ) -> None:
-        """Compute the modes below the threshold tau, and factor.  Collective.
+        """Compute the modes below the threshold tau, and factor the coarse problem.  Collective.
 
-        All boundary operators must be dense, except on large bodies.  Options under `feti_coarse_` as in
+        All boundary operators must be dense, except on large bodies.  Options with the prefix `feti_coarse_` are as in
         `DistributedSolver`.
 
         Raises:
@@ -85,7 +85,7 @@ class AdaptiveCoarseSpace:
         self.factor(self.part())
 
     def activate(self, active: Float) -> None:
-        """Average the modes over node copies on the active rows, and factor.  Collective.
+        """Average the modes over node copies on the active rows, and factor the coarse problem.  Collective.
 
         Rows are active where `active` (owned rows,) is 1, as in the scaling.  Raises as `factor`.
         """
@@ -93,34 +93,32 @@ class AdaptiveCoarseSpace:
         changed = mask != self._mask
         touched = [i for i, rows in enumerate(self._neighbours.rows) if changed[rows].any()]
         BW = geneo.scaled_constraints(self._scaling)
-        of = [geneo.local_columns(BW, self._operators.slices[i], self._neighbours.rows[i]) for i in touched]
-        self._update(touched, of)
+        blocks = [geneo.local_columns(BW, self._operators.slices[i], self._neighbours.rows[i]) for i in touched]
+        self._update(touched, blocks)
         self._mask = mask
         self.factor(self.part())
 
     def _update(self, which: Sequence[int], BW: Sequence[csr_matrix]) -> None:
-        """Compute S Z_0 and Z_0^T S Z_0 of the subdomains `which`, from scaled constraints `BW`."""
+        """Compute S Z_0 and Z_0^T S Z_0 on the subdomains `which` from their scaled constraints `BW`."""
         for i, constraints in zip(which, BW, strict=True):
             Z = self._modes.of_subdomain(i, constraints)
             self._forces[i] = self._operators.with_springs[i].apply_schur(Z)
             self._energies[i] = Z.T @ self._forces[i]
 
     def part(self) -> csr_matrix:
-        """Sum this rank's part (u, u) of Z_0^T S Z_0."""
+        """Sum the local contribution (u, u) to Z_0^T S Z_0."""
         blocks = zip(self._columns, self._columns, self._energies, strict=True)
         return sum_of_blocks((len(self._modes.reaching),) * 2, blocks)
 
     def factor(self, part: csr_matrix) -> None:
-        """Factor Z_0^T S Z_0, the sum of all parts, scaled to a unit diagonal, plus a small multiple of I.
+        """Factor the coarse matrix Z_0^T S Z_0, the sum of the parts on all ranks.  Collective.
 
-        Collective.
-
-        Modes of a free fibre have no energy, and are left out; other modes may be linearly dependent.  The multiple
-        eps I makes the sum definite, and S_0 larger: of the forces of a coarse displacement with the scaled energy mu,
-        the fraction eps / (mu + eps) is left.
+        The matrix is scaled to a unit diagonal.  Modes of a free fibre have no energy, and get no equation; other modes
+        may be linearly dependent.  A multiple eps I makes the matrix definite and S_0 larger: the coarse correction
+        leaves the fraction eps / (mu + eps) of the forces of a coarse displacement with the scaled energy mu.
 
         Raises:
-            LinAlgError: rounding leaves the matrix indefinite with each of COARSE_REGULARISATIONS.
+            LinAlgError: rounding leaves the matrix indefinite with all COARSE_REGULARISATIONS.
             CaseError: the library in the options cannot factor the matrix on this number of ranks.
         """
         self.factorizations += 1
@@ -131,10 +129,10 @@ class AdaptiveCoarseSpace:
         energy = distributed_arrays.allreduce_sum(self.comm, energies)[self._modes.reaching]
         if self._free_energy is None:
             largest = self.comm.allreduce(energy.max(initial=0.0), MPI.MAX)
-            # Energies of displacements that are rounding are rounding squared.
+            # A displacement of rounding size has an energy of rounding squared.
             rounded = (ROUNDING_MARGIN * np.finfo(float).eps) ** 2 * largest
             self._free_energy = ZERO_TOLERANCE * np.where(energy > rounded, energy, largest)
-        # The energy of a free motion is rounding, which the scale would increase beyond the added multiple.
+        # The energy of a free motion is rounding, which the scaling would raise above the added multiple.
         is_held = energy > self._free_energy
         root = np.sqrt(np.where(is_held, energy, 0.0))
         self._weights = np.divide(1.0, root, out=np.zeros_like(root), where=is_held)
@@ -162,25 +160,25 @@ class AdaptiveCoarseSpace:
         return forces
 
     def solve(self, work: Float) -> Float:
-        """Solve Z_0^T S Z_0 c = work, summed over ranks, for c; both are (u,) or (u, k).  Collective."""
+        """Solve the coarse problem for c: Z_0^T S Z_0 c = sum of `work` (u,) or (u, k) over the ranks.  Collective."""
         with self._solve_event:
             return distributed_arrays.scale_rows(
                 self._weights, self.solver.solve(distributed_arrays.scale_rows(self._weights, work))
             )
 
     def _parts(self) -> zip[tuple[Int, Float, slice]]:
-        """Pair the mode positions of each subdomain with S Z_0 and with the slice of its boundary dofs."""
+        """Iterate over the subdomains: mode positions, S Z_0, and slice of the boundary dofs."""
         return zip(self._columns, self._forces, self._operators.slices, strict=True)
 
     def destroy(self) -> None:
-        """Free the solver.  Collective."""
+        """Free the factor of the coarse matrix.  Collective."""
         self.solver.destroy()
 
 
 class Balanced(Preconditioner):
     """The preconditioner z = B_D S_0 B_D^T r, with S_0 of `coarse` and B_D of `scaled`.
 
-    S_0 B_D^T B R = S_0 R = 0 for rigid-body motions R: so G^T z = 0, and a part G a of r does not change z.
+    S_0 B_D^T B R = S_0 R = 0 for rigid-body motions R, so that G^T z = 0, and a part G a of r does not change z.
 
     Attributes:
         scaled: the preconditioner without coarse space.
@@ -191,14 +189,14 @@ class Balanced(Preconditioner):
         self.scaled, self.coarse = scaled, coarse
 
     def activate(self, active: Float) -> None:
-        """Restrict both to the rows where `active` is 1.  Collective."""
+        """Restrict scaling and coarse space to the rows where `active` is 1.  Collective."""
         self.scaled.activate(active)
         self.coarse.activate(active)
 
     def apply(self, r: Float) -> Float:
-        """Compute B_D S_0 B_D^T r.  Collective."""
+        """Apply the preconditioner: B_D S_0 B_D^T r.  Collective."""
         return self.scaled.multipliers(self.coarse.balanced(self.scaled.displacement_with_jump(r)))
 
     def closing_forces(self, jump: Float) -> Float:
-        """Compute B_D S B_D^T times the jump.  Collective."""
+        """Compute the forces B_D S B_D^T jump without the coarse space.  Collective."""
         return self.scaled.apply(jump)

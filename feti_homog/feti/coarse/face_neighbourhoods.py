@@ -1,12 +1,11 @@
 """Face neighbourhoods on long boundaries, and trace spaces of piecewise linear displacements.
 
-For face displacements p, the body energy is at least the energy in the face neighbourhood N, for any other
-displacements:
+For face displacements p and any other displacements, the body has at least the energy of the face neighbourhood N:
 
     min { x^T S x : x = p on the face } >= p^T S_N p.
 
-So each soft displacement x of the body is soft in a neighbourhood, on its face; the neighbourhood may have more soft
-displacements.  With all nodes off the face fixed, it is stiffer than the body:  S restricted to the face <= S_fixed.
+So every soft displacement of the body is soft in a neighbourhood, which may have more soft displacements.  With all
+other nodes fixed, the face is stiffer than in the body:  S restricted to the face <= S_fixed.
 
 Refinement hardly changes the soft modes of a subdomain.  So the search uses the coarsest trace space with enough dofs:
 P q for the values q at the vertices of the coarse mesh and at every k-th node along its edges.
@@ -30,7 +29,7 @@ from feti_homog.typing import Float, Int
 def trace_space(
     submesh: Submesh, lattice: ReferenceLattice, problem: Problem, nodes: Int, min_dofs: int = DEFAULTS.min_trace_dofs
 ) -> csr_matrix:
-    """Return the prolongation P (cn, cm) to n boundary `nodes`, with cm >= min(cn, `min_dofs`).
+    """Build the prolongation P (cn, cm) from a trace space to n boundary nodes; cm >= min(cn, `min_dofs`).
 
     Nodes are sorted classes of the refined piece; edge ends that are not boundary nodes have zero displacement.
     """
@@ -68,14 +67,14 @@ def trace_space(
 
 @dataclass(frozen=True)
 class FaceNeighbourhood:
-    """A face neighbourhood in its body, as a subdomain, condensed to the n face dofs.
+    """A face neighbourhood as a subdomain, condensed to the n face dofs.
 
     Attributes:
         at: (n,) positions of the face dofs among the boundary dofs of the body.
         operator: dense boundary operators of the neighbourhood.
         R: (n, k) kernel on the face.
         P: (n, m) trace space.
-        S_fixed: (n, n) stiffness of the face if other faces and all nodes outside the neighbourhood are fixed.
+        S_fixed: (n, n) stiffness of the face with other faces and all nodes outside the neighbourhood fixed.
     """
 
     at: Int
@@ -88,7 +87,7 @@ class FaceNeighbourhood:
 def face_neighbourhoods(
     body: Subdomain, dofs: Int, face: Int, thresholds: Thresholds = DEFAULTS
 ) -> list[FaceNeighbourhood]:
-    """Build the neighbourhoods of a face: connected parts of the triangles near it with several face nodes.
+    """Build the neighbourhoods of a face: connected triangles near the face, with several face nodes.
 
     Args:
         dofs: (n,) boundary dofs of the body, sorted.
@@ -118,7 +117,7 @@ def face_neighbourhoods(
         of_body = np.empty(subdomain.mesh.n_classes, np.int64)
         of_body[subdomain.mesh.node_class[subdomain.mesh.nodes]] = classes[members]
         nodes = np.flatnonzero(on_face[of_body])
-        if len(nodes) < 2:  # a single node has no soft mode: it can only translate
+        if len(nodes) < 2:  # a single node can only translate, and has no soft mode
             continue
         face, at = all_of(nodes), np.searchsorted(dofs, all_of(of_body[nodes]))
         movable = all_of(np.flatnonzero(on_face[of_body] | ~(outside | on_others)[of_body]))

@@ -1,8 +1,8 @@
-"""Local eigenproblems of all subdomains, whose soft modes slow down the convergence, and averages of these modes.
+"""Soft modes of all subdomains, which slow down the convergence, and averages of these modes.
 
 With the averaged soft modes in equilibrium, the largest eigenvalue of the preconditioned dual operator is at most
-1 + N / tau for any geometry and any materials.  N is the largest number of subdomains around one subdomain, itself
-included (GenEO: Spillane & Rixen, IJNME 95, 2013).  Measured values are about 1 / tau.
+1 + N / tau for any geometry and any materials.  N - 1 is the largest number of neighbours of a subdomain (GenEO:
+Spillane & Rixen, IJNME 95, 2013).  Measured values are about 1 / tau.
 
 Subdomain modes are averaged over node copies: Z_0 = (I - B_D^T B) V, the coarse displacements.
 B Z_0 = 0, for B B_D^T = I, so Z_0 are displacements of the cell with glued active rows.  A subdomain mode reaches only
@@ -24,17 +24,17 @@ from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.system.parallel import distributed_arrays, mpi_errors
 from feti_homog.typing import Float, Float32, Int
 
-# Jumps B V that the modes of a subdomain or of a neighbour open on the rows of the subdomain: row positions (r,),
-# numbers (c,) of coarse modes, and values (r, c).
+# Jumps B V from the modes of one subdomain, on rows of the same or a neighbour subdomain: row positions (r,), coarse
+# mode numbers (c,), and values (r, c).
 Jumps = tuple[Int, Int, Float]
 
 
 class AveragedModes:
-    """The averaged modes Z_0 on local subdomains, from parts that hold for any active rows.
+    """The averaged modes Z_0 on the local subdomains, for any active rows.
 
     Attributes:
-        total: number n of coarse modes of all subdomains.
-        columns: numbers (m,) of the modes that reach each subdomain, ascending.
+        total: number n of coarse modes in the cell.
+        columns: ascending numbers (m,) of the modes that reach a subdomain, in a list over the subdomains.
         reaching: (u,) numbers of the modes that reach any local subdomain, ascending.
         is_own: (u,) whether the mode belongs to a local subdomain.
     """
@@ -42,7 +42,7 @@ class AveragedModes:
     def __init__(
         self, comm: MPI.Intracomm, blocks: Sequence[SubdomainBlocks], neighbours: Neighbours, V: Sequence[Float]
     ) -> None:
-        """Exchange the jumps of `V`: kernel and soft modes of each subdomain on its boundary.  Collective."""
+        """Exchange the jumps of the boundary modes `V`, a list over the subdomains.  Collective."""
         self._blocks, self._V, self._sizes = blocks, V, [len(rows) for rows in neighbours.rows]
         counts = np.zeros(len(neighbours.rank), np.int64)
         counts[neighbours.index] = [v.shape[1] for v in V]
@@ -71,9 +71,9 @@ class AveragedModes:
         self.is_own = np.isin(self.reaching, np.concatenate([none, *numbers]))
 
     def of_subdomain(self, i: int, BW: csr_matrix) -> Float:
-        """Compute Z_0 on subdomain i, (boundary dofs, m), less the kernel of i, which has no energy there.
+        """Compute the averaged modes Z_0 (boundary dofs, m) on subdomain i, without its kernel.
 
-        Without the kernel, the rest of a rigid-body motion in a stiff subdomain has all digits.
+        The kernel has no energy.  Without it, the remaining motion of a stiff subdomain keeps all digits.
 
         Args:
             BW: (rows, boundary dofs) scaled constraints W^-1 B D^-1 of the subdomain, on the active rows.
@@ -89,7 +89,7 @@ class AveragedModes:
         return Z
 
     def translations(self, comm: MPI.Intracomm) -> Float:
-        """Compute amplitudes (u, c) of whole-cell translations, which have little energy.  Collective."""
+        """Compute the amplitudes (u, c) of cell translations, which have little energy.  Collective."""
         subdomains = [block.subdomain for block in self._blocks]
         c = subdomains[0].problem.components if subdomains else 0
         amplitudes = np.zeros((self.total, comm.allreduce(c, MPI.MAX)))
@@ -101,7 +101,7 @@ class AveragedModes:
 def subdomain_blocks(
     operators: InterfaceOperators, scaling: StiffnessScaled, rows: Sequence[Int]
 ) -> list[SubdomainBlocks]:
-    """Cut the blocks of local subdomains out of B and W^-1 B D^-1, on the `rows` of their nodes.  Collective."""
+    """Cut the subdomain blocks out of B and W^-1 B D^-1, on the constraint `rows` of every subdomain.  Collective."""
     B, BW = operators.B.tocsc(), scaled_constraints(scaling)
     blocks = []
     for i, (subdomain, operator) in enumerate(zip(operators.subdomains, operators.with_springs, strict=True)):
@@ -113,7 +113,7 @@ def subdomain_blocks(
 
 
 def scaled_constraints(scaling: StiffnessScaled) -> csc_matrix:
-    """Compute W^-1 B D^-1 (local rows, boundary dofs), 0 on inactive rows.  Collective."""
+    """Compute the scaled constraints W^-1 B D^-1 (local rows, boundary dofs), 0 on inactive rows.  Collective."""
     jump_operator = scaling.jump_operator
     owned = jump_operator.owned[1] - jump_operator.owned[0]
     inverse = scaling.W_inverse.tocoo()
@@ -129,14 +129,14 @@ def scaled_constraints(scaling: StiffnessScaled) -> csc_matrix:
 def kernels_and_soft_modes(
     blocks: Sequence[SubdomainBlocks], neighbours: Neighbours, threshold: float, thresholds: Thresholds = DEFAULTS
 ) -> list[Float]:
-    """Compute V (n, k + m) of each local subdomain: kernel and m modes below the threshold.  Collective.
+    """Compute the modes V (n, k + m) of the local subdomains: kernel and m soft modes.  Collective.
 
     Raises:
         MeshError: a face neighbourhood on some rank is not a valid subdomain.
     """
     parts = list(zip(blocks, neighbours.common, strict=True))
     problems = mpi_errors.agree(neighbours.comm, lambda: [eigenproblem(*part, thresholds) for part in parts])
-    # Shares of the neighbours in M^-1, on common rows.
+    # Contributions of the neighbours to M^-1, on common rows.
     received: list[list[tuple[int, Float32]]] = [[] for _ in blocks]
 
     def messages() -> Iterator[tuple[int, int, Float32]]:
@@ -148,8 +148,8 @@ def kernels_and_soft_modes(
     V = []
     for block, problem, shares in zip(blocks, problems, received, strict=True):
         modes = problem.modes(shares, threshold)
-        # Soft modes, too, are displacements of about 1, so that all energies have the unit of stress.  Powers of two
-        # change no digit.
+        # Soft modes are scaled to displacements of about 1, as kernels are, so that all energies have the unit of
+        # stress.  Powers of two change no digit.
         exponent = np.frexp(np.abs(modes).max(axis=0, initial=0.0))[1]
         V.append(np.hstack([block.R, np.ldexp(modes, -exponent)]))
         shares.clear()
@@ -157,7 +157,7 @@ def kernels_and_soft_modes(
 
 
 def local_columns(matrix: csc_matrix, span: slice, rows: Int) -> csr_matrix:
-    """Cut out the columns `span` on sorted `rows` that contain all entries of these columns."""
+    """Cut the columns `span` out of a matrix; the sorted `rows` contain all entries in these columns."""
     indptr = matrix.indptr[span.start : span.stop + 1]
     part = slice(indptr[0], indptr[-1])
     at = np.searchsorted(rows, matrix.indices[part])

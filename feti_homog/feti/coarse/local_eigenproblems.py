@@ -1,12 +1,12 @@
-"""Soft subdomain modes, from one eigenproblem on the boundary or from one on each face.
+"""Soft subdomain modes, from one eigenproblem on the boundary or from an eigenproblem on every face.
 
 For a subdomain s with Schur complement S_s and constraints B_s, the displacements p of its boundary with
 
     S_s p = theta N_s p,  N_s = B_s^T M^-1 B_s,  theta < tau
 
-are soft in s but stiff in the preconditioner.  On a large boundary, this dense eigenproblem is too large.  But if each
-node belongs to one other body only, the weights of M^-1 hardly change along the boundary, the share of s in M^-1 is at
-most S_s, and the share of the neighbour makes p stiff.  Then each face has its own eigenproblem, with the Schur
+are soft in s but stiff in the preconditioner.  On a large boundary, this dense eigenproblem is too large.  But if every
+node belongs to one other body only, the weights of M^-1 hardly change along the boundary, s contributes at most S_s to
+M^-1, and the contribution of the neighbour makes p stiff.  Then every face has a separate eigenproblem, with the Schur
 complement of the face neighbourhood in place of S_s.  The eigenproblems are projected to trace spaces.
 """
 
@@ -30,7 +30,7 @@ SINGLE_PRECISION_NULL = 10 * np.finfo(np.float32).eps
 
 @dataclass(frozen=True)
 class SubdomainBlocks:
-    """Matrices of one subdomain, on the constraint rows that act on it.
+    """The matrices of one subdomain, on the constraint rows that act on the subdomain.
 
     Attributes:
         subdomain: the subdomain.
@@ -38,7 +38,7 @@ class SubdomainBlocks:
         operator: boundary operators.
         B: (rows, n) constraints.
         BW: (rows, n) scaled constraints W^-1 B D^-1.
-        facewise: whether each face has an eigenproblem of its own.
+        facewise: whether every face has a separate eigenproblem.
     """
 
     subdomain: Subdomain
@@ -50,7 +50,7 @@ class SubdomainBlocks:
 
     @property
     def R(self) -> Float:
-        """(n, k) kernel on the boundary."""
+        """Return the kernel (n, k) on the boundary."""
         return self.subdomain.R[self.dofs]
 
 
@@ -60,24 +60,24 @@ class SubdomainEigenproblem:
     def __init__(
         self, block: SubdomainBlocks, operator: DenseOperator, common: Mapping[int, Int], min_trace_dofs: int
     ) -> None:
-        """Project S to the trace space; `common` are the rows in common with each subdomain, itself included."""
+        """Project S to the trace space; `common` maps every neighbour, and s, to the common rows."""
         self.block, self.common, self._operator = block, common, operator
         subdomain, S = block.subdomain, operator.S
         nodes = np.unique(subdomain.problem.nodes(block.dofs))
         self._P = trace_space(subdomain.submesh, subdomain.mesh.lattice, subdomain.problem, nodes, min_trace_dofs)
         self._regular_S = congruent(self._P, S) + operator.regularisation(self._P)
-        # Share W^-1 B D^-1 S D^-1 B^T W^-1 of M^-1 (rows, rows); single precision separates soft from stiff modes.
+        # Part W^-1 B D^-1 S D^-1 B^T W^-1 of M^-1 (rows, rows); single precision separates soft from stiff modes.
         BW = block.BW.astype(np.float32)
         self._share = BW @ (BW @ S.astype(np.float32)).T
 
     def preconditioner_shares(self) -> Iterator[tuple[int, Float32]]:
-        """Yield the share in M^-1 on the rows in common with each other subdomain."""
+        """Yield every neighbour, with the contribution to M^-1 on the common rows."""
         for s, rows in self.common.items():
             if s != self.block.subdomain.submesh.index:
                 yield s, self._share[np.ix_(rows, rows)]
 
     def modes(self, shares: Sequence[tuple[int, Float32]], threshold: float) -> Float:
-        """Compute soft modes (n, m) without the kernel, from the shares of other subdomains in M^-1."""
+        """Compute the soft modes (n, m) without the kernel; `shares` are the neighbour contributions to M^-1."""
         M = self._share.copy()
         # Subdomain order, so that rounding does not depend on the ranks.
         for s, share in sorted(shares, key=lambda part: part[0]):
@@ -88,7 +88,7 @@ class SubdomainEigenproblem:
 
 
 class FaceEigenproblems:
-    """The eigenproblems of a subdomain on each face; methods as of `SubdomainEigenproblem`."""
+    """The eigenproblems on the faces of a subdomain, with the methods of `SubdomainEigenproblem`."""
 
     def __init__(self, block: SubdomainBlocks, common: Mapping[int, Int], thresholds: Thresholds) -> None:
         self.block, self.common = block, common
@@ -102,7 +102,7 @@ class FaceEigenproblems:
         }
 
     def preconditioner_shares(self) -> Iterator[tuple[int, Float32]]:
-        """Yield upper bounds of the share in M^-1 on the rows in common with each other subdomain."""
+        """Yield every neighbour, with an upper bound of the contribution to M^-1 on the common rows."""
         for s, neighbourhoods in self._neighbourhoods.items():
             share = np.zeros((len(self.common[s]),) * 2)
             for part in neighbourhoods:
@@ -111,9 +111,9 @@ class FaceEigenproblems:
             yield s, share.astype(np.float32)
 
     def modes(self, shares: Sequence[tuple[int, Float32]], threshold: float) -> Float:
-        """Compute soft face modes (n, m), from the shares of other subdomains in M^-1.
+        """Compute the soft face modes (n, m); `shares` are the neighbour contributions to M^-1.
 
-        Each mode continues on the rest of the boundary as in the whole body, until it has decayed.
+        A face mode continues on the rest of the boundary as in the whole body, down to the decayed displacements.
         """
         forces = [np.zeros((len(self.block.dofs), 0))]
         for s, share in shares:
@@ -133,7 +133,7 @@ class FaceEigenproblems:
 def eigenproblem(
     block: SubdomainBlocks, common: Mapping[int, Int], thresholds: Thresholds
 ) -> SubdomainEigenproblem | FaceEigenproblems:
-    """Set up the eigenproblem of a subdomain, or one eigenproblem for each face.
+    """Set up the eigenproblem of a subdomain, or the eigenproblems of its faces.
 
     Raises:
         TypeError: the problem is on the whole boundary, but the operators are not dense.
@@ -146,10 +146,10 @@ def eigenproblem(
 
 
 def jump_forces(B: csr_matrix, p: Float, R: Float, M: Float32) -> Float:
-    """Compute N p (n, m), N = B^T M B, for p (n, m), less forces that do work on the kernel R (n, k).
+    """Compute the forces N p (n, m), N = B^T M B, without work on the kernel R (n, k).
 
-    S+ N p is a step of inverse iteration, which bends an eigenvector of the trace space as the body bends.  The result
-    is as precise as M.
+    S+ N p is a step of inverse iteration, which bends an eigenvector p (n, m) of the trace space as the body bends.
+    The result is as precise as M.
     """
     NR, Np = (np.asarray(B.T @ (M @ (B @ x).astype(np.float32)).astype(float)) for x in (R, p))
     return np.asfortranarray(
@@ -158,19 +158,21 @@ def jump_forces(B: csr_matrix, p: Float, R: Float, M: Float32) -> Float:
 
 
 def congruent(T: csr_matrix | Float, A: Float | Float32) -> Float:
-    """Compute T^T A T for symmetric A."""
+    """Compute the congruent matrix T^T A T for symmetric A."""
     return np.asarray(T.T @ (T.T @ A).T)
 
 
 def jump_energy(B: csr_matrix, P: csr_matrix, R: Float, M: Float32) -> Float:
-    """Compute T^T M T (m + k, m + k) for symmetric M and the jumps T = B [P R] of trace space and kernel."""
+    """Compute the energy T^T M T (m + k, m + k) of the jumps T = B [P R] for symmetric M."""
     TP, TR = (B @ P).astype(np.float32), (B @ R).astype(np.float32)
     MR = M @ TR
     return np.block([[congruent(TP, M), TP.T @ MR], [(TP.T @ MR).T, TR.T @ MR]]).astype(float)
 
 
 def soft_modes(S: Float, N: Float, threshold: float) -> Float:
-    """Compute eigenvectors q (m, j) of P^T S P q = theta P^T N P q with theta < threshold, without the kernel of S.
+    """Compute the soft modes q (m, j), without the kernel of S.
+
+    Soft modes solve P^T S P q = theta P^T N P q with theta < threshold.
 
     Args:
         S: (m, m) P^T S P, regularised on the kernel of S.

@@ -1,4 +1,4 @@
-"""The natural coarse space: G = B R, the projector P = I - G (G^T G)^-1 G^T and the rigid-body amplitudes, Eq. (37)."""
+"""The natural coarse space: G = B R, the projector P = I - G (G^T G)^-1 G^T and rigid-body amplitudes, Eq. (37)."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from feti_homog.typing import Float, Int
 
 
 class NaturalCoarseSpace:
-    """The condition G^T lam = 0 on the active multipliers, for which all subdomains are in equilibrium.
+    """The rigid-body motions of all subdomains, and the projector on multipliers in equilibrium, G^T lam = 0.
 
-    The load of a macroscopic strain does no work on rigid-body motions, so e = R^T f vanishes.  G has a row for each
-    multiplier and a column for each kernel mode.  Every rank has its owned rows, and its part in a factor of G^T G.
+    The load of a macroscopic strain does no work on rigid-body motions, so e = R^T f vanishes.  G has a row for every
+    multiplier and a column for every kernel mode.  A rank stores its owned rows, and its part in a factor of G^T G.
 
     Attributes:
-        kernel_dimension: number m of kernel modes of all subdomains.
+        kernel_dimension: number m of kernel modes in the cell.
         owned_modes: slice of the modes of local subdomains among all modes.
         R: (boundary dofs, owned modes) kernels on the boundaries.
         G: (owned rows, m).
-        body: (m,) body of each mode.
+        body: (m,) body numbers of the modes.
         pinned_body: body with the pinned class, -1 if no class is pinned.
         unconstrained_modes: (m, z) orthonormal amplitudes of the motions that no active row resists, sparse.
         unknowns: (u,) modes in the owned rows of G or in local unconstrained modes, and owned modes.
@@ -36,9 +36,9 @@ class NaturalCoarseSpace:
     """
 
     def __init__(self, operators: InterfaceOperators) -> None:
-        """Assemble G and factor for all rows.  Collective.
+        """Assemble G, and factor G^T G with all rows active.  Collective.
 
-        Options under `feti_natural_` as of `DistributedSolver`.
+        Options with the prefix `feti_natural_` are as in `DistributedSolver`.
         """
         comm, jump_operator, subdomains = operators.comm, operators.jump_operator, operators.subdomains
         kernels = [s.R[dofs] for s, dofs in zip(subdomains, operators.dofs, strict=True)]
@@ -63,7 +63,7 @@ class NaturalCoarseSpace:
         self.factor()
 
     def activate(self, active: Float) -> None:
-        """Set the active rows, where `active` (owned rows,) is 1; other rows have no multiplier.  Collective.
+        """Set the active rows, where `active` (owned rows,) is 1; inactive rows have no multiplier.  Collective.
 
         The next projection factors G^T G.  Motions Z that no active row resists, for example of a free fibre, get a
         stiffness s: G^T G + s Z Z^T.
@@ -73,7 +73,7 @@ class NaturalCoarseSpace:
 
     @property
     def G_active(self) -> csr_matrix:
-        """The matrix G with 0 in inactive rows."""
+        """Return the matrix G (owned rows, m), with 0 in inactive rows."""
         return (diags(self._active) @ self.G).tocsr()
 
     def factor(self) -> None:
@@ -94,27 +94,27 @@ class NaturalCoarseSpace:
 
     @cached_property
     def _gram(self) -> GramMatrix:
-        """Products of G, set up when a row becomes inactive for the first time: 36 numbers a row.  Collective.
+        """Return the stored products of G, set up at the first inactive row: 36 numbers a row.  Collective.
 
         The pieces of the pinned body are glued to the pinned class and cannot move.
         """
         return GramMatrix(self.comm, self.G, np.flatnonzero(self.body != self.pinned_body))
 
     def free_motions(self, active: Float) -> csc_matrix:
-        """Compute the `unconstrained_modes` (m, z) for these active rows: the null space of G^T G.  Collective."""
+        """Compute the null space (m, z) of G^T G on the active rows: `unconstrained_modes`.  Collective."""
         return self._gram.null_space(active, ZERO_TOLERANCE * self._diagonal)
 
     def amplitudes(self, x: Float) -> Float:
-        """Compute (G^T G)^-1 G^T x on every rank, for owned rows x (rows,) or (rows, k).  Collective."""
+        """Compute the amplitudes (G^T G)^-1 G^T x of jumps x (owned rows,) or (owned rows, k).  Collective."""
         if not self._is_factored:
             self.factor()
-        place = np.searchsorted(self.unknowns, np.arange(self.kernel_dimension)[self.owned_modes])
+        positions = np.searchsorted(self.unknowns, np.arange(self.kernel_dimension)[self.owned_modes])
         amplitudes = np.zeros((self.kernel_dimension, *x.shape[1:]))
-        amplitudes[self.owned_modes] = self.solver.solve(self._GT @ x)[place]
+        amplitudes[self.owned_modes] = self.solver.solve(self._GT @ x)[positions]
         return distributed_arrays.allreduce_sum(self.comm, amplitudes)
 
     def project(self, x: Float) -> Float:
-        """Project owned rows x, 0 on inactive rows: P x does no work on rigid-body motions.  Collective."""
+        """Compute the projection P x of owned rows x, which are 0 on inactive rows.  Collective."""
         if not self.kernel_dimension:
             return x.copy()
         if not self._is_factored:
@@ -128,15 +128,15 @@ class NaturalCoarseSpace:
         return motion
 
     def destroy(self) -> None:
-        """Free the solver.  Collective."""
+        """Free the factor of G^T G.  Collective."""
         self.solver.destroy()
 
 
 class GramMatrix:
-    """Entries of G^T A G in the pattern of G^T G, for active rows A = diag(a), as sums of stored products."""
+    """The matrix G^T A G for changing active rows A = diag(a), as sums of stored products."""
 
     def __init__(self, comm: MPI.Intracomm, G: csr_matrix, movable: Int) -> None:
-        """Compute the products of G (owned rows, m), and group the `movable` modes.  Collective."""
+        """Compute the products of all entry pairs in rows of G, and group the `movable` modes.  Collective."""
         self._comm, self._m = comm, G.shape[1]
         count = np.diff(G.indptr)
         # Pairs of entries of one row.
@@ -152,17 +152,17 @@ class GramMatrix:
         self._entry, self._product = entry, G.data[a] * G.data[b]
         self._active, self._own = np.zeros(G.shape[0]), np.zeros(len(self._keys))
         self._rows, self._columns = np.divmod(self._keys, self._m)
-        # Modes that G^T G couples have a common eigenproblem, which is about as large as the kernel of a fibre: modes
-        # (groups, size), positions of their blocks in the entries, and the blocks, eigenvalues and eigenvectors of the
-        # last call of `null_space`.
+        # Modes that G^T G couples have a common eigenproblem, about as large as the kernel of a fibre.  The tuples are
+        # modes (groups, size), positions of the blocks in the entries, and the blocks, eigenvalues and eigenvectors in
+        # the last call of `null_space`.
         self._groups: list[tuple[Int, Int, Float, Float, Float]] = []
         for members in self.groups(movable):
-            places = self.places(members)
-            nothing = np.full(places.shape, np.nan)
-            self._groups.append((members, places, nothing, nothing[..., 0].copy(), nothing.copy()))
+            numbers = self.places(members)
+            nothing = np.full(numbers.shape, np.nan)
+            self._groups.append((members, numbers, nothing, nothing[..., 0].copy(), nothing.copy()))
 
     def entries(self, active: Float) -> Float:
-        """Compute the entries of G^T A G, row by row, for owned rows where `active` is 1.  Collective.
+        """Compute the entries of G^T A G, row by row, with A = diag(`active`) on the owned rows.  Collective.
 
         The method adds or subtracts only the products of rows that changed since the last call.
         """
@@ -175,18 +175,18 @@ class GramMatrix:
         return distributed_arrays.allreduce_sum(self._comm, self._own)
 
     def null_space(self, active: Float, tolerance: Float) -> csc_matrix:
-        """Compute eigenvectors (m, z) of G^T A G with eigenvalues up to the largest `tolerance` (m,) of their modes.
+        """Compute a basis (m, z) of the null space of G^T A G.  Collective.
 
-        Collective.
+        An eigenvalue is zero up to the largest `tolerance` (m,) among the modes of a group.
         """
         padded, columns, none = np.append(self.entries(active), 0.0), 0, np.zeros(0, np.int64)
         rows, numbers, values = [none], [none], [np.zeros(0)]
         for members, places, blocks, eigenvalues, vectors in self._groups:
             now = padded[places]
             # A broken bond changes one or two groups.
-            if len(other := np.flatnonzero((now != blocks).any(axis=(1, 2)))):
-                eigenvalues[other], vectors[other] = np.linalg.eigh(now[other])
-                blocks[other] = now[other]
+            if len(changed := np.flatnonzero((now != blocks).any(axis=(1, 2)))):
+                eigenvalues[changed], vectors[changed] = np.linalg.eigh(now[changed])
+                blocks[changed] = now[changed]
             which, mode = np.nonzero(eigenvalues <= tolerance[members].max(axis=1, keepdims=True))
             rows.append(members[which].ravel())
             numbers.append(np.repeat(columns + np.arange(len(which)), members.shape[1]))
@@ -199,10 +199,10 @@ class GramMatrix:
         return Z
 
     def groups(self, some: Int) -> list[Int]:
-        """Group the modes in `some` that G^T G couples: one array (groups, size) for each group size."""
-        place = np.full(self._m, -1)
-        place[some] = np.arange(len(some))
-        i, j = place[self._rows], place[self._columns]
+        """Group coupled modes of the set `some`, and return an array (groups, size) for every group size."""
+        position = np.full(self._m, -1)
+        position[some] = np.arange(len(some))
+        i, j = position[self._rows], position[self._columns]
         coupled = (i >= 0) & (j >= 0)
         group = periodic_topology.components(len(some), i[coupled], j[coupled])
         order, sizes = np.argsort(group, kind="stable"), np.bincount(group)
@@ -210,7 +210,7 @@ class GramMatrix:
         return [some[order[starts[sizes == size][:, None] + np.arange(size)]] for size in np.unique(sizes)]
 
     def places(self, members: Int) -> Int:
-        """Return entry numbers (g, s, s) for pairs of the members (g, s) of each group.
+        """Return the entry numbers (g, s, s) of all mode pairs in groups with members (g, s).
 
         A pair without an entry gets the total number of entries.
         """
