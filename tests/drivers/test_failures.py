@@ -144,7 +144,7 @@ WITHOUT_MEMORY = {
     "field file": (1, "results.field_file:_write_rows"),
     "contact": (2, "interface.contact.contact_problem:kkt_errors"),
     "influence columns": (1, "feti.exact.reference_cell:ReferenceCell.columns"),
-    "checkpoint": (0, "results.checkpoints:Checkpoint._write"),
+    "checkpoint": (0, "results.checkpoints:Checkpoint.write"),
     "table": (0, "results.result_json:write_csv"),
     "picture": (0, "report.plots.figures:plot"),
 }

@@ -44,7 +44,7 @@ def test_a_path_killed_in_the_middle_of_a_cycle_goes_on_as_it_was(tmp_path, meth
     (tmp_path / "case.toml").write_text(CYCLES.replace("[output]", f"{steps}[output]"))
     words = ("run", tmp_path / "case.toml", "--out")
     assert command_line(1, *words, tmp_path / "whole").returncode == 0
-    there = Hook("feti_homog.results.checkpoints:Checkpoint._write", WAIT, when=f"args[1] == {kept - 1}", after=True)
+    there = Hook("feti_homog.results.checkpoints:Checkpoint.write", WAIT, when=f"args[1] == {kept - 1}", after=True)
     with HookedJob(1, [there], *words, tmp_path / "out") as job:
         assert job.reported() == "0 here"
         job.killed()

@@ -7,7 +7,7 @@ from support.command_line import command_line
 from support.hooks import KILL, Hook, hooked
 from support.small_path import PATH
 
-WRITE = "feti_homog.results.checkpoints:Checkpoint._write"
+WRITE = "feti_homog.results.checkpoints:Checkpoint.write"
 COMMIT = "feti_homog.results.atomic:commit"
 WRITE_STATE = "feti_homog.results.field_file:FieldFile.write_state"
 # In the order in which a run comes to them, and how many events are kept then: all (None) when fields are written.

@@ -64,7 +64,7 @@ def killed(ranks: int, case: Path, out: Path, at: int, *words: str, moment: str 
     return events.count(out)
 
 
-WRITE = "feti_homog.results.checkpoints:Checkpoint._write"
+WRITE = "feti_homog.results.checkpoints:Checkpoint.write"
 APPEND = "feti_homog.results.atomic:append"
 COUNT = (
     "os.path.exists('{0}') and "
