@@ -158,7 +158,7 @@ class _Finder:
                 yield point | section | dict(zip(self._break_names, shares, strict=True))
 
     def _unit_loads(self, strain: Float, temperature: float, names: Sequence[str]) -> Float:
-        """Return the coefficients (n, l) of the unit loads in strains (n, m) and temperature."""
+        """Express strains (n, m) and a temperature by unit loads; return the coefficients (n, l)."""
         column = {name: strain[:, number] for number, name in enumerate(names)}
         column["temperature"] = np.full(len(strain), temperature)
         return np.stack([column[load] for load in self._loads], axis=1)

@@ -67,7 +67,7 @@ class SolverOptions:
 
 @dataclass(frozen=True)
 class ProblemSizes:
-    """The sizes that determine the choice, over all ranks.
+    """The properties of the problem, over all ranks, that determine the solver plan.
 
     Attributes:
         applications: expected number of products with the dual operator.

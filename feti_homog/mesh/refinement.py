@@ -179,7 +179,7 @@ def joined(meshes: Sequence[FineMesh]) -> FineMesh:
 
 
 def edge_node(n_classes: int, edge: Int, position: Int, lattice: ReferenceLattice) -> Int:
-    """Return the class of the lattice node at `position` (1..M-1) on the local torus edge `edge`."""
+    """Return the class of the node at `position`, from 1 to lattice.intervals - 1, on a torus edge of the rank."""
     return n_classes + edge * (lattice.intervals - 1) + position - 1
 
 

@@ -30,7 +30,7 @@ class Cohesive(QuadraticStrength):
         return np.asarray(self.section.get("damage", 0.0), float)
 
     def jumps(self, traction: Float) -> Float:
-        """(k, c) traction / stiffness, which damage lowers except in compression."""
+        """Return the jumps (k, c), traction / stiffness; damage spares the normal stiffness in compression."""
         share = np.broadcast_to(np.where(self.damage < 1.0, 1.0 - self.damage, 1.0), len(traction))[:, None]
         shares = np.repeat(share, traction.shape[1], axis=1)
         shares[:, 0] = np.where(traction[:, 0] > 0.0, shares[:, 0], 1.0)

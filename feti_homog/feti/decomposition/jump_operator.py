@@ -120,7 +120,7 @@ class JumpOperator:
         return self.sum(local)[self.nodes.row].astype(np.int64)
 
     def _exchange(self, x: Float) -> _Exchange:
-        """Return the exchange for vectors with as many columns as x; the last KEPT_EXCHANGES are kept."""
+        """Return the scatter for vectors with as many columns as x; the last KEPT_EXCHANGES are cached."""
         columns = x.size // len(x) if len(x) else int(np.prod(x.shape[1:]))
         exchange = self._exchanges.pop(columns, None) or _Exchange(self.vector, self.rows, columns)
         self._exchanges[columns] = exchange

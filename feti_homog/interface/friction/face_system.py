@@ -39,7 +39,7 @@ class Prescribed:
 
 
 class FaceSystem:
-    """Debonded faces, and their response to loads with prescribed statuses.
+    """Debonded faces, and their response to loads while the nodes keep prescribed statuses.
 
     Attributes:
         friction: (n,) mu.

@@ -196,9 +196,9 @@ def _refuse_many(edges: float, limit: int) -> None:
 
 
 def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges: Int | int, limit: int) -> Stations:
-    """Place nodes on lines, equidistant in the measure ds / h of the size h.
+    """Place nodes on lines at equal steps of the integral of ds / h, with the edge size h.
 
-    A line has at least `least_edges`, () or (c,), edges. Samples of h are at `least_samples` equidistant positions on
+    A line has at least `least_edges` edges, () or (c,). Samples of h are at `least_samples` equidistant positions on
     each line and, for graded sizes, at SAMPLES_OF_AN_EDGE positions or more on each edge.
 
     Raises:

@@ -84,7 +84,7 @@ def images(arrangement: Arrangement) -> tuple[Outlines, Int, Int]:
 
 
 def crossings(curves: Conics, axis: int, size: Float) -> Float:
-    """Return the sorted coordinates of corners and curve crossings on the side at 0 along `axis`."""
+    """Return the sorted coordinates of corners and crossings on the side through 0 parallel to `axis`."""
     middle, half = curves.chord(axis)
     crossing = np.concatenate([middle - half, middle + half])[np.tile(half > 0, 2)]
     return np.concatenate([[0.0], np.sort(crossing[(crossing > 0) & (crossing < size[axis])]), [size[axis]]])
@@ -136,9 +136,9 @@ def vertex_angles(curves: Conics, name: Int, crossing: tuple[Int, Float], marks:
 
 
 def arcs_within(curves: Conics, vertices: OnCircles, size: Float) -> tuple[Int, Float, Float]:
-    """Divide curves into arcs of at most a quarter turn in the cell.
+    """Divide curves into arcs of at most a quarter turn; keep the arcs in the cell.
 
-    Returns the curve, start and stop (a,) of each arc. The arcs of a curve without vertices begin at 0.
+    Returns the curve, start and stop (a,) of each arc. The arcs of a curve without vertices begin at the angle 0.
     """
     bare_curves = np.setdiff1d(np.arange(len(curves)), vertices[0])
     curve, angle = np.append(vertices[0], bare_curves), np.append(vertices[1], np.zeros(len(bare_curves)))

@@ -55,7 +55,7 @@ def figure(cell: drawn_cell.DrawnCell) -> Figure:
 
 
 def partition(cell: drawn_cell.DrawnCell) -> Figure:
-    """Draw the parts of the bodies in the subdomains.
+    """Draw each part, the piece of one body in one subdomain, in a colour.
 
     A subdomain across several materials has one part in each body.
     """

@@ -63,7 +63,7 @@ def descriptions(record: type | Any) -> dict[str, Description]:
 
 
 def plain(value: Any) -> Any:
-    """Return the value with records as mappings of their described fields.
+    """Return the value, with a mapping of its described fields for each record.
 
     A field whose default is None is left out while it is None.
     """
