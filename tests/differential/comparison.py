@@ -13,7 +13,7 @@ import numpy as np
 # What follows from the path, whose events are compared by their loads: `peak` has their numbers.
 LEFT_OUT = {
     "schema", "version", "case", "digest", "solver", "checks", "check_tolerance", "kkt_tolerance", "warnings",
-    "remarks", "states", "resumed", "result_h5", "timings", "memory", "checksum", "path", "peak",
+    "remarks", "states", "phase_stresses", "resumed", "result_h5", "timings", "memory", "checksum", "path", "peak",
     "envelope",
 }  # fmt: skip
 # Numbers of the solver, or of pieces; a ratio of two others; which point is the peak, as above.
