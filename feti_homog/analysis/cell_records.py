@@ -205,7 +205,7 @@ class Sensitivities:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PhaseStresses:
-    """The largest stresses of one phase in s states, at the integration points of its elements."""
+    """The largest stresses of a phase in s states, at the integration points of the elements."""
 
     phase: str = described("name of the phase")
     state: tuple[str, ...] = described("labels of the states, as in result.h5: `E11`, `load`, `event 12`, ...")

@@ -207,7 +207,7 @@ def _note_bounds(
 def state_error(
     context: AnalysisContext, responses: Sequence[averaging.Response]
 ) -> tuple[dict[str, float], list[averaging.Response]]:
-    """Estimate the mesh error of the energy of one state.  Collective.
+    """Estimate the mesh error of the energy under one load.  Collective.
 
     Returns the entry `mesh_error`, error / energy (nothing if the case has `mesh_error = false`), and the responses,
     with element errors if a later step uses these errors.

@@ -94,7 +94,7 @@ class CellLoads:
 
 @dataclass
 class AnalysisContext:
-    """The context of one analysis run.
+    """The cell, loads, checks and recorders that an analysis run shares.
 
     Attributes:
         loads: the cell under its loads.
@@ -182,8 +182,8 @@ class AnalysisContext:
         from feti_homog.results import checkpoints  # only paths have events
 
         comm, jumps, room = self.cell.comm, self.cell.solver.jump_operator, checkpoints.room_of(self.case)
-        if self.directory is None:  # without fields and tips, a path never rereads an event
-            reads_again = self.states.has_place or self.plane.law.has_toughness
+        if self.directory is None:  # without recorded states and tips, a path never rereads an event
+            reads_again = self.states.is_recording or self.plane.law.has_toughness
             return checkpoints.EventsInMemory(comm, room if reads_again else 0)
         pieces = f"{self.cell.summary.subdomains} subdomains on {comm.size} ranks, {jumps.global_rows} multipliers"
         digest = mpi_errors.on_root(comm, self.case.digest, False)  # events are the same for any [output]

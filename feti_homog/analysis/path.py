@@ -177,7 +177,7 @@ def _completed(
     """
     document = {"case": context.case.resolved(), "path": entries}
     marks, states = landmarks.marks(document), dict[str, Any]()
-    if law.has_tips or context.states.has_use:
+    if law.has_tips or context.states.is_recording:
         legs = len(context.case.targets) if path.method == "events" else 0
         numbers = landmarks.kept(entries, context.case.output.states, legs, marks)
         with context.progress.stage("states") as line:
@@ -186,12 +186,12 @@ def _completed(
                 point, responses = _checked(context, point, _label(path, number))
                 if law.has_tips:
                     entries[number]["tips"] = tips(context, law, point)
-                if context.states.has_use:
+                if context.states.is_recording:
                     error, responses = state_error(context, responses)
                     entries[number] |= error
                     context.states.record(responses, point.load_factor, _label(path, number), number)
             line.append(f"{len(numbers)} of {len(entries)} points")
-        states = {"states": numbers} if context.states.has_use else {}
+        states = {"states": numbers} if context.states.is_recording else {}
     else:
         _checked(context, last, _label(path, len(entries) - 1))
     if context.case.has_friction and (loose := context.fibre_interfaces.loose(last.after.bonds.status)):

@@ -92,7 +92,7 @@ class StateRecorder:
 
     Attributes:
         has_place: whether fields are recorded.
-        has_use: whether states of a path are recorded: for fields, or for the utilisation of strengths.
+        is_recording: whether states of a path are recorded, for fields or for the utilisation of strengths.
         singularities: descriptions of points near which the largest stresses have no limit.
         error: the write error, if any, after which the run continues without the file.
     """
@@ -104,7 +104,7 @@ class StateRecorder:
         self._number, self._states, self._say = 0, list[field_layout.StatePart](), say
         self._largest, self._labels = list[dict[str, recovered_fields.Largest]](), list[str]()
         self.has_place = keep or file is not None
-        self.has_use = self.has_place or any(material.strength for material in cell.case.materials.values())
+        self.is_recording = self.has_place or any(material.strength for material in cell.case.materials.values())
         self.error: FetiHomogError | None = None
         self.singularities = set[str]()
 
@@ -113,7 +113,7 @@ class StateRecorder:
     ) -> None:
         """Record the next state from the response, or None, in each problem.  Collective."""
         plane, axial = (*responses, None)[:2]
-        if self.has_use:
+        if self.is_recording:
             self._largest.append(recovered_fields.largest_stresses(self._cell, plane, axial))
             self._labels.append(label)
             self.singularities |= recovered_fields.singularities(self._cell, plane)

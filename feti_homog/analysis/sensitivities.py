@@ -1,4 +1,4 @@
-"""Derivatives of a stiffness and its constants, or of one state, by the constants of the case."""
+"""Derivatives of a stiffness, its constants or the state under a load, by the material and spring constants."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -85,7 +85,7 @@ AXIS = KeyRow("SECTION.KEY", sections.AXIS_EXPECTED, "", "", "", sections.AXIS_M
 
 
 def tables(section: str | None = None) -> list[TableReference]:
-    """Return all tables of the case file, or of one section, in the order of `ORDER`.
+    """Return the reference tables of all sections or of one section, ordered as in `ORDER`.
 
     Raises:
         CaseError: no section has this name.

@@ -40,7 +40,7 @@ class ElementStresses:
 
 @dataclass(frozen=True)
 class RecoveredStress:
-    """The element stresses and recovered stresses in subdomains of one phase, under k loads.
+    """The element stresses and the recovered stresses under k loads, in subdomains of one phase.
 
     Attributes:
         points: (n, 2) positions of the plane nodes.
@@ -89,7 +89,7 @@ class RecoveredStress:
 
     @cached_property
     def vertices(self) -> Int:
-        """Return the element vertex numbers (e, 3); periodic images have the same number."""
+        """Return the vertex numbers (e, 3) of the elements.  Periodic images share a number."""
         return np.asarray(np.take(self.numbers, np.take(self.node_class, self._rows)).T)
 
     @cached_property

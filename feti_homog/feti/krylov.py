@@ -161,13 +161,15 @@ class Krylov:
         self.ksp.setType(PETSc.KSP.Type.CG)
         self.ksp.setNormType(PETSc.KSP.NormType.PRECONDITIONED)
         self.ksp.setTolerances(rtol=RTOL, atol=0.0, max_it=MAX_ITERATIONS)
-        self.ksp.setComputeSingularValues(True)
         self.ksp.setConvergenceTest(lambda *iteration: errors.call(lambda: test(*iteration), REASON.DIVERGED_NANORINF))
         pc = self.ksp.getPC()
         pc.setType(PETSc.PC.Type.PYTHON)
         pc.setOptionsPrefix("feti_projected_")
         pc.setPythonContext(context)
         self.ksp.setFromOptions()
+        # PETSc reserves memory for the coefficients of all permitted iterations, which may exceed the unknowns.
+        permitted = self.ksp.getTolerances()[3]
+        self.ksp.setComputeSingularValues(permitted <= max(MAX_ITERATIONS, sizes[1]))
 
     def solve(self, lam: Float, right: Float) -> tuple[Float, Float, int, int]:
         """Solve P F lam = right for projected jumps (rows, k) from multipliers lam (rows, k).  Collective.
@@ -210,7 +212,7 @@ class Krylov:
     def describe(self, iterations: int) -> str:
         """Describe the iterations and the condition number of the last solve for -feti_view."""
         line = f"FETI: {self._columns} load case{'s' * (self._columns > 1)}, {iterations} iterations"
-        if self.extreme_values is None:
+        if not iterations or self.extreme_values is None:
             return line
         smallest, largest = self.extreme_values
         return f"{line}, condition number about {largest / smallest:.3g} ({smallest:.3g} to {largest:.3g})"
@@ -218,7 +220,8 @@ class Krylov:
     @property
     def extreme_values(self) -> tuple[float, float] | None:
         """Return the extreme singular values of P H P F in the last solve, or None without an estimate."""
-        if not self.ksp.getIterationNumber() or self.ksp.getType() not in ESTIMATES_SINGULAR_VALUES:
+        has_values = self.ksp.getComputeSingularValues() and self.ksp.getType() in ESTIMATES_SINGULAR_VALUES
+        if not has_values or self.ksp.getConvergedReason() <= 0 or not self.ksp.getIterationNumber():
             return None
         largest, smallest = self.ksp.computeExtremeSingularValues()
         return (smallest, largest) if smallest > 0.0 else None

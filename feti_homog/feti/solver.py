@@ -199,7 +199,7 @@ class FetiSolver:
         applied, iterations, reason = np.zeros_like(lam), 0, int(PETSc.KSP.ConvergedReason.CONVERGED_ATOL)
         if is_seen.any():
             lam, applied, iterations, reason = krylov.solve(lam, right)
-            smallest, largest = krylov.extreme_values or (1.0, self.condition)
+            smallest, largest = (iterations and krylov.extreme_values) or (1.0, self.condition)
             self.condition = max(self.condition, largest / smallest)
             if self._view:
                 PETSc.Sys.Print(krylov.describe(iterations), comm=self.comm)

@@ -20,8 +20,8 @@ from feti_homog.typing import Float
 MEASURES = ("principal", "von_mises", "hydrostatic", "utilisation")
 # Relative difference below which values are equal except for rounding, as at symmetric positions.
 TIE = 1e-6
-# Fraction of the macroscopic stresses below which the stresses of a free body are rounding errors.
-ROUNDING = 1e-9
+# Fraction of the stresses L |E| of a part below which its stresses are rounding errors, as in a free body.
+ROUNDING = 1e4 * np.finfo(float).eps
 
 
 @dataclass(frozen=True)
@@ -101,9 +101,9 @@ def largest_stresses(cell: TornCell, plane: Response | None, axial: Response | N
     """
     in_plane = None if plane is None else _stresses(cell, plane)
     along = None if axial is None or cell.axial is None else _stresses(cell.axial, axial)
-    noise = ROUNDING * max(np.abs(response.stress).max() for response in (plane, axial) if response is not None)
+    parts_of_problems = [problem.parts for problem in cell.problems]  # on all ranks, also on ranks without parts
     by_phase: dict[str, list[Largest]] = {phase: [] for phase in cell.summary.phases}
-    for part in cell.parts:
+    for part in parts_of_problems[0]:
         fields = [None if stresses is None else next(stresses) for stresses in (in_plane, along)]
         points = next(field[0] for field in fields if field is not None)
         material, stress = cell.case.material_of(part.submesh.phase), np.zeros((len(points), 6))
@@ -115,7 +115,6 @@ def largest_stresses(cell: TornCell, plane: Response | None, axial: Response | N
         if fields[1] is not None:
             stress[:, [4, 3]] = fields[1][1]
         if not np.isnan(stress).any():
-            stress[np.abs(stress) < noise] = 0.0
             values, inside = _measures(material, stress), in_cell(points, cell.summary.period)
             by_phase[part.submesh.phase].append(_largest(values, np.repeat(inside[:, None], len(MEASURES), axis=1)))
     of_ranks = cell.comm.allgather({phase: _joined(parts) for phase, parts in by_phase.items() if parts})
@@ -144,7 +143,9 @@ def _stresses(cell: TornCell, response: Response) -> Iterator[tuple[Float, Float
         stress = np.concatenate([chunk.stress.reshape(-1, m) for chunk in elements])
         # Stresses conjugate to the other loads, such as S33 to E33, follow from the strains of the first loads.
         strain = np.linalg.solve(L[:m, :m], (stress - L[:m, m:] @ response.strain[m:]).T).T
-        yield points, np.hstack([stress, strain @ L[:m, m:] + L[m:, m:] @ response.strain[m:]])
+        stress = np.hstack([stress, strain @ L[:m, m:] + L[m:, m:] @ response.strain[m:]])
+        size = (np.abs(L) @ np.abs(response.strain))[: part.problem.stresses].max()
+        yield points, np.where(np.abs(stress) < ROUNDING * size, 0.0, stress)
 
 
 def _measures(material: material_forms.Material, stress: Float) -> Float:

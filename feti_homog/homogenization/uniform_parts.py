@@ -130,7 +130,7 @@ class ForcesBetweenParts:
 
 @dataclass(frozen=True)
 class NestedInterior:
-    """The factored interior of one-phase subdomains on a coarser mesh with c displacements per node.
+    """The factored interior of subdomains of one phase, on a coarser mesh with c displacements per node.
 
     Attributes:
         members: subdomains.

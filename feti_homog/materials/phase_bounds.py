@@ -74,7 +74,7 @@ class Springs:
 
 @dataclass(frozen=True)
 class Fibres:
-    """The fibres of one phase: volume fraction, constants and, around fibres of equal radius, springs."""
+    """The fibres of one phase: volume fraction, constants, and springs around fibres of equal radius."""
 
     fraction: float
     constants: TransverseIsotropy

@@ -41,7 +41,7 @@ def arrange(cell: cell_section.Cell) -> Arrangement:
 def random_arrangement(
     cell: cell_section.Cell, max_steps: int | None = None, max_attempts: int | None = None
 ) -> Arrangement:
-    """Place discs at random on the unit torus, in the same way on every machine.
+    """Place discs at random on the unit torus; every machine finds the same discs.
 
     Radii are uniform in mean * (1 - s, 1 + s), s = `radius_spread`, and scaled to the phase fractions; all voids have
     one radius. The gap between any two discs, with coatings and images, is at least `min_gap` mean fibre diameters. For

@@ -18,6 +18,8 @@ LAW = "phases"
 CRITERIA = dict(principal="maximum principal", von_mises="von Mises", tension="Drucker-Prager", axial_shear="Hashin")
 # Values within this of the largest are at its position, too; positions are those of quadrature points, to rounding.
 SAME_VALUE, SAME_PLACE = 1e-5, 1e-9
+# Part of the stress L |E| of a phase below which the limit of the law admits only rounding, as in a free body.
+ROUNDED = 1e-4
 
 
 def check_phases(findings: Findings, cell: DiscreteCell, state: State, number: int) -> None:
@@ -31,31 +33,29 @@ def check_phases(findings: Findings, cell: DiscreteCell, state: State, number: i
     phase_of = np.repeat(cell.files.mesh.phase, len(stress) // len(cell.files.mesh.phase))
     known = [name for k, name in enumerate(cell.files.phases) if not np.isnan(stress[phase_of == k]).any()]
     findings.require(LAW, sorted(entry["phase"] for entry in table) == sorted(known), "names of the phases")
-    for entry in table:
-        name = entry["phase"]
-        if name not in known:
-            continue
-        labels = [str(label) for label in entry["state"]]
+    for entry in (entry for entry in table if entry["phase"] in known):
+        name, labels = entry["phase"], [str(label) for label in entry["state"]]
+        phase, strength = cell.files.phases.index(name), limits[name]
         is_labelled = number < len(labels) and state.name.endswith(f"({labels[number]})")
         findings.require(LAW, is_labelled and len(labels) == len(cell.files.file["state"]), f"{state.name}: its label")
-        rows = phase_of == cell.files.phases.index(name)
-        strength = limits[name]
+        rows = phase_of == phase
         values, scale = _measures(stress[rows], strength), float(np.abs(stress[rows]).max())
+        rounded = ROUNDED * float(np.abs(cell.stiffnesses[phase]).max()) * cell.scales_of(state).strain
+        raised = max(1.0, rounded / scale) if scale > 0.0 else 1.0
         for measure, column in values.items():
             place = f"{state.name}, {measure} of {name}"
-            columns = [entry.get(key, []) for key in (measure, f"{measure}_at")]
-            if any(len(column) != len(labels) for column in columns):
+            reported, at = entry.get(measure), entry.get(f"{measure}_at")
+            if not len(reported or ()) == len(at or ()) == len(labels):
                 findings.require(LAW, False, f"{place}: missing")
                 continue
-            reported = float(columns[0][number])
-            size = 1.0 if measure == "utilisation" else scale
-            findings.compare(LAW, reported, column.max(), max(size, cell.scales_of(state).stress), place)
-            away = from_centre(points[rows], np.array(columns[1][number]), cell.files.size)
-            at = np.hypot(*away.T) < SAME_PLACE * cell.files.size.max()
-            least = column.max() - SAME_VALUE * max(abs(column.max()), cell.scales_of(state).stress)
-            findings.require(LAW, bool((column[at] >= least).any()), f"{place}: another position")
-        key = next((key for key in CRITERIA if key in (strength or ())), None)
-        findings.require(LAW, entry.get("criterion") == CRITERIA.get(key or ""), f"{name}: its criterion")
+            size = raised * float(np.abs(column).max()) if measure == "utilisation" else max(scale, rounded)
+            findings.compare(LAW, float(reported[number]), column.max(), size, place)
+            distance = np.hypot(*from_centre(points[rows], np.array(at[number]), cell.files.size).T)
+            near = column[distance < SAME_PLACE * cell.files.size.max()]
+            is_largest = bool((near >= column.max() - SAME_VALUE * size).any())
+            findings.require(LAW, is_largest, f"{place}: another position")
+        key = next((key for key in CRITERIA if key in (strength or ())), "")
+        findings.require(LAW, entry.get("criterion") == CRITERIA.get(key), f"{name}: its criterion")
 
 
 def _stresses(cell: DiscreteCell, state: State) -> tuple[Float, Float]:

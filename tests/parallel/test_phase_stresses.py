@@ -80,3 +80,13 @@ def test_stresses_rise_beside_tips_and_corners(comm):
     arc = {"interface": {"debonded": [{"fibre": "all", "centre": 0.0, "angle": 90.0}]}}
     assert "beside tips of debonding they rise with finer elements" in remarks(CELL, **arc)
     assert "they rise" not in remarks(CELL)
+
+
+def test_a_soft_phase_keeps_its_stresses_and_a_free_fibre_has_none(comm):
+    soft, softer = (
+        phases_of(comm, {"E11": 0.01}, fibre=FIBRE | {"young": young}, plane="strain")["fibre"]
+        for young in (1e-3, 1e-9)
+    )
+    np.testing.assert_allclose(softer.von_mises, 1e-6 * soft.von_mises, rtol=1e-3)
+    free = {"interface": {"contact": False, "debonded": [{"fibre": "all", "centre": 0.0, "angle": 360.0}]}}
+    assert phases_of(comm, {"E11": 0.01}, plane="strain", **free)["fibre"].von_mises == 0.0

@@ -31,7 +31,7 @@ LINES = {
     "schema": 430,
     "studies": 2950,
     "system": 1770,
-    "verify": 3100 + 145,
+    "verify": 3100 + 150,
 }
 FILES, TOTAL = 310, 45000
 # Percent of all lines: private functions that are called once, and imports.

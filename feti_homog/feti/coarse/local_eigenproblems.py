@@ -30,7 +30,7 @@ SINGLE_PRECISION_NULL = 10 * np.finfo(np.float32).eps
 
 @dataclass(frozen=True)
 class SubdomainBlocks:
-    """The matrices of one subdomain, on the constraint rows that act on the subdomain.
+    """The boundary matrices and the constraint rows of one subdomain.
 
     Attributes:
         subdomain: the subdomain.

@@ -244,7 +244,7 @@ def label(submesh: Submesh) -> str:
 
 
 def _pinned(K: csr_matrix, problem: Problem, pinned: int) -> csr_matrix:
-    """Pin a node: set its rows and columns in K to those of a multiple of I.  -1 pins no node."""
+    """Replace the rows and columns of a pinned node in K by a multiple of I; -1 pins no node."""
     if pinned < 0:
         return K
     dofs, largest = problem.dofs(np.array([pinned])), K.diagonal().max()

@@ -211,7 +211,7 @@ class ExactInverse(Preconditioner):
         return self.reference.respond(distributed_arrays.scale_rows(self.reference.active, g)) + at_rest
 
     def multipliers(self, d: Float, E: Float) -> Float:
-        """Compute H d E for E (v, k); d (owned rows, v) must be the same in every call.  Collective."""
+        """Compute H d E (owned rows, k) for E (v, k).  All calls must pass the same d (owned rows, v).  Collective."""
         return distributed_arrays.scale_rows(self._active, self.renew_answer(d) @ E)
 
     def answer(self, d: Float, E: Float, free: int = 0) -> tuple[Float, Float] | None:
