@@ -80,8 +80,8 @@ class _Content:
         match block.keyword:
             case "PART" | "INSTANCE" | "END INSTANCE" | "ASSEMBLY" | "END ASSEMBLY" as keyword:
                 if keyword in self.seen:
-                    words = "in which matrix and fibres share the nodes of their interfaces: merge the instances"
-                    raise ValueError(f"a second {keyword.lower()}: expected one, {words} (Abaqus/CAE: Merge/Cut, Mesh)")
+                    expected = "one, in which matrix and fibres share the nodes of their interfaces: merge instances"
+                    raise ValueError(f"a second {keyword.lower()}: expected {expected} (Abaqus/CAE: Merge/Cut, Mesh)")
                 self.seen |= {keyword} & {"PART", "INSTANCE"}
                 self.is_assembly = keyword in ("ASSEMBLY", "END INSTANCE")
                 if keyword == "INSTANCE" and len(block.rows) > 1:
