@@ -6,6 +6,9 @@ a: L^ef in plane strain, plane stress, and of long fibres that are free along x3
 three-dimensional cell); debonded faces overlapping freely.
 b: Sigma in plane strain under E = [0, 0, 0.2] (40), with and without contact.
 
+The paper prints curves, no numbers.  At both ends of the curves the exact values are known, by multipole series: those
+of the bonded cell, and without contact those of a cell with holes.
+
 Convention: every fibre has one debonded arc, centred on the positive x1 axis through its own centre; the angle is the
 arc's whole opening in degrees, measured at that centre.  0 is perfect bonding, 360 a loose fibre.
 """
@@ -19,6 +22,7 @@ from typing import Any
 
 import figures
 import numpy as np
+from effective_stiffness import REFERENCE
 from figures import INK
 from mpi4py.MPI import Intracomm
 from numpy.typing import NDArray
@@ -30,6 +34,8 @@ STIFFNESSES = {"11": (0, 0), "22": (1, 1), "12": (0, 1), "33": (2, 2)}
 STRESSES = ("11", "22", "12")
 PLANES = {"strain": "--", "stress": "-."}
 CURVES = {"plane strain": "--", "long fibres": "-", "plane stress": "-."}
+# Exact C11, C12, C33 in plane strain at the angle 360, of a cell with holes.
+HOLES = (36.123857, 14.523762, 10.800047)
 CONTACT = {"with contact": "-", "without contact": "--"}
 
 
@@ -74,6 +80,7 @@ def write(folder: Path, angles: list[float], free: dict[str, Any], shear: dict[s
     """debonding_angle.csv and debonding_angle.png."""
     from matplotlib.figure import Figure
 
+    _print_ends(free, shear)
     header = ["angle", *(f"C{e} {name}" for name in free for e in STIFFNESSES)]
     header += [f"S{e} {word}" for word in shear for e in STRESSES]
     rows = np.column_stack([angles, *free.values(), *shear.values()]).tolist()
@@ -85,6 +92,23 @@ def write(folder: Path, angles: list[float], free: dict[str, Any], shear: dict[s
     right.set(title=r"b. $E = [0, 0, 0.2]$, plane strain", ylabel="macroscopic stress (GPa)")
     figure.savefig(folder / "debonding_angle.png")
     return [figures.tabulate(folder / "debonding_angle.csv", header, rows), folder / "debonding_angle.png"]
+
+
+def _print_ends(free: dict[str, Any], shear: dict[str, Any]) -> None:
+    """Print both ends of the curves beside exact values."""
+    print(f"{'curve':<26}{'angle':>6}{'exact':>12}{'computed':>12}{'difference':>12}")
+    bonded = {plane: REFERENCE["hexagonal", plane] for plane in PLANES}
+    rows = [(f"plane {plane}", 0, bonded[plane]) for plane in PLANES] + [("plane strain", 360, HOLES)]
+    names = list(STIFFNESSES)
+    lines = [
+        (f"C{name} {curve}", angle, exact, free[curve][-1 if angle else 0, names.index(name)])
+        for curve, angle, values in rows
+        for name, exact in zip(("11", "12", "33"), values, strict=True)
+    ]
+    lines += [(f"S12 {name}", 0, SHEAR[2] * bonded["strain"][2], shear[name][0, 2]) for name in CONTACT]
+    lines.append(("S12 without contact", 360, SHEAR[2] * HOLES[2], shear["without contact"][-1, 2]))
+    for curve, angle, exact, own in lines:
+        print(f"{curve:<26}{angle:>6}{exact:>12.5f}{own:>12.5f}{own / exact - 1:>12.1e}")
 
 
 def _curves(

@@ -54,7 +54,7 @@ def checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
         return cell if cell.fibre_list is None else _with_table(cell, faults)
     named = folder / cell.file  # the suffix of a link itself counts
     file = Path(os.path.realpath(named.parent)) / named.name  # unlike Path.resolve, without an error for circular links
-    if file.suffix not in SUFFIXES[cell.geometry]:
+    if file.suffix.lower() not in SUFFIXES[cell.geometry]:
         return cell
     if words := missing(file):
         faults.append(f"[cell] file = {wording.toml_value(str(cell.file))}: {words}")

@@ -6,6 +6,7 @@ Columns may have units in brackets; diameters, areas and axes of ellipses may re
 import difflib
 import math
 import re
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,7 +53,7 @@ def lines_of(path: Path) -> Iterator[tuple[int, str, str]]:
     except OSError as error:
         raise CaseError(f"{path}: cannot be read: {error.strerror}") from error
     try:
-        text = content.decode("utf-8-sig")
+        text = content.decode("utf-16" if content.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) else "utf-8-sig")
     except UnicodeDecodeError as error:
         try:
             text = content.translate(UNITS_OF_EXCEL).decode()
@@ -84,7 +85,7 @@ def row_fault(line: str, cells: Sequence[str], count: int) -> str:
 
 
 UNITS = "nm|um|µm|μm|mm|cm|m|px|pixels?|deg|degrees?"
-UNIT = re.compile(rf"\s*(\[[^]]*\]|\([^)]*\)|/\s*[^/]+|_({UNITS}))\s*$", re.IGNORECASE)
+UNIT = re.compile(rf"\s*(\[[^]]*\]|\([^)]*\)|/\s*[^/]+|[_\s]({UNITS})(\^?[2²])?)\s*$", re.IGNORECASE)
 ROW_UNIT = re.compile(rf"[\[(]?({UNITS}|°|-)[\])]?", re.IGNORECASE)
 """A cell in a line of units."""
 MATLABS_AXIS = "majoraxislength"
@@ -101,8 +102,8 @@ def _half(value: float) -> float:
 # Other names of columns, those before first, and what makes the column of their values. Major and Minor are ImageJ's
 # axes of ellipses, whose areas are of no more use; MATLAB's Centroid_1 is x, centroid-0 of scikit-image its row, y.
 OTHERS: tuple[tuple[tuple[str, ...], str, Callable[[float], float]], ...] = (
-    (("xm", *(word.format("x") for word in CENTRES), "centroid_1", "centroid-1"), "x", float),
-    (("ym", *(word.format("y") for word in CENTRES), "centroid_2", "centroid-0"), "y", float),
+    (("xm", *(word.format("x") for word in CENTRES), "centroid_1", "centroid-1", "col", "column"), "x", float),
+    (("ym", *(word.format("y") for word in CENTRES), "centroid_2", "centroid-0", "row"), "y", float),
     (("major", MATLABS_AXIS), "a", _half),
     (("minor", "minoraxislength"), "b", _half),
     (("r", "rad", "fibre_radius", "fiber_radius", "radii"), "radius", float),
@@ -131,8 +132,8 @@ class SourceColumn:
 
 
 def _bare(word: str) -> str:
-    """Return a name without its unit, in lower case."""
-    return UNIT.sub("", word).strip().lower()
+    """Return a name without its unit, in lower case, with _ for blanks."""
+    return UNIT.sub("", word).strip().lower().replace(" ", "_")
 
 
 def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceColumn], list[str]]:

@@ -125,7 +125,7 @@ def table_of(table: type[Any], expected: str, *, least: int = 0) -> ValueType:
 
 def file_name(expected: str, *suffixes: str) -> ValueType:
     """Return the type of file names with one of these suffixes."""
-    return ValueType(expected, lambda value: text.accepts(value) and value.endswith(suffixes), Path)
+    return ValueType(expected, lambda value: text.accepts(value) and value.lower().endswith(suffixes), Path)
 
 
 def choice(*options: str) -> ValueType:

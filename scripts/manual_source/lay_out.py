@@ -22,7 +22,7 @@ LEFT_OUT = shutil.ignore_patterns("__pycache__", "*.pyc", "manual_source")
 def main(target: Path) -> None:
     for folder in FOLDERS:  # whole folders, for documents link to files
         shutil.copytree(ROOT / folder, target / folder, ignore=LEFT_OUT)
-    for path in (*ROOT.glob("*.md"), ROOT / "LICENSE", HERE / "index.md"):
+    for path in (*ROOT.glob("*.md"), ROOT / "LICENSE", *HERE.glob("*.md")):
         shutil.copy2(path, target)
     reference_pages.write(target / "reference")
 

@@ -13,16 +13,21 @@ import numpy as np
 # What follows from the path, whose events are compared by their loads: `peak` has their numbers.
 LEFT_OUT = {
     "schema", "version", "case", "digest", "solver", "checks", "check_tolerance", "kkt_tolerance", "warnings",
-    "remarks", "states", "phase_stresses", "resumed", "result_h5", "timings", "memory", "checksum", "path", "peak",
+    "remarks", "states", "resumed", "result_h5", "timings", "memory", "checksum", "path", "peak",
     "envelope",
 }  # fmt: skip
-# Numbers of the solver, or of pieces; a ratio of two others; which point is the peak, as above.
-LEFT_OUT_WITHIN = {"iterations", "nodes", "dissipation_ratio", "mark"}
+# Numbers of the solver, or of pieces; a ratio of two others; which point is the peak, as above; the positions of the
+# largest stresses, several of which may tie.
+LEFT_OUT_WITHIN = {
+    "iterations", "nodes", "dissipation_ratio", "mark", "principal_at", "von_mises_at", "hydrostatic_at",
+    "utilisation_at",
+}  # fmt: skip
 ENERGIES = {
     "stored", "stored_in_springs", "work", "dissipated", "dissipated_strain_controlled", "fracture_energy",
     "friction_heat",
 }  # fmt: skip
 RATES = {"G", "G_I", "G_II"}
+STRESSES = {"principal", "von_mises", "hydrostatic"}
 DIRECTIONS = {"angle", "bond_angle", "psi"}
 COUNTS = {"broke", "softened", "bonded", "open", "closed", "free_motions", "fibre", "interface", "number", "elements"}
 TOUCHING = {"open", "closed"}
@@ -41,10 +46,18 @@ Kinds = Mapping[str, Sequence[Any]]
 
 def apart(base: Any, other: Any) -> list[tuple[float, str]]:
     """Return the deviation of each kind of number, and its path; inf where counts, words or shapes differ."""
-    ours, theirs = ({p: v for p, v in _kinds(document).items()} for document in (base, other))
+    ours, theirs = (_kinds(document) for document in _with_phases(base, other))
     found = [(DIFFERENT, f"{path} in one of them") for path in ours.keys() ^ theirs.keys()]
     sizes = _sizes(ours)
     return found + [(_deviation(path, ours, theirs, sizes), path) for path in ours.keys() & theirs.keys()]
+
+
+def _with_phases(*documents: Any) -> list[Any]:
+    """Sort stresses of phases by name; leave them out where one result has none, and of the chosen states of paths."""
+    name = "phase_stresses"
+    if "path" in documents[0] or not all(document.get(name) for document in documents):
+        return [{key: value for key, value in document.items() if key != name} for document in documents]
+    return [document | {name: sorted(document[name], key=lambda phase: phase["phase"])} for document in documents]
 
 
 def _kinds(document: Any) -> dict[str, list[Any]]:
@@ -70,7 +83,7 @@ def leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 def group(path: str) -> str:
     """Numbers of one group are measured by the largest of them all."""
     record, _, name = path.rpartition(".")
-    return next((f"{record}: {names}" for names in (ENERGIES, RATES) if name in names), path)
+    return next((f"{record}: {names}" for names in (ENERGIES, RATES, STRESSES) if name in names), path)
 
 
 def _in_words(values: Sequence[Any]) -> bool:

@@ -50,7 +50,7 @@ class Setting:
 
     def solved(self, document: Document, **keys: Any) -> Any:
         """result.json of another case.  Collective."""
-        result = run(self.drawn.parsed(document), self.comm, **keys)
+        result = run(self.drawn.parsed(document), self.comm, **({"fields": True} | keys))
         return json.loads(json.dumps(result.document, default=lambda array: array.tolist()))
 
     def compared(self, other: Any, pieces: bool = False) -> Compared:

@@ -1,9 +1,13 @@
 """Largest stresses of the phases: uniform cells have the macroscopic stress, and any number of ranks finds the same."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 from support.cases import FIBRE, MATRIX
+from support.ranks import write_once
+from unit.mesh.faulty_meshes import grid
 
 from feti_homog import Case, run
 from feti_homog.materials import voigt
@@ -53,6 +57,38 @@ def test_stresses_out_of_the_plane_count(comm, plane):
     S33 = MATRIX["poisson"] * 18.0 if plane == "strain" else 0.0
     np.testing.assert_allclose(found.hydrostatic, [(18.0 + S33) / 3], rtol=1e-8)
     np.testing.assert_allclose(found.von_mises, voigt.von_mises(np.array([[30.0, -12.0, 0.0]]), S33), rtol=1e-8)
+
+
+def angular(x, y):
+    """Return whether a place is in a fibre of three squares, which nothing maps onto itself."""
+    return (0.25 < x < 0.75 and 0.25 < y < 0.5) or (0.25 < x < 0.5 and 0.25 < y < 0.75)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_moved_and_a_turned_cell_have_the_same_stresses(comm, shared_path, order):
+    """On the torus, by a quarter and a half of the cell; by a quarter turn, which swaps S11 and S22."""
+    base = grid(angular)
+    turned = replace(base, nodes={tag: (1.0 - y, x, z) for tag, (x, y, z) in base.nodes.items()})
+    moved = grid(lambda x, y: angular((x - 0.25) % 1.0, (y - 0.5) % 1.0))
+    load = {"S11": 30.0, "S22": -12.0, "S12": 11.0}
+    back = {
+        "base": lambda place: place,
+        "moved": lambda place: (place - [0.25, 0.5]) % 1.0,
+        "turned": lambda place: np.stack([place[:, 1], 1.0 - place[:, 0]], axis=1),
+    }
+    found = {}
+    for name, mesh in (("base", base), ("moved", moved), ("turned", turned)):
+        write_once(comm, mesh, shared_path / f"{name}.msh")
+        cell = {"geometry": "mesh", "file": str(shared_path / f"{name}.msh"), "order": order, "refine": 1}
+        asked = load if name != "turned" else {"S11": -12.0, "S22": 30.0, "S12": -11.0}
+        found[name] = phases_of(comm, asked, plane="strain", strengths=({"von_mises": 50.0}, None), cell=cell)
+    for name, phases in found.items():
+        for phase, stresses in phases.items():
+            for measure in ("principal", "von_mises", "hydrostatic", "utilisation")[: 4 if phase == "matrix" else 3]:
+                expected = found["base"][phase]
+                value, place = getattr(stresses, measure), getattr(stresses, f"{measure}_at")
+                np.testing.assert_allclose(value, getattr(expected, measure), rtol=1e-8)
+                np.testing.assert_allclose(back[name](place), getattr(expected, f"{measure}_at"), atol=1e-6)
 
 
 @pytest.mark.parametrize("order", [1, 2])

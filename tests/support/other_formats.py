@@ -17,7 +17,7 @@ def written(mesh: Any, path: Path, **options: Any) -> Path:
     if path.suffix == ".msh":
         mesh.write(path)
         return path
-    if path.suffix == ".inp":
+    if path.suffix.lower() == ".inp":
         return write_inp(path, mesh)
     tags, kinds = sorted(mesh.nodes), {1: "line", 8: "line3", 2: "triangle", 3: "quad", 9: "triangle6"}
     cells, phases, debonded = [], [], []

@@ -80,8 +80,8 @@ class _Content:
         match block.keyword:
             case "PART" | "INSTANCE" | "END INSTANCE" | "ASSEMBLY" | "END ASSEMBLY" as keyword:
                 if keyword in self.seen:
-                    expected = "one, in which matrix and fibres share the nodes of their interfaces"
-                    raise ValueError(f"a second {keyword.lower()}: expected {expected}: merge the instances")
+                    expected = "one, in which matrix and fibres share the nodes of their interfaces: merge instances"
+                    raise ValueError(f"a second {keyword.lower()}: expected {expected} (Abaqus/CAE: Merge/Cut, Mesh)")
                 self.seen |= {keyword} & {"PART", "INSTANCE"}
                 self.is_assembly = keyword in ("ASSEMBLY", "END INSTANCE")
                 if keyword == "INSTANCE" and len(block.rows) > 1:
@@ -110,6 +110,8 @@ class _Content:
         counts = next((sizes for pattern, sizes in SIZES.items() if re.fullmatch(pattern, kind)), ())
         if not counts:
             expected = "only triangles of three or six nodes and quadrilaterals of four, eight or nine can be used"
+            if kind.startswith("COH"):
+                expected = "delete cohesive elements and merge the nodes of their faces; [interface] has the law"
             raise ValueError(f"elements are {kind or 'of no TYPE'}: {expected}")
         elements = self.lines if len(counts) > 1 else self.triangles
         for row in block.rows:

@@ -86,7 +86,7 @@ def duplicate_nodes(mesh: RawMesh) -> list[str]:
     if len(pairs) < MOST_PAIRS:
         pairs = cKDTree(plane).query_pairs(reach, output_type="ndarray")
     pairs = pairs[np.lexsort(pairs.T[::-1])]
-    return _listed("nodes at the same place: ", pairs, lambda pair: " and ".join(map(mesh.node, pair)))
+    return _listed("nodes at the same place (merge nodes): ", pairs, lambda pair: " and ".join(map(mesh.node, pair)))
 
 
 def middle_nodes(mesh: RawMesh) -> list[str]:

@@ -61,7 +61,7 @@ def read(path: Path, snap: float | None = None, phases: Selectors | None = None,
     """
     moved = 0.0
     try:
-        raw = with_phases(LOADERS[path.suffix](path), phases or {})
+        raw = with_phases(LOADERS[path.suffix.lower()](path), phases or {})
     except OSError as error:
         raise MeshError(f"{path}: cannot be read: {error.strerror}") from None
     except MeshError as error:

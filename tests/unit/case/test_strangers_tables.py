@@ -26,10 +26,15 @@ TABLES = {
     "units by strokes": "fiber_id,center_x_um,center_y_um,fiber_diameter_um\n1,2,2,2\n2,5,4,2.4\n",
     "MATLAB's regionprops": "Centroid_1,Centroid_2,EquivDiameter\n2,2,2\n5,4,2.4\n",
     "scikit-image": "label,centroid-0,centroid-1,equivalent_diameter_area\n1,2,2,2\n2,4,5,2.4\n",
+    "QuPath": "Image\tClass\tCentroid X µm\tCentroid Y µm\tArea µm^2\na\tfibre\t2\t2\t3.14159265\n"
+    "b\tfibre\t5\t4\t4.52389342\n",
+    "rows and columns": "Row px,Col px,Diameter px\n2,2,2\n4,5,2.4\n",
+    "blanks in names": "X,Y,Equivalent Diameter [um]\n2,2,2\n5,4,2.4\n",
     "own": "x,y,radius,phase\n2,2,1,fibre\n5,4,1.2,\n",
 }
 WHOLLY_READ = (
     "own", "NumPy", "MATLAB", "units after a stroke", "Excel for others", "units below", "MATLAB's regionprops",
+    "rows and columns", "blanks in names",
 )  # fmt: skip
 
 
@@ -78,6 +83,16 @@ def test_names_of_the_case_take_the_place_of_those_of_the_table(tmp_path, names)
 def test_excels_units_need_no_utf_8(tmp_path):
     (tmp_path / "t.csv").write_bytes((SIZE + "x;y;Radius (µm)\r\n2,0;2,0;1,0\r\n5;4;1,2\r\n").encode("cp1252"))
     is_expected(read_table(tmp_path / "t.csv"))
+
+
+@pytest.mark.parametrize("coding", ["utf-16", "utf-8-sig"])
+@pytest.mark.parametrize("writer", ["German Excel", "QuPath"])
+def test_marks_of_the_coding_are_no_part_of_a_table(tmp_path, writer, coding):
+    (tmp_path / "T.CSV").write_bytes((SIZE + TABLES[writer]).encode(coding))
+    is_expected(read_table(tmp_path / "T.CSV"))
+    (tmp_path / "T.CSV").write_bytes("\ufeffx,y".encode("utf-16-be")[:-1])  # half a character
+    with pytest.raises(CaseError, match=r"T\.CSV: expected text in UTF-8"):
+        read_table(tmp_path / "T.CSV")
 
 
 @pytest.mark.parametrize("names", ["X,Y,Major,Minor,Angle", "X,Y,MajorAxisLength,MinorAxisLength,Orientation"])

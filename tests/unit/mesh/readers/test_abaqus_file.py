@@ -119,7 +119,9 @@ FAULTS = [
     ("line 1: data without a keyword: expected *NODE, *ELEMENT", "1, 0, 0\n" + SQUARE),
     *((f"line 9, *ELEMENT: elements are {kind}: only triangles of three or six nodes and quadrilaterals of four",
        SQUARE + f"*ELEMENT, TYPE={kind}, ELSET=fibre\n3, 1, 2, 3, 4\n")
-      for kind in ("C3D4", "C3D8", "CAX8", "CAX3", "SC6R", "COH2D4", "MASS", "AC2D3", "U1")),
+      for kind in ("C3D4", "C3D8", "CAX8", "CAX3", "SC6R", "MASS", "AC2D3", "U1")),
+    *((f"line 9, *ELEMENT: elements are {kind}: delete cohesive elements and merge the nodes of their faces; [interf",
+       SQUARE + f"*ELEMENT, TYPE={kind}, ELSET=bond\n3, 1, 2, 3, 4\n") for kind in ("COH2D4", "COHAX4", "COH2D4P")),
     ('*NODE: "0.2_5": expected a number', SQUARE.replace("3, 1, 1", "3, 0.2_5, 1")),
     ('*ELEMENT: "٣": expected a whole number', SQUARE.replace("2, 1, 3, 4", "2, 1, ٣, 4")),
     ('"99999999999999999999": expected a whole number of at most 15 digits',

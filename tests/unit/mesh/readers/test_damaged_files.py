@@ -132,7 +132,7 @@ def test_many_nodes_at_one_place_are_counted(tmp_path):
     nodes = {k: (float(k % 2), 0.0, 0.0) for k in range(2, count + 2)} | {1: (0.5, 1.0, 0.0)}
     elements = {k: (2, 1, 1, (k, k + 1, 1)) for k in range(2, count + 2, 2)}
     MshFile(nodes, elements).write(tmp_path / "a.msh")
-    with pytest.raises(MeshError, match=r"nodes at the same place: node 2 \(0, 0\) and node 4 .* and 19995 more$"):
+    with pytest.raises(MeshError, match=r"same place \(merge nodes\): node 2 \(0, 0\) and node 4 .* and 19995 more$"):
         read(tmp_path / "a.msh")
 
 

@@ -138,6 +138,14 @@ ELEMENTS_2 = "$Elements\n1\n1 2 2 1 1 1 2 3\n$EndElements\n"
 NODES_4 = "$Nodes\n1 3 1 3\n2 1 0 3\n1\n2\n3\n0 0 0\n1 0 0\n0 1 0\n$EndNodes\n"
 ELEMENTS_4 = "$Elements\n1 1 1 1\n2 1 2 1\n1 1 2 3\n$EndElements\n"
 FILE_2, FILE_4 = HEAD_2 + NODES_2 + ELEMENTS_2, HEAD_4 + NODES_4 + ELEMENTS_4
+
+
+@pytest.mark.parametrize("version", ["2", "2.0", "2.000000", "2.2"])
+def test_netgens_numbers_of_the_version_are_read(version, tmp_path):
+    (tmp_path / "A.MSH").write_text(FILE_2.replace("2.2", version, 1))
+    assert gmsh_file.load(tmp_path / "A.MSH").groups == (("number 1",),)
+
+
 FAULTS = {
     "format 3": (FILE_2.replace("2.2", "3"), 'format "3" of gmsh: expected 2.2, 4.0 or 4.1'),
     "no version": ("$MeshFormat\n$EndMeshFormat\n", 'format "" of gmsh: expected 2.2, 4.0 or 4.1'),

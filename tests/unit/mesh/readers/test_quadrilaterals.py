@@ -14,7 +14,7 @@ from feti_homog.mesh.readers.raw_mesh import in_triangles
 IMAGE = """f00003 f00003 f00003 c00380 0007c0 000fe0 000fe0 078fc0 0fc7c0 0fc380 0fe03e 0fc03f
            07c07f 00007f 78073f fc0fbe fe1fc0 fe1fc0 fc1fc0 7c0f80 300700 e00001 f00003 f00003"""
 STRETCH_AND_SHEAR = np.array([-0.101, -0.106])
-FORMATS = (".inp", ".vtu")
+FORMATS = (".inp", ".vtu", ".msh", ".INP")
 
 
 def solved(image: np.ndarray, path):

@@ -11,6 +11,7 @@ import pytest
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.readers.msh_reader import read
+from feti_homog.mesh.readers.vtk_file import load_medit
 
 meshio = pytest.importorskip("meshio")
 
@@ -59,6 +60,13 @@ Triangles 2
 Ridges 0
 End
 """
+
+
+def test_empty_sections_of_netgen_are_none(tmp_path):
+    (tmp_path / "a.mesh").write_text(MEDIT.replace("Ridges 0", "Tetrahedra\n0\nQuadrilaterals\n0"))
+    assert len(load_medit(tmp_path / "a.mesh").triangles) == 2
+
+
 FAULTS = [
     ("not XML: syntax error: line 1, column 0", "a.vtu", "hello"),
     ("cannot be read", "a.vtk", lambda path: path),
