@@ -35,7 +35,8 @@ def read_document(path: str | Path) -> dict[str, Any]:
         raise CaseError(f"{path}: {TOO_DEEP}") from None
     except ValueError as error:  # also for a number with too many digits
         place = f"line {content.count(chr(10)) + 1}, the end"
-        raise CaseError(f"{path}: not TOML: {str(error).replace('end of document', place)}") from None
+        words = str(error).replace("newline or end of document after a statement", "one statement a line")
+        raise CaseError(f"{path}: not TOML: {words.replace('end of document', place)}") from None
     except OSError as error:
         raise CaseError(f"{path}: cannot be read: {error.strerror}") from None
     level: list[Any] = [document]

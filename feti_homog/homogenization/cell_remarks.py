@@ -184,9 +184,9 @@ def _law_warnings(case: Case) -> list[str]:
         if abs(stiffness / similar - 1.0) > SAME_RATIO:
             section = interface_section.interface_label(number, len(case.interfaces))
             lines.append(
-                f"[{section}] tangential_stiffness / normal_stiffness = "
-                f"{stiffness:.4g}: other than (normal_toughness / tangential_toughness) (tangential_strength / "
-                f"normal_strength)^2 = {similar:.4g}: the energy of bonds whose mode changes depends on the way"
+                f"[{section}] tangential_stiffness = {bond.tangential_stiffness:g}: the energy of bonds whose mode "
+                f"changes depends on the way; expected {similar * bond.normal_stiffness:.7g}, of normal_stiffness "
+                "(normal_toughness / tangential_toughness) (tangential_strength / normal_strength)^2"
             )
     excess, tolerance = law.overshoot, case.interfaces[0].softening_tolerance
     if excess > tolerance * (1.0 + SAME_RATIO):

@@ -89,7 +89,7 @@ class CellSummary:
     def warnings(self) -> list[str]:
         """List the changes made to a user's mesh."""
         moved = f"nodes on the sides of the mesh were moved by up to {self.snapped:.3g} to match"
-        return [moved] if self.snapped > 0 else []
+        return [moved] if self.snapped > 64 * np.finfo(float).eps * (self.width + self.height) else []
 
     @property
     def period(self) -> Float:

@@ -74,6 +74,8 @@ def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty
             faults.append(f"{name} = {wording.toml_value(value)}: {words}")
         elif number_at(document, path) is None:
             faults.append(f"{name}: expected a key of the case whose value is a number")
+        elif path[0] == "material" and path[2:3] == ("strength",):
+            faults.append(f"{name}: no result whose scatter is given depends on it; expected a number alone")
     pairs = table.get(sections.CORRELATION, [])
     faults += _pair_faults(pairs, named)
     if faults:

@@ -8,6 +8,7 @@ from unit.case.faulty_materials import FAULTY_MATERIALS
 
 NOT_TOML: dict[str, str] = {
     "not TOML: Expected '=' after a key in a key/value pair (at line 4": cell("mesh_size = 0.05", "mesh_size 0.05"),
+    "not TOML: Expected one statement a line (at line 4": cell("mesh_size = 0.05", "mesh_size = 0.05 coating = 0.1"),
     "not TOML: Unterminated string (at line 18, the end": ended('[output]\nlength_unit = """'),
     "not TOML: Cannot overwrite a value (at line 5": cell("mesh_size = 0.05", "mesh_size = 0.05\nmesh_size = 0.1"),
     "not TOML: Cannot declare ('cell',) twice (at line 17": ended("[cell]\n"),

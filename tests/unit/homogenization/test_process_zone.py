@@ -93,6 +93,14 @@ COHESIVE = {
 }  # fmt: skip
 
 
+def test_the_warning_of_a_ratio_gives_the_stiffness_that_ends_it():
+    """1e5 (0.05 / 0.09) (60 / 40)^2 = 125000."""
+    for stiffness, words in ((4e4, ["expected 125000,"]), (125e3, [])):
+        bond = COHESIVE | {"tangential_stiffness": stiffness}
+        found = warnings(cases.parse(case_of(coating=None).resolved() | {"interface": bond}, Path()))
+        assert [word for word in ("expected 125000,",) for line in found if word in line] == words
+
+
 @pytest.mark.parametrize("shear", [0.09, 0.3], ids=["shear is shorter", "opening is shorter"])
 def test_the_zone_is_that_of_the_shorter_mode_of_the_weakest_pair(shear):
     """Lengths G / R^2 of pure modes: of one pair 0.05 / 40^2 and 0.09 or 0.3 / 60^2, of the other ten times."""

@@ -81,6 +81,8 @@ def test_entries_of_lists_have_the_names_of_their_derivatives():
          "[uncertainty] material.fibre.yuong: expected a key of the case"),
         ([], "[uncertainty]\nmaterial.fibre.young = 0.0\n",
          "[uncertainty] material.fibre.young = 0.0: expected a standard"),
+        ([("poisson = 0.299", "poisson = 0.299\nstrength.principal = {mean = 80.0, std = 4.0}")], "",
+         "[uncertainty] material.matrix.strength.principal: no result whose scatter is given depends"),
         ([], PAIR, "[uncertainty] correlation = "),
         (UNCERTAIN, PAIR.replace("]]", '], ["material.fibre.young", "material.matrix.young", -0.4]]'),
          '[uncertainty] correlation = ["material.fibre.young", "material.matrix.young", -0.4]: this pair'),
