@@ -50,7 +50,7 @@ def figure(cell: drawn_cell.DrawnCell) -> Figure:
     entries = [Patch(facecolor=inks[k], edgecolor="black", linewidth=0.6, label=phases[k]) for k in present[:IN_LEGEND]]
     if len(present) > IN_LEGEND:
         entries.append(Patch(facecolor="none", edgecolor="none", label=f"and {len(present) - IN_LEGEND} others"))
-    picture.legend(handles=entries, loc="outside lower center", ncols=3, frameon=False)
+    drawn_cell.legend_below(axes, entries, 3)
     return picture
 
 
@@ -198,7 +198,7 @@ def deformed(cell: drawn_cell.DrawnCell, state: Any, document: Document) -> Figu
     marks = cell.interface.mark(axes, moved, drawn_cell.states_of_nodes(state))
     drawn_cell.label_cell_axes(axes, attributes)
     handles = [*(marks if len(marks) > 1 else ()), line]
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 2), frameon=False)
+    drawn_cell.legend_below(axes, handles, min(len(handles), 2))
     axes.set_title(_title(attributes, title))
     return figure
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, Literal
@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.transforms import ScaledTranslation
 from scipy.spatial import cKDTree
 
 from feti_homog.materials import voigt
@@ -115,10 +116,22 @@ def _wrapped(points: Array, period: Array, tolerance: float) -> Array:
 
 
 def figure_of(attributes: Any) -> tuple[Figure, Axes]:
-    """Return a figure with axes for the cell, and room for text, a legend and a colour bar."""
+    """Return a figure with axes for the cell, and room for text and a colour bar.
+
+    The places are given in inches: a layout engine would draw all text twice to find them.
+    """
     width, height = cell_size(attributes)
-    figure = Figure(figsize=(width + 1.9, max(height, width / 4) + 1.2), layout="compressed")
-    return figure, figure.subplots()
+    size = width + 1.9, max(height, width / 4) + 1.2
+    figure = Figure(figsize=size)
+    return figure, figure.add_axes((0.7 / size[0], 0.6 / size[1], width / size[0], 1.0 - 1.2 / size[1]))
+
+
+def legend_below(axes: Axes, handles: Sequence[Any], columns: int) -> None:
+    """Add a legend below the axes of a cell and their labels."""
+    figure: Any = axes.figure
+    below = axes.transAxes + ScaledTranslation(0.0, -0.5, figure.dpi_scale_trans)
+    place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "bbox_transform": below}
+    axes.legend(handles=handles, ncols=columns, frameon=False, **place)
 
 
 def cell_scale(attributes: Any) -> float:

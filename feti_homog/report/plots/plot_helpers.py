@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import TriMesh
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
@@ -72,18 +72,31 @@ def faint_grid(axes: Axes) -> None:
 
 def fill_triangles(axes: Axes, drawn: DrawnMesh, points: Array, colours: Array, edges: bool) -> None:
     """Fill triangles with colours (q, 4), without antialiasing, which would leave seams."""
-    style: dict[str, Any] = {"edgecolors": "none", "antialiased": False}
+    separate = np.arange(drawn.triangles.size).reshape(-1, 3)  # each triangle has nodes of its own
+    mesh: Any = _add_triangles(axes, points[drawn.triangles].reshape(-1, 2), separate)
+    mesh.set_facecolor(np.repeat(colours, 3, axis=0))
     if edges:
-        style = {"edgecolors": "0.55", "linewidths": 0.15}
-    corners: Any = points[drawn.triangles]
-    axes.add_collection(PolyCollection(corners, facecolors=colours, **style))
+        draw_segments(axes, points[drawn.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)], "0.55", 0.15)
 
 
 def shade_triangles(axes: Axes, drawn: DrawnMesh, points: Array, values: Array, norm: Normalize, colours: str) -> Any:
     """Draw triangles in smooth colours for the nodal values (p,).  The nodes are at `points` (p, 2)."""
+    mesh = _add_triangles(axes, points, drawn.triangles)
+    mesh.set(array=values, norm=norm, cmap=colours)
+    return mesh
+
+
+def _add_triangles(axes: Axes, points: Array, triangles: Array) -> TriMesh:
+    """Add triangles to the axes as pixels, also in vector graphics.
+
+    Matplotlib's `tripcolor` makes a path of each triangle to find the limits, which takes longer than all the rest.
+    """
     x, y = points.T
-    mesh = Triangulation(x, y, drawn.triangles)
-    return axes.tripcolor(mesh, values, shading="gouraud", norm=norm, cmap=colours)
+    mesh = TriMesh(Triangulation(x, y, triangles), rasterized=True)
+    mesh.set_in_layout(False)
+    axes.add_collection(mesh, autolim=False)
+    axes.update_datalim(points)
+    return mesh
 
 
 def draw_segments(
