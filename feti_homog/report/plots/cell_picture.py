@@ -203,7 +203,7 @@ def deformed(cell: drawn_cell.DrawnCell, state: Any, document: Document) -> Figu
     marks = cell.interface.mark(axes, moved, state)
     drawn_cell.label_cell_axes(axes, attributes)
     handles = [*(marks if len(marks) > 1 else ()), line]
-    drawn_cell.legend_below(axes, handles, min(len(handles), 2))
+    drawn_cell.legend_below(axes, handles, min(len(handles), 3))
     axes.set_title(_title(attributes, title))
     return figure
 

@@ -152,7 +152,9 @@ def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, 
     norm, extend = value_range(values, areas)
     bottom, top = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
     largest = max(-bottom, top) or 1.0
-    shades = mpl.colormaps["RdBu_r"](np.linspace(0.5 + 0.5 * bottom / largest, 0.5 + 0.5 * top / largest, 256))
+    # A range far from zero still begins with a light colour.
+    first, last = min(0.5 + 0.5 * bottom / largest, 0.55), max(0.5 + 0.5 * top / largest, 0.45)
+    shades = mpl.colormaps["RdBu_r"](np.linspace(first, last, 256))
     return norm, ListedColormap(shades), extend
 
 
