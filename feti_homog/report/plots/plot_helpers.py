@@ -16,6 +16,7 @@ from matplotlib.colors import Colormap, ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Path2D
+from matplotlib.text import Text
 from matplotlib.tri import Triangulation
 
 from feti_homog.case import bond_laws
@@ -42,6 +43,7 @@ OUTLIERS = 0.005  # area fraction that may lie outside a colour range, at either
 INK = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 # Colours of macroscopic stresses: one a component in all pictures.
 STRESS_INK = dict(zip(("S11", "S22", "S12", "S33", "S23", "S13"), INK, strict=False))
+LEAST_TEXT = 6.0  # points; journals take no smaller text
 STYLE = {"font.size": 10, "axes.titlesize": 11, "axes.linewidth": 0.8}
 DPI = 200
 
@@ -65,8 +67,12 @@ def save(figure: Figure, path: Path, look: Look = PLAIN) -> Path:
     if look.size is not None:
         before = figure.get_size_inches()
         figure.set_size_inches(look.size[0] / 2.54, look.size[1] / 2.54)
-        for text in (text for axes in figure.axes for text in axes.texts):
-            text.set_fontsize(float(text.get_fontsize() * min(1.0, (figure.get_size_inches() / before).min())))
+        scale = float(min(1.0, (figure.get_size_inches() / before).min()))
+        for text in figure.findobj(Text):
+            points = float(text.get_fontsize())
+            text.set_fontsize(max(scale * points, min(LEAST_TEXT, points)))
+        for axes in figure.findobj(Axes):
+            axes.tick_params(labelsize=max(10.0 * scale, LEAST_TEXT))
         if figure.get_layout_engine() is None:
             figure.set_layout_engine("compressed")
     box = "tight" if look.size is None else None
