@@ -13,7 +13,6 @@ from feti_homog.report.plots import drawn_cell, plot_helpers
 from feti_homog.results import landmarks, path_curves
 from feti_homog.typing import Array, Document
 
-ARROWS = 6  # most arrows along a path
 MARKS = {"first_softening_": "v", "first_break_": "D", "": "*"}  # of landmarks
 LEGIBLE = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5}  # background of numbers on curves
 STATES = {drawn_cell.BONDED: "bonded", drawn_cell.OPEN: "open", drawn_cell.CLOSED: "closed"}
@@ -55,8 +54,8 @@ def figure(document: Document) -> Figure:
     # The panels of path_states.png show the same points.
     by_state = landmarks.kept_points(document)
     numbers = [by_state[state] for state in landmarks.landmark_states(document, 6, len(by_state))]
-    curve, ink = np.stack([strain, stress[:, component]], axis=1), _ink(document, component)
     peak, unit = landmarks.peak_of(document), case.get("output", {}).get("stress_unit", "")
+    curve, ink = np.stack([strain, stress[:, component]], axis=1), plot_helpers.STRESS_INK[peak["stress_name"]]
     star: dict[str, Any] = {"markeredgecolor": "white", "zorder": 5, "linestyle": "none", "color": ink}
     for title, mark in MARKS.items():
         if f"{title}event" in peak:
@@ -69,7 +68,7 @@ def figure(document: Document) -> Figure:
         axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
         plot_helpers.finish_curves(axes)
     upper.margins(y=0.12)  # room for numbers
-    _number_points(upper, curve, numbers, ink)
+    _number_points(upper, curve, numbers)
     if "damaged_length" in points[0]:  # softening laws have damaged bonds that hold
         right = lower.twinx()
         right.plot(strain, [sum(p["damaged_length"]) for p in points], color="0.5", linestyle="--", linewidth=1.0)
@@ -79,11 +78,6 @@ def figure(document: Document) -> Figure:
         right.spines["top"].set_visible(False)
         lower.legend(frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.12, 1.0))
     return picture
-
-
-def _ink(document: Document, component: int) -> str:
-    """Return the colour of a stress component."""
-    return plot_helpers.STRESS_INK[voigt.voigt_names(len(document["path"][0]["stress"]))[1][component]]
 
 
 def _stress_curves(
@@ -138,20 +132,13 @@ def _records(document: Document) -> Array | None:
     return np.flatnonzero(load >= np.maximum.accumulate(load))
 
 
-def _number_points(axes: Axes, curve: Array, numbers: Sequence[int], ink: str) -> None:
-    """Write point numbers with lines to a curve (points, 2), and draw arrows in the colour `ink` along the curve."""
+def _number_points(axes: Axes, curve: Array, numbers: Sequence[int]) -> None:
+    """Write point numbers with lines to a curve (points, 2)."""
     style: dict[str, Any] = {"color": "0.3", "fontsize": 7, "ha": "center", "va": "center", "bbox": LEGIBLE}
     pointer: dict[str, Any] = {"arrowstyle": "-", "color": "0.3", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
     for number, rise in zip(numbers, np.diff(curve[numbers, 1], prepend=0.0), strict=True):
         offset = (-6, 16) if rise >= 0.0 else (16, -12)  # clear of the curve at peaks and at the ends of drops
         axes.annotate(str(number), curve[number], offset, textcoords="offset points", arrowprops=pointer, **style)
-    pointer = {"arrowstyle": "-|>", "color": ink, "linewidth": 0, "shrinkB": 0, "mutation_scale": 15}
-    corners = np.vstack([np.zeros(2), curve])
-    steps, extent = np.diff(corners, axis=0), np.ptp(corners, axis=0)
-    length = np.linalg.norm(steps / np.where(extent > 0.0, extent, 1.0), axis=1)
-    for k in np.argsort(-length, kind="stable")[:ARROWS]:
-        if length[k] > 0.06:
-            axes.annotate("", corners[k] + 0.52 * steps[k], corners[k], arrowprops=pointer)
 
 
 def energies(document: Document) -> Figure | None:
