@@ -11,7 +11,7 @@ from feti_homog.analysis import path_events
 from feti_homog.analysis.constants import check_accuracy, state_error
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import PathPoint, Peak
-from feti_homog.analysis.tip_records import criterion_of, tips
+from feti_homog.analysis.tip_records import criterion_of, most_utilised_bond, tips
 from feti_homog.case import load_sections
 from feti_homog.errors import NotCarriedError
 from feti_homog.homogenization import averaging
@@ -203,10 +203,13 @@ def _completed(
         )
     for number, mark in marks.items():
         entries[number]["mark"] = mark
-    return {
-        "path": tuple(PathPoint(**entry) for entry in entries),
-        "peak": Peak(**landmarks.peak_of(document)),
-    } | states
+    peak = landmarks.peak_of(document)
+    for title in ("first_softening_", "first_break_", ""):
+        if (event := peak.get(f"{title}event")) is not None:
+            point = last if event == len(entries) - 1 else path_events.read(context, law, event)[1]
+            bond = most_utilised_bond(context, point.used)
+            peak |= {f"{title}{name}": value for name, value in bond.items()}
+    return {"path": tuple(PathPoint(**entry) for entry in entries), "peak": Peak(**peak)} | states
 
 
 def _checked(

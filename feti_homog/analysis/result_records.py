@@ -139,8 +139,8 @@ class PathPoint:
     )
     temperature: float | None = described(TEMPERATURE, default=None)
     mark: str | None = described(
-        "`first break`, `peak` or `largest so far`, `after the peak` (the branch of the valley after it) or `end`, "
-        "several joined by `and`",
+        "`first softening`, `first break`, `peak` or `largest so far`, `after the peak` (branch of the valley after "
+        "it) or `end`, several joined by `and`",
         default=None,
     )
     broke: int = described("bonds that break at this event, or broke in the step to this increment")
@@ -204,14 +204,21 @@ class Peak:
 
     stress_name: str = described("name of the component")
     strain_name: str = described("name of its strain")
-    stress: float = described(
-        "the largest in magnitude up to that fall, or of all without one, with its sign", records.STRESS
-    )
+    stress: float = described("the largest up to that fall, or of all without one, signed", records.STRESS)
     strain: float = described("macroscopic strain there")
     event: int = described("number of its point in `path`, from 0")
     first_break_stress: float | None = described("stress where the first bonds break", records.STRESS, default=None)
     first_break_strain: float | None = described("strain there", default=None)
     first_break_event: int | None = described("number of that point", default=None)
+    first_break_fibre: int | None = described("fibre of the most utilised bond there, from 1", default=None)
+    first_break_angle: float | None = described("direction of that bond from the centre", records.DEGREES, default=None)
+    first_softening_stress: float | None = described("stress where first bonds soften", records.STRESS, default=None)
+    first_softening_strain: float | None = described("strain there", default=None)
+    first_softening_event: int | None = described("number of that point", default=None)
+    first_softening_fibre: int | None = described("fibre of the most utilised bond there, from 1", default=None)
+    first_softening_angle: float | None = described("direction of that bond", records.DEGREES, default=None)
+    fibre: int | None = described("fibre of the most utilised bond at the peak, from 1", default=None)
+    angle: float | None = described("direction of that bond from the centre", records.DEGREES, default=None)
     stress_left: float | None = described(
         "stress in the valley of that fall, the load only rising on a path of one leg; absent where it never falls by "
         "1 % as bonds break",

@@ -1,6 +1,7 @@
 """Debonding tips in result.json: their bond law, driving energies, release rates and modes."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from feti_homog.analysis.result_records import TipRates, Tips
 from feti_homog.errors import CaseError
 from feti_homog.homogenization import averaging, unit_cell
 from feti_homog.interface.contact import BONDED
-from feti_homog.interface.laws import BondLaw, energy
+from feti_homog.interface.laws import UTILISATION_TIE, BondLaw, energy
 from feti_homog.interface.path import path_points
 from feti_homog.materials import voigt
 from feti_homog.typing import Float, Int
@@ -84,6 +85,19 @@ def tips(context: AnalysisContext, law: BondLaw, point: path_points.Point) -> Ti
     table = table[np.lexsort((np.round(table[:, 1], DIRECTION_DIGITS), table[:, 5], table[:, 0]))]
     fibre, angle, opening, shear, mode, pair = table.T
     return Tips(tuple(fibre.astype(int).tolist()), angle, opening, shear, mode, _sections(cell, pair))
+
+
+def most_utilised_bond(context: AnalysisContext, used: Float) -> dict[str, Any]:
+    """Return the `fibre` and `angle` of the most utilised bond; empty if no bond holds.  Collective.
+
+    `used` (k,) has the utilisations of this rank's bonds.  Ties: lowest fibre, then direction.
+    """
+    cell = context.cell
+    fibre = cell.summary.fibre_number(context.loads.interfaces.nodes.fibre)
+    table = np.concatenate(cell.comm.allgather(np.column_stack([used, fibre, bond_directions(cell)])))
+    table = table[(table[:, 0] > 0.0) & (table[:, 0] >= table[:, 0].max(initial=0.0) * (1.0 - UTILISATION_TIE))]
+    first = table[np.lexsort((np.round(table[:, 2], DIRECTION_DIGITS), table[:, 1]))[:1]]
+    return {} if not len(first) else {"fibre": int(first[0, 1]), "angle": float(first[0, 2])}
 
 
 def _sections(cell: unit_cell.TornCell, pair: Float | Int) -> tuple[int, ...] | None:

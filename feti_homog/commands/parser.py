@@ -95,7 +95,15 @@ def _add_products(commands: argparse._SubParsersAction[Parser]) -> None:
     ]
     for parser in of_result:
         parser.add_argument("directory", type=folder, metavar="DIR")
-    *_, fields, export, verify = of_result
+    plot, _, fields, export, verify = of_result
+    plot.add_argument(
+        "--format", choices=("png", "pdf", "svg"), default="png", help="pdf, svg: lines and text as vectors"
+    )
+    plot.add_argument("--state", type=integer, metavar="N", help="draw state N of result.h5 alone, counted from 0")
+    stresses = ("S11", "S22", "S12", "S33", "S23", "S13")
+    plot.add_argument("--component", choices=stresses, metavar="NAME", help="stress to draw: S11, S22, S12, ...")
+    plot.add_argument("--size", type=size, metavar="WxH", help="width and height in centimetres, such as 9x7")
+    plot.add_argument("--title", metavar="TEXT", help='title of the pictures; "" for none')
     fields.add_argument(
         "--format",
         choices=("vtkhdf", "vtu"),
@@ -162,3 +170,13 @@ def integer(word: str) -> int:
     if not re.fullmatch(r"[+-]?[0-9]{1,9}", word):
         raise ValueError
     return int(word)
+
+
+def size(word: str) -> tuple[float, float]:
+    """Convert a word such as 9x7.5 to two lengths above zero.  Raises ValueError."""
+    if not re.fullmatch(r"[0-9]{1,3}(\.[0-9]{1,3})?x[0-9]{1,3}(\.[0-9]{1,3})?", word):
+        raise ValueError
+    width, height = map(float, word.split("x"))
+    if min(width, height) < 2.0:  # less than a picture's text needs
+        raise ValueError
+    return width, height

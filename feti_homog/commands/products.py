@@ -15,11 +15,12 @@ from feti_homog.typing import Intracomm
 
 def plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
     """Draw the pictures of a stored result again."""
-    from feti_homog.report.plots import figures
+    from feti_homog.report.plots import figures, plot_helpers
 
     directory = _result_folder(arguments)
     mpi_errors.on_root_only(comm, stored_result.check_to_draw, directory)
-    paths = mpi_errors.on_root_only(comm, figures.plot, directory)
+    look = plot_helpers.Look(arguments.format, arguments.size, arguments.title)
+    paths = mpi_errors.on_root_only(comm, figures.plot, directory, look, arguments.state, arguments.component)
     if paths == []:
         standard_streams.say(f"{directory}: nothing to draw: its case has no fields, and no points that make a curve")
     for path in paths or []:

@@ -48,6 +48,7 @@ class MeshPart:
         shape="(m,)",
         dtype="int32",
     )
+    rank: AnyInt = described("rank that computed each element, from 0", shape="(m,)", dtype="int32")
     phase: AnyInt = described("phase of each element, a place in `phases`", shape="(m,)", dtype="int32")
     fibre_number: AnyInt = described(
         "number of the fibre, also of its coating, from 1; 0 in the matrix", shape="(m,)", dtype="int32"

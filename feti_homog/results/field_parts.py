@@ -42,6 +42,7 @@ def mesh_part(cell: unit_cell.TornCell) -> MeshPart:
         triangles=np.concatenate(triangles or [np.zeros((0, columns), np.int64)]),
         body=np.repeat([s.submesh.body for s in subdomains], sizes).astype(np.int32),
         subdomain=np.repeat([s.submesh.index for s in subdomains], sizes).astype(np.int32),
+        rank=np.full(sum(sizes), cell.comm.rank, np.int32),
         phase=np.repeat(phase, sizes).astype(np.int32),
         fibre_number=np.repeat([cell.summary.numbers[s.submesh.body] for s in subdomains], sizes).astype(np.int32),
     )

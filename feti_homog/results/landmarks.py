@@ -1,8 +1,8 @@
 """Find the path landmarks, and choose the points to keep and to show.
 
-Landmarks are first break, peak, valley after the peak, and end.  The peak is the largest stress before a fall, in the
-component with the largest strain.  Points are entries of `path` in result.json.  At the end of a path, fields are kept
-for both ends, for points around drops, and for evenly spaced points between them.
+Landmarks are first softening, first break, peak, valley after the peak, and end.  The peak is the largest stress before
+a fall, in the component with the largest strain.  Points are entries of `path` in result.json.  At the end of a path,
+fields are kept for both ends, for points around drops, and for evenly spaced points between them.
 """
 
 from collections.abc import Collection, Sequence
@@ -68,19 +68,26 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
     event = int(number[size[: top + 1].argmax()])
     names = [names[component] for names in voigt.voigt_names(len(points[0]["stress"]))]
     entries = {"stress": float(stress[event]), "strain": float(strain[event]), "event": event}
-    first = next((number for number, point in enumerate(points) if point["broke"]), None)
-    if first is not None:
-        entries |= {
-            "first_break_stress": float(stress[first]),
-            "first_break_strain": float(strain[first]),
-            "first_break_event": first,
-        }
+    for title, count in (("first_softening", "softened"), ("first_break", "broke")):
+        first = next((number for number, point in enumerate(points) if point.get(count)), None)
+        if first is not None:
+            numbers = {"stress": float(stress[first]), "strain": float(strain[first]), "event": first}
+            entries |= {f"{title}_{name}": value for name, value in numbers.items()}
     if valley is not None:
         entries |= {"stress_left": float(curve[valley]), "event_left": int(number[valley])}
     elif points[-1]["load_factor"] < 1.0 - path_curves.SAME_LOAD:
         entries["so_far"] = True
     entries["dissipated"] = points[event].get("dissipated", 0.0)
-    return {"strain_name": names[0], "stress_name": names[1], **entries}
+    # The fibres and directions of the bonds follow from the states alone.
+    bonds = {name: value for name, value in document.get("peak", {}).items() if name.endswith(("fibre", "angle"))}
+    return {"strain_name": names[0], "stress_name": names[1], **entries, **bonds}
+
+
+def bond_of(peak: path_curves.Document, title: str = "") -> str:
+    """Describe the bond at a landmark, such as "first_break_", by fibre and direction; empty if unknown."""
+    if peak.get(f"{title}fibre") is None:
+        return ""
+    return f"fibre {peak[f'{title}fibre']} at {peak[f'{title}angle'] + 0.0:.4g} degrees"
 
 
 def stresses_of(document: path_curves.Document, peak: path_curves.Document) -> list[float]:
@@ -106,7 +113,12 @@ def marks(document: path_curves.Document) -> dict[int, str]:
     """Return the titles of all landmarks, by rising point number."""
     peak = peak_of(document)
     largest = name_of(document, peak)
-    places = {"first break": "first_break_event", largest: "event", f"after the {largest}": "event_left"}
+    places = {
+        "first softening": "first_softening_event",
+        "first break": "first_break_event",
+        largest: "event",
+        f"after the {largest}": "event_left",
+    }
     entries = {title: peak[name] for title, name in places.items() if name in peak}
     entries["end"] = len(document["path"]) - 1
     numbers = sorted({int(number) for number in entries.values()})

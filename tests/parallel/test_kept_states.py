@@ -223,3 +223,19 @@ def test_without_fields_none_are_kept(comm, shared_path):
     result = run(Case.parse(document_of), comm, out=shared_path)
     assert result.states is None and "states" not in document(shared_path)
     parallel_assert(comm, not (shared_path / field_file.NAME).exists())
+
+
+@pytest.mark.parametrize(("strain", "angle"), [([0.2, 0.0, 0.0], 0.0), ([0.0, 0.2, 0.0], 90.0)])
+def test_damage_starts_at_the_poles_of_a_pulled_fibre(comm: Any, strain: list[float], angle: float) -> None:
+    """There the normal traction is largest; softening starts before the first break."""
+    softening = Case.parse(case("softening", 2).resolved() | {"path": {"strain": strain}})
+    for pulled in (case("straight", 2, strain=strain), softening):
+        peak = run(pulled, comm).peak
+        assert peak is not None
+        bonds = [(peak.first_break_fibre, peak.first_break_angle)]
+        if pulled is softening:
+            bonds.append((peak.first_softening_fibre, peak.first_softening_angle))
+            parallel_assert(comm, (peak.first_softening_event or 0) < (peak.first_break_event or 0))
+        for fibre, direction in bonds:
+            off = abs(float(direction or 0.0) - angle) % 180.0
+            parallel_assert(comm, fibre == 1 and min(off, 180.0 - off) < 25.0)

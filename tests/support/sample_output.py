@@ -46,7 +46,7 @@ def sample(cells: int = 8, refine: int = 0, order: int = 1) -> Sample:
         corners = np.concatenate([corners, mids], axis=1)
     points, triangles = _merge(corners, submesh)
     phase = (submesh == 2).astype(int)
-    mesh = MeshPart(points, triangles, body=phase, subdomain=submesh, phase=phase, fibre_number=phase)
+    mesh = MeshPart(points, triangles, body=phase, subdomain=submesh, rank=phase, phase=phase, fibre_number=phase)
     header = Header("sample", "0", 1.0, 1.0, order, refine, ("matrix", "fibre"), "mm", "GPa")
     one = np.array([1])
     fibres = FibrePart(one, one, one, np.array([[0.5, 0.5]]), np.array([np.nan]), np.ones(1))
@@ -61,7 +61,7 @@ def part_of(whole: Sample, rank: int, size: int) -> Sample:
     mine = [submesh for submesh in range(last + 1) if min(submesh, size - 1) == rank]
     rows = np.isin(mesh.subdomain, mine)
     nodes, triangles = np.unique(mesh.triangles[rows], return_inverse=True)
-    labels = {name: getattr(mesh, name)[rows] for name in ("body", "subdomain", "phase", "fibre_number")}
+    labels = {name: getattr(mesh, name)[rows] for name in ("body", "subdomain", "rank", "phase", "fibre_number")}
     part = MeshPart(mesh.points[nodes], triangles.reshape(-1, mesh.triangles.shape[1]), **labels)
     owned = slice(None) if last in mine else slice(0)
     fibres = FibrePart(**{name: table[: 1 if rank == 0 else 0] for name, table in vars(whole.fibres).items()})

@@ -22,8 +22,8 @@ from feti_homog.report.plots import decimation, drawn_cell, plot_helpers
 from feti_homog.typing import Array, Document
 
 IN_LEGEND = 12  # most phases in the legend, which would otherwise cover the cell
-MATRIX = "#ece8df"
-FIBRES = ("Blues", "Oranges", "Greens", "Purples", "Reds", "Greys")  # one colour map for each phase
+MATRIX = "0.87"
+FIBRES, TURN = "hsv", 0.618  # a cyclic colour map without grey, and the share of a turn between two phases
 LEAST_SIZE = 3.0  # points; smallest font size
 LEVEL_INK, LEVEL_WIDTH = "0.15", 0.6  # style of the contour lines of u_3
 UNDEFORMED = "0.5"
@@ -36,10 +36,9 @@ def figure(cell: drawn_cell.DrawnCell) -> Figure:
     """
     drawn, attributes, fibres = cell.drawn, cell.file.attrs, cell.file["fibre"]
     phases = list(attributes["phases"])
-    # The first phases have a colour map each, for the largest contrast; further phases have other tones.
-    tones = [0.55 - 0.25 * (k // len(FIBRES) * 0.618 % 1.0) for k in range(len(phases) - 1)]
-    materials = [mpl.colormaps[FIBRES[k % len(FIBRES)]](tone) for k, tone in enumerate(tones)]
-    inks = np.array([mpl.colors.to_rgba(MATRIX), *materials])
+    # The golden section never repeats a colour; white between leaves room for black numbers.
+    fibres_inks = 0.45 + 0.55 * mpl.colormaps[FIBRES]((0.58 + TURN * np.arange(len(phases) - 1)) % 1.0)
+    inks = np.array([mpl.colors.to_rgba(MATRIX), *fibres_inks])
     picture, axes = _outlined(cell, inks[drawn.phase])
     factors = fibres["strength"][:] if "strength" in fibres else np.ones(len(fibres["number"]))
     varies = bool((factors != 1.0).any())
@@ -50,24 +49,30 @@ def figure(cell: drawn_cell.DrawnCell) -> Figure:
     entries = [Patch(facecolor=inks[k], edgecolor="black", linewidth=0.6, label=phases[k]) for k in present[:IN_LEGEND]]
     if len(present) > IN_LEGEND:
         entries.append(Patch(facecolor="none", edgecolor="none", label=f"and {len(present) - IN_LEGEND} others"))
-    picture.legend(handles=entries, loc="outside lower center", ncols=3, frameon=False)
+    drawn_cell.legend_below(axes, entries, 3)
     return picture
 
 
 def partition(cell: drawn_cell.DrawnCell) -> Figure:
-    """Draw each part, the piece of one body in one subdomain, in a colour.
+    """Draw each part, the piece of one body in one subdomain, in a tone of the colour of its rank.
 
     A subdomain across several materials has one part in each body.
     """
     drawn = cell.drawn
-    parts = drawn.subdomain.max() + 1
-    # Parts with close numbers get very different colours.
-    colours: Array = mpl.colormaps["tab20"](np.arange(parts) * 7 % 20)
-    colours[:, :3] = 0.3 + 0.7 * colours[:, :3]
+    parts, ranks = drawn.subdomain.max() + 1, np.unique(drawn.rank)
+    base: Array = mpl.colormaps[FIBRES]((0.58 + TURN * np.arange(drawn.rank.max() + 1)) % 1.0)[:, :3]
+    rank_of = np.zeros(parts, int)
+    rank_of[drawn.subdomain] = drawn.rank
+    tones = 0.25 + 0.6 * (TURN * np.arange(parts) % 1.0)[:, None]  # parts with close numbers differ much
+    colours = np.column_stack([(1.0 - tones) * base[rank_of] + tones, np.ones(parts)])
     picture, axes = _outlined(cell, colours[drawn.subdomain])
     plot_helpers.draw_segments(axes, drawn.points[decimation.outline_edges(drawn, drawn.subdomain)], "black", 0.5)
     text = f"{_count(drawn.body.max() + 1, 'body', 'bodies')} in {_count(parts, 'part', 'parts')}"
-    axes.set_title(_title(cell.file.attrs, text))
+    axes.set_title(_title(cell.file.attrs, f"{text} on {_count(len(ranks), 'rank', 'ranks')}"))
+    entries = [Patch(facecolor=0.55 * base[k] + 0.45, edgecolor="black", label=f"rank {k}") for k in ranks[:IN_LEGEND]]
+    if len(entries) > 1:
+        entries += [Patch(facecolor="none", label=f"to rank {ranks[-1]}")] * (len(ranks) > IN_LEGEND)
+        drawn_cell.legend_below(axes, entries, 3)
     return picture
 
 
@@ -95,9 +100,9 @@ def mesh_error(cell: drawn_cell.DrawnCell) -> Figure | None:
     top = float(plot_helpers.value_range(density, area)[0].vmax or highest)
     lowest = top / 10.0**4  # smaller densities, on hardly any area, have one colour
     colours = ScalarMappable(LogNorm(lowest, top), "magma_r")
-    plot_helpers.fill_triangles(
-        axes, drawn, drawn.points, np.asarray(colours.to_rgba(np.maximum(density, lowest))), edges=False
-    )
+    # Means at the nodes of each body do not show where the body is cut.
+    values = np.maximum(np.exp(decimation.node_means(np.log(np.maximum(density, lowest)), drawn)), lowest)
+    plot_helpers.shade_triangles(axes, drawn, drawn.points, values, colours.norm, colours.cmap)
     extend = "both" if highest > top else "min"
     bar = drawn_cell.bar_beside(axes, colours, extend)
     letters = int((picture.get_figheight() - 1.2) / 0.075)
@@ -195,10 +200,10 @@ def deformed(cell: drawn_cell.DrawnCell, state: Any, document: Document) -> Figu
         plot_helpers.draw_segments(axes, outline, UNDEFORMED, 0.7)
         line = Line2D([], [], color=UNDEFORMED, linewidth=0.7, label="undeformed")
     plot_helpers.draw_segments(axes, moved[cell.borders], "black", 0.8)
-    marks = cell.interface.mark(axes, moved, drawn_cell.states_of_nodes(state))
+    marks = cell.interface.mark(axes, moved, state)
     drawn_cell.label_cell_axes(axes, attributes)
     handles = [*(marks if len(marks) > 1 else ()), line]
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 2), frameon=False)
+    drawn_cell.legend_below(axes, handles, min(len(handles), 3))
     axes.set_title(_title(attributes, title))
     return figure
 

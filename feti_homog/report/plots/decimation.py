@@ -32,6 +32,7 @@ class DrawnMesh:
     triangles: Array  # (q, 3) into points
     body: Array  # (q,)
     subdomain: Array  # (q,)
+    rank: Array  # (q,)
     phase: Array  # (q,)
 
     @cached_property
@@ -75,8 +76,10 @@ def drawn_mesh(file: Any, limit: int = TRIANGLE_LIMIT, block: int = 1 << 18) -> 
     nodes, triangles = np.unique(corners, return_inverse=True)
     labels = {
         name: np.repeat(_blocks(file[f"mesh/{name}"], group, block, lambda rows: rows[:, 0]), pieces)
-        for name in ("body", "subdomain", "phase")
+        for name in ("body", "subdomain", "rank", "phase")
+        if f"mesh/{name}" in file
     }
+    labels.setdefault("rank", np.zeros_like(labels["body"]))  # of files that do not have it yet
     points = _picked(file["mesh/points"], nodes, block)
     return DrawnMesh(block, group, pieces, nodes, points, triangles.reshape(-1, 3), **labels)
 

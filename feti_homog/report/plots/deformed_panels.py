@@ -35,7 +35,7 @@ class DeformedCell(drawn_cell.DrawnCell):
     """A cell with the colours, scale and labels that all panels share."""
 
     component: str
-    colours: tuple[Normalize, str, str]
+    colours: tuple[Normalize, Any, str]
     scale: float
     labels: drawn_cell.LoadLabels
     marks: Mapping[int, str]
@@ -66,17 +66,26 @@ class DeformedCell(drawn_cell.DrawnCell):
         return places
 
     def draw(self, axes: Axes, number: int, moved: Array) -> Any:
-        """Draw the cell in a state, with its nodes at `moved` (p, 2); return the coloured triangles."""
+        """Draw the cell in a state, with its nodes at `moved` (p, 2); return the coloured triangles.
+
+        The end of a path has a range of its own if its stresses would all have the last colour of the common range.
+        """
         state, (norm, colours, _) = self.state(number), self.colours
-        stress = plot_helpers.nodal_stress(state, self.component, self.drawn)
+        stress, mark = (
+            plot_helpers.nodal_stress(state, self.component, self.drawn),
+            self.marks.get(state.attrs["point"]),
+        )
+        own, *rest = plot_helpers.colour_range(stress, self.drawn.node_areas)
+        least, most = (max(abs(limits.vmin or 0.0), abs(limits.vmax or 0.0)) for limits in (norm, own))
+        if mark == "end" and most > 2.0 * least:
+            norm, colours, mark = own, rest[0], "end, own colours"
         shapes = plot_helpers.shade_triangles(axes, self.drawn, moved, stress, norm, colours)
         plot_helpers.draw_segments(axes, moved[self.borders], "black", 0.5)
-        self.interface.mark(axes, moved, drawn_cell.states_of_nodes(state), magnified=0.8)
+        self.interface.mark(axes, moved, state, magnified=0.8)
         axes.set_aspect("equal")
         axes.set(xticks=(), yticks=())
         axes.set_axis_off()
         attributes = state.attrs
-        mark = self.marks.get(int(attributes["point"]))
         title = f"{mark}: {attributes['label']}" if mark else attributes["label"]
         axes.set_title(f"{title}\n{self.labels.label(attributes, LOADS_IN_PANEL)}", fontsize=9, y=1.0)
         return shapes
@@ -179,6 +188,8 @@ def panels(file: Any, document: Document, scale: float) -> Figure:
     figure = Figure(figsize=(WIDTH, rows * height + 0.7), layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     shapes = [cell.draw(axes, number, moved) for axes, number, moved in zip(grid, numbers, places, strict=False)]
+    if shapes[-1].norm is not cell.colours[0]:
+        cell.bar(grid[len(numbers) - 1], shapes[-1])
     bar: Any = figure.colorbar(shapes[0], ax=grid.tolist(), extend=cell.colours[2], shrink=0.7, aspect=30, pad=0.01)
     bar.locator = MaxNLocator(6)
     for axes in grid[len(numbers) :]:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, Literal
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.transforms import ScaledTranslation
 from scipy.spatial import cKDTree
 
 from feti_homog.materials import voigt
@@ -32,7 +34,7 @@ class NodeState(IntEnum):
 
 BONDED, CLOSED, OPEN, DAMAGED = NodeState
 STATE_NAMES = {BONDED: "bonded", DAMAGED: "damaged", CLOSED: "in contact", OPEN: "open"}
-STATE_COLOURS = {BONDED: "black", CLOSED: "#ff7f0e", OPEN: "#00a14b", DAMAGED: "#9467bd"}
+STATE_COLOURS = {BONDED: "black", CLOSED: "#E69F00", OPEN: "#0072B2"}
 STATE_WIDTHS = {BONDED: 0.8, CLOSED: 2.6, OPEN: 2.0, DAMAGED: 2.0}
 # An edge has the state of that end which comes later in this order.
 ORDER = np.array(list(STATE_NAMES))
@@ -65,9 +67,13 @@ class InterfaceEdges:
         """Return the edge states (e,) for node states (k,): open if an end is open, else in contact or damaged."""
         return np.asarray(ORDER[np.argsort(ORDER)[status[self.nodes]].max(axis=1, initial=0)])
 
-    def mark(self, axes: Axes, points: Array, status: Array, magnified: float = 1.0) -> list[Line2D]:
-        """Draw the interface edges, with nodes at `points` (p, 2); return legend lines for the drawn states."""
-        states = self.state(status)
+    def mark(self, axes: Axes, points: Array, state: Any, magnified: float = 1.0) -> list[Line2D]:
+        """Draw the interface edges in a state, with nodes at `points` (p, 2); return legend lines for the drawn states.
+
+        Damaged edges that hold have colours by the damage of their ends, in tenths.
+        """
+        states = self.state(states_of_nodes(state))
+        damage = state["damage"][:][self.nodes].max(axis=1, initial=0.0) if "damage" in state else np.zeros(len(states))
         present = [kind for kind in STATE_NAMES if (states == kind).any()]
         for kind in present:
             segments = points[self.edges[states == kind]]
@@ -75,7 +81,10 @@ class InterfaceEdges:
             if kind != BONDED:
                 # This ink shows on every colour; magenta and orange vanish on red.
                 draw_segments(axes, segments, "white", magnified * (STATE_WIDTHS[kind] + 1.6), cap)
-            draw_segments(axes, segments, STATE_COLOURS[kind], magnified * STATE_WIDTHS[kind], cap)
+            tenths = np.ceil(10.0 * damage[states == kind]) if kind == DAMAGED else np.ones(len(segments))
+            for tenth in np.unique(tenths):
+                ink = damage_colour(tenth / 10.0) if kind == DAMAGED else STATE_COLOURS[kind]
+                draw_segments(axes, segments[tenths == tenth], ink, magnified * STATE_WIDTHS[kind], cap)
         return state_legend(present)
 
 
@@ -103,8 +112,17 @@ def states_of_nodes(state: Any) -> Array:
     return np.asarray(np.where((status == BONDED) & (damage > 0.0), DAMAGED, status))
 
 
-def state_legend(kinds: Iterable[NodeState]) -> list[Line2D]:
-    return [Line2D([], [], color=STATE_COLOURS[k], linewidth=STATE_WIDTHS[k], label=STATE_NAMES[k]) for k in kinds]
+def damage_colour(damage: float) -> Any:
+    """Return the colour of a damage between 0 and 1."""
+    return mpl.colormaps["BuPu"](0.35 + 0.65 * damage)
+
+
+def state_legend(kinds: Collection[NodeState]) -> list[Line2D]:
+    """Return legend lines of interface states, with three steps of the colours of damage."""
+    lines = [(STATE_NAMES[k], STATE_COLOURS[k], STATE_WIDTHS[k]) for k in kinds if k != DAMAGED]
+    if DAMAGED in kinds:
+        lines += [(f"damage {d:g}", damage_colour(d), STATE_WIDTHS[DAMAGED]) for d in (0.1, 0.5, 1.0)]
+    return [Line2D([], [], color=ink, linewidth=width, label=name) for name, ink, width in lines]
 
 
 def _wrapped(points: Array, period: Array, tolerance: float) -> Array:
@@ -115,10 +133,22 @@ def _wrapped(points: Array, period: Array, tolerance: float) -> Array:
 
 
 def figure_of(attributes: Any) -> tuple[Figure, Axes]:
-    """Return a figure with axes for the cell, and room for text, a legend and a colour bar."""
+    """Return a figure with axes for the cell, and room for text and a colour bar.
+
+    The places are given in inches: a layout engine would draw all text twice to find them.
+    """
     width, height = cell_size(attributes)
-    figure = Figure(figsize=(width + 1.9, max(height, width / 4) + 1.2), layout="compressed")
-    return figure, figure.subplots()
+    size = width + 1.9, max(height, width / 4) + 1.2
+    figure, sides = Figure(figsize=size), {"left": 0.7 / size[0], "right": (0.7 + width) / size[0]}
+    return figure, figure.subplots(gridspec_kw=sides | {"bottom": 0.6 / size[1], "top": 1.0 - 0.6 / size[1]})
+
+
+def legend_below(axes: Axes, handles: Sequence[Any], columns: int) -> None:
+    """Add a legend below the axes of a cell and their labels."""
+    figure: Any = axes.figure
+    below = axes.transAxes + ScaledTranslation(0.0, -0.5, figure.dpi_scale_trans)
+    place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "bbox_transform": below}
+    axes.legend(handles=handles, ncols=columns, frameon=False, **place)
 
 
 def cell_scale(attributes: Any) -> float:

@@ -1,11 +1,13 @@
 """All pictures of a result folder; each module of this package is loaded only for results with its pictures."""
 
 from pathlib import Path
+from typing import Any
 
 import h5py
 import matplotlib as mpl
+from matplotlib.figure import Figure
 
-from feti_homog.errors import FetiHomogError
+from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.materials import voigt
 from feti_homog.report.plots import cell_picture, drawn_cell, plot_helpers
 from feti_homog.report.text.summary import reported
@@ -13,7 +15,12 @@ from feti_homog.results import atomic, field_file, output_folder, result_json
 from feti_homog.typing import Document
 
 
-def plot(directory: Path) -> list[Path]:
+def plot(
+    directory: Path,
+    look: plot_helpers.Look = plot_helpers.PLAIN,
+    state: int | None = None,
+    component: str | None = None,
+) -> list[Path]:
     """Draw the pictures of a result folder into the folder; return the picture paths.
 
     - cell.png: materials; partition.png: body parts; mesh_error.png: estimated mesh error;
@@ -21,46 +28,62 @@ def plot(directory: Path) -> list[Path]:
     - sensitivities.png, if the case asks for them;
     - `angle`: angle.png, angle_states.png; `path`: path.png, path_states.png, path.gif, energy.png;
     - `load`: load.png; `envelope`: envelope.png;
-    - interface.png, if some interface is debonded.
+    - interface.png, of a path or a debonded interface: tractions, jumps and damage around fibres.
 
     [output] of the case in result.json chooses stress component (default: by the unit strain) and deformation scale.
-    A case without fields has curves alone.  Call on one rank.
+    A case without fields has curves alone.  A `component` replaces the stress; a `state` gives state_K.png alone.  Call
+    on one rank.
 
     Raises:
+        CaseError: the result has no such state or component.
         FetiHomogError: result.h5 cannot be read, or a picture cannot be written.
     """
     directory, paths = Path(directory), list[Path]()
     atomic.remove_unfinished(directory, output_folder.RESULT_FILE, alone=False)
     document = result_json.read(directory) if (directory / result_json.NAME).exists() else {}
+    if component is not None:
+        document.setdefault("case", {}).setdefault("output", {})["stress"] = component
     with mpl.rc_context(plot_helpers.STYLE):
         if document.get("case", {}).get("output", {}).get("fields", True):
             try:
                 with h5py.File(directory / field_file.NAME, "r") as file:
-                    paths = of_fields(directory, drawn_cell.DrawnCell.of(file), document)
+                    paths = of_fields(directory, file, document, look, state)
             except OSError as error:
                 reason = error.strerror or error
                 raise FetiHomogError(f"cannot draw {directory / field_file.NAME}: {reason}") from error
-        if document.keys() & {"angle", "path", "envelope", "sensitivities"}:
+        if state is None and document.keys() & {"angle", "path", "envelope", "sensitivities"}:
             from feti_homog.report.plots import response_curves  # most results have no curves
 
-            paths += response_curves.plot(directory, document)
+            paths += response_curves.plot(directory, document, look)
     return paths
 
 
-def of_fields(directory: Path, cell: drawn_cell.DrawnCell, document: Document) -> list[Path]:
-    """Draw the pictures that show the mesh or a field; return the picture paths."""
-    file, report = cell.file, reported(document)
+def of_fields(
+    directory: Path, file: Any, document: Document, look: plot_helpers.Look, chosen: int | None = None
+) -> list[Path]:
+    """Draw the pictures that show the mesh or a field, or one state alone; return the picture paths."""
+    cell, report = drawn_cell.DrawnCell.of(file), reported(document)
+    states = {number: file[f"state/{number}"] for number in sorted(file.get("state", ()), key=int)}
+    stress = document.get("case", {}).get("output", {}).get("stress", "auto")
+    if any(stress != "auto" and plot_helpers.STRESS_TABLES[stress][0] not in state for state in states.values()):
+        raise CaseError(f"--component {stress}: expected a stress of the plane, S11, S22 or S12, as in {directory}")
+
+    def save(figure: Figure, name: str) -> Path:
+        return plot_helpers.save(figure, directory / f"{name}.png", look)
+
+    if chosen is not None:
+        if str(chosen) not in states:
+            raise CaseError(f"--state {chosen}: expected a state from 0 to {len(states) - 1} of {directory}")
+        return [save(cell_picture.deformed(cell, states[str(chosen)], document), f"state_{chosen}")]
     pictures = {"cell": cell_picture.figure, "partition": cell_picture.partition, "mesh_error": cell_picture.mesh_error}
     figures = ((name, draw(cell)) for name, draw in pictures.items())
-    paths = [plot_helpers.save(figure, directory / f"{name}.png") for name, figure in figures if figure is not None]
-    states = {number: file[f"state/{number}"] for number in sorted(file.get("state", ()), key=int)}
+    paths = [save(figure, name) for name, figure in figures if figure is not None]
     if report.is_curve and states:
         from feti_homog.report.plots import deformed_panels
 
         scale = deformed_panels.shown_scale(file, document)
-        panels = deformed_panels.panels(file, document, scale)
-        paths.append(plot_helpers.save(panels, directory / f"{report.name}_states.png"))
-        if report.is_followed:
+        paths.append(save(deformed_panels.panels(file, document, scale), f"{report.name}_states"))
+        if report.is_followed and look == plot_helpers.PLAIN:
             paths.append(deformed_panels.animation(file, document, scale, directory / "path.gif"))
     for number, state in {} if report.is_curve else states.items():
         strain = state.attrs["strain"]
@@ -69,10 +92,10 @@ def of_fields(directory: Path, cell: drawn_cell.DrawnCell, document: Document) -
         (load, value), *further_loads = [load for load in loads.items() if load[1]] or [("", 0.0)]
         is_unit = abs(value) == 1.0 and not further_loads
         name = f"case_{'minus_' if value < 0 else ''}{load}" if is_unit else f"state_{number}"
-        figure = cell_picture.deformed(cell, state, document)
-        paths.append(plot_helpers.save(figure, directory / f"{report.picture or name}.png"))
-    if any((state["status"][:] != drawn_cell.BONDED).any() for state in states.values()):
-        from feti_homog.report.plots import traction_plots  # bonded interfaces have no picture
+        paths.append(save(cell_picture.deformed(cell, state, document), report.picture or name))
+    broken = any((state["status"][:] != drawn_cell.BONDED).any() for state in states.values())
+    if broken or (report.is_followed and states):
+        from feti_homog.report.plots import traction_plots  # perfect bonding has no picture
 
-        paths.append(plot_helpers.save(traction_plots.figure(cell, document), directory / "interface.png"))
+        paths.append(save(traction_plots.figure(cell, document), "interface"))
     return paths

@@ -4,16 +4,19 @@ import math
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
-from matplotlib.colors import Normalize
+from matplotlib.collections import TriMesh
+from matplotlib.colors import Colormap, ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Path2D
+from matplotlib.text import Text
 from matplotlib.tri import Triangulation
 
 from feti_homog.case import bond_laws
@@ -36,15 +39,48 @@ STRESS_TABLES: dict[str, tuple[str, int | None]] = {
     **{name: ("axial_stress", column) for column, name in enumerate(voigt.AXIAL_STRESSES)},
 }
 OUTLIERS = 0.005  # area fraction that may lie outside a colour range, at either end
-INK = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d", "#8a6d00", "#0f7c8c", "#8c1d40")  # of curves
+# Of curves: the colours of Okabe and Ito, which the colour-blind tell apart.
+INK = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+# Colours of macroscopic stresses: one a component in all pictures.
+STRESS_INK = dict(zip(("S11", "S22", "S12", "S33", "S23", "S13"), INK, strict=False))
+LEAST_TEXT = 6.0  # points; journals take no smaller text
 STYLE = {"font.size": 10, "axes.titlesize": 11, "axes.linewidth": 0.8}
 DPI = 200
 
 
-def save(figure: Figure, path: Path) -> Path:
-    """Write the figure as PNG without white margins.  Raises FetiHomogError if it cannot be written."""
+@dataclass(frozen=True)
+class Look:
+    """The file format of pictures, their size in centimetres, and their title; None for those of each picture."""
+
+    format: str = "png"
+    size: tuple[float, float] | None = None
+    title: str | None = None
+
+
+PLAIN = Look()
+
+
+def save(figure: Figure, path: Path, look: Look = PLAIN) -> Path:
+    """Write the figure, by default without white margins.  Raises FetiHomogError if it cannot be written."""
+    if look.title is not None:
+        figure.suptitle(plain(look.title)) if figure.get_suptitle() else figure.axes[0].set_title(plain(look.title))
+    if look.size is not None:
+        before = figure.get_size_inches()
+        figure.set_size_inches(look.size[0] / 2.54, look.size[1] / 2.54)
+        scale = float(min(1.0, (figure.get_size_inches() / before).min()))
+        for text in figure.findobj(Text):
+            points = float(text.get_fontsize())
+            text.set_fontsize(max(scale * points, min(LEAST_TEXT, points)))
+        for axes in figure.findobj(Axes):
+            axes.tick_params(labelsize=max(10.0 * scale, LEAST_TEXT))
+        if figure.get_layout_engine() is None:
+            figure.set_layout_engine("compressed")
+    box = "tight" if look.size is None else None
     with missing_letters_as_boxes():
-        return atomic.replace(path, lambda part: figure.savefig(part, format="png", dpi=DPI, bbox_inches="tight"))
+        return atomic.replace(
+            path.with_suffix(f".{look.format}"),
+            lambda part: figure.savefig(part, format=look.format, dpi=DPI, bbox_inches=box),
+        )
 
 
 @contextmanager
@@ -72,18 +108,31 @@ def faint_grid(axes: Axes) -> None:
 
 def fill_triangles(axes: Axes, drawn: DrawnMesh, points: Array, colours: Array, edges: bool) -> None:
     """Fill triangles with colours (q, 4), without antialiasing, which would leave seams."""
-    style: dict[str, Any] = {"edgecolors": "none", "antialiased": False}
+    separate = np.arange(drawn.triangles.size).reshape(-1, 3)  # each triangle has nodes of its own
+    mesh: Any = _add_triangles(axes, points[drawn.triangles].reshape(-1, 2), separate)
+    mesh.set_facecolor(np.repeat(colours, 3, axis=0))
     if edges:
-        style = {"edgecolors": "0.55", "linewidths": 0.15}
-    corners: Any = points[drawn.triangles]
-    axes.add_collection(PolyCollection(corners, facecolors=colours, **style))
+        draw_segments(axes, points[drawn.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)], "0.55", 0.15)
 
 
-def shade_triangles(axes: Axes, drawn: DrawnMesh, points: Array, values: Array, norm: Normalize, colours: str) -> Any:
+def shade_triangles(axes: Axes, drawn: DrawnMesh, points: Array, values: Array, norm: Normalize, colours: Any) -> Any:
     """Draw triangles in smooth colours for the nodal values (p,).  The nodes are at `points` (p, 2)."""
+    mesh = _add_triangles(axes, points, drawn.triangles)
+    mesh.set(array=values, norm=norm, cmap=colours)
+    return mesh
+
+
+def _add_triangles(axes: Axes, points: Array, triangles: Array) -> TriMesh:
+    """Add triangles to the axes as pixels, also in vector graphics.
+
+    Matplotlib's `tripcolor` makes a path of each triangle to find the limits, which takes longer than all the rest.
+    """
     x, y = points.T
-    mesh = Triangulation(x, y, drawn.triangles)
-    return axes.tripcolor(mesh, values, shading="gouraud", norm=norm, cmap=colours)
+    mesh = TriMesh(Triangulation(x, y, triangles), rasterized=True)
+    mesh.set_in_layout(False)
+    axes.add_collection(mesh, autolim=False)
+    axes.update_datalim(points)
+    return mesh
 
 
 def draw_segments(
@@ -97,21 +146,22 @@ def draw_segments(
     axes.update_datalim(path.vertices)  # as `add_patch` does, one segment after the other
 
 
-def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, str, str]:
-    """Choose the colour range and the colour map of a field.
+def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, Colormap, str]:
+    """Choose the colour range and the colour map of a stress.
 
-    Zero is white if both signs matter.  Values (n,) have weights `areas` (n,), 1 by default: meshes are fine at tips,
-    where stresses are singular.
+    Zero is white, tension red and pressure blue in all pictures; the range ends near the values.  Values (n,) have
+    weights `areas` (n,), 1 by default: meshes are fine at tips, where stresses are singular.
 
     Returns:
         colour range, colour map, and the ends of the range beyond which values lie.
     """
     norm, extend = value_range(values, areas)
     bottom, top = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
-    if min(-bottom, top) <= 0.1 * max(-bottom, top) or _is_uniform(values):
-        return norm, "viridis", extend
-    top = max(-bottom, top)
-    return Normalize(-top, top), "RdBu_r", _outside(values, -top, top)
+    largest = max(-bottom, top) or 1.0
+    # A range far from zero still begins with a light colour.
+    first, last = min(0.5 + 0.5 * bottom / largest, 0.55), max(0.5 + 0.5 * top / largest, 0.45)
+    shades = mpl.colormaps["RdBu_r"](np.linspace(first, last, 256))
+    return norm, ListedColormap(shades), extend
 
 
 def value_range(values: Array, areas: Array | None = None) -> tuple[Normalize, str]:

@@ -23,13 +23,15 @@ CELL = (0.95, 0.42)  # width and height of an entry, inches
 FAINTEST = 0.005  # smaller entries have no number
 
 
-def plot(directory: Path, document: Document) -> list[Path]:
+def plot(directory: Path, document: Document, look: plot_helpers.Look) -> list[Path]:
     """Draw all pictures that need only result.json; return their paths."""
     name = reported(document).name
     pictures = {"sensitivities": sensitivities(document), "energy": path_picture.energies(document)}
     pictures |= {name: CURVES[name](document)} if name in CURVES else {}
     return [
-        plot_helpers.save(drawn, directory / f"{name}.png") for name, drawn in pictures.items() if drawn is not None
+        plot_helpers.save(drawn, directory / f"{name}.png", look)
+        for name, drawn in pictures.items()
+        if drawn is not None
     ]
 
 

@@ -22,26 +22,39 @@ from feti_homog.typing import Array, Document
 
 SPIKES = 2.0  # percentage of the nodes that the range estimate ignores, at either end
 SHADE: dict[str, Any] = {"alpha": 0.18, "linewidth": 0}
-INK = ("#1f4e9c", "#2a7f3f", "#c44e00")
-NAMES = {"traction": (r"$t_\mathrm{n}$", r"$t_\mathrm{t}$", r"$t_\mathrm{a}$"), "jump": ("gap", "slip", "axial slip")}
+NAMES = {
+    "traction": (r"$t_\mathrm{n}$", r"$t_\mathrm{t}$", r"$t_\mathrm{a}$"),
+    "jump": ("gap", "slip", "axial slip"),
+    "damage": ("damage",),
+}
 
 
 def figure(cell: drawn_cell.DrawnCell, document: Document) -> Figure:
-    """Draw tractions and jumps around the most debonded fibres, one row per fibre."""
+    """Draw tractions, jumps and damage around the most debonded or damaged, else most loaded fibres, one per row."""
     file, labels, names = cell.file, drawn_cell.LoadLabels.of(document), _chosen_states(cell.file, document)
     fibre, status = file["interface/fibre"][:], file[f"state/{names[-1]}/status"][:]
-    bodies, count = np.unique(fibre[status != drawn_cell.BONDED], return_counts=True)
-    chosen = np.sort(bodies[np.argsort(-count, kind="stable")][:4])
-    picture = Figure(figsize=(9.0, 2.4 * len(chosen) + 1.5), layout="constrained")
-    grid = picture.subplots(len(chosen), 2, sharex="row", sharey="col", squeeze=False)
+    last_state, broken = file[f"state/{names[-1]}"], status != drawn_cell.BONDED
+    damage = last_state["damage"][:] if "damage" in last_state else np.zeros(len(status))
+    quantities = [*NAMES][: 3 if ((damage > 0.0) & (damage < 1.0)).any() else 2]
+    harm = np.maximum(damage, broken)
+    load = last_state["traction"][:, 0]
+    bodies, place = np.unique(fibre, return_inverse=True)
+    harmed, largest = np.unique(fibre[harm > 0.0]), np.full(len(bodies), -np.inf)
+    np.maximum.at(largest, place, load)
+    order = np.lexsort((-largest, -np.bincount(place, harm)))  # by damage, then by the largest normal traction
+    chosen = np.sort(bodies[order][: min(4, max(len(harmed), 1))])
+    picture = Figure(figsize=(1.5 + 3.75 * len(quantities), 2.4 * len(chosen) + 1.5), layout="constrained")
+    grid = picture.subplots(len(chosen), len(quantities), sharex="row", sharey="col", squeeze=False)
     stress = plot_helpers.stress_label(file.attrs["stress_unit"])
     length = plot_helpers.unit_label(file.attrs["length_unit"]) or "(cell units)"
     for row, body in zip(grid, chosen, strict=True):
         place = coordinate(cell, body)
-        for axes, quantity in zip(row, NAMES, strict=True):
+        for axes, quantity in zip(row, quantities, strict=True):
             _panel(axes, [file[f"state/{name}"] for name in names], quantity, place)
         row[0].set_ylabel(f"traction {stress}")
         row[1].set_ylabel(f"jump {length}")
+        for axes in row[2:]:
+            axes.set(ylabel="damage of the bonds", ylim=(-0.03, 1.03))
         fibre_name = f"fibre {file['interface/fibre_number'][place.nodes[0]]}"
         is_fibre = body in file["fibre/body"][:]
         row[0].set_title(fibre_name if is_fibre else f"coating of {fibre_name}", fontsize=10, loc="left")
@@ -53,7 +66,9 @@ def figure(cell: drawn_cell.DrawnCell, document: Document) -> Figure:
         )
         low, high = np.percentile(values, (SPIKES, 100.0 - SPIKES))
         low, high = 2.0 * low - high, 2.0 * high - low
-        if values.min() < low or values.max() > high:
+        if first is grid[0][1] and np.abs(values).max() < SAME_PLACE**2 * file.attrs["width"]:
+            first.set_ylim(-1.0, 1.0)  # jumps of bonded faces are rounding
+        elif high > low and (values.min() < low or values.max() > high):
             first.set_ylim(max(values.min(), low), min(values.max(), high))
     shaded = status[np.isin(fibre, chosen)]
     patches = [
@@ -66,8 +81,8 @@ def figure(cell: drawn_cell.DrawnCell, document: Document) -> Figure:
     title = f"{last['label']}: {labels.label(last)}"
     if len(names) > 1:
         title += f"   (dashed: {before['label']}: {labels.label(before)})"
-    if len(bodies) > len(chosen):
-        title += f"\nthe {len(chosen)} of {len(bodies)} debonded interfaces that are so most"
+    if len(harmed) > len(chosen):
+        title += f"\nthe {len(chosen)} of {len(harmed)} debonded or damaged interfaces that are so most"
     picture.suptitle(title, fontsize=10)
     return picture
 
@@ -105,6 +120,7 @@ def _panel(axes: Axes, states: list[Any], quantity: str, place: Coordinate) -> N
         values: Array = state[quantity][:]
         if f"axial_{quantity}" in state and (axial := state[f"axial_{quantity}"][:]).any():
             values = np.column_stack([values, axial])
+        values = values.reshape(len(values), -1)
         values, at, turn = values[place.nodes], place.values, place.ends[1] - place.ends[0]
         # The curve closes if the gap between the last and the first node is less than twice the other gaps.
         if place.is_direction and len(at) > 1 and at[0] + turn - at[-1] < 2.0 * np.diff(at).max():
@@ -112,7 +128,7 @@ def _panel(axes: Axes, states: list[Any], quantity: str, place: Coordinate) -> N
             values = np.concatenate([values[-1:], values, values[:1]])
         is_last = state is states[-1]
         width, style = (1.5, "-") if is_last else (0.9, "--")
-        for label, column, ink in zip(NAMES[quantity], values.T, INK, strict=False):
+        for label, column, ink in zip(NAMES[quantity], values.T, plot_helpers.INK, strict=False):
             axes.plot(at, column, style, color=ink, linewidth=width, label=label if is_last else None)
     axes.axhline(0.0, color="0.6", linewidth=0.6)
     axes.set(xlim=place.ends, xlabel=place.label)

@@ -53,10 +53,11 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     begins = {landmarks.PEAK: f"Peak {name}", landmarks.LARGEST: f"Largest {name}"}
     text = begins.get(largest, f"Largest {name} so far, the path being cut off")
     text += f": {stress:.6g} at {peak['strain_name']} = {strain:.6g}"
-    text += f" (point {peak['event']})"
-    if "first_break_event" in peak:
-        first, at = peak["first_break_stress"], peak["first_break_strain"]
-        text += f"; first break {first:.6g} at {at:.6g} (point {peak['first_break_event']})"
+    text += f" ({_place(peak, '')})"
+    for title in ("first_softening_", "first_break_"):
+        if f"{title}event" in peak:
+            first, at = peak[f"{title}stress"], peak[f"{title}strain"]
+            text += f"; {title.replace('_', ' ')}{first:.6g} at {at:.6g} ({_place(peak, title)})"
     stresses = landmarks.stresses_of(document, peak)
     if "event_left" in peak:
         lost = 1.0 - peak["stress_left"] / peak["stress"]
@@ -77,6 +78,11 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     if path_curves.scales_with_toughness(document):
         lines.append("Scaling: strains and stresses of the path are as the root of the toughness")
     return lines
+
+
+def _place(peak: Document, title: str) -> str:
+    """Name the point, fibre and direction of a landmark."""
+    return ", ".join(filter(None, [f"point {peak[f'{title}event']}", landmarks.bond_of(peak, title)]))
 
 
 def _path_energies(document: Document, label: str) -> list[str]:

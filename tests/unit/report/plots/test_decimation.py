@@ -33,7 +33,7 @@ def write(directory: Path, whole: Sample) -> Path:
 def square() -> DrawnMesh:
     points = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
     label = np.zeros(2, int)
-    return DrawnMesh(8, 1, 1, np.arange(4), points, np.array([[0, 1, 2], [2, 0, 3]]), label, label, label)
+    return DrawnMesh(8, 1, 1, np.arange(4), points, np.array([[0, 1, 2], [2, 0, 3]]), label, label, label, label)
 
 
 @pytest.mark.parametrize("bodies", [1, 2])
@@ -41,7 +41,7 @@ def test_values_at_nodes_are_means_within_a_body_weighted_by_area(bodies: int) -
     """Two triangles of areas 1 and 3 with a side in common, each with nodes of its own: of one body or of two."""
     points = np.array([[0, 0], [2, 0], [2, 1], [2, 1], [0, 0], [-2, 2]], float)
     body = np.arange(2) % bodies
-    drawn = DrawnMesh(8, 1, 1, np.arange(6), points, np.arange(6).reshape(2, 3), body, np.arange(2), body)
+    drawn = DrawnMesh(8, 1, 1, np.arange(6), points, np.arange(6).reshape(2, 3), body, np.arange(2), body, body)
     means = node_means(np.array([4.0, 8.0]), drawn)
     middle = (4.0 * drawn.areas[0] + 8.0 * drawn.areas[1]) / drawn.areas.sum()
     assert means.tolist() == pytest.approx(

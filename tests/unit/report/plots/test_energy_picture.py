@@ -53,9 +53,19 @@ def test_parts_are_stacked_to_the_work(fracture: dict[str, list[float]], parts: 
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("leg of the path", "energy per area (MPa)")
 
 
-def test_energies_against_points_and_results_without_energies() -> None:
+def test_energies_at_rising_loads_and_results_without_energies() -> None:
     figure = path_picture.energies(path([0.5, 0.25, 1.0], **ENERGIES))
     assert figure is not None
     place = figure.axes[0].lines[0].get_xdata()
-    assert list(place[-3:]) == [0.0, 1.0, 2.0] and place[0] == -1.0 and "number" in figure.axes[0].get_xlabel()
+    assert list(place[-2:]) == [1.0, 2.0] and (np.diff(place) >= 0.0).all()
+    # One leg: the load 0.5 is reached on a branch that stores 2 at the load 1, a quarter of it at 0.5; 3.5 are lost.
+    document = path([0.5, 0.25, 1.0], **ENERGIES | {"stored": [4.0, 1.0, 2.0], "stored_in_springs": [0.0] * 3})
+    document["case"]["path"]["waypoints"].pop()
+    for point, lost in zip(document["path"], (0.0, 3.0, 3.5), strict=True):
+        point["dissipated_strain_controlled"] = lost
+    figure = path_picture.energies(document)
+    assert figure is not None
+    loads, work = figure.axes[0].lines[0].get_data()
+    np.testing.assert_allclose(work[loads == 0.5], [4.0, 2.0 / 4.0 + 3.5])
+    assert work[-1] == 5.5
     assert path_picture.energies(path([0.5, 0.6, 1.0])) is None

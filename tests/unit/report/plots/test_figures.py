@@ -188,7 +188,7 @@ def test_loads_in_space_have_their_pictures(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("extent", "step"), [(1.0, 0.1), (1.2, 0.1), (1.32, 0.2), (36.0, 5.0), (7.2e5, 1e5)])
 def test_lines_of_displacement_are_at_round_steps(extent: float, step: float) -> None:
     label, corners = np.zeros(1, int), np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    drawn = decimation.DrawnMesh(8, 1, 1, np.arange(3), corners, np.arange(3)[None], label, label, label)
+    drawn = decimation.DrawnMesh(8, 1, 1, np.arange(3), corners, np.arange(3)[None], label, label, label, label)
     state = {"axial_displacement": extent * np.array([0.0, 1.0, 0.5])}
     assert cell_picture.draw_levels(Figure().subplots(), state, drawn) == pytest.approx(step)
 
@@ -203,29 +203,49 @@ def test_the_case_chooses_component_and_scale(tmp_path: Path) -> None:
     assert before[:3] == after[:3] and all(a != b for a, b in zip(before[3:6], after[3:6], strict=True))
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "begin"), [("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<?xml")])
+def test_a_state_is_drawn_alone_in_the_size_and_format_of_a_paper(tmp_path: Path, kind: str, begin: bytes) -> None:
+    write(tmp_path, sample(4))
+    (path,) = figures.plot(tmp_path, plot_helpers.Look(kind, (9.0, 8.0), "whole $"), 1, "S12")
+    content = path.read_bytes()
+    assert path.name == f"state_1.{kind}" and content.startswith(begin)
+    if kind == "png":
+        assert imread(path).shape[:2] == pytest.approx((8.0 / 2.54 * 200, 9.0 / 2.54 * 200), abs=2)
+    if kind == "svg":
+        assert content.count(b"<image") == 2 and len(content) < 500_000  # the field and its bar are pixels
+    with pytest.raises(CaseError, match="--state 7: expected a state from 0 to 2"):
+        figures.plot(tmp_path, state=7)
+    with pytest.raises(CaseError, match="--component S13: expected a stress of the plane"):
+        figures.plot(tmp_path, component="S13")
+
+
 @pytest.mark.parametrize(
     ("values", "expected"),
     [
-        (np.linspace(1, 2, 1001), (1, 2, "viridis", "neither")),
-        (np.linspace(-1, 2, 1001), (-2, 2, "RdBu_r", "neither")),
-        (np.append(np.linspace(1, 2, 1001), 50), (1, 2, "viridis", "max")),
-        (np.append(np.linspace(1, 2, 1001), -50), (1, 2, "viridis", "min")),
-        (np.full(9, 4.0) + 1e-9 * np.arange(9), (2, 6, "viridis", "neither")),
-        (np.zeros(9), (-0.5, 0.5, "viridis", "neither")),
+        (np.linspace(1, 2, 1001), (1, 2, "neither")),
+        (np.linspace(-1, 2, 1001), (-1, 2, "neither")),
+        (np.append(np.linspace(1, 2, 1001), 50), (1, 2, "max")),
+        (np.append(np.linspace(1, 2, 1001), -50), (1, 2, "min")),
+        (np.full(9, 4.0) + 1e-9 * np.arange(9), (2, 6, "neither")),
     ],
 )
-def test_the_colour_range_leaves_out_outliers(values: Any, expected: tuple[float, float, str, str]) -> None:
+def test_the_colour_range_leaves_out_outliers(values: Any, expected: tuple[float, float, str]) -> None:
     norm, colours, extend = plot_helpers.colour_range(values)
     assert (norm.vmin, norm.vmax) == pytest.approx(expected[:2], abs=0.02)
-    assert (colours, extend) == expected[2:]
+    assert extend == expected[2]
+    red, _, blue = np.moveaxis(colours(norm(np.array([-1.0, 0.0, 1.0, norm.vmax])))[:, :3], 1, 0)
+    assert red[3] > 2.0 * blue[3] and red[2] > blue[2]  # tension is red
+    if expected[0] < 0.0:  # zero is white, pressure blue
+        assert min(red[1], blue[1]) > 0.9 and blue[0] > red[0]
 
 
 def test_values_count_by_their_area() -> None:
     """Most of a thousand values at a tip, which is no part of the cell, are beyond the colours."""
     values = np.append(np.linspace(1, 2, 1001), np.linspace(-90, 90, 1001))
     areas = np.append(np.ones(1001), np.full(1001, 1e-9))
-    norm, colours, extend = plot_helpers.colour_range(values, areas)
-    assert (norm.vmin, norm.vmax) == pytest.approx((1, 2), abs=0.02) and (colours, extend) == ("viridis", "both")
+    norm, _, extend = plot_helpers.colour_range(values, areas)
+    assert (norm.vmin, norm.vmax) == pytest.approx((1, 2), abs=0.02) and extend == "both"
 
 
 @pytest.mark.parametrize(("largest", "scale"), [(1.0, 0.1), (1.2, 0.1), (0.01, 10.0), (0.3e-4, 5e3), (0.0, 1.0)])

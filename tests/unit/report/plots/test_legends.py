@@ -50,7 +50,7 @@ def drawn(directory: Path, monkeypatch: Any) -> dict[str, Figure]:
     """Return the figures of a result by the names of their files."""
     found: dict[str, Figure] = {}
 
-    def keep(figure: Figure, path: Path) -> Path:
+    def keep(figure: Figure, path: Path, look: plot_helpers.Look) -> Path:
         FigureCanvasAgg(figure).draw()
         found[path.name] = figure
         return path
@@ -145,7 +145,7 @@ def test_under_a_given_shear_its_stress_alone_is_drawn_over_its_strain_at_a_risi
     document = in_six([(0.5, 1.0, 2.0), (0.4, 1.5, 1.6), (1.0, 4.0, 4.0)], {"to": {"S13": 4.0}})
     figure = path_picture(document)
     upper = figure.axes[0]
-    assert upper.get_xlabel() == r"macroscopic strain $\gamma_{13}$"
+    assert figure.axes[-1].get_xlabel() == r"macroscopic strain $\gamma_{13}$"
     assert entries(figure)[:3] == [r"$\Sigma_{13}$", "all equilibria", "rising load"]
     thick = max(upper.lines, key=lambda line: line.get_linewidth())
     np.testing.assert_allclose(thick.get_xydata(), [[0, 0], [1, 2], [2, 2], [4, 4]])
@@ -190,19 +190,24 @@ def test_a_single_load_has_a_picture_that_says_what_it_gives(tmp_path: Path, mon
 def test_points_of_a_path_are_numbered_where_its_curve_folds_back(tmp_path: Path, monkeypatch: Any) -> None:
     write(tmp_path, sample(4), path_of([0.5, 0.2, 1.0]))
     figure = drawn(tmp_path, monkeypatch)["path.png"]
-    upper, middle, lower = figure.axes
-    for axes in (upper, middle):
-        assert {"0", "1", "2"} <= {text.get_text() for text in axes.texts if isinstance(text, Annotation)}
-    np.testing.assert_allclose(lower.lines[0].get_xdata(), [0, 1, 2])
+    upper, lower = figure.axes
+    assert {"0", "1", "2"} <= {text.get_text() for text in upper.texts if isinstance(text, Annotation)}
+    np.testing.assert_allclose(lower.lines[0].get_xdata(), [0.5, 0.2, 1.0])
+    np.testing.assert_allclose(lower.lines[1].get_xdata(), [0.5, 1.0])  # where the load rises
     stresses = {r"$\Sigma_{11}$": 3.0, r"$\Sigma_{22}$": 1.0, r"$\Sigma_{12}$": 0.5}
-    for line, factor in zip(middle.lines, stresses.values(), strict=False):
-        np.testing.assert_allclose(line.get_ydata(), factor * np.array([0.5, 0.2, 1.0]))
-    (strain, stress, named), (_, beside, _), (number, nodes, counted) = panels(figure)
-    assert (strain, stress, beside) == ("macroscopic strain $E_{11}$", "macroscopic stress (GPa)", "stress (GPa)")
+    (_, stress, named), (strain, nodes, counted) = panels(figure)
+    assert (strain, stress) == ("macroscopic strain $E_{11}$", "macroscopic stress (GPa)")
     for name, factor in stresses.items():
         np.testing.assert_allclose(named[name][-1], factor)
-    assert (number, nodes) == ("number of the point, in the order of the path", "interface nodes")
-    assert [counted[name].tolist() for name in ("bonded", "in contact", "open")] == [[5] * 3, [2] * 3, [3] * 3]
+    assert nodes == "interface nodes"
+    assert [counted[name].tolist() for name in ("bonded", "in contact", "open")] == [[5] * 2, [2] * 2, [3] * 2]
+
+
+def test_the_picture_of_a_path_names_the_bonds_of_its_landmarks() -> None:
+    document = path_of([0.5, 0.2, 1.0])
+    document["peak"] = {"first_break_fibre": 3, "first_break_angle": -45.0, "fibre": 2, "angle": 12.5}
+    words = " ".join(entries(path_picture(document)))
+    assert "first break 1.5 GPa\nfibre 3 at -45°" in words and "fibre 2 at 12.5°" in words
 
 
 @pytest.mark.parametrize("kind", ["stiffness", "stress"])
@@ -228,7 +233,7 @@ def test_tractions_and_jumps_have_their_names_and_units(tmp_path: Path, monkeypa
     """Beside half of the fibre, from its lower left corner: where each of the sample's ten nodes is."""
     whole = sample(4)
     write(tmp_path, in_space(whole), None)
-    traction, jump = panels(drawn(tmp_path, monkeypatch)["interface.png"])
+    traction, jump, *_ = panels(drawn(tmp_path, monkeypatch)["interface.png"])
     assert (traction[1], jump[1]) == ("traction (GPa)", "jump (mm)")
     k = np.arange(10.0)
     values = {r"$t_\mathrm{n}$": k, r"$t_\mathrm{t}$": -k, r"$t_\mathrm{a}$": k}
