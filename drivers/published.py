@@ -1,4 +1,4 @@
-"""Published numbers beside those of this program: constants of plies, energy release rates of debonded fibres.
+"""Compare published ply constants and energy release rates with computed values.
 
     mpirun -n 2 .venv/bin/python drivers/published.py --out results/published
 
@@ -87,7 +87,10 @@ def of_ply(given: argparse.Namespace, comm: Intracomm, name: str) -> list[Row]:
 
 
 def one_fibre(given: argparse.Namespace, comm: Intracomm) -> list[Row]:
-    """Return G / G0 of one fibre in a wide cell, whose strain is that of the matrix under uniaxial stress."""
+    """Compute G / G0 of one debonded fibre in a wide cell.
+
+    The macroscopic strain is the strain of the pure matrix under uniaxial stress.
+    """
     young, poisson = (GLASS_EPOXY["matrix"][name] for name in ("young", "poisson"))
     strain = [(1 - poisson**2) / young, -poisson * (1 + poisson) / young, 0.0]
     cell = {"geometry": "square", "fibre_fraction": np.pi / WIDTHS**2, "fibre_radius": 1.0, "mesh_size": 0.05}

@@ -11,7 +11,7 @@ from feti_homog.analysis import path_events
 from feti_homog.analysis.constants import check_accuracy, state_error
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import PathPoint, Peak
-from feti_homog.analysis.tip_records import criterion_of, most_utilised_bond, tips
+from feti_homog.analysis.tip_records import bond_directions, criterion_of, most_utilised_bond, tips
 from feti_homog.case import load_sections
 from feti_homog.errors import NotCarriedError
 from feti_homog.homogenization import averaging
@@ -40,18 +40,21 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
     check_accuracy(context)
     count = path_events.resumable(context, law)
     work, entries, last = path_events.Work(), list[dict[str, Any]](), None
+    direction, bonds = bond_directions(context.cell), list[tuple[float, float]]()
     with path_events.EventProgress(context.progress, path_events.BARS[path.method], context.events) as progress:
-        for number, (point, energies, responses) in enumerate(_points(context, path, law, count)):
+        for number, (point, before, responses) in enumerate(_points(context, path, law, count)):
             place = f"at {point.load_factor:.6f}, {responses[0].leading}"
-            if energies is not None:
+            if before is not None:
                 place += ", from the checkpoint"
-                work.resume_from(*energies, point)
+                all_equilibria, load_controlled, bond = before
+                work.resume_from(all_equilibria, load_controlled, point)
             else:
                 work.arrive(point)
+                bond = most_utilised_bond(context, point.used, direction)
                 if point.state.converged:
                     # The many small drops are cheap to compute again.
                     light = point.broke == 0 < point.softened
-                    event = path_events.stored(point, responses, work, context.loads.interfaces)
+                    event = path_events.stored(point, bond, responses, work, context.loads.interfaces)
                     context.checkpoint.write(number, *event, light=light)
             for response, problem in zip(responses, ("", ", along the fibres"), strict=False):
                 faults = len(context.checks.faults)
@@ -59,8 +62,9 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
                 context.log(line)
                 progress.report(line, urgent=len(context.checks.faults) > faults)
             entries.append(entry := _entry(context, law, point, responses, work))
-            bonds = f"{entry['bonded']} bonded, {entry['open'] + entry['closed']} broken"
-            progress.advance(point.load_factor, f"{len(entries)} {path.method}, {bonds}")
+            counts = f"{entry['bonded']} bonded, {entry['open'] + entry['closed']} broken"
+            progress.advance(point.load_factor, f"{len(entries)} {path.method}, {counts}")
+            bonds.append(bond)
             last = point
             if not point.state.converged:  # the next break would follow from an unconverged state
                 break
@@ -70,16 +74,20 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
                     'result.json has status "not converged"; --resume with a higher max_events goes on'
                 )
                 break
-    return {"resumed": count} | ({"path": ()} if last is None else _completed(context, path, law, entries, last))
+    if last is None:
+        return {"resumed": count, "path": ()}
+    return {"resumed": count} | _completed(context, path, law, entries, bonds, last)
 
 
 def _points(
     context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw, stored_events: int
-) -> Iterator[tuple[path_points.Point, tuple[path_points.Energies, float] | None, list[averaging.Response]]]:
+) -> Iterator[
+    tuple[path_points.Point, tuple[path_points.Energies, float, tuple[float, float]] | None, list[averaging.Response]]
+]:
     """Yield each point with its responses.  Collective.
 
-    Points come first from the checkpoint, with the energies up to each point, then from the load path.  The path ends
-    with a fault where the cell no longer carries the stresses, or where friction has no equilibrium.
+    Points come first from the checkpoint, with the numbers that `path_events.restored` adds, then from the load path.
+    The path ends with a fault where the cell no longer carries the stresses, or where friction has no equilibrium.
 
     Raises:
         NotCarriedError: the cell carries the stresses of no point.
@@ -89,11 +97,11 @@ def _points(
     responses: list[averaging.Response] = []
     for number in range(stored_events):
         event = context.checkpoint.read(number)
-        point, energies = path_events.restored(event, cell)
+        point, before = path_events.restored(event, cell)
         if number == stored_events - 1 and not checkpoints.has_multipliers(event):  # the path continues from this point
             point = path_events.found_again(point, cell, law)
         begin, responses = point.after, path_events.averages(event, point, context.loads)
-        yield point, energies, responses
+        yield point, before, responses
     engine: type[frictionless_leg.FrictionlessLeg] | partial[coulomb_leg.CoulombLeg] = frictionless_leg.FrictionlessLeg
     if context.case.has_friction:
         coefficients = np.array([(face.friction, face.friction_on_damage) for face in context.case.interfaces])
@@ -168,12 +176,13 @@ def _completed(
     path: load_sections.LoadPath,
     law: BondLaw,
     entries: list[dict[str, Any]],
+    bonds: Sequence[tuple[float, float]],
     last: path_points.Point,
 ) -> dict[str, Any]:
     """Complete the entries of a finished path.  Collective.
 
-    The function marks the main points, and records tips and fields at the kept points.  The checkpoint provides all
-    kept points but the last.
+    The function marks the main points, names the most utilised of the `bonds` at the landmarks, and records tips and
+    fields at the kept points.  The checkpoint provides all kept points but the last.
     """
     document = {"case": context.case.resolved(), "path": entries}
     marks, states = landmarks.marks(document), dict[str, Any]()
@@ -205,10 +214,9 @@ def _completed(
         entries[number]["mark"] = mark
     peak = landmarks.peak_of(document)
     for title in ("first_softening_", "first_break_", ""):
-        if (event := peak.get(f"{title}event")) is not None:
-            point = last if event == len(entries) - 1 else path_events.read(context, law, event)[1]
-            bond = most_utilised_bond(context, point.used)
-            peak |= {f"{title}{name}": value for name, value in bond.items()}
+        fibre, angle = bonds[peak[f"{title}event"]] if f"{title}event" in peak else (np.nan, np.nan)
+        if not np.isnan(fibre):
+            peak |= {f"{title}fibre": int(fibre), f"{title}angle": angle}
     return {"path": tuple(PathPoint(**entry) for entry in entries), "peak": Peak(**peak)} | states
 
 

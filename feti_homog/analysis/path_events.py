@@ -68,13 +68,14 @@ class Work:
 
 def stored(
     point: path_points.Point,
+    bond: tuple[float, float],
     responses: Sequence[averaging.Response],
     work: Work,
     cell: coupled_interfaces.CoupledInterfaces,
 ) -> tuple[dict[str, Any], checkpoints.Arrays]:
     """Split a point into plain numbers and distributed arrays for the checkpoint.
 
-    A resumed path continues from the multipliers of the last state.
+    A resumed path continues from the multipliers of the last state.  The `bond` is as in `most_utilised_bond`.
     """
     after = point.after
     numbers: dict[str, Any] = {
@@ -83,6 +84,7 @@ def stored(
         "macroscopic": np.stack([after.origin.strain, after.origin.stress, after.last.strain, after.last.stress]),
         "broken": np.nan if after.broken is None else after.broken,
         "stretched": after.stretched,
+        "bond": bond,
     }
     distributed: checkpoints.Arrays = {"used": point.used} | _bond_arrays(after.bonds, "_after")
     for suffix, interface, response, state in zip(
@@ -112,8 +114,8 @@ def stored(
 
 def restored(
     event: checkpoints.Arrays, cell: coupled_interfaces.CoupledInterfaces
-) -> tuple[path_points.Point, tuple[path_points.Energies, float]]:
-    """Rebuild a path point and the energies up to this point from an event.
+) -> tuple[path_points.Point, tuple[path_points.Energies, float, tuple[float, float]]]:
+    """Rebuild a path point, the energies up to this point, and its most utilised bond from an event.
 
     Arrays beyond the room of the checkpoint are empty; `found_again` computes them.
     """
@@ -148,7 +150,8 @@ def restored(
     since_last, up_to_point = path_points.Energies(*energies[:n]), path_points.Energies(*energies[n : 2 * n])
     broke, softened = map(int, counts)
     point = path_points.Point(load_factor, scale, state, broke, softened, since_last, event.get("used", EMPTY), after)
-    return point, (up_to_point, energies[2 * n])
+    fibre, direction = event.get("bond", np.full(2, np.nan)).tolist()  # absent from older checkpoints
+    return point, (up_to_point, energies[2 * n], (fibre, direction))
 
 
 def averages(event: checkpoints.Arrays, point: path_points.Point, loads: CellLoads) -> list[averaging.Response]:

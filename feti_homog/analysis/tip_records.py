@@ -1,9 +1,9 @@
 """Debonding tips in result.json: their bond law, driving energies, release rates and modes."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import TipRates, Tips
@@ -87,17 +87,24 @@ def tips(context: AnalysisContext, law: BondLaw, point: path_points.Point) -> Ti
     return Tips(tuple(fibre.astype(int).tolist()), angle, opening, shear, mode, _sections(cell, pair))
 
 
-def most_utilised_bond(context: AnalysisContext, used: Float) -> dict[str, Any]:
-    """Return the `fibre` and `angle` of the most utilised bond; empty if no bond holds.  Collective.
+def most_utilised_bond(context: AnalysisContext, used: Float, direction: Float) -> tuple[float, float]:
+    """Return the fibre number and the direction of the most utilised bond.  Collective.
 
-    `used` (k,) has the utilisations of this rank's bonds.  Ties: lowest fibre, then direction.
+    Among equally utilised bonds, the lowest fibre number comes first, then the lowest direction.
+
+    Args:
+        used, direction: (k,) utilisations and directions of this rank's bonds.
+
+    Returns:
+        the number, from 1, and degrees; NaN if no bond holds.
     """
     cell = context.cell
-    fibre = cell.summary.fibre_number(context.loads.interfaces.nodes.fibre)
-    table = np.concatenate(cell.comm.allgather(np.column_stack([used, fibre, bond_directions(cell)])))
-    table = table[(table[:, 0] > 0.0) & (table[:, 0] >= table[:, 0].max(initial=0.0) * (1.0 - UTILISATION_TIE))]
-    first = table[np.lexsort((np.round(table[:, 2], DIRECTION_DIGITS), table[:, 1]))[:1]]
-    return {} if not len(first) else {"fibre": int(first[0, 1]), "angle": float(first[0, 2])}
+    largest = cell.comm.allreduce(used.max(initial=0.0), MPI.MAX)
+    rows = np.flatnonzero((used > 0.0) & (used >= largest * (1.0 - UTILISATION_TIE)))
+    fibre = cell.summary.fibre_number(context.loads.interfaces.nodes.fibre[rows])
+    table = np.concatenate(cell.comm.allgather(np.column_stack([fibre, direction[rows]])))
+    order = np.lexsort((np.round(table[:, 1], DIRECTION_DIGITS), table[:, 0]))
+    return tuple(table[order[0]].tolist()) if len(table) else (np.nan, np.nan)
 
 
 def _sections(cell: unit_cell.TornCell, pair: Float | Int) -> tuple[int, ...] | None:

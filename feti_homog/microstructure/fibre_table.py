@@ -26,7 +26,7 @@ OF_FIBRES = ("coating", "inner_radius")
 # Error of centres and radii in tables, relative to the radius: closer rows are one fibre, and smaller overlaps can be
 # repaired.
 SAME_FIBRE = 0.01
-SIZE = re.compile(r"\b(width|height|left|bottom)\s*[=:]\s*([^\s;=]+?)(?=,?\s|,?$|;|,[a-z])")
+SIZE = re.compile(r"\b(width|height|left|bottom)\s*[=:]\s*([^\s;=:]+?)(?=,?\s|,?$|;|,[a-z])")
 
 
 @dataclass(frozen=True)

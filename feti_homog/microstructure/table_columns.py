@@ -85,7 +85,7 @@ def row_fault(line: str, cells: Sequence[str], count: int) -> str:
 
 
 UNITS = "nm|um|µm|μm|mm|cm|m|px|pixels?|deg|degrees?"
-UNIT = re.compile(rf"\s*(\[[^]]*\]|\([^)]*\)|/\s*[^/]+|[_\s]({UNITS})(\^?[2²])?)\s*$", re.IGNORECASE)
+UNIT = re.compile(rf"(\[[^][]*\]|\([^()]*\)|/[^/]+|[_\s]({UNITS})(\^?[2²])?)$", re.IGNORECASE)
 ROW_UNIT = re.compile(rf"[\[(]?({UNITS}|°|-)[\])]?", re.IGNORECASE)
 """A cell in a line of units."""
 MATLABS_AXIS = "majoraxislength"
@@ -133,7 +133,7 @@ class SourceColumn:
 
 def _bare(word: str) -> str:
     """Return a name without its unit, in lower case, with _ for blanks."""
-    return UNIT.sub("", word).strip().lower().replace(" ", "_")
+    return UNIT.sub("", word.strip()).strip().lower().replace(" ", "_")
 
 
 def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceColumn], list[str]]:

@@ -23,6 +23,8 @@ TABLES: dict[str, tuple[Content, str]] = {
     "names alone": (HEAD, "no fibres"),
     "one line of a megabyte": (HEAD + "1," * 500_000, "has 500001 columns"),
     "a name of a megabyte": ("x" * 1_000_000, "expected names of columns"),
+    "a name with many blanks": ("x,y,radius,a" + " " * 60_000 + "b\n0.5,0.5,-0.1,1\n", "expected a number above 0"),
+    "sizes without a number": ("# " + "width:" * 20_000 + "=\nx,y,radius\n0.5,0.5,0.1\n", "width"),
     "colours": (HEAD + "\x1b[31m,1,1\n", "x = "),
     "colours of a size": ("# width = 1\x1b[31m\nx,y,radius\n0.5,0.5,0.1\n", "width = 1"),
     "two numbers of a size": ("# width = 10 20\nx,y,radius\n0.5,0.5,0.1\n", "width"),

@@ -23,7 +23,7 @@ from feti_homog.typing import Array, Document
 
 IN_LEGEND = 12  # most phases in the legend, which would otherwise cover the cell
 MATRIX = "0.87"
-FIBRES, TURN = "hsv", 0.618  # a cyclic colour map without grey, and the share of a turn between two phases
+TURN = 0.618  # golden section: as a fraction of the colour circle, it never repeats a colour
 LEAST_SIZE = 3.0  # points; smallest font size
 LEVEL_INK, LEVEL_WIDTH = "0.15", 0.6  # style of the contour lines of u_3
 UNDEFORMED = "0.5"
@@ -36,9 +36,8 @@ def figure(cell: drawn_cell.DrawnCell) -> Figure:
     """
     drawn, attributes, fibres = cell.drawn, cell.file.attrs, cell.file["fibre"]
     phases = list(attributes["phases"])
-    # The golden section never repeats a colour; white between leaves room for black numbers.
-    fibres_inks = 0.45 + 0.55 * mpl.colormaps[FIBRES]((0.58 + TURN * np.arange(len(phases) - 1)) % 1.0)
-    inks = np.array([mpl.colors.to_rgba(MATRIX), *fibres_inks])
+    # Pale colours leave black numbers readable.
+    inks = np.array([mpl.colors.to_rgba(MATRIX), *(0.45 + 0.55 * _cyclic_colours(len(phases) - 1))])
     picture, axes = _outlined(cell, inks[drawn.phase])
     factors = fibres["strength"][:] if "strength" in fibres else np.ones(len(fibres["number"]))
     varies = bool((factors != 1.0).any())
@@ -53,14 +52,19 @@ def figure(cell: drawn_cell.DrawnCell) -> Figure:
     return picture
 
 
-def partition(cell: drawn_cell.DrawnCell) -> Figure:
-    """Draw each part, the piece of one body in one subdomain, in a tone of the colour of its rank.
+def _cyclic_colours(count: int) -> Array:
+    """Return colours (count, 4) around the colour circle, which begins with blue and has no grey."""
+    return np.asarray(mpl.colormaps["hsv"]((0.58 + TURN * np.arange(count)) % 1.0))
 
-    A subdomain across several materials has one part in each body.
+
+def partition(cell: drawn_cell.DrawnCell) -> Figure:
+    """Draw the parts of the cell, each in a tone of its rank's colour.
+
+    A part is the piece of one body in one subdomain; a subdomain across several materials has one part in each body.
     """
     drawn = cell.drawn
     parts, ranks = drawn.subdomain.max() + 1, np.unique(drawn.rank)
-    base: Array = mpl.colormaps[FIBRES]((0.58 + TURN * np.arange(drawn.rank.max() + 1)) % 1.0)[:, :3]
+    base = _cyclic_colours(drawn.rank.max() + 1)[:, :3]
     rank_of = np.zeros(parts, int)
     rank_of[drawn.subdomain] = drawn.rank
     tones = 0.25 + 0.6 * (TURN * np.arange(parts) % 1.0)[:, None]  # parts with close numbers differ much

@@ -71,21 +71,19 @@ class DeformedCell(drawn_cell.DrawnCell):
         The end of a path has a range of its own if its stresses would all have the last colour of the common range.
         """
         state, (norm, colours, _) = self.state(number), self.colours
-        stress, mark = (
-            plot_helpers.nodal_stress(state, self.component, self.drawn),
-            self.marks.get(state.attrs["point"]),
-        )
-        own, *rest = plot_helpers.colour_range(stress, self.drawn.node_areas)
-        least, most = (max(abs(limits.vmin or 0.0), abs(limits.vmax or 0.0)) for limits in (norm, own))
-        if mark == "end" and most > 2.0 * least:
-            norm, colours, mark = own, rest[0], "end, own colours"
+        attributes = state.attrs
+        stress = plot_helpers.nodal_stress(state, self.component, self.drawn)
+        mark = self.marks.get(attributes["point"])
+        of_state = plot_helpers.colour_range(stress, self.drawn.node_areas)
+        common, largest = (max(abs(limits.vmin or 0.0), abs(limits.vmax or 0.0)) for limits in (norm, of_state[0]))
+        if mark == "end" and largest > 2.0 * common:
+            norm, colours, mark = *of_state[:2], "end, own colours"
         shapes = plot_helpers.shade_triangles(axes, self.drawn, moved, stress, norm, colours)
         plot_helpers.draw_segments(axes, moved[self.borders], "black", 0.5)
         self.interface.mark(axes, moved, state, magnified=0.8)
         axes.set_aspect("equal")
         axes.set(xticks=(), yticks=())
         axes.set_axis_off()
-        attributes = state.attrs
         title = f"{mark}: {attributes['label']}" if mark else attributes["label"]
         axes.set_title(f"{title}\n{self.labels.label(attributes, LOADS_IN_PANEL)}", fontsize=9, y=1.0)
         return shapes

@@ -50,7 +50,13 @@ DPI = 200
 
 @dataclass(frozen=True)
 class Look:
-    """The file format of pictures, their size in centimetres, and their title; None for those of each picture."""
+    """The format, size and title of pictures.
+
+    Attributes:
+        format: file format, "png", "pdf" or "svg".
+        size: width and height in centimetres; None keeps the size of each picture.
+        title: text above the picture; None keeps the title of each picture.
+    """
 
     format: str = "png"
     size: tuple[float, float] | None = None

@@ -23,7 +23,7 @@ CELL = (0.95, 0.42)  # width and height of an entry, inches
 FAINTEST = 0.005  # smaller entries have no number
 
 
-def plot(directory: Path, document: Document, look: plot_helpers.Look) -> list[Path]:
+def plot(directory: Path, document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> list[Path]:
     """Draw all pictures that need only result.json; return their paths."""
     name = reported(document).name
     pictures = {"sensitivities": sensitivities(document), "energy": path_picture.energies(document)}

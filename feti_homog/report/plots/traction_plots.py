@@ -82,7 +82,7 @@ def figure(cell: drawn_cell.DrawnCell, document: Document) -> Figure:
     if len(names) > 1:
         title += f"   (dashed: {before['label']}: {labels.label(before)})"
     if len(harmed) > len(chosen):
-        title += f"\nthe {len(chosen)} of {len(harmed)} debonded or damaged interfaces that are so most"
+        title += f"\nthe {len(chosen)} most debonded or damaged of {len(harmed)} interfaces"
     picture.suptitle(title, fontsize=10)
     return picture
 

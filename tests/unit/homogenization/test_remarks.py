@@ -2,6 +2,8 @@
 
 import re
 import tomllib
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from mpi4py import MPI
@@ -13,6 +15,7 @@ from feti_homog import run
 from feti_homog.analysis.description import describe
 from feti_homog.case.cases import Case
 from feti_homog.homogenization.cell_remarks import table_remarks
+from feti_homog.homogenization.domain_partition import CellSummary
 
 
 @pytest.mark.parametrize("fraction", [None, 0.3])
@@ -76,3 +79,10 @@ def test_another_number_of_subdomains_than_asked_for_is_remarked(asked, words):
     assert len(found) == (words is not None)
     for line in found:
         assert int(re.search(f"subdomains = {asked}: {words}$", line)[1]) == result.solver.subdomains != asked
+
+
+@pytest.mark.parametrize(("moved", "warns"), [(0.0, 0), (2e-14, 0), (1e-9, 1)])
+@pytest.mark.parametrize("unit", [1.0, 1e-6])
+def test_only_moves_beyond_rounding_are_warnings(moved: float, warns: int, unit: float) -> None:
+    summary: Any = SimpleNamespace(snapped=moved * unit, width=2.0 * unit, height=unit)
+    assert len(CellSummary.warnings(summary)) == warns
