@@ -89,8 +89,10 @@ class DeformedCell(drawn_cell.DrawnCell):
         return shapes
 
     def bar(self, axes: Axes, shapes: Any) -> None:
-        """Draw the common colour bar beside the axes."""
-        bar = drawn_cell.bar_beside(axes, shapes, self.colours[2])
+        """Draw the colour bar of the shapes beside the axes; a bar for the end of a path alone has a title."""
+        is_common = shapes.norm is self.colours[0]
+        bar = drawn_cell.bar_beside(axes, shapes, self.colours[2] if is_common else shapes.cmap.colorbar_extend)
+        bar.ax.set_title("" if is_common else "end", fontsize=8)
         bar.ax.tick_params(labelsize=8)
         bar.locator = MaxNLocator(6)
 
@@ -129,9 +131,8 @@ def draw_state(
     except (OSError, KeyError) as error:
         raise FetiHomogError(f"cannot draw state {number} of {path}: {error}") from error
     axes.autoscale_view()
-    for line in drawn_cell.state_legend(
-        [kind for kind in drawn_cell.STATE_NAMES if softens or kind != drawn_cell.DAMAGED]
-    ):
+    kinds = [kind for kind in drawn_cell.STATE_NAMES if softens or kind != drawn_cell.DAMAGED]
+    for line in drawn_cell.state_legend(kinds):
         axes.add_line(line)
     return caption
 

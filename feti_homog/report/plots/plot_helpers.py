@@ -81,12 +81,9 @@ def save(figure: Figure, path: Path, look: Look = PLAIN) -> Path:
             axes.tick_params(labelsize=max(10.0 * scale, LEAST_TEXT))
         if figure.get_layout_engine() is None:
             figure.set_layout_engine("compressed")
-    box = "tight" if look.size is None else None
+    file, box = path.with_suffix(f".{look.format}"), "tight" if look.size is None else None
     with missing_letters_as_boxes():
-        return atomic.replace(
-            path.with_suffix(f".{look.format}"),
-            lambda part: figure.savefig(part, format=look.format, dpi=DPI, bbox_inches=box),
-        )
+        return atomic.replace(file, lambda part: figure.savefig(part, format=look.format, dpi=DPI, bbox_inches=box))
 
 
 @contextmanager
@@ -167,7 +164,9 @@ def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, 
     # A range far from zero still begins with a light colour.
     first, last = min(0.5 + 0.5 * bottom / largest, 0.55), max(0.5 + 0.5 * top / largest, 0.45)
     shades = mpl.colormaps["RdBu_r"](np.linspace(first, last, 256))
-    return norm, ListedColormap(shades), extend
+    colours: Any = ListedColormap(shades)
+    colours.colorbar_extend = extend
+    return norm, colours, extend
 
 
 def value_range(values: Array, areas: Array | None = None) -> tuple[Normalize, str]:
