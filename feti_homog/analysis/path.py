@@ -11,7 +11,7 @@ from feti_homog.analysis import path_events
 from feti_homog.analysis.constants import check_accuracy, state_error
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import PathPoint, Peak
-from feti_homog.analysis.tip_records import bond_directions, criterion_of, most_utilised_bond, tips
+from feti_homog.analysis.tip_records import criterion_of, most_utilised_bond, tips
 from feti_homog.case import load_sections
 from feti_homog.errors import NotCarriedError
 from feti_homog.homogenization import averaging
@@ -38,9 +38,9 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
     to the checkpoint at once.
     """
     check_accuracy(context)
-    count = path_events.resumable(context, law)
+    count = path_events.resumable(context)
     work, entries, last = path_events.Work(), list[dict[str, Any]](), None
-    direction, bonds = bond_directions(context.cell), list[tuple[float, float]]()
+    bonds = list[tuple[float, float]]()
     with path_events.EventProgress(context.progress, path_events.BARS[path.method], context.events) as progress:
         for number, (point, before, responses) in enumerate(_points(context, path, law, count)):
             place = f"at {point.load_factor:.6f}, {responses[0].leading}"
@@ -50,7 +50,7 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
                 work.resume_from(all_equilibria, load_controlled, point)
             else:
                 work.arrive(point)
-                bond = most_utilised_bond(context, point.used, direction)
+                bond = most_utilised_bond(context, law, point)
                 if point.state.converged:
                     # The many small drops are cheap to compute again.
                     light = point.broke == 0 < point.softened
@@ -99,7 +99,7 @@ def _points(
         event = context.checkpoint.read(number)
         point, before = path_events.restored(event, cell)
         if number == stored_events - 1 and not checkpoints.has_multipliers(event):  # the path continues from this point
-            point = path_events.found_again(point, cell, law)
+            point = path_events.found_again(point, cell)
         begin, responses = point.after, path_events.averages(event, point, context.loads)
         yield point, before, responses
     engine: type[frictionless_leg.FrictionlessLeg] | partial[coulomb_leg.CoulombLeg] = frictionless_leg.FrictionlessLeg
@@ -191,7 +191,7 @@ def _completed(
         numbers = landmarks.kept(entries, context.case.output.states, legs, marks)
         with context.progress.stage("states") as line:
             for number in context.progress.bar(numbers, "states"):
-                point = last if number == len(entries) - 1 else path_events.read(context, law, number)[1]
+                point = last if number == len(entries) - 1 else path_events.read(context, number)[1]
                 point, responses = _checked(context, point, _label(path, number))
                 if law.has_tips:
                     entries[number]["tips"] = tips(context, law, point)

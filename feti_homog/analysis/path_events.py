@@ -13,7 +13,6 @@ from feti_homog.feti import DualSolution
 from feti_homog.homogenization import averaging
 from feti_homog.interface import Load, Macroscopic
 from feti_homog.interface.contact import BondState, Equilibrium, coupled_interfaces
-from feti_homog.interface.laws import BondLaw
 from feti_homog.interface.path import path_points
 from feti_homog.results import checkpoints
 from feti_homog.system.runtime import progress_bar
@@ -86,7 +85,7 @@ def stored(
         "stretched": after.stretched,
         "bond": bond,
     }
-    distributed: checkpoints.Arrays = {"used": point.used} | _bond_arrays(after.bonds, "_after")
+    distributed = _bond_arrays(after.bonds, "_after")
     for suffix, interface, response, state in zip(
         SUFFIXES, cell.problems, responses, point.state.problems, strict=False
     ):
@@ -149,7 +148,7 @@ def restored(
     n, energies = len(path_points.NO_ENERGIES), event["energies"].tolist()
     since_last, up_to_point = path_points.Energies(*energies[:n]), path_points.Energies(*energies[n : 2 * n])
     broke, softened = map(int, counts)
-    point = path_points.Point(load_factor, scale, state, broke, softened, since_last, event.get("used", EMPTY), after)
+    point = path_points.Point(load_factor, scale, state, broke, softened, since_last, EMPTY, after)
     fibre, direction = event.get("bond", np.full(2, np.nan)).tolist()  # absent from older checkpoints
     return point, (up_to_point, energies[2 * n], (fibre, direction))
 
@@ -167,27 +166,23 @@ def averages(event: checkpoints.Arrays, point: path_points.Point, loads: CellLoa
     return responses
 
 
-def found_again(
-    point: path_points.Point, cell: coupled_interfaces.CoupledInterfaces, law: BondLaw
-) -> path_points.Point:
+def found_again(point: path_points.Point, cell: coupled_interfaces.CoupledInterfaces) -> path_points.Point:
     """Solve for the equilibrium of a point whose event has no multipliers.  Collective."""
     loads = ((problem.load.values, problem.load.by_stress) for problem in point.state.problems)
     values, by_stress = zip(*loads, strict=True)
     load = Load(np.concatenate(values), np.concatenate(by_stress))
     state = cell.equilibrium(load, point.state.bonds, cell.no_multipliers())
-    # The state belongs to the whole load; the point is `scale` times the state, and so are its utilisations.
-    used = point.scale * path_points.most_utilised(cell, law, state)[0]
-    return replace(point, state=state, used=used, after=replace(point.after, lam=state.multipliers))
+    return replace(point, state=state, after=replace(point.after, lam=state.multipliers))
 
 
-def read(context: AnalysisContext, law: BondLaw, number: int) -> tuple[checkpoints.Arrays, path_points.Point]:
+def read(context: AnalysisContext, number: int) -> tuple[checkpoints.Arrays, path_points.Point]:
     """Read an event and rebuild its path point; solve for missing multipliers.  Collective."""
     event, cell = context.checkpoint.read(number), context.loads.interfaces
     point, _ = restored(event, cell)
-    return event, point if checkpoints.has_multipliers(event) else found_again(point, cell, law)
+    return event, point if checkpoints.has_multipliers(event) else found_again(point, cell)
 
 
-def resumable(context: AnalysisContext, law: BondLaw) -> int:
+def resumable(context: AnalysisContext) -> int:
     """Count the checkpoint events that a run can reuse, and drop all other events.  Collective.
 
     A run that does not resume drops all events; otherwise the events before the first invalid event count.
@@ -201,14 +196,14 @@ def resumable(context: AnalysisContext, law: BondLaw) -> int:
             say(f"  {dropped} events of an earlier run are dropped; --resume would have gone on from them")
         return 0
     stored_events = context.checkpoint.count()
-    if (count := holding(context, law, stored_events)) < stored_events:
+    if (count := holding(context, stored_events)) < stored_events:
         say(f"  event {count} of the checkpoint does not hold: it and all after it are found again")
     begin = "there is no checkpoint: the path begins at its beginning"
     say(f"  {f'{count} events are taken from the checkpoint' if stored_events else begin}")
     return count
 
 
-def holding(context: AnalysisContext, law: BondLaw, count: int) -> int:
+def holding(context: AnalysisContext, count: int) -> int:
     """Count the valid events among the first `count` of the checkpoint.  Collective.
 
     Completes and checks the last events, back to the point at which F lambda has confirmed every problem.  Events from
@@ -222,7 +217,7 @@ def holding(context: AnalysisContext, law: BondLaw, count: int) -> int:
             break
         first -= 1
     for number in range(first, count):
-        event, point = read(context, law, number)
+        event, point = read(context, number)
         responses = context.loads.responses(context.loads.interfaces.completed(point.state), point.scale)
         for response, kept in zip(responses, averages(event, point, context.loads), strict=True):
             if any(not error <= context.checks.tolerance(name) for name, error in response.checks.items()):

@@ -76,7 +76,8 @@ def tips(context: AnalysisContext, law: BondLaw, point: path_points.Point) -> Ti
     is_next = (cell.neighbours.adjacency @ (status != BONDED) > 0)[cell.neighbours.first :][: len(bonds.status)]
     is_tip = (bonds.status == BONDED) & is_next
     node = np.flatnonzero(is_tip)
-    energy = point.used[node] ** 2 * law.fracture(bonds, is_tip, traction)
+    used = point.scale * path_points.most_utilised(loaded, law, point.state)[0]
+    energy = used[node] ** 2 * law.fracture(bonds, is_tip, traction)
     mode = law.at(node).mode_angle(traction[node])
     fibre, direction = cell.summary.fibre_number(loaded.nodes.fibre[node]), bond_directions(cell)[node]
     energies = energy * np.cos(mode) ** 2, energy * np.sin(mode) ** 2
@@ -87,22 +88,23 @@ def tips(context: AnalysisContext, law: BondLaw, point: path_points.Point) -> Ti
     return Tips(tuple(fibre.astype(int).tolist()), angle, opening, shear, mode, _sections(cell, pair))
 
 
-def most_utilised_bond(context: AnalysisContext, used: Float, direction: Float) -> tuple[float, float]:
-    """Return the fibre number and the direction of the most utilised bond.  Collective.
+def most_utilised_bond(context: AnalysisContext, law: BondLaw, point: path_points.Point) -> tuple[float, float]:
+    """Return the fibre number and the direction of the most utilised bond of a new point.  Collective.
 
     Among equally utilised bonds, the lowest fibre number comes first, then the lowest direction.
 
-    Args:
-        used, direction: (k,) utilisations and directions of this rank's bonds.
-
     Returns:
-        the number, from 1, and degrees; NaN if no bond holds.
+        the number, from 1, and degrees; NaN if no bond carries more than the solver's error.
     """
-    cell = context.cell
+    cell, sizes = context.cell, list[Float]()
+    for problem, state in zip(context.loads.interfaces.problems, point.state.problems, strict=True):
+        size = problem.scales.sign_noise * problem.scales.bond_stress(point.scale * state.asked)
+        sizes += [size] * problem.solver.jump_operator.components
+    used = np.where(point.used > law.share(np.stack(sizes, axis=1)), point.used, 0.0)
     largest = cell.comm.allreduce(used.max(initial=0.0), MPI.MAX)
     rows = np.flatnonzero((used > 0.0) & (used >= largest * (1.0 - UTILISATION_TIE)))
     fibre = cell.summary.fibre_number(context.loads.interfaces.nodes.fibre[rows])
-    table = np.concatenate(cell.comm.allgather(np.column_stack([fibre, direction[rows]])))
+    table = np.concatenate(cell.comm.allgather(np.column_stack([fibre, bond_directions(cell)[rows]])))
     order = np.lexsort((np.round(table[:, 1], DIRECTION_DIGITS), table[:, 0]))
     return tuple(table[order[0]].tolist()) if len(table) else (np.nan, np.nan)
 

@@ -227,9 +227,11 @@ def test_without_fields_none_are_kept(comm, shared_path):
 
 @pytest.mark.parametrize(("strain", "angle"), [([0.2, 0.0, 0.0], 0.0), ([0.0, 0.2, 0.0], 90.0)])
 def test_damage_starts_at_the_poles_of_a_pulled_fibre(comm: Any, strain: list[float], angle: float) -> None:
-    """There the normal traction is largest; softening starts before the first break."""
+    """There the normal traction is largest; softening starts before the first break, and steps break many bonds."""
     softening = Case.parse(case("softening", 2).resolved() | {"path": {"strain": strain}})
-    for pulled in (case("straight", 2, strain=strain), softening):
+    stepped = {"path": {"strain": strain, "method": "increments", "increments": 3}}
+    steps = Case.parse(case("straight", 2).resolved() | stepped)
+    for pulled in (case("straight", 2, strain=strain), softening, steps):
         peak = run(pulled, comm).peak
         assert peak is not None
         bonds = [(peak.first_break_fibre, peak.first_break_angle)]

@@ -70,19 +70,19 @@ class Leg(ABC):
         """Return the point after the path's step `number`, from 1.  Collective."""
         before, parted = self._bonds.history, 0
         self._go_to(number * len(self.waypoints) / steps - self.leg)
+        first = self._used()[0]
         while self._is_overloaded():
             used, _, worst = self._used()
             count, _, broken = self._release(worst if worst_only else used > 1.0)
             parted += count
             self._settle(broken)
         bonds, after = self.state.bonds, self._path_state()
-        weaker = path_points.count_on_all_ranks(
-            self.cell, (bonds.history != before).any(axis=1) & (bonds.status == BONDED)
-        )
+        hold_less = (bonds.history != before).any(axis=1) & (bonds.status == BONDED)
+        weaker = path_points.count_on_all_ranks(self.cell, hold_less)
         if self.limit is not None:
-            return self._point(parted, weaker, replace(after, leg=number - 1))
+            return replace(self._point(parted, weaker, replace(after, leg=number - 1)), used=first)
         point = self._point(parted, weaker, replace(after, leg=number, position=0.0))
-        return replace(point, load_factor=number / steps)
+        return replace(point, load_factor=number / steps, used=first)
 
     def _load_at(self, share: float) -> Load:
         """Return the load at a leg fraction."""

@@ -72,7 +72,7 @@ class Point:
         broke: number of bonds that part after this state; with increments, in the step before this state.
         softened: number of bonds that lose teeth and hold.
         energies: energies since the last point.
-        used: (k,) utilisation of the bonds, 0 without a bond.
+        used: (k,) utilisation before bonds break, 0 without a bond; empty in a point from a checkpoint.
         after: state from which the path continues.
     """
 

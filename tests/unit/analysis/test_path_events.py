@@ -28,7 +28,7 @@ def test_events_after_the_last_that_holds_in_all_problems_are_checked(monkeypatc
     ]
     checked = []
     points = {number: SimpleNamespace(state=event, scale=1.0) for number, event in enumerate(events)}
-    monkeypatch.setattr(path_events, "read", lambda context, law, number: (events[number], points[number]))
+    monkeypatch.setattr(path_events, "read", lambda context, number: (events[number], points[number]))
     monkeypatch.setattr(path_events, "averages", lambda *_: [])
     loads = SimpleNamespace(
         problems=[*columns],
@@ -36,7 +36,7 @@ def test_events_after_the_last_that_holds_in_all_problems_are_checked(monkeypatc
         responses=lambda event, _: checked.append(event["number"]) or [],
     )
     context = SimpleNamespace(loads=loads, checkpoint=SimpleNamespace(read=events.__getitem__))
-    assert holding(context, None, len(events)) == len(events) and checked == unconfirmed
+    assert holding(context, len(events)) == len(events) and checked == unconfirmed
 
 
 @pytest.mark.parametrize("wrong", [None, 0, 1])
@@ -45,11 +45,11 @@ def test_events_whose_means_are_wrong_do_not_hold(monkeypatch, wrong):
     events = [{"confirmed": False, "stress": np.array([1.0, 2.0 + 1e-3 * (number == wrong)])} for number in range(2)]
     point = SimpleNamespace(state=None, scale=1.0)
     response = SimpleNamespace(stress=np.array([1.0, 2.0]), checks={"strain": 1e-12})
-    monkeypatch.setattr(path_events, "read", lambda context, law, number: (events[number], point))
+    monkeypatch.setattr(path_events, "read", lambda context, number: (events[number], point))
     monkeypatch.setattr(path_events, "averages", lambda event, *_: [SimpleNamespace(stress=event["stress"])])
     loads = SimpleNamespace(
         problems=["plane"], interfaces=SimpleNamespace(completed=lambda state: state), responses=lambda *_: [response]
     )
     checks = SimpleNamespace(tolerance=lambda law: 1e-6)
     context = SimpleNamespace(loads=loads, checkpoint=SimpleNamespace(read=events.__getitem__), checks=checks)
-    assert holding(context, None, 2) == (2 if wrong is None else wrong)
+    assert holding(context, 2) == (2 if wrong is None else wrong)
