@@ -91,8 +91,8 @@ class Orthotropic:
 class TransverselyIsotropic:
     """Engineering constants of a phase that is isotropic in the plane, such as most fibres.
 
-    Plane stress needs E_transverse and nu_transverse, plane strain also E_axial and nu_axial, generalized plane strain
-    all.
+    Plane stress needs E_transverse and either nu_transverse or G_transverse, plane strain also E_axial and nu_axial,
+    generalized plane strain G_axial, too.
     """
 
     E_axial: float | None = key(
@@ -105,7 +105,12 @@ class TransverselyIsotropic:
         "2 nu_axial^2 < (1 - nu_transverse) E_axial/E_transverse; plane strain needs it.",
         default=None,
     )
-    nu_transverse: float = key(types.real(above=-1.0, below=1.0), "Poisson's ratio in the plane.")
+    nu_transverse: float | None = key(
+        types.real(above=-1.0, below=1.0), "Poisson's ratio in the plane.", absent="given by G_transverse"
+    )
+    G_transverse: float | None = key(
+        POSITIVE, "Shear modulus in the plane, in place of nu_transverse.", unit="stress", default=None
+    )
     G_axial: float | None = key(
         POSITIVE,
         "Shear modulus between x3 and the plane; generalized plane strain needs it.",
