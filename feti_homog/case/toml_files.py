@@ -1,5 +1,6 @@
 """Read the document of a case, nested tables of TOML types, from a file or from Python and NumPy values."""
 
+import copy
 import hashlib
 import os
 import tomllib
@@ -97,6 +98,39 @@ def leaves(
             yield from leaves(value, is_value, path)
         else:
             yield path, value
+
+
+def with_values(
+    base: Mapping[str, Any], values: Mapping[TomlPath, Any], faults: list[str], place: str = ""
+) -> dict[str, Any]:
+    """Return a copy of a document with other values at some paths.
+
+    A table is merged into its section, None takes a key out, a missing section is made.  A number, from 1, selects one
+    of several sections of the same name.  Faults, which begin with `place`, are appended to `faults`.
+    """
+    document = copy.deepcopy(dict(base))
+    for path, value in values.items():
+        table: Any = document
+        for name in path[:-1]:
+            if isinstance(table, list):
+                table = table[int(name) - 1] if name.isdecimal() and 0 < int(name) <= len(table) else None
+            else:
+                table = table.setdefault(name, {})
+            if not isinstance(table, dict | list):
+                faults.append(f"{place}{wording.dotted_key(path)}: {wording.toml_value(name)} is no section")
+                return document
+        if isinstance(table, list) and len(table) == 1 and isinstance(table[0], dict):
+            table = table[0]
+        name, last = wording.dotted_key(path[:-1]), path[-1]
+        if isinstance(table, list):
+            several = f"there are {len(table)} sections [[{name}]]; expected {name}.1.{last} or the like"
+            faults.append(f"{place}{wording.dotted_key(path)}: {several}")
+            return document
+        is_merged = isinstance(value, dict) and isinstance(table.get(last, {}), dict)
+        table[last] = table.get(last, {}) | value if is_merged else value
+        if value is None:
+            del table[last]
+    return document
 
 
 def short_digest(content: bytes) -> str:
