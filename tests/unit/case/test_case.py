@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.base_case import BASE, FIBRE, changed
+from support.base_case import BASE, FIBRE, ORTHOTROPIC, OUT_OF_PLANE, SPATIAL, changed, fibre
 from unit.case.faulty_bonding import BARE_ARC, FAULTY_BONDINGS, FAULTY_COHESIVE_LAWS, PATH, SOFTENING, debonded, of_type
 from unit.case.faulty_cases import FAULTY_CASES, FAULTY_SIZES, FAULTY_TABLE_CELLS
 from unit.case.faulty_envelopes import FAULTY_ENVELOPES
@@ -159,6 +159,19 @@ def test_faults_of_replaced_values_are_those_of_files(tmp_path, key, value, faul
     with pytest.raises(CaseError) as caught:
         case_of(tmp_path, BASE).replace({key: value})
     assert caught.value.faults == (fault,)
+
+
+def test_entries_of_lists_are_replaced_by_number(tmp_path):
+    case = case_of(tmp_path, fibre(ORTHOTROPIC + OUT_OF_PLANE + "expansion = [1e-6, 2e-6, 3e-6]\n"))
+    assert case.replace({"material.fibre.expansion.2": 5e-6}).materials["fibre"].expansion == (1e-6, 5e-6, 3e-6)
+    for key in ("expansion.4", "expansion.x1"):
+        with pytest.raises(CaseError, match=f"^material.fibre.{key}: expected material.fibre.expansion.1 to material"):
+            case.replace({f"material.fibre.{key}": 5e-6})
+    given = case_of(tmp_path, fibre(SPATIAL))
+    rows = np.array(given.materials["fibre"].stiffness)
+    rows[0, 1] = rows[1, 0] = 3.5
+    found = given.replace({"material.fibre.stiffness.C12": 3.5}).materials["fibre"].stiffness
+    np.testing.assert_array_equal(found, rows)
 
 
 def test_mesh_file_is_beside_the_case(tmp_path):
