@@ -3,9 +3,11 @@
 From a program of one's own, under `mpirun` or not:
 
     from feti_homog import Case, run
-    result = run(Case.load("case.toml"))            # the same on every rank; no files, no output
+    case = Case.load("case.toml")
+    result = run(case)                              # the same on every rank; no files, no output
     print(result)                                   # a short summary; in a notebook, tables
-    result.effective_stiffness, result.moduli.E1    # arrays and numbers; see `Result`
+    result.effective_stiffness, result.E1           # arrays and numbers; see `Result`
+    run(case.replace({"material.fibre.young": 80.0}))           # other values by dotted key, checked again
     run(case, out="results", fields=True).fields    # with files, and with mesh and states in memory
 
 - `Case`: a checked case, of a file (`Case.load`) or of a document of the same sections (`Case.parse`).

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, is_dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from feti_homog.analysis import cell_records, result_records
 from feti_homog.materials import engineering_constants, phase_bounds, voigt
 from feti_homog.results import field_layout, result_json
+from feti_homog.schema import wording
 from feti_homog.system.runtime import described, records
 from feti_homog.typing import Float, Intracomm
 
+CONSTANTS = ("moduli", "constants", "transversely_isotropic", "transverse_moduli")
 Part = TypeVar(
     "Part", field_layout.MeshPart, field_layout.FibrePart, field_layout.InterfacePart, field_layout.StatePart
 )
@@ -70,7 +72,7 @@ class Result:
     """The result of a case, equal on all ranks except for `fields`.
 
     `print` shows a short summary, a notebook shows tables.  The manual lists all keys of result.json; entries that the
-    analysis does not compute are None.
+    analysis does not compute are None.  Constants are attributes, too: `result.E1` is that of `moduli` or `constants`.
 
     Attributes:
         effective_stiffness: L^ef, (3, 3) or in generalized plane strain (6, 6); its columns are the stresses under the
@@ -104,31 +106,19 @@ class Result:
     )
     bounds: cell_records.StiffnessBounds | None = described("bounds of a perfectly bonded cell", default=None)
     effective_stiffness: Float | None = described(
-        "L^ef: columns are the stresses under the unit strains",
-        records.STRESS,
-        result_records.EITHER_STIFFNESS,
-        default=None,
+        "L^ef: columns are stresses under unit strains", records.STRESS, result_records.EITHER_STIFFNESS, default=None
     )
     effective_stiffness_compression: Float | None = described(
-        "the same under minus the unit strains, with contact",
-        records.STRESS,
-        result_records.EITHER_STIFFNESS,
-        default=None,
+        "the same under minus these, with contact", records.STRESS, result_records.EITHER_STIFFNESS, default=None
     )
     compliance: Float | None = described(
         "of generalized plane strain: inverse of L^ef", f"1 / {records.STRESS}", "(6, 6)", default=None
     )
     thermal_stress: Float | None = described(
-        "stress per unit of temperature at zero strain, if the phases have expansions",
-        f"{records.STRESS} per unit of temperature",
-        "(6,)",
-        default=None,
+        "stress under a unit of temperature, if the phases expand", result_records.PER_DEGREE, "(6,)", default=None
     )
     thermal_stress_compression: Float | None = described(
-        "minus the stress under minus a unit of temperature, with contact",
-        f"{records.STRESS} per unit of temperature",
-        "(6,)",
-        default=None,
+        "minus the stress under minus a unit, with contact", result_records.PER_DEGREE, "(6,)", default=None
     )
     thermal_expansion: Float | None = described(
         "strains under a unit of temperature at no stress, without contact", "1 / temperature", "(6,)", default=None
@@ -164,8 +154,7 @@ class Result:
     peak: result_records.Peak | None = described("peak of the path, with its first break", default=None)
     load: result_records.LoadPoint | None = described("state of analysis `load`, as in load.csv", default=None)
     envelope: tuple[result_records.EnvelopePoint, ...] | None = described(
-        "directions of analysis `envelope`, as in envelope.csv",
-        default=None,
+        "directions of analysis `envelope`, as in envelope.csv", default=None
     )
     states: tuple[int, ...] | None = described(
         "of a path: the numbers, from 0, of the points whose fields are kept; /state/K is that of entry K", default=None
@@ -256,6 +245,21 @@ class Result:
         if not self.path or not path_curves.is_proportional(document):
             raise ValueError("only a path of one leg, followed by events, has a first drop")
         return path_curves.first_drop(document["path"])
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a number of a record of CONSTANTS by its name, such as E1, nu12, G12 or E_axial.
+
+        Raises AttributeError, with the record that has the name, or with near names.
+        """
+        parts = {key: vars(part) for key, part in vars(self).items() if is_dataclass(part)}
+        table = {key: value for record in CONSTANTS for key, value in parts.get(record, {}).items()}
+        if name in table:
+            return table[name]
+        places = {key: f"result.{record}" for record, part in parts.items() for key in part}
+        names = [*table, *(key for key, value in vars(self).items() if value is not None)]
+        raise AttributeError(
+            f"this result has no {name}: {wording.suggestion(name, names, places)}", name=name, obj=self
+        )
 
     def __repr__(self) -> str:
         return f"Result({self.case.get('name', '')!r}, {self.case['analysis']['type']}, {self.status})"

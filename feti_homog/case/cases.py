@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from feti_homog.case.material_sections import provider, read_materials
 from feti_homog.case.relations import axes_lines, idle_friction_keys, read_interfaces, relation_faults, stress_free
 from feti_homog.case.rules import RULES
 from feti_homog.case.section_values import ANALYSIS_TYPE, CRITERION, METHOD, PLANE
-from feti_homog.case.toml_files import read_document, short_digest, to_document
+from feti_homog.case.toml_files import leaves, read_document, short_digest, to_document, with_values
 from feti_homog.errors import CaseError
 from feti_homog.materials import laws, material_forms
 from feti_homog.schema import TableReader, keys, types, wording
@@ -40,6 +40,7 @@ class Case:
         interfaces: empty for perfect bonding; each of several interfaces has its pair of phases.
         angle, path, single_load, envelope: the analysis section, None for other types; single_load is [load].
         petsc: PETSc options without dash.
+        source: document and folder of `parse`, without defaults.
     """
 
     name: str
@@ -54,6 +55,7 @@ class Case:
     decomposition: sections.Decomposition
     output: sections.Output
     petsc: dict[str, sections.Scalar]
+    source: tuple[dict[str, Any], Path] = field(compare=False, repr=False)
 
     @classmethod
     def load(cls, path: str | Path) -> Case:
@@ -64,6 +66,19 @@ class Case:
     def parse(cls, document: Mapping[str, Any], folder: str | Path = ".") -> Case:
         """Build a case from nested dictionaries, as the function `parse`."""
         return parse(document, Path(folder))
+
+    def replace(self, changes: Mapping[str, Any]) -> Case:
+        """Return the checked case with other values by dotted key, as `{"material.fibre.young": 80.0}`.
+
+        The other keys are those that the file or document gives.  A number, from 1, selects one of several sections or
+        an entry of a list, as `interface.2.friction` and `material.fibre.expansion.3`; `material.fibre.stiffness.C12`
+        are both entries; None takes a key out.  Raises CaseError with all faults.
+        """
+        (document, folder), faults = self.source, list[str]()
+        changed = with_values(document, dict(leaves(to_document(changes))), faults)
+        if faults:
+            raise CaseError(*faults)
+        return parse(changed, folder)
 
     @property
     def arcs(self) -> tuple[Arc, ...]:
@@ -173,7 +188,7 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
         contents["cell"] = cell_sizes.sized(cell, document["cell"], materials, plane, free_faces, faults)
     if faults:
         raise CaseError(*faults)
-    return Case(name=document.get("name", "case"), **contents)
+    return Case(name=document.get("name", "case"), source=(document, folder), **contents)
 
 
 def check_stored(values: Mapping[str, Any]) -> None:

@@ -103,7 +103,7 @@ def _read_material(
             try:
                 check(material)
             except ValueError as error:
-                reader.faults.append(f"[{section}] {error}")
+                reader.faults += {f"[{section}] {error}"}.difference(reader.faults)
     return material
 
 

@@ -1,7 +1,9 @@
 """Read the document of a case, nested tables of TOML types, from a file or from Python and NumPy values."""
 
+import copy
 import hashlib
 import os
+import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path, PurePath
@@ -97,6 +99,58 @@ def leaves(
             yield from leaves(value, is_value, path)
         else:
             yield path, value
+
+
+def in_lists(path: TomlPath) -> TomlPath:
+    """Split the last name Cij of a stiffness path into row and column."""
+    entry = re.fullmatch(r"C([1-6])([1-6])", path[-1]) if path[-2:-1] == ("stiffness",) else None
+    return path if entry is None else (*path[:-1], *entry.groups())
+
+
+def with_values(
+    base: Mapping[str, Any], values: Mapping[TomlPath, Any], faults: list[str], place: str = ""
+) -> dict[str, Any]:
+    """Return a copy of a document with other values at some paths.
+
+    A table is merged into its section, None takes a key out, a missing section is made.  A number, from 1, selects one
+    of several sections or an entry of a list; Cij are both entries of a symmetric stiffness.  Faults, which begin with
+    `place`, are appended to `faults`.
+    """
+    document = copy.deepcopy(dict(base))
+    for path, value in values.items():
+        entry = in_lists(path)[len(path) - 1 :]
+        for *above, last in {(*path[:-1], *entry), (*path[:-1], *entry[::-1])}:
+            table: Any = document
+            for name in above:
+                table = _one_of(table, name)
+                if isinstance(table, list):
+                    table = table[int(name) - 1] if name.isdecimal() and 0 < int(name) <= len(table) else None
+                else:
+                    table = table.setdefault(name, {})
+                if not isinstance(table, dict | list):
+                    faults.append(f"{place}{wording.dotted_key(path)}: {wording.toml_value(name)} is no section")
+                    return document
+            table, name = _one_of(table, last), wording.dotted_key(above)
+            if isinstance(table, list):
+                several = f"there are {len(table)} sections [[{name}]]; expected {name}.1.{last} or the like"
+                if not any(isinstance(each, dict) for each in table):
+                    several = f"expected {name}.1 to {name}.{len(table)}"
+                    if last.isdecimal() and 0 < int(last) <= len(table):
+                        table[int(last) - 1] = value
+                        continue
+                faults.append(f"{place}{wording.dotted_key(path)}: {several}")
+                return document
+            is_merged = isinstance(value, dict) and isinstance(table.get(last, {}), dict)
+            table[last] = table.get(last, {}) | value if is_merged else value
+            if value is None:
+                del table[last]
+    return document
+
+
+def _one_of(table: Any, name: str) -> Any:
+    """Return the only section or row of a list, unless `name` is the number of the section; else the table."""
+    is_one = isinstance(table, list) and len(table) == 1
+    return table[0] if is_one and isinstance(table[0], list if name.isdecimal() else dict | list) else table
 
 
 def short_digest(content: bytes) -> str:

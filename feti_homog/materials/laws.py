@@ -74,7 +74,7 @@ def isotropic_ratio(material: material_forms.Material) -> float | None:
     A transversely isotropic material is isotropic if its constants are isotropic up to ISOTROPY.
     """
     if isinstance(material, material_forms.TransverselyIsotropic):
-        young, ratio, shear = material.E_transverse, material.nu_transverse, material.G_axial
+        young, ratio, shear = material.E_transverse, transverse_ratio(material), material.G_axial
         pairs = [(material.E_axial, young), (material.nu_axial, ratio), (shear, young / (2 + 2 * ratio))]
         compared = pairs if shear is not None else pairs[:2]
         alike = all(first is not None and math.isclose(first, second, rel_tol=ISOTROPY) for first, second in compared)
@@ -188,6 +188,9 @@ def stable_compliance(material: material_forms.Orthotropic | material_forms.Tran
             fault = f"nu12 = {material.nu12}: expected nu12^2 < E1/E2 = {limit}"
         else:
             fault = f"nu_transverse = {material.nu_transverse}: expected a number above -1 and below 1"
+            if material.G_transverse is not None:
+                limit = f"E_transverse/4 = {material.E_transverse / 4.0:.12g}"
+                fault = f"G_transverse = {material.G_transverse}: expected more than {limit}"
         raise ValueError(f"{fault}; no material is stable otherwise")
     missing = [name for name in NEEDED[type(material)].get(plane, ()) if getattr(material, name) is None]
     if missing:
@@ -198,7 +201,7 @@ def stable_compliance(material: material_forms.Orthotropic | material_forms.Tran
     if isinstance(material, material_forms.Orthotropic):
         raise ValueError("E1, E2, E3, nu12, nu13, nu23: expected a positive definite compliance")
     E_transverse, E_axial, nu_axial = _numbers(material.E_transverse, material.E_axial, material.nu_axial)
-    limit = wording.limit_in_words((1.0 - material.nu_transverse) * E_axial / (2.0 * E_transverse), nu_axial**2, 6)
+    limit = wording.limit_in_words((1.0 - transverse_ratio(material)) * E_axial / (2.0 * E_transverse), nu_axial**2, 6)
     words = "nu_axial^2 < (1 - nu_transverse) E_axial/(2 E_transverse)"
     raise ValueError(f"nu_axial = {nu_axial}: expected {words} = {limit}; no material is stable otherwise")
 
@@ -207,7 +210,7 @@ def known_compliance(material: material_forms.Orthotropic | material_forms.Trans
     """Return the compliance (6, 6) in material axes; NaN for undetermined entries."""
     if isinstance(material, material_forms.TransverselyIsotropic):
         E1, E3, G13, nu31 = _numbers(material.E_transverse, material.E_axial, material.G_axial, material.nu_axial)
-        nu12, nu13 = material.nu_transverse, nu31 * E1 / E3
+        nu12, nu13 = transverse_ratio(material), nu31 * E1 / E3
         G12 = E1 / (2.0 * (1.0 + nu12))
         moduli, ratios, shears = [E1, E1, E3], [nu12, nu13, nu13], [G13, G13, G12]
     else:
@@ -218,6 +221,16 @@ def known_compliance(material: material_forms.Orthotropic | material_forms.Trans
     for (i, j), ratio in zip(((0, 1), (0, 2), (1, 2)), ratios, strict=True):
         compliance[i, j] = compliance[j, i] = -ratio / moduli[i]
     return compliance
+
+
+def transverse_ratio(material: material_forms.TransverselyIsotropic) -> float:
+    """Return nu_transverse, or E_transverse/(2 G_transverse) - 1.  Raises ValueError unless one of both is given."""
+    ratio, shear = material.nu_transverse, material.G_transverse
+    if ratio is not None and shear is None:
+        return ratio
+    if shear is not None and ratio is None:
+        return material.E_transverse / (2.0 * shear) - 1.0
+    raise ValueError("nu_transverse, G_transverse: expected one of them, and not both")
 
 
 def _numbers(*constants: float | None) -> list[float]:

@@ -1,12 +1,14 @@
 """The forms in which a section [material.PHASE] gives the constants of a linear elastic phase."""
 
 from dataclasses import dataclass
+from functools import partial
 
 from feti_homog.schema import key, types
 
 Matrix = tuple[tuple[float, ...], ...]
 
 POSITIVE = types.real(above=0.0)
+stress = partial(key, POSITIVE, unit="stress")
 MATRIX = types.either(
     "a symmetric 3x3 array of numbers in the order 11, 22, 12, or 6x6 in the order 11, 22, 33, 23, 13, 12",
     *(types.list_of(types.list_of(types.real(), "", count=size), "", count=size) for size in (3, 6)),
@@ -24,20 +26,16 @@ class PhaseStrength:
     Its keys are principal; von_mises; tension and compression; or the six of Hashin for fibres along x3.
     """
 
-    principal: float | None = key(POSITIVE, "Largest principal stress.", unit="stress", default=None)
-    von_mises: float | None = key(POSITIVE, "Von Mises stress.", unit="stress", default=None)
-    tension: float | None = key(
-        POSITIVE, "Uniaxial tension, with compression: Drucker and Prager's criterion.", unit="stress", default=None
-    )
-    compression: float | None = key(POSITIVE, "Uniaxial compression, with tension.", unit="stress", default=None)
-    axial_tension: float | None = key(
-        POSITIVE, "Tension along x3, with the next five: Hashin's criterion.", unit="stress", default=None
-    )
-    axial_compression: float | None = key(POSITIVE, "Compression along x3.", unit="stress", default=None)
-    axial_shear: float | None = key(POSITIVE, "Shear between x3 and the plane.", unit="stress", default=None)
-    transverse_tension: float | None = key(POSITIVE, "Tension in the plane.", unit="stress", default=None)
-    transverse_compression: float | None = key(POSITIVE, "Compression in the plane.", unit="stress", default=None)
-    transverse_shear: float | None = key(POSITIVE, "Shear in the plane.", unit="stress", default=None)
+    principal: float | None = stress("Largest principal stress.", default=None)
+    von_mises: float | None = stress("Von Mises stress.", default=None)
+    tension: float | None = stress("Uniaxial tension, with compression: Drucker and Prager's criterion.", default=None)
+    compression: float | None = stress("Uniaxial compression, with tension.", default=None)
+    axial_tension: float | None = stress("Tension along x3, with the next five: Hashin's criterion.", default=None)
+    axial_compression: float | None = stress("Compression along x3.", default=None)
+    axial_shear: float | None = stress("Shear between x3 and the plane.", default=None)
+    transverse_tension: float | None = stress("Tension in the plane.", default=None)
+    transverse_compression: float | None = stress("Compression in the plane.", default=None)
+    transverse_shear: float | None = stress("Shear in the plane.", default=None)
 
 
 STRENGTH = types.table_of(PhaseStrength, "a table such as {principal = 80.0}", least=1)
@@ -48,7 +46,7 @@ UTILISATION = "Strength of the phase, whose utilisation is computed with its lar
 class Isotropic:
     """Young's modulus and Poisson's ratio."""
 
-    young: float = key(POSITIVE, "Young's modulus.", unit="stress")
+    young: float = stress("Young's modulus.")
     poisson: float = key(types.real(above=-1.0, most=0.5), "Poisson's ratio; 0.5 in plane stress alone.")
     expansion: float | None = key(types.real(), "Thermal expansion.", unit=PER_TEMPERATURE, default=None)
     strength: PhaseStrength | None = key(STRENGTH, UTILISATION, default=None)
@@ -62,21 +60,15 @@ class Orthotropic:
     plane strain all.
     """
 
-    E1: float = key(POSITIVE, "Young's modulus along axis 1.", unit="stress")
-    E2: float = key(POSITIVE, "Young's modulus along axis 2.", unit="stress")
-    E3: float | None = key(
-        POSITIVE, "Young's modulus out of the plane; plane strain needs it.", unit="stress", default=None
-    )
+    E1: float = stress("Young's modulus along axis 1.")
+    E2: float = stress("Young's modulus along axis 2.")
+    E3: float | None = stress("Young's modulus out of the plane; plane strain needs it.", default=None)
     nu12: float = key(types.real(), "Poisson's ratio in the plane; nu12^2 < E1/E2.")
     nu13: float | None = key(types.real(), "Poisson's ratio out of the plane; plane strain needs it.", default=None)
     nu23: float | None = key(types.real(), "Poisson's ratio out of the plane; plane strain needs it.", default=None)
-    G12: float = key(POSITIVE, "Shear modulus in the plane.", unit="stress")
-    G13: float | None = key(
-        POSITIVE, "Shear modulus between axis 1 and x3; generalized plane strain needs it.", unit="stress", default=None
-    )
-    G23: float | None = key(
-        POSITIVE, "Shear modulus between axis 2 and x3; generalized plane strain needs it.", unit="stress", default=None
-    )
+    G12: float = stress("Shear modulus in the plane.")
+    G13: float | None = stress("Shear modulus between axis 1 and x3; generalized plane strain needs it.", default=None)
+    G23: float | None = stress("Shear modulus between axis 2 and x3; generalized plane strain needs it.", default=None)
     angle: float = key(types.real(), "Direction of axis 1, from x1 towards x2.", unit="degrees", default=0.0)
     expansion: float | tuple[float, ...] | None = key(
         EXPANSION,
@@ -91,26 +83,24 @@ class Orthotropic:
 class TransverselyIsotropic:
     """Engineering constants of a phase that is isotropic in the plane, such as most fibres.
 
-    Plane stress needs E_transverse and nu_transverse, plane strain also E_axial and nu_axial, generalized plane strain
-    all.
+    Plane stress needs E_transverse and either nu_transverse or G_transverse, plane strain also E_axial and nu_axial,
+    generalized plane strain G_axial, too.
     """
 
-    E_axial: float | None = key(
-        POSITIVE, "Young's modulus along x3; plane strain needs it.", unit="stress", default=None
-    )
-    E_transverse: float = key(POSITIVE, "Young's modulus in the plane.", unit="stress")
+    E_axial: float | None = stress("Young's modulus along x3; plane strain needs it.", default=None)
+    E_transverse: float = stress("Young's modulus in the plane.")
     nu_axial: float | None = key(
         types.real(),
         "Contraction in the plane per stretch under stress along x3, "
         "2 nu_axial^2 < (1 - nu_transverse) E_axial/E_transverse; plane strain needs it.",
         default=None,
     )
-    nu_transverse: float = key(types.real(above=-1.0, below=1.0), "Poisson's ratio in the plane.")
-    G_axial: float | None = key(
-        POSITIVE,
-        "Shear modulus between x3 and the plane; generalized plane strain needs it.",
-        unit="stress",
-        default=None,
+    nu_transverse: float | None = key(
+        types.real(above=-1.0, below=1.0), "Poisson's ratio in the plane.", absent="given by G_transverse"
+    )
+    G_transverse: float | None = stress("Shear modulus in the plane, in place of nu_transverse.", default=None)
+    G_axial: float | None = stress(
+        "Shear modulus between x3 and the plane; generalized plane strain needs it.", default=None
     )
     expansion: float | None = key(
         types.real(), "Thermal expansion, the same in all directions.", unit=PER_TEMPERATURE, default=None

@@ -32,6 +32,7 @@ class ViewedState:
         points: (n, 3) node positions; nodes are torn between subdomains.
         cells: (m, 3 or 6) triangle nodes, mid-side nodes last; (k, 1) interface nodes.
         nodes, elements: arrays by name, with (n, ...) and (m, ...) rows; vectors have three columns, tensors nine.
+        means: one row (1, c) of each of load_factor, temperature, mean_strain, mean_stress, as `xdmf.cell_means`.
         label: state label.
     """
 
@@ -39,6 +40,7 @@ class ViewedState:
     cells: Array
     nodes: Mapping[str, Array]
     elements: Mapping[str, Array]
+    means: Mapping[str, Float]
     label: str
 
     def __repr__(self) -> str:
@@ -93,7 +95,8 @@ def cell_state(file: Any, state: int) -> ViewedState:
     elements["von_mises"] = voigt.spatial_von_mises(in_plane, S33, shears)
     principal = voigt.spatial_principal(in_plane, S33, shears) if more else voigt.principal(in_plane, S33)
     elements |= {f"principal_{k + 1}": column for k, column in enumerate(principal.T)}
-    return ViewedState(np.pad(points, [(0, 0), (0, 1)]), triangles, nodes, elements, str(group.attrs["label"]))
+    means, points = xdmf.cell_means(group.attrs), np.pad(points, [(0, 0), (0, 1)])
+    return ViewedState(points, triangles, nodes, elements, means, str(group.attrs["label"]))
 
 
 def interface_state(file: Any, state: int) -> ViewedState:
@@ -102,7 +105,8 @@ def interface_state(file: Any, state: int) -> ViewedState:
     more = xdmf.SPATIAL_POINTS if AXIAL_DISPLACEMENT in group else {}
     nodes = _tables(file, state, xdmf.INTERFACE_POINTS | more)
     points = np.pad(file["interface/points"][()], [(0, 0), (0, 1)])
-    return ViewedState(points, file["interface/vertex"][()], nodes, {}, str(group.attrs["label"]))
+    means = xdmf.cell_means(group.attrs)
+    return ViewedState(points, file["interface/vertex"][()], nodes, {}, means, str(group.attrs["label"]))
 
 
 def _tables(file: Any, state: int, places: Mapping[str, str]) -> dict[str, Array]:
@@ -121,7 +125,8 @@ def write_vtk(directory: Path, kind: str) -> list[Path]:
     """Write the states of `directory`/result.h5 in a VTK format; return the paths.  Call on one rank.
 
     `kind` is one of `FORMATS`.  `vtu` writes cell_0000.vtu, ... and their list cell.pvd; `vtkhdf` writes cell.vtkhdf,
-    with all states as steps.  A cell with interface nodes also has interface_0000.vtu, ... or interface.vtkhdf.
+    with all states as steps.  A cell with interface nodes also has interface_0000.vtu, ... or interface.vtkhdf.  Times
+    are numbers of states, which rise where load factors snap back; these and the means are field data.
 
     Raises:
         CaseError: result.h5 is missing.
@@ -153,20 +158,22 @@ def _grid(state: ViewedState) -> ET.Element:
     root = ET.Element("VTKFile", form)
     m, columns = state.cells.shape
     sizes = {"NumberOfPoints": str(len(state.points)), "NumberOfCells": str(m)}
-    piece = ET.SubElement(ET.SubElement(root, "UnstructuredGrid"), "Piece", sizes)
+    grid = ET.SubElement(root, "UnstructuredGrid")
+    whole, piece = ET.SubElement(grid, "FieldData"), ET.SubElement(grid, "Piece", sizes)
     cells = {
         "connectivity": state.cells.ravel(),
         "offsets": columns * np.arange(1, m + 1),
         "types": np.full(m, KINDS[columns], np.uint8),
     }
     groups = {"Points": {"Points": state.points}, "Cells": cells, "PointData": state.nodes, "CellData": state.elements}
-    for group, arrays in groups.items():
-        parent = ET.SubElement(piece, group)
+    parents = {whole: state.means} | {ET.SubElement(piece, group): arrays for group, arrays in groups.items()}
+    for parent, arrays in parents.items():
         for name, array in arrays.items():
             values = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
             width = {"NumberOfComponents": str(values.shape[1])} if values.ndim == 2 else {}
             form = {"type": TYPES[values.dtype.str[1:]], "Name": name, "format": "binary"}
-            element = ET.SubElement(parent, "DataArray", form | width)
+            tuples = {"NumberOfTuples": "1"} if parent is whole else {}
+            element = ET.SubElement(parent, "DataArray", form | width | tuples)
             element.text = base64.b64encode(np.uint64(values.nbytes).tobytes() + values.tobytes()).decode()
     return root
 
@@ -195,7 +202,8 @@ def _write_vtkhdf(read: Any, file: Any, path: Path) -> None:
                 root["Points"], root["Connectivity"] = state.points, state.cells.ravel().astype(np.int64)
                 root["Offsets"] = columns * np.arange(m + 1)
                 root["Types"] = np.full(m, KINDS[columns], np.uint8)
-            for group, arrays in (("PointData", state.nodes), ("CellData", state.elements)):
+            groups = {"FieldData": state.means, "PointData": state.nodes, "CellData": state.elements}
+            for group, arrays in groups.items():
                 tables, offsets = root.require_group(group), steps.require_group(f"{group}Offsets")
                 for name, array in arrays.items():
                     rows = len(array)

@@ -18,6 +18,7 @@ from feti_homog.materials import voigt
 from feti_homog.results import atomic, field_file
 from feti_homog.results.field_layout import StatePart, tables
 from feti_homog.results.field_views import AXIAL
+from feti_homog.typing import Float
 
 CELL, INTERFACE = "result.xdmf", "interface.xdmf"
 TENSOR = np.array([0, 5, 4, 5, 1, 3, 4, 3, 2])  # tensor rows, as indices into [11, 22, 33, 23, 13, 12]
@@ -84,15 +85,8 @@ def write(directory: Path) -> list[Path]:
                 ET.SubElement(block, "Time", Value=state)
                 grid = ET.SubElement(block, "Grid", Name=label, GridType="Uniform")
                 _numbers(grid, "label", "Scalar", list(label.encode().ljust(longest)))
-                means = file[f"state/{state}"].attrs
-                _numbers(grid, "load_factor", "Scalar", [float(means["load_factor"])])
-                strain, stress, kind_of_means = means["strain"], means["stress"], "Vector"
-                if "temperature" in means:
-                    _numbers(grid, "temperature", "Scalar", [float(means["temperature"])])
-                    kind_of_means, stress = "Tensor", stress[TENSOR]
-                    strain = strain[TENSOR] * np.where(TENSOR < 3, 1.0, 0.5)
-                _numbers(grid, "mean_strain", kind_of_means, strain.tolist())
-                _numbers(grid, "mean_stress", kind_of_means, stress.tolist())
+                for mean, values in cell_means(file[f"state/{state}"].attrs).items():
+                    _numbers(grid, mean, SHAPES[values.size], values.ravel().tolist())
                 is_spatial = AXIAL in file[f"state/{state}"]
                 if name == CELL:
                     triangles = "Triangle_6" if file["mesh/triangles"].shape[1] == 6 else "Triangle"
@@ -107,6 +101,19 @@ def write(directory: Path) -> list[Path]:
             write_tree = partial(ET.ElementTree(root).write, encoding="utf-8", xml_declaration=True)
             paths.append(atomic.replace(h5.with_name(name), write_tree))
     return paths
+
+
+def cell_means(attributes: Mapping[str, Any]) -> dict[str, Float]:
+    """Return the numbers of a whole state by name, each in a row (1, c): load factor, temperature, means.
+
+    Mean strain and stress are vectors in the order [11, 22, 12] or, in generalized plane strain, tensors.
+    """
+    names, strain, stress = ["load_factor"], attributes["strain"], attributes["stress"]
+    if "temperature" in attributes:
+        names, stress = [*names, "temperature"], stress[TENSOR]
+        strain = strain[TENSOR] * np.where(TENSOR < 3, 1.0, 0.5)
+    numbers = {name: np.array([[attributes[name]]], float) for name in names}
+    return numbers | {"mean_strain": strain[None], "mean_stress": stress[None]}
 
 
 def _numbers(grid: ET.Element, name: str, kind: str, values: Sequence[float]) -> None:

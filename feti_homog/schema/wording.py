@@ -12,6 +12,7 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(("nu", "v", "poisson_ratio", "poissons_ratio"), ("poisson", "nu12")),
     **dict.fromkeys(("g", "shear_modulus"), ("G12", "G_axial")),
     **dict.fromkeys(("nu23", "nut"), ("nu_transverse",)),
+    **dict.fromkeys(("g23", "gt"), ("G_transverse",)),
     **dict.fromkeys(("alpha", "cte", "thermal_expansion"), ("expansion",)),
     **dict.fromkeys(("strength", "bond_strength", "tensile_strength"), ("normal_strength", "tangential_strength")),
     "shear_strength": ("tangential_strength",),
@@ -29,10 +30,6 @@ ABSENT = {
     "element": "leave it out: quadratic elements of isotropic phases have a pressure of their own",
     "element_size": "give mesh_size and refine: elements have the size mesh_size / 2^refine",
 }
-# Names of constants that another key replaces: the key, and the formula for its value.
-IN_PLACE = dict.fromkeys(
-    ("g_transverse", "g23", "gt"), ("nu_transverse", "give nu_transverse = E_transverse / (2 G_transverse) - 1")
-)
 
 
 def toml_value(value: object) -> str:
@@ -70,9 +67,6 @@ def suggestion(name: str, known: Iterable[str], owners: Mapping[str, str]) -> st
     known = list(known)
     if meant := [key for key in SYNONYMS.get(name.lower(), ()) if key in known]:
         return f"did you mean {' or '.join(meant)}?"
-    key, words = IN_PLACE.get(name.lower(), ("", ""))
-    if key in known:
-        return words
     if name.lower() in ABSENT:
         return ABSENT[name.lower()]
     if name in owners:

@@ -1,6 +1,5 @@
 """Expand a sweep file to numbered cases, and check every case."""
 
-import copy
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -154,7 +153,7 @@ def case_documents(
     The cases run through all points; further realisations follow, of points with a random cell alone.  Faults of the
     points and of the realisations are appended to `faults`.
     """
-    documents = [_with_values(base, point, faults, section) for point in points]
+    documents = [toml_files.with_values(base, point, faults, f"[{section}] ") for point in points]
     if realisations is not None and not any(map(_is_random, documents)):
         faults.append(f'[{sections.SWEEP}] realisations: only cells with geometry = "random" have several')
     keys = [key for path, value in next(iter(points), {}).items() for key in _inputs({path: value})]
@@ -173,35 +172,6 @@ def case_documents(
                 continue
             ordered.append((SweepCase(len(ordered) + 1, number, realisation, inputs, ""), varied))
     return ordered
-
-
-def _with_values(base: Mapping[str, Any], point: Assignment, faults: list[str], section: str) -> dict[str, Any]:
-    """Return a copy of the base document with the point values.
-
-    A table is merged into its section; a missing section is made.  A number, from 1, selects one of several sections
-    of the same name.  Faults are appended to `faults`.
-    """
-    document = copy.deepcopy(dict(base))
-    for path, value in point.items():
-        table: Any = document
-        for name in path[:-1]:
-            if isinstance(table, list):
-                table = table[int(name) - 1] if name.isdecimal() and 0 < int(name) <= len(table) else None
-            else:
-                table = table.setdefault(name, {})
-            if not isinstance(table, dict | list):
-                faults.append(f"[{section}] {wording.dotted_key(path)}: {wording.toml_value(name)} is no section")
-                return document
-        if isinstance(table, list) and len(table) == 1 and isinstance(table[0], dict):
-            table = table[0]
-        place, last = wording.dotted_key(path[:-1]), path[-1]
-        if isinstance(table, list):
-            several = f"there are {len(table)} sections [[{place}]]; expected {place}.1.{last} or the like"
-            faults.append(f"[{section}] {wording.dotted_key(path)}: {several}")
-            return document
-        is_merged = isinstance(value, dict) and isinstance(table.get(last, {}), dict)
-        table[last] = table.get(last, {}) | value if is_merged else value
-    return document
 
 
 def _is_random(document: Mapping[str, Any]) -> bool:

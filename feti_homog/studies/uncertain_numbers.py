@@ -1,7 +1,5 @@
 """Read the uncertain numbers of a case, KEY = {mean, std} or {mean, cv}, and their correlation."""
 
-import copy
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -129,33 +127,10 @@ def _means(
     return value["mean"]
 
 
-def _in_lists(path: toml_files.TomlPath) -> toml_files.TomlPath:
-    """Split the last name Cij of a stiffness path into row and column."""
-    result = re.fullmatch(r"C([1-6])([1-6])", path[-1]) if path[-2:-1] == (STIFFNESS,) else None
-    return path if result is None else (*path[:-1], *result.groups())
-
-
 def number_at(document: Mapping[str, Any], path: toml_files.TomlPath) -> float | None:
     """Return the number at a path; None for other values, and for a path into one of several sections."""
-    result = _at(document, _in_lists(path))
+    result = _at(document, toml_files.in_lists(path))
     return float(result) if types.is_number(result) else None
-
-
-def with_number(
-    document: Mapping[str, Any], path: toml_files.TomlPath, value: float
-) -> tuple[toml_files.TomlPath, Any]:
-    """Return the key and new value of a number; for a number in a list, the key of the list and the new list."""
-    full = _in_lists(path)
-    for k in range(1, len(full)):
-        result = _at(document, full[:k])
-        if isinstance(result, list) and not any(isinstance(each, dict) for each in result):
-            changed, place = copy.deepcopy(result), full[k:]
-            for *above, last in (place, place[::-1]) if full[k - 1] == STIFFNESS else (place,):
-                numbers = _at(changed, tuple(above))
-                numbers = numbers[0] if len(numbers) == 1 and isinstance(numbers[0], list) else numbers
-                numbers[int(last) - 1] = value
-            return full[:k], changed
-    return path, value
 
 
 def _at(document: Any, path: toml_files.TomlPath) -> Any:

@@ -25,7 +25,7 @@ from feti_homog.studies.axes import Assignment, read_points
 from feti_homog.studies.predictions import Datum, exact_derivatives, responses
 from feti_homog.studies.study import SILENT, Evaluator, Study
 from feti_homog.studies.sweep_cases import Sweep, cases_at
-from feti_homog.studies.uncertain_numbers import SECTIONS, Uncertainty, number_at, read_uncertainty, with_number
+from feti_homog.studies.uncertain_numbers import SECTIONS, Uncertainty, number_at, read_uncertainty
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.typing import Float
 
@@ -54,8 +54,7 @@ class ScatterStudy(Study):
     def differing(self, names: Sequence[str]) -> Sweep:
         """Return the cases one standard deviation below and above the mean of each number."""
         ends = [(name, self.means[name] + sign * self.uncertainty.std[name]) for name in names for sign in (-1, 1)]
-        points = [dict([with_number(self.document, _path(name), end)]) for name, end in ends]
-        return self.cases(points, mesh_error=False)
+        return self.cases([{_path(name): end} for name, end in ends], mesh_error=False)
 
     def identity(self, cases: list[str]) -> Any:
         return [cases, self.uncertainty.to_table()]

@@ -53,8 +53,9 @@ def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
     for constants in (phase_constants(case, phase) for phase in phases):
         is_isotropic = "young" in constants
         if constants.get("E_axial") is not None and constants.get("nu_axial") is not None:
-            isotropic = {"young": constants["E_transverse"], "poisson": constants["nu_transverse"]}
-            is_isotropic = np.allclose(_compliance(constants), _compliance(isotropic), rtol=ROUNDING, atol=0)
+            compliance = _compliance(constants)
+            isotropic = {"young": constants["E_transverse"], "poisson": -compliance[0, 1] / compliance[0, 0]}
+            is_isotropic = np.allclose(compliance, _compliance(isotropic), rtol=ROUNDING, atol=0)
         mixed.append(is_isotropic)
     has_mixed = case["cell"].get("element", "mixed") == "mixed" and case["analysis"]["plane"] != "stress"
     return np.asarray(np.array(mixed, bool) & has_mixed)
@@ -106,7 +107,8 @@ def _compliance(constants: Constants) -> Float:
         e, nu = float(constants["young"]), float(constants["poisson"])
         moduli, ratios, shears = [e, e, e], [nu, nu, nu], [e / (2 * (1 + nu))] * 3
     elif "E_transverse" in constants:
-        e, nu = float(constants["E_transverse"]), float(constants["nu_transverse"])
+        e, shear = float(constants["E_transverse"]), float(constants.get("G_transverse") or 0.0)
+        nu = e / (2 * shear) - 1 if shear else float(constants["nu_transverse"])
         along = float(constants.get("E_axial") or e)
         # Under stress along x1 the phase contracts along x3 by nu_axial e / along: compliances are symmetric.
         minor, shear = float(constants.get("nu_axial") or 0.0) * e / along, e / (2 * (1 + nu))

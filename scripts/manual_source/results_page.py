@@ -27,9 +27,10 @@ face. The filter Python Annotation, of the field data, shows a state's label by
 `label.astype("u1").tobytes().decode()`, and its load factor by `load_factor`.
 
 What follows from these fields is not stored: `feti-homog fields DIR` writes all states with fluctuations, strains, von
-Mises and principal stresses as `cell.vtkhdf` and `interface.vtkhdf` (ParaView from 5.12 on, PyVista), and with
-`--format vtu` as a `.vtu` for each state (meshio, too). In Python `feti_homog.read_state(DIR, K)` returns them as
-arrays."""
+Mises and principal stresses as `cell.vtkhdf` and `interface.vtkhdf` (ParaView from 5.12 on), and with `--format vtu` as
+a `.vtu` for each state (meshio, too), which `cell.pvd` and `interface.pvd` list (PyVista). Their times are the numbers
+of the states, for load factors do not rise where a path snaps back; `load_factor`, `temperature`, `mean_strain` and
+`mean_stress` are field data. In Python `feti_homog.read_state(DIR, K)` returns all of them as arrays."""
 
 CASES_CSV = """\
 Of a sweep, a row for each case; results are there once `collect` has written them. i and j stand for 1, 2 or 3, in

@@ -41,6 +41,15 @@ def test_data_without_noise_return_the_truth(comm, shared_path, name):
         assert own["shares"] == pytest.approx(shares[:, k], abs=1e-3)
 
 
+def test_a_shear_modulus_is_fitted_to_plies_that_were_made_with_a_ratio(comm, shared_path):
+    name, key = "AS4/3501-6", "material.fibre.nu_transverse"
+    document = fit(name, model(name, comm)([*truth(name).values()])[0])
+    document["material"]["fibre"] |= {n.rpartition(".")[2]: x for n, x in truth(name).items() if n != key}
+    document["unknown"] = {"material.fibre.G_transverse": {"start": 9.0, "lower": 4.0, "upper": 20.0}}
+    found = run_fit(document, shared_path / "out", comm)["unknowns"]["material.fibre.G_transverse"]
+    assert found["estimate"] == pytest.approx(14.0 / (2 * 1.25), rel=1e-6)
+
+
 def test_an_interrupted_fit_goes_on_with_what_it_has(comm, shared_path, glass, monkeypatch):
     """Only evaluations that were not finished are computed again."""
     out, calls, compute = shared_path / "out", [], case_runs.run_all

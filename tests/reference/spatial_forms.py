@@ -21,8 +21,9 @@ def law(material):
         m |= {f"E{i}": m["young"] for i in (1, 2, 3)} | {f"nu{i}": m["poisson"] for i in (12, 13, 23)}
         m |= dict.fromkeys(("G12", "G13", "G23"), m["young"] / (2 + 2 * m["poisson"]))
     if "E_axial" in m:
-        E, nu = m["E_transverse"], m["nu_transverse"]
-        m |= {"E1": E, "E2": E, "E3": m["E_axial"], "nu12": nu, "G12": E / (2 + 2 * nu)}
+        E = m["E_transverse"]
+        G = m["G_transverse"] if "G_transverse" in m else E / (2 + 2 * m["nu_transverse"])
+        m |= {"E1": E, "E2": E, "E3": m["E_axial"], "nu12": E / (2 * G) - 1, "G12": G}
         # Contraction along x3 under stress across: nu_13 / E_1 = nu_31 / E_3.
         m |= dict.fromkeys(("nu13", "nu23"), m["nu_axial"] * E / m["E_axial"])
         m |= dict.fromkeys(("G13", "G23"), m["G_axial"])

@@ -1,5 +1,7 @@
 """Results: what is described is what is written, what is written is read again, and what is printed is short."""
 
+import copy
+import pickle
 import re
 from typing import Any
 
@@ -197,6 +199,32 @@ def test_results_can_be_told_apart():
     """Compared as objects: their arrays have no single answer."""
     result = RESULTS["stiffness"]
     assert result == result and result != Result.of(result.document) and len({*RESULTS.values()}) == len(RESULTS)
+
+
+def test_constants_are_attributes():
+    """Young's moduli and ratios are those of the inverse stiffness."""
+    for result, C in ((RESULTS["stiffness"], STIFFNESS), (RESULTS["space"], SPATIAL)):
+        S = np.linalg.inv(C)
+        expected = [1 / S[0, 0], -S[1, 0] / S[0, 0], 1 / S[-1, -1]]
+        assert [result.E1, result.nu12, result.G12] == pytest.approx(expected, rel=1e-12)
+    assert RESULTS["space"].E_axial == RESULTS["space"].transversely_isotropic.E_axial
+    copied = pickle.loads(pickle.dumps(copy.copy(RESULTS["stiffness"])))
+    assert copied.E1 == RESULTS["stiffness"].moduli.E1 and copied.fields is None
+
+
+@pytest.mark.parametrize(
+    ("name", "word", "hint"),
+    [
+        ("stiffness", "E", "did you mean E1?"),
+        ("stiffness", "effective_stifness", "did you mean effective_stiffness?"),
+        ("stiffness", "fibre_fraction", "it belongs to result.cell"),
+        ("stiffness", "E_axial", "expected one of E1, E2, nu12, "),
+        ("path", "E1", "expected one of schema, version, "),
+    ],
+)
+def test_an_unknown_attribute_names_where_it_is(name, word, hint):
+    with pytest.raises(AttributeError, match=f"^this result has no {word}: {re.escape(hint)}"):
+        getattr(RESULTS[name], word)
 
 
 @pytest.mark.parametrize("name", RESULTS)

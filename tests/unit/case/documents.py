@@ -75,7 +75,9 @@ def materials(draw: st.DrawFn) -> dict[str, Any]:
         moduli = {name: draw(st.floats(1.0, 2.0)) for name in ("E_axial", "E_transverse", "G_axial")}
         pair = {"expansion_axial": draw(EXPANSIONS), "expansion_transverse": draw(EXPANSIONS)}
         expansions = draw(st.sampled_from([{}, {"expansion": 1e-6}, pair]))
-        return moduli | {"nu_axial": draw(numbers(-0.3, 0.3)), "nu_transverse": draw(numbers(-0.6, 0.6))} | expansions
+        ratio = {"nu_transverse": draw(numbers(-0.6, 0.6))}
+        across = draw(st.sampled_from([ratio, {"G_transverse": moduli["E_transverse"] / 2}]))
+        return moduli | {"nu_axial": draw(numbers(-0.3, 0.3))} | across | expansions
     return {"stiffness": draw(stiffnesses())} | draw(optional(expansion=EXPANSIONS_BY_AXES))
 
 

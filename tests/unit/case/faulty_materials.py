@@ -85,10 +85,13 @@ FAULTY_MATERIALS: dict[str, str] = {
         fibre(ORTHOTROPIC + OUT_OF_PLANE, "generalized"),
     "E1, E2, E3, nu12, nu13, nu23: expected a positive definite compliance":
         fibre(ORTHOTROPIC + OUT_OF_PLANE.replace("nu13 = 0.3", "nu13 = 1.4") + "G13 = 1\nG23 = 1\n", "generalized"),
-    "[material.fibre] nu_transverse: missing; expected a number above -1 and below 1":
-        fibre("E_transverse = 14.0\n", "stress"),
-    "G_transverse = 7.0: unknown key; give nu_transverse = E_transverse / (2 G_transverse) - 1":
+    "[material.fibre] nu_transverse, G_transverse: expected one of them, and not both":
+        fibre("E_transverse = 14.0\nstrength = {von_mises = 3.0}\n", "stress"),
+    "[material.fibre] nu_transverse, G_transverse: expected one of them, and not":
         fibre(TRANSVERSE + AXIAL + "G_axial = 15.0\nG_transverse = 7.0\n", "generalized"),
+    "[material.fibre] G_transverse = 3.5: expected more than E_transverse/4 = 3.5; no material is stable otherwise":
+        fibre("E_transverse = 14.0\nG_transverse = 3.5\n", "stress"),
+    "[material.fibre] GT = 7.0: unknown key; did you mean G_transverse?": fibre("E_transverse = 14.0\nGT = 7.0\n"),
     "[material.fibre] E_axial, nu_axial: missing; plane strain needs them": fibre(TRANSVERSE),
     "[material.fibre] G_axial: missing; generalized plane strain needs it": fibre(TRANSVERSE + AXIAL, "generalized"),
     "[material.fibre] E1 (orthotropic) and E_transverse, nu_transverse (transversely isotropic): exclude each":

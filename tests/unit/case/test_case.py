@@ -5,8 +5,9 @@ import json
 import pickle
 from pathlib import Path
 
+import numpy as np
 import pytest
-from support.base_case import BASE, FIBRE, changed
+from support.base_case import BASE, FIBRE, ORTHOTROPIC, OUT_OF_PLANE, SPATIAL, changed, fibre
 from unit.case.faulty_bonding import BARE_ARC, FAULTY_BONDINGS, FAULTY_COHESIVE_LAWS, PATH, SOFTENING, debonded, of_type
 from unit.case.faulty_cases import FAULTY_CASES, FAULTY_SIZES, FAULTY_TABLE_CELLS
 from unit.case.faulty_envelopes import FAULTY_ENVELOPES
@@ -127,6 +128,50 @@ def test_sections_of_bonds_and_loads_are_read(tmp_path):
     assert (case.path.method, case.path.increments, case.path.max_events) == ("events", None, 100_000)
     there_and_back = case_of(tmp_path, of_type("path", "[path]\nwaypoints = [[1, 0, 0], [0, 0, 0]]"))
     assert tuple(there_and_back.path.placed.values()) == ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+def test_replaced_values_make_the_case_of_the_edited_file(tmp_path):
+    case, edited = case_of(tmp_path, BASE), changed(("200.0", "80.0"), ("mesh_size = 0.05", "accuracy = 1e-3"))
+    other = case.replace({"material.fibre.young": np.float64(80.0), "cell": {"mesh_size": None, "accuracy": 1e-3}})
+    assert other == case_of(tmp_path, edited) != case == case_of(tmp_path, BASE)
+    back = other.replace({"material": {"fibre": {"young": 200.0}}, "cell.accuracy": None, "cell.mesh_size": 0.05})
+    assert (
+        back == case == case.replace({}) and pickle.loads(pickle.dumps(back)).replace({"cell.accuracy": None}) == case
+    )
+    # A default is not given: the order follows the new ratio as in a file.
+    assert case.replace({"material.matrix.poisson": 0.499}).cell.order == 2
+    (tmp_path / "cases").mkdir()
+    below = case_of(tmp_path, MESH.replace("cell.msh", "../cell.msh"), "cases/one.toml")
+    assert below.replace({"output.fields": False}).cell.file == (tmp_path / "cell.msh").resolve()
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "fault"),
+    [
+        ("material.fibre.young", -1.0, "[material.fibre] young = -1.0: expected a number above 0"),
+        ("material.fibre.yuong", 1.0, "[material.fibre] yuong = 1.0: unknown key; did you mean young?"),
+        ("material.fibre.young", None, "[material.fibre] young: missing; expected a number above 0"),
+        ("materials.fibre.young", 1.0, "[materials]: unknown section; did you mean material?"),
+        ("cell.mesh_size.fine", 1.0, 'cell.mesh_size.fine: "mesh_size" is no section'),
+    ],
+)
+def test_faults_of_replaced_values_are_those_of_files(tmp_path, key, value, fault):
+    with pytest.raises(CaseError) as caught:
+        case_of(tmp_path, BASE).replace({key: value})
+    assert caught.value.faults == (fault,)
+
+
+def test_entries_of_lists_are_replaced_by_number(tmp_path):
+    case = case_of(tmp_path, fibre(ORTHOTROPIC + OUT_OF_PLANE + "expansion = [1e-6, 2e-6, 3e-6]\n"))
+    assert case.replace({"material.fibre.expansion.2": 5e-6}).materials["fibre"].expansion == (1e-6, 5e-6, 3e-6)
+    for key in ("expansion.4", "expansion.x1"):
+        with pytest.raises(CaseError, match=f"^material.fibre.{key}: expected material.fibre.expansion.1 to material"):
+            case.replace({f"material.fibre.{key}": 5e-6})
+    given = case_of(tmp_path, fibre(SPATIAL))
+    rows = np.array(given.materials["fibre"].stiffness)
+    rows[0, 1] = rows[1, 0] = 3.5
+    found = given.replace({"material.fibre.stiffness.C12": 3.5}).materials["fibre"].stiffness
+    np.testing.assert_array_equal(found, rows)
 
 
 def test_mesh_file_is_beside_the_case(tmp_path):

@@ -145,6 +145,8 @@ def test_sweeps_vary_a_key_of_one_section():
     ((_, varied),) = case_documents(base, [{("interface", "2", "normal_strength"): 5.0}], None, faults)
     assert not faults
     assert [interface["normal_strength"] for interface in varied["interface"]] == [1.0, 5.0]
+    replaced = Case.parse(base).replace({"interface.2.normal_strength": 5.0})
+    assert replaced == Case.parse(varied) and replaced.interfaces[0] == Case.parse(base).interfaces[0]
 
 
 @pytest.mark.parametrize(
@@ -160,3 +162,6 @@ def test_sweeps_say_which_section_they_lack(path, words):
     faults: list[str] = []
     case_documents(base, [{path: 5.0}], None, faults)
     assert any(words in fault for fault in faults), faults
+    with pytest.raises(CaseError) as caught:
+        Case.parse(base).replace({".".join(path): 5.0})
+    assert [f"[sweep] {fault}" for fault in caught.value.faults] == faults

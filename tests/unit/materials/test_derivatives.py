@@ -30,6 +30,7 @@ PHASES = {
     "general": General(stiffness=tuple(map(tuple, spatial_stiffness(TURNED).tolist())), expansion=(1e-6, 2e-6, 3e-6)),
     "in the plane": General(stiffness=((10.0, 2.0, 0.5), (2.0, 8.0, 0.1), (0.5, 0.1, 3.0))),
     "sheet": TransverselyIsotropic(E_transverse=14.0, nu_transverse=-0.25),
+    "by shears": TransverselyIsotropic(E_axial=230.0, E_transverse=15.0, nu_axial=0.2, G_transverse=7.0, G_axial=24.0),
 }  # fmt: skip
 PLANES = {"in the plane": ("strain", "stress"), "sheet": ("stress",)}
 CASES = [(name, plane) for name in PHASES for plane in PLANES.get(name, ("strain", "stress", "generalized"))]
@@ -79,6 +80,8 @@ def test_every_given_constant_has_a_derivative():
     assert entries == [f"stiffness.C{pair}" for pair in ("11", "12", "13", "22", "23", "33")]
     assert sum(change.name.startswith("stiffness") for change in law_changes(PHASES["general"], "generalized")) == 13
     assert [change.name for change in law_changes(PHASES["sheet"], "stress")] == ["E_transverse", "nu_transverse"]
+    by_shears = [change.name for change in law_changes(PHASES["by shears"], "strain")]
+    assert by_shears == ["E_axial", "E_transverse", "nu_axial", "G_transverse", "G_axial"]
 
 
 def test_constants_of_composites_are_those_of_results():

@@ -66,6 +66,7 @@ def same_material(young: float, poisson: float) -> list[Material]:
         Orthotropic(**moduli, **ratios, **shears, angle=37.0, expansion=(3.0, 3.0, 3.0)),
         TransverselyIsotropic(**across, expansion_axial=3.0, expansion_transverse=3.0),
         TransverselyIsotropic(**across, expansion=3.0),
+        TransverselyIsotropic(**across | {"nu_transverse": None, "G_transverse": shear}, expansion=3.0),
         General(rows(whole), 3.0),
     ]
 
@@ -93,6 +94,15 @@ def test_a_transversely_isotropic_stiffness_is_that_of_hills_moduli():
     expected = np.diag([0.0, 0.0, 0.0, AS4.G_axial, AS4.G_axial, m])
     expected[:3, :3] = [[k + m, k - m, cross], [k - m, k + m, cross], [cross, cross, n]]
     np.testing.assert_allclose(spatial_stiffness(AS4), expected, rtol=1e-12, atol=1e-12)
+
+
+def test_the_shear_modulus_in_the_plane_is_in_place_of_the_ratio():
+    sheared = dataclasses.replace(AS4, nu_transverse=None, G_transverse=14.0 / 2.5)
+    assert spatial_stiffness(sheared)[5, 5] == pytest.approx(5.6, rel=1e-12)
+    np.testing.assert_allclose(spatial_stiffness(sheared), spatial_stiffness(AS4), rtol=1e-12)
+    for plane in ("strain", "stress"):
+        np.testing.assert_allclose(plane_stiffness(sheared, plane), plane_stiffness(AS4, plane), rtol=1e-12)
+        np.testing.assert_allclose(out_of_plane(sheared, plane), out_of_plane(AS4, plane), rtol=1e-12)
 
 
 def test_ratios_of_a_transversely_isotropic_material_are_those_of_its_tests():

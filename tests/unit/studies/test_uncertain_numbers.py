@@ -9,8 +9,9 @@ from support.base_case import changed
 
 from feti_homog.case.cases import Case
 from feti_homog.case.sections import UNCERTAINTY
+from feti_homog.case.toml_files import with_values
 from feti_homog.errors import CaseError
-from feti_homog.studies.uncertain_numbers import Uncertainty, number_at, read_uncertainty, with_number
+from feti_homog.studies.uncertain_numbers import Uncertainty, number_at, read_uncertainty
 
 UNCERTAIN = (
     ("young = 88.0", "young = {mean = 88.0, cv = 0.05}"),
@@ -64,8 +65,11 @@ def test_entries_of_lists_have_the_names_of_their_derivatives():
     document = case.resolved() | {"path": {"waypoints": [[1.0, 2.0, 3.0]]}}
     stiffness = ("material", "matrix", "stiffness")
     assert number_at(document, (*stiffness, "C12")) == 2.0
-    assert with_number(document, (*stiffness, "C12"), 5.0) == (stiffness, [[10, 5, 0], [5, 8, 0], [0, 0, 3]])
-    assert with_number(document, ("path", "waypoints", "2"), 5.0) == (("path", "waypoints"), [[1, 5, 3]])
+    changes = {(*stiffness, "C12"): 5.0, ("path", "waypoints", "2"): 6.0}
+    other = with_values(document, changes, [])
+    assert {path: number_at(other, path) for path in changes} == changes
+    assert other["material"]["matrix"]["stiffness"] == [[10, 5, 0], [5, 8, 0], [0, 0, 3]]
+    assert other["path"]["waypoints"] == [[1, 6, 3]] and number_at(document, (*stiffness, "C12")) == 2.0
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ GENERAL = {"stiffness": [[10.0, 2.0, 0.5], [2.0, 8.0, 0.1], [0.5, 0.1, 3.0]]}
 IN_PLANE = {"E1": 15.0, "E2": 230.0, "nu12": 0.013, "G12": 25.0, "angle": 30.0}
 CARBON = {"E_axial": 235.0, "E_transverse": 14.0, "nu_axial": 0.2, "nu_transverse": 0.25}
 SHEET = {"E_transverse": 14.0, "nu_transverse": -0.25}
+BY_SHEAR = {"E_axial": 235.0, "E_transverse": 14.0, "nu_axial": 0.2, "G_transverse": 5.0}
 STIFF = {"E1": 2.0, "E2": 9.0, "E3": 4.0, "nu12": -0.2, "nu13": 0.4, "nu23": 0.3, "G12": 1.0, "angle": -73.0}
 
 
@@ -25,7 +26,7 @@ IN_SPACE = {
 
 
 @pytest.mark.parametrize("plane", ["strain", "stress"])
-@pytest.mark.parametrize("fibre", [FIBRE, TURNED, STIFF, GENERAL, IN_SPACE, CARBON, IN_PLANE, SHEET], ids=str)
+@pytest.mark.parametrize("fibre", [FIBRE, TURNED, STIFF, GENERAL, IN_SPACE, CARBON, BY_SHEAR, IN_PLANE, SHEET])
 def test_both_ways_to_the_law_of_a_plane_state_agree(tmp_path, fibre, plane):
     if plane == "strain" and fibre in (IN_PLANE, SHEET):
         pytest.skip("plane strain needs constants out of the plane")
@@ -44,7 +45,12 @@ def test_both_ways_to_the_law_of_a_plane_state_agree(tmp_path, fibre, plane):
         np.testing.assert_allclose(rule, out_of_plane(case.material_of(phase), plane), rtol=1e-12, atol=1e-14)
 
 
-@pytest.mark.parametrize("fibre", [WARM, TURNED_IN_SPACE, WARM_CARBON, IN_SPACE | {"expansion": [1e-6, 2e-6, 3e-6]}])
+WARM_BY_SHEAR = BY_SHEAR | {"G_axial": 28.0, "expansion": 1e-6}
+
+
+@pytest.mark.parametrize(
+    "fibre", [WARM, TURNED_IN_SPACE, WARM_CARBON, WARM_BY_SHEAR, IN_SPACE | {"expansion": [1e-6, 2e-6, 3e-6]}]
+)
 def test_both_ways_to_the_law_in_space_agree(tmp_path, fibre):
     document = {
         "cell": {"geometry": "square", "fibre_fraction": 0.3},
@@ -68,6 +74,7 @@ def test_phases_without_material_are_reported_and_without_expansion_leave_all_un
 
 
 ALIKE = {"E_axial": 3.0, "E_transverse": 3.0, "nu_axial": 0.4999, "nu_transverse": 0.4999}
+ALIKE_BY_SHEAR = {name: value for name, value in ALIKE.items() if name != "nu_transverse"}
 ORTHOTROPIC = {f"E{k}": 3.0 for k in (1, 2, 3)} | {"nu12": 0.2, "nu13": 0.2, "nu23": 0.2, "G12": 1.25}
 
 
@@ -78,6 +85,8 @@ ORTHOTROPIC = {f"E{k}": 3.0 for k in (1, 2, 3)} | {"nu12": 0.2, "nu13": 0.2, "nu
         (ALIKE, 0.4999),
         (ALIKE | {"G_axial": 3.0 / 2 / 1.4999}, 0.4999),
         (ALIKE | {"G_axial": 1.01}, None),
+        (ALIKE_BY_SHEAR | {"G_transverse": 3.0 / 2 / 1.4999}, 0.4999),
+        (ALIKE_BY_SHEAR | {"G_transverse": 1.01}, None),
         (ALIKE | {"E_axial": 3.0 * (1 + 1e-7)}, None),
         (ALIKE | {"nu_axial": 0.4998}, None),
         (GENERAL, None),

@@ -1,6 +1,7 @@
 """Fields that follow from those of result.h5: by the independent elements and laws of `verify`, and in files of VTK."""
 
 import shutil
+from xml.etree import ElementTree
 
 import h5py
 import meshio
@@ -67,6 +68,18 @@ def folder(request, results, tmp_path_factory):
     return copy
 
 
+def means_of(folder, number):
+    """Return load factor, temperature and means of a state as (1, c), from its attributes in result.h5."""
+    with h5py.File(folder / "result.h5", "r") as file:
+        of_state = dict(file[f"state/{number}"].attrs)
+    means = {f"mean_{name}": of_state[name] for name in ("strain", "stress")}
+    if "temperature" in of_state:  # tensors, of strains with half of the shears
+        means = {name: values[VOIGT[6]].ravel() for name, values in means.items()}
+        means["mean_strain"] *= np.where(np.eye(3) > 0, 1.0, 0.5).ravel()
+    numbers = {name: of_state[name] for name in ("load_factor", "temperature") if name in of_state}
+    return {name: np.atleast_2d(values) for name, values in (numbers | means).items()}
+
+
 def test_meshio_reads_every_state(folder):
     with h5py.File(folder / "result.h5", "r") as file:
         count, nodes, faces = len(file["state"]), len(file["mesh/points"]), len(file["interface/points"])
@@ -74,7 +87,11 @@ def test_meshio_reads_every_state(folder):
         assert len(list(folder.glob(f"{name}_*.vtu"))) == count
         mesh = meshio.read(folder / f"{name}_{count - 1:04d}.vtu")
         assert mesh.points.shape == (size, 3)
-        assert (folder / f"{name}.pvd").read_text().count(".vtu") == count
+        listed = [entry.attrib for entry in ElementTree.parse(folder / f"{name}.pvd").iter("DataSet")]
+        assert listed == [{"timestep": str(k), "file": f"{name}_{k:04d}.vtu"} for k in range(count)]
+        expected = means_of(folder, count - 1)
+        assert set(mesh.field_data) == set(expected)
+        assert all((mesh.field_data[key] == values).all() for key, values in expected.items())
     seen, mesh = read_state(folder, count - 1), meshio.read(folder / f"cell_{count - 1:04d}.vtu")
     (block,) = mesh.cells
     assert block.type == ("triangle" if seen.cells.shape[1] == 3 else "triangle6")
@@ -92,9 +109,14 @@ def test_vtk_reads_the_states_as_steps(folder):
     reader.SetFileName(str(folder / "cell.vtkhdf"))
     reader.UpdateInformation()
     assert reader.GetNumberOfSteps() == count
-    reader.SetStep(count - 1)
-    reader.Update()
-    data, seen = reader.GetOutputDataObject(0), read_state(folder, count - 1)
+    for step in (0, count - 1):
+        reader.SetStep(step)
+        reader.Update()
+        data, expected = reader.GetOutputDataObject(0), means_of(folder, step) | {"Time": np.array([[float(step)]])}
+        arrays = data.GetFieldData()
+        assert {arrays.GetArrayName(i) for i in range(arrays.GetNumberOfArrays())} == set(expected)
+        assert all((vtk_to_numpy(arrays.GetArray(name)) == values).all() for name, values in expected.items())
+    seen = read_state(folder, count - 1)
     cells = vtk_to_numpy(data.GetCells().GetConnectivityArray())
     np.testing.assert_array_equal(cells.reshape(seen.cells.shape), seen.cells)
     for own, arrays in ((seen.nodes, data.GetPointData()), (seen.elements, data.GetCellData())):
