@@ -53,7 +53,7 @@ def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numb
         values |= _at_point("end", path[-1]) | {name: path[-1][name] for name in ("dissipated", "work")}
         largest = stress[np.abs(stress).argmax(axis=0), range(len(stresses))]
         values |= {f"peak_{name}": value for name, value in zip(stresses, largest.tolist(), strict=True)}
-        peak = landmarks.peak_of(document)
+        peak = landmarks.peak_of({**document, "path": path})
         values |= {f"peak_{peak[f'{kind}_name']}": peak[kind] for kind in ("stress", "strain")}
         values |= {f"end_{state}": path[-1][state] for state in point_tables.STATES}
     if envelope := document.get("envelope"):  # first axis, least and largest factor
