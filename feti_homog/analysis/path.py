@@ -64,8 +64,7 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
                 if number == 0 or len(context.checks.faults) > faults:
                     context.progress.say(line)
             counts = f"{entry['bonded']} bonded, {entry['open'] + entry['closed']} broken"
-            # The first break takes a large share of the load, and no time.
-            known = number == 0 or before is not None
+            known = number == 0 or before is not None  # the first break takes much of the load, and no time
             advance(point.load_factor, len(entries), f"{len(entries)} {path.method}, {counts}", known)
             bonds.append(bond)
             last = point

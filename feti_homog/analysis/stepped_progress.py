@@ -9,7 +9,6 @@ from typing import Any
 from feti_homog.system.runtime import progress_bar
 
 SECONDS_A_LINE = 60.0
-BAR = "{l_bar}{bar}| {elapsed} used{postfix}"
 
 
 @contextmanager
@@ -27,7 +26,7 @@ def shown(
     if progress.on_terminal:
         from tqdm import tqdm  # unused in most runs, and slow to import
 
-        bar = tqdm(total=1.0, desc=label, bar_format=BAR, leave=False)
+        bar = tqdm(total=1.0, desc=label, bar_format="{l_bar}{bar}| {elapsed} used{postfix}", leave=False)
 
     def advance(share: float, count: int, text: str, known: bool) -> None:
         nonlocal reached, next_line, since

@@ -32,8 +32,7 @@ SWEEP_HELP = (
 )
 COLLECT_HELP = (
     "Write cases.csv, the inputs and outputs of all cases, statistics.csv, those over realisations, and a picture of "
-    "moduli over the fibre fraction, and print means of constants or peaks with their scatter. The sweep may still be "
-    "running: finished cases are collected, and the points so far of begun paths."
+    "moduli; print means of constants or peaks. The sweep may still be running: begun paths have their points so far."
 )
 FIT_HELP = (
     "Fit the unknowns of a file to measured values by least squares, with exact derivatives where there are some. "
