@@ -23,7 +23,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     unit = section.strain is None
     starts = context.loads.zero_multipliers()[: None if unit else 1]
     points = []
-    for number, value in enumerate(context.progress.bar(section.values, "angles")):
+    for number, value in enumerate(section.values):
         bonds, label = context.bonds(value), f"{value:g} deg"
         point: dict[str, Any] = {"angle": value}
         responses: list[averaging.Response]

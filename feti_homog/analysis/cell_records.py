@@ -163,11 +163,6 @@ class Checks:
     )
     symmetry: float | None = described("L^ef is symmetric; of bonded or frictionless free faces only", default=None)
 
-    def by_law(self) -> dict[str, float]:
-        """Return the errors of the checked laws by name."""
-        errors: dict[str, float] = records.plain(self)
-        return errors
-
 
 @dataclass(frozen=True)
 class StiffnessBounds:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.analysis import path_events
+from feti_homog.analysis import path_events, stepped_progress
 from feti_homog.analysis.constants import check_accuracy, state_error
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import PathPoint, Peak
@@ -21,6 +21,7 @@ from feti_homog.interface.path import coulomb_leg, frictionless_leg, path_follow
 from feti_homog.materials import voigt
 from feti_homog.results import checkpoints, landmarks, path_curves
 
+OF_FIBRES = ("debonded_length", "debonding_angle")  # lists of a point, kept where its fields are
 NAMED_FIBRES = 8  # most fibre names in a remark
 
 
@@ -41,7 +42,7 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
     count = path_events.resumable(context)
     work, entries, last = path_events.Work(), list[dict[str, Any]](), None
     bonds = list[tuple[float, float]]()
-    with path_events.EventProgress(context.progress, path_events.BARS[path.method], context.events) as progress:
+    with stepped_progress.shown(context.progress, "load") as advance:
         for number, (point, before, responses) in enumerate(_points(context, path, law, count)):
             place = f"at {point.load_factor:.6f}, {responses[0].leading}"
             if before is not None:
@@ -51,19 +52,20 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
             else:
                 work.arrive(point)
                 bond = most_utilised_bond(context, law, point)
-                if point.state.converged:
-                    # The many small drops are cheap to compute again.
-                    light = point.broke == 0 < point.softened
-                    event = path_events.stored(point, bond, responses, work, context.loads.interfaces)
-                    context.checkpoint.write(number, *event, light=light)
+            entries.append(entry := _entry(context, law, point, responses, work))
+            if before is None and point.state.converged:
+                cell, light = context.loads.interfaces, point.broke == 0 < point.softened
+                event = path_events.stored(point, bond, responses, work, cell, _without_lists(entry))
+                context.checkpoint.write(number, *event, light=light)  # many small drops are cheap to compute again
             for response, problem in zip(responses, ("", ", along the fibres"), strict=False):
                 faults = len(context.checks.faults)
                 line = context.checks.record(f"{_label(path, number)} {place}{problem}", response)
                 context.log(line)
-                progress.report(line, urgent=len(context.checks.faults) > faults)
-            entries.append(entry := _entry(context, law, point, responses, work))
+                if number == 0 or len(context.checks.faults) > faults:
+                    context.progress.say(line)
             counts = f"{entry['bonded']} bonded, {entry['open'] + entry['closed']} broken"
-            progress.advance(point.load_factor, f"{len(entries)} {path.method}, {counts}")
+            known = number == 0 or before is not None  # the first break takes much of the load, and no time
+            advance(point.load_factor, len(entries), f"{len(entries)} {path.method}, {counts}", known)
             bonds.append(bond)
             last = point
             if not point.state.converged:  # the next break would follow from an unconverged state
@@ -76,6 +78,7 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
                 break
     if last is None:
         return {"resumed": count, "path": ()}
+    context.progress.say(f"  all {len(entries)} {path.method} are in {context.events}")
     return {"resumed": count} | _completed(context, path, law, entries, bonds, last)
 
 
@@ -143,6 +146,11 @@ def _label(path: load_sections.LoadPath, number: int) -> str:
     return f"{'event' if path.method == 'events' else 'increment'} {number}"
 
 
+def _without_lists(entry: dict[str, Any]) -> dict[str, Any]:
+    """Return the fields of a point without the lists with a number for each fibre, which fill result.json."""
+    return {name: value for name, value in entry.items() if name not in OF_FIBRES}
+
+
 def _entry(
     context: AnalysisContext,
     law: BondLaw,
@@ -162,7 +170,7 @@ def _entry(
     }
     if damage is not None:
         length = context.fibre_interfaces.length((damage > 0.0) & (damage < 1.0))
-        entry |= {"softened": point.softened, "damaged_length": length}
+        entry |= {"softened": point.softened, "damaged_share": context.fibre_interfaces.share(length)}
     if context.case.has_friction:
         entry["friction_heat"] = energies.friction
     if law.has_toughness:
@@ -186,11 +194,13 @@ def _completed(
     """
     document = {"case": context.case.resolved(), "path": entries}
     marks, states = landmarks.marks(document), dict[str, Any]()
+    legs = len(context.case.targets) if path.method == "events" else 0
+    numbers = landmarks.kept(entries, context.case.output.states, legs, marks)
+    for number in {*range(len(entries))}.difference(numbers):
+        entries[number] = _without_lists(entries[number])
     if law.has_tips or context.states.is_recording:
-        legs = len(context.case.targets) if path.method == "events" else 0
-        numbers = landmarks.kept(entries, context.case.output.states, legs, marks)
         with context.progress.stage("states") as line:
-            for number in context.progress.bar(numbers, "states"):
+            for number in numbers:
                 point = last if number == len(entries) - 1 else path_events.read(context, number)[1]
                 point, responses = _checked(context, point, _label(path, number))
                 if law.has_tips:

@@ -1,10 +1,8 @@
-"""The events of a path: accumulated energies, checkpoint arrays, printed lines and progress bar."""
+"""The events of a path: accumulated energies and checkpoint arrays."""
 
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -14,14 +12,8 @@ from feti_homog.homogenization import averaging
 from feti_homog.interface import Load, Macroscopic
 from feti_homog.interface.contact import BondState, Equilibrium, coupled_interfaces
 from feti_homog.interface.path import path_points
-from feti_homog.results import checkpoints
-from feti_homog.system.runtime import progress_bar
+from feti_homog.results import checkpoints, result_json
 
-SECONDS_A_LINE = 1.0
-# Equal steps predict the remaining time; the number of events is unknown.
-STEPS_BAR = "{l_bar}{bar}| {elapsed}, {remaining} left{postfix}"
-EVENTS_BAR = "{l_bar}{bar}| {elapsed}{postfix}"
-BARS = {"events": EVENTS_BAR, "increments": STEPS_BAR}
 # Errors of the contact conditions; the last exists only with friction.
 KKT_LAWS = ("kkt_complementarity", "kkt_penetration", "kkt_tension", "kkt_friction")
 # Laws for which the responses of an event may have errors.
@@ -57,11 +49,9 @@ class Work:
         controlled = self.load_controlled + rise**2 * point.energies.released
         self.resume_from(self.all_equilibria.plus(point.energies), controlled, point)
 
-    def resume_from(
-        self, all_equilibria: path_points.Energies, load_controlled: float, point: path_points.Point
-    ) -> None:
+    def resume_from(self, energies: path_points.Energies, load_controlled: float, point: path_points.Point) -> None:
         """Continue from a stored point, with the energies up to this point."""
-        self.all_equilibria, self.load_controlled = all_equilibria, load_controlled
+        self.all_equilibria, self.load_controlled = energies, load_controlled
         self._load, self._largest_load = point.load_factor, max(point.load_factor, self._largest_load)
 
 
@@ -71,10 +61,12 @@ def stored(
     responses: Sequence[averaging.Response],
     work: Work,
     cell: coupled_interfaces.CoupledInterfaces,
+    entry: Mapping[str, Any],
 ) -> tuple[dict[str, Any], checkpoints.Arrays]:
     """Split a point into plain numbers and distributed arrays for the checkpoint.
 
-    A resumed path continues from the multipliers of the last state.  The `bond` is as in `most_utilised_bond`.
+    A resumed path continues from the multipliers of the last state.  The `bond` is as in `most_utilised_bond`, the
+    `entry` that of the point in result.json.
     """
     after = point.after
     numbers: dict[str, Any] = {
@@ -84,6 +76,7 @@ def stored(
         "broken": np.nan if after.broken is None else after.broken,
         "stretched": after.stretched,
         "bond": bond,
+        "point": result_json.text_of(entry),
     }
     distributed = _bond_arrays(after.bonds, "_after")
     for suffix, interface, response, state in zip(
@@ -236,54 +229,3 @@ def _bond_arrays(bonds: BondState, suffix: str) -> checkpoints.Arrays:
 def _bond_state(event: checkpoints.Arrays, suffix: str) -> BondState:
     """Rebuild a bond state from the arrays that `_bond_arrays` made."""
     return BondState(*(event.get(f"{field.name}{suffix}") for field in fields(BondState)))  # type: ignore[arg-type]
-
-
-class EventProgress:
-    """A context manager that prints path events and a progress bar.
-
-    The first, the last and urgent lines are always printed, other lines at most once a second.  The bar appears only
-    on a terminal.
-    """
-
-    def __init__(
-        self, progress: progress_bar.Progress, layout: str, file: str, clock: Callable[[], float] = time.monotonic
-    ) -> None:
-        """Set the bar layout, STEPS_BAR or EVENTS_BAR, and the name of the event file."""
-        self._progress, self._layout, self._file, self._clock = progress, layout, file, clock
-        self._next_line, self._held_back, self._left_out = float("-inf"), "", 0
-        self._bar: Any = None
-
-    def __enter__(self) -> Self:
-        if self._progress.on_terminal:
-            from tqdm import tqdm  # unused in most runs, and slow to import
-
-            self._bar = tqdm(total=1.0, desc="path", bar_format=self._layout, leave=False)
-        return self
-
-    def report(self, line: str, urgent: bool) -> None:
-        """Print a line about an event, or hold the line back."""
-        now = self._clock()
-        self._left_out += bool(self._held_back)
-        self._held_back = ""
-        if urgent or now >= self._next_line:
-            self._progress.say(line)
-            self._next_line = now + SECONDS_A_LINE
-        else:
-            self._held_back = line
-
-    def advance(self, share: float, text: str) -> None:
-        """Move the bar to the fraction `share` of the path, and show a text."""
-        if self._bar is not None:
-            self._bar.set_postfix_str(text, refresh=False)
-            self._bar.update(max(share - self._bar.n, 0.0))
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._bar is not None:
-            self._bar.close()
-        if self._held_back:
-            self._progress.say(self._held_back)
-        if self._left_out:
-            count = "1 more event is" if self._left_out == 1 else f"{self._left_out} more events are"
-            self._progress.say(f"  {count} in {self._file}")

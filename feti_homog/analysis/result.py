@@ -199,8 +199,9 @@ class Result:
         Empty for other analyses.
         """
         documents = [records.plain(point) for point in (*(self.angle or ()), *(self.path or ()))]
-        names = dict.fromkeys(name for point in documents for name in point if name != "tips")
-        return {name: np.array([point.get(name, np.nan) for point in documents]) for name in names}
+        values = {name: value for point in documents for name, value in point.items() if name != "tips"}
+        gaps = {name: np.full(np.shape(value), np.nan).tolist() for name, value in values.items()}
+        return {name: np.array([point.get(name, gap) for point in documents]) for name, gap in gaps.items()}
 
     def rising_strain(self) -> dict[str, Float]:
         """Return the response of a one-leg path to a rising load.

@@ -15,6 +15,7 @@ EITHER, EITHER_STIFFNESS = "(3,) or (6,)", "(3, 3) or (6, 6)"
 ENERGY = f"{records.STRESS} times that of the cell"
 PER_DEGREE = f"{records.STRESS} per unit of temperature"
 TEMPERATURE = "change of temperature, in generalized plane strain with expansions"
+DEBONDED_LENGTH, KEPT = "debonded length of each fibre's interface", "of points whose fields `states` keeps"
 DEBONDED_ANGLE = (
     "the same in degrees of arc, `debonded_length` / radius; of a fibre that is not round, or whose coating has an "
     "interface too, 360 times the share of its interfaces"
@@ -115,7 +116,7 @@ class AnglePoint:
     )
     debonded_share: float = described("debonded share of the length of all interfaces")
     debonded_shares: Float | None = described(DEBONDED_SHARES, "", "(i,)", default=None)
-    debonded_length: Float = described("debonded length of each fibre's interface", records.LENGTH, "(f,)")
+    debonded_length: Float = described(DEBONDED_LENGTH, records.LENGTH, "(f,)")
     debonding_angle: Float = described(DEBONDED_ANGLE, records.DEGREES, "(f,)")
     tips: TipRates | None = described("energy release rates at the tips of its arcs", default=None)
     bonded: int = described("bonded interface nodes; of unit strains under gamma12, as the next two")
@@ -178,14 +179,9 @@ class PathPoint:
     )
     debonded_share: float = described("debonded share of the length of all interfaces")
     debonded_shares: Float | None = described(DEBONDED_SHARES, "", "(i,)", default=None)
-    debonded_length: Float = described("debonded length of each fibre's interface", records.LENGTH, "(f,)")
-    damaged_length: Float | None = described(
-        "length of each fibre's interface that is damaged, but holds: of its process zones; of laws that soften",
-        records.LENGTH,
-        "(f,)",
-        default=None,
-    )
-    debonding_angle: Float = described(DEBONDED_ANGLE, records.DEGREES, "(f,)")
+    damaged_share: float | None = described("the same of damaged bonds that hold, of laws that soften", default=None)
+    debonded_length: Float | None = described(f"{DEBONDED_LENGTH}, {KEPT}", records.LENGTH, "(f,)", default=None)
+    debonding_angle: Float | None = described(f"{DEBONDED_ANGLE}; {KEPT}", records.DEGREES, "(f,)", default=None)
     tips: Tips | None = described(
         "of bonds that break by energy, at the points that `states` in [output] chooses", default=None
     )
@@ -247,7 +243,7 @@ class LoadPoint:
     mesh_error: float | None = described("estimated relative error of `stored` by the mesh", default=None)
     debonded_share: float = described("debonded share of the length of all interfaces")
     debonded_shares: Float | None = described(DEBONDED_SHARES, "", "(i,)", default=None)
-    debonded_length: Float = described("debonded length of each fibre's interface", records.LENGTH, "(f,)")
+    debonded_length: Float = described(DEBONDED_LENGTH, records.LENGTH, "(f,)")
     debonding_angle: Float = described(DEBONDED_ANGLE, records.DEGREES, "(f,)")
     tips: TipRates | None = described(
         "energy release rates at the tips of its arcs; absent under loads other than strains of the plane", default=None

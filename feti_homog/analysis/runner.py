@@ -20,7 +20,7 @@ from feti_homog.homogenization import partition_policy, uniform_parts, unit_cell
 from feti_homog.results import field_file, field_parts, output_folder, result_json, xdmf
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.petsc import options_database
-from feti_homog.system.runtime import process_memory, progress_bar
+from feti_homog.system.runtime import process_memory, progress_bar, records
 from feti_homog.version import __version__
 
 # Bytes that a process keeps between cases: their release would cost a small case 10 % of its time.
@@ -117,6 +117,7 @@ def _run_and_write(
         states = StateRecorder(cell, file, keep_fields, progress.say)
         context = AnalysisContext.of(cell, progress, states)
         context = replace(context, directory=directory, resume=resume, log=log.write, events=output_folder.LOG)
+        context.opening = result_json.text_of(records.plain(_opening(context)))
         analysis = _analyse(context)
         seal = states.seal()
         if states.error is not None and not keep_fields:
@@ -174,8 +175,8 @@ def _analyse(context: AnalysisContext) -> dict[str, Any]:
     return analysis
 
 
-def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields | None) -> Result:
-    """Build the result from the entries of an analysis, with counts and timings.  Collective."""
+def _opening(context: AnalysisContext) -> dict[str, Any]:
+    """Return the `Result` entries that do not follow from the responses, but for timings so far.  Collective."""
     cell, progress, checks = context.cell, context.progress, context.checks
     fractions = cell.fractions()
     # Straight edges cut off a part of the fibres.
@@ -196,31 +197,30 @@ def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Field
         refine=cell.case.cell.refine,
         match_distance=cell.summary.match_distance,
     )
-    return Result(
-        version=__version__,
-        case=cell.case.resolved(),
-        digest=mpi_errors.on_root(cell.comm, cell.case.digest),
-        cell=cell_info,
-        fibres=FibreInfo.all_of(cell),
-        solver=SolverInfo.of(cell, checks.iterations, checks.reasons),
-        checks=Checks(**checks.errors),
-        check_tolerance=checks.tolerance("jump"),
-        kkt_tolerance=CONTACT_TOLERANCE,
-        warnings=(*cell.case.warnings(), *cell.summary.warnings(), *context.warnings()),
-        remarks=(
-            *cell.case.remarks(),
-            *cell.summary.remarks,
-            *([polygons] if lost > REMARKABLE_LOSS else []),
-            *context.remarks(),
-        ),
-        faults=tuple(checks.faults),
-        status="not converged" if checks.faults else "done",
-        timings=progress.timings(),
-        memory=progress.memory(),
-        fields=fields,
-        phase_stresses=context.states.phase_stresses(),
-        **analysis,
-    )
+    remarks = *cell.case.remarks(), *cell.summary.remarks, *([polygons] if lost > REMARKABLE_LOSS else [])
+    return {
+        "version": __version__,
+        "case": cell.case.resolved(),
+        "digest": mpi_errors.on_root(cell.comm, cell.case.digest),
+        "cell": cell_info,
+        "fibres": FibreInfo.all_of(cell),
+        "solver": SolverInfo.of(cell, checks.iterations, checks.reasons),
+        "checks": checks.errors,
+        "check_tolerance": checks.tolerance("jump"),
+        "kkt_tolerance": CONTACT_TOLERANCE,
+        "warnings": (*cell.case.warnings(), *cell.summary.warnings(), *context.warnings()),
+        "remarks": (*remarks, *context.remarks()),
+        "timings": progress.timings(),
+        "memory": progress.memory(),
+    }
+
+
+def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields | None) -> Result:
+    """Build the result from the entries of an analysis, with counts and timings.  Collective."""
+    checks = context.checks
+    entries = _opening(context) | {"checks": Checks(**checks.errors), "faults": tuple(checks.faults)}
+    status = "not converged" if checks.faults else "done"
+    return Result(status=status, fields=fields, phase_stresses=context.states.phase_stresses(), **entries, **analysis)
 
 
 def _print_summary(result: Result, progress: progress_bar.Progress) -> None:

@@ -8,34 +8,37 @@ from typing import Any
 from feti_homog.analysis.result import Result
 from feti_homog.case import Case, cases
 from feti_homog.errors import CaseError
-from feti_homog.results import checkpoints, field_file, result_json
+from feti_homog.results import checkpoints, field_file, output_folder, result_json
 
 
 def read(directory: Path) -> dict[str, Any]:
-    """Read result.json, and check result.h5 if the case keeps fields.  Call on one rank.
+    """Read a result, checked with result.h5 if the case keeps fields, or an unfinished path.  Call on one rank.
 
     Raises:
         CaseError: a file is missing, damaged, or from another program or run.
     """
-    document = result_json.read(directory)
-    result = _restored(directory, document)
-    if result.case["output"].get("fields", True):
-        _check_fields(directory, result)
+    document = output_folder.latest(directory)
+    if "unfinished" not in document:
+        result = _restored(directory, document)
+        if result.case["output"].get("fields", True):
+            _check_fields(directory, result)
     return document
 
 
-def check_to_draw(directory: Path) -> None:
+def check_to_draw(directory: Path) -> str:
     """Check that the plottable files in `directory` belong to one run.  Call on one rank.
 
-    The file result.h5 is required, result.json is optional.
+    The file result.h5 is required, result.json is optional.  Returns the status of an unfinished path, else nothing.
 
     Raises:
         CaseError: result.h5 is missing, or a file is damaged, or from another program or run.
     """
-    if os.path.lexists(directory / result_json.NAME):  # also true for a circular link
-        read(directory)
-    elif not (directory / field_file.NAME).is_file():
+    # Also true for a circular link.
+    if os.path.lexists(directory / result_json.NAME) or (directory / checkpoints.FOLDER).is_dir():
+        return str(read(directory).get("unfinished", ""))
+    if not (directory / field_file.NAME).is_file():
         raise CaseError(f"cannot read {directory / field_file.NAME}: No such file or directory")
+    return ""
 
 
 def finished(directory: Path, case: Case) -> bool:

@@ -31,8 +31,8 @@ SWEEP_HELP = (
     "skipped: the same command resumes. Failed cases are kept and reported at the end, with exit code 3."
 )
 COLLECT_HELP = (
-    "Write cases.csv, the inputs and outputs of all cases, statistics.csv, those over realisations, and a "
-    "picture of moduli over the fibre fraction. The sweep may still be running: finished cases are collected."
+    "Write cases.csv, the inputs and outputs of all cases, statistics.csv, those over realisations, and a picture of "
+    "moduli; print means of constants or peaks. The sweep may still be running: begun paths have their points so far."
 )
 FIT_HELP = (
     "Fit the unknowns of a file to measured values by least squares, with exact derivatives where there are some. "
@@ -133,7 +133,7 @@ def _add_studies(commands: argparse._SubParsersAction[Parser]) -> None:
     sweep.add_argument("case", type=Path, metavar="CASE.toml", help="a case file with a section [sweep]")
     sweep.add_argument("--out", type=folder, metavar="DIR", help="folder of the sweep, in which each case has its own")
     one = sweep.add_mutually_exclusive_group()
-    one.add_argument("--list", action="store_true", help="print the cases, with --out also their status; run none")
+    one.add_argument("--list", action="store_true", help="print the cases, with --out also how far they are; run none")
     one.add_argument("--index", type=integer, metavar="K", help="run case K alone, counted from 1, as a job array does")
     words = "make one table and a picture of the cases of a sweep's folder"
     collect = _command(commands, "studies.collect", words, COLLECT_HELP)

@@ -18,13 +18,15 @@ def plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.report.plots import figures, plot_helpers
 
     directory = _result_folder(arguments)
-    mpi_errors.on_root_only(comm, stored_result.check_to_draw, directory)
+    place = mpi_errors.on_root_only(comm, stored_result.check_to_draw, directory)
     look = plot_helpers.Look(arguments.format, arguments.size, arguments.title)
     paths = mpi_errors.on_root_only(comm, figures.plot, directory, look, arguments.state, arguments.component)
-    if paths == []:
+    if paths == [] and not place:
         standard_streams.say(f"{directory}: nothing to draw: its case has no fields, and no points that make a curve")
     for path in paths or []:
         standard_streams.say(str(path))
+    if place:
+        standard_streams.say(f"{directory}: {place}; pictures of its fields follow at its end")
 
 
 def report(arguments: argparse.Namespace, comm: Intracomm) -> None:

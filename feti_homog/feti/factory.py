@@ -91,11 +91,7 @@ class SolverParts:
 
 
 def database_options(thresholds: Thresholds = DEFAULTS) -> SolverOptions:
-    """Read the options from PETSc's database.
-
-    Raises:
-        CaseError: an option has no such value.
-    """
+    """Read the options from PETSc's database.  Raises CaseError for a value that an option does not have."""
     database = PETSc.Options("feti_")
     return SolverOptions.read(database.getString, database.getReal, thresholds)
 

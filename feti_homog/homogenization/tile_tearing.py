@@ -111,11 +111,7 @@ def deal_tiles(tiles: Sequence[tile_filling.Tile], comm: MPI.Intracomm) -> list[
 
 
 def fill_own(tiles: list[tuple[int, tile_filling.Tile]]) -> list[tuple[int, tile_filling.Filling]]:
-    """Fill numbered tiles.
-
-    Raises:
-        MeshError: gmsh cannot fill a tile.
-    """
+    """Fill numbered tiles.  Raises MeshError if gmsh cannot fill a tile."""
     return [(k, tile_filling.fill(tile)) for k, tile in tiles]
 
 

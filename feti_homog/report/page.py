@@ -9,7 +9,7 @@ from string import Template
 from feti_homog.errors import CaseError
 from feti_homog.materials import voigt
 from feti_homog.report.text.summary import REMARKS, answers, checks, summary, title_of
-from feti_homog.results import atomic, output_folder, result_json
+from feti_homog.results import atomic, output_folder
 from feti_homog.typing import Document
 
 NAME, SWEEP = "report.html", "sweep.json"
@@ -48,7 +48,7 @@ def write(directory: Path) -> Path:
         raise CaseError(f"cannot report {directory}: there is no such folder")
     if (directory / SWEEP).exists():
         raise CaseError(f"cannot report {directory}: it is the folder of a sweep; name the folder of one of its cases")
-    document = result_json.read(directory)
+    document = output_folder.latest(directory)
     atomic.remove_unfinished(directory, output_folder.RESULT_FILE, alone=False)
     try:
         html = page(document, directory)

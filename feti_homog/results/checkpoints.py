@@ -29,7 +29,7 @@ from feti_homog.results import atomic
 from feti_homog.system.parallel import mpi_errors
 
 FOLDER, DROPPED, NAME = "checkpoint", "checkpoint.dropped", "events"  # DROPPED is the folder name during its removal
-FORMAT = 11  # raise when the content of an event changes
+FORMAT = 12  # raise when the content of an event changes
 HEAD = re.compile(rb"feti-homog checkpoint, format (\d+)\n")
 # Formats up to 10 had one file for each event; the pattern matches them too, and their unfinished files.
 EVENT_FILE = re.compile(rf"{NAME}|\d{{6,}}\.h5(\..+\.\d+\.part)?")
@@ -107,7 +107,7 @@ class Checkpoint(EventsInMemory):
     """A store of events in the file `directory`/checkpoint/events, which rank 0 writes.
 
     Attributes:
-        signature: text of case, subdomains and ranks; a run resumes only from events with the same signature.
+        signature: a line of case, subdomains and ranks, required to resume, and the text of entries of result.json.
     """
 
     def __init__(self, directory: Path, comm: MPI.Intracomm, signature: str, room: int | None = WHOLE_BYTES) -> None:
@@ -130,9 +130,9 @@ class Checkpoint(EventsInMemory):
     def count(self) -> int:
         def counted() -> int:
             if number := self._count_records():
-                written = next(records(self.path))[1].decode()
-                if written != self.signature:
-                    raise CaseError(f"{self.path} is of another run: expected {self.signature}; found {written}")
+                first, own = next(records(self.path))[1].decode(), self.signature.partition("\n")[0]
+                if (written := first.partition("\n")[0]) != own:
+                    raise CaseError(f"{self.path} is of another run: expected {own}; found {written}")
             return number
 
         try:

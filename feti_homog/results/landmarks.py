@@ -75,8 +75,8 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
             entries |= {f"{title}_{name}": value for name, value in numbers.items()}
     if valley is not None:
         entries |= {"stress_left": float(curve[valley]), "event_left": int(number[valley])}
-    elif points[-1]["load_factor"] < 1.0 - path_curves.SAME_LOAD:
-        entries["so_far"] = True
+    is_cut_off = valley is None and points[-1]["load_factor"] < 1.0 - path_curves.SAME_LOAD
+    entries |= {"so_far": True} if is_cut_off or "unfinished" in document else {}
     entries["dissipated"] = points[event].get("dissipated", 0.0)
     # The fibres and directions of the bonds follow from the states alone.
     bonds = {name: value for name, value in document.get("peak", {}).items() if name.endswith(("fibre", "angle"))}

@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.materials import voigt
@@ -113,6 +113,27 @@ def _is_own(path: Path) -> bool:
     if path.name == field_file.NAME:
         return head.startswith(HDF5_SIGNATURE) and PROGRAM.encode() in head
     return path.name != LOG or head.startswith(LOG_HEADER.encode())
+
+
+def latest(directory: Path) -> dict[str, Any]:
+    """Return the content of result.json, or of an unfinished path with more points.  Call on one rank.
+
+    An unfinished path has the entry `unfinished`, which its `status` repeats: the number of its points and its load.
+    Raises CaseError without such a file, for a damaged and for an unreadable one.
+    """
+    from feti_homog.results import checkpoints  # only paths have checkpoints
+
+    path = directory / checkpoints.FOLDER / checkpoints.NAME
+    records = checkpoints.records(path) if path.is_file() else ()
+    first, *events = [content for _, content in records] or [b""]
+    stored = result_json.read(directory) if not events or os.path.lexists(directory / result_json.NAME) else {}
+    opening = result_json.loads(first.decode().partition("\n")[2] or "{}")
+    if not events or (stored.get("digest") == opening["digest"] and len(stored.get("path", ())) >= len(events)):
+        return stored
+    points = [result_json.loads(str(checkpoints.unpacked(event)["point"])) for event in events]
+    opening["solver"]["iterations"] = [point["iterations"] for point in points]
+    place = f"unfinished, {len(points)} points up to load {max(point['load_factor'] for point in points):.4f}"
+    return opening | {"path": points, "status": place, "unfinished": place}
 
 
 @contextmanager

@@ -38,14 +38,19 @@ def write(directory: Path, document: Mapping[str, Any]) -> Path:
             file cannot be written.
         TypeError: a value has no JSON type.
     """
+    text, path = text_of(document), Path(directory) / NAME
+    with atomic.write_errors(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    return atomic.replace_text(path, text)
+
+
+def text_of(document: Mapping[str, Any]) -> str:
+    """Return the text of a document with arrays, as `loads` parses it.  Raises as `write`."""
     faults = list[str]()
     content = _json_value(document, "", faults)
     if faults:
         raise FetiHomogError(*faults)
-    path = Path(directory) / NAME
-    with atomic.write_errors(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-    return atomic.replace_text(path, dumps(content))
+    return dumps(content)
 
 
 def read(directory: Path) -> dict[str, Any]:

@@ -6,6 +6,7 @@ DIR/case-0001/result.json     the result, as of a single run
 DIR/case-0001/error.txt       the reason of a failure
 """
 
+import contextlib
 import csv
 import io
 import math
@@ -38,7 +39,8 @@ class Status(StrEnum):
     """The progress of a case.
 
     An UNCONVERGED case has a result that its checks refuse, a FAILED case an error instead of a result.  The result of
-    a DAMAGED case is unreadable or belongs to another case.  A WAITING case has neither a result nor an error.
+    a DAMAGED case is unreadable or belongs to another case.  An INTERRUPTED case has events of a path, a WAITING case
+    has nothing.
     """
 
     DONE = "done"
@@ -46,6 +48,7 @@ class Status(StrEnum):
     FAILED = "failed"
     DAMAGED = "damaged"
     RUNNING = "running"
+    INTERRUPTED = "interrupted"
     WAITING = "waiting"
 
     @property
@@ -54,9 +57,12 @@ class Status(StrEnum):
         return self in (Status.UNCONVERGED, Status.FAILED)
 
 
+BEGUN = (Status.RUNNING, Status.INTERRUPTED)
+
+
 @dataclass(frozen=True)
 class CaseState:
-    """The progress of a case, the reason for a failure, and the content of result.json if the file exists."""
+    """The progress of a case, the reason for it, and the content of result.json or of an unfinished path."""
 
     status: Status
     reason: str = ""
@@ -165,9 +171,15 @@ def _replaced(value: Any, old: Any, new: Any) -> Any:
 
 def case_state(directory: Path, entry: SweepCase) -> CaseState:
     """Return the progress of a case, RUNNING while a process holds its lock.  On one rank."""
-    state = stored_state(directory, entry)
-    is_open = state.status in (Status.WAITING, Status.FAILED)
-    return CaseState(Status.RUNNING) if is_open and file_locks.holder(directory / entry.folder / LOCK_FILE) else state
+    state, folder = stored_state(directory, entry), directory / entry.folder
+    is_running = bool(file_locks.holder(folder / LOCK_FILE))
+    if state.status is not Status.WAITING and not (is_running and state.status is Status.FAILED):
+        return state
+    document, status = None, Status.RUNNING if is_running else Status.WAITING
+    with contextlib.suppress(FetiHomogError):  # no event yet, or an unreadable one, which the next run names
+        document = output_folder.latest(folder)
+        status = Status.RUNNING if is_running else Status.INTERRUPTED
+    return CaseState(status, (document or {}).get("unfinished", ""), document)
 
 
 def stored_state(directory: Path, entry: SweepCase) -> CaseState:

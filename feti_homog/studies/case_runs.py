@@ -9,25 +9,27 @@ from enum import Enum, auto
 from pathlib import Path
 from typing import Any
 
-from feti_homog.analysis import description, runner
+from feti_homog.analysis import description, runner, stepped_progress
 from feti_homog.case import Case, cases, sections
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError
 from feti_homog.studies import case_folders
 from feti_homog.studies.sweep_cases import Sweep, SweepCase, case_names, expand
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.petsc import options_database
-from feti_homog.system.runtime import file_locks, standard_streams
+from feti_homog.system.runtime import file_locks, progress_bar, standard_streams
 from feti_homog.typing import Intracomm
 
 
 def list_cases(sweep: Sweep, directory: Path | None) -> list[str]:
     """Return a line for each case of a sweep, with its status if there is a folder.  On one rank."""
-    statuses = ["" if directory is None else case_folders.case_state(directory, e).status for e in sweep.entries]
-    width = max(map(len, statuses))
-    return [
-        f"{entry.folder}  {status:<{width}}  {entry.describe(sweep.stress_unit)}".replace("    ", "  ").rstrip()
-        for entry, status in zip(sweep.entries, statuses, strict=True)
-    ]
+    if directory is None:
+        return [f"{entry.folder}  {entry.describe(sweep.stress_unit)}".rstrip() for entry in sweep.entries]
+    states, lines = [case_folders.case_state(directory, entry) for entry in sweep.entries], list[str]()
+    width = max(len(state.status) for state in states)
+    for entry, state in zip(sweep.entries, states, strict=True):
+        line = f"{entry.folder}  {state.status:<{width}}  {entry.describe(sweep.stress_unit)}".rstrip()
+        lines.append(f"{line}; {state.reason}" if state.reason and state.status in case_folders.BEGUN else line)
+    return lines
 
 
 def group_size(comm: Intracomm, ranks_per_case: int | None) -> int:
@@ -39,11 +41,12 @@ def group_size(comm: Intracomm, ranks_per_case: int | None) -> int:
 
 
 def run_all(
-    sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int | None, retry: bool, quiet: bool
+    sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int | None, retry: bool, quiet: bool | None
 ) -> None:
     """Run all sweep cases.  Collective.
 
-    A group of `ranks_per_case` ranks, by default all, runs one case; the groups work concurrently.
+    A group of `ranks_per_case` ranks, by default all, runs one case; the groups work concurrently.  Unless `quiet`, the
+    first one shows the progress, with lines about cases if not None.
 
     Raises:
         CaseError: PETSc options are faulty, `ranks_per_case` does not divide the rank count, or the folder
@@ -64,13 +67,13 @@ def run_all(
                         case_folders.reset(directory, entry, status)
 
             mpi_errors.on_root_only(comm, reset_failures)
-        fault = CaseRunner(group, directory, sweep, False, quiet).run_free()
+        fault = CaseRunner(group, directory, sweep, False, quiet is not False).run_free(comm.rank < size and not quiet)
         if faults := [fault for fault in comm.allgather(fault) if fault is not None]:
             remark = "finished cases are kept; the same command goes on with the others"
             raise FetiHomogError(*dict.fromkeys(line for fault in faults for line in fault.faults), remark)
     states = mpi_errors.on_root(comm, lambda: [case_folders.case_state(directory, entry) for entry in sweep.entries])
     failed = [(entry, state) for entry, state in zip(sweep.entries, states, strict=True) if state.status.is_failure]
-    if comm.rank == 0 and not quiet:
+    if comm.rank == 0 and quiet is False:
         done = sum(state.status is case_folders.Status.DONE for state in states)
         standard_streams.say(f"{done} of {len(states)} cases done in {directory}")
     if failed:
@@ -136,7 +139,7 @@ class Outcome(Enum):
 
 @dataclass(frozen=True)
 class CaseRunner:
-    """A group of ranks that runs sweep cases; `retry` repeats failed cases, `quiet` prints nothing."""
+    """A group of ranks that runs sweep cases; `retry` repeats failed cases, `quiet` prints no line about a case."""
 
     comm: Intracomm
     directory: Path
@@ -144,17 +147,23 @@ class CaseRunner:
     retry: bool
     quiet: bool
 
-    def run_free(self) -> FetiHomogError | None:
-        """Run cases until no free case remains.  Collective in the group.
+    def run_free(self, shows: bool) -> FetiHomogError | None:
+        """Run cases until no free case remains, and show the progress.  Collective in the group.
 
         The group skips cases that other groups hold; in a last round it waits for the locks of these cases.
         Returns the error that stopped the group, or None.
         """
-        timeouts = [0.0, file_locks.LOCK_TIMEOUT_S]
+        timeouts, count = [0.0, file_locks.LOCK_TIMEOUT_S], len(self.sweep.entries)
+        progress, label = progress_bar.Progress(self.comm, quiet=not shows), f"cases of {self.directory.name}"
         try:
-            while timeouts:
-                outcomes = [self.run(entry, timeouts[0])[0] for entry in self.sweep.entries]
-                timeouts = timeouts if Outcome.COMPUTED in outcomes else timeouts[1:]
+            with stepped_progress.shown(progress, label) as advance:
+                while timeouts:
+                    outcomes = list[Outcome]()
+                    for number, entry in enumerate(self.sweep.entries, 1):
+                        outcomes.append(self.run(entry, timeouts[0])[0])
+                        is_known = outcomes[-1] is not Outcome.COMPUTED
+                        advance(number / count, number, f"{number} of {count} cases", is_known)
+                    timeouts = timeouts if Outcome.COMPUTED in outcomes else timeouts[1:]
         except FetiHomogError as error:
             if not mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
                 raise
@@ -216,8 +225,7 @@ class CaseRunner:
         return Outcome.COMPUTED, ""
 
     def _print(self, line: str) -> None:
-        if self.comm.rank == 0 and not self.quiet:
-            standard_streams.say(line)
+        progress_bar.Progress(self.comm, self.quiet).say(line)  # past the bar
 
 
 def describe(document: dict[str, Any], folder: Path, comm: Intracomm) -> str:

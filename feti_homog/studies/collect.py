@@ -14,6 +14,7 @@ from feti_homog.report.text import point_tables, tables
 from feti_homog.results import atomic
 from feti_homog.studies import case_folders
 from feti_homog.studies.outputs import numbers, outputs
+from feti_homog.studies.predictions import responses
 from feti_homog.studies.sweep_table import PARTS, SweepTable
 
 COUNTS = ("refine", "elements", "nodes", "ranks", "subdomains", "dofs", "multipliers", "iterations", "memory")
@@ -21,11 +22,7 @@ CASE = ("folder", "point", "realisation", "status", "reason")
 
 
 def read(directory: Path) -> SweepTable:
-    """Read the sweep folder to a table of all cases, finished or not.  On one rank.
-
-    Raises:
-        CaseError: the folder holds no sweep, or its case list is damaged.
-    """
+    """Read the table of all cases of a sweep folder.  On one rank.  Raises CaseError without a sound case list."""
     return _table(*_index_and_states(directory))
 
 
@@ -51,7 +48,25 @@ def collect(directory: Path, pictures: bool) -> list[str]:
         if state.status.is_failure or state.status is case_folders.Status.DAMAGED
     ]
     failures = case_folders.failure_lines(failed, index.stress_unit)
-    return [f"{len(table.status)} cases: {counts}", *failures, *map(str, paths)]
+    rows = zip(table.folder, table.status, table.reason, strict=True)
+    begun = [f"  {folder}  {status}; {reason}" for folder, status, reason in rows if status in case_folders.BEGUN]
+    return [f"{len(table.status)} cases: {counts}", *begun, *failures, *means(table), *map(str, paths)]
+
+
+def means(table: SweepTable) -> list[str]:
+    """Return a table of peaks or constants over several realisations, with scatter and intervals of the means."""
+    names = [name for name in responses(table.finished[0]) if name in table.stated] if table.finished else []
+    names = [name for name in names if not re.match(r"C\d|onset", name)] or names
+    columns = [tables.Column("output", -22), tables.Column("cases", 6, "d"), tables.Column("mean", 13, ".6g")]
+    columns += [tables.Column("std"), tables.Column("95 % +-")]
+    lines = list[str]()
+    for number, point in enumerate(table.points):
+        parts = {name: [getattr(table.statistics[name], part)[number] for part in PARTS] for name in names}
+        rows = [[tables.with_unit(name, table.stress_unit), int(count), *moments]
+                for name, (count, *moments) in parts.items() if count > 1]  # fmt: skip
+        title = table.label(point) or "All realisations"
+        lines += ["", *tables.Table(title, columns, rows).lines] if rows else []
+    return lines
 
 
 def write(directory: Path, table: SweepTable) -> list[Path]:
@@ -72,8 +87,8 @@ def write(directory: Path, table: SweepTable) -> list[Path]:
     statistics: list[list[Any]] = [["point", *inputs, "output", "unit", *PARTS]]
     for number, point in enumerate(table.points):
         at_point = [point, *(table.input_of(point, name) for name in inputs)]
-        for name, of_output in table.statistics.items():
-            count, *moments = (float(getattr(of_output, part)[number]) for part in PARTS)
+        for name in table.stated:
+            count, *moments = (float(getattr(table.statistics[name], part)[number]) for part in PARTS)
             if count:
                 statistics.append([*at_point, name, tables.unit(name, table.stress_unit), int(count), *moments])
 
@@ -96,7 +111,9 @@ def _table(index: case_folders.SweepIndex, states: Sequence[case_folders.CaseSta
     place = {name: [getattr(entry, name) for entry in index.entries] for name in ("folder", "point", "realisation")}
     inputs = [entry.inputs for entry in index.entries]
     in_names = numbers(row.get("analysis.plane") for row in inputs)
-    columns = _columns([{} if document is None else outputs(document, in_names) for document in documents], np.nan)
+    shown = (case_folders.Status.DONE, *case_folders.BEGUN)
+    rows = [outputs(s.document, in_names) if s.document and s.status in shown else {} for s in states]
+    columns = _columns(rows, np.nan)
     return SweepTable(
         name=index.name,
         stress_unit=index.stress_unit,

@@ -25,7 +25,10 @@ def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
 
 
 def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numbers) -> dict[str, float]:
-    """Return the numbers in result.json by column name; `numbers` are i and j in Cij of a stiffness (3, 3)."""
+    """Return the numbers in result.json by column name; `numbers` are i and j in Cij of a stiffness (3, 3).
+
+    Components that are noise beside the others of their point, or along the whole path, are zero.
+    """
     solver = document["solver"]
     cell, fractions = document["cell"], document["cell"].get("fractions", {})
     values = {"fraction_meshed": cell["fibre_fraction"], "elements": cell["elements"], "nodes": cell["nodes"]}
@@ -42,14 +45,15 @@ def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numb
         )
         values |= {f"angle_{point['angle']:g}_{name}": value for name, value in entries.items()}
     if path := document.get("path"):  # onset, end, largest stresses and peak
-        stress = np.array([point["stress"] for point in path])
+        strain, stress = (point_tables.columns_without_noise([p[name] for p in path]) for name in ("strain", "stress"))
+        path = [p | {"strain": e, "stress": s} for p, e, s in zip(path, strain, stress, strict=True)]
         stresses = voigt.voigt_names(stress.shape[1])[1]
         if (onset := next((p for p in path if p["broke"] or p.get("softened")), None)) is not None:
             values |= {"onset_load_factor": onset["load_factor"]} | _at_point("onset", onset)
         values |= _at_point("end", path[-1]) | {name: path[-1][name] for name in ("dissipated", "work")}
         largest = stress[np.abs(stress).argmax(axis=0), range(len(stresses))]
         values |= {f"peak_{name}": value for name, value in zip(stresses, largest.tolist(), strict=True)}
-        peak = landmarks.peak_of(document)
+        peak = landmarks.peak_of({**document, "path": path})
         values |= {f"peak_{peak[f'{kind}_name']}": peak[kind] for kind in ("stress", "strain")}
         values |= {f"end_{state}": path[-1][state] for state in point_tables.STATES}
     if envelope := document.get("envelope"):  # first axis, least and largest factor
@@ -96,7 +100,7 @@ def _linear(section: Document, numbers: Sequence[int]) -> dict[str, float]:
 
 
 def _named(names: Iterable[str], values: Iterable[float]) -> dict[str, float]:
-    return dict(zip(names, values, strict=False))
+    return dict(zip(names, point_tables.columns_without_noise([[*values]])[0].tolist(), strict=False))
 
 
 def _entries(stiffness: Any, numbers: Sequence[int], suffix: str = "") -> dict[str, float]:
@@ -120,8 +124,9 @@ def _phases(document: Document) -> dict[str, float]:
 
 
 def _at_point(place: str, point: Document) -> dict[str, float]:
-    names = zip(voigt.voigt_names(len(point["strain"])), (point["strain"], point["stress"]), strict=True)
-    return {f"{place}_{name}": value for keys, values in names for name, value in zip(keys, values, strict=True)}
+    strains, stresses = voigt.voigt_names(len(point["strain"]))
+    values = _named(strains, point["strain"]) | _named(stresses, point["stress"])
+    return {f"{place}_{name}": value for name, value in values.items()}
 
 
 CASE_COLUMNS = (
@@ -129,8 +134,8 @@ CASE_COLUMNS = (
     Column("folder", "", "folder of the case, below the folder of the sweep"),
     Column("point", "", "number of the point, from 1"),
     Column("realisation", "", "number of the realisation of the point, from 1"),
-    Column("status", "", "`done`, `not converged`, `failed`, `damaged`, `running` or `waiting`"),
-    Column("reason", "", "why there is no result"),
+    Column("status", "", "`done`, `not converged`, `failed`, `damaged`, `running`, `interrupted` or `waiting`"),
+    Column("reason", "", "why there is no result; of an unfinished path its points and load"),
 )
 INPUT_COLUMNS = (Column("SECTION.KEY", "that of the key", "value of a key that varies"),)
 MODULI = {column.name for column in result_json.columns(engineering_constants.Moduli)}

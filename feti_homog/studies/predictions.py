@@ -119,11 +119,7 @@ def _values(document: path_curves.Document) -> dict[str, float]:
 
 
 def predicted(document: path_curves.Document, data: Sequence[Datum]) -> Float:
-    """Return the computed values (m,) that correspond to the data.
-
-    Raises:
-        CaseError: the result lacks a value.
-    """
+    """Return the computed values (m,) that correspond to the data.  Raises CaseError if the result lacks one."""
     values = _values(document)
     missing = [datum.name for datum in data if datum.strain is None and datum.name not in values]
     if missing:

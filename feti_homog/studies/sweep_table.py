@@ -49,7 +49,7 @@ class SweepTable:
         name, stress_unit: as in the sweep.
         folder, point, realisation, status, reason: values for each case; `reason` explains a failure.
         inputs: by dotted key the value of each case, None if the key does not vary in the case.
-        outputs: by name the values (cases,), NaN for cases without the output.
+        outputs: by name the values (cases,), NaN for cases without the output; of unfinished paths those so far.
         documents: result.json of finished cases, else None.
     """
 
@@ -75,12 +75,20 @@ class SweepTable:
 
     @cached_property
     def statistics(self) -> dict[str, Statistics]:
-        """The statistics of each output over the realisations of each point."""
+        """The statistics of each output over the finished realisations of each point."""
         statistics = {}
         for name, values in self.outputs.items():
+            finished = np.array([document is not None for document in self.documents])
+            values = np.where(finished, values, np.nan)
             samples = [Statistics.of(values[self.rows(point)]) for point in self.points]
             statistics[name] = Statistics(*(np.array([getattr(each, part) for each in samples]) for part in PARTS))
         return statistics
+
+    @property
+    def stated(self) -> list[str]:
+        """The outputs with statistics for readers: neither times, memory and checks, nor zero in all cases."""
+        names = [name for name, values in self.outputs.items() if np.nan_to_num(values).any()]
+        return [name for name in names if not name.startswith(("seconds_", "memory", "check_"))]
 
     @property
     def finished(self) -> list[Document]:

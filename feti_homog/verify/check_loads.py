@@ -24,7 +24,7 @@ NAMES = {
     6: (("E11", "E22", "E33", "gamma23", "gamma13", "gamma12"), ("S11", "S22", "S33", "S23", "S13", "S12")),
 }
 TEMPERATURE, COUNTS = "temperature", {status.name.lower(): status for status in Status}
-OF_ARCS = "debonded_length", "damaged_length", "debonded_shares"  # of an angle, in all unit loads
+OF_ARCS = "debonded_length", "debonded_share", "debonded_shares"  # of an angle, in all unit loads
 UNIT_LOADS = {3: [0, 1, 2], 6: [0, 1, 5, 2, 6, 4, 3]}  # components in the order of the states; 6 is the temperature
 FIELDS = ("displacement", "fluctuation", "stress", "mesh_error", "stress_33")  # of a state on its mesh
 
@@ -187,6 +187,7 @@ def check_tables(findings: Findings, cell: DiscreteCell, states: States, pairs: 
         return np.asarray(np.bincount(nodes.fibre - 1, nodes.length * where, len(files.fibres.radius)), float)
 
     longest = float(lengths(np.ones(len(nodes.length), bool)).max(initial=0.0)) or 1.0
+    whole, kept = nodes.length.sum() or 1.0, {state.point for state in states}
     of_section = nodes.length[:, None] * (nodes.pair[:, None] == np.arange(sections))
     stress = max((float(np.abs(state.mean_stress).max()) for state in states), default=0.0) or 1.0
     energy = max([state.stored for state, _ in pairs], default=0.0) + cell.rounded_energy
@@ -200,7 +201,8 @@ def check_tables(findings: Findings, cell: DiscreteCell, states: States, pairs: 
             "stored": (state.stored, energy),
             "stored_in_springs": (state.in_springs, energy),
             "debonded_length": (lengths(debonded), longest),
-            "damaged_length": (lengths(damaged), longest),
+            "debonded_share": (lengths(debonded).sum() / whole, 1.0),
+            "damaged_share": (lengths(damaged).sum() / whole, 1.0),
             "debonded_shares": (debonded @ of_section / of_section.sum(axis=0), 1.0),
         }
         numbers |= {name: (np.count_nonzero(state.status == status), 1.0) for name, status in COUNTS.items()}
@@ -210,7 +212,8 @@ def check_tables(findings: Findings, cell: DiscreteCell, states: States, pairs: 
     for number, point in enumerate(files.points):
         count, place = sum(point[name] for name in COUNTS), f"point {number}, {', '.join(COUNTS)}"
         findings.compare("tables", count, len(nodes.length), 1.0, place)
-        missing = sorted({"debonded_length", *["debonded_shares"] * (sections > 1)}.difference(point))
+        names = ["debonded_length"] * (number in kept) + ["debonded_shares"] * (sections > 1)
+        missing = sorted({*names}.difference(point))
         findings.require("tables", not missing, f"point {number}, {', '.join(missing)}")
 
 

@@ -187,7 +187,7 @@ REASONS = {
     "what breaks at tips would release": ("G_I", "G_II"),
     "of the mesher, or of a table that is not in the files": ("match_distance", "mesh_size", "refine"),
     "copies of other numbers, for readers": (
-        "fibres", "peak", "mark", "debonding_angle", "debonded_share", "dissipation_ratio", "parameter_values",
+        "fibres", "peak", "mark", "debonding_angle", "dissipation_ratio", "parameter_values",
     ),
 }  # fmt: skip
 ATOMS = ("case", "result_h5")

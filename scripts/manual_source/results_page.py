@@ -36,7 +36,9 @@ CASES_CSV = """\
 Of a sweep, a row for each case; results are there once `collect` has written them. i and j stand for 1, 2 or 3, in
 stiffnesses of generalized plane strain for 1 to 6."""
 
-STATISTICS_CSV = "A row for each point of a sweep and each output: the statistics of its realisations."
+STATISTICS_CSV = """\
+A row for each point of a sweep and each output: the statistics of its finished realisations. Times, memory, checks and
+outputs that are zero in all cases have none."""
 
 SPATIAL = """\
 Of generalized plane strain, result.h5 has all of the above but for what stands here again or is new. Fields do not vary

@@ -143,7 +143,7 @@ def test_paths_of_every_kind_resume(tmp_path, ranks, kind):
     assert_same_curve(found["path"], expected["path"])
     if softens:
         assert sum(point["softened"] for point in expected["path"][:kept]) > 0
-        for key in ("softened", "fracture_energy", "damaged_length"):
+        for key in ("softened", "fracture_energy", "damaged_share"):
             np.testing.assert_allclose(*([point[key] for point in of["path"]] for of in (found, expected)), rtol=1e-6)
 
 

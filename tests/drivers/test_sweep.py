@@ -218,7 +218,10 @@ def test_collect_writes_tables_and_pictures(tmp_path):
     out = tmp_path / "out"
     swept(out, sweep_file(tmp_path, "realisations = 3\ncell.fibre_fraction = [0.2, 0.3]\n", RANDOM))
     names = ("cases.csv", "statistics.csv", "moduli.png")
-    assert collected(out).stdout.splitlines() == ["6 cases: 6 done", *(str(out / name) for name in names)]
+    first, *table, cases, statistics, moduli = collected(out).stdout.splitlines()
+    assert (first, cases, statistics, moduli) == ("6 cases: 6 done", *(str(out / name) for name in names))
+    printed = [float(line.split()[3]) for line in table if line.startswith("  E1 (GPa)  ")]
+    assert printed == pytest.approx(means(out, "E1"), rel=1e-5) and len(printed) == 2
     assert imread(out / "moduli.png")[..., :3].std() > 0.02
     assert [row["status"] for row in rows(out)] == ["done"] * 6
     found = means(out, "bulk")

@@ -82,7 +82,7 @@ def states_of(folder: Path) -> list[dict[str, Any]]:
         ]
 
 
-OF_KEPT = {"tips", "mesh_error"}
+OF_KEPT = {"tips", "mesh_error", "debonded_length", "debonding_angle"}
 
 
 def document(folder: Path) -> dict[str, Any]:

@@ -185,12 +185,15 @@ def test_without_sensitivity_to_the_mode_toughness_times_length_is_counted_exact
     result = run(case, comm)
     assert sum(point.broke for point in result.path) > 10
     for point in result.path:
-        broken = float(np.sum(point.debonded_length))
-        assert point.fracture_energy == pytest.approx(TOUGHNESS * broken / result.cell.area, rel=1e-12)
-        assert point.debonding_angle == pytest.approx(np.degrees(np.array(point.debonded_length) / 7.5))
-        assert point.debonded_share == pytest.approx(broken / (2 * np.pi * 7.5), rel=1e-9)
+        broken = point.debonded_share * 2 * np.pi * 7.5
+        assert point.fracture_energy == pytest.approx(TOUGHNESS * broken / result.cell.area, rel=1e-9)
         if point.fracture_energy:
             assert point.dissipation_ratio == pytest.approx(point.dissipated / point.fracture_energy)
+    last = result.path[-1]
+    assert sum(last.debonded_length) == pytest.approx(last.debonded_share * 2 * np.pi * 7.5, rel=1e-9)
+    assert last.debonding_angle == pytest.approx(np.degrees(np.array(last.debonded_length) / 7.5))
+    assert len(result.path) > 2 and {point.debonded_length is None for point in result.path[1:-1]} == {True}
+    assert result.points["debonded_length"].shape == (len(result.path), 1)
 
 
 def test_the_tips_of_one_debond(comm):

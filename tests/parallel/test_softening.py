@@ -135,7 +135,7 @@ def test_a_path_goes_on_where_it_was_ended(comm, shared_path, falsified):
     for found, expected in zip(result.path, whole, strict=True):
         assert (found.broke, found.softened) == (expected.broke, expected.softened)
         np.testing.assert_allclose(found.stress, expected.stress, atol=1e-12)
-        np.testing.assert_allclose(found.damaged_length, expected.damaged_length)
+        np.testing.assert_allclose(found.damaged_share, expected.damaged_share)
 
 
 def test_a_wrong_answer_does_not_outlive_the_next_confirmation(comm):

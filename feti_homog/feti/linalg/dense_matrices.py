@@ -181,11 +181,7 @@ class DenseSolver:
     """Solver X = A^-1 B for one SPD matrix A (n, n).  The factor overwrites A in Fortran order."""
 
     def __init__(self, A: Float) -> None:
-        """Factor A.
-
-        Raises:
-            LinAlgError: as `cholesky`.
-        """
+        """Factor A.  Raises LinAlgError as `cholesky`."""
         self._L = cholesky(A, clean=False)
 
     def solve(self, B: Float) -> Float:

@@ -277,10 +277,6 @@ class SizedLines:
         return arcs, place_nodes(field, self.bridges, sampling.bridge, 1, sampling.most_nodes)
 
     def joined(self, parts: Sequence[LineStations]) -> LineStations:
-        """Concatenate the nodes of all parts of these lines.
-
-        Raises:
-            MeshError: the sampling allows fewer nodes.
-        """
+        """Concatenate the nodes of all parts of these lines.  Raises MeshError if the sampling allows fewer nodes."""
         arcs, bridges = (Stations.joined(stations, self.sampling.most_nodes) for stations in zip(*parts, strict=True))
         return arcs, bridges

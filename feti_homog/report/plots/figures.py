@@ -11,7 +11,7 @@ from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.materials import voigt
 from feti_homog.report.plots import cell_picture, drawn_cell, plot_helpers
 from feti_homog.report.text.summary import reported
-from feti_homog.results import atomic, field_file, output_folder, result_json
+from feti_homog.results import atomic, checkpoints, field_file, output_folder, result_json
 from feti_homog.typing import Document
 
 
@@ -40,11 +40,12 @@ def plot(
     """
     directory, paths = Path(directory), list[Path]()
     atomic.remove_unfinished(directory, output_folder.RESULT_FILE, alone=False)
-    document = result_json.read(directory) if (directory / result_json.NAME).exists() else {}
+    stored = {path.name for path in directory.iterdir()} & {result_json.NAME, checkpoints.FOLDER}
+    document = output_folder.latest(directory) if stored else {}
     if component is not None:
         document.setdefault("case", {}).setdefault("output", {})["stress"] = component
     with mpl.rc_context(plot_helpers.STYLE):
-        if document.get("case", {}).get("output", {}).get("fields", True):
+        if "unfinished" not in document and document.get("case", {}).get("output", {}).get("fields", True):
             try:
                 with h5py.File(directory / field_file.NAME, "r") as file:
                     paths = of_fields(directory, file, document, look, state)

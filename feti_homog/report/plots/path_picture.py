@@ -44,9 +44,9 @@ def figure(document: Document) -> Figure:
     _stress_curves(upper, document, strain, components, style)
     upper.set_ylabel(f"macroscopic stress {plot_helpers.stress_unit(case)}")
     lower.set_xlabel(f"macroscopic strain ${plot_helpers.SYMBOLS[voigt.voigt_names(strains.shape[1])[0][component]]}$")
-    upper.set_title(
-        "\n".join([plot_helpers.title_of(case, f"plane {case['analysis']['plane']}"), *plot_helpers.bond_limits(case)])
-    )
+    title = plot_helpers.title_of(case, f"plane {case['analysis']['plane']}")
+    titles = title, document.get("unfinished"), *plot_helpers.bond_limits(case)
+    upper.set_title("\n".join(filter(None, titles)))
     for axes in middle:
         axes.plot(strain, [point["temperature"] for point in points], color="0.3", linewidth=1.2, **style)
         axes.set_ylabel("change of temperature\n" r"$\Delta T$")
@@ -69,11 +69,10 @@ def figure(document: Document) -> Figure:
         plot_helpers.finish_curves(axes)
     upper.margins(y=0.12)  # room for numbers
     _number_points(upper, curve, numbers)
-    if "damaged_length" in points[0]:  # softening laws have damaged bonds that hold
+    if "damaged_share" in points[0]:  # softening laws have damaged bonds that hold
         right = lower.twinx()
-        right.plot(strain, [sum(p["damaged_length"]) for p in points], color="0.5", linestyle="--", linewidth=1.0)
-        label = f"damaged length {plot_helpers.unit_label(case.get('output', {}).get('length_unit', ''))}".rstrip()
-        right.set_ylabel(label, color="0.4", fontsize=8)
+        right.plot(strain, [p["damaged_share"] for p in points], color="0.5", linestyle="--", linewidth=1.0)
+        right.set_ylabel("damaged share of interfaces", color="0.4", fontsize=8)
         right.tick_params(colors="0.4", labelsize=8)
         right.spines["top"].set_visible(False)
         lower.legend(frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.12, 1.0))
@@ -179,7 +178,7 @@ def energies(document: Document) -> Figure | None:
     axes.set_xlabel(words)
     axes.set_ylabel(f"energy per area {plot_helpers.stress_unit(case)}")
     text = "energies along the path" if rising is None else f"energies, the {path_curves.what_rises(document)} rising"
-    axes.set_title(plot_helpers.title_of(case, text))
+    axes.set_title("\n".join(filter(None, [plot_helpers.title_of(case, text), document.get("unfinished")])))
     axes.spines[["top", "right"]].set_visible(False)
     handles, labels = axes.get_legend_handles_labels()
     axes.legend(handles[::-1], labels[::-1], frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.0, 1.0))

@@ -2,18 +2,15 @@
 
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
-from typing import TypeVar
 
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from feti_homog.system.runtime import process_memory
 from feti_homog.system.runtime.standard_streams import say
-
-T = TypeVar("T")
 
 
 class Progress:
@@ -55,14 +52,6 @@ class Progress:
             self._within[-1] += seconds
         self.seconds[name] = self.seconds.get(name, 0.0) + took
         self.say(f"{name:<9} {took:8.2f} s  {' '.join(remarks)}".rstrip())
-
-    def bar(self, items: Iterable[T], label: str) -> Iterator[T]:
-        """Yield the items, with a progress bar if rank 0 writes to a terminal."""
-        if not self.on_terminal:
-            return iter(items)
-        from tqdm import tqdm  # of no use to most runs, and slow to import
-
-        return iter(tqdm(items, desc=label, leave=False))
 
     def timings(self) -> dict[str, float]:
         """Return the seconds of each stage, the maximum over ranks.  Collective."""

@@ -1,62 +1,18 @@
 """Statistics over realisations, and the tables and pictures of a sweep."""
 
 import csv
-import math
 
 import numpy as np
 import pytest
 from matplotlib.image import imread
 from scipy import stats
+from support.sweep_tables import collected, document, path_document
 
 from feti_homog.materials.voigt import SPATIAL_STRESSES
 from feti_homog.report.text.tables import unit, with_unit
 from feti_homog.studies import collect, pictures
 from feti_homog.studies.outputs import numbers, outputs
-from feti_homog.studies.sweep_table import Statistics, SweepTable, series_over
-
-MATERIAL = {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}}
-
-
-def test_statistics_are_scipys():
-    samples = np.random.default_rng(0).normal(5.0, 2.0, (7, 3))
-    found = Statistics.of(samples)
-    for k, column in enumerate(samples.T):
-        low, high = stats.t.interval(0.95, len(column) - 1, loc=column.mean(), scale=stats.sem(column))
-        assert (found.mean[k], found.std[k]) == pytest.approx((column.mean(), column.std(ddof=1)))
-        assert found.mean[k] + np.array([-1, 1]) * found.ci95[k] == pytest.approx([low, high])
-
-
-def test_statistics_of_too_few_values_are_nan():
-    found = Statistics.of(np.array([[1.0, 2.0, np.nan], [np.nan, 4.0, np.nan]]))
-    assert found.count.tolist() == [1, 2, 0]
-    assert found.mean[:2].tolist() == [1.0, 3.0] and math.isnan(found.mean[2])
-    assert np.isnan(found.std[[0, 2]]).all() and found.std[1] == pytest.approx(2**0.5)
-    assert found.ci95[1] == pytest.approx(12.706, rel=1e-4)
-
-
-def document(fraction, fibres, shift):
-    """Write the files of a run with a stiffness slightly above that of Reuss."""
-    C = np.array([[120.0 + 80 * fraction, 50.0, 0.0], [50.0, 120.0 + 80 * fraction, 0.0], [0.0, 0.0, 35.0]]) + shift
-    cell = {"geometry": "random", "fibre_fraction": fraction, "fibres": fibres}
-    return {
-        "case": {"cell": cell, "material": MATERIAL, "analysis": {"type": "stiffness", "plane": "strain"}},
-        "cell": {"fibre_fraction": fraction, "elements": 10, "nodes": 9},
-        "solver": {"ranks": 1, "subdomains": 2, "dofs": 18, "multipliers": 4, "iterations": [3, 4, 5]},
-        "effective_stiffness": C, "moduli": {"bulk": 85.0 + 60 * fraction + shift, "shear": 35.0 + shift},
-        "checks": {"hill": 1e-12}, "timings": {"solve": 0.1}, "memory": 1000,
-    }  # fmt: skip
-
-
-def path_document(fibres, shift):
-    points = [
-        {"load_factor": f, "strain": [0.2 * f, 0, 0], "stress": [s + shift, s / 3, 0.0], "broke": 1,
-         "dissipated": 0.1 * f, "work": 0.3 * f, "bonded": 9, "open": 1, "closed": 0}
-        for f, s in ((0.1, 4.0), (0.08, 2.0), (0.5, 5.0), (1.0, 8.0))
-    ]  # fmt: skip
-    base = document(0.4, fibres, 0.0)
-    case = base["case"] | {"path": {"method": "events", "strain": [0.2, 0, 0]}}
-    del base["effective_stiffness"], base["moduli"]
-    return base | {"case": case, "path": points}
+from feti_homog.studies.sweep_table import Statistics, series_over
 
 
 def sheared(fibres, compliance):
@@ -71,17 +27,6 @@ def sheared(fibres, compliance):
     case["analysis"] = case["analysis"] | {"type": "path", "plane": "generalized"}
     del base["effective_stiffness"], base["moduli"]
     return base | {"case": case, "path": points}
-
-
-def collected(inputs, documents, point, realisation):
-    found = [outputs(d) if d else {} for d in documents]
-    names = dict.fromkeys(name for row in found for name in row)
-    return SweepTable(
-        name="test", stress_unit="GPa", folder=[f"case-{k + 1:04d}" for k in range(len(documents))],
-        point=point, realisation=realisation, status=["done" if d else "waiting" for d in documents],
-        reason=[""] * len(documents), inputs=inputs, documents=documents,
-        outputs={name: np.array([row.get(name, np.nan) for row in found]) for name in names},
-    )  # fmt: skip
 
 
 @pytest.mark.slow

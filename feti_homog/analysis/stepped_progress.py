@@ -1,0 +1,50 @@
+"""The progress of a long computation in steps: a bar on a terminal, a line a minute in a file."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from datetime import timedelta
+from typing import Any
+
+from feti_homog.system.runtime import progress_bar
+
+SECONDS_A_LINE = 60.0
+
+
+@contextmanager
+def shown(
+    progress: progress_bar.Progress, label: str, clock: Callable[[], float] = time.monotonic
+) -> Iterator[Callable[[float, int, str, bool], None]]:
+    """Show the share of the whole `label`, the rate of steps, and the time used and left.
+
+    The block calls `advance(share, count, text, known)` after each step; `known` steps were not computed here.  The
+    time left supposes that the rest of the share takes as long as the share since the last known step.
+    """
+    begin = clock()
+    reached, next_line, since = 0.0, begin + SECONDS_A_LINE, (begin, 0.0, 0)
+    bar: Any = None
+    if progress.on_terminal:
+        from tqdm import tqdm  # unused in most runs, and slow to import
+
+        bar = tqdm(total=1.0, desc=label, bar_format="{l_bar}{bar}| {elapsed} used{postfix}", leave=False)
+
+    def advance(share: float, count: int, text: str, known: bool) -> None:
+        nonlocal reached, next_line, since
+        now, reached = clock(), max(share, reached)  # the load falls in a snap-back
+        since = (now, reached, count) if known else since
+        seconds, gain, steps = now - since[0], reached - since[1], count - since[2]
+        text += f", {60.0 * steps / seconds:,.1f} a minute" if steps and seconds else ""
+        text += f", {timedelta(seconds=round(seconds * (1.0 - reached) / gain))} left" if gain else ""
+        if bar is not None:
+            bar.set_postfix_str(text, refresh=False)
+            bar.update(reached - bar.n)
+        elif now >= next_line:
+            used = timedelta(seconds=round(now - begin))
+            progress.say(f"  {label} {reached:.0%}, {used} used, {text}")
+            next_line = now + SECONDS_A_LINE
+
+    try:
+        yield advance
+    finally:
+        if bar is not None:
+            bar.close()

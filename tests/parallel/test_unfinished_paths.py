@@ -1,0 +1,139 @@
+"""A path that is interrupted: its points so far are those of the finished path, wherever they are read."""
+
+import csv
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import pytest
+from support.ranks import PIECES, parallel_assert
+
+from feti_homog import Case, run, run_sweep
+from feti_homog.errors import CaseError, ConvergenceError
+from feti_homog.report import page
+from feti_homog.report.plots import figures, path_picture
+from feti_homog.results import checkpoints, output_folder, result_json
+from feti_homog.studies import case_folders, case_runs, collect, sweep_cases
+from feti_homog.system.parallel.mpi_errors import on_root
+from feti_homog.system.runtime import file_locks
+
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
+
+EVENTS = 6
+CASE: dict[str, Any] = {
+    "name": "sheet",
+    "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.3},
+    "material": {"matrix": {"young": 100.0, "poisson": 0.4}, "fibre": {"young": 500.0, "poisson": 0.2}},
+    "analysis": {"type": "path", "plane": "stress"},
+    "interface": {"normal_strength": 4.0, "tangential_strength": 3.0},
+    "path": {"strain": [0.2, 0.0, 0.05]},
+    "decomposition": PIECES,
+    "output": {"pictures": False, "states": 2},
+}
+LEGS = {"waypoints": [[0.1, 0.0, 0.0], [-0.05, 0.02, 0.0]]}
+PATHS = {"events": CASE["path"], "legs": LEGS, "increments": LEGS | {"method": "increments", "increments": 12}}
+# Entries that the end of a path adds to some points.
+AT_END = {"mark", "mesh_error", "tips", "debonded_length", "debonding_angle"}
+
+
+def interrupted(at: int = EVENTS, of: str = "") -> Any:
+    """End a run, whose folder has `of` in its path, after so many events."""
+    write = checkpoints.Checkpoint.write
+
+    def written(self: checkpoints.Checkpoint, number: int, *event: Any, **light: bool) -> None:
+        write(self, number, *event, **light)
+        if number == at - 1 and of in str(self.path):
+            raise RuntimeError("interrupted")
+
+    return mock.patch.object(checkpoints.Checkpoint, "write", written)
+
+
+def begun(comm: Any, folder: Path, path: dict[str, Any]) -> None:
+    with interrupted(), pytest.raises(RuntimeError, match="interrupted"):
+        run(Case.parse(CASE | {"path": path}), comm, out=folder)
+    comm.barrier()
+
+
+@pytest.mark.parametrize("kind", PATHS)
+def test_points_so_far_are_those_of_the_finished_path(comm, shared_path, kind):
+    case, out = Case.parse(CASE | {"path": PATHS[kind]}), shared_path / "out"
+    begun(comm, out, PATHS[kind])
+    so_far = on_root(comm, output_folder.latest, out)
+    run(case, comm, out=shared_path / "whole")
+    whole = on_root(comm, result_json.read, shared_path / "whole")
+    expected = [{k: v for k, v in point.items() if k not in AT_END} for point in whole["path"]]
+    assert len(expected) > EVENTS and so_far["path"] == expected[:EVENTS]
+    assert {k: so_far[k] for k in ("case", "digest", "cell")} == {k: whole[k] for k in ("case", "digest", "cell")}
+    largest = max(point["load_factor"] for point in expected[:EVENTS])
+    assert so_far["status"] == f"unfinished, {EVENTS} points up to load {largest:.4f}"
+    run(case, comm, out=out, resume=True)
+    assert on_root(comm, output_folder.latest, out)["status"] == "done"
+
+
+def test_curves_and_page_tell_that_the_path_is_unfinished(comm, shared_path):
+    begun(comm, shared_path, CASE["path"])
+
+    def drawn() -> list[str]:
+        paths = figures.plot(shared_path)
+        text = page.write(shared_path).read_text()
+        (title, status, _) = path_picture.figure(output_folder.latest(shared_path)).axes[0].get_title().split("\n")
+        assert status.startswith("unfinished, 6 points") and status in text and title.startswith("sheet")
+        assert "Largest S11 so far, the path being cut off" in text
+        return sorted(path.name for path in paths)
+
+    assert on_root(comm, drawn) == ["energy.png", "path.png"]
+
+
+def test_a_result_that_has_all_points_is_no_unfinished_path(comm, shared_path):
+    """A path cut off by `max_events` keeps its checkpoint; further events are newer than its result."""
+    short = Case.parse(CASE | {"path": CASE["path"] | {"max_events": 4}})
+    with pytest.raises(ConvergenceError, match="max_events"):
+        run(short, comm, out=shared_path)
+    assert on_root(comm, output_folder.latest, shared_path)["status"] == "not converged"
+    with interrupted(), pytest.raises(RuntimeError, match="interrupted"):
+        run(Case.parse(CASE), comm, out=shared_path, resume=True)
+    assert len(on_root(comm, output_folder.latest, shared_path)["path"]) == EVENTS
+
+
+def test_a_record_that_is_being_written_does_not_count(comm, shared_path):
+    begun(comm, shared_path, CASE["path"])
+
+    def read() -> None:
+        path = shared_path / checkpoints.FOLDER / checkpoints.NAME
+        content = path.read_bytes()
+        path.write_bytes(content[:-1])
+        assert len(output_folder.latest(shared_path)["path"]) == EVENTS - 1
+        path.write_bytes(content[:-9] + bytes(9))
+        with pytest.raises(CaseError, match="checksum of record 6 is wrong"):
+            output_folder.latest(shared_path)
+
+    on_root(comm, read)
+
+
+def test_sweeps_tell_and_collect_begun_cases(comm, shared_path):
+    """The second of two points is interrupted: statistics are those of the first."""
+    document = CASE | {"output": {"fields": False}, "sweep": {"interface.normal_strength": [4.0, 4.5]}}
+    out, sweep = shared_path / "out", sweep_cases.expand(document, Path())
+    with interrupted(of="case-0002"), pytest.raises(RuntimeError, match="interrupted"):
+        run_sweep(document, out, comm)
+    comm.barrier()
+
+    def told() -> None:
+        first, second = case_runs.list_cases(sweep, out)
+        assert first.startswith("case-0001  done         ") and second.startswith("case-0002  interrupted  ")
+        so_far = output_folder.latest(out / "case-0002")
+        assert second.endswith(f"normal_strength = 4.5; {so_far['unfinished']}") and "; " not in first
+        lines = collect.collect(out, pictures=False)
+        assert lines[:2] == ["2 cases: 1 done, 1 interrupted", f"  case-0002  interrupted; {so_far['unfinished']}"]
+        rows = list(csv.DictReader((out / "cases.csv").read_text().splitlines()))
+        stress = [point["stress"][0] for point in so_far["path"]]
+        assert [row["status"] for row in rows] == ["done", "interrupted"] and rows[1]["reason"] == so_far["unfinished"]
+        assert float(rows[1]["end_S11"]) == stress[-1] and float(rows[1]["peak_S22"]) > 0.0
+        means = csv.DictReader((out / "statistics.csv").read_text().splitlines())
+        assert {row["point"] for row in means} == {"1"}
+        with file_locks.Lock(out / "case-0002" / case_folders.LOCK_FILE):
+            assert case_runs.list_cases(sweep, out)[1].startswith("case-0002  running  ")
+
+    on_root(comm, told)
+    table = run_sweep(document, out, comm)
+    parallel_assert(comm, list(table.status) == ["done", "done"])

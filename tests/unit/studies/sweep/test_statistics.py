@@ -1,0 +1,64 @@
+"""Statistics over realisations: against scipy's, without noise, and as `collect` prints them."""
+
+import csv
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+from support.sweep_tables import collected, path_document
+
+from feti_homog.studies import collect
+from feti_homog.studies.sweep_table import Statistics
+
+
+def test_statistics_are_scipys():
+    samples = np.random.default_rng(0).normal(5.0, 2.0, (7, 3))
+    found = Statistics.of(samples)
+    for k, column in enumerate(samples.T):
+        low, high = stats.t.interval(0.95, len(column) - 1, loc=column.mean(), scale=stats.sem(column))
+        assert (found.mean[k], found.std[k]) == pytest.approx((column.mean(), column.std(ddof=1)))
+        assert found.mean[k] + np.array([-1, 1]) * found.ci95[k] == pytest.approx([low, high])
+
+
+def test_statistics_of_too_few_values_are_nan():
+    found = Statistics.of(np.array([[1.0, 2.0, np.nan], [np.nan, 4.0, np.nan]]))
+    assert found.count.tolist() == [1, 2, 0]
+    assert found.mean[:2].tolist() == [1.0, 3.0] and math.isnan(found.mean[2])
+    assert np.isnan(found.std[[0, 2]]).all() and found.std[1] == pytest.approx(2**0.5)
+    assert found.ci95[1] == pytest.approx(12.706, rel=1e-4)
+
+
+def samples(scale):
+    """Three realisations of a path, S11 of which is noise, with a peak of 3, 4 and 5 times a scale."""
+    documents = [path_document(4, 0.0) for _ in range(3)]
+    for number, each in enumerate(documents):
+        each["path"] = [
+            point | {"stress": [scale * (-1) ** k * 2e-13, scale * (3 + number) * share, scale * 0.5 * share]}
+            for k, (point, share) in enumerate(zip(each["path"], (0.5, 0.4, 1.0, 0.5), strict=True))
+        ]
+    return collected({"cell.seed": [0, 1, 2]}, documents, [1] * 3, [1, 2, 3])
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+def test_noise_and_costs_have_no_statistics(tmp_path, scale):
+    """Noise is what is small beside the other stresses of the path, in any unit."""
+    table = samples(scale)
+    assert table.outputs["peak_S11"].tolist() == table.outputs["onset_S11"].tolist() == [0.0] * 3
+    collect.write(tmp_path, table)
+    rows = {row["output"]: row for row in csv.DictReader((tmp_path / "statistics.csv").read_text().splitlines())}
+    assert not {"peak_S11", "end_S11", "memory", "seconds_solve", "check_hill"} & {*rows}
+    assert float(rows["peak_S12"]["mean"]) == pytest.approx(scale / 2)
+    assert [float(rows["peak_S22"][name]) for name in ("mean", "std")] == pytest.approx([4 * scale, scale])
+    title, head, *printed = [line for line in collect.means(table) if line]
+    assert title == "All realisations" and head.split() == ["output", "cases", "mean", "std", "95", "%", "+-"]
+    (peak,) = [line.split() for line in printed if "peak_S22" in line]
+    count, *numbers = map(float, peak[2:])
+    half = stats.t.ppf(0.975, 2) * scale / 3**0.5
+    assert count == 3 and numbers == pytest.approx([4 * scale, scale, half], rel=1e-4)
+    assert {line.split()[0] for line in printed} == {"peak_S12", "peak_S22", "peak_E11"}
+
+
+def test_a_single_realisation_has_no_scatter():
+    assert collect.means(collected({"cell.order": [1]}, [path_document(2, 0.0)], [1], [1])) == []
+    assert collect.means(collected({"cell.order": [1]}, [None], [1], [1])) == []
