@@ -191,12 +191,6 @@ class Sensitivities:
         "whether faces touch without tension: derivatives hold as long as no node opens or closes", default=False
     )
 
-    @property
-    def elasticities(self) -> Float:
-        """Return the elasticities d ln constant / d ln parameter (n, p); NaN if a value is zero."""
-        values = np.where(self.constant_values == 0.0, np.nan, self.constant_values)
-        return np.asarray(self.derivatives * self.parameter_values / values[:, None])
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PhaseStresses:
