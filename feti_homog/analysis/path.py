@@ -198,7 +198,7 @@ def _completed(
                 if context.states.is_recording:
                     error, responses = state_error(context, responses)
                     entries[number] |= error
-                    context.states.record(responses, point.load_factor, _label(path, number), number)
+                    context.states.record({_label(path, number): responses}, point.load_factor, number)
             line.append(f"{len(numbers)} of {len(entries)} points")
         states = {"states": numbers} if context.states.is_recording else {}
     else:

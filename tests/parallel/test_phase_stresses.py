@@ -18,6 +18,7 @@ CELL = {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.15, "refine"
 LOAD = {"S11": 30.0, "S22": -12.0, "S33": 5.0, "S23": 7.0, "S13": -9.0, "S12": 11.0}
 AXES = {"axial_tension": 40.0, "axial_compression": 25.0, "axial_shear": 20.0, "transverse_tension": 50.0,
         "transverse_compression": 90.0, "transverse_shear": 30.0}  # fmt: skip
+MEASURES = ("principal", "von_mises", "hydrostatic", "utilisation")
 
 
 def phases_of(comm, load, order=1, plane="generalized", fibre=FIBRE, strengths=(None, None), **more):
@@ -29,8 +30,7 @@ def phases_of(comm, load, order=1, plane="generalized", fibre=FIBRE, strengths=(
         "cell": CELL | {"order": order},
         "material": materials,
         "analysis": {"type": "load", "plane": plane},
-        "load": {"to": load},
-    }
+    } | ({"load": {"to": load}} if load else {})
     return {phase.phase: phase for phase in run(Case.parse(document | more), comm, fields=True).phase_stresses}
 
 
@@ -84,7 +84,7 @@ def test_a_moved_and_a_turned_cell_have_the_same_stresses(comm, shared_path, ord
         found[name] = phases_of(comm, asked, plane="strain", strengths=({"von_mises": 50.0}, None), cell=cell)
     for name, phases in found.items():
         for phase, stresses in phases.items():
-            for measure in ("principal", "von_mises", "hydrostatic", "utilisation")[: 4 if phase == "matrix" else 3]:
+            for measure in MEASURES[: 4 if phase == "matrix" else 3]:
                 expected = found["base"][phase]
                 value, place = getattr(stresses, measure), getattr(stresses, f"{measure}_at")
                 np.testing.assert_allclose(value, getattr(expected, measure), rtol=1e-8)
@@ -126,3 +126,15 @@ def test_a_soft_phase_keeps_its_stresses_and_a_free_fibre_has_none(comm):
     np.testing.assert_allclose(softer.von_mises, 1e-6 * soft.von_mises, rtol=1e-3)
     free = {"interface": {"contact": False, "debonded": [{"fibre": "all", "centre": 0.0, "angle": 360.0}]}}
     assert phases_of(comm, {"E11": 0.01}, plane="strain", **free)["fibre"].von_mises == 0.0
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_unit_loads_together_have_the_stresses_of_each_alone(comm, order):
+    more = {"fibre": FIBRE | {"young": 20.0}, "strengths": ({"tension": 8.0, "compression": 12.0}, AXES)}
+    together = phases_of(comm, None, order, **more, analysis={"type": "stiffness", "plane": "generalized"})
+    for number, load in enumerate(together["matrix"].state):
+        strains = dict.fromkeys(voigt.SPATIAL_STRAINS, 0.0) | {load: 1.0}
+        for name, alone in phases_of(comm, strains, order, **more).items():
+            for measure in MEASURES:
+                value = getattr(together[name], measure)[number]
+                np.testing.assert_allclose(value, getattr(alone, measure)[0], rtol=1e-8, atol=1e-9)
