@@ -148,13 +148,17 @@ class StateRecorder:
         return tuple(map(self._of_phase, phases)) or None
 
     def _of_phase(self, phase: str) -> PhaseStresses:
-        material, columns = self._cell.case.material_of(phase), dict[str, Any]()
-        for k, name in enumerate(recovered_fields.MEASURES):
-            if name != "utilisation" or material.strength is not None:
-                columns[name] = np.array([state[phase][0][k] for state in self._largest])
-                columns[f"{name}_at"] = np.array([state[phase][1][k] for state in self._largest])
-        criterion = None if material.strength is None else strength.criterion(material.strength)
-        return PhaseStresses(phase=phase, state=tuple(self._labels), criterion=criterion, **columns)
+        limit, columns = self._cell.case.material_of(phase).strength, dict[str, Any]()
+        arrays = zip(*(state[phase] for state in self._largest), strict=True)
+        by_measure = (np.split(np.stack(array), (1, 2, 3), axis=1) for array in arrays)
+        for name, values, places in zip(recovered_fields.MEASURES, *by_measure, strict=True):
+            if values.size:  # the utilisation has a column for each mode, or none
+                modes, states = values.argmax(axis=1), np.arange(len(values))
+                columns |= {name: values[states, modes], f"{name}_at": places[states, modes]}
+        if limit is not None:
+            columns["criterion"] = strength.criterion(limit)
+            columns["mode"] = tuple(map(strength.MODES.__getitem__, modes)) if values.shape[1] > 1 else None
+        return PhaseStresses(phase=phase, state=tuple(self._labels), **columns)
 
     def fields(self) -> Fields | None:
         """Return this rank's fields; None unless the run keeps fields in memory."""

@@ -84,7 +84,7 @@ def out_of_plane_stress(cell: TornCell, stress: Float) -> Float:
 
 
 Largest = tuple[Float, Float]
-"""The largest value (4,) of each measure, -inf without values, and its position (4, 2)."""
+"""The largest value (v,) of each measure, of the utilisation in each mode, and its position (v, 2)."""
 
 
 def largest_stresses(cell: TornCell, states: Sequence[Sequence[Response | None]]) -> list[dict[str, Largest]]:
@@ -104,8 +104,7 @@ def largest_stresses(cell: TornCell, states: Sequence[Sequence[Response | None]]
         for *_, more in further:
             stress += more
         if not np.isnan(stress).any():
-            inside = in_cell(points, cell.summary.period)
-            places = np.broadcast_to(inside[:, None], (len(inside), len(MEASURES), 2))
+            places = in_cell(points, cell.summary.period)[:, None]
             for largest, tensors in zip(by_phase, stress, strict=True):
                 largest[phase].append(_largest(_measures(cell.case.material_of(phase), tensors.T), places))
     by_state = zip(*cell.comm.allgather([*map(_joined, by_phase)]), strict=True)
@@ -146,7 +145,7 @@ def _stresses(cell: TornCell, responses: Sequence[Response | None]) -> Iterator[
 
 
 def _measures(material: material_forms.Material, stress: Float) -> Float:
-    """Return the `MEASURES` (n, 4) of stresses (n, 6), with lower bounds for small principal stresses."""
+    """Return the `MEASURES` (n, v) of stresses (n, 6), with lower bounds for small principal stresses."""
     in_plane, S33, shears = stress[:, voigt.IN_PLANE], stress[:, 2], stress[:, [3, 4]]
     von_mises, hydrostatic = voigt.spatial_von_mises(in_plane, S33, shears), stress[:, :3].mean(axis=1)
     if not shears.any():
@@ -158,17 +157,17 @@ def _measures(material: material_forms.Material, stress: Float) -> Float:
         principal = hydrostatic + von_mises / 3
         near = hydrostatic + 2 / 3 * von_mises >= principal.max()
         principal[near] = voigt.spatial_principal(in_plane[near], S33[near], shears[near])[:, 0]
-    used = np.full(len(stress), -np.inf)
+    values = [principal, von_mises, hydrostatic]
     if material.strength is not None:
-        used = strength.utilisation(material.strength, stress, principal, von_mises)
-    return np.stack([principal, von_mises, hydrostatic, used], axis=1)
+        values += [*strength.utilisation(material.strength, stress, principal, von_mises).T]
+    return np.asarray(np.stack(values, axis=1))
 
 
 def _largest(values: Float, points: Float) -> Largest:
-    """Find the largest of the values (n, 4) at points (n, 4, 2); ties take the first by x, then y."""
+    """Find the largest of the values (n, v) at points (n, v or 1, 2); ties take the first by x, then y."""
     peak, positions = values.max(axis=0), np.zeros((values.shape[1], 2))
     for number, (column, top) in enumerate(zip(values.T, peak, strict=True)):
-        tied = points[column >= top - TIE * abs(top), number] if np.isfinite(top) else points[:1, number]
+        tied = points[column >= top - TIE * abs(top), number % points.shape[1]]
         size = np.abs(tied).max() or 1.0
         positions[number] = tied[np.lexsort(np.round(tied / size, 6).T[::-1])[0]]
     return peak, positions

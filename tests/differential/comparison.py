@@ -17,10 +17,10 @@ LEFT_OUT = {
     "envelope",
 }  # fmt: skip
 # Numbers of the solver, or of pieces; a ratio of two others; which point is the peak, as above; the positions of the
-# largest stresses, several of which may tie.
+# largest stresses and modes of failure, several of which may tie.
 LEFT_OUT_WITHIN = {
     "iterations", "nodes", "dissipation_ratio", "mark", "principal_at", "von_mises_at", "hydrostatic_at",
-    "utilisation_at",
+    "utilisation_at", "mode",
 }  # fmt: skip
 ENERGIES = {
     "stored", "stored_in_springs", "work", "dissipated", "dissipated_strain_controlled", "fracture_energy",
