@@ -70,8 +70,8 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
                 break
             if len(entries) == path.max_events and point.load_factor < 1.0:
                 context.checks.faults.append(
-                    f"[path] max_events = {path.max_events}: the path was not finished: "
-                    'result.json has status "not converged"; --resume with a higher max_events goes on'
+                    f"[path] max_events = {path.max_events}: the path was not finished: result.json has status "
+                    f'"not converged"; --resume with a higher max_events goes on{context.case.fewer_events}'
                 )
                 break
     if last is None:
