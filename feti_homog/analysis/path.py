@@ -74,9 +74,7 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
                     f'"not converged"; --resume with a higher max_events goes on{context.case.fewer_events}'
                 )
                 break
-    if last is None:
-        return {"resumed": count, "path": ()}
-    return {"resumed": count} | _completed(context, path, law, entries, bonds, last)
+    return {"resumed": count} | ({"path": ()} if last is None else _completed(context, path, law, entries, bonds, last))
 
 
 def _points(

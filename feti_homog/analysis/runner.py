@@ -1,5 +1,6 @@
 """Run one case: tear the cell, solve, homogenize and check; write the result if there is a folder."""
 
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import replace
@@ -198,6 +199,7 @@ def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Field
     )
     return Result(
         version=__version__,
+        date=mpi_errors.on_root(cell.comm, time.strftime, "%Y-%m-%d %H:%M UTC", time.gmtime()),
         case=cell.case.resolved(),
         digest=mpi_errors.on_root(cell.comm, cell.case.digest),
         cell=cell_info,

@@ -12,7 +12,7 @@ import numpy as np
 
 # What follows from the path, whose events are compared by their loads: `peak` has their numbers.
 LEFT_OUT = {
-    "schema", "version", "case", "digest", "solver", "checks", "check_tolerance", "kkt_tolerance", "warnings",
+    "schema", "version", "date", "case", "digest", "solver", "checks", "check_tolerance", "kkt_tolerance", "warnings",
     "remarks", "states", "resumed", "result_h5", "timings", "memory", "checksum", "path", "peak",
     "envelope",
 }  # fmt: skip
