@@ -40,7 +40,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
             error, responses = state_error(context, responses)
             point |= error | {"strain": responses[0].strain, "stress": responses[0].stress}
             point |= {"stored": responses[0].stored, "stored_in_springs": responses[0].in_springs}
-            context.states.record(responses, 1.0, label, number)
+            context.states.record({label: responses}, 1.0, number)
         starts = [r.state.solution.lam for r in responses]
         point["tips"] = tip_rates(context, responses, context.loads.names if unit else ("strain",))
         points.append(AnglePoint(**point | context.point(responses)))

@@ -173,10 +173,10 @@ class AnalysisContext:
         self, responses: Sequence[averaging.Response], load_factor: float, label: str, point: int
     ) -> None:
         """Record one state for each unit load, in its problem.  Collective."""
-        in_plane = len(self.plane.loads)
+        in_plane, pairs = len(self.plane.loads), dict[str, Sequence[averaging.Response | None]]()
         for number, (name, response) in enumerate(zip(self.loads.names, responses, strict=True)):
-            pair = (response, None) if number < in_plane else (None, response)
-            self.states.record(pair, load_factor, f"{label}{name}", point)
+            pairs[f"{label}{name}"] = (response, None) if number < in_plane else (None, response)
+        self.states.record(pairs, load_factor, point)
 
     @cached_property
     def checkpoint(self) -> checkpoints.EventsInMemory:

@@ -23,7 +23,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
         context.progress.say(context.checks.record(problem, response))
     error, responses = state_error(context, responses)
     note_accuracy(context, max(error.values(), default=0.0))
-    context.states.record(responses, 1.0, "load", 0)
+    context.states.record({"load": responses}, 1.0, 0)
     point = context.loaded_point(responses) | error | {"free_motions": state.free_motions}
     strains = zip(cell.loads, cell.macroscopic(state.solutions).strain.tolist(), strict=True)
     only_in_plane = not any(strain for name, strain in strains if name not in IN_PLANE_LOADS)

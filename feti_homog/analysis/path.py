@@ -72,8 +72,8 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
                 break
             if len(entries) == path.max_events and point.load_factor < 1.0:
                 context.checks.faults.append(
-                    f"[path] max_events = {path.max_events}: the path was not finished: "
-                    'result.json has status "not converged"; --resume with a higher max_events goes on'
+                    f"[path] max_events = {path.max_events}: the path was not finished: result.json has status "
+                    f'"not converged"; --resume with a higher max_events goes on{context.case.fewer_events}'
                 )
                 break
     if last is None:
@@ -208,7 +208,7 @@ def _completed(
                 if context.states.is_recording:
                     error, responses = state_error(context, responses)
                     entries[number] |= error
-                    context.states.record(responses, point.load_factor, _label(path, number), number)
+                    context.states.record({_label(path, number): responses}, point.load_factor, number)
             line.append(f"{len(numbers)} of {len(entries)} points")
         states = {"states": numbers} if context.states.is_recording else {}
     else:

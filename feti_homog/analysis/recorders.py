@@ -108,37 +108,36 @@ class StateRecorder:
         self.error: FetiHomogError | None = None
         self.singularities = set[str]()
 
-    def record(
-        self, responses: Sequence[averaging.Response | None], load_factor: float, label: str, point: int
-    ) -> None:
-        """Record the next state from the response, or None, in each problem.  Collective."""
-        plane, axial = (*responses, None)[:2]
+    def record(self, states: Mapping[str, Sequence[averaging.Response | None]], load_factor: float, point: int) -> None:
+        """Record the next states by label, each from the response, or None, in each problem.  Collective."""
         if self.is_recording:
-            self._largest.append(recovered_fields.largest_stresses(self._cell, plane, axial))
-            self._labels.append(label)
-            self.singularities |= recovered_fields.singularities(self._cell, plane)
-        if self._file is None and not self._keep:
-            return
-        state: field_layout.StatePart
-        if plane is None or len(self._cell.problems) > 1:
-            state = field_parts.spatial_state_part(self._cell, plane, axial, load_factor, label, point)
-        else:
-            state = field_parts.state_part(self._cell, plane, load_factor, label, point)
-        self._write(lambda file: file.write_state(self._number, state))
-        self._number += 1
-        if self._keep:
-            self._states.append(state)
+            self._largest += recovered_fields.largest_stresses(self._cell, [*states.values()])
+            self._labels += states
+            self.singularities |= recovered_fields.singularities(self._cell, [plane for plane, *_ in states.values()])
+        for label, responses in states.items():
+            if self._file is None and not self._keep:
+                return
+            plane, axial = (*responses, None)[:2]
+            state: field_layout.StatePart
+            if plane is None or len(self._cell.problems) > 1:
+                state = field_parts.spatial_state_part(self._cell, plane, axial, load_factor, label, point)
+            else:
+                state = field_parts.state_part(self._cell, plane, load_factor, label, point)
+            self._write(field_file.FieldFile.write_state, self._number, state)
+            self._number += 1
+            if self._keep:
+                self._states.append(state)
 
     def seal(self) -> result_json.FileSeal | None:
         """Complete the file and return its seal; None without a file.  Collective."""
         self._write(field_file.FieldFile.close)
         return None if self._file is None else mpi_errors.on_root(self._cell.comm, result_json.seal, self._file.path)
 
-    def _write(self, write: Callable[[field_file.FieldFile], object]) -> None:
+    def _write(self, write: Callable[..., object], *arguments: object) -> None:
         """Write to the file, if any; after an error, continue without the file."""
         if self._file is not None:
             try:
-                write(self._file)
+                write(self._file, *arguments)
             except FetiHomogError as error:
                 self._file, self.error = None, error
                 self._say(f"warning: {error}; the remaining results are computed without it")
@@ -149,13 +148,17 @@ class StateRecorder:
         return tuple(map(self._of_phase, phases)) or None
 
     def _of_phase(self, phase: str) -> PhaseStresses:
-        material, columns = self._cell.case.material_of(phase), dict[str, Any]()
-        for k, name in enumerate(recovered_fields.MEASURES):
-            if name != "utilisation" or material.strength is not None:
-                columns[name] = np.array([state[phase].value[k] for state in self._largest])
-                columns[f"{name}_at"] = np.array([state[phase].position[k] for state in self._largest])
-        criterion = None if material.strength is None else strength.criterion(material.strength)
-        return PhaseStresses(phase=phase, state=tuple(self._labels), criterion=criterion, **columns)
+        limit, columns = self._cell.case.material_of(phase).strength, dict[str, Any]()
+        arrays = zip(*(state[phase] for state in self._largest), strict=True)
+        by_measure = (np.split(np.stack(array), (1, 2, 3), axis=1) for array in arrays)
+        for name, values, places in zip(recovered_fields.MEASURES, *by_measure, strict=True):
+            if values.size:  # the utilisation has a column for each mode, or none
+                modes, states = values.argmax(axis=1), np.arange(len(values))
+                columns |= {name: values[states, modes], f"{name}_at": places[states, modes]}
+        if limit is not None:
+            columns["criterion"] = strength.criterion(limit)
+            columns["mode"] = tuple(map(strength.MODES.__getitem__, modes)) if values.shape[1] > 1 else None
+        return PhaseStresses(phase=phase, state=tuple(self._labels), **columns)
 
     def fields(self) -> Fields | None:
         """Return this rank's fields; None unless the run keeps fields in memory."""

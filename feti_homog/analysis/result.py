@@ -89,6 +89,7 @@ class Result:
 
     schema: int = described("version of this layout", default=result_json.SCHEMA)
     version: str = described("version of the program")
+    date: str = described("time at which the run ended", default="")
     case: Mapping[str, Any] = described("the case with its defaults, as in a case file", entries={"KEY": "as there"})
     digest: str = described("short digest of the case without its name, labels, pictures and PETSc options")
     cell: cell_records.CellInfo = described("the meshed cell")

@@ -1,5 +1,6 @@
 """Run one case: tear the cell, solve, homogenize and check; write the result if there is a folder."""
 
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import replace
@@ -200,6 +201,7 @@ def _opening(context: AnalysisContext) -> dict[str, Any]:
     remarks = *cell.case.remarks(), *cell.summary.remarks, *([polygons] if lost > REMARKABLE_LOSS else [])
     return {
         "version": __version__,
+        "date": mpi_errors.on_root(cell.comm, time.strftime, "%Y-%m-%d %H:%M UTC", time.gmtime()),
         "case": cell.case.resolved(),
         "digest": mpi_errors.on_root(cell.comm, cell.case.digest),
         "cell": cell_info,

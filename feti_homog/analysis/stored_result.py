@@ -51,8 +51,7 @@ def finished(directory: Path, case: Case) -> bool:
     """
     if (directory / checkpoints.FOLDER).is_dir() or not (directory / result_json.NAME).is_file():
         return False
-    document = result_json.read(directory)
-    result = _restored(directory, document)
+    result = _restored(directory, result_json.read(directory))
     if result.digest != case.digest():
         now = case.resolved()
         changed = [f"[{k}]" for k in now if k not in ("name", "petsc") and now[k] != result.case.get(k)]

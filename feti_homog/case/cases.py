@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from feti_homog.case import cell_sizes, sections
+from feti_homog.case import bond_laws, cell_sizes, sections
 from feti_homog.case.cell_files import checked_cell
 from feti_homog.case.cell_section import GEOMETRY, Cell
 from feti_homog.case.interface_section import Arc, InterfaceSection, interface_tables
@@ -116,6 +116,15 @@ class Case:
         """
         return self.materials[provider(phase, self.materials)]
 
+    @property
+    def fewer_events(self) -> str:
+        """Advise on the key with which a path of damage has fewer events; empty for other cases."""
+        has_events = self.path is not None and self.path.method == "events"
+        if self.interface is None or not has_events or not bond_laws.LAWS[self.interface.criterion].softens:
+            return ""
+        by = "fewer teeth" if self.interface.teeth else "a larger softening_tolerance"
+        return f"; {by} in [interface] makes a path of fewer events"
+
     def warnings(self) -> tuple[str, ...]:
         """List valid but probably unintended settings, one per line."""
         of_elements = cell_sizes.warnings(self.materials, self.analysis.plane)
@@ -126,7 +135,7 @@ class Case:
         """List the assumptions about missing settings, one per line."""
         kind, section, plane = self.analysis.type, self.section, self.analysis.plane
         of_elements = cell_sizes.remarks(self.materials, plane)
-        of_table = () if self.cell.table is None else self.cell.table.remarks
+        of_table = () if self.cell.table is None else (*self.cell.table.remarks, *cell_sizes.default_size(self.cell))
         of_load = *stress_free(kind, section.placed, plane), *axes_lines(kind, section, self.materials, plane)
         return *of_elements, *of_table, *of_load
 

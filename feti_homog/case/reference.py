@@ -1,14 +1,15 @@
 """Generate the case file reference, `feti-homog keys`, from the definitions of the keys."""
 
+import difflib
 import inspect
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from feti_homog.case import sections
 from feti_homog.errors import CaseError
 from feti_homog.materials import material_forms
-from feti_homog.schema import keys, types
+from feti_homog.schema import keys, types, wording
 
 ORDER = (
     *("name", "cell", "material", *[*sections.SECTIONS][1:]),
@@ -84,14 +85,14 @@ PAIRS = KeyRow(sections.CORRELATION, PAIR_WORDS, "", "", "", "Correlation of pai
 AXIS = KeyRow("SECTION.KEY", sections.AXIS_EXPECTED, "", "", "", sections.AXIS_MEANING)
 
 
-def tables(section: str | None = None) -> list[TableReference]:
-    """Return the reference tables of all sections or of one section, ordered as in `ORDER`.
+def tables(word: str = "") -> list[TableReference]:
+    """Return the reference tables, ordered as in `ORDER`: all, those of a section, or what has a word in it.
+
+    Names and descriptions have the word in any case, with spaces or underscores.
 
     Raises:
-        CaseError: no section has this name.
+        CaseError: nothing has the word.
     """
-    if section is not None and section not in ORDER:
-        raise CaseError(f"{section}: unknown section; expected one of {', '.join(ORDER)}")
     ranges = _rows(sections.SWEEP, sections.RANGE_KEYS)
     references = [
         TableReference("name", "before the first section", "the case as a whole.", (NAME,)),
@@ -108,8 +109,42 @@ def tables(section: str | None = None) -> list[TableReference]:
             sections.SWEEP, f"a range in [{sections.SWEEP}]", "Values of a key that lie between two ends.", ranges
         ),
     ]
-    chosen = [table for table in references if section in (None, table.section)]
-    return sorted(chosen, key=lambda table: ORDER.index(table.section))
+    references.sort(key=lambda table: ORDER.index(table.section))
+    if not word or word in ORDER:
+        return [table for table in references if word in ("", table.section)]
+    found = []
+    for table in references:
+        rows = table.rows if _has(word, table.section) else [r for r in table.rows if _has(word, *vars(r).values())]
+        if rows or _has(word, table.meaning):
+            found.append(replace(table, rows=tuple(sorted(rows, key=lambda row: not _has(word, row.key)))))
+    if not found:
+        names = {*ORDER, *(row.key for table in references for row in table.rows)}
+        near = [*wording.SYNONYMS.get(word.lower(), ()), *difflib.get_close_matches(word, sorted(names))]
+        words = f"near words: {', '.join(near)}" if near else "`feti-homog keys` lists all keys"
+        raise CaseError(f"keys {wording.toml_key(word)}: no key, section or description has it; {words}")
+    return found
+
+
+def _has(word: str, *texts: str) -> bool:
+    return any(word.lower().replace("_", " ") in text.lower().replace("_", " ") for text in texts)
+
+
+def text(word: str = "") -> str:
+    """Write the reference, after an index of all keys by need, or the tables with a word in them."""
+    references = tables(word)
+    if word:
+        return as_text(references)
+    groups = {name: dict[str, dict[str, None]]() for name in sections.GROUPS}
+    group_of = {place: name for name, places in sections.GROUPS.items() for place in places.split()}
+    for table in references:
+        for row in table.rows:
+            group = group_of.get(f"{table.section}.{row.key}", group_of[table.section])
+            groups[group].setdefault(table.place.partition(",")[0], {})[row.key] = None
+    lines = ["Keys by need. `feti-homog keys WORD` prints the keys and sections that have a word in them."]
+    for name, places in groups.items():
+        rows = (f"  {place}: {', '.join(names)}" for place, names in places.items())
+        lines += [f"\n{name}", *(textwrap.fill(row, WIDTH, subsequent_indent=4 * " ") for row in rows)]
+    return "\n".join([*lines, "", as_text(references)])
 
 
 def _table(table: sections.SectionTable, *rows: KeyRow) -> TableReference:

@@ -219,6 +219,20 @@ SECTIONS: dict[str, type[Any]] = {
     "output": Output,
 }
 
+GROUPS = {
+    "start here": "name cell.geometry cell.fibre_fraction cell.width cell.fibre_radius material.young material.poisson "
+    "analysis",
+    "fibres: random, coated, of tables; meshes of your own": "cell",
+    "meshes": "cell.accuracy cell.mesh_size cell.refine cell.order cell.interface_size cell.tip_size cell.bodies",
+    "materials and their strengths": "material",
+    "interfaces": "interface",
+    "loads": "load path angle envelope",
+    "output": "output",
+    "many cases, fits, scatter": "sweep unknown measured uncertainty",
+    "solver": "decomposition petsc",
+}
+"""The keys by need: whole sections, or keys that are listed apart from the rest of their section."""
+
 SECTIONS_OF_AN_ANALYSIS = {name: ANALYSIS_TYPE.among(name) for name in ("angle", "path", "load", "envelope")}
 """Sections that one analysis type requires, and no other type has."""
 

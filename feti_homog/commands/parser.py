@@ -75,7 +75,8 @@ def command_parser() -> Parser:
     _add_products(commands)
     _add_studies(commands)
     keys = _command(commands, "run.keys", "print the keys of a case file and their meaning")
-    keys.add_argument("section", nargs="?", metavar="SECTION", help="cell, material, ...; by default all of them")
+    words = "a section, or a word of names and descriptions: cell, friction, ...; by default all, after an index"
+    keys.add_argument("word", nargs="*", metavar="WORD", help=words)
     _command(commands, "run.options", "print PETSc's options that the solver takes")
     return parser
 

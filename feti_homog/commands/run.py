@@ -37,11 +37,11 @@ def check(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Print the reference of the keys in a section, or in the whole case file."""
+    """Print the reference of the case file, or of the keys and sections with a word."""
     from feti_homog.case import reference
 
-    tables = mpi_errors.on_root_only(comm, reference.tables, arguments.section)
-    mpi_errors.on_root_only(comm, standard_streams.print_product, reference.as_text(tables or []))
+    text = mpi_errors.on_root_only(comm, reference.text, " ".join(arguments.word))
+    mpi_errors.on_root_only(comm, standard_streams.print_product, text)
 
 
 def options(_: argparse.Namespace, comm: Intracomm) -> None:

@@ -4,13 +4,13 @@ Fields are nodal displacements, element means of strains and stresses, tractions
 those at the integration points: one point in a linear element, six points in a quadratic element.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from feti_homog.fem import assembly, stress_recovery
+from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.domain_partition import in_cell
 from feti_homog.homogenization.unit_cell import TornCell
@@ -83,98 +83,96 @@ def out_of_plane_stress(cell: TornCell, stress: Float) -> Float:
     return np.asarray(np.einsum("ev,ev->e", stress, np.repeat(np.reshape(rules, (-1, 3)), sizes, axis=0)))
 
 
-class Largest(NamedTuple):
-    """The largest value (4,) of each measure, -inf without values, and its position (4, 2)."""
-
-    value: Float
-    position: Float
+Largest = tuple[Float, Float]
+"""The largest value (v,) of each measure, of the utilisation in each mode, and its position (v, 2)."""
 
 
-def largest_stresses(cell: TornCell, plane: Response | None, axial: Response | None) -> dict[str, Largest]:
-    """Find the largest stresses of each phase in a state.  Collective.
+def largest_stresses(cell: TornCell, states: Sequence[Sequence[Response | None]]) -> list[dict[str, Largest]]:
+    """Find the largest stresses of each phase in each state, in one pass.  Collective.
 
     The principal stress is the largest with its sign, the hydrostatic stress a third of the trace.  Phases whose
     constants leave S33 open have no entry.
 
     Args:
-        plane, axial: responses of both problems; a problem without a response has zero stresses.
+        states: responses of each problem in each state; a problem without a response has zero stresses.
     """
-    in_plane = None if plane is None else _stresses(cell, plane)
-    along = None if axial is None or cell.axial is None else _stresses(cell.axial, axial)
-    parts_of_problems = [problem.parts for problem in cell.problems]  # on all ranks, also on ranks without parts
-    by_phase: dict[str, list[Largest]] = {phase: [] for phase in cell.summary.phases}
-    for part in parts_of_problems[0]:
-        fields = [None if stresses is None else next(stresses) for stresses in (in_plane, along)]
-        points = next(field[0] for field in fields if field is not None)
-        material, stress = cell.case.material_of(part.submesh.phase), np.zeros((len(points), 6))
-        if fields[0] is not None:
-            plane_stress = fields[0][1]
-            stress[:, voigt.IN_PLANE] = plane_stress[:, :3]
-            rule = laws.out_of_plane(material, cell.case.analysis.plane)[0] if cell.axial is None else None
-            stress[:, 2] = plane_stress[:, 3] if rule is None else plane_stress[:, :3] @ rule
-        if fields[1] is not None:
-            stress[:, [4, 3]] = fields[1][1]
+    by_problem = zip(cell.problems, zip(*states, strict=True), strict=False)
+    fields = [_stresses(problem, responses) for problem, responses in by_problem if any(responses)]
+    by_phase: list[dict[str, list[Largest]]] = [{phase: [] for phase in cell.summary.phases} for _ in states]
+    # Ranks without parts, too, begin with all problems, whose parts are collective: so strict.
+    for (phase, points, stress), *further in zip(*fields, strict=True):
+        for *_, more in further:
+            stress += more
         if not np.isnan(stress).any():
-            values, inside = _measures(material, stress), in_cell(points, cell.summary.period)
-            by_phase[part.submesh.phase].append(_largest(values, np.repeat(inside[:, None], len(MEASURES), axis=1)))
-    of_ranks = cell.comm.allgather({phase: _joined(parts) for phase, parts in by_phase.items() if parts})
-    gathered = {phase: [parts[phase] for parts in of_ranks if phase in parts] for phase in by_phase}
-    return {phase: _joined(parts) for phase, parts in gathered.items() if parts}
+            places = in_cell(points, cell.summary.period)[:, None]
+            for largest, tensors in zip(by_phase, stress, strict=True):
+                largest[phase].append(_largest(_measures(cell.case.material_of(phase), tensors.T), places))
+    by_state = zip(*cell.comm.allgather([*map(_joined, by_phase)]), strict=True)
+    gathered = ({name: [rank[name] for rank in state if name in rank] for name in by_phase[0]} for state in by_state)
+    return [*map(_joined, gathered)]
 
 
-def singularities(cell: TornCell, plane: Response | None) -> set[str]:
-    """Name the places at which stresses grow without limit on finer meshes."""
+def singularities(cell: TornCell, states: Sequence[Response | None]) -> set[str]:
+    """Name the places at which stresses of plane states grow without limit on finer meshes."""
     corners = np.isnan(cell.summary.frames[cell.summary.fibre_bodies]).any()
     rigid = any(bond.normal_stiffness is None for bond in cell.case.interfaces)
-    tips = plane is not None and rigid and plane.debonded > 0 < plane.counts["bonded"]
+    tips = rigid and any(plane is not None and plane.debonded > 0 < plane.counts["bonded"] for plane in states)
     return {name for name, exists in (("corners of fibres", corners), ("tips of debonding", tips)) if exists}
 
 
-def _stresses(cell: TornCell, response: Response) -> Iterator[tuple[Float, Float]]:
-    """Yield the points (n, 2) and the stresses (n, v), conjugate to the loads, of each part."""
-    loads = response.strain[:, None]
-    for part, u in cell.displacements(response.u[:, None], loads):
-        displacement = u.reshape(-1, part.problem.components, 1)
-        elements = stress_recovery.RecoveredStress.on(
-            part.mesh, part.L, part.problem, displacement, loads, part.is_mixed
-        ).elements
-        m, L = part.problem.strains, part.L
-        points = np.concatenate([chunk.points.reshape(-1, 2) for chunk in elements])
-        stress = np.concatenate([chunk.stress.reshape(-1, m) for chunk in elements])
-        # Stresses conjugate to the other loads, such as S33 to E33, follow from the strains of the first loads.
-        strain = np.linalg.solve(L[:m, :m], (stress - L[:m, m:] @ response.strain[m:]).T).T
-        stress = np.hstack([stress, strain @ L[:m, m:] + L[m:, m:] @ response.strain[m:]])
-        size = (np.abs(L) @ np.abs(response.strain))[: part.problem.stresses].max()
-        yield points, np.where(np.abs(stress) < ROUNDING * size, 0.0, stress)
+def _stresses(cell: TornCell, responses: Sequence[Response | None]) -> Iterator[tuple[str, Float, Float]]:
+    """Yield phase, points (n, 2) and stresses (s, 6, n) of each chunk of elements."""
+    at = [number for number, response in enumerate(responses) if response is not None]
+    u, loads = (np.stack([vars(responses[number])[name] for number in at], axis=1) for name in ("u", "strain"))
+    for part, displacement in cell.displacements(u, loads):
+        L, problem, m = part.L, part.problem, part.problem.strains
+        # The stresses in space follow from those conjugate to displacement strains.
+        rows, constants = np.zeros((6, m)), np.zeros((6, len(at)))
+        rows[voigt.IN_PLANE if problem.turns else phase_laws.AXIAL_SHEAR] = np.eye(m)
+        if len(loads) > m:  # S33 is conjugate to the load E33
+            rows[2] = np.linalg.solve(L[:m, :m], L[:m, m])
+            constants[2] = (L[m, m:] - rows[2] @ L[:m, m:]) @ loads[m:]
+        elif problem.turns:
+            rows[2] = laws.out_of_plane(cell.case.material_of(part.submesh.phase), cell.case.analysis.plane)[0]
+        noise = ROUNDING * (np.abs(L) @ np.abs(loads))[: problem.stresses].max(axis=0)[:, None, None]
+        u_of_part = displacement.reshape(-1, problem.components, len(at))
+        recovery = stress_recovery.RecoveredStress.on(part.mesh, L, problem, u_of_part, loads, part.is_mixed)
+        for chunk in recovery.elements:
+            stress = rows @ chunk.stress.reshape(-1, m, len(at)).transpose(2, 1, 0) + constants.T[:, :, None]
+            everywhere = np.zeros((len(responses), *stress.shape[1:]))  # also in states without a response
+            everywhere[at] = np.where(np.abs(stress) < noise, 0.0, stress)
+            yield part.submesh.phase, chunk.points.reshape(-1, 2), everywhere
 
 
 def _measures(material: material_forms.Material, stress: Float) -> Float:
-    """Return the `MEASURES` (n, 4) of stresses (n, 6), with lower bounds for small principal stresses."""
+    """Return the `MEASURES` (n, v) of stresses (n, 6), with lower bounds for small principal stresses."""
     in_plane, S33, shears = stress[:, voigt.IN_PLANE], stress[:, 2], stress[:, [3, 4]]
     von_mises, hydrostatic = voigt.spatial_von_mises(in_plane, S33, shears), stress[:, :3].mean(axis=1)
-    # The largest eigenvalue of the deviator is between vm / 3 and 2 vm / 3.
-    principal = hydrostatic + von_mises / 3
-    near = hydrostatic + 2 / 3 * von_mises >= principal.max()
-    if shears.any():
-        principal[near] = voigt.spatial_principal(in_plane[near], S33[near], shears[near])[:, 0]
-    else:
+    if not shears.any():
         principal = voigt.principal(in_plane, S33)[:, 0]
-    used = np.full(len(stress), -np.inf)
+    elif not (in_plane.any() or S33.any()):
+        principal = von_mises / np.sqrt(3)
+    else:
+        # The largest eigenvalue of the deviator is between vm / 3 and 2 vm / 3.
+        principal = hydrostatic + von_mises / 3
+        near = hydrostatic + 2 / 3 * von_mises >= principal.max()
+        principal[near] = voigt.spatial_principal(in_plane[near], S33[near], shears[near])[:, 0]
+    values = [principal, von_mises, hydrostatic]
     if material.strength is not None:
-        used = strength.utilisation(material.strength, stress, principal, von_mises)
-    return np.stack([principal, von_mises, hydrostatic, used], axis=1)
+        values += [*strength.utilisation(material.strength, stress, principal, von_mises).T]
+    return np.asarray(np.stack(values, axis=1))
 
 
 def _largest(values: Float, points: Float) -> Largest:
-    """Find the largest of the values (n, 4) at points (n, 4, 2); ties take the first by x, then y."""
+    """Find the largest of the values (n, v) at points (n, v or 1, 2); ties take the first by x, then y."""
     peak, positions = values.max(axis=0), np.zeros((values.shape[1], 2))
     for number, (column, top) in enumerate(zip(values.T, peak, strict=True)):
-        tied = points[column >= top - TIE * abs(top), number] if np.isfinite(top) else points[:1, number]
-        size = np.abs(points).max()
+        tied = points[column >= top - TIE * abs(top), number % points.shape[1]]
+        size = np.abs(tied).max() or 1.0
         positions[number] = tied[np.lexsort(np.round(tied / size, 6).T[::-1])[0]]
-    return Largest(peak, positions)
+    return peak, positions
 
 
-def _joined(parts: Sequence[Largest]) -> Largest:
-    """Find the largest values of several parts."""
-    return _largest(np.stack([part.value for part in parts]), np.stack([part.position for part in parts]))
+def _joined(parts: Mapping[str, Sequence[Largest]]) -> dict[str, Largest]:
+    """Find the largest values of the parts of each phase; a phase without parts has no entry."""
+    return {phase: _largest(*map(np.stack, zip(*largest, strict=True))) for phase, largest in parts.items() if largest}

@@ -21,6 +21,7 @@ CRITERIA = {
     ),
 }  # fmt: skip
 """Criteria with the keys that each criterion needs."""
+MODES = ("fibre tension", "fibre compression", "matrix tension", "matrix compression")  # of Hashin
 
 
 def criterion(strength: PhaseStrength) -> str:
@@ -38,7 +39,7 @@ def criterion(strength: PhaseStrength) -> str:
 
 
 def utilisation(strength: PhaseStrength, stress: Float, principal: Float, von_mises: Float) -> Float:
-    """Compute the utilisation (n,) of a phase strength under stresses.
+    """Compute the utilisations (n, modes) of a strength under stresses; Hashin has four modes, others one.
 
     Args:
         stress: (n, 6) in the order [11, 22, 33, 23, 13, 12], x3 along the fibres.
@@ -47,14 +48,14 @@ def utilisation(strength: PhaseStrength, stress: Float, principal: Float, von_mi
     """
     limits = {name: float(limit) for name, limit in vars(strength).items() if limit is not None}
     if "principal" in limits:
-        ratio = principal / limits["principal"]
+        ratios = [principal / limits["principal"]]
     elif "von_mises" in limits:
-        ratio = von_mises / limits["von_mises"]
+        ratios = [von_mises / limits["von_mises"]]
     elif "tension" in limits:
-        ratio = _drucker_prager(limits, stress[:, :3].sum(axis=1), von_mises)
+        ratios = [_drucker_prager(limits, stress[:, :3].sum(axis=1), von_mises)]
     else:
-        ratio = _hashin(limits, stress)
-    return np.maximum(ratio, 0.0)
+        ratios = _hashin(limits, stress)
+    return np.asarray(np.maximum(np.stack(ratios, axis=1), 0.0))
 
 
 def _drucker_prager(limits: Mapping[str, float], trace: Float, von_mises: Float) -> Float:
@@ -63,17 +64,17 @@ def _drucker_prager(limits: Mapping[str, float], trace: Float, von_mises: Float)
     return (tension + compression) / 2 * von_mises + (tension - compression) / 2 * trace
 
 
-def _hashin(limits: Mapping[str, float], stress: Float) -> Float:
-    """Compute the largest utilisation of the fibre modes and the transverse modes.
+def _hashin(limits: Mapping[str, float], stress: Float) -> list[Float]:
+    """Compute the utilisations (n,) of the `MODES`, not above 0 for the other sign.
 
     A mode a f^2 + b f = 1 with the load factor f at failure has the utilisation 1 / f = (b + sqrt(b^2 + 4 a)) / 2.
     """
     S11, S22, S33, S23, S13, S12 = stress.T
     axial, across = np.hypot(S13, S23) / limits["axial_shear"], S11 + S22
-    fibre = np.where(S33 > 0, np.hypot(S33 / limits["axial_tension"], axial), -S33 / limits["axial_compression"])
+    parted = np.hypot(S33 / limits["axial_tension"], axial)
     shear = axial**2 + (S12**2 - S11 * S22) / limits["transverse_shear"] ** 2
     pulled = np.sqrt(np.maximum((across / limits["transverse_tension"]) ** 2 + shear, 0.0))
     doubled, compression = 2 * limits["transverse_shear"], limits["transverse_compression"]
     linear = ((compression / doubled) ** 2 - 1) * across / compression
     pressed = (linear + np.sqrt(linear**2 + 4 * np.maximum((across / doubled) ** 2 + shear, 0.0))) / 2
-    return np.maximum(fibre, np.where(across > 0, pulled, pressed))
+    return [parted * (S33 > 0), -S33 / limits["axial_compression"], pulled * (across >= 0), pressed * (across < 0)]

@@ -1,7 +1,7 @@
 """Results for readers: the printed summary, pictures, report.html, material cards.
 
-Imports `materials`, `report.text` and `results`.  Main entries: its own floors, from below `text`, `plots`, `page` and
-`cards`.
+Imports `materials`, `report.cards`, `report.text` and `results`.  Main entries: its own floors, from below `text`,
+`plots`, `cards` and `page`.
 """
 
 __all__ = ["page"]

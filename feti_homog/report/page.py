@@ -1,13 +1,17 @@
-"""report.html: one page of a result with its tables, checks and pictures, readable without a network."""
+"""report.html: one page of a result with its tables, pictures, cards and case, readable without a network."""
 
 import base64
+from contextlib import suppress
 from html import escape
 from importlib import resources
 from pathlib import Path
 from string import Template
 
+import tomli_w
+
 from feti_homog.errors import CaseError
 from feti_homog.materials import voigt
+from feti_homog.report.cards import effective_material, export
 from feti_homog.report.text.summary import REMARKS, answers, checks, summary, title_of
 from feti_homog.results import atomic, output_folder
 from feti_homog.typing import Document
@@ -52,13 +56,17 @@ def write(directory: Path) -> Path:
     atomic.remove_unfinished(directory, output_folder.RESULT_FILE, alone=False)
     try:
         html = page(document, directory)
-    except (OSError, KeyError) as error:
+    except (OSError, KeyError, TypeError, ValueError) as error:
         raise CaseError(f"cannot report {directory}: a file of the result is missing or damaged: {error}") from error
     return atomic.replace_text(directory / NAME, html)
 
 
 def page(document: Document, directory: Path) -> str:
-    """Return the HTML page of a result.  Raises OSError or KeyError if the result files are damaged."""
+    """Return the HTML page of a result.
+
+    Raises:
+        OSError, KeyError, TypeError, ValueError: a result file is missing or damaged.
+    """
     title, status, files = escape(title_of(document)), document["status"], resources.files("feti_homog.report")
     style = files.joinpath("page.css").read_text(encoding="utf-8")
     captions = {directory / f"{name}.png": caption for name, caption in PICTURES.items()}
@@ -74,26 +82,30 @@ def page(document: Document, directory: Path) -> str:
         for label in REMARKS
         for remark in document.get(f"{label.lower()}s", ())
     ]
+    texts = dict[str, str]()
+    for form, card in export.FORMATS.items():
+        with suppress(CaseError):  # of a result without a material, or one that the format cannot carry
+            texts[f"Material card, {form}"] = card(effective_material.in_axes_of_the_cell(document))
+    texts["Case file, with the defaults of its keys"] = tomli_w.dumps(document["case"])
+    *cards, case = (
+        f"<details><summary>{name}</summary>\n<pre>{escape(text)}</pre></details>" for name, text in texts.items()
+    )
     sections = {
         "Results": "\n".join(f'<div class="scroll">{answer.html}</div>' for answer in answers(document, MOST_ROWS)),
         "Remarks": "\n".join(remarks),
         "Checks": f'<div class="scroll">{checks(document).html}</div>',
         "Pictures": "\n".join(pictures) or "<p>None: <code>feti-homog plot</code> draws them.</p>",
         "Summary": f"<pre>{escape(summary(document))}</pre>",
+        "Cards": "\n".join(cards),
+        "Case": case,
     }
     filled = {name: body for name, body in sections.items() if body}
     links = "\n".join(f'<a href="#{name.lower()}">{name}</a>' for name in filled)
     body = "\n".join(
         f'<section id="{name.lower()}">\n<h2>{name}</h2>\n{text}\n</section>' for name, text in filled.items()
     )
-    verdict, version = "good" if status == "done" else "bad", escape(str(document["version"]))
+    verdict, run = "good" if status == "done" else "bad", f"{document['version']}, run of {document.get('date', '')}"
     return Template(files.joinpath("page.html").read_text(encoding="utf-8")).substitute(
-        policy=POLICY,
-        title=title,
-        style=style,
-        version=version,
-        verdict=verdict,
-        status=escape(status),
-        links=links,
-        body=body,
-    )
+        policy=POLICY, title=title, style=style, run=escape(run.removesuffix(", run of ")), verdict=verdict,
+        status=escape(status), links=links, body=body,
+    )  # fmt: skip

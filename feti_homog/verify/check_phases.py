@@ -16,6 +16,7 @@ from feti_homog.verify.torus import from_centre
 LAW = "phases"
 # Criteria by a key that they have alone.
 CRITERIA = dict(principal="maximum principal", von_mises="von Mises", tension="Drucker-Prager", axial_shear="Hashin")
+MODES = ("fibre tension", "fibre compression", "matrix tension", "matrix compression")
 # Values within this of the largest are at its position, too; positions are those of quadrature points, to rounding.
 SAME_VALUE, SAME_PLACE = 1e-5, 1e-9
 # Part of the stress L |E| of a phase below which the limit of the law admits only rounding, as in a free body.
@@ -56,6 +57,10 @@ def check_phases(findings: Findings, cell: DiscreteCell, state: State, number: i
             findings.require(LAW, is_largest, f"{place}: another position")
         key = next((key for key in CRITERIA if key in (strength or ())), "")
         findings.require(LAW, entry.get("criterion") == CRITERIA.get(key), f"{name}: its criterion")
+        if strength is not None and key == "axial_shear":
+            modes, mode = _hashin(stress[rows], strength), dict(enumerate(entry.get("mode") or ())).get(number)
+            used = modes[MODES.index(mode)].max() if mode in MODES else -np.inf
+            findings.require(LAW, used >= (1 - SAME_VALUE * raised) * np.max(modes), f"{state.name}, mode of {name}")
 
 
 def _stresses(cell: DiscreteCell, state: State) -> tuple[Float, Float]:
@@ -104,23 +109,23 @@ def _measures(stress: Float, strength: Mapping[str, Any] | None) -> dict[str, Fl
         T, C = limit["tension"], limit["compression"]
         used = ((C - T) * 3 * p + (C + T) * q) / (2 * C * T)
     else:
-        used = _hashin(stress, limit)
+        used = np.max(_hashin(stress, limit), axis=0)
     return values | {"utilisation": np.maximum(used, 0.0)}
 
 
-def _hashin(stress: Float, limit: Mapping[str, float]) -> Float:
-    """Return the largest of the four modes; of a mode with a linear term 1 / the root of a f^2 + b f = 1."""
+def _hashin(stress: Float, limit: Mapping[str, float]) -> list[Float]:
+    """Return the `MODES` (n,), near zero both signs; of one with a linear term 1 / the root of a f^2 + b f = 1."""
+    zero = SAME_PLACE * float(np.abs(stress).max(initial=0.0))
     shear = (stress[:, 0, 2] ** 2 + stress[:, 1, 2] ** 2) / limit["axial_shear"] ** 2
     along, across = stress[:, 2, 2], stress[:, 0, 0] + stress[:, 1, 1]
     turned = shear - np.linalg.det(stress[:, :2, :2]) / limit["transverse_shear"] ** 2
     modes = [
         np.where(along > 0, np.sqrt((along / limit["axial_tension"]) ** 2 + shear), 0.0),
         np.where(along < 0, -along / limit["axial_compression"], 0.0),
-        np.where(across > 0, np.sqrt(np.maximum((across / limit["transverse_tension"]) ** 2 + turned, 0.0)), 0.0),
+        np.where(across > -zero, np.sqrt(np.maximum((across / limit["transverse_tension"]) ** 2 + turned, 0.0)), 0.0),
     ]
     ratio = limit["transverse_compression"] / (2 * limit["transverse_shear"])
     b = (ratio**2 - 1) / limit["transverse_compression"] * across
     a = np.maximum((across / (2 * limit["transverse_shear"])) ** 2 + turned, 0.0)
     root = np.sqrt(b**2 + 4 * a)
-    modes.append(np.where(across <= 0, (b + root) / 2, 0.0))
-    return np.asarray(np.max(modes, axis=0))
+    return [*modes, np.where(across < zero, (b + root) / 2, 0.0)]

@@ -177,7 +177,7 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool, mixed: tuple[float
 # Why laws leave numbers alone, by a part of their names; the first that fits.
 REASONS = {
     "names of the program and the case, and how the run went": (
-        "version", "digest", "resumed", "solver", "timings", "memory", "iterations", "free_motions",
+        "version", "date", "digest", "resumed", "solver", "timings", "memory", "iterations", "free_motions",
     ),
     "residuals of the solver, of which only the tolerance is checked": ("checks",),
     "texts": ("warnings", "remarks", "faults"),

@@ -34,7 +34,11 @@ def command_line() -> str:
 
 def case_file() -> str:
     """Return the keys of every table of a case file."""
-    parts = ["# Case file", "A case file is TOML. `feti-homog keys` prints these tables."]
+    parts = [
+        "# Case file",
+        "A case file is TOML. `feti-homog keys` prints these tables after an index by need, `feti-homog keys WORD` "
+        "the keys and sections that have a word in them.",
+    ]
     for each in reference.tables():
         rows = [(code(r.key), _accepts(r), r.default, r.applies, r.meaning) for r in each.rows]
         parts += [f"## {plain(capitalised(each.place))}", plain(capitalised(each.meaning))]

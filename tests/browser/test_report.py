@@ -59,6 +59,23 @@ def test_the_page_can_be_printed(chromium: Any, reports: dict[str, Path]) -> Non
     assert len(chromium.print_page()) > 100_000  # base64 of a PDF
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_table_runs_off_the_paper(chromium: Any, reports: dict[str, Path], kind: str) -> None:
+    """A4 less Chromium's margins has 718 pixels; what is folded on the screen is printed."""
+    chromium.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    chromium.execute_cdp_cmd(
+        "Emulation.setDeviceMetricsOverride", {"width": 718, "height": 1046, "deviceScaleFactor": 1, "mobile": False}
+    )
+    try:
+        opened(chromium, reports[kind])
+        boxes = "return [...document.querySelectorAll('table, pre')].map(e => e.getBoundingClientRect().toJSON())"
+        shown = chromium.execute_script(boxes)
+        assert len(shown) >= 5 and all(box["right"] <= 719 and box["height"] > 0 for box in shown)
+    finally:
+        chromium.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+        chromium.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
 def test_names_of_a_case_are_words_not_programs(chromium: Any, reports: dict[str, Path]) -> None:
     name = json.loads((reports["path"].parent / "result.json").read_text())["case"]["name"]
     assert "<script>" in name

@@ -12,15 +12,15 @@ import numpy as np
 
 # What follows from the path, whose events are compared by their loads: `peak` has their numbers.
 LEFT_OUT = {
-    "schema", "version", "case", "digest", "solver", "checks", "check_tolerance", "kkt_tolerance", "warnings",
+    "schema", "version", "date", "case", "digest", "solver", "checks", "check_tolerance", "kkt_tolerance", "warnings",
     "remarks", "states", "resumed", "result_h5", "timings", "memory", "checksum", "path", "peak",
     "envelope",
 }  # fmt: skip
 # Numbers of the solver, or of pieces; a ratio of two others; which point is the peak, as above; the positions of the
-# largest stresses, several of which may tie.
+# largest stresses and modes of failure, several of which may tie.
 LEFT_OUT_WITHIN = {
     "iterations", "nodes", "dissipation_ratio", "mark", "principal_at", "von_mises_at", "hydrostatic_at",
-    "utilisation_at",
+    "utilisation_at", "mode",
 }  # fmt: skip
 ENERGIES = {
     "stored", "stored_in_springs", "work", "dissipated", "dissipated_strain_controlled", "fracture_energy",

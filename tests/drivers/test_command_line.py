@@ -208,7 +208,11 @@ def test_a_nearly_incompressible_phase_makes_elements_quadratic(tmp_path):
 def test_keys_of_all_sections():
     job = command_line(2, "keys")
     assert job.returncode == 0, job.stderr
-    assert job.stdout.count("[cell]: ") == 1 and "  realisations\n" in job.stdout
+    assert (
+        job.stdout.startswith("Keys by need. ")
+        and job.stdout.count("[cell]: Geometry") == 1
+        and "  realisations\n" in job.stdout
+    )
 
 
 def test_keys_of_a_section():
@@ -217,9 +221,9 @@ def test_keys_of_a_section():
     assert "an arc of [interface] debonded: " in job.stdout and "[cell]: " not in job.stdout
 
 
-def test_keys_of_no_section():
-    job = command_line(2, "keys", "cells")
-    assert job.returncode == 2 and job.stderr.count("cells: unknown section; expected one of name, cell") == 1
+def test_keys_of_a_word_that_is_nowhere():
+    job = command_line(2, "keys", "qwxz")
+    assert job.returncode == 2 and job.stderr.count("error: keys qwxz: no key, section or description has it; ") == 1
 
 
 @pytest.mark.parametrize("name", ["schema", "statistics"])

@@ -11,6 +11,7 @@ from unit.mesh.faulty_meshes import grid
 
 from feti_homog import Case, run
 from feti_homog.materials import voigt
+from feti_homog.report.text import phase_tables
 
 pytestmark = pytest.mark.parallel
 
@@ -18,9 +19,10 @@ CELL = {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.15, "refine"
 LOAD = {"S11": 30.0, "S22": -12.0, "S33": 5.0, "S23": 7.0, "S13": -9.0, "S12": 11.0}
 AXES = {"axial_tension": 40.0, "axial_compression": 25.0, "axial_shear": 20.0, "transverse_tension": 50.0,
         "transverse_compression": 90.0, "transverse_shear": 30.0}  # fmt: skip
+MEASURES = ("principal", "von_mises", "hydrostatic", "utilisation")
 
 
-def phases_of(comm, load, order=1, plane="generalized", fibre=FIBRE, strengths=(None, None), **more):
+def result_of(comm, load, order=1, plane="generalized", fibre=FIBRE, strengths=(None, None), **more):
     materials = {
         name: material if limit is None else material | {"strength": limit}
         for (name, material), limit in zip({"matrix": MATRIX, "fibre": fibre}.items(), strengths, strict=True)
@@ -29,9 +31,18 @@ def phases_of(comm, load, order=1, plane="generalized", fibre=FIBRE, strengths=(
         "cell": CELL | {"order": order},
         "material": materials,
         "analysis": {"type": "load", "plane": plane},
-        "load": {"to": load},
-    }
-    return {phase.phase: phase for phase in run(Case.parse(document | more), comm, fields=True).phase_stresses}
+    } | ({"load": {"to": load}} if load else {})
+    return run(Case.parse(document | more), comm, fields=True)
+
+
+def phases_of(*of_run, **more):
+    return {phase.phase: phase for phase in result_of(*of_run, **more).phase_stresses}
+
+
+def factors(result):
+    """Return the printed load factor of each phase."""
+    *_, table = phase_tables.phase_tables(result.document)
+    return {row[0]: row[-1] for row in table.rows if table.columns[-1].name == "load factor"}
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -84,7 +95,7 @@ def test_a_moved_and_a_turned_cell_have_the_same_stresses(comm, shared_path, ord
         found[name] = phases_of(comm, asked, plane="strain", strengths=({"von_mises": 50.0}, None), cell=cell)
     for name, phases in found.items():
         for phase, stresses in phases.items():
-            for measure in ("principal", "von_mises", "hydrostatic", "utilisation")[: 4 if phase == "matrix" else 3]:
+            for measure in MEASURES[: 4 if phase == "matrix" else 3]:
                 expected = found["base"][phase]
                 value, place = getattr(stresses, measure), getattr(stresses, f"{measure}_at")
                 np.testing.assert_allclose(value, getattr(expected, measure), rtol=1e-8)
@@ -126,3 +137,57 @@ def test_a_soft_phase_keeps_its_stresses_and_a_free_fibre_has_none(comm):
     np.testing.assert_allclose(softer.von_mises, 1e-6 * soft.von_mises, rtol=1e-3)
     free = {"interface": {"contact": False, "debonded": [{"fibre": "all", "centre": 0.0, "angle": 360.0}]}}
     assert phases_of(comm, {"E11": 0.01}, plane="strain", **free)["fibre"].von_mises == 0.0
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_unit_loads_together_have_the_stresses_of_each_alone(comm, order):
+    more = {"fibre": FIBRE | {"young": 20.0}, "strengths": ({"tension": 8.0, "compression": 12.0}, AXES)}
+    together = phases_of(comm, None, order, **more, analysis={"type": "stiffness", "plane": "generalized"})
+    for number, load in enumerate(together["matrix"].state):
+        strains = dict.fromkeys(voigt.SPATIAL_STRAINS, 0.0) | {load: 1.0}
+        for name, alone in phases_of(comm, strains, order, **more).items():
+            for measure in MEASURES:
+                value = getattr(together[name], measure)[number]
+                np.testing.assert_allclose(value, getattr(alone, measure)[0], rtol=1e-8, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("load", "mode", "strength"),
+    [
+        ({"S33": 2.0}, "fibre tension", "axial_tension"),
+        ({"S33": -2.0}, "fibre compression", "axial_compression"),
+        ({"S11": 2.0}, "matrix tension", "transverse_tension"),
+        ({"S22": -2.0}, "matrix compression", "transverse_compression"),
+    ],
+)
+def test_a_uniform_cell_fails_at_the_strength_of_its_mode(comm, load, mode, strength):
+    result = result_of(comm, load, fibre=MATRIX, strengths=({"von_mises": 70.0}, AXES))
+    assert result.phase_stresses[1].mode == (mode,) and result.phase_stresses[0].mode is None
+    expected = {"matrix": 70.0 / 2.0, "fibre": AXES[strength] / 2.0}
+    assert factors(result) == pytest.approx(expected, rel=1e-8)
+
+
+def test_at_its_load_factor_each_phase_has_the_utilisation_one(comm):
+    load, limits = {"S11": 3.0, "S13": -2.0, "E33": 1e-4}, ({"tension": 40.0, "compression": 60.0}, AXES)
+    result = result_of(comm, load, strengths=limits)
+    for phase, factor in factors(result).items():
+        again = phases_of(comm, {name: factor * value for name, value in load.items()}, strengths=limits)[phase]
+        assert again.utilisation == pytest.approx(1.0, rel=1e-8)
+        assert again.mode == next(each.mode for each in result.phase_stresses if each.phase == phase)
+
+
+@pytest.mark.parametrize(
+    ("load", "analysis", "is_proportional"),
+    [
+        ({"temperature": -10.0, "S11": 0.0}, "load", True),
+        ({"temperature": -10.0, "S11": 1.0}, "load", False),
+        ({"S11": 1.0}, "path", False),
+    ],
+)
+def test_only_loads_in_proportion_have_factors(comm, load, analysis, is_proportional):
+    warm = {"strength": {"von_mises": 70.0}, "expansion": 1e-5}
+    materials = {"matrix": MATRIX | warm, "fibre": FIBRE | warm | {"expansion": 2e-5}}
+    more = {"analysis": {"type": analysis, "plane": "generalized"}, "material": materials}
+    path = {"path": {"to": load}, "interface": {"normal_strength": 1e6}} if analysis == "path" else {}
+    result = result_of(comm, None if path else load, **more, **path)
+    assert (set(factors(result)) == {"matrix", "fibre"}) == is_proportional

@@ -87,7 +87,7 @@ def test_options_that_print_change_no_number(comm, capfd, cut):
 def _outcome(comm, capfd, cell, petsc):
     """Return result.json without options, times and memory, and what the run prints."""
     found = plain(run(make_case(**cell, petsc=petsc), comm, quiet=False).document)
-    del found["timings"], found["memory"], found["case"]["petsc"]
+    del found["date"], found["timings"], found["memory"], found["case"]["petsc"]
     comm.barrier()
     return json.dumps(found, default=np.ndarray.tolist), capfd.readouterr().out
 

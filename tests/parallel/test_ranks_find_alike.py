@@ -14,7 +14,7 @@ from feti_homog.system.parallel.mpi_errors import on_root
 pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
 
 # What the solver took, and what is left of its errors.
-OF_THE_RUN = {"version", "solver", "timings", "memory", "checks", "iterations"}
+OF_THE_RUN = {"version", "date", "solver", "timings", "memory", "checks", "iterations"}
 ALIKE = 1e-6
 
 

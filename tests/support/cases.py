@@ -43,8 +43,8 @@ class Responses:
     def __init__(self):
         self.taken = []
 
-    def record(self, responses, *_):
-        self.taken.append(responses[0])
+    def record(self, states, *_):
+        self.taken += [plane for plane, *_ in states.values()]
 
 
 def solve(case, comm, thresholds=DEFAULTS, policy=DEFAULT_POLICY):

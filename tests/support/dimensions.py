@@ -27,7 +27,7 @@ OF_PATHS = {"path[].temperature": (0, 0, 1), "load.temperature": (0, 0, 1)}
 # Entries of constants, whose errors have their units.
 OF_CONSTANTS = {"moduli", "constants", "transversely_isotropic", "transverse_moduli"}
 # What is no number of the response: where and when it was computed, and the case itself.
-APART = {"case", "digest", "version", "timings", "memory", "checksum", "result_h5"}
+APART = {"case", "digest", "version", "date", "timings", "memory", "checksum", "result_h5"}
 
 # The same of the entries of a case, by their names.
 OF_CASE = {

@@ -17,7 +17,7 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 LINES = {
     ".": 470,
     "analysis": 3000 + 80,
-    "case": 2880,
+    "case": 2880 + 25,
     "commands": 560,
     "fem": 1150,
     "feti": 6300,
@@ -31,9 +31,9 @@ LINES = {
     "schema": 430,
     "studies": 2950,
     "system": 1770,
-    "verify": 3100 + 150,
+    "verify": 3100 + 160,
 }
-FILES, TOTAL = 310, 45000
+FILES, TOTAL = 310, 45000 + 120
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.0, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

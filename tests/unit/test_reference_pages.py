@@ -16,6 +16,7 @@ from mpi4py import MPI
 from feti_homog.analysis.result_records import AnglePoint, EnvelopePoint, PathPoint
 from feti_homog.analysis.runner import run
 from feti_homog.case.cases import Case
+from feti_homog.materials.strength import CRITERIA
 from feti_homog.results.result_json import columns
 from feti_homog.studies import case_runs, collect, sweep_cases
 from feti_homog.studies.outputs import COLUMNS, OUTPUT_COLUMNS, STATISTICS_COLUMNS, outputs
@@ -50,7 +51,8 @@ MATCHED = {"geometry": "random", "match": str(TABLE), "fibres": 10}
 VOIDS = {"geometry": "random", "fibre_fraction": 0.3, "fibres": 2, "voids": 0.05}
 OPENINGS, PATH, LOAD = {"values": [0, 60]}, {"strain": STRAIN}, {"to": {"E11": 0.01}}
 WEAK = {"normal_strength": 1.0}
-LIMITED = {name: phase | {"strength": {"principal": 1.0}} for name, phase in BASE["material"].items()}
+HASHIN = {name: 1.0 for name in CRITERIA["Hashin"]}
+LIMITED = {name: phase | {"strength": HASHIN} for name, phase in BASE["material"].items()}
 CASES = {
     "bonded": {"output": BASE["output"] | {"sensitivities": True}},
     "debonded": {"interface": HALF_OPEN},

@@ -179,34 +179,23 @@ def csv_table(material: effective_material.EffectiveMaterial) -> str:
 
     Rows: engineering constants, expansions, and the stiffness in the order [11, 22, 33, 23, 13, 12].
     """
-    rows, unit = [CSV_COLUMNS], material.stress_unit
+    rows, unit, C = list[tuple[str, float, str, str]](), material.stress_unit, material.stiffness
     for name, value in material.constants.items():
         axes = [int(digit) for digit in name if digit.isdigit()]
         where = " and ".join(f"axis {axis}, {FIBRE_AXES[axis - 1]}" for axis in axes)
         meanings = {"E": f"Young's modulus along {where}", "G": f"shear modulus between {where}"}
         ratio = f"-eps_{axes[-1]}/eps_{axes[0]} under stress along axis {axes[0]}: {where}"
-        rows.append(
-            (name, effective_material.number(value), "" if name[0] == "n" else unit, meanings.get(name[0], ratio))
-        )
-    if material.expansion is not None:
-        for name, component, value in zip(
-            engineering_constants.MATERIAL_EXPANSIONS, COMPONENTS, material.expansion, strict=True
-        ):
-            rows.append(
-                (
-                    name,
-                    effective_material.number(value),
-                    "1 / temperature",
-                    f"thermal strain {component} per unit of temperature",
-                )
-            )
-    C = material.stiffness
+        rows.append((name, value, "" if name[0] == "n" else unit, meanings.get(name[0], ratio)))
+    strains: list[float] = [] if material.expansion is None else material.expansion.tolist()
+    for name, component, value in zip(engineering_constants.MATERIAL_EXPANSIONS, COMPONENTS, strains, strict=False):
+        rows.append((name, value, "1 / temperature", f"thermal strain {component} per unit of temperature"))
     for i, j in SYMMETRIC21:
         digits = "".join(str(axis + 1) for axis in effective_material.PAIRS[i])
         meaning = f"stiffness: stress {digits} under the unit strain {COMPONENTS[j]}"
-        rows.append((f"C{i + 1}{j + 1}", effective_material.number(C[i, j]), unit, meaning))
+        rows.append((f"C{i + 1}{j + 1}", C[i, j], unit, meaning))
     stream = io.StringIO()
-    csv.writer(stream, lineterminator="\n").writerows(rows)
+    texts = ((name, effective_material.number(value), *words) for name, value, *words in rows)
+    csv.writer(stream, lineterminator="\n").writerows([CSV_COLUMNS, *texts])
     return stream.getvalue().removesuffix("\n")
 
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from feti_homog.materials import voigt
-from feti_homog.report.text.tables import Column, Table, stress_label, without_noise
+from feti_homog.report.text.tables import UNKNOWN, Column, Table, stress_label, without_noise
 from feti_homog.typing import Document
 
 POINTS = 4  # of a curve
@@ -20,28 +20,27 @@ def phase_tables(document: Document) -> list[Table]:
     pairs = [(phase, k) for k in states for phase in phases]
     names = [f"{labels[k]} {phase['phase']}" if len(labels) > 1 else phase["phase"] for phase, k in pairs]
     first = Column("", -max(16, *(len(name) + 2 for name in names)), indent=0)
-    columns = [first]
-    for title in STRESSES.values():
-        columns += [Column(title), Column("at", 16)]
+    heads = [first, *(column for title in STRESSES.values() for column in (Column(title), Column("at", 16)))]
     rows = [
         [name, *(value for measure in STRESSES for value in _entry(phase, measure, k))]
         for name, (phase, k) in zip(names, pairs, strict=True)
     ]
-    used = [
-        [name, phase["criterion"], *_entry(phase, "utilisation", k)]
-        for name, (phase, k) in zip(names, pairs, strict=True)
-        if "criterion" in phase
-    ]
     loads = ", under unit loads" if labels[0].split()[-1] in voigt.SPATIAL_STRAINS else ""
-    tables = [
-        Table(f"Largest stresses of the phases{stress_label(document)}, tension positive{loads}", columns, rows),
-        Table(
-            f"Utilisation of the strengths{loads}",
-            [first, Column("criterion", 20), Column("utilisation"), Column("at", 16)],
-            used,
-        ),
-    ]
-    return [table for table in tables if table.rows]
+    tables = [Table(f"Largest stresses of the phases{stress_label(document)}, tension positive{loads}", heads, rows)]
+    has_modes, load = any(phase.get("mode") for phase in phases), document["case"].get("load", {}).get("to", {})
+    is_mixed = bool(load.get("temperature")) and len([value for value in load.values() if value]) > 1
+    has_factors = "path" not in document and not is_mixed  # stresses in proportion to the load
+    used = list[list[Any]]()
+    for name, (phase, k) in zip(names, pairs, strict=True):
+        if "criterion" in phase:
+            value, place = _entry(phase, "utilisation", k)
+            used.append([name, phase["criterion"], value, place])
+            used[-1] += [phase["mode"][k] if phase.get("mode") and value else UNKNOWN] * has_modes
+            used[-1] += [1.0 / value if value else UNKNOWN] * has_factors
+    heads = [first, Column("criterion", 20), Column("utilisation"), Column("at", 16)]
+    heads += [Column("mode", 20)] * has_modes + [Column("load factor")] * has_factors
+    notes = ["  load factor: at this multiple of the load the utilisation is 1"] * has_factors
+    return [*tables, *([Table(f"Utilisation of the strengths{loads}", heads, used, below=notes)] if used else [])]
 
 
 def _states(document: Document, count: int) -> Sequence[int]:

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from typing import Any
 
@@ -90,7 +90,7 @@ class Table:
         above, below: lines of the text before the heads, and after the rows; notes in HTML.
         title_in_head: in text the title stands where the first column has its head.
         abreast: rows per line of text, without heads; 0 for one row per line with heads.
-        most_columns: columns behind the first in text; more are blocks below each other, without unknown rows.
+        most_columns: columns behind the first; more are blocks below each other, without unknown rows.
     """
 
     title: str
@@ -103,19 +103,20 @@ class Table:
     most_columns: int = 100
 
     @property
+    def blocks(self) -> list[tuple[Sequence[Column], Sequence[Sequence[Any]]]]:
+        """Return the columns and rows of each block."""
+        parts = [slice(k, k + self.most_columns) for k in range(1, len(self.columns), self.most_columns)]
+        rows = ([[*row[:1], *row[part]] for row in self.rows] for part in parts)
+        known = [[row for row in block if set(row[1:]) != {UNKNOWN}] for block in rows]
+        return [([self.columns[0], *self.columns[part]], block) for part, block in zip(parts, known, strict=True)]
+
+    @property
     def lines(self) -> list[str]:
         """Return the lines of the table as text."""
         title, blocks = [self.title, *self.above], list[str]()
-        step = self.most_columns
-        for first in range(1, len(self.columns), step):
-            columns = [self.columns[0], *self.columns[first : first + step]]
+        for columns, rows in self.blocks:
             head = "".join(column.head for column in columns)
-            rows = [[*row[:1], *row[first : first + step]] for row in self.rows]
-            texts = [
-                "".join(column.cell(value) for column, value in zip(columns, row, strict=False))
-                for row in rows
-                if set(row[1:]) != {UNKNOWN}
-            ]
+            texts = ["".join(column.cell(v) for column, v in zip(columns, row, strict=False)) for row in rows]
             if self.abreast:
                 groups = (texts[k : k + self.abreast] for k in range(0, len(texts), self.abreast))
                 blocks += ["  " + "    ".join(group) for group in groups]
@@ -141,12 +142,14 @@ class Table:
 
     @property
     def html(self) -> str:
-        """Return the table as HTML."""
-        head = _row((column.name for column in self.columns), "col", 'th scope="col"')
-        rows = "\n".join(_row(row, "row", "td") for row in self.cells)
+        """Return the table as HTML, each block as a table of its own."""
         notes = "".join(f"<small>{escape(line)}</small>" for line in (*self.above, *self.below))
-        caption = f"<caption>{escape(self.title)}{notes}</caption>"
-        return f"<table>{caption}\n<thead>{head}</thead>\n<tbody>\n{rows}\n</tbody></table>"
+        text = f"<table><caption>{escape(self.title)}{notes}</caption>"
+        for number, (columns, part) in enumerate(self.blocks):
+            head = _row((column.name for column in columns), "col", 'th scope="col"')
+            rows = "\n".join(_row(row, "row", "td") for row in replace(self, columns=columns, rows=part).cells)
+            text += ("</table>\n<table>" if number else "") + f"<thead>{head}</thead>\n<tbody>\n{rows}\n</tbody>"
+        return f"{text}</table>"
 
 
 def number(value: Any, form: str) -> str:

@@ -43,6 +43,17 @@ def test_faults_of_sizes_and_rows(keys, table, line, tmp_path):
     assert len(error.value.faults) == 1
 
 
+SIZES = {"": "4", "refine = 1": "2", "refine = 2": "", "mesh_size = 0.2": "", "accuracy = 0.1": ""}
+
+
+@pytest.mark.parametrize(("keys", "elements"), SIZES.items())
+def test_long_elements_by_default_name_the_way_to_choose_them(keys, elements, tmp_path):
+    """0.05 of a width of 40 is 2: four mean radii of 0.5."""
+    remarks = case_of(tmp_path, f"width = 40\nheight = 30\n{keys}").remarks()
+    assert [line for line in remarks if f"default: elements of up to {elements} mean radii" in line] == [*remarks]
+    assert bool(remarks) == bool(elements) and all("; accuracy = 0.01 chooses" in line for line in remarks)
+
+
 def test_the_digest_is_that_of_the_table(tmp_path):
     keys = "width = 4\nheight = 3"
     digests = [case_of(tmp_path, keys, table).digest() for table in (TABLE, TABLE, TABLE.replace("0.5", "0.6"))]

@@ -82,6 +82,23 @@ TABLE = {
 BILINEAR = TABLE | {"law": "bilinear", "normal_stiffness": 10.0, "normal_strength": 1.0}
 del BILINEAR["openings"], BILINEAR["tractions"]
 ARC = {"fibre": 1, "angle": 30.0}
+
+
+@pytest.mark.parametrize(
+    ("law", "method", "key"),
+    [
+        (BILINEAR | {"normal_toughness": 0.5}, "events", "a larger softening_tolerance"),
+        (TABLE | {"teeth": 5}, "events", "fewer teeth"),
+        (BILINEAR | {"normal_toughness": 0.5}, "increments", ""),
+        (STRONG, "events", ""),
+    ],
+)
+def test_a_path_of_damage_names_the_key_that_makes_it_cheaper(law, method, key):
+    path = {"strain": [0.01, 0.0, 0.0], "method": method} | ({"increments": 5} if method == "increments" else {})
+    advice = Case.parse(document(law) | {"path": path}).fewer_events
+    assert (key in advice) and bool(advice) == bool(key)
+
+
 # Of each key a law that has it, and two values.
 VALUES = {
     "contact": (STRONG, True, False),

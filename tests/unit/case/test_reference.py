@@ -1,9 +1,11 @@
 """The reference of the case file: nothing is left out, and every key is explained."""
 
+import re
+
 import pytest
 
 from feti_homog.case import reference
-from feti_homog.case.sections import RANGE_KEYS, TABLES, TOP_LEVEL, SweepSection
+from feti_homog.case.sections import GROUPS, RANGE_KEYS, TABLES, TOP_LEVEL, SweepSection
 from feti_homog.errors import CaseError
 from feti_homog.schema.keys import keys_of
 
@@ -65,6 +67,55 @@ def test_the_text_has_every_key_and_no_long_line():
     assert all(table.place in text for table in reference.tables())
 
 
-def test_an_unknown_section():
-    with pytest.raises(CaseError, match=r"^cells: unknown section; expected one of name, cell, material, "):
-        reference.tables("cells")
+def test_the_index_has_every_key_of_every_table_once_and_groups_without_keys_are_none():
+    index, _, rest = reference.text().partition("\n\nbefore the first section: the case")
+    assert rest and max(map(len, index.splitlines())) <= reference.WIDTH
+    listed = [part.split() for part in re.split(r"\n\n[^\n]+\n|\n  (?! )", index)[1:] if part]
+    expected = {(table.place.partition(",")[0], row.key) for table, row in ROWS}
+    found = [
+        (place, key) for place, keys in (" ".join(words).split(": ") for words in listed) for key in keys.split(", ")
+    ]
+    assert len(found) == len(set(found)) and set(found) == expected
+    assert set(" ".join(GROUPS.values()).split()) <= {*reference.ORDER, *(f"{t.section}.{row.key}" for t, row in ROWS)}
+
+
+@pytest.mark.parametrize(
+    ("word", "expected"),
+    [
+        ("teeth", ("interface", "teeth")),  # a key
+        ("Coulomb", ("interface", "friction")),  # a description, in any case
+        ("coulomb", ("interface", "friction")),
+        ("mesh size", ("cell", "mesh_size")),  # without its underscore
+        ("micrograph", ("cell", "geometry")),
+        ("decomp", ("decomposition", "max_dofs")),  # a part of the name of a section has all its keys
+        ("latin", ("sweep", "sampling")),  # a value
+    ],
+)
+def test_a_word_finds_keys_and_sections(word, expected):
+    section, key = expected
+    found = [(table, row) for table in reference.tables(word) for row in table.rows]
+    assert (section, key) in {(table.section, row.key) for table, row in found}
+    words = word.lower().replace(" ", "_")
+    for table, row in found:
+        assert words in " ".join((table.section, *vars(row).values())).lower().replace(" ", "_")
+    left_out = [row for table, row in ROWS if row not in {other for _, other in found}]
+    assert not any(words in " ".join(vars(row).values()).lower().replace(" ", "_") for row in left_out)
+
+
+def test_keys_with_the_word_come_before_descriptions_with_it():
+    (table,) = (table for table in reference.tables("teeth") if table.place == "[interface]")
+    assert table.rows[0].key == "teeth" and len(table.rows) > 1
+
+
+@pytest.mark.parametrize(
+    ("word", "line"),
+    [
+        ("mesh_sise", "keys mesh_sise: no key, section or description has it; near words: mesh_size, mesh_error"),
+        ("alpha", "keys alpha: no key, section or description has it; near words: expansion"),
+        ("qwxz", "keys qwxz: no key, section or description has it; `feti-homog keys` lists all keys"),
+    ],
+)
+def test_a_word_that_is_nowhere(word, line):
+    with pytest.raises(CaseError) as caught:
+        reference.tables(word)
+    assert caught.value.faults == (line,) and caught.value.exit_code == 2

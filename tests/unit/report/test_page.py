@@ -1,5 +1,6 @@
 """report.html without a browser: what is on the page, and what of a folder that has no whole result."""
 
+import tomllib
 from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 
 from feti_homog.errors import CaseError
 from feti_homog.report import page
+from feti_homog.report.cards import export
 from feti_homog.report.text.summary import answers, checks
 from feti_homog.results import output_folder, result_json
 
@@ -30,11 +32,12 @@ def document(kind: str, **more: Any) -> dict[str, Any]:
     case = {
         "name": NAME, "cell": {"geometry": "square", "order": 1, "refine": 0},
         "analysis": {"type": kind, "plane": "strain"},
-        "output": {"stress_unit": "GPa"}, "path": {"strain": [1, 0, 0], "method": "events"}, "angle": {"strain": None},
+        "output": {"stress_unit": "GPa"}, "path": {"strain": [1, 0, 0], "method": "events"},
     }  # fmt: skip
     case |= {} if kind == "stiffness" else {"interface": {"contact": True}}
     return {
-        "schema": result_json.SCHEMA, "version": "0", "case": case, "cell": CELL, "solver": SOLVER, "status": "done",
+        "schema": result_json.SCHEMA, "version": "0", "date": "<2026>",
+        "case": case, "cell": CELL, "solver": SOLVER, "status": "done",
         "checks": {"hill": 1e-12, "kkt_tension": 1e-3}, "check_tolerance": 1e-5, "kkt_tolerance": 1e-6,
         "warnings": [], "faults": ["a fault"], "timings": {"solve": 1.5}, "memory": 1 << 20,
     } | more  # fmt: skip
@@ -119,18 +122,22 @@ class Words(HTMLParser):
     def __init__(self, text: str) -> None:
         super().__init__()
         self.tags, self.text, self._is_style = list[str](), list[str](), False
+        self.verbatim, self._is_pre = list[str](), False
         self.feed(text)
 
     def handle_starttag(self, tag: str, attributes: Any) -> None:
         self.tags.append(tag)
-        self._is_style = tag == "style"
+        self._is_style, self._is_pre = tag == "style", tag == "pre"
+        self.verbatim += [""] * self._is_pre
 
     def handle_endtag(self, tag: str) -> None:
-        self._is_style = False
+        self._is_style = self._is_pre = False
 
     def handle_data(self, data: str) -> None:
         if not self._is_style:
             self.text.append(data.strip())
+        if self._is_pre:
+            self.verbatim[-1] += data
 
 
 @pytest.mark.parametrize("result", [path, angle, bonded])
@@ -143,6 +150,9 @@ def test_the_page_has_what_there_is(tmp_path: Path, result: Callable[[], dict[st
     assert {"hill", "pass", "a fault", "done"} <= set(words.text)
     assert ("kkt_tension" in words.text) == ("FAIL" in words.text) == (result is not bonded)
     assert words.tags.count("img") == 1 and "svg" not in words.tags
+    assert "feti-homog 0, run of <2026>" in words.text
+    _, *cards, case = words.verbatim
+    assert tomllib.loads(case) == result()["case"] and cards == []
 
 
 @pytest.mark.parametrize("result", [space, angle_in_space])
@@ -150,6 +160,16 @@ def test_the_page_of_a_cell_in_space(tmp_path: Path, result: Callable[[], dict[s
     words = Words(page.write(written(tmp_path, result())).read_text(encoding="utf-8"))
     assert {"S33", "gamma23", "mori tanaka", "3.1", "E_axial"} <= set(words.text) or result is angle_in_space
     assert {"C66", "C44"} <= set(words.text) or result is space
+    cards = [text for text in words.text if text.startswith("Material card, ")]
+    assert cards == [f"Material card, {form}" for form in export.FORMATS] * (result is space)
+    if cards:
+        assert words.verbatim[1:-1] == [export.card(tmp_path, form, "orthotropic") for form in export.FORMATS]
+
+
+def test_an_older_result_has_no_date(tmp_path: Path) -> None:
+    old = {key: value for key, value in bonded().items() if key != "date"}
+    words = Words(page.write(written(tmp_path, old)).read_text(encoding="utf-8"))
+    assert "feti-homog 0" in words.text
 
 
 def test_the_table_of_a_load() -> None:

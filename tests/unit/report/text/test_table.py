@@ -37,7 +37,8 @@ def test_rows_abreast_and_columns_in_blocks():
     ]  # fmt: skip
     table = Table("t", [Column("", -4), *map(Column, "xyz")], [["p", 1, 2, "-"], ["q", "-", "-", 3]], most_columns=2)
     assert [line.split() for line in table.lines] == [["t"], ["x", "y"], ["p", "1", "2"], ["z"], ["q", "3"]]
-    assert table.cells == [["p", "1", "2", "-"], ["q", "-", "-", "3"]] and table.html.count("<tr>") == 3
+    assert table.cells == [["p", "1", "2", "-"], ["q", "-", "-", "3"]] and table.html.count("<tr>") == 4
+    assert table.html.count("<table>") == table.html.count("<thead>") == 2 and table.html.count("<caption>") == 1
 
 
 def document(count: int, names: tuple[str, ...], without: tuple[int, ...] = (), **section: Any) -> dict[str, Any]:
