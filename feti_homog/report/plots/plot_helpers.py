@@ -83,7 +83,10 @@ def save(figure: Figure, path: Path, look: Look = PLAIN) -> Path:
             figure.set_layout_engine("compressed")
     file, box = path.with_suffix(f".{look.format}"), "tight" if look.size is None else None
     with missing_letters_as_boxes():
-        return atomic.replace(file, lambda part: figure.savefig(part, format=look.format, dpi=DPI, bbox_inches=box))
+        # Level 4 compresses in a third of the time of the default, 6, to files that are 3 % larger.
+        more = {"pil_kwargs": {"compress_level": 4}} if look.format == "png" else {}
+        how: dict[str, Any] = {"format": look.format, "dpi": DPI, "bbox_inches": box} | more
+        return atomic.replace(file, lambda part: figure.savefig(part, **how))
 
 
 @contextmanager
