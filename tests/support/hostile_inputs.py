@@ -88,6 +88,8 @@ CASES: dict[str, tuple[str, str]] = {
         "expected an integer at least 0 and at most 1000000000000000",
     ),
     "unknowns of thirty digits": (ended(f"[decomposition]\nmax_dofs = {10**30}\n"), "at most 1000000000"),
+    "an integer of 4334 digits": (fraction(f"0x{'f' * 3600}"), "cell.fibre_fraction: expected no integer of more than"),
+    "a name of 4334 digits": (f"name = 0x{'f' * 3600}\n{BASE}", "name: expected no integer of more than"),
     "fraction at the limit": (fraction("0.9068998"), "fibre_fraction = 0.9068998: expected less than 0.9068997 for"),
     "elements without number": (changed(("0.05", "1e-4")), "mesh_size = 0.0001: about 4e+08 elements before refine"),
     "fibres without number": (
