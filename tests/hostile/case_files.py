@@ -40,6 +40,21 @@ FILES: dict[str, tuple[Content, str]] = {
     "1e5 waypoints": (changed(SMALL, PATH, end=f"[path]\nwaypoints = [{'[nan, 0, 0], ' * 100_000}]\n"), ""),
 }
 
+SPRINGS = "[path]\nstrain = [0.1, 0, 0]\n[output]\npictures = false\n[interface]\nnormal_stiffness = {}\n"
+SPRINGS += "tangential_stiffness = {}\nlaw = "
+STRENGTHS = "normal_strength = 0.05\ntangential_strength = 0.05\n"
+LAWS = {
+    "energy of soft springs": ('"energy"\ntoughness = 1e-3\n', ("1e3", "1e-99"), "error: ", 3),
+    "soft springs": (f'"max"\n{STRENGTHS}', ("1e99", "1e-99"), "leaves a matrix singular", 3),
+    "damage of stiff springs": (
+        f'"bilinear"\n{STRENGTHS}normal_toughness = 1e-3\ntangential_toughness = 1e-3\n',
+        ("1e99", "1e99"),
+        "expected at most 1.25e+12",
+        2,
+    ),
+}
+"""Laws at the edges of their ranges."""
+
 
 def attempts() -> Iterator[Attempt]:
     for name, (words, expected) in OPTIONS.items():
@@ -56,6 +71,11 @@ def attempts() -> Iterator[Attempt]:
         yield Attempt("cells", name, ("check", "@/c.toml"), expected, {"c.toml": case})
     for name, (content, expected) in FILES.items():
         yield Attempt("case files", name, ("check", "@/c.toml"), expected, {"c.toml": content})
+    for name, (law, stiffnesses, expected, code) in LAWS.items():
+        case = changed(("0.05", "0.3"), PATH, end=SPRINGS.format(*stiffnesses) + law)
+        yield Attempt(
+            "laws", name, ("run", "@/c.toml", "--out", "@/out", "--quiet"), expected, {"c.toml": case}, (code,)
+        )
     yield Attempt("case files", "of no name", ("check", "@/a\0b.toml"), "null character")
     yield Attempt("case files", "none", ("check", "@/\x1b[31m.toml"), r"\x1b[31m")
     yield Attempt("options", "of control characters", ("check", "@/c.toml", "--\x1b[31m"), r"\x1b[31m")
