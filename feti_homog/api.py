@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import io
+import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -173,17 +174,25 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
     from mpi4py import MPI
 
     def main() -> int:
-        options = option_values.named_values(petsc)
-        faults = [*option_values.faulty_values(options), *option_table.unknown_options(options)]
-        if faults:
-            raise CaseError(*faults)
-        try:
-            libraries.start_petsc([sys.argv[0], *option_values.petsc_words(options)], MPI.COMM_WORLD)
-        except RuntimeError as error:  # raised by petsc4py before PETSc can name it
-            raise CaseError(f"PETSc does not start with {' '.join(petsc)}: {error}") from error
+        _start_petsc(petsc, MPI.COMM_WORLD)
         return command(words, MPI.COMM_WORLD)
 
     return mpi_errors.run_main(MPI.COMM_WORLD, main)
+
+
+def _start_petsc(words: Sequence[str], comm: Intracomm) -> None:
+    """Start PETSc with the options in `words` and in PETSC_OPTIONS.  Collective.  Raises CaseError for faulty ones."""
+    others, of_environment = option_values.split_argv(os.environ.get("PETSC_OPTIONS", "").split())
+    os.environ["PETSC_OPTIONS"] = "-skip_petscrc"  # gmsh starts a PETSc of its own
+    options = option_values.named_values([*of_environment, *words])
+    faults = [f"PETSC_OPTIONS: {word}: expected options of PETSc and their values" for word in others]
+    faults += ["PETSC_OPTIONS_YAML: expected PETSC_OPTIONS in its place"] * ("PETSC_OPTIONS_YAML" in os.environ)
+    if faults := [*faults, *option_values.faulty_values(options), *option_table.unknown_options(options)]:
+        raise CaseError(*faults)
+    try:
+        libraries.start_petsc([sys.argv[0], *option_values.petsc_words(options)], comm)
+    except RuntimeError as error:  # raised by petsc4py before PETSc can name it
+        raise CaseError(f"PETSc does not start with {' '.join(words)}: {error}") from error
 
 
 def folder(name: str | Path) -> Path:
@@ -220,5 +229,5 @@ def _started(comm: Intracomm | None) -> Intracomm:
 
     if "petsc4py.PETSc" not in sys.modules:
         # On more ranks PETSc would wait for ranks without a case; a case brings its communicator.
-        libraries.start_petsc([], MPI.COMM_SELF)
+        _start_petsc([], MPI.COMM_SELF)
     return MPI.COMM_WORLD if comm is None else comm

@@ -37,6 +37,33 @@ SURROUNDINGS: dict[str, tuple[str, str, tuple[int, ...]]] = {
         (0,),
     ),
     "a backend that is none": ("MPLBACKEND=nonexistent feti run drawn.toml --out out", "cell.png", (0,)),
+    "options by a pipe": (
+        "mkfifo out/p; PETSC_OPTIONS='-options_file out/p' feti check c.toml",
+        "-options_file out/p: expected a file",
+        (2,),
+    ),
+    "options of a file of itself": (
+        "echo -options_file out/o > out/o; PETSC_OPTIONS='-options_file out/o' feti check c.toml",
+        "none of another file",
+        (2,),
+    ),
+    "options of the environment": (
+        "echo -history > out/o; PETSC_OPTIONS='-feti_ksp_rtol 2 -options_file out/o' feti check c.toml",
+        "-history: no option",
+        (2,),
+    ),
+    "words of the environment": ("PETSC_OPTIONS=foo feti check c.toml", "PETSC_OPTIONS: foo: expected options", (2,)),
+    "options of YAML": ("PETSC_OPTIONS_YAML='a: b' feti check c.toml", "PETSC_OPTIONS_YAML: expected", (2,)),
+    "good options of the environment": (
+        r"printf '# a\n-feti_ksp_rtol 1e-9 # b\n' > out/o; PETSC_OPTIONS='-options_file out/o' feti check c.toml",
+        "the case is valid",
+        (0,),
+    ),
+    "a .petscrc at home": (
+        "mkdir out/h; echo -start_in_debugger > out/h/.petscrc; HOME=out/h feti check c.toml",
+        "",
+        (0,),
+    ),
     "a case by a pipe": ("feti check <(cat c.toml)", "the case is valid", (0,)),
     "an endless case by a pipe": ("cat /dev/zero | feti check /dev/stdin", "more than 16 MiB", (2,)),
 }
