@@ -1,6 +1,7 @@
 """Surroundings of a process: limits, settings of the folder, rights, full disks, kills, ranks."""
 
 import os
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -67,6 +68,17 @@ SURROUNDINGS: dict[str, tuple[str, str, tuple[int, ...]]] = {
     "a case by a pipe": ("feti check <(cat c.toml)", "the case is valid", (0,)),
     "an endless case by a pipe": ("cat /dev/zero | feti check /dev/stdin", "more than 16 MiB", (2,)),
 }
+PROGRAM = "import sys\nfrom feti_homog import Case, run\nfrom mpi4py import MPI\ncase = Case.load('c.toml')\n"
+PROGRAMS = {
+    "no standard output": "sys.stdout = None\nrun(case, quiet=False)\n",
+    "a closed standard output": "sys.stdout.close()\nsys.stderr.close()\nrun(case, quiet=False)\n",
+    "no MPI": "MPI.Finalize()\ntry:\n    run(case)\nexcept Exception as met:\n    assert str(met) == 'MPI has ended'\n",
+    "threads": (
+        "from concurrent.futures import ThreadPoolExecutor\nwith ThreadPoolExecutor(3) as pool:\n"
+        "    ends = [pool.submit(run, case) for _ in range(3)]\nerrors = {str(end.exception()) for end in ends}\n"
+        "assert errors == {'None', 'another thread of this process works with PETSc'}, errors\n"
+    ),
+}
 FULL: dict[str, str] = {
     "keys": "feti keys",
     "check": "feti check c.toml",
@@ -112,6 +124,8 @@ def attempts(prepared: Path) -> Iterator[Attempt]:
             yield Attempt(kind, name, (), expected, files | {"out/x": ""}, codes, shell)
     for name, words in FULL.items():
         yield Attempt("full outputs", name, (), "standard output cannot be written", made, (1,), f"{words} > /dev/full")
+    for name, content in PROGRAMS.items():
+        yield Attempt("programs", name, (), "", {**files, "p.py": PROGRAM + content}, (0,), f"{sys.executable} p.py")
     tag = '"$(hostname).1.0"'  # of a process that began with the machine, which none did
     shell = f"touch out/cell.png.{tag}.part; feti plot out && [ ! -e out/cell.png.{tag}.part ]"
     yield Attempt("leftovers", "of a dead plot", (), "cell.png", made, (0,), shell)
