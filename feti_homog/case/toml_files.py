@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path, PurePath
@@ -16,6 +17,9 @@ from feti_homog.system.runtime import input_files
 MAX_BYTES = 1 << 24
 MAX_DEPTH = 50
 MAX_BITS = 10_000  # of an integer: Python writes none of more than 4 300 digits into messages
+MOST_KEYS, MOST_ENTRIES = 10_000, 100_000  # of a table, of a list
+# tomllib takes time in the square of the length of a dotted key.
+DEEP_KEY = re.compile(rf"""(?<![\w-])((?>[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*+\.[ \t]*+){{{MAX_DEPTH}}}""")
 TOO_DEEP = f"tables and arrays are nested more than {MAX_DEPTH} deep"
 
 TomlPath = tuple[str, ...]
@@ -28,6 +32,8 @@ def read_document(path: str | Path) -> dict[str, Any]:
         raise CaseError(f"{str(path)!r}: no file has a name with a null character")
     try:
         content = input_files.read(path, MAX_BYTES, pipes=True).decode("utf-8-sig")
+        if DEEP_KEY.search(content):
+            raise RecursionError
         document = tomllib.loads(content)
     except UnicodeDecodeError as error:
         line = error.object.count(b"\n", 0, error.start) + 1
@@ -52,29 +58,32 @@ def to_document(values: object) -> dict[str, Any]:
 
     Raises:
         TypeError: the values are no mapping.
-        CaseError: a key is no text, an integer is too large for messages, or the nesting is too deep or a circle.
+        CaseError: a key is no text, an integer is too large for messages, or tables are too long, too deep or a circle.
     """
     if not isinstance(values, Mapping):
         raise TypeError(
             f"expected the sections of a case as a dictionary, such as tomllib.load returns; got {_article(values)}"
         )
     faults: list[str] = []
-    document = {name: _to_toml(value, (name,), faults) for name, value in _named_items(values, (), faults)}
+    document: dict[str, Any] = _to_toml(values, (), faults)
     if faults:
         raise CaseError(*faults)
     return document
 
 
-def _to_toml(value: Any, path: TomlPath, faults: list[str], depth: int = 1) -> Any:
+def _to_toml(value: Any, path: TomlPath, faults: list[str], depth: int = 0) -> Any:
     if isinstance(value, str | float | bool) and not isinstance(value, np.generic):
         return value  # first, for most are
-    if depth > MAX_DEPTH:
-        raise CaseError(f"{wording.dotted_key(path)}: {TOO_DEEP}")
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, Mapping | list | tuple):
+        most, noun = (MOST_KEYS, "keys") if isinstance(value, Mapping) else (MOST_ENTRIES, "entries")
+        if depth > MAX_DEPTH or len(value) > most:
+            words = TOO_DEEP if depth > MAX_DEPTH else f"{len(value)} {noun}; expected at most {most}"
+            raise CaseError(f"{wording.dotted_key(path) or 'the file'}: {words}")
     if isinstance(value, Mapping):
         items = _named_items(value, path, faults)
         return {name: _to_toml(entry, (*path, name), faults, depth + 1) for name, entry in items}
-    if isinstance(value, np.ndarray):
-        value = value.tolist()
     if isinstance(value, list | tuple):
         return [_to_toml(entry, path, faults, depth + 1) for entry in value]
     if isinstance(value, int) and value.bit_length() > MAX_BITS:

@@ -14,6 +14,7 @@ from feti_homog.typing import Float
 
 STIFFNESS = "stiffness"
 SECTIONS = ("material", "interface")
+MOST_NUMBERS = 1000
 EXPECTED = "expected {mean, std} or {mean, cv}, numbers, std and cv above 0"
 
 
@@ -64,6 +65,9 @@ def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty
     given = [(path, value) for path, value in stds if value != {}]
     for section in document:
         document[section] = _means(document[section], (section,), given, faults)
+    if len(given) > MOST_NUMBERS:
+        faults.append(f"[{sections.UNCERTAINTY}]: {len(given)} uncertain numbers; expected at most {MOST_NUMBERS}")
+        return Uncertainty({})
     paths, named = [path for path, _ in given], {".".join(path): value for path, value in given}
     for path, value in dict(given).items():
         name = f"[{sections.UNCERTAINTY}] {wording.dotted_key(path)}"
