@@ -15,10 +15,13 @@ def verify(words: Sequence[str]) -> int:
     standard_streams.end_on_signals()
     prints = standard_streams.launched_rank() == 0
     os.environ.pop("H5PY_ALWAYS_USE_MPI", None)  # the serial h5py reads the files
-    from feti_homog.verify import certificate
+    from feti_homog.results import field_guard
+    from feti_homog.verify import certificate, reading
 
     try:
         arguments = command_parser().parse_args(words)
+        if os.path.isfile(path := arguments.directory / reading.FIELDS) and os.access(path, os.R_OK):
+            field_guard.require_own(path)
         outcome = certificate.verify(arguments.directory)
         if prints:
             standard_streams.print_product(json.dumps(outcome.document, indent=1) if arguments.json else outcome.text)
