@@ -164,8 +164,7 @@ class Result:
     peak: result_records.Peak | None = described("peak of the path, with its first break", default=None)
     load: result_records.LoadPoint | None = described("state of analysis `load`, as in load.csv", default=None)
     envelope: tuple[result_records.EnvelopePoint, ...] | None = described(
-        "directions of analysis `envelope`, as in envelope.csv",
-        default=None,
+        "directions of analysis `envelope`, as in envelope.csv", default=None
     )
     states: tuple[int, ...] | None = described(
         "of a path: the numbers, from 0, of the points whose fields are kept; /state/K is that of entry K", default=None

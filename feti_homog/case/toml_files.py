@@ -14,11 +14,9 @@ from feti_homog.errors import CaseError
 from feti_homog.schema import wording
 from feti_homog.system.runtime import input_files
 
-MAX_BYTES = 1 << 24
-MAX_DEPTH = 50
+MAX_BYTES, MAX_DEPTH = 1 << 24, 50
 MAX_BITS = 10_000  # of an integer: Python writes none of more than 4 300 digits into messages
 MOST_KEYS, MOST_ENTRIES = 10_000, 100_000  # of a table, of a list
-# tomllib takes time in the square of the length of a dotted key.
 DEEP_KEY = re.compile(rf"""(?<![\w-])((?>[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*+\.[ \t]*+){{{MAX_DEPTH}}}""")
 TOO_DEEP = f"tables and arrays are nested more than {MAX_DEPTH} deep"
 
@@ -33,7 +31,7 @@ def read_document(path: str | Path) -> dict[str, Any]:
     try:
         content = input_files.read(path, MAX_BYTES, pipes=True).decode("utf-8-sig")
         if DEEP_KEY.search(content):
-            raise RecursionError
+            raise RecursionError  # for tomllib takes time in the square of the length
         document = tomllib.loads(content)
     except UnicodeDecodeError as error:
         line = error.object.count(b"\n", 0, error.start) + 1
@@ -82,8 +80,8 @@ def _to_toml(value: Any, path: TomlPath, faults: list[str], depth: int = 0) -> A
             words = TOO_DEEP if depth > MAX_DEPTH else f"{len(value)} {noun}; expected at most {most}"
             raise CaseError(f"{wording.dotted_key(path) or 'the file'}: {words}")
     if isinstance(value, Mapping):
-        items = _named_items(value, path, faults)
-        return {name: _to_toml(entry, (*path, name), faults, depth + 1) for name, entry in items}
+        named = _named_items(value, path, faults)
+        return {name: _to_toml(entry, (*path, name), faults, depth + 1) for name, entry in named}
     if isinstance(value, list | tuple):
         return [_to_toml(entry, path, faults, depth + 1) for entry in value]
     if isinstance(value, int) and value.bit_length() > MAX_BITS:

@@ -32,11 +32,7 @@ class ProjectedProblem:
     """The shell matrix P F and the shell preconditioner P H on the active rows, which keeps the last residual r."""
 
     def __init__(
-        self,
-        errors: c_functions.CallbackErrors,
-        preconditioner: Preconditioner,
-        jumps: ActiveJumps,
-        columns: int,
+        self, errors: c_functions.CallbackErrors, preconditioner: Preconditioner, jumps: ActiveJumps, columns: int
     ) -> None:
         """Set up the products for vectors with a number of load `columns`."""
         self._errors, self._preconditioner, self._jumps = errors, preconditioner, jumps

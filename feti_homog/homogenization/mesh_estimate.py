@@ -75,11 +75,7 @@ class EnergyErrors:
 
 
 def energy_errors(
-    cell: TornCell,
-    responses: Sequence[Response],
-    contact: bool = False,
-    keep: bool = True,
-    nested: bool | None = None,
+    cell: TornCell, responses: Sequence[Response], contact: bool = False, keep: bool = True, nested: bool | None = None
 ) -> EnergyErrors:
     """Estimate the mesh errors of responses in one problem.  Collective.
 

@@ -119,12 +119,7 @@ def can_be_cut_across(case: Case) -> bool:
 
 
 def wanted_pieces(
-    case: Case,
-    load: Int,
-    edges: Int,
-    lattice: ReferenceLattice,
-    n_ranks: int,
-    policy: PartitionPolicy = DEFAULT_POLICY,
+    case: Case, load: Int, edges: Int, lattice: ReferenceLattice, n_ranks: int, policy: PartitionPolicy = DEFAULT_POLICY
 ) -> Int:
     """Choose the piece count (b,) of each body.
 

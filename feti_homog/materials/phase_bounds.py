@@ -154,9 +154,7 @@ def hashin_shtrikman(fractions: ArrayLike, stiffnesses: Sequence[ArrayLike]) -> 
 
 
 def aligned_cylinders(
-    fractions: Sequence[float],
-    phases: Sequence[TransverseIsotropy],
-    surroundings: tuple[float, float, float],
+    fractions: Sequence[float], phases: Sequence[TransverseIsotropy], surroundings: tuple[float, float, float]
 ) -> TransverseIsotropy:
     """Estimate the constants of cylinders in a reference medium k0, m0, p0 under equal far fields.
 

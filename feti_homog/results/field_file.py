@@ -70,12 +70,7 @@ class FieldFile:
         self.part: Path = mpi_errors.on_root(comm, atomic.part_of, self.path)
         file_locks.files.add(self.part)
         self._units = {records.LENGTH: header.length_unit, records.STRESS: header.stress_unit}
-        counts = {
-            "n": len(mesh.points),
-            "m": len(mesh.triangles),
-            "k": len(interface.points),
-            "f": len(fibres.number),
-        }
+        counts = {"n": len(mesh.points), "m": len(mesh.triangles), "k": len(interface.points), "f": len(fibres.number)}
         self._rows = {symbol: _Rows.of(comm, count) for symbol, count in counts.items()}
         self._reserved = RESERVE
         size = RESERVE + sum(map(self._bytes, (mesh, fibres, interface)))

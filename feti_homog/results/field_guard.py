@@ -8,39 +8,29 @@ import h5py
 from feti_homog.errors import CaseError
 from feti_homog.system.runtime import input_files
 
-MOST_OBJECTS = 1_000_000
-MOST_RATIO = 64  # of the bytes of views, tables that show others, to those of the file
-
 
 def require_own(path: Path) -> None:
     """Require hard links, and tables of numbers that lie in the file.
 
-    A link may lead to a pipe, back to its group or to files of others; a table may declare any size.  Raises CaseError
-    also for a missing or damaged file, FetiHomogError without the right to read it.
+    Links may lead to pipes, back or elsewhere; tables may have any size.  Raises CaseError, FetiHomogError as `read`.
     """
     if not path.is_file():
-        raise CaseError(f"cannot read {path}: No such file or directory")
-    size, count = path.stat().st_size, 0
-    room = {True: MOST_RATIO * size, False: size}
+        raise CaseError(f"cannot read {path}: it is missing; run the case again")
+    room = {True: 64 * path.stat().st_size, False: path.stat().st_size}  # of views, which show tables, and of tables
     try:
         with h5py.File(path, "r", locking=False) as file:
-            groups: list[Any] = [file]
+            groups = [file["/"]]
             for group in groups:
                 for name in group:
-                    place, count = f"{group.name.rstrip('/')}/{name}", count + 1
-                    if not isinstance(group.get(name, getlink=True), h5py.HardLink) or count > MOST_OBJECTS:
-                        raise CaseError(f"{path}: {place} is a link, or one of too many: the file is no result")
-                    entry = group[name]
-                    if isinstance(entry, h5py.Group):
+                    entry: Any = group[name] if isinstance(group.get(name, getlink=True), h5py.HardLink) else None
+                    if isinstance(entry, h5py.Group) and len(groups) << 10 < room[True]:
                         groups.append(entry)
                         continue
-                    is_view = isinstance(entry, h5py.Dataset) and entry.is_virtual
-                    files = {source.file_name for source in entry.virtual_sources()} if is_view else {"."}
-                    is_table = isinstance(entry, h5py.Dataset) and not entry.external and files == {"."}
-                    if not is_table or entry.dtype.kind not in "fiu":
-                        raise CaseError(f"{path}: {place} is no table of numbers in the file: the file is no result")
-                    room[is_view] -= entry.nbytes
-                    if room[is_view] < 0:
-                        raise CaseError(f"{path}: {place} has more numbers than the file: it is no result")
+                    is_table = isinstance(entry, h5py.Dataset) and not entry.external and entry.dtype.kind in "fiu"
+                    if is_table:
+                        room[entry.is_virtual] -= entry.nbytes
+                        is_table = not entry.is_virtual or {s.file_name for s in entry.virtual_sources()} == {"."}
+                    if not is_table or min(room.values()) < 0:
+                        raise CaseError(f"{path}: no result: {group.name}/{name} is no table of numbers within it")
     except (OSError, RuntimeError, KeyError) as error:
         raise input_files.unreadable(path, error if isinstance(error, OSError) else OSError(str(error))) from error

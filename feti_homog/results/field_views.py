@@ -74,11 +74,7 @@ AXIAL = "axial_displacement"  # dataset that only states of generalized plane st
 # The views of each group; /state/K stands for every state.
 VIEWS: dict[str, tuple[View, ...]] = {
     "interface": (_vector("normal"),),
-    GROUP_OF_STATES: (
-        _vector("displacement"),
-        _tensor("stress", "stress", STRESS_TENSOR),
-        *COLUMNS,
-    ),
+    GROUP_OF_STATES: (_vector("displacement"), _tensor("stress", "stress", STRESS_TENSOR), *COLUMNS),
 }
 
 # The views of a state in generalized plane strain.

@@ -14,8 +14,7 @@ from feti_homog.studies.axes import Assignment
 from feti_homog.studies.fit import Fit
 from feti_homog.studies.predictions import Datum, data_faults
 
-MOST_ROWS = 10_000
-MOST_TESTS = 1000
+MOST_ROWS, MOST_TESTS = 10_000, 1000
 LEAST_STD = 1e-12  # relative to the value: smaller deviations are below rounding errors
 
 

@@ -14,7 +14,6 @@ from feti_homog.typing import Float
 
 STIFFNESS = "stiffness"
 SECTIONS = ("material", "interface")
-MOST_NUMBERS = 1000
 EXPECTED = "expected {mean, std} or {mean, cv}, numbers, std and cv above 0"
 
 
@@ -65,8 +64,8 @@ def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty
     given = [(path, value) for path, value in stds if value != {}]
     for section in document:
         document[section] = _means(document[section], (section,), given, faults)
-    if len(given) > MOST_NUMBERS:
-        faults.append(f"[{sections.UNCERTAINTY}]: {len(given)} uncertain numbers; expected at most {MOST_NUMBERS}")
+    if len(given) > 1000:
+        faults.append(f"[{sections.UNCERTAINTY}]: {len(given)} uncertain numbers; expected at most 1000")
         return Uncertainty({})
     paths, named = [path for path, _ in given], {".".join(path): value for path, value in given}
     for path, value in dict(given).items():

@@ -198,11 +198,7 @@ class SharedEntities(Sharers):
 
 
 def share_entities(
-    comm: MPI.Intracomm,
-    meshes: SubmeshesOfRank,
-    table: submeshes.SubdomainTable,
-    pairs: Int,
-    lattice: ReferenceLattice,
+    comm: MPI.Intracomm, meshes: SubmeshesOfRank, table: submeshes.SubdomainTable, pairs: Int, lattice: ReferenceLattice
 ) -> SharedEntities:
     """Find the shared entities of this rank, and number the constraints rank by rank.  Collective.
 

@@ -211,13 +211,7 @@ def checks(document: Document) -> Table:
 def _field(label: str, phrases: Iterable[str]) -> list[str]:
     """Join the phrases by commas after a label, and wrap them to WIDTH characters."""
     text = ", ".join(phrases).replace(", (", " (")
-    return wrap(
-        text,
-        WIDTH,
-        initial_indent=f"{label:<{LABEL}}",
-        subsequent_indent=" " * LABEL,
-        break_long_words=False,
-    )
+    return wrap(text, WIDTH, initial_indent=f"{label:<{LABEL}}", subsequent_indent=" " * LABEL, break_long_words=False)
 
 
 def _number(count: int, name: str) -> str:
