@@ -5,13 +5,15 @@ from __future__ import annotations
 import argparse
 import contextlib
 import io
+import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feti_homog.case import Case
-from feti_homog.errors import CaseError, ExitCode, LibraryError
+from feti_homog.errors import CaseError, ExitCode, FetiHomogError, LibraryError
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.petsc import libraries, option_table, option_values
 from feti_homog.system.runtime import environment, standard_streams
@@ -20,6 +22,8 @@ from feti_homog.typing import Intracomm
 if TYPE_CHECKING:
     from feti_homog.analysis import result
     from feti_homog.studies import sweep_table
+
+RUNNING = threading.RLock()  # PETSc bears one thread
 
 
 def run(
@@ -33,8 +37,8 @@ def run(
 ) -> result.Result:
     """Run a case on the ranks of `comm`, by default all ranks.
 
-    Collective over `comm`; other ranks need not take part.  PETSc starts without options unless the program has started
-    PETSc before; the section `petsc` of the case has the case options.  Returns the result on every rank.
+    Collective over `comm`; other ranks need not take part.  PETSc starts with PETSC_OPTIONS alone unless the program
+    has started it before; the section `petsc` of the case has the case options.  Returns the result on every rank.
 
     Args:
         out: a folder for the files that `feti-homog run` writes; by default the run writes no files.
@@ -47,16 +51,16 @@ def run(
         CaseError, MeshError: the case cannot be run, or `out` cannot be used.
         ConvergenceError: a solve did not converge or a check failed; the computed part is in `out`.
         LibraryError: mpi4py, petsc4py or h5py is missing or does not fit.
+        FetiHomogError: MPI has ended, or another thread of the process is in a call of this module.
     """
     if not isinstance(case, Case):
-        kind = type(case).__name__
-        raise TypeError(f"run takes a Case, not {kind}: Case.load reads a case file, Case.parse takes a document")
-    comm = _started(comm)
-    from feti_homog.analysis import runner
+        raise TypeError(f"run takes a Case, not {type(case).__name__}: Case.load reads a file, Case.parse a document")
+    with _started(comm) as comm:
+        from feti_homog.analysis import runner
 
-    if out is None:
-        return runner.compute(case, comm, fields, quiet)
-    return runner.run(case, folder(out), comm, quiet, resume, fields)
+        if out is None:
+            return runner.compute(case, comm, fields, quiet)
+        return runner.run(case, folder(out), comm, quiet, resume, fields)
 
 
 def run_sweep(
@@ -70,8 +74,7 @@ def run_sweep(
 ) -> sweep_table.SweepTable:
     """Run the sweep cases, given as a file or document.  Collective.
 
-    Returns the table of the cases on every rank.  Finished cases in `out` are kept, so that the same call resumes after
-    an interruption.
+    Returns the table of the cases on every rank.  The same call resumes an interrupted sweep in `out`.
 
     Args:
         ranks_per_case: ranks of a case (default: all); groups of this size work concurrently.
@@ -82,29 +85,24 @@ def run_sweep(
         CaseError: the cases are faulty, `out` cannot be used, or `ranks_per_case` does not divide the ranks.
         ConvergenceError: cases failed; `collect_sweep` makes the table of the finished cases.
     """
-    comm = _started(comm)
-    from feti_homog.studies import case_runs, collect, sweep_cases
+    with _started(comm) as comm:
+        from feti_homog.studies import case_runs, collect, sweep_cases
 
-    if isinstance(cases, Mapping):
-        sweep = mpi_errors.on_root(comm, sweep_cases.expand, cases, Path())
-    else:
-        sweep = mpi_errors.on_root(comm, sweep_cases.load, cases)
-    case_runs.run_all(sweep, folder(out), comm, ranks_per_case, retry, quiet)
-    return mpi_errors.on_root(comm, collect.read, Path(out))
+        given = (sweep_cases.expand, cases, Path()) if isinstance(cases, Mapping) else (sweep_cases.load, cases)
+        sweep = mpi_errors.on_root(comm, *given)
+        case_runs.run_all(sweep, folder(out), comm, ranks_per_case, retry, quiet)
+        return mpi_errors.on_root(comm, collect.read, Path(out))
 
 
 def collect_sweep(out: str | Path, comm: Intracomm | None = None, *, pictures: bool = True) -> list[str]:
     """Write cases.csv, statistics.csv and the sweep picture.  Collective.
 
-    The sweep may still be running.  Returns lines to print.
-
-    Raises:
-        CaseError: `out` is no sweep folder.
+    The sweep may still be running.  Returns lines to print.  Raises CaseError if `out` is no sweep folder.
     """
-    comm = _started(comm)
-    from feti_homog.studies import collect
+    with _started(comm) as comm:
+        from feti_homog.studies import collect
 
-    return mpi_errors.on_root(comm, collect.collect, Path(out), pictures)
+        return mpi_errors.on_root(comm, collect.collect, Path(out), pictures)
 
 
 def run_fit(
@@ -118,21 +116,18 @@ def run_fit(
 ) -> dict[str, Any]:
     """Fit the unknowns in a file or document to measured values.  Collective.
 
-    Returns the content of fit.json on every rank.  Every evaluation is kept in `out`, so that the same call resumes
-    after an interruption.  Arguments are as for `run_sweep`.
+    Returns the content of fit.json on every rank.  Interruptions and arguments are as for `run_sweep`.
 
     Raises:
         CaseError: the fit is faulty, or `out` cannot be used.
         ConvergenceError: a case failed, or the data do not determine the unknowns.
     """
-    comm = _started(comm)
-    from feti_homog.studies import fit_file
+    with _started(comm) as comm:
+        from feti_homog.studies import fit_file
 
-    if isinstance(fit, str | Path):
-        study = mpi_errors.on_root(comm, fit_file.load, Path(fit))
-    else:
-        study = mpi_errors.on_root(comm, fit_file.parse, fit, Path())
-    return study.run(folder(out), comm, ranks_per_case, retry, quiet)
+        given = (fit_file.parse, fit, Path()) if isinstance(fit, Mapping) else (fit_file.load, Path(fit))
+        content: dict[str, Any] = mpi_errors.on_root(comm, *given).run(folder(out), comm, ranks_per_case, retry, quiet)
+        return content
 
 
 def launch(
@@ -173,24 +168,29 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
     from mpi4py import MPI
 
     def main() -> int:
-        options = option_values.named_values(petsc)
-        faults = [*option_values.faulty_values(options), *option_table.unknown_options(options)]
-        if faults:
-            raise CaseError(*faults)
-        try:
-            libraries.start_petsc([sys.argv[0], *option_values.petsc_words(options)], MPI.COMM_WORLD)
-        except RuntimeError as error:  # raised by petsc4py before PETSc can name it
-            raise CaseError(f"PETSc does not start with {' '.join(petsc)}: {error}") from error
+        _start_petsc(petsc, MPI.COMM_WORLD)
         return command(words, MPI.COMM_WORLD)
 
     return mpi_errors.run_main(MPI.COMM_WORLD, main)
 
 
-def folder(name: str | Path) -> Path:
-    """Convert the name of a folder or file to a path.
+def _start_petsc(words: Sequence[str], comm: Intracomm) -> None:
+    """Start PETSc with the options in `words` and in PETSC_OPTIONS.  Collective.  Raises CaseError for faulty ones."""
+    others, of_environment = option_values.split_argv(os.environ.get("PETSC_OPTIONS", "").split())
+    os.environ["PETSC_OPTIONS"] = "-skip_petscrc"  # gmsh starts a PETSc of its own
+    options = option_values.named_values([*of_environment, *words])
+    faults = [f"PETSC_OPTIONS: {word}: expected options of PETSc and their values" for word in others]
+    faults += ["PETSC_OPTIONS_YAML: expected PETSC_OPTIONS in its place"] * ("PETSC_OPTIONS_YAML" in os.environ)
+    if faults := [*faults, *option_values.faulty_values(options), *option_table.unknown_options(options)]:
+        raise CaseError(*faults)
+    try:
+        libraries.start_petsc([sys.argv[0], *option_values.petsc_words(options)], comm)
+    except RuntimeError as error:  # raised by petsc4py before PETSc can name it
+        raise CaseError(f"PETSc does not start with {' '.join(words)}: {error}") from error
 
-    Raises CaseError for an empty name, which Path takes for the current folder, and for null characters.
-    """
+
+def folder(name: str | Path) -> Path:
+    """Convert a name to a path.  Raises CaseError for null characters, and for "", which Path takes for "."."""
     if name == "":
         raise CaseError('"" is no name of a folder; the current one is "."')
     if "\0" in str(name):
@@ -212,13 +212,23 @@ def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracom
         raise
 
 
-def _started(comm: Intracomm | None) -> Intracomm:
-    """Start PETSc unless it runs, and return the communicator, by default of all ranks."""
+@contextlib.contextmanager
+def _started(comm: Intracomm | None) -> Iterator[Intracomm]:
+    """Start PETSc unless it runs, and yield the communicator, by default of all ranks; for one thread at a time."""
+    standard_streams.prepare()
     environment.prefer_own_toolkits()
     libraries.require()
     from mpi4py import MPI
 
-    if "petsc4py.PETSc" not in sys.modules:
-        # On more ranks PETSc would wait for ranks without a case; a case brings its communicator.
-        libraries.start_petsc([], MPI.COMM_SELF)
-    return MPI.COMM_WORLD if comm is None else comm
+    comm = MPI.COMM_WORLD if comm is None else comm
+    if not isinstance(comm, MPI.Intracomm) or comm == MPI.COMM_NULL:
+        raise TypeError(f"comm is an intracommunicator of mpi4py, not {comm!r:.80}")
+    if (ended := MPI.Is_finalized()) or not RUNNING.acquire(blocking=False):
+        raise FetiHomogError("MPI has ended" if ended else "another thread of this process works with PETSc")
+    try:
+        if "petsc4py.PETSc" not in sys.modules:
+            # On more ranks PETSc would wait for ranks without a case; a case brings its communicator.
+            _start_petsc([], MPI.COMM_SELF)
+        yield comm
+    finally:
+        RUNNING.release()

@@ -8,6 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -90,14 +91,17 @@ def _torn(case: Case, comm: MPI.Intracomm, progress: progress_bar.Progress) -> I
     PETSc.garbage_cleanup(comm)  # all ranks free the parallel objects of earlier cases together
     process_memory.forget_peak(kept=SPARE_BYTES)
     with options_database.case_options(case.petsc):
-        cell = unit_cell.tear(case, comm, progress, policy=partition_policy.BY_COST)
+        cell = None
         try:
+            cell = unit_cell.tear(case, comm, progress, policy=partition_policy.BY_COST)
             options_database.refuse_unused()
             yield cell
-        except BaseException as error:
-            if mpi_errors.all_raise(comm, error):  # destroy is collective, and ranks without an error go on
+        except BaseException as met:
+            line = f"rounding leaves a matrix singular: stiffnesses differ by too much ({met})"
+            error = ConvergenceError(line) if isinstance(met, np.linalg.LinAlgError) else met
+            if cell and mpi_errors.all_raise(comm, error):  # destroy is collective, and ranks without an error go on
                 cell.destroy()
-            raise
+            raise error from met.__cause__
         cell.destroy()
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from feti_homog.analysis.result import Result
 from feti_homog.case import Case, cases
 from feti_homog.errors import CaseError
-from feti_homog.results import checkpoints, field_file, output_folder, result_json
+from feti_homog.results import checkpoints, field_file, field_guard, output_folder, result_json
 
 
 def read(directory: Path) -> dict[str, Any]:
@@ -36,15 +36,12 @@ def check_to_draw(directory: Path) -> str:
     # Also true for a circular link.
     if os.path.lexists(directory / result_json.NAME) or (directory / checkpoints.FOLDER).is_dir():
         return str(read(directory).get("unfinished", ""))
-    if not (directory / field_file.NAME).is_file():
-        raise CaseError(f"cannot read {directory / field_file.NAME}: No such file or directory")
+    field_guard.require_own(directory / field_file.NAME)
     return ""
 
 
 def finished(directory: Path, case: Case) -> bool:
-    """Return whether a folder has the complete result of a case.  Call on one rank.
-
-    A folder with a checkpoint has no complete result.
+    """Return whether a folder without checkpoint has a case's whole result.  Call on one rank.
 
     Raises:
         CaseError: the result is damaged, or belongs to another case.
@@ -80,7 +77,6 @@ def _restored(directory: Path, document: Mapping[str, Any]) -> Result:
 
 def _check_fields(directory: Path, result: Result) -> None:
     path = directory / field_file.NAME
-    if not path.is_file():
-        raise CaseError(f"{path}: it is missing; run the case again")
-    if result.result_h5 is not None:
+    if result.result_h5 is not None and path.is_file():
         result_json.check(path, result.result_h5)
+    field_guard.require_own(path)

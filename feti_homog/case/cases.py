@@ -222,15 +222,16 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
         selected[selector] = value if keys.keys_of(section)[selector.key].type.accepts(value) else None
     faults = [f"[{section}]: missing section" for section in sections.REQUIRED if section not in document]
     for name, value in document.items():
-        hint = wording.suggestion(name, sections.TOP_LEVEL, sections.KEY_OWNERS)
-        if name in sections.FIT_SECTIONS:
-            hint = "it belongs to the file of a fit; `feti-homog fit` runs it"
         if name in STUDIES:
             words = f"{name} = {wording.toml_value(value)}: expected a section [{name}]"
             faults.append(f"[{name}]: {STUDIES[name]}" if isinstance(value, dict) else words)
         elif name not in sections.TOP_LEVEL:
             is_section = isinstance(value, dict)
             key = f"[{wording.toml_key(name)}]" if is_section else wording.toml_key(name)
+            of_fit = (
+                "it belongs to the file of a fit; `feti-homog fit` runs it" if name in sections.FIT_SECTIONS else ""
+            )
+            hint = of_fit or wording.suggestion(name, sections.TOP_LEVEL, sections.KEY_OWNERS)
             faults.append(f"{key}: unknown {'section' if is_section else 'key'}; {hint}")
     if complaint := types.text.complaint(name := document.get("name", "case")):
         faults.append(f"name = {wording.toml_value(name)}: {complaint}")

@@ -158,7 +158,7 @@ class InterfaceSection:
     )
     normal_toughness: float | None = pair_key(
         kinds.TOUGHNESS,
-        "G_n, the energy per area that a bond takes in pure opening: no less than N^2 / (2 normal_stiffness).",
+        "G_n, the energy per area that a bond takes in pure opening: 1 to 1e12 times N^2 / (2 normal_stiffness).",
         unit="stress * length",
         default=None,
         only=(kinds.BREAKING, kinds.SOFTENING),

@@ -16,6 +16,8 @@ from feti_homog.schema import TableReader, keys, wording
 
 # Relative tolerance between a softening branch and the keys that repeat its numbers.
 SAME = 1e-6
+# Largest ratio of toughness to the energy at the peak: 1 - d of a damage d near 1 has three of its digits left.
+MOST_BRITTLE = 1e12
 COMMON = tuple(name for name, entry in keys.keys_of(InterfaceSection).items() if not entry.by_pair)
 """Keys with one value for all interfaces: every [[interface]] section must repeat it."""
 
@@ -166,6 +168,9 @@ def _faults_within(interface: InterfaceSection, table: Mapping[str, Any]) -> Ite
             if toughness < least * (1.0 - SAME):
                 line = f"expected at least {kind}_strength^2 / (2 {kind}_stiffness) = {least:.6g}, stored at the peak"
                 yield f"{kind}_toughness = {toughness:g}: {line}"
+            elif toughness > MOST_BRITTLE * least:
+                line = f"expected at most {MOST_BRITTLE * stiffness * least / toughness:.6g}"
+                yield f"{kind}_stiffness = {stiffness:g}: {line}; the damage of stiffer springs has no digits"
     if interface.friction == 0.0:
         return
     if not interface.contact:

@@ -79,9 +79,9 @@ STATES = types.either(f'"all", "peaks" or {KEPT.expected}', types.choice("all", 
 PAIR = types.list_of(types.text, f"the names of two phases, such as {PAIR_EXAMPLE}", count=2, unique=True)
 STRENGTH, STIFFNESS = _positive_or_inf("a traction"), _positive_or_inf("a stiffness")
 TOUGHNESS = replace(types.real(above=0.0), expected="an energy per area above 0")
-NUMBERS_ABOVE = types.list_of(types.real(least=0.0), "a list of two numbers or more, none below 0", least=2)
+NUMBERS_ABOVE = types.list_of(types.real(least=0.0), "a list of two numbers or more, none below 0", least=2, most=1000)
 _ANGLES = types.list_of(
-    types.real(least=0.0, most=360.0), "a rising list of numbers from 0 to 360", least=1, unique=True
+    types.real(least=0.0, most=360.0), "a rising list of numbers from 0 to 360", least=1, most=1000, unique=True
 )
 OPENINGS = replace(_ANGLES, accepts=lambda v: _ANGLES.accepts(v) and all(a < b for a, b in pairwise(v)))
 STRAIN = types.list_of(types.real(), f"a list of three numbers {STRAIN_COMPONENTS}", count=3)

@@ -15,8 +15,10 @@ from feti_homog.errors import CaseError
 from feti_homog.schema import wording
 from feti_homog.system.runtime import input_files
 
-MAX_BYTES = 1 << 24
-MAX_DEPTH = 50
+MAX_BYTES, MAX_DEPTH = 1 << 24, 50
+MAX_BITS = 10_000  # of an integer: Python writes none of more than 4 300 digits into messages
+MOST_KEYS, MOST_ENTRIES = 10_000, 100_000  # of a table, of a list
+DEEP_KEY = re.compile(rf"""(?<![\w-])((?>[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*+\.[ \t]*+){{{MAX_DEPTH}}}""")
 TOO_DEEP = f"tables and arrays are nested more than {MAX_DEPTH} deep"
 
 TomlPath = tuple[str, ...]
@@ -29,6 +31,8 @@ def read_document(path: str | Path) -> dict[str, Any]:
         raise CaseError(f"{str(path)!r}: no file has a name with a null character")
     try:
         content = input_files.read(path, MAX_BYTES, pipes=True).decode("utf-8-sig")
+        if DEEP_KEY.search(content):
+            raise RecursionError  # for tomllib takes time in the square of the length
         document = tomllib.loads(content)
     except UnicodeDecodeError as error:
         line = error.object.count(b"\n", 0, error.start) + 1
@@ -41,12 +45,6 @@ def read_document(path: str | Path) -> dict[str, Any]:
         raise CaseError(f"{path}: not TOML: {words.replace('end of document', place)}") from None
     except OSError as error:
         raise CaseError(f"{path}: cannot be read: {error.strerror}") from None
-    level: list[Any] = [document]
-    for _ in range(MAX_DEPTH):
-        entries = (entry for each in level for entry in (each.values() if isinstance(each, dict) else each))
-        level = [entry for entry in entries if isinstance(entry, dict | list)]
-    if level:
-        raise CaseError(f"{path}: {TOO_DEEP}")
     # Without a UTF-8 locale, Python escapes the bytes of file names.
     return {"name": os.fsencode(path.stem).decode("utf-8", "replace")} | document
 
@@ -59,26 +57,36 @@ def to_document(values: object) -> dict[str, Any]:
 
     Raises:
         TypeError: the values are no mapping.
-        CaseError: a key is no text.
+        CaseError: a key is no text, an integer is too large for messages, or tables are too long, too deep or a circle.
     """
     if not isinstance(values, Mapping):
         raise TypeError(
             f"expected the sections of a case as a dictionary, such as tomllib.load returns; got {_article(values)}"
         )
     faults: list[str] = []
-    document = {name: _to_toml(value, (str(name),), faults) for name, value in _named_items(values, (), faults)}
+    document: dict[str, Any] = _to_toml(values, (), faults)
     if faults:
         raise CaseError(*faults)
     return document
 
 
-def _to_toml(value: Any, path: TomlPath, faults: list[str]) -> Any:
-    if isinstance(value, Mapping):
-        return {name: _to_toml(entry, (*path, name), faults) for name, entry in _named_items(value, path, faults)}
+def _to_toml(value: Any, path: TomlPath, faults: list[str], depth: int = 0) -> Any:
+    if isinstance(value, str | float | bool) and not isinstance(value, np.generic):
+        return value  # first, for most are
     if isinstance(value, np.ndarray):
-        return _to_toml(value.tolist(), path, faults)
+        value = value.tolist()
+    if isinstance(value, Mapping | list | tuple):
+        most, noun = (MOST_KEYS, "keys") if isinstance(value, Mapping) else (MOST_ENTRIES, "entries")
+        if depth > MAX_DEPTH or len(value) > most:
+            words = TOO_DEEP if depth > MAX_DEPTH else f"{len(value)} {noun}; expected at most {most}"
+            raise CaseError(f"{wording.dotted_key(path) or 'the file'}: {words}")
+    if isinstance(value, Mapping):
+        named = _named_items(value, path, faults)
+        return {name: _to_toml(entry, (*path, name), faults, depth + 1) for name, entry in named}
     if isinstance(value, list | tuple):
-        return [_to_toml(entry, path, faults) for entry in value]
+        return [_to_toml(entry, path, faults, depth + 1) for entry in value]
+    if isinstance(value, int) and value.bit_length() > MAX_BITS:
+        faults.append(f"{wording.dotted_key(path)}: expected no integer of more than {MAX_BITS} bits")
     if isinstance(value, np.floating):
         return float(value)
     if isinstance(value, np.generic):

@@ -19,6 +19,10 @@ def verify(words: Sequence[str]) -> int:
 
     try:
         arguments = command_parser().parse_args(words)
+        if os.path.isfile(path := arguments.directory / "result.h5"):
+            from feti_homog.results import field_guard
+
+            field_guard.require_own(path)
         outcome = certificate.verify(arguments.directory)
         if prints:
             standard_streams.print_product(json.dumps(outcome.document, indent=1) if arguments.json else outcome.text)

@@ -5,6 +5,6 @@ Imports `case`, `fem`, `homogenization`, `materials`, `system` and `verify`.  Ma
 """
 
 __all__ = [
-    "atomic", "checkpoints", "field_file", "field_layout", "field_parts", "landmarks", "output_folder",
+    "atomic", "checkpoints", "field_file", "field_guard", "field_layout", "field_parts", "landmarks", "output_folder",
     "path_curves", "result_json", "viewed_states", "xdmf",
 ]  # fmt: skip

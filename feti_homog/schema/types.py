@@ -92,16 +92,17 @@ def _within(name: str, is_of_type: Test, store: Callable[[Any], Any], limits: Ma
 
 
 def list_of(
-    item: ValueType, expected: str, *, least: int = 0, count: int | None = None, unique: bool = False
+    item: ValueType, expected: str, *, least: int = 0, most: int = 0, count: int | None = None, unique: bool = False
 ) -> ValueType:
     """Return the type of lists with entries of one type.
 
-    A list has at least `least` or exactly `count` entries, all different if `unique`.
+    A list has `least` to `most`, if given, or exactly `count` entries, all different if `unique`.
     """
-    fewest, most = (least, math.inf) if count is None else (count, count)
+    fewest, largest = (least, most or math.inf) if count is None else (count, count)
+    expected += f", at most {most} of them" if most else ""
 
     def accepts(value: Any) -> bool:
-        has_length = isinstance(value, list) and fewest <= len(value) <= most
+        has_length = isinstance(value, list) and fewest <= len(value) <= largest
         return has_length and all(map(item.accepts, value)) and not (unique and len({*value}) < len(value))
 
     return ValueType(expected, accepts, lambda value: tuple(map(item.store, value)), item=item if item.table else None)

@@ -14,7 +14,7 @@ from feti_homog.studies.axes import Assignment
 from feti_homog.studies.fit import Fit
 from feti_homog.studies.predictions import Datum, data_faults
 
-MOST_ROWS = 10_000
+MOST_ROWS, MOST_TESTS = 10_000, 1000
 LEAST_STD = 1e-12  # relative to the value: smaller deviations are below rounding errors
 
 
@@ -93,8 +93,9 @@ class FitReader:
             )
             return [], []
         rows = [{sections.MEASURED: measured}] if tests is None else tests
-        if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-            self.faults.append(f"{sections.TEST} = {wording.toml_value(rows)}: expected sections [[{sections.TEST}]]")
+        if not isinstance(rows, list) or len(rows) > MOST_TESTS or not all(isinstance(row, dict) for row in rows):
+            words = f"expected sections [[{sections.TEST}]], at most {MOST_TESTS}"
+            self.faults.append(f"{sections.TEST} = {wording.toml_value(rows)}: {words}")
             return [], []
         assignments, data = list[Assignment](), list[Datum]()
         both = {*keys.keys_of(sections.Measured), *keys.keys_of(sections.MeasuredCurve)}

@@ -62,6 +62,9 @@ def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty
     given = [(path, value) for path, value in stds if value != {}]
     for section in document:
         document[section] = _means(document[section], (section,), given, faults)
+    if len(given) > 1000:
+        faults.append(f"[{sections.UNCERTAINTY}]: {len(given)} uncertain numbers; expected at most 1000")
+        return Uncertainty({})
     paths, named = [path for path, _ in given], {".".join(path): value for path, value in given}
     for path, value in dict(given).items():
         name = f"[{sections.UNCERTAINTY}] {wording.dotted_key(path)}"

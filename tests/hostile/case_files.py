@@ -24,6 +24,7 @@ CELLS = {
         "elements before refine",
     ),
 }
+UNKNOWN = "material.fibre.young = {start = 70.0, lower = 10.0, upper = 200.0}\n"
 FILES: dict[str, tuple[Content, str]] = {
     "endless": (lambda path: path.symlink_to("/dev/zero"), "more than 16 MiB"),
     "a link in a circle": (lambda path: path.symlink_to(path), "Too many levels of symbolic links"),
@@ -32,13 +33,41 @@ FILES: dict[str, tuple[Content, str]] = {
     "colours of a key": (changed(("young = 88.0", '"\\u001b[31m" = 88.0')), r"\u001b[31m"),
     "colours of a name": (changed(('"strain"', '"\\u001b[31m"')), r"\u001b[31m"),
     "turned text": (changed(('"strain"', '"\u202e"')), "\\u202e"),
-    "1e5 keys": (BASE + "".join(f"x{k} = 1\n" for k in range(100_000)), "more faults"),
+    "1e5 keys": (BASE + "".join(f"x{k} = 1\n" for k in range(100_000)), "keys; expected at most 10000"),
+    "a key of 3e6 parts": ("a." * 3_000_000 + "b = 1\n", "nested more than 50 deep"),
+    "quoted parts of a key": ("['a' . " + '"" .' * 500_000 + "b]\n", "nested more than 50 deep"),
+    "1e4 sections": (BASE + "".join(f"[x{k}]\n" for k in range(9_000)), "more faults"),
+    "1e6 angles": (BASE + f"[angle]\nvalues = [{'1.0, ' * 1_000_000}]\n", "entries; expected at most 100000"),
+    "2000 angles": (BASE + f"[angle]\nvalues = {[k * 0.1 for k in range(2000)]}\n", "at most 1000 of them"),
+    "3000 tests": (
+        BASE + f"[unknown]\n{UNKNOWN}" + "[[test]]\nmeasured.E1 = {value = 1, std = 1}\n" * 3000,
+        "at most 1000",
+    ),
+    "9000 uncertain numbers": (
+        BASE + "[uncertainty]\n" + "".join(f"material.fibre.x{k} = 1.0\n" for k in range(9000)),
+        "9000 uncertain numbers; expected at most 1000",
+    ),
     "a bad range of 1e4 cases": (
         BASE + '[sweep]\n"cell.fibre_fraction" = {from = 1.0, to = 2.0, step = 1e-4}\n',
         "more faults",
     ),
-    "1e5 waypoints": (changed(SMALL, PATH, end=f"[path]\nwaypoints = [{'[nan, 0, 0], ' * 100_000}]\n"), ""),
+    "1e5 waypoints": (changed(SMALL, PATH, end=f"[path]\nwaypoints = [{'[1, 0, 0], ' * 100_000}]\n"), "at most 10000"),
 }
+
+SPRINGS = "[path]\nstrain = [0.1, 0, 0]\n[output]\npictures = false\n[interface]\nnormal_stiffness = {}\n"
+SPRINGS += "tangential_stiffness = {}\nlaw = "
+STRENGTHS = "normal_strength = 0.05\ntangential_strength = 0.05\n"
+LAWS = {
+    "energy of soft springs": ('"energy"\ntoughness = 1e-3\n', ("1e3", "1e-99"), "error: ", 3),
+    "soft springs": (f'"max"\n{STRENGTHS}', ("1e99", "1e-99"), "leaves a matrix singular", 3),
+    "damage of stiff springs": (
+        f'"bilinear"\n{STRENGTHS}normal_toughness = 1e-3\ntangential_toughness = 1e-3\n',
+        ("1e99", "1e99"),
+        "expected at most 1.25e+12",
+        2,
+    ),
+}
+"""Laws at the edges of their ranges."""
 
 
 def attempts() -> Iterator[Attempt]:
@@ -56,6 +85,11 @@ def attempts() -> Iterator[Attempt]:
         yield Attempt("cells", name, ("check", "@/c.toml"), expected, {"c.toml": case})
     for name, (content, expected) in FILES.items():
         yield Attempt("case files", name, ("check", "@/c.toml"), expected, {"c.toml": content})
+    for name, (law, stiffnesses, expected, code) in LAWS.items():
+        case = changed(("0.05", "0.3"), PATH, end=SPRINGS.format(*stiffnesses) + law)
+        yield Attempt(
+            "laws", name, ("run", "@/c.toml", "--out", "@/out", "--quiet"), expected, {"c.toml": case}, (code,)
+        )
     yield Attempt("case files", "of no name", ("check", "@/a\0b.toml"), "null character")
     yield Attempt("case files", "none", ("check", "@/\x1b[31m.toml"), r"\x1b[31m")
     yield Attempt("options", "of control characters", ("check", "@/c.toml", "--\x1b[31m"), r"\x1b[31m")

@@ -1,6 +1,7 @@
 """Surroundings of a process: limits, settings of the folder, rights, full disks, kills, ranks."""
 
 import os
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -37,8 +38,46 @@ SURROUNDINGS: dict[str, tuple[str, str, tuple[int, ...]]] = {
         (0,),
     ),
     "a backend that is none": ("MPLBACKEND=nonexistent feti run drawn.toml --out out", "cell.png", (0,)),
+    "options by a pipe": (
+        "mkfifo out/p; PETSC_OPTIONS='-options_file out/p' feti check c.toml",
+        "-options_file out/p: expected a file",
+        (2,),
+    ),
+    "options of a file of itself": (
+        "echo -options_file out/o > out/o; PETSC_OPTIONS='-options_file out/o' feti check c.toml",
+        "none of another file",
+        (2,),
+    ),
+    "options of the environment": (
+        "echo -history > out/o; PETSC_OPTIONS='-feti_ksp_rtol 2 -options_file out/o' feti check c.toml",
+        "-history: no option",
+        (2,),
+    ),
+    "words of the environment": ("PETSC_OPTIONS=foo feti check c.toml", "PETSC_OPTIONS: foo: expected options", (2,)),
+    "options of YAML": ("PETSC_OPTIONS_YAML='a: b' feti check c.toml", "PETSC_OPTIONS_YAML: expected", (2,)),
+    "good options of the environment": (
+        r"printf '# a\n-feti_ksp_rtol 1e-9 # b\n' > out/o; PETSC_OPTIONS='-options_file out/o' feti check c.toml",
+        "the case is valid",
+        (0,),
+    ),
+    "a .petscrc at home": (
+        "mkdir out/h; echo -start_in_debugger > out/h/.petscrc; HOME=out/h feti check c.toml",
+        "",
+        (0,),
+    ),
     "a case by a pipe": ("feti check <(cat c.toml)", "the case is valid", (0,)),
     "an endless case by a pipe": ("cat /dev/zero | feti check /dev/stdin", "more than 16 MiB", (2,)),
+}
+PROGRAM = "import sys\nfrom feti_homog import Case, run\nfrom mpi4py import MPI\ncase = Case.load('c.toml')\n"
+PROGRAMS = {
+    "no standard output": "sys.stdout = None\nrun(case, quiet=False)\n",
+    "a closed standard output": "sys.stdout.close()\nsys.stderr.close()\nrun(case, quiet=False)\n",
+    "no MPI": "MPI.Finalize()\ntry:\n    run(case)\nexcept Exception as met:\n    assert str(met) == 'MPI has ended'\n",
+    "threads": (
+        "from concurrent.futures import ThreadPoolExecutor\nwith ThreadPoolExecutor(3) as pool:\n"
+        "    ends = [pool.submit(run, case) for _ in range(3)]\nerrors = {str(end.exception()) for end in ends}\n"
+        "assert errors == {'None', 'another thread of this process works with PETSc'}, errors\n"
+    ),
 }
 FULL: dict[str, str] = {
     "keys": "feti keys",
@@ -85,6 +124,8 @@ def attempts(prepared: Path) -> Iterator[Attempt]:
             yield Attempt(kind, name, (), expected, files | {"out/x": ""}, codes, shell)
     for name, words in FULL.items():
         yield Attempt("full outputs", name, (), "standard output cannot be written", made, (1,), f"{words} > /dev/full")
+    for name, content in PROGRAMS.items():
+        yield Attempt("programs", name, (), "", {**files, "p.py": PROGRAM + content}, (0,), f"{sys.executable} p.py")
     tag = '"$(hostname).1.0"'  # of a process that began with the machine, which none did
     shell = f"touch out/cell.png.{tag}.part; feti plot out && [ ! -e out/cell.png.{tag}.part ]"
     yield Attempt("leftovers", "of a dead plot", (), "cell.png", made, (0,), shell)

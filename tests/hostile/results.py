@@ -3,9 +3,11 @@
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import h5py
 from support.base_case import changed
 from support.small_path import PATH
 
@@ -113,6 +115,49 @@ FIELDS: dict[str, tuple[Content, str]] = {
     "cut off": (lambda path: os.truncate(path, path.stat().st_size // 2), ""),
     "text": ("\x1b[31m" * 1000, ""),
 }
+
+
+def with_tables(change: Callable[[h5py.File], object]) -> Callable[[Path], None]:
+    """Change the tables of a folder's result.h5, which then has the checksum of what it is."""
+
+    def make(path: Path) -> None:
+        with h5py.File(path, "r+") as file:
+            change(file)
+        sealed(lambda document: document.update(result_h5=asdict(result_json.seal(path))))(
+            path.with_name("result.json")
+        )
+
+    return make
+
+
+def in_place(name: str, make: Callable[[h5py.File, str], object]) -> Callable[[Path], None]:
+    def change(file: h5py.File) -> None:
+        del file[name]
+        make(file, name)
+
+    return with_tables(change)
+
+
+def virtual(file: h5py.File, name: str) -> None:
+    layout = h5py.VirtualLayout((4, 3), "f8")
+    layout[:] = h5py.VirtualSource("/etc/passwd", "a", (4, 3))
+    file.create_virtual_dataset(name, layout)
+
+
+STRESS, NO_RESULT = "state/0/stress", "no result"
+TABLES: dict[str, Callable[[Path], None]] = {
+    "a link to a pipe": in_place(STRESS, lambda f, name: f.__setitem__(name, h5py.ExternalLink("pipe", "/a"))),
+    "a link to itself": in_place(STRESS, lambda f, name: f.__setitem__(name, h5py.SoftLink(f"/{name}"))),
+    "a circle of groups": with_tables(lambda f: f.__setitem__("state/0/up", f["state"])),
+    "raw data of others": in_place(
+        STRESS, lambda f, name: f.create_dataset(name, (9, 3), "f8", external=[("/etc/passwd", 0, h5py.h5f.UNLIMITED)])
+    ),
+    "views of others": in_place(STRESS, virtual),
+    "1e15 points": in_place("mesh/points", lambda f, name: f.create_dataset(name, (10**15, 2), "f8", chunks=(999, 2))),
+    "tables without data": in_place("mesh/points", lambda f, name: f.create_dataset(name, (10**9, 2), "f8")),
+    "2000 hard links": with_tables(lambda f: [f.__setitem__(f"state/x{k}", f["state/0"]) for k in range(2000)]),
+    "texts": in_place(STRESS, lambda f, name: f.create_dataset(name, (9, 3), h5py.string_dtype())),
+}
 SWEEPS: dict[str, tuple[Content, str]] = {
     "a pipe": (replaced(os.mkfifo), "it is a pipe"),
     "endless": (link_to("/dev/zero"), "it is no file but a device"),
@@ -146,6 +191,10 @@ def attempts(prepared: Path) -> Iterator[Attempt]:
         for command in READERS:
             files = {"out": copy_of(prepared / "path", result_h5=content)}
             yield Attempt("result.h5", f"{name}, {command}", COMMANDS[command], expected, files, (2, 3))
+    for name, make in TABLES.items():
+        for command in ("plot", "report", "verify", "fields"):
+            files = {"pipe": os.mkfifo, "out": copy_of(prepared / "path", result_h5=make)}
+            yield Attempt("tables of fields", f"{name}, {command}", (command, "@/out"), NO_RESULT, files, (2,))
     files = {"out": copy_of(prepared / "path", path_csv=link_to("/dev/zero"))}
     yield Attempt("tables of points", "endless, which is none", COMMANDS["verify"], "", files, (0,))
     for name, (content, expected) in SWEEPS.items():

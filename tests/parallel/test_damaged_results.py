@@ -93,7 +93,7 @@ DAMAGES = {
 OF_PLOT = {
     "neither": (
         lambda out: [(out / name).unlink() for name in ("result.json", "result.h5")],
-        "No such file or directory",
+        "result.h5: it is missing",
     ),
     "result.json is a folder": (lambda out: gone(out / "result.json"), "Is a directory"),
     "no result.h5": (lambda out: (out / "result.h5").unlink(), "result.h5: it is missing"),
@@ -102,10 +102,10 @@ OF_PLOT = {
         lambda out: other(out, "result.json"),
         "result.h5: it is damaged, or of another run",
     ),
-    "no folder": (shutil.rmtree, "No such file or directory"),
+    "no folder": (shutil.rmtree, "result.h5: it is missing"),
     "unfinished": (
         lambda out: [(out / name).rename(out / f"{name}.vm.1.part") for name in ("result.json", "result.h5")],
-        "No such file or directory",
+        "result.h5: it is missing",
     ),
 }
 OF_RESUME = {"result of another case": (lambda out: other(out, "result.json"), "holds the result of another case")}

@@ -1,5 +1,7 @@
 """`from feti_homog import Case, run` in a program of its own: arrays, no files, and communicators of any size."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import h5py
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from support.cases import MATRIX, make_case
 from support.jobs import mpirun
 from support.ranks import parallel_assert
 
-from feti_homog import Case, CaseError, ConvergenceError, collect_sweep, run, run_sweep
+from feti_homog import Case, CaseError, ConvergenceError, FetiHomogError, api, collect_sweep, run, run_sweep
 from feti_homog.results.field_layout import tables
 from feti_homog.system.runtime.records import plain
 
@@ -176,6 +178,20 @@ def test_files_of_an_earlier_run_do_not_stay_beside_the_result(comm, shared_path
 def test_what_is_no_case_is_refused(comm, case):
     with pytest.raises(TypeError, match=r"run takes a Case, not .*Case.load .*Case.parse"):
         run(case, comm)
+
+
+@pytest.mark.parametrize("wrong", [3, MPI.COMM_NULL, MPI.GROUP_EMPTY, MPI])
+def test_what_is_no_communicator_is_refused(wrong):
+    with pytest.raises(TypeError, match=r"comm is an intracommunicator"):
+        run(with_fraction(0.4), wrong)
+
+
+def test_a_second_thread_is_refused(comm):
+    """Two threads in PETSc would crash it."""
+    with api._started(comm), ThreadPoolExecutor(1) as other:
+        refused = other.submit(run, with_fraction(0.4), comm).exception()
+        assert isinstance(refused, FetiHomogError) and "another thread" in str(refused)
+        assert run(with_fraction(0.4), comm).status == "done"
 
 
 def test_faulty_sweeps_are_refused(comm, shared_path):

@@ -17,7 +17,7 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 LINES = {
     ".": 470,
     "analysis": 3000 + 80,
-    "case": 2880 + 25,
+    "case": 2880 + 40,
     "commands": 560,
     "fem": 1150,
     "feti": 6300,
@@ -27,13 +27,13 @@ LINES = {
     "mesh": 5500,
     "microstructure": 2140,
     "report": 3420 + 160,
-    "results": 2430,
+    "results": 2430 + 25,
     "schema": 430,
     "studies": 2950,
     "system": 1770,
     "verify": 3100 + 160,
 }
-FILES, TOTAL = 310, 45000 + 120
+FILES, TOTAL = 310, 45000 + 150
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.0, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

@@ -65,10 +65,10 @@ def gmsh_session() -> Iterator[ModuleType]:
     """Run gmsh in a context, silently, with fixed options and an empty model."""
     import gmsh
 
-    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    gmsh.initialize(["gmsh", "-v", "0", "-skip_petscrc"], False, interruptible=False)  # it starts a PETSc
     try:
         options = {"General.Terminal": 0, "General.NumThreads": 1, "Mesh.RandomSeed": 1, "Mesh.Renumber": 0}
-        for option, value in options.items():
+        for option, value in {**options, "General.Verbosity": 5}.items():
             gmsh.option.setNumber(option, value)
         gmsh.model.add("cell")
         yield gmsh

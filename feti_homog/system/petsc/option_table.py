@@ -79,17 +79,15 @@ PREFIXES = ("feti_ksp_", "feti_pc_", *DIRECT_PREFIXES)
 
 # Options that PETSc reads when it starts, logs and ends.
 PETSC_NAMES = (
-    *("help", "version", "info", "info_exclude", "history", "citations", "python", "tmp", "shared_tmp"),
-    *("log_view", "log_view_memory", "log_view_gpu_time", "log_all", "log_trace", "log_sync", "log_mpe", "log_exclude"),
-    *("log_nvtx", "log_perfstubs", "get_total_flops"),
-    *("malloc", "malloc_debug", "malloc_dump", "malloc_view", "malloc_view_threshold", "malloc_test", "malloc_info"),
-    *("malloc_hbw", "malloc_coalesce", "malloc_requested_size", "memory_view", "objects_dump", "checkstack"),
-    *("options_file", "options_file_yaml", "options_string_yaml", "options_left", "options_view", "options_monitor"),
-    *("options_monitor_cancel", "options_suppress_deprecated_warnings", "skip_petscrc"),
-    *("on_error_abort", "on_error_mpiabort", "on_error_emacs", "on_error_attach_debugger", "error_output_stdout"),
-    *("error_output_none", "no_signal_handler", "fp_trap", "start_in_debugger", "stop_for_debugger", "debug_terminal"),
-    *("debugger_ranks", "debugger_nodes", "debugger_pause", "check_pointer_intensity", "mpidump"),
+    *("help", "version", "info", "info_exclude", "tmp", "shared_tmp", "log_view", "log_view_memory"),
+    *("log_view_gpu_time", "log_all", "log_trace", "get_total_flops", "malloc", "malloc_debug", "malloc_dump"),
+    *("malloc_view", "malloc_test", "memory_view", "objects_dump", "checkstack", "options_file", "options_left"),
+    *("options_view", "options_monitor", "options_monitor_cancel", "options_suppress_deprecated_warnings"),
+    *("skip_petscrc", "on_error_abort", "on_error_mpiabort", "error_output_stdout", "error_output_none"),
+    *("no_signal_handler", "fp_trap", "check_pointer_intensity", "mpidump"),
 )
+# With options of these beginnings PETSc waits for somebody, runs other code, or reads what nobody has checked.
+NOT_IN_BATCH = re.compile("history|citations|python|options_.*yaml|start_|stop_|debug|dll|on_error_(att|em)")
 # More of each beginning, of which every release of PETSc has others.
 PETSC_BEGINNINGS = ("log_", "malloc_", "device_", "cuda_", "hip_", "sf_", "viewer_", "use_gpu_aware_mpi")
 
@@ -110,6 +108,8 @@ def unknown_options(names: Iterable[str]) -> list[str]:
             hint = "" if name in TABLE or solver_prefix(name) else f"unknown option; {suggestion(name)}"
         elif f"feti_{name}" in TABLE:
             hint = f"not an option of this program; did you mean -feti_{name}?"
+        elif NOT_IN_BATCH.match(name):
+            hint = "no option of a program that runs in batch"
         elif name not in PETSC_NAMES and (nearest := difflib.get_close_matches(name, PETSC_NAMES, 1, CLOSE)):
             hint = f"unknown option; did you mean -{nearest[0]}?"
         elif name not in PETSC_NAMES and not name.startswith(PETSC_BEGINNINGS):

@@ -16,7 +16,7 @@ OptionRule = tuple[str, Callable[[str], bool]]
 TRUE, FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 VIEWER = re.compile(r"(ascii)?(:(?P<file>[^:]*)(:(default|ascii_\w+)?(:(write|append))?)?)?")
 FLAGS = (
-    *("feti_view", "malloc_debug", "malloc_test", "log_view_memory", "log_view_gpu_time"),
+    *("feti_view", "malloc_debug", "malloc_test", "malloc_requested_size", "log_view_memory", "log_view_gpu_time"),
     *("options_left", "skip_petscrc", "on_error_abort", "on_error_mpiabort", "no_signal_handler"),
 )
 CASE_FILE = ".toml"
@@ -113,14 +113,14 @@ def _is_place(text: str) -> bool:
     return _is_switch(text) or (match is not None and (not match["file"] or can_be_written(match["file"])))
 
 
-def _has_options(file: str) -> bool:
-    """Return whether a file can be read, and its lines are options, comments or aliases."""
+def _words_of(file: str) -> list[str]:
+    """Return the words of an options file; none of a file that cannot be read, or has other words or files."""
     try:
-        content = input_files.read(Path(file), 1 << 20)
+        lines = input_files.read(Path(file), 1 << 20).decode("utf-8", "replace").splitlines()
     except (OSError, ValueError):  # ValueError: of a null character
-        return False
-    lines = [line.strip() for line in content.decode("utf-8", "replace").splitlines()]
-    return all(not line or line.startswith(("-", "#", "!", "%", "alias ")) for line in lines)
+        return []
+    words = [word for line in lines for word in re.split(r"(^|\s)#|^ *[!%]", line)[0].split()]
+    return [] if split_argv(words)[0] or "-options_file" in map(str.lower, words) else words
 
 
 SWITCH: OptionRule = "true or false, or no value", _is_switch
@@ -150,7 +150,7 @@ RULES: dict[str, OptionRule] = {
         ("info", "malloc_dump", "malloc_view"),  # up to its first colon the text is a switch or a file
         (NEW_FILE, lambda text: _is_switch(file := text.partition(":")[0]) or can_be_written(file)),
     ),
-    "options_file": ("a file with an option of PETSc in each line", _has_options),
+    "options_file": ("a file with an option of PETSc in each line, none of another file", lambda text: False),
     "log_trace": (NEW_FILE, lambda text: not text or can_be_written(text)),
 }
 """For each of these options, what is expected in words, and whether a text is that."""
@@ -180,13 +180,16 @@ def split_argv(argv: Sequence[str]) -> tuple[list[str], list[str]]:
 
 
 def named_values(words: Sequence[str]) -> dict[str, str]:
-    """Return the values of PETSc's options on the command line by name without dash; empty without a value."""
+    """Return the values of PETSc's options by name without dash, empty without a value; with those of options files."""
     values: dict[str, str] = {}
     name = ""
     for word in words:
         if _is_petsc(word):
             name = word[1:].lower()  # PETSc takes names in either case
             values[name] = ""
+        elif name == "options_file" and (inner := _words_of(word)):
+            del values[name]
+            values |= named_values(inner)
         else:
             values[name] = word
     return values

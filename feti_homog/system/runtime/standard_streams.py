@@ -20,8 +20,7 @@ from feti_homog.system.runtime import file_locks
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGXCPU)  # the last: the limit of CPU time
 # Variables in which launchers give the rank of a process before MPI has started.
 RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
-# How long the others wait: after a rank has ended, Open MPI drops what rank 0 prints, and a call of a library may keep
-# rank 0 from hearing the signal for a while.
+# How long the others wait for rank 0, which a library may keep from the signal: then Open MPI drops what rank 0 prints.
 SILENT_SECONDS = 5.0
 KEPT = "\n\t"  # of the characters that are not printable; others may come from files
 
@@ -61,10 +60,11 @@ def prepare() -> None:
             os.fstat(number)
         except OSError:  # the next file that is opened would take its place, and what is printed
             os.open(os.devnull, os.O_RDWR)
-    sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: SIM115 (None if it was closed)
-    sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: SIM115
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if getattr(stream, "closed", stream is None):  # None if it was closed before Python began
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115
+        elif isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
 
 

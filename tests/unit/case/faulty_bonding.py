@@ -146,6 +146,7 @@ BRANCH = ['law = "table"', "tangential_stiffness = 10.0", "tangential_strength =
 FAULTY_COHESIVE_LAWS: dict[str, str] = {
     **faults(of_type("path", PATH, "[interface]", *SOFTENING, "normal_toughness = 1"), {
         "[interface] normal_toughness = 0.0049": "expected at least normal_strength^2 / (2 normal_stiffness) = 0.005",
+        "[interface] normal_stiffness = 1e+99": "expected at most 5e+11; the damage of stiffer springs has no digits",
         "[interface] teeth = 0": "expected an integer at least 1 and at most 10000",
         '[interface] growth = "released"':
             'belongs to law = "energy", not "bilinear"; use no growth: a law that softens takes the energy of its',

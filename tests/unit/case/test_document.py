@@ -96,6 +96,8 @@ def test_what_is_no_mapping_is_a_type_error(values):
         Case.parse(values)
 
 
+CIRCLE: list[Any] = []
+CIRCLE += [CIRCLE, CIRCLE]
 FAULTY: dict[str, tuple[dict[Any, Any], str]] = {
     "number as section": ({3: {}}, "3: expected a text as key, not an int"),
     "number as key": ({"cell": {3: 4}}, "[cell] 3: expected a text as key, not an int"),
@@ -115,6 +117,11 @@ FAULTY: dict[str, tuple[dict[Any, Any], str]] = {
     "nan": ({"cell": {"mesh_size": np.nan}}, "[cell] mesh_size = nan: expected a number"),
     "function": ({"cell": {"geometry": len}}, '[cell] geometry = "<built-in function len>": expected one of'),
     "real as integer": ({"cell": {"refine": np.float64(2)}}, "[cell] refine = 2.0: expected an integer"),
+    "integer without end": (
+        {"cell": {"refine": 1 << 20_000}},
+        "cell.refine: expected no integer of more than 10000 bits",
+    ),
+    "circle": ({"cell": CIRCLE}, "cell: tables and arrays are nested more than 50 deep"),
     "truth as number": ({"cell": {"refine": np.bool_(True)}}, "[cell] refine = true: expected an integer"),
 }
 

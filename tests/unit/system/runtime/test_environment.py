@@ -59,7 +59,7 @@ def test_matplotlib_finds_its_own_toolkits(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("start", ["api.start(lambda words, comm: 0, [])", "api._started(None)"])
+@pytest.mark.parametrize("start", ["api.start(lambda words, comm: 0, [])", "api._started(None).__enter__()"])
 def test_every_start_of_the_program_pairs_them(tmp_path: Path, start: str) -> None:
     shown, warning = words_of(tmp_path, f"{BOUND_TO_ANOTHER}from feti_homog import api; {start}\n{CHECK}")
     assert shown == "True\n" and "Axes3D" not in warning
