@@ -153,7 +153,9 @@ class StateRecorder:
         for k, name in enumerate(recovered_fields.MEASURES):
             if name != "utilisation" or material.strength is not None:
                 columns[name] = np.array([state[phase].value[k] for state in self._largest])
-                columns[f"{name}_at"] = np.array([state[phase].position[k] for state in self._largest])
+                columns[f"{name}_at"] = (
+                    np.array([state[phase].position[k] for state in self._largest]) + self._cell.summary.origin
+                )
         criterion = None if material.strength is None else strength.criterion(material.strength)
         return PhaseStresses(phase=phase, state=tuple(self._labels), criterion=criterion, **columns)
 

@@ -195,6 +195,7 @@ def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Field
         mesh_size=None if cell.case.cell.has_own_mesh else cell.case.cell.mesh_size,
         refine=cell.case.cell.refine,
         match_distance=cell.summary.match_distance,
+        origin=cell.summary.origin,
     )
     return Result(
         version=__version__,

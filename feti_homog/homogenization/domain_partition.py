@@ -34,6 +34,7 @@ class CellSummary:
         centres, radii: (constituents, 2) and (constituents,) centres in the cell and radii of fibres, else NaN.
         frames: (constituents, 2, 2) as in `Ellipses`, for fibres that are circles or ellipses; else NaN.
         snapped: largest distance that a node in a user's mesh was moved to make sides match.
+        origin: lower left corner of the cell in the coordinates of the user; all other places are relative to it.
         voids: void count.
         match_distance: distance between the fibres and a matched table, see `random_fibres`; None without a table.
         remarks: lines about unexpected cell properties.
@@ -56,6 +57,7 @@ class CellSummary:
     frames: Float
     moved_tips: tuple[debonded_arcs.MovedTips, ...]
     snapped: float
+    origin: tuple[float, float]
     voids: int
     match_distance: float | None
     remarks: tuple[str, ...]
@@ -170,6 +172,7 @@ def distribute(
         frames=mesh_fibres.fibre_frames(torus),
         moved_tips=tuple(map(dict, moved)),
         snapped=mesh.snapped,
+        origin=mesh.origin,
         voids=coarse_mesh.voids(mesh) if torus.at_void.any() else 0,
         match_distance=match_distance(case, mesh.width, mesh.height, centres[is_fibre], circles[is_fibre, 2]),
         remarks=(*cell_remarks.table_remarks(case), *cell_remarks.mesh_remarks(case, torus, pairs), *notes),
@@ -207,6 +210,7 @@ def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triang
         frames=np.concatenate([np.full((1, 2, 2), np.nan), regions.ellipses.frames[circle]]),
         moved_tips=({},) * len(case.interfaces),
         snapped=0.0,
+        origin=arrangement.origin,
         voids=arrangement.voids,
         match_distance=match_distance(case, regions.width, regions.height, centres[is_fibre], radii[is_fibre]),
         remarks=(

@@ -25,6 +25,7 @@ def header(cell: unit_cell.TornCell) -> Header:
         phases=plan.phases,
         length_unit=case.output.length_unit,
         stress_unit=case.output.stress_unit,
+        origin=plan.origin,
         case=json.dumps(case.resolved(), default=os.fspath),
     )
 
@@ -38,7 +39,7 @@ def mesh_part(cell: unit_cell.TornCell) -> MeshPart:
     triangles = [s.mesh.triangles + n for s, n in zip(subdomains, nodes, strict=False)]
     phase = [cell.summary.phases.index(s.submesh.phase) for s in subdomains]
     return MeshPart(
-        points=np.concatenate([s.mesh.points for s in subdomains] or [np.zeros((0, 2))]),
+        points=np.concatenate([s.mesh.points for s in subdomains] or [np.zeros((0, 2))]) + cell.summary.origin,
         triangles=np.concatenate(triangles or [np.zeros((0, columns), np.int64)]),
         body=np.repeat([s.submesh.body for s in subdomains], sizes).astype(np.int32),
         subdomain=np.repeat([s.submesh.index for s in subdomains], sizes).astype(np.int32),
@@ -56,10 +57,31 @@ def fibre_part(cell: unit_cell.TornCell) -> FibrePart:
         number=summary.fibre_number(body),
         body=body,
         phase=summary.constituent_phase[body],
-        centre=summary.centres[body],
+        centre=fibre_centres(cell)[: len(body)],
         radius=summary.radii[body],
         strength=cell.strength_factors[: len(body)],
     )
+
+
+def fibre_centres(cell: unit_cell.TornCell) -> Float:
+    """Return the fibre centres (fibres, 2) in the coordinates of the user, as a table lists them."""
+    summary, table = cell.summary, cell.case.cell.table
+    centres = summary.centres[summary.fibre_bodies] + summary.origin
+    if table is None:
+        return centres
+    from feti_homog.microstructure import periodic_table  # imports the windows of tables
+
+    return periodic_table.listed_centres(table, cell.case.cell.window, centres)
+
+
+def table_rows(cell: unit_cell.TornCell) -> list[int | None]:
+    """Return the row of each fibre in the fibre table, from 1; None for each fibre of another cell."""
+    table = cell.case.cell.table
+    if table is None:
+        return [None] * cell.summary.fibres
+    from feti_homog.microstructure import periodic_table  # imports the windows of tables
+
+    return table.number[periodic_table.fibre_rows(table, cell.case.cell.window)].tolist()
 
 
 def interface_part(cell: unit_cell.TornCell) -> InterfacePart:
@@ -68,7 +90,7 @@ def interface_part(cell: unit_cell.TornCell) -> InterfacePart:
     first = cell.comm.exscan(sum(len(s.mesh.points) for s in cell.parts)) or 0
     numbers = first + cell.class_nodes
     return InterfacePart(
-        points=nodes.points,
+        points=nodes.points + cell.summary.origin,
         normal=nodes.normal,
         length=nodes.length,
         fibre=nodes.fibre,

@@ -109,6 +109,7 @@ def made(raw: RawMesh, path: str, has_voids: bool = True) -> CoarseMesh:
         arc_edges=np.zeros((0, 2), np.int32),
         arc_circle=np.zeros(0, np.int32),
         debonded_edges=np.searchsorted(raw.node_tags, raw.debonded).astype(np.int32),
+        origin=tuple(origin.tolist()),
     )
     _refuse(path, mesh_checks.unmatched_sides(raw, mesh))
     _refuse(path, mesh_checks.islands(raw, mesh), mesh_checks.void_faults(raw, mesh, has_voids))
