@@ -74,7 +74,7 @@ class FibreInfo:
         bodies, varies = summary.fibre_bodies, not (factors == 1.0).all()
         ellipses = Ellipses(summary.centres, summary.frames)
         is_ellipse = np.isnan(summary.radii) & ~np.isnan(ellipses.angles)
-        columns = bodies, summary.coatings, factors, field_parts.fibre_centres(cell), field_parts.table_rows(cell)
+        columns = bodies, summary.coatings, factors, *field_parts.listed_fibres(cell)
         return tuple(
             cls(
                 number=number,

@@ -149,13 +149,12 @@ class StateRecorder:
         return tuple(map(self._of_phase, phases)) or None
 
     def _of_phase(self, phase: str) -> PhaseStresses:
-        material, columns = self._cell.case.material_of(phase), dict[str, Any]()
+        cell, columns = self._cell, dict[str, Any]()
+        material, origin = cell.case.material_of(phase), cell.summary.origin
         for k, name in enumerate(recovered_fields.MEASURES):
             if name != "utilisation" or material.strength is not None:
                 columns[name] = np.array([state[phase].value[k] for state in self._largest])
-                columns[f"{name}_at"] = (
-                    np.array([state[phase].position[k] for state in self._largest]) + self._cell.summary.origin
-                )
+                columns[f"{name}_at"] = np.array([state[phase].position[k] for state in self._largest]) + origin
         criterion = None if material.strength is None else strength.criterion(material.strength)
         return PhaseStresses(phase=phase, state=tuple(self._labels), criterion=criterion, **columns)
 

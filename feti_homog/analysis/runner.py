@@ -183,6 +183,7 @@ def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Field
     meshed = sum(share for phase, share in fractions.items() if phase not in AROUND_FIBRES)
     lost = 1.0 - meshed / area if area and cell.case.cell.order == 1 else 0.0
     polygons = f"[cell] order = 1: polygons have {lost:.1%} less area than the fibres asked for; refine, or order = 2"
+    lost_area = [polygons] if lost > REMARKABLE_LOSS else []
     cell_info = CellInfo(
         width=cell.summary.width,
         height=cell.summary.height,
@@ -208,12 +209,7 @@ def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Field
         check_tolerance=checks.tolerance("jump"),
         kkt_tolerance=CONTACT_TOLERANCE,
         warnings=(*cell.case.warnings(), *cell.summary.warnings(), *context.warnings()),
-        remarks=(
-            *cell.case.remarks(),
-            *cell.summary.remarks,
-            *([polygons] if lost > REMARKABLE_LOSS else []),
-            *context.remarks(),
-        ),
+        remarks=(*cell.case.remarks(), *cell.summary.remarks, *lost_area, *context.remarks()),
         faults=tuple(checks.faults),
         status="not converged" if checks.faults else "done",
         timings=progress.timings(),

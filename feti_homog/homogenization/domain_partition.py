@@ -147,8 +147,7 @@ def distribute(
         raise CaseError(*faults)
     parts = torus.constituent if case.cell.bodies == "torus" else torus.plane_parts()
     bodies, triangles = int(parts.max()) + 1, len(mesh.triangles)
-    cut = _cut_across(case, torus, lattice, n_ranks, policy)
-    across = cut is not None
+    across = (cut := _cut_across(case, torus, lattice, n_ranks, policy)) is not None
     if cut is None:
         sides = parts[np.stack(torus.sides[:2])]
         shared_edges = np.bincount(sides[:, sides[0] != sides[1]].ravel(), minlength=bodies)
@@ -186,13 +185,11 @@ def distribute(
 def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triangles: int) -> CellSummary:
     """Summarize a tiled cell with given numbers of subdomains and coarse triangles."""
     regions, lines, arrangement = noded.regions, noded.lines, noded.arrangement
-    inside = regions.constituent[:-1]
-    solid = np.flatnonzero(inside >= 0)
+    solid = np.flatnonzero((inside := regions.constituent[:-1]) >= 0)
     circle = solid[np.unique(inside[solid], return_index=True)[1]]
-    disc = lines.disc[circle]
+    disc, radii = lines.disc[circle], regions.ellipses.circles[circle, 2]
     is_fibre = arrangement.precedence(disc, lines.is_coating[circle]) == disc + 1
     centres = in_cell(noded.scale * arrangement.centres[disc], np.array([regions.width, regions.height]))
-    radii = regions.ellipses.circles[circle, 2]
     nothing = np.full((1, 2), np.nan)
     return CellSummary(
         width=regions.width,

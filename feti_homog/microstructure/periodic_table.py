@@ -184,7 +184,7 @@ def listed_centres(table: FibreTable, window: str, centres: Float, rows: Int | N
         np.array([table.width, table.height], float),
     )
     moves = (centres - listed + size / 2) % size - size / 2
-    return listed + np.where(np.abs(moves) > cut_window.TOLERANCE * table.radius.mean(), moves, 0.0)
+    return np.asarray(listed + np.where(np.abs(moves) > cut_window.TOLERANCE * table.radius.mean(), moves, 0.0))
 
 
 def _corner(table: FibreTable) -> Float:

@@ -57,31 +57,22 @@ def fibre_part(cell: unit_cell.TornCell) -> FibrePart:
         number=summary.fibre_number(body),
         body=body,
         phase=summary.constituent_phase[body],
-        centre=fibre_centres(cell)[: len(body)],
+        centre=listed_fibres(cell)[0][: len(body)],
         radius=summary.radii[body],
         strength=cell.strength_factors[: len(body)],
     )
 
 
-def fibre_centres(cell: unit_cell.TornCell) -> Float:
-    """Return the fibre centres (fibres, 2) in the coordinates of the user, as a table lists them."""
-    summary, table = cell.summary, cell.case.cell.table
-    centres = summary.centres[summary.fibre_bodies] + summary.origin
+def listed_fibres(cell: unit_cell.TornCell) -> tuple[Float, list[int | None]]:
+    """Return the centres (fibres, 2) in the user's coordinates, and the rows in the fibre table, from 1."""
+    summary, table, window = cell.summary, cell.case.cell.table, cell.case.cell.window
+    centres, rows = summary.centres[summary.fibre_bodies] + summary.origin, [None] * summary.fibres
     if table is None:
-        return centres
+        return centres, [*rows]
     from feti_homog.microstructure import periodic_table  # imports the windows of tables
 
-    return periodic_table.listed_centres(table, cell.case.cell.window, centres)
-
-
-def table_rows(cell: unit_cell.TornCell) -> list[int | None]:
-    """Return the row of each fibre in the fibre table, from 1; None for each fibre of another cell."""
-    table = cell.case.cell.table
-    if table is None:
-        return [None] * cell.summary.fibres
-    from feti_homog.microstructure import periodic_table  # imports the windows of tables
-
-    return table.number[periodic_table.fibre_rows(table, cell.case.cell.window)].tolist()
+    numbers: list[int | None] = table.number[periodic_table.fibre_rows(table, window)].tolist()
+    return periodic_table.listed_centres(table, window, centres), numbers
 
 
 def interface_part(cell: unit_cell.TornCell) -> InterfacePart:
