@@ -136,7 +136,8 @@ def draw_fibres(axes: Any, result: Result, tractions: np.ndarray, first: list[in
         discs.set_clim(tractions.min(), tractions.max())
         axes.add_collection(discs)
     axes.figure.colorbar(discs, ax=axes, label=TRACTION, shrink=0.85)
-    axes.set(xlim=(0, cell.width), ylim=(0, cell.height), aspect="equal", xlabel="$x_1$ (um)", ylabel="$x_2$ (um)")
+    (left, bottom), size = cell.origin, {"xlabel": "$x_1$ (um)", "ylabel": "$x_2$ (um)", "aspect": "equal"}
+    axes.set(xlim=(left, left + cell.width), ylim=(bottom, bottom + cell.height), **size)
     axes.set_title("The window, made periodic", fontsize=11)
 
 

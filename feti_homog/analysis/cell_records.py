@@ -10,6 +10,7 @@ import numpy as np
 
 from feti_homog.materials import phase_bounds
 from feti_homog.microstructure.shapes import Ellipses
+from feti_homog.results import field_parts
 from feti_homog.system.runtime import described, records
 from feti_homog.typing import Float
 
@@ -37,6 +38,7 @@ class CellInfo:
     )
     refine: int = described("how many times elements were split in four, likewise", default=0)
     porosity: float = described("share of voids in the area of the cell", default=0.0)
+    origin: tuple[float, float] = described("lower left corner of the cell", records.LENGTH, default=(0.0, 0.0))
     match_distance: float | None = described(
         "of a cell that matches a table, in mean diameters: root mean square difference of the sorted distances of "
         "nearest and second neighbours",
@@ -49,9 +51,10 @@ class FibreInfo:
     """One fibre, with the number N of `fibre = N` in case files."""
 
     number: int = described("number in `fibre = N` of case files, from 1")
+    row: int | None = described("its row in the table, of rows with fibres from 1; absent without one", default=None)
     phase: str = described("name of its phase")
     centre: Float | None = described(
-        "that of its circle, else of its area, in the cell; absent if it winds around it",
+        "that of its circle, in a table where it is listed, else of its area; absent if it winds around the cell",
         records.LENGTH,
         "(2,)",
         default=None,
@@ -71,18 +74,20 @@ class FibreInfo:
         bodies, varies = summary.fibre_bodies, not (factors == 1.0).all()
         ellipses = Ellipses(summary.centres, summary.frames)
         is_ellipse = np.isnan(summary.radii) & ~np.isnan(ellipses.angles)
+        columns = bodies, summary.coatings, factors, *field_parts.listed_fibres(cell)
         return tuple(
             cls(
                 number=number,
                 phase=summary.phases[summary.constituent_phase[body]],
-                centre=None if np.isnan(summary.centres[body, 0]) else summary.centres[body],
+                row=row,
+                centre=None if np.isnan(centre[0]) else centre,
                 radius=None if np.isnan(summary.radii[body]) else float(summary.radii[body]),
                 semi_axes=ellipses.semi_axes[body] if is_ellipse[body] else None,
                 angle=float(ellipses.angles[body]) if is_ellipse[body] else None,
                 coating=float(thickness) if thickness > 0 else None,
                 strength=float(factor) if varies else None,
             )
-            for number, (body, thickness, factor) in enumerate(zip(bodies, summary.coatings, factors, strict=True), 1)
+            for number, (body, thickness, factor, centre, row) in enumerate(zip(*columns, strict=True), 1)
         )
 
 

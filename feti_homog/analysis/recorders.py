@@ -148,13 +148,14 @@ class StateRecorder:
         return tuple(map(self._of_phase, phases)) or None
 
     def _of_phase(self, phase: str) -> PhaseStresses:
-        limit, columns = self._cell.case.material_of(phase).strength, dict[str, Any]()
+        cell, columns = self._cell, dict[str, Any]()
+        limit, origin = cell.case.material_of(phase).strength, cell.summary.origin
         arrays = zip(*(state[phase] for state in self._largest), strict=True)
         by_measure = (np.split(np.stack(array), (1, 2, 3), axis=1) for array in arrays)
         for name, values, places in zip(recovered_fields.MEASURES, *by_measure, strict=True):
             if values.size:  # the utilisation has a column for each mode, or none
                 modes, states = values.argmax(axis=1), np.arange(len(values))
-                columns |= {name: values[states, modes], f"{name}_at": places[states, modes]}
+                columns |= {name: values[states, modes], f"{name}_at": places[states, modes] + origin}
         if limit is not None:
             columns["criterion"] = strength.criterion(limit)
             columns["mode"] = tuple(map(strength.MODES.__getitem__, modes)) if values.shape[1] > 1 else None

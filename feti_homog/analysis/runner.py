@@ -189,6 +189,7 @@ def _opening(context: AnalysisContext) -> dict[str, Any]:
     meshed = sum(share for phase, share in fractions.items() if phase not in AROUND_FIBRES)
     lost = 1.0 - meshed / area if area and cell.case.cell.order == 1 else 0.0
     polygons = f"[cell] order = 1: polygons have {lost:.1%} less area than the fibres asked for; refine, or order = 2"
+    lost_area = [polygons] if lost > REMARKABLE_LOSS else []
     cell_info = CellInfo(
         width=cell.summary.width,
         height=cell.summary.height,
@@ -201,8 +202,8 @@ def _opening(context: AnalysisContext) -> dict[str, Any]:
         mesh_size=None if cell.case.cell.has_own_mesh else cell.case.cell.mesh_size,
         refine=cell.case.cell.refine,
         match_distance=cell.summary.match_distance,
+        origin=cell.summary.origin,
     )
-    remarks = *cell.case.remarks(), *cell.summary.remarks, *([polygons] if lost > REMARKABLE_LOSS else [])
     return {
         "version": __version__,
         "date": mpi_errors.on_root(cell.comm, time.strftime, "%Y-%m-%d %H:%M UTC", time.gmtime()),
@@ -215,7 +216,7 @@ def _opening(context: AnalysisContext) -> dict[str, Any]:
         "check_tolerance": checks.tolerance("jump"),
         "kkt_tolerance": CONTACT_TOLERANCE,
         "warnings": (*cell.case.warnings(), *cell.summary.warnings(), *context.warnings()),
-        "remarks": (*remarks, *context.remarks()),
+        "remarks": (*cell.case.remarks(), *cell.summary.remarks, *lost_area, *context.remarks()),
         "timings": progress.timings(),
         "memory": progress.memory(),
     }

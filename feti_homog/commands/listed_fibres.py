@@ -1,6 +1,6 @@
 """List the fibres of a case or result as a table, which [cell] geometry = "table" reads."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from feti_homog.errors import CaseError
 from feti_homog.mesh import Torus, arrange, coarse_mesh, mesh_fibres
 from feti_homog.mesh.fill import gmsh_mesher
 from feti_homog.mesh.readers import msh_reader
+from feti_homog.microstructure import periodic_table
 from feti_homog.microstructure.shapes import Ellipses, shapes
 from feti_homog.typing import Float
 
@@ -45,7 +46,10 @@ def table(source: Path) -> str:
         columns["inner_radius"] = _words(fibres.cores)
     rows = map(",".join, zip(*columns.values(), strict=True))
     width, height = fibres.size.tolist()
-    size = f"# width = {width!r}, height = {height!r}, left = 0, bottom = 0"
+    reach = fibres.ellipses.longest[:, None]
+    low, high = (ellipses.centres + reach).min(axis=0), (ellipses.centres - reach).max(axis=0) - fibres.size
+    left, bottom = np.clip(fibres.origin, high, low).tolist()
+    size = f"# width = {width!r}, height = {height!r}, left = {left!r}, bottom = {bottom!r}"
     return "\n".join([size, ",".join(columns), *rows])
 
 
@@ -56,14 +60,15 @@ def _words(values: Float) -> list[str]:
 
 @dataclass(frozen=True)
 class ListedFibres:
-    """The N fibres of a periodic cell [0, width] x [0, height], in the order of their numbers.
+    """The N fibres of a periodic cell, in the order of their numbers.
 
     Attributes:
         size: (2,) width and height.
-        ellipses: N circles and ellipses about centres within the cell.
+        ellipses: N circles and ellipses, where a table lists them, else about centres within the cell.
         phases: N phase names; in cells that the program meshes, voids follow the fibres.
         coatings: (N,) thickness of the coatings, 0 without a coating.
         cores: (N,) radii of the voids within hollow fibres, else 0.
+        origin: (2,) lower left corner.
         lacks_voids: whether the cell has voids that the list omits.
         others: columns (N,) of fibres that are neither discs nor ellipses, else NaN; `ellipses` has discs of equal area
             for these fibres.
@@ -74,6 +79,7 @@ class ListedFibres:
     phases: tuple[str, ...]
     coatings: Float
     cores: Float
+    origin: Sequence[float]
     lacks_voids: bool
     others: Mapping[str, Float] = field(default_factory=dict)
 
@@ -117,6 +123,7 @@ def _of_result(directory: Path) -> ListedFibres:
         tuple(fibre["phase"] for fibre in fibres),
         np.array([fibre.get("coating") or 0.0 for fibre in fibres]),
         np.zeros(len(fibres)),
+        cell.get("origin", (0.0, 0.0)),
         lacks_voids=bool(cell.get("porosity")),
     )
 
@@ -126,18 +133,25 @@ def _of_cell(cell: cell_section.Cell) -> ListedFibres:
         mesh = msh_reader.read_cell(cell)
         torus = Torus.of(mesh)
         numbers, is_fibre = mesh_fibres.fibre_numbers(torus)
-        ellipses = Ellipses(mesh_fibres.fibre_circles(torus)[:, :2] % mesh.period, mesh_fibres.fibre_frames(torus))
+        ellipses = Ellipses(
+            mesh_fibres.fibre_circles(torus)[:, :2] % mesh.period + mesh.origin, mesh_fibres.fibre_frames(torus)
+        )
         coatings = mesh_fibres.coating_thickness(numbers, is_fibre, ellipses.semi_axes)
         phases = tuple(mesh.phases[phase] for phase in torus.constituent_phase[is_fibre])
         has_voids = coarse_mesh.voids(mesh) > 0
-        return ListedFibres(mesh.period, ellipses[is_fibre], phases, coatings, np.zeros(len(phases)), has_voids)
+        return ListedFibres(
+            mesh.period, ellipses[is_fibre], phases, coatings, np.zeros(len(phases)), mesh.origin, has_voids
+        )
     arrangement = arrange.arrange(cell)
     scale = gmsh_mesher.arrangement_scale(cell, arrangement)
     size = scale * arrangement.size
     conics = shapes.elliptic(arrangement.outlines).grown(arrangement.walls)
-    ellipses = Ellipses(scale * conics.centres % size, scale * conics.frames)
+    centres = scale * conics.centres % size + arrangement.origin
+    if cell.table is not None:
+        centres = periodic_table.listed_centres(cell.table, cell.window, centres, arrangement.row)
+    ellipses = Ellipses(centres, scale * conics.frames)
     coatings = scale * (arrangement.coating - arrangement.walls)
     cores = scale * np.where(arrangement.walls > 0, arrangement.radii, 0.0)
     columns = {} if cell.table is None else {name: of[arrangement.row] for name, of in cell.table.columns.items()}
     others = shapes.columns_without_tips(columns) if columns else {}
-    return ListedFibres(size, ellipses, arrangement.phase, coatings, cores, lacks_voids=False, others=others)
+    return ListedFibres(size, ellipses, arrangement.phase, coatings, cores, arrangement.origin, False, others)

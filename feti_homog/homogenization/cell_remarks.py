@@ -75,7 +75,7 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
     # A bond at the pinned node, Eq. (15).
     pinned = np.searchsorted(torus.class_keys, submeshes.pinned_class(torus))
     if not torus.never_part[pinned] and torus.meeting[pinned] >= 2:
-        x, y = torus.mesh.points[np.flatnonzero(torus.node_class == pinned)[0]]
+        x, y = torus.mesh.points[np.flatnonzero(torus.node_class == pinned)[0]] + torus.mesh.origin
         lines.append(
             f"[interface] the node at ({x:.6g}, {y:.6g}) never parts: it holds the cell, for all nodes of the mesh are "
             "on interfaces; use a finer mesh"

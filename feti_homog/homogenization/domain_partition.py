@@ -34,6 +34,7 @@ class CellSummary:
         centres, radii: (constituents, 2) and (constituents,) centres in the cell and radii of fibres, else NaN.
         frames: (constituents, 2, 2) as in `Ellipses`, for fibres that are circles or ellipses; else NaN.
         snapped: largest distance that a node in a user's mesh was moved to make sides match.
+        origin: lower left corner of the cell in the coordinates of the user; all other places are relative to it.
         voids: void count.
         match_distance: distance between the fibres and a matched table, see `random_fibres`; None without a table.
         remarks: lines about unexpected cell properties.
@@ -56,6 +57,7 @@ class CellSummary:
     frames: Float
     moved_tips: tuple[debonded_arcs.MovedTips, ...]
     snapped: float
+    origin: tuple[float, float]
     voids: int
     match_distance: float | None
     remarks: tuple[str, ...]
@@ -145,8 +147,7 @@ def distribute(
         raise CaseError(*faults)
     parts = torus.constituent if case.cell.bodies == "torus" else torus.plane_parts()
     bodies, triangles = int(parts.max()) + 1, len(mesh.triangles)
-    cut = _cut_across(case, torus, lattice, n_ranks, policy)
-    across = cut is not None
+    across = (cut := _cut_across(case, torus, lattice, n_ranks, policy)) is not None
     if cut is None:
         sides = parts[np.stack(torus.sides[:2])]
         shared_edges = np.bincount(sides[:, sides[0] != sides[1]].ravel(), minlength=bodies)
@@ -170,6 +171,7 @@ def distribute(
         frames=mesh_fibres.fibre_frames(torus),
         moved_tips=tuple(map(dict, moved)),
         snapped=mesh.snapped,
+        origin=mesh.origin,
         voids=coarse_mesh.voids(mesh) if torus.at_void.any() else 0,
         match_distance=match_distance(case, mesh.width, mesh.height, centres[is_fibre], circles[is_fibre, 2]),
         remarks=(*cell_remarks.table_remarks(case), *cell_remarks.mesh_remarks(case, torus, pairs), *notes),
@@ -183,13 +185,11 @@ def distribute(
 def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triangles: int) -> CellSummary:
     """Summarize a tiled cell with given numbers of subdomains and coarse triangles."""
     regions, lines, arrangement = noded.regions, noded.lines, noded.arrangement
-    inside = regions.constituent[:-1]
-    solid = np.flatnonzero(inside >= 0)
+    solid = np.flatnonzero((inside := regions.constituent[:-1]) >= 0)
     circle = solid[np.unique(inside[solid], return_index=True)[1]]
-    disc = lines.disc[circle]
+    disc, radii = lines.disc[circle], regions.ellipses.circles[circle, 2]
     is_fibre = arrangement.precedence(disc, lines.is_coating[circle]) == disc + 1
     centres = in_cell(noded.scale * arrangement.centres[disc], np.array([regions.width, regions.height]))
-    radii = regions.ellipses.circles[circle, 2]
     nothing = np.full((1, 2), np.nan)
     return CellSummary(
         width=regions.width,
@@ -207,6 +207,7 @@ def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triang
         frames=np.concatenate([np.full((1, 2, 2), np.nan), regions.ellipses.frames[circle]]),
         moved_tips=({},) * len(case.interfaces),
         snapped=0.0,
+        origin=arrangement.origin,
         voids=arrangement.voids,
         match_distance=match_distance(case, regions.width, regions.height, centres[is_fibre], radii[is_fibre]),
         remarks=(

@@ -46,6 +46,7 @@ class CoarseMesh:
         arc_circle: (a,) the ellipse of each such edge.
         debonded_edges: (d, 2) edges between a fibre and the matrix that are debonded from the start.
         snapped: largest move of a node in a user's mesh to make opposite sides match.
+        origin: lower left corner of the cell in the coordinates of the user.
         remarks: differences of a cell from the fibre table, and unused curves in a user's mesh, in a line each.
         centres: (fibres, 2) fibre centres, if the precedence is the fibre number from 1, with the numbers of coatings
             behind in the same order; else None.
@@ -64,6 +65,7 @@ class CoarseMesh:
     arc_circle: Int32
     debonded_edges: Int32
     snapped: float = 0.0
+    origin: tuple[float, float] = (0.0, 0.0)
     remarks: tuple[str, ...] = ()
     centres: Float | None = None
 

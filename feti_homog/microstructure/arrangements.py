@@ -40,6 +40,7 @@ class Arrangement:
         is_hollow: (N,) mask of voids in hollow fibres, whose ring has the fibre phase; other rings are coatings.
         mesh_order: (N,) meshing order, on which a few triangles depend; by index if None.
         row: (N,) row indices in the fibre table; None for cells without a table.
+        origin: lower left corner of the cell in the coordinates of the table.
         remarks: lines on the differences between the cell and the table.
     """
 
@@ -51,6 +52,7 @@ class Arrangement:
     is_hollow: Bool
     mesh_order: Int | None = None
     row: Int | None = None
+    origin: tuple[float, float] = (0.0, 0.0)
     remarks: tuple[str, ...] = ()
 
     @classmethod

@@ -57,13 +57,15 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
         coating=np.where(is_hollow, outlines.radii - core, table.coating[rows] * outlines.radii),
         is_hollow=is_hollow,
         row=rows,
+        origin=tuple(_corner(table).tolist()),
         remarks=remarks,
     )
     shifted = arrangements.clear_shift(fibres)
     is_placed = table.left is not None and table.bottom is not None
     clear = min(LEAST_CLEARANCE * float(fibres.radii.mean()), arrangements.clearance(shifted))
     if not is_placed or arrangements.clearance(fibres) < clear or arrangements.in_voids(fibres, np.zeros((1, 2))).all():
-        rounded = _rounded(shifted)
+        moved = (fibres.centres[0] - shifted.centres[0] + fibres.size / 2) % fibres.size - fibres.size / 2
+        rounded = replace(_rounded(shifted), origin=tuple((_corner(table) + size[0] * moved).tolist()))
         return replace(rounded, mesh_order=np.lexsort((rounded.centres[:, 1], rounded.centres[:, 0])))
     return fibres if isinstance(fibres.outlines, Discs) else _rounded(fibres)
 
@@ -170,6 +172,19 @@ def fibre_rows(table: FibreTable, window: str) -> Int:
     size = np.array([table.width, table.height], float)
     first, _ = _without_images(table, table.centres - _corner(table), size, window == "cut")
     return np.flatnonzero(first & ~table.is_void)
+
+
+def listed_centres(table: FibreTable, window: str, centres: Float, rows: Int | None = None) -> Float:
+    """Replace images of centres (k, 2) by the centres in the table, plus the moves of a cut window.
+
+    The centres are those of `rows` (k,), by default of all fibres.
+    """
+    listed, size = (
+        table.centres[fibre_rows(table, window) if rows is None else rows],
+        np.array([table.width, table.height], float),
+    )
+    moves = (centres - listed + size / 2) % size - size / 2
+    return np.asarray(listed + np.where(np.abs(moves) > cut_window.TOLERANCE * table.radius.mean(), moves, 0.0))
 
 
 def _corner(table: FibreTable) -> Float:

@@ -27,6 +27,7 @@ class Header:
     phases: tuple[str, ...] = described("names of the phases")
     length_unit: str = described("label of the unit of lengths, may be empty", default="")
     stress_unit: str = described("label of the unit of stresses, may be empty", default="")
+    origin: tuple[float, float] = described("lower left corner of the cell", records.LENGTH, default=(0.0, 0.0))
     case: str = described("the case with its defaults as JSON, the same as `case` of result.json", default="{}")
 
 
@@ -63,7 +64,8 @@ class FibrePart:
     body: AnyInt = described("body in /mesh/body", shape="(f,)", dtype="int32")
     phase: AnyInt = described("phase, a place in `phases`", shape="(f,)", dtype="int32")
     centre: Float = described(
-        "centre of the circle, within the cell, or of the area of a fibre that is not round; NaN if it winds around",
+        "centre of the circle, in a table where it is listed, or of the area of a fibre that is not round; NaN if it "
+        "winds around",
         records.LENGTH,
         "(f, 2)",
     )
@@ -105,7 +107,11 @@ class StatePart:
     load_factor: float = described("position on the path, 0 to 1; 1 of other analyses")
     point: int = described("number, from 0, of its point in `path` or `angle` of result.json; 0 of a stiffness")
     label: str = described("label of the state, as `E11`, `60 deg E11`, `event 12`")
-    displacement: Float = described("displacement, including that of the macroscopic strain", records.LENGTH, "(n, 2)")
+    displacement: Float = described(
+        "displacement, including that of the macroscopic strain, E x from the lower left corner",
+        records.LENGTH,
+        "(n, 2)",
+    )
     stress: Float = described(f"means over the elements, {', '.join(voigt.STRESSES)}", records.STRESS, "(m, 3)")
     stress_33: Float = described(
         "stress 33, out of the plane: 0 in plane stress, NaN where the material's constants do not determine it",

@@ -25,6 +25,7 @@ def header(cell: unit_cell.TornCell) -> Header:
         phases=plan.phases,
         length_unit=case.output.length_unit,
         stress_unit=case.output.stress_unit,
+        origin=plan.origin,
         case=json.dumps(case.resolved(), default=os.fspath),
     )
 
@@ -38,7 +39,7 @@ def mesh_part(cell: unit_cell.TornCell) -> MeshPart:
     triangles = [s.mesh.triangles + n for s, n in zip(subdomains, nodes, strict=False)]
     phase = [cell.summary.phases.index(s.submesh.phase) for s in subdomains]
     return MeshPart(
-        points=np.concatenate([s.mesh.points for s in subdomains] or [np.zeros((0, 2))]),
+        points=np.concatenate([s.mesh.points for s in subdomains] or [np.zeros((0, 2))]) + cell.summary.origin,
         triangles=np.concatenate(triangles or [np.zeros((0, columns), np.int64)]),
         body=np.repeat([s.submesh.body for s in subdomains], sizes).astype(np.int32),
         subdomain=np.repeat([s.submesh.index for s in subdomains], sizes).astype(np.int32),
@@ -56,10 +57,22 @@ def fibre_part(cell: unit_cell.TornCell) -> FibrePart:
         number=summary.fibre_number(body),
         body=body,
         phase=summary.constituent_phase[body],
-        centre=summary.centres[body],
+        centre=listed_fibres(cell)[0][: len(body)],
         radius=summary.radii[body],
         strength=cell.strength_factors[: len(body)],
     )
+
+
+def listed_fibres(cell: unit_cell.TornCell) -> tuple[Float, list[int | None]]:
+    """Return the centres (fibres, 2) in the user's coordinates, and the rows in the fibre table, from 1."""
+    summary, table, window = cell.summary, cell.case.cell.table, cell.case.cell.window
+    centres, rows = summary.centres[summary.fibre_bodies] + summary.origin, [None] * summary.fibres
+    if table is None:
+        return centres, [*rows]
+    from feti_homog.microstructure import periodic_table  # imports the windows of tables
+
+    numbers: list[int | None] = table.number[periodic_table.fibre_rows(table, window)].tolist()
+    return periodic_table.listed_centres(table, window, centres), numbers
 
 
 def interface_part(cell: unit_cell.TornCell) -> InterfacePart:
@@ -68,7 +81,7 @@ def interface_part(cell: unit_cell.TornCell) -> InterfacePart:
     first = cell.comm.exscan(sum(len(s.mesh.points) for s in cell.parts)) or 0
     numbers = first + cell.class_nodes
     return InterfacePart(
-        points=nodes.points,
+        points=nodes.points + cell.summary.origin,
         normal=nodes.normal,
         length=nodes.length,
         fibre=nodes.fibre,

@@ -78,7 +78,7 @@ def cell_state(file: Any, state: int) -> ViewedState:
     # The macroscopic strain has the displacement H x, in the plane and along the fibres.
     along = strain[[4, 3]] if more else np.zeros(2)
     gradient = np.vstack([PLANE.gradient(strain[[0, 1, -1]]), AXIAL.gradient(along)])
-    nodes["fluctuation"] = nodes["displacement"] - points @ gradient.T
+    nodes["fluctuation"] = nodes["displacement"] - (points - points.min(axis=0)) @ gradient.T
     in_plane = group["stress"][()]
     if more:
         E33 = np.full(len(in_plane), strain[2])

@@ -52,6 +52,7 @@ def check_mesh(findings: Findings, cell: DiscreteCell) -> None:
     counts |= {"elements": len(mesh.triangles), "nodes": len(mesh.points)}
     for name, value in counts.items():
         findings.compare("cell", section[name], value, value, f"cell.{name}")
+    findings.compare("cell", section.get("origin", [0, 0]), mesh.points.min(axis=0), width, "cell.origin")
     fibres = [number for number, name in enumerate(phases) if name not in ("matrix", COATING)]
     shares = {"fibre_fraction": cell.fractions[fibres].sum(), "porosity": cell.porosity}
     for name, value in shares.items():

@@ -189,7 +189,8 @@ class ResultFiles:
                 _expect(has_size, f"/{group} has a strain or a stress of another size than {v}")
                 name, temperature = f"state {number} ({attributes['label']})", float(attributes.get("temperature", 0.0))
                 factor, point = float(attributes["load_factor"]), int(attributes["point"])
-                arrays["fluctuation"] = arrays["displacement"] - self.mesh.points @ gradient(strain).T
+                x = self.mesh.points - self.mesh.points.min(axis=0)
+                arrays["fluctuation"] = arrays["displacement"] - x @ gradient(strain).T
                 state = State(name, strain, mean, factor, point, status=status, temperature=temperature, **arrays)
             yield state
 

@@ -16,9 +16,9 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 # Lines, of the modules beside the packages under "."; the second numbers: phase stresses, start of damage, figures.
 LINES = {
     ".": 470,
-    "analysis": 3000 + 80,
+    "analysis": 3000 + 90,
     "case": 2880 + 40,
-    "commands": 560,
+    "commands": 560 + 10,
     "fem": 1150,
     "feti": 6300,
     "homogenization": 3230 + 55,
@@ -27,13 +27,13 @@ LINES = {
     "mesh": 5500,
     "microstructure": 2140,
     "report": 3420 + 160,
-    "results": 2430 + 25,
+    "results": 2430 + 40,
     "schema": 430,
     "studies": 2950,
     "system": 1770,
     "verify": 3100 + 160,
 }
-FILES, TOTAL = 310, 45000 + 150
+FILES, TOTAL = 310, 45000 + 200
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.0, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

@@ -137,7 +137,8 @@ class NodedCell:
         ends = self.regions.nodes + np.cumsum([0, *(len(filling.inner) for filling in fillings)])
         filled = map(FilledTile, range(len(fillings)), self.parts, fillings, ends.tolist())
         centres = self.scale * self.arrangement.centres[: self.arrangement.fibres]
-        return replace(tile_mesh(self.regions, list(filled))[0], centres=centres, remarks=self.arrangement.remarks)
+        mesh = tile_mesh(self.regions, list(filled))[0]
+        return replace(mesh, centres=centres, origin=self.arrangement.origin, remarks=self.arrangement.remarks)
 
     @cached_property
     def regions(self) -> Regions:

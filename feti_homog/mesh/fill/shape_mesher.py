@@ -84,6 +84,7 @@ def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> C
         ellipses=mesh.ellipses.scaled(scale),
         precedence=precedence[raw.group],
         centres=scale * arrangement.centres[: arrangement.fibres],
+        origin=arrangement.origin,
     )
 
 

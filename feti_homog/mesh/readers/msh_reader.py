@@ -59,7 +59,6 @@ def read(path: Path, snap: float | None = None, phases: Selectors | None = None,
         MeshError: all faults of the first faulty stage: file, labels, shapes, middle nodes, connections, sides,
             debonded lines.
     """
-    moved = 0.0
     try:
         raw = with_phases(LOADERS[path.suffix.lower()](path), phases or {})
     except OSError as error:
@@ -68,8 +67,7 @@ def read(path: Path, snap: float | None = None, phases: Selectors | None = None,
         raise MeshError(*(f"{path.name}: {fault}" for fault in error.faults)) from None
     _refuse(path.name, mesh_checks.unlabelled(raw), unknown_phases(raw), mesh_checks.stray_lines(raw))
     _refuse(path.name, mesh_checks.not_finite(raw))
-    if snap is not None:
-        raw, moved = snapped(raw, snap)
+    raw, moved = (raw, 0.0) if snap is None else snapped(raw, snap)
     unused = tuple(escaped(f"{path.name}: {remark}") for remark in mesh_checks.unused_curves(raw))
     return replace(made(raw, path.name, has_voids), snapped=moved, remarks=unused)
 
@@ -82,8 +80,7 @@ def made(raw: RawMesh, path: str, has_voids: bool = True) -> CoarseMesh:
     raw = replace(raw, triangles=np.where(clockwise[:, None], raw.triangles[:, ::-1], raw.triangles))
     _refuse(path, mesh_checks.middle_nodes(raw))
     _refuse(path, _lattice(raw.points[:, :2], raw.triangles))
-    origin = raw.points[:, :2].min(axis=0)
-    size = raw.points[:, :2].max(axis=0) - origin
+    origin, size = raw.points[:, :2].min(axis=0), np.ptp(raw.points[:, :2], axis=0)
     plane = raw.points[:, :2] - origin
     for level in (np.zeros(2), size):
         plane = np.where(np.abs(plane - level) < mesh_checks.SAME_PLACE * size.max(), level, plane)
@@ -109,6 +106,7 @@ def made(raw: RawMesh, path: str, has_voids: bool = True) -> CoarseMesh:
         arc_edges=np.zeros((0, 2), np.int32),
         arc_circle=np.zeros(0, np.int32),
         debonded_edges=np.searchsorted(raw.node_tags, raw.debonded).astype(np.int32),
+        origin=(float(origin[0]), float(origin[1])),
     )
     _refuse(path, mesh_checks.unmatched_sides(raw, mesh))
     _refuse(path, mesh_checks.islands(raw, mesh), mesh_checks.void_faults(raw, mesh, has_voids))
@@ -117,8 +115,7 @@ def made(raw: RawMesh, path: str, has_voids: bool = True) -> CoarseMesh:
     mesh = with_circles(mesh, middles)
     # Fibre numbers are those without bent edges: round fibres first.
     numbers = Torus.of(mesh).constituent.astype(np.int32)
-    mesh = with_bent_edges(with_ellipses(mesh, middles), middles)
-    return replace(mesh, precedence=numbers)
+    return replace(with_bent_edges(with_ellipses(mesh, middles), middles), precedence=numbers)
 
 
 def _refuse(path: str, *faults: Sequence[str]) -> None:
@@ -175,8 +172,7 @@ def _lattice(plane: Float, triangles: Int32) -> list[str]:
     corners = corners[turn > STRAIGHT * np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)]
     if len(corners) not in (4, 6) or np.abs(areas(plane, triangles)).sum() < FILLED * hull.volume:
         return []
-    sides = np.roll(corners, -1, axis=0) - corners
-    half = len(sides) // 2
+    sides, half = np.roll(corners, -1, axis=0) - corners, len(corners) // 2
     lengths = np.abs(sides[:half])
     is_upright = half == 2 and bool((lengths.min(axis=1) <= UPRIGHT * lengths.max(axis=1)).all())
     if np.abs(sides[:half] + sides[half:]).max() > STRAIGHT * np.abs(sides).max() or is_upright:

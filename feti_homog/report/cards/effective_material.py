@@ -162,7 +162,7 @@ def _stiffness(document: Document) -> Float:
     """Return the symmetric positive definite stiffness (6, 6) in cell axes."""
     analysis = document["case"]["analysis"]
     if document["status"] != "done":
-        faults = document["faults"] or ["it was not finished"]
+        faults = document.get("faults") or ["it was not finished"]
         more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
         raise CaseError(f'its status is "{document["status"]}": {faults[0]}{more}; run the case again')
     if document.get("effective_stiffness") is None:

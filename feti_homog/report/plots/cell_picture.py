@@ -200,7 +200,7 @@ def deformed(cell: drawn_cell.DrawnCell, state: Any, document: Document) -> Figu
         outline: Array = drawn.points[cell.borders]
         if drawn.body.max() >= 8:  # the cell alone
             corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [attributes["width"], attributes["height"]]
-            outline = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+            outline = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1) + drawn.points.min(axis=0)
         plot_helpers.draw_segments(axes, outline, UNDEFORMED, 0.7)
         line = Line2D([], [], color=UNDEFORMED, linewidth=0.7, label="undeformed")
     plot_helpers.draw_segments(axes, moved[cell.borders], "black", 0.8)

@@ -146,7 +146,8 @@ def drawn_displacement(state: Any, drawn: DrawnMesh) -> Array:
     displacement = nodal_values(state["displacement"], drawn)
     loads = dict(zip(voigt.voigt_names(len(state.attrs["strain"]))[0], state.attrs["strain"], strict=True))
     shear = 0.5 * loads["gamma12"]
-    fluctuation = displacement - drawn.points @ np.array([[loads["E11"], shear], [shear, loads["E22"]]])
+    x = drawn.points - drawn.points.min(axis=0)  # as far from the origin as may be, a factor would move the picture
+    fluctuation = displacement - x @ np.array([[loads["E11"], shear], [shear, loads["E22"]]])
     areas = _determinant(_sides(drawn.points, drawn))
     return np.asarray(displacement - np.average(fluctuation[drawn.triangles].mean(axis=1), axis=0, weights=areas))
 

@@ -65,7 +65,8 @@ fibre_list = [{x = 1, y = 2, a = 0.3, b = 0.8, angle = 20, coating = 0.1}, {x = 
 
 def squares(cell):
     found = arrange(cell)
-    return found.outlines.squares, found.coating, found.centres
+    away = found.centres - found.centres[0] + 0.3 * found.size  # another window may be as good
+    return found.outlines.squares, found.coating, away % found.size
 
 
 @pytest.mark.parametrize("of", ["case", "result"])

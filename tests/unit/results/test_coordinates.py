@@ -1,0 +1,55 @@
+"""Fibres and nodes come out where they were given."""
+
+import h5py
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from mpi4py import MPI
+from unit.mesh.faulty_meshes import grid
+
+from feti_homog import Case, draw_state, run
+from feti_homog.results.viewed_states import read_state
+
+MATERIAL = {"matrix": {"young": 3.0, "poisson": 0.3}, "fibre": {"young": 70.0, "poisson": 0.2}}
+# A disc that touches the lower side, so that the cell is shifted; a comment and a row outside the window.
+ROWS = "106.08,217.37,4\n# none\n137.25,203.7,3.7\n90,210,4\n145.8,231.9,4.2\n"
+TABLE = f"# width = 50, height = 40, left = 100, bottom = 200\nx,y,radius\n{ROWS}"
+
+
+def result_of(folder, **cell):
+    output = {"pictures": False, "fields": True}
+    document = {
+        "cell": cell,
+        "material": MATERIAL,
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "output": output,
+    }
+    return run(Case.parse(document), MPI.COMM_SELF, out=folder)
+
+
+def test_fibres_of_a_cropped_table_have_the_centres_and_rows_of_the_table(tmp_path):
+    (tmp_path / "t.csv").write_text(TABLE)
+    result = result_of(tmp_path / "out", geometry="table", file=str(tmp_path / "t.csv"), window="cut", mesh_size=0.1)
+    listed = np.array([line.split(",")[:2] for line in ROWS.splitlines() if "," in line], float)
+    assert [fibre.row for fibre in result.fibres] == [1, 2, 4]
+    assert [fibre.centre.tolist() for fibre in result.fibres] == listed[[0, 1, 3]].tolist()
+    with h5py.File(tmp_path / "out" / "result.h5") as file:
+        points, fibre = file["interface/points"][:], file["interface/fibre_number"][:] - 1
+        assert file["fibre/centre"][:].tolist() == listed[[0, 1, 3]].tolist()
+        away = points - listed[[0, 1, 3]][fibre]
+        away -= np.round(away / [50, 40]) * [50, 40]
+        assert np.hypot(*away.T) == pytest.approx(np.array([4, 3.7, 4.2])[fibre], rel=1e-8)
+        corner = file["mesh/points"][:].min(axis=0)
+    assert corner == pytest.approx(result.cell.origin, abs=1e-12) and (corner != [100, 200]).any()
+    assert (np.abs(corner - [100, 200]) <= [25, 20]).all()
+    axes = Figure().subplots()
+    draw_state(axes, tmp_path / "out", scale=0.0)
+    assert axes.dataLim.min == pytest.approx(corner, abs=1e-9) and axes.dataLim.size == pytest.approx([50, 40])
+
+
+def test_nodes_of_a_mesh_are_those_of_its_file(tmp_path):
+    mesh = grid().moved(**{f"n{tag}": (x - 5, y + 7) for tag, (x, y, _) in grid().nodes.items()})
+    mesh.write(tmp_path / "cell.msh")
+    result_of(tmp_path / "out", geometry="mesh", file=str(tmp_path / "cell.msh"))
+    places = {tuple(np.round(place[:2], 9) + 0.0) for place in mesh.nodes.values()}
+    assert {tuple(np.round(place[:2], 9) + 0.0) for place in read_state(tmp_path / "out").points} == places
