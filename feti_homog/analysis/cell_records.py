@@ -51,7 +51,7 @@ class FibreInfo:
     """One fibre, with the number N of `fibre = N` in case files."""
 
     number: int = described("number in `fibre = N` of case files, from 1")
-    row: int | None = described("its row in the table, of rows with fibres from 1; absent without one", default=None)
+    row: int | None = described("its line in the table, or place in `fibre_list`, from 1", default=None)
     phase: str = described("name of its phase")
     centre: Float | None = described(
         "that of its circle, in a table where it is listed, else of its area; absent if it winds around the cell",

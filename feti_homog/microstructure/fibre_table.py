@@ -35,8 +35,7 @@ class FibreTable:
 
     Attributes:
         name: name of the file or list, for messages.
-        row: (N,) line in the file or position in the list, from 1, for messages.
-        number: (N,) row among the rows of fibres, from 1.
+        row: (N,) line in the file or position in the list, from 1, for messages and results.
         columns: numbers (N,) of all NUMBERS, by name.
         given: names of the columns in the table.
         phase: N names, "fibre" by default, "void" for voids.
@@ -47,7 +46,6 @@ class FibreTable:
 
     name: str
     row: Int
-    number: Int
     columns: Columns
     given: frozenset[str]
     phase: tuple[str, ...]
@@ -95,8 +93,7 @@ class FibreTable:
     def rows(self, kept: Int) -> FibreTable:
         """Restrict the table to the rows with indices `kept` (k,)."""
         columns = {name: values[kept] for name, values in self.columns.items()}
-        phase = tuple(self.phase[k] for k in kept.tolist())
-        return replace(self, row=self.row[kept], number=self.number[kept], columns=columns, phase=phase)
+        return replace(self, row=self.row[kept], columns=columns, phase=tuple(self.phase[k] for k in kept.tolist()))
 
     @property
     def outer_radius(self) -> Float:
@@ -232,7 +229,6 @@ def _table(
     return FibreTable(
         name=name,
         row=np.fromiter(rows, np.intp),
-        number=np.arange(1, len(rows) + 1),
         columns=columns,
         given=frozenset(names),
         phase=tuple(cells.get("phase", "fibre") for cells in rows.values()),
