@@ -220,7 +220,8 @@ def boundary_tractions(
         free = np.repeat(sides.at_void, 2)
         rows = np.column_stack([half[:, 1], -half[:, 0], np.hypot(*half.T), np.ones(len(ends)), free])
         loaded = np.flatnonzero(free | (of_node[position[ends]] > 0))
-        sums.append(np.stack([np.bincount(ends[loaded], row, len(position)) for row in rows[loaded].T], axis=1))
+        columns = [np.bincount(ends[loaded], row, len(position)) for row in rows[loaded].T]
+        sums.append(np.stack(columns, axis=1).astype(float))  # of no sides: integers
     if shared is not None:
         parts = [sums[number][classes] for number, classes in zip(shared.meshes, shared.classes, strict=True)]
         for number, classes, total in zip(shared.meshes, shared.classes, shared.sum(parts), strict=True):

@@ -125,7 +125,7 @@ def test_plot_of_an_empty_folder_names_the_missing_file(tmp_path):
     job = command_line(1, "plot", tmp_path)
     assert job.returncode == 2 and job.stdout == ""
     assert (
-        job.stderr.startswith(f"error: cannot read {tmp_path}/result.h5: No such file")
+        job.stderr.startswith(f"error: cannot read {tmp_path}/result.h5: it is missing")
         and "Traceback" not in job.stderr
     )
 

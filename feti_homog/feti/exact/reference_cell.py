@@ -252,7 +252,7 @@ def one_sided_jumps(operators: InterfaceOperators) -> csr_matrix:
         np.bincount(side[mine], values, count_of_sides)
         for values in (weights * operators.diagonal[B.col[mine]], weights)
     ]
-    total, count = distributed_arrays.allreduce_sum(comm, np.stack(sums))
+    total, count = distributed_arrays.allreduce_sum(comm, np.stack(sums).astype(float))  # of no bonds: integers
     outer_mean, inner_mean = (total / np.maximum(count, 1.0)).reshape(-1, 2).T
     moves_inner = np.append(inner_mean <= STIFF_FIBRES * outer_mean, False)[inside]
     moved = ~mine | (operators.of_inner[B.col] == moves_inner[B.row])

@@ -1,0 +1,35 @@
+"""Known tractions at vertices that pieces of a body share."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from feti_homog.homogenization import mesh_estimate
+
+
+def group(points, sides, first):
+    """One triangle, of which the first `sides` sides lie on an arc; its forces begin at `first`."""
+    ends = np.array([[0, 1], [1, 2]])[:sides]
+    stress = SimpleNamespace(
+        node_class=np.arange(3), triangles=np.arange(3)[None], problem=SimpleNamespace(components=2)
+    )
+    on_arc = SimpleNamespace(
+        element=np.zeros(sides, int), ends=ends, points=np.array(points)[ends], at_void=np.zeros(sides, bool)
+    )
+    return mesh_estimate.Group(stress, on_arc, first + 2 * np.arange(3))
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
+def test_a_piece_that_meets_an_arc_in_a_vertex_has_its_traction(monkeypatch, unit):
+    """Two pieces have a side each beside the vertex, a third has none, in any unit of length."""
+    corners = unit * np.array([[0.0, 0.0], [1.5, 0.5], [1.0, 2.0]])
+    groups = [group(corners, 1, 0), group(corners[[1, 2, 0]], 1, 6), group(corners[[1, 0, 2]], 0, 12)]
+    classes = [np.array([1]), np.array([0]), np.array([0])]
+    shared = SimpleNamespace(meshes=[0, 1, 2], classes=classes, sum=lambda parts: [sum(parts)] * 3)
+    monkeypatch.setattr(mesh_estimate, "_forces", lambda *_: (np.ones((18, 1)), np.full(18, unit)))
+    known = mesh_estimate.boundary_tractions(None, [], groups, shared, False)
+    assert sorted(known) == [0, 1, 2]
+    for name in ("normal", "traction"):
+        assert np.isfinite(getattr(known[0], name)).all()
+        assert getattr(known[2], name) == pytest.approx(getattr(known[0], name))
