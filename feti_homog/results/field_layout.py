@@ -64,8 +64,7 @@ class FibrePart:
     body: AnyInt = described("body in /mesh/body", shape="(f,)", dtype="int32")
     phase: AnyInt = described("phase, a place in `phases`", shape="(f,)", dtype="int32")
     centre: Float = described(
-        "centre of the circle, in a table where it is listed, or of the area of a fibre that is not round; NaN if it "
-        "winds around",
+        "centre of the circle, within the cell, or of the area of a fibre that is not round; NaN if it winds around",
         records.LENGTH,
         "(f, 2)",
     )

@@ -57,7 +57,7 @@ def fibre_part(cell: unit_cell.TornCell) -> FibrePart:
         number=summary.fibre_number(body),
         body=body,
         phase=summary.constituent_phase[body],
-        centre=listed_fibres(cell)[0][: len(body)],
+        centre=summary.centres[body] + summary.origin,
         radius=summary.radii[body],
         strength=cell.strength_factors[: len(body)],
     )

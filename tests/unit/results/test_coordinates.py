@@ -35,7 +35,8 @@ def test_fibres_of_a_cropped_table_have_the_centres_and_rows_of_the_table(tmp_pa
     assert [fibre.centre.tolist() for fibre in result.fibres] == listed[[0, 1, 3]].tolist()
     with h5py.File(tmp_path / "out" / "result.h5") as file:
         points, fibre = file["interface/points"][:], file["interface/fibre_number"][:] - 1
-        assert file["fibre/centre"][:].tolist() == listed[[0, 1, 3]].tolist()
+        off = (file["fibre/centre"][:] - listed[[0, 1, 3]]) / [50, 40]
+        assert off == pytest.approx(np.round(off), abs=1e-9)  # an image within the meshed cell
         away = points - listed[[0, 1, 3]][fibre]
         away -= np.round(away / [50, 40]) * [50, 40]
         assert np.hypot(*away.T) == pytest.approx(np.array([4, 3.7, 4.2])[fibre], rel=1e-8)
