@@ -177,12 +177,12 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
 def _start_petsc(words: Sequence[str], comm: Intracomm) -> None:
     """Start PETSc with the options in `words` and in PETSC_OPTIONS.  Collective.  Raises CaseError for faulty ones."""
     others, of_environment = option_values.split_argv(os.environ.get("PETSC_OPTIONS", "").split())
-    os.environ["PETSC_OPTIONS"] = "-skip_petscrc"  # gmsh starts a PETSc of its own
     options = option_values.named_values([*of_environment, *words])
     faults = [f"PETSC_OPTIONS: {word}: expected options of PETSc and their values" for word in others]
     faults += ["PETSC_OPTIONS_YAML: expected PETSC_OPTIONS in its place"] * ("PETSC_OPTIONS_YAML" in os.environ)
     if faults := [*faults, *option_values.faulty_values(options), *option_table.unknown_options(options)]:
         raise CaseError(*faults)
+    os.environ["PETSC_OPTIONS"] = "-skip_petscrc"  # gmsh starts a PETSc of its own
     try:
         libraries.start_petsc([sys.argv[0], *option_values.petsc_words(options)], comm)
     except RuntimeError as error:  # raised by petsc4py before PETSc can name it
@@ -214,7 +214,7 @@ def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracom
 
 @contextlib.contextmanager
 def _started(comm: Intracomm | None) -> Iterator[Intracomm]:
-    """Start PETSc unless it runs, and yield the communicator, by default of all ranks; for one thread at a time."""
+    """Start PETSc unless it runs, and yield the communicator, by default of all ranks, to one thread at a time."""
     standard_streams.prepare()
     environment.prefer_own_toolkits()
     libraries.require()

@@ -10,7 +10,6 @@ import numpy as np
 
 from feti_homog.materials import phase_bounds
 from feti_homog.microstructure.shapes import Ellipses
-from feti_homog.results import field_parts
 from feti_homog.system.runtime import described, records
 from feti_homog.typing import Float
 
@@ -74,7 +73,7 @@ class FibreInfo:
         bodies, varies = summary.fibre_bodies, not (factors == 1.0).all()
         ellipses = Ellipses(summary.centres, summary.frames)
         is_ellipse = np.isnan(summary.radii) & ~np.isnan(ellipses.angles)
-        columns = bodies, summary.coatings, factors, *field_parts.listed_fibres(cell)
+        columns = bodies, summary.coatings, factors, *_listed(cell)
         return tuple(
             cls(
                 number=number,
@@ -89,6 +88,18 @@ class FibreInfo:
             )
             for number, (body, thickness, factor, centre, row) in enumerate(zip(*columns, strict=True), 1)
         )
+
+
+def _listed(cell: unit_cell.TornCell) -> tuple[Float, list[int | None]]:
+    """Return the centres (fibres, 2) in the user's coordinates, and the rows of the fibre table."""
+    summary, table, window = cell.summary, cell.case.cell.table, cell.case.cell.window
+    centres = summary.centres[summary.fibre_bodies] + summary.origin
+    if table is None:
+        return centres, [None] * summary.fibres
+    from feti_homog.microstructure import periodic_table  # imports the windows of tables
+
+    rows = table.row[periodic_table.fibre_rows(table, window)].tolist()
+    return periodic_table.listed_centres(table, window, centres), rows
 
 
 @dataclass(frozen=True)

@@ -105,7 +105,7 @@ class AnalysisContext:
         resume: whether a path continues from the checkpoint.
         log: function that receives a line about each path event.
         events: name of the file with all these lines.
-        opening: the text of the entries of result.json that do not follow from the analysis.
+        opening: function of the context: the text of entries of result.json known before the analysis.  Collective.
         undetermined: undetermined strains at each point under one load.
         excess: largest ratio of the strains under one load to the strains of the bonded cell.
         notes: remarks on the result.
@@ -119,7 +119,7 @@ class AnalysisContext:
     resume: bool = False
     log: Callable[[str], object] = lambda line: None
     events: str = "result.path"
-    opening: str = "{}"
+    opening: Callable[[AnalysisContext], str] = lambda context: "{}"
     undetermined: list[list[str]] = field(default_factory=list)
     excess: float = 0.0
     notes: list[str] = field(default_factory=list)
@@ -189,7 +189,7 @@ class AnalysisContext:
             return checkpoints.EventsInMemory(comm, room if reads_again else 0)
         pieces = f"{self.cell.summary.subdomains} subdomains on {comm.size} ranks, {jumps.global_rows} multipliers"
         digest = mpi_errors.on_root(comm, self.case.digest, False)  # events are the same for any [output]
-        return checkpoints.Checkpoint(self.directory, comm, f"case {digest}, {pieces}\n{self.opening}", room)
+        return checkpoints.Checkpoint(self.directory, comm, f"case {digest}, {pieces}\n{self.opening(self)}", room)
 
     @cached_property
     def release_rates(self) -> energy_release.EnergyReleaseRates:

@@ -147,7 +147,7 @@ def _label(path: load_sections.LoadPath, number: int) -> str:
 
 
 def _without_lists(entry: dict[str, Any]) -> dict[str, Any]:
-    """Return the fields of a point without the lists with a number for each fibre, which fill result.json."""
+    """Return the fields of a point without the lists over fibres, which would fill result.json."""
     return {name: value for name, value in entry.items() if name not in OF_FIBRES}
 
 

@@ -142,7 +142,7 @@ def restored(
     since_last, up_to_point = path_points.Energies(*energies[:n]), path_points.Energies(*energies[n : 2 * n])
     broke, softened = map(int, counts)
     point = path_points.Point(load_factor, scale, state, broke, softened, since_last, EMPTY, after)
-    fibre, direction = event.get("bond", np.full(2, np.nan)).tolist()  # absent from older checkpoints
+    fibre, direction = event["bond"].tolist()
     return point, (up_to_point, energies[2 * n], (fibre, direction))
 
 

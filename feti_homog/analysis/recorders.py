@@ -109,7 +109,7 @@ class StateRecorder:
         self.singularities = set[str]()
 
     def record(self, states: Mapping[str, Sequence[averaging.Response | None]], load_factor: float, point: int) -> None:
-        """Record the next states by label, each from the response, or None, in each problem.  Collective."""
+        """Record the states of labels, from the response, or None, in each problem.  Collective."""
         if self.is_recording:
             self._largest += recovered_fields.largest_stresses(self._cell, [*states.values()])
             self._labels += states

@@ -101,7 +101,7 @@ def _torn(case: Case, comm: MPI.Intracomm, progress: progress_bar.Progress) -> I
             error = ConvergenceError(line) if isinstance(met, np.linalg.LinAlgError) else met
             if cell and mpi_errors.all_raise(comm, error):  # destroy is collective, and ranks without an error go on
                 cell.destroy()
-            raise error from met.__cause__
+            raise error from (met.__cause__ if error is met else met)
         cell.destroy()
 
 
@@ -121,8 +121,10 @@ def _run_and_write(
     ):
         states = StateRecorder(cell, file, keep_fields, progress.say)
         context = AnalysisContext.of(cell, progress, states)
+        # No function of the context may hold it: the garbage collection of a rank would then close the parallel file, a
+        # collective call.
         context = replace(context, directory=directory, resume=resume, log=log.write, events=output_folder.LOG)
-        context.opening = result_json.text_of(records.plain(_opening(context)))
+        context.opening = lambda of: result_json.text_of(records.plain(_opening(of)))
         analysis = _analyse(context)
         seal = states.seal()
         if states.error is not None and not keep_fields:
@@ -181,7 +183,7 @@ def _analyse(context: AnalysisContext) -> dict[str, Any]:
 
 
 def _opening(context: AnalysisContext) -> dict[str, Any]:
-    """Return the `Result` entries that do not follow from the responses, but for timings so far.  Collective."""
+    """Return the `Result` entries known before the analysis, with errors and times so far.  Collective."""
     cell, progress, checks = context.cell, context.progress, context.checks
     fractions = cell.fractions()
     # Straight edges cut off a part of the fibres.

@@ -15,7 +15,7 @@ SECONDS_A_LINE = 60.0
 def shown(
     progress: progress_bar.Progress, label: str, clock: Callable[[], float] = time.monotonic
 ) -> Iterator[Callable[[float, int, str, bool], None]]:
-    """Show the share of the whole `label`, the rate of steps, and the time used and left.
+    """Show the finished share of a computation, the rate of steps, and the time used and left.
 
     The block calls `advance(share, count, text, known)` after each step; `known` steps were not computed here.  The
     time left supposes that the rest of the share takes as long as the share since the last known step.

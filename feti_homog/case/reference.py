@@ -86,9 +86,9 @@ AXIS = KeyRow("SECTION.KEY", sections.AXIS_EXPECTED, "", "", "", sections.AXIS_M
 
 
 def tables(word: str = "") -> list[TableReference]:
-    """Return the reference tables, ordered as in `ORDER`: all, those of a section, or what has a word in it.
+    """Return the reference tables in the `ORDER` of sections, of one section, or with a word.
 
-    Names and descriptions have the word in any case, with spaces or underscores.
+    The search ignores case, and takes underscores for spaces, in names and descriptions of keys and sections.
 
     Raises:
         CaseError: nothing has the word.

@@ -127,7 +127,7 @@ def with_values(
     document = copy.deepcopy(dict(base))
     for path, value in values.items():
         entry = in_lists(path)[len(path) - 1 :]
-        for *above, last in {(*path[:-1], *entry), (*path[:-1], *entry[::-1])}:
+        for *above, last in dict.fromkeys([(*path[:-1], *entry), (*path[:-1], *entry[::-1])]):
             table: Any = document
             for name in above:
                 table = _one_of(table, name)

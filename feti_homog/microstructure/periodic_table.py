@@ -179,10 +179,8 @@ def listed_centres(table: FibreTable, window: str, centres: Float, rows: Int | N
 
     The centres are those of `rows` (k,), by default of all fibres.
     """
-    listed, size = (
-        table.centres[fibre_rows(table, window) if rows is None else rows],
-        np.array([table.width, table.height], float),
-    )
+    listed = table.centres[fibre_rows(table, window) if rows is None else rows]
+    size = np.array([table.width, table.height], float)
     moves = (centres - listed + size / 2) % size - size / 2
     return np.asarray(listed + np.where(np.abs(moves) > cut_window.TOLERANCE * table.radius.mean(), moves, 0.0))
 

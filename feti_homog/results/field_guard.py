@@ -10,9 +10,9 @@ from feti_homog.system.runtime import input_files
 
 
 def require_own(path: Path) -> None:
-    """Require hard links, and tables of numbers that lie in the file.
+    """Refuse links other than hard links, and tables that are larger than the file or lie elsewhere.
 
-    Links may lead to pipes, back or elsewhere; tables may have any size.  Raises CaseError, FetiHomogError as `read`.
+    Other links may lead to pipes, other files or back.  Raises CaseError; FetiHomogError for an unreadable file.
     """
     if not path.is_file():
         raise CaseError(f"cannot read {path}: it is missing; run the case again")

@@ -63,18 +63,6 @@ def fibre_part(cell: unit_cell.TornCell) -> FibrePart:
     )
 
 
-def listed_fibres(cell: unit_cell.TornCell) -> tuple[Float, list[int | None]]:
-    """Return the centres (fibres, 2) in the user's coordinates, and the rows of the fibre table."""
-    summary, table, window = cell.summary, cell.case.cell.table, cell.case.cell.window
-    centres, rows = summary.centres[summary.fibre_bodies] + summary.origin, [None] * summary.fibres
-    if table is None:
-        return centres, [*rows]
-    from feti_homog.microstructure import periodic_table  # imports the windows of tables
-
-    rows = table.row[periodic_table.fibre_rows(table, window)].tolist()
-    return periodic_table.listed_centres(table, window, centres), rows
-
-
 def interface_part(cell: unit_cell.TornCell) -> InterfacePart:
     """Return the interface nodes whose multipliers this rank owns.  Collective."""
     jumps, nodes = cell.jumps, cell.jumps.nodes

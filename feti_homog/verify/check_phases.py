@@ -114,7 +114,7 @@ def _measures(stress: Float, strength: Mapping[str, Any] | None) -> dict[str, Fl
 
 
 def _hashin(stress: Float, limit: Mapping[str, float]) -> list[Float]:
-    """Return the `MODES` (n,), near zero both signs; of one with a linear term 1 / the root of a f^2 + b f = 1."""
+    """Compute the utilisation 1 / f, with a f^2 + b f = 1, of each of the `MODES` (n,); near zero, of both signs."""
     zero = SAME_PLACE * float(np.abs(stress).max(initial=0.0))
     shear = (stress[:, 0, 2] ** 2 + stress[:, 1, 2] ** 2) / limit["axial_shear"] ** 2
     along, across = stress[:, 2, 2], stress[:, 0, 0] + stress[:, 1, 1]

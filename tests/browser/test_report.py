@@ -61,7 +61,7 @@ def test_the_page_can_be_printed(chromium: Any, reports: dict[str, Path]) -> Non
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_table_runs_off_the_paper(chromium: Any, reports: dict[str, Path], kind: str) -> None:
-    """A4 less Chromium's margins has 718 pixels; what is folded on the screen is printed."""
+    """A4 without Chromium's margins is 718 pixels wide; folded parts are printed, too."""
     chromium.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
     chromium.execute_cdp_cmd(
         "Emulation.setDeviceMetricsOverride", {"width": 718, "height": 1046, "deviceScaleFactor": 1, "mobile": False}

@@ -56,7 +56,7 @@ def sparse(path: Path) -> None:
 
 
 def sealed(change: Callable[[dict[str, Any]], object]) -> Callable[[Path], None]:
-    """Change a document, which then has the checksum of what it is."""
+    """Return a function that changes a document and renews its checksum."""
 
     def make(path: Path) -> None:
         document = json.loads(path.read_text())
@@ -118,7 +118,7 @@ FIELDS: dict[str, tuple[Content, str]] = {
 
 
 def with_tables(change: Callable[[h5py.File], object]) -> Callable[[Path], None]:
-    """Change the tables of a folder's result.h5, which then has the checksum of what it is."""
+    """Return a function that changes tables of result.h5 in a folder, and renews its checksum."""
 
     def make(path: Path) -> None:
         with h5py.File(path, "r+") as file:

@@ -1,6 +1,7 @@
-"""A path that is interrupted: its points so far are those of the finished path, wherever they are read."""
+"""The points of an interrupted path equal the first points of the finished path, for every reader."""
 
 import csv
+import gc
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -12,7 +13,7 @@ from feti_homog import Case, run, run_sweep
 from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.report import page
 from feti_homog.report.plots import figures, path_picture
-from feti_homog.results import checkpoints, output_folder, result_json
+from feti_homog.results import checkpoints, field_file, output_folder, result_json
 from feti_homog.studies import case_folders, case_runs, collect, sweep_cases
 from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.system.runtime import file_locks
@@ -70,6 +71,18 @@ def test_points_so_far_are_those_of_the_finished_path(comm, shared_path, kind):
     assert on_root(comm, output_folder.latest, out)["status"] == "done"
 
 
+def test_an_interrupted_run_leaves_no_file_to_the_garbage_collection(comm, shared_path):
+    """One rank alone would close the file, and wait for the others."""
+    gc.collect()
+    gc.disable()
+    try:
+        begun(comm, shared_path, CASE["path"])
+        left = [item for item in gc.get_objects() if isinstance(item, field_file.FieldFile)]
+    finally:
+        gc.enable()
+    parallel_assert(comm, not left)
+
+
 def test_curves_and_page_tell_that_the_path_is_unfinished(comm, shared_path):
     begun(comm, shared_path, CASE["path"])
 
@@ -111,7 +124,7 @@ def test_a_record_that_is_being_written_does_not_count(comm, shared_path):
 
 
 def test_sweeps_tell_and_collect_begun_cases(comm, shared_path):
-    """The second of two points is interrupted: statistics are those of the first."""
+    """The second of two points is interrupted: the first alone has statistics."""
     document = CASE | {"output": {"fields": False}, "sweep": {"interface.normal_strength": [4.0, 4.5]}}
     out, sweep = shared_path / "out", sweep_cases.expand(document, Path())
     with interrupted(of="case-0002"), pytest.raises(RuntimeError, match="interrupted"):

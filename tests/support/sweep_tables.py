@@ -9,7 +9,7 @@ MATERIAL = {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.
 
 
 def document(fraction, fibres, shift):
-    """Write the files of a run with a stiffness slightly above that of Reuss."""
+    """Write the files of a run with a stiffness slightly above Reuss' bound."""
     C = np.array([[120.0 + 80 * fraction, 50.0, 0.0], [50.0, 120.0 + 80 * fraction, 0.0], [0.0, 0.0, 35.0]]) + shift
     cell = {"geometry": "random", "fibre_fraction": fraction, "fibres": fibres}
     return {

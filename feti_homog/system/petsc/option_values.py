@@ -180,7 +180,7 @@ def split_argv(argv: Sequence[str]) -> tuple[list[str], list[str]]:
 
 
 def named_values(words: Sequence[str]) -> dict[str, str]:
-    """Return the values of PETSc's options by name without dash, empty without a value; with those of options files."""
+    """Return the values of PETSc's options by name, without dash, also from options files; empty without a value."""
     values: dict[str, str] = {}
     name = ""
     for word in words:

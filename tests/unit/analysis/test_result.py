@@ -202,7 +202,7 @@ def test_results_can_be_told_apart():
 
 
 def test_constants_are_attributes():
-    """Young's moduli and ratios are those of the inverse stiffness."""
+    """Young's moduli and ratios follow from the inverse stiffness."""
     for result, C in ((RESULTS["stiffness"], STIFFNESS), (RESULTS["space"], SPATIAL)):
         S = np.linalg.inv(C)
         expected = [1 / S[0, 0], -S[1, 0] / S[0, 0], 1 / S[-1, -1]]

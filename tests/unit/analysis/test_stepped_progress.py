@@ -1,4 +1,4 @@
-"""Long runs: a bar on a terminal, a line a minute in a file, with the same numbers."""
+"""A bar on a terminal and a line a minute in a file show the same numbers."""
 
 from functools import partial
 
@@ -29,7 +29,7 @@ class Clock:
 
 
 def shown_lines(shares, seconds, known=0):
-    """Return the lines of steps of so many seconds each, the first of which are known at once."""
+    """Return the lines about steps that take `seconds` each; the first `known` steps take no time."""
     progress, clock = Words(), Clock()
     with stepped_progress.shown(progress, "load", clock) as advance:
         for count, share in enumerate(shares, 1):

@@ -9,7 +9,7 @@ from feti_homog.homogenization import mesh_estimate
 
 
 def group(points, sides, first):
-    """One triangle, of which the first `sides` sides lie on an arc; its forces begin at `first`."""
+    """Return a body of one triangle; its first `sides` sides lie on an arc, its forces begin at `first`."""
     ends = np.array([[0, 1], [1, 2]])[:sides]
     stress = SimpleNamespace(
         node_class=np.arange(3), triangles=np.arange(3)[None], problem=SimpleNamespace(components=2)

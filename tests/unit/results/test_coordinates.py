@@ -12,7 +12,7 @@ from feti_homog.results.viewed_states import read_state
 
 MATERIAL = {"matrix": {"young": 3.0, "poisson": 0.3}, "fibre": {"young": 70.0, "poisson": 0.2}}
 # A disc that touches the lower side, so that the cell is shifted; a comment and a row outside the window.
-ROWS = "106.08,217.37,4\n# none\n137.25,203.7,3.7\n90,210,4\n145.8,231.9,4.2\n"
+ROWS = "106.0812345678912,217.37,4\n# none\n137.25,203.7,3.7\n90,210,4\n145.8,231.9,4.2\n"
 TABLE = f"# width = 50, height = 40, left = 100, bottom = 200\nx,y,radius\n{ROWS}"
 
 
@@ -37,6 +37,9 @@ def test_fibres_of_a_cropped_table_have_the_centres_and_rows_of_the_table(tmp_pa
         points, fibre = file["interface/points"][:], file["interface/fibre_number"][:] - 1
         off = (file["fibre/centre"][:] - listed[[0, 1, 3]]) / [50, 40]
         assert off == pytest.approx(np.round(off), abs=1e-9)  # an image within the meshed cell
+        own = points - file["fibre/centre"][:][fibre]
+        own -= np.round(own / [50, 40]) * [50, 40]
+        assert np.hypot(*own.T) == pytest.approx(np.array([4, 3.7, 4.2])[fibre], rel=1e-13)  # beyond the digits of gmsh
         away = points - listed[[0, 1, 3]][fibre]
         away -= np.round(away / [50, 40]) * [50, 40]
         assert np.hypot(*away.T) == pytest.approx(np.array([4, 3.7, 4.2])[fibre], rel=1e-8)

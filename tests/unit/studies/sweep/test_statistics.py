@@ -30,7 +30,7 @@ def test_statistics_of_too_few_values_are_nan():
 
 
 def samples(scale):
-    """Three realisations of a path, S11 of which is noise, with a peak of 3, 4 and 5 times a scale."""
+    """Collect three realisations of a path with peaks of 3, 4 and 5 times a scale; S11 is noise."""
     documents = [path_document(4, 0.0) for _ in range(3)]
     for number, each in enumerate(documents):
         each["path"] = [
@@ -42,7 +42,7 @@ def samples(scale):
 
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
 def test_noise_and_costs_have_no_statistics(tmp_path, scale):
-    """Noise is what is small beside the other stresses of the path, in any unit."""
+    """A stress far below the other stresses of its path is noise, in any unit."""
     table = samples(scale)
     assert table.outputs["peak_S11"].tolist() == table.outputs["onset_S11"].tolist() == [0.0] * 3
     collect.write(tmp_path, table)
