@@ -90,8 +90,8 @@ def rays_of(
     loads[:, [names.index(name) for name in plane]] = np.where(np.abs(unit) < np.finfo(float).eps, 0.0, unit)
     heat_stress = zero if thermal_stress is None else temperature * thermal_stress
     if by_stress:
-        heat_strain = -np.linalg.solve(stiffness, heat_stress)
-        return Rays(np.linalg.solve(stiffness, loads.T).T, loads, heat_strain, zero, temperature)
+        strain, heat_strain = (np.asarray(np.linalg.solve(stiffness, s), float) for s in (loads.T, -heat_stress))
+        return Rays(strain.T, loads, heat_strain, zero, temperature)
     return Rays(loads, loads @ stiffness.T, zero, heat_stress, temperature)
 
 
@@ -129,7 +129,7 @@ class _Finder:
         largest = float(self._comm.allreduce(used.max(initial=0.0), MPI.MAX))
         for first in range(0, len(rays.strain), self._chunk):
             loads = self._unit_loads(rays.strain[first : first + self._chunk], 0.0, names)
-            directions = np.tensordot(loads, self._unit, axes=1)
+            directions = np.asarray(np.tensordot(loads, self._unit, axes=1), float)
             if largest < 1.0:
                 # (n, k) utilisations by the bond stresses of the bonded cell, which scale the solver's noise.
                 total, column = np.zeros((len(loads), len(self._fibre))), 0

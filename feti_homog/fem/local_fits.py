@@ -64,7 +64,7 @@ class PatchNeighbours:
         a, b = self.vector.T
         moved_x, moved_y = x + a * one, y + b * one
         moved = one, moved_x, moved_y, xx + a * (x + moved_x), xy + a * y + b * moved_x, yy + b * (y + moved_y)
-        return NEIGHBOURS[1] * np.stack([np.bincount(self.at, row, moments.shape[1]) for row in moved])
+        return NEIGHBOURS[1] * np.array([np.bincount(self.at, row, moments.shape[1]) for row in moved])
 
     def shared_matrices(self, moments: Float, order: int) -> Float:
         """Return the weighted neighbour contributions (vertices, p, p) to moments (vertices, p, p)."""

@@ -44,7 +44,7 @@ class SpringSides:
         for part in parts:
             triangle, k, line = border_lines(part.submesh, part.mesh, part.mesh.node_class[part.mesh.nodes])
             nodes, first = number[first : first + part.mesh.n_classes][line], first + part.mesh.n_classes
-            inner = (nodes >= 0).all(axis=1)
+            inner = np.asarray((nodes >= 0).all(axis=1))
             inner[inner] = (fibre[nodes[inner]] == part.submesh.constituent[triangle[inner], None]).all(axis=1)
             normal, turn = shared_entities.edge_normals(part.submesh, triangle[inner], k[inner])
             nodes = nodes[inner][:, starts[:, None] + np.arange(lattice.order + 1)].reshape(-1, lattice.order + 1)

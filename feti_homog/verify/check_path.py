@@ -155,7 +155,7 @@ def check_envelope(findings: Findings, cell: DiscreteCell, states: States) -> No
         imposed = unit if of_strains else np.linalg.solve(stiffness, unit)
         strain = np.array(point["strain"]) if has_factor else imposed
         shares, *_ = np.linalg.lstsq(unit_loads, np.array([*strain, temperature * has_factor]), rcond=None)
-        traction = np.tensordot(shares, unit_tractions, axes=1)
+        traction = np.asarray(np.tensordot(shares, unit_tractions, axes=1), float)
         used = np.where(may_break, law.onset(traction), 0.0)
         if not has_factor:
             noise = CONTACT_PER_RTOL * float(document["solver"].hint("rtol")) * np.abs(stiffness @ strain).max()

@@ -77,7 +77,7 @@ def _stresses(cell: DiscreteCell, state: State) -> tuple[Float, Float]:
         rules, along = out_of_plane(cell.files.case, cell.files.phases)[:, 0], np.zeros(len(free))
     else:
         L, out = cell.stiffnesses, cell.stiffnesses[:, 2, PLANE]
-        rules = np.linalg.solve(L[:, PLANE][:, :, PLANE], out[..., None])[..., 0]
+        rules = np.asarray(np.linalg.solve(L[:, PLANE][:, :, PLANE], out[..., None])[..., 0], float)
         along = (L[:, 2, 2] - (rules * out).sum(axis=1)) * (state.along - free[:, 2])
     in_plane = stress[..., PLANE if v == 6 else slice(None)]
     tensors[..., 2, 2] = np.einsum("ei,eqi->eq", rules[mesh.phase], in_plane) + along[mesh.phase, None]

@@ -70,7 +70,7 @@ def check_gluing(findings: Findings, cell: DiscreteCell, state: State, fields: E
     scales = scale + np.where(is_fixed, rounding_of_all, rounding)
     findings.record("equilibrium", relative(inner, scales[:, None]), f"{state.name}, mesh node {{}}".format)
     # Forces of glued nodes, the last group.
-    sums = np.stack([np.bincount(copy, column) for column in fields.force[nodes.node].T], axis=1)
+    sums = np.stack([np.bincount(copy, column) for column in fields.force[nodes.node].T], axis=1, dtype=float)
     # The traction pulls the fibre, its reaction the matrix.
     row = cell.faces.row[first]
     on_face = row >= 0

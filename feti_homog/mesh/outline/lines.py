@@ -208,7 +208,7 @@ def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges:
 
     def size_at(line: Int, share: Float) -> Float:
         low, high = lines.cap[line].T
-        return np.minimum(field(lines.points(line, share)), low + share * (high - low))
+        return np.asarray(np.minimum(field(lines.points(line, share)), low + share * (high - low)))
 
     line, samples = np.repeat(np.arange(len(lengths)), least_samples), np.linspace(0, 1, least_samples)
     samples = np.tile(samples, len(lengths))

@@ -94,7 +94,7 @@ def middle_nodes(mesh: RawMesh) -> list[str]:
     middles, plane = mesh.middles, mesh.points[:, :2]
     if len(middles.tags) == 0:
         return []
-    finite = np.isfinite(middles.points).all(axis=1)
+    finite = np.asarray(np.isfinite(middles.points).all(axis=1))
     places = np.where(finite[:, None], middles.points, mesh.points[middles.edges].mean(axis=1))
     reach = SAME_PLACE * np.ptp(plane, axis=0).max()
     start, stop = plane[middles.edges[:, 0]], plane[middles.edges[:, 1]]

@@ -47,7 +47,7 @@ def circle_size(arrangement: Arrangement, largest: float) -> Float:
     """
     shells, disc = arrangement.shells
     caps = np.minimum(largest, 2 * np.pi * shells.radii / MIN_EDGES_AROUND)
-    return np.minimum(caps, coating_size(arrangement)[disc])
+    return np.asarray(np.minimum(caps, coating_size(arrangement)[disc]))
 
 
 def coating_size(arrangement: Arrangement) -> Float:
@@ -156,7 +156,7 @@ class SizeField:
             sizes = (self._lengths[nearest] + self._growths[nearest] * distance).reshape(len(some), count)
             parts.append(np.minimum(self.largest, sizes.min(axis=1)))
         sizes = np.concatenate(parts)
-        return sizes if self.graded is None else np.minimum(sizes, self.graded(points))
+        return sizes if self.graded is None else np.asarray(np.minimum(sizes, self.graded(points)))
 
 
 def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips: Float) -> SizeField:

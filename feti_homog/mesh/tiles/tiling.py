@@ -242,7 +242,7 @@ def tile_torus(regions: Regions, tiles: Sequence[FilledTile], all_nodes: int) ->
     mesh, classes, tile = tile_mesh(regions, tiles)
     plane, triangle_edges = plane_edges_of(mesh)
     class_keys, node_class = np.unique(classes, return_inverse=True)
-    keys, torus_edge = np.unique(np.sort(classes[plane], axis=1) @ [all_nodes, 1], return_inverse=True)
+    keys, torus_edge = np.unique(np.sort(classes[plane], axis=1) @ np.array([all_nodes, 1]), return_inverse=True)
     void_arcs = mesh.arc_edges[regions.constituent[mesh.arc_circle] < 0]
     torus = Torus(
         mesh=mesh,

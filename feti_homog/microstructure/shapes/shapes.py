@@ -72,7 +72,7 @@ def with_parts(outlines: Outlines, parts: Sequence[tuple[Bool, Outlines]]) -> Ou
 
 def elliptic(outlines: Outlines) -> Ellipses:
     """Replace outlines that are no ellipses by equal-area discs."""
-    has_core = outlines.cores.any(axis=(1, 2))[:, None, None]
+    has_core = outlines.cores.any(axis=(1, 2), keepdims=True)
     return Ellipses(outlines.centres, np.where(has_core, outlines.radii[:, None, None] * np.eye(2), outlines.frames))
 
 

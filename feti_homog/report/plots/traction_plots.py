@@ -48,14 +48,14 @@ def figure(cell: drawn_cell.DrawnCell, document: Document) -> Figure:
     stress = plot_helpers.stress_label(file.attrs["stress_unit"])
     length = plot_helpers.unit_label(file.attrs["length_unit"]) or "(cell units)"
     for row, body in zip(grid, chosen, strict=True):
-        place = coordinate(cell, body)
+        along = coordinate(cell, body)
         for axes, quantity in zip(row, quantities, strict=True):
-            _panel(axes, [file[f"state/{name}"] for name in names], quantity, place)
+            _panel(axes, [file[f"state/{name}"] for name in names], quantity, along)
         row[0].set_ylabel(f"traction {stress}")
         row[1].set_ylabel(f"jump {length}")
         for axes in row[2:]:
             axes.set(ylabel="damage of the bonds", ylim=(-0.03, 1.03))
-        fibre_name = f"fibre {file['interface/fibre_number'][place.nodes[0]]}"
+        fibre_name = f"fibre {file['interface/fibre_number'][along.nodes[0]]}"
         is_fibre = body in file["fibre/body"][:]
         row[0].set_title(fibre_name if is_fibre else f"coating of {fibre_name}", fontsize=10, loc="left")
     for first, *lower_axes in grid.T:
