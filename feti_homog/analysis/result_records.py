@@ -195,7 +195,7 @@ class PathPoint:
 class Peak:
     """The largest stress on a path up to its deepest fall.
 
-    The stress component belongs to the leading strain, the largest strain that the loads change.
+    Its component has the largest strain that the loads change, up to the end of the leg with the first break.
     """
 
     stress_name: str = described("name of the component")

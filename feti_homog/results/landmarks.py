@@ -45,13 +45,13 @@ def turning_points(values: Float, threshold: float) -> list[int]:
 def peak_of(document: path_curves.Document) -> dict[str, Any]:
     """Return the fields of `result_records.Peak` for a non-empty path.
 
-    The peak is the largest stress up to the deepest fall in which bonds break, or on the whole path without such a
+    The peak is the largest stress up to the deepest fall in which bonds break, or on all leading points without such a
     fall: after all fibres debond, the matrix alone may carry a larger stress than the composite did.  A path that
     stopped early without a fall has no peak, but a largest stress `so_far`.
 
     On a path with one leg the load only rises: where bonds break, the cell drops to the next stable branch.
     """
-    points, component = document["path"], path_curves.leading_component(document)
+    points, component = path_curves.leading_points(document), path_curves.leading_component(document)
     # The sum with 0.0 turns -0.0 into 0.0.
     stress, strain = (np.array([p[name] for p in points], float)[:, component] + 0.0 for name in ("stress", "strain"))
     number, curve, broke = np.arange(len(stress)), stress, np.array([point["broke"] for point in points])
@@ -75,7 +75,7 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
             entries |= {f"{title}_{name}": value for name, value in numbers.items()}
     if valley is not None:
         entries |= {"stress_left": float(curve[valley]), "event_left": int(number[valley])}
-    is_cut_off = valley is None and points[-1]["load_factor"] < 1.0 - path_curves.SAME_LOAD
+    is_cut_off = valley is None and document["path"][-1]["load_factor"] < 1.0 - path_curves.SAME_LOAD
     entries |= {"so_far": True} if is_cut_off or "unfinished" in document else {}
     entries["dissipated"] = points[event].get("dissipated", 0.0)
     # The fibres and directions of the bonds follow from the states alone.
@@ -97,8 +97,9 @@ def stresses_of(document: path_curves.Document, peak: path_curves.Document) -> l
 
 
 def fall_of(document: path_curves.Document, peak: path_curves.Document) -> float:
-    """Return the stress fall after the peak, to the valley or the end, divided by the largest stress."""
-    remaining = (stresses_of(document, peak)[-1], peak.get("stress_left", peak["stress"]))
+    """Return the stress fall after the peak, to the valley or the last leading point, divided by the largest stress."""
+    last = stresses_of(document, peak)[len(path_curves.leading_points(document)) - 1]
+    remaining = (last, peak.get("stress_left", peak["stress"]))
     return max(1.0 - stress / peak["stress"] for stress in remaining) if peak["stress"] else 0.0
 
 

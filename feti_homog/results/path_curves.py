@@ -4,7 +4,7 @@ Points are entries of `path` in result.json: mappings with `load_factor`, `strai
 order: [11, 22, 12], or [11, 22, 33, 23, 13, 12] in generalized plane strain; stresses in the moduli's unit.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -54,13 +54,37 @@ def changed_components(document: Document) -> list[int]:
 
 
 def leading_component(document: Document) -> int:
-    """Return the component with the largest strain among those that the waypoints change.
+    """Return the component with the largest strain on the `leading_points`, among those that the waypoints change.
 
     If the waypoints change the temperature alone, all components are compared.
     """
-    largest = np.abs([point["strain"] for point in document["path"]]).max(axis=0)
+    largest = np.abs([point["strain"] for point in leading_points(document)]).max(axis=0)
     changed = changed_components(document) or list(range(len(largest)))
     return changed[int(largest[changed].argmax())]
+
+
+def leading_points(document: Document) -> list[Point]:
+    """Return the points up to the end of the leg on which the first bond breaks; all points without a break."""
+    leg, broke = legs_of(document), np.array([point["broke"] > 0 for point in document["path"]])
+    return [*document["path"][: int((leg <= leg[broke].min(initial=np.inf)).sum())]]
+
+
+def largest_of_legs(document: Document) -> Iterator[tuple[int, int, int]]:
+    """Yield leg, component and point of the largest stress on later legs, where the strain changes most."""
+    leg, changed = legs_of(document), changed_components(document)
+    strain, stress = (np.array([point[name] for point in document["path"]]) for name in ("strain", "stress"))
+    for number in range(2, legs(document) + 1):
+        points = np.flatnonzero(leg == number)
+        if len(points):
+            change = np.abs(strain[points] - strain[max(points[0] - 1, 0)]).max(axis=0)
+            component = max(changed or range(len(change)), key=change.__getitem__)
+            yield number, component, int(points[np.abs(stress[points, component]).argmax()])
+
+
+def legs_of(document: Document) -> Float:
+    """Return the leg (n,) of each point, counted from 1."""
+    position = np.array([point["load_factor"] for point in document["path"]]) * (count := legs(document))
+    return np.asarray(np.ceil(position - SAME_LOAD * count).clip(1))
 
 
 def components_above(share: float, values: Float) -> list[int]:

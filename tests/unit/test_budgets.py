@@ -26,14 +26,14 @@ LINES = {
     "materials": 1430 + 95,
     "mesh": 5500,
     "microstructure": 2140,
-    "report": 3420 + 160,
-    "results": 2430 + 30,
+    "report": 3420 + 170,
+    "results": 2430 + 55,
     "schema": 430,
     "studies": 2950,
     "system": 1770,
     "verify": 3100 + 160,
 }
-FILES, TOTAL = 310, 45000 + 200
+FILES, TOTAL = 310, 45000 + 230
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.0, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

@@ -75,6 +75,12 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     parts = [f"{error:.1e} at {place}" for place, error in errors.items() if error is not None]
     text += f"; mesh error of the energy {', '.join(parts)}" if parts else ""
     lines = wrap(text, WIDTH, subsequent_indent="  ")
+    strains, stresses_of_path = voigt.voigt_names(len(document["path"][0]["stress"]))
+    for leg, k, number in path_curves.largest_of_legs(document):
+        if strains[k] != peak["strain_name"]:
+            strain, stress = (without_noise(document["path"][number][name][k]) for name in ("strain", "stress"))
+            name = stresses_of_path[k] + stress_label(document)
+            lines.append(f"Largest {name} of leg {leg}: {stress:.6g} at {strains[k]} = {strain:.6g} (point {number})")
     if path_curves.scales_with_toughness(document):
         lines.append("Scaling: strains and stresses of the path are as the root of the toughness")
     return lines

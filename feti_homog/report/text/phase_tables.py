@@ -48,7 +48,7 @@ def _states(document: Document, count: int) -> Sequence[int]:
     if "path" in document and "states" in document:
         from feti_homog.results import landmarks  # of paths alone
 
-        return landmarks.chosen_states(document, POINTS, count)
+        return landmarks.landmark_states(document, POINTS, count)
     points = len(document.get("angle", ())) or (count if "path" in document else 1)
     step, loads = -(-points // POINTS), count // points
     return [point * loads + load for point in range(0, points, step) for load in range(loads)]

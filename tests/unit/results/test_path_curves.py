@@ -11,6 +11,7 @@ from feti_homog.results.path_curves import (
     ends_of_legs,
     first_drop,
     first_leg,
+    largest_of_legs,
     leading_component,
     load_controlled,
     named_components,
@@ -157,6 +158,24 @@ def test_what_a_waypoint_does_not_name_stays_and_the_components_that_change_are_
         0,
         1,
     ]
+
+
+def test_the_strength_of_the_first_leg_is_the_peak_although_later_legs_strain_more() -> None:
+    """Tension breaks bonds, then compression with shear breaks more."""
+    rows = [(4.0, 0.0), (5.0, 0.0), (3.0, 0.0), (-3.0, 0.0), (-3.0, 2.0), (-3.0, 1.0)]
+    path = mixed([[0.5, 0, 0], {"S11": -3.0}, {"S11": -3.0, "gamma12": 9.0}], [[a, 0, b] for a, b in rows], "strain")
+    loads = [0.2, 0.3, 1 / 3, 2 / 3, 0.9, 1.0]
+    for entry, load, broke, gamma in zip(
+        path["path"], loads, (0, 1, 1, 0, 0, 1), (0, 0, 0, 0, 20.0, 50.0), strict=True
+    ):
+        entry |= {"load_factor": load, "broke": broke, "strain": [*entry["strain"][:2], gamma]}
+    peak = peak_of(path)
+    assert (peak["stress_name"], peak["stress"], peak["event"], peak["first_break_event"]) == ("S11", 5.0, 1, 1)
+    assert peak["stress_left"] == 3.0 and peak["event_left"] == 2  # the second leg unloads, and is no fall
+    assert list(largest_of_legs(path)) == [(2, 0, 3), (3, 2, 4)]
+    for entry in path["path"][:3]:
+        entry["broke"] = 0
+    assert leading_component(path) == 2 and peak_of(path)["stress"] == 2.0
 
 
 def test_the_strain_that_leads_is_among_those_that_are_named() -> None:

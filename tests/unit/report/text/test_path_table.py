@@ -16,7 +16,8 @@ def test_what_is_left_is_that_after_the_peak() -> None:
     }  # fmt: skip
     case = {"analysis": {"plane": "strain"}, "path": {"method": "events", "strain": [1.0, 0.0, 0.0]}}
     case["output"] = {"stress_unit": "MPa"}
-    lines = _peak_lines({"case": case, "path": [{"stress": [0.0, 0.0, 0.0]}] * 4}, peak)
+    point = {"load_factor": 1.0, "broke": 0, "strain": [0.0, 0.0, 0.0], "stress": [0.0, 0.0, 0.0]}
+    lines = _peak_lines({"case": case, "path": [point] * 4}, peak)
     assert " ".join(" ".join(lines).split()) == (
         "Peak S11 (MPa): 40 at E11 = 0.006 (point 1); first break 30 at 0.005 (point 2); "
         "20 after the peak as the strain rises, 50.0% less (point 3)"
