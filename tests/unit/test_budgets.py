@@ -34,7 +34,7 @@ LINES = {
     "system": 1770,
     "verify": 3100 + 160,
 }
-FILES, TOTAL = 310, 45000 + 221
+FILES, TOTAL = 310, 45000 + 225
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.0, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.
