@@ -24,6 +24,7 @@ from feti_homog.system.runtime import described, input_files, records
 NAME = "result.json"
 KEY = "checksum"
 BLOCK = 1 << 26  # bytes of one read
+ENCODE = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
 SCHEMA = 1  # version of the layout: raise when a key changes name or meaning, or disappears
 
 
@@ -225,5 +226,11 @@ def _sealed(text: str, checksum: Any) -> str:
     return f'{begin}\n "{KEY}": {json.dumps(checksum)}\n}}\n'
 
 
-def _text(content: Mapping[str, Any]) -> str:
-    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)
+def _text(value: Any, begin: str = "\n ") -> str:
+    """Serialize with indents; an array of numbers, and each row of a matrix, has one line."""
+    if isinstance(value, dict) and value:
+        lines = [f"{ENCODE(key)}: {_text(item, begin + ' ')}" for key, item in value.items()]
+        return f"{{{begin}{(',' + begin).join(lines)}{begin[:-1]}}}"
+    if isinstance(value, list | tuple) and any(isinstance(item, dict | list | tuple | str) for item in value):
+        return f"[{begin}{(',' + begin).join(_text(item, begin + ' ') for item in value)}{begin[:-1]}]"
+    return ENCODE(value)
