@@ -161,22 +161,22 @@ def loads(text: str) -> dict[str, Any]:
     """
     try:
         document = json.loads(text)
+        if not isinstance(document, dict):
+            raise ValueError("it is damaged: no table of keys and values")
+        if KEY not in document:
+            *rest, (_, last) = document.items() if document else [("", None)]
+            if isinstance(last, str) and len(last) == 8 and last == _checksum(_text(dict(rest))):
+                raise ValueError("it is damaged: the key of its checksum has another name")
+            return document
+        stored = document.pop(KEY)
+        end = _sealed("{\n}", stored)[1:]
+        if text.endswith(end) and _checksum(text[: -len(end)] + "\n}") == stored:  # the text is unchanged
+            return document
+        if stored != _checksum(_text(document)):
+            raise ValueError("it is damaged: its checksum is wrong")
+        return document
     except RecursionError as error:
         raise ValueError("it is nested too deeply") from error
-    if not isinstance(document, dict):
-        raise ValueError("it is damaged: no table of keys and values")
-    if KEY not in document:
-        *rest, (_, last) = document.items() if document else [("", None)]
-        if isinstance(last, str) and len(last) == 8 and last == _checksum(_text(dict(rest))):
-            raise ValueError("it is damaged: the key of its checksum has another name")
-        return document
-    stored = document.pop(KEY)
-    end = _sealed("{\n}", stored)[1:]
-    if text.endswith(end) and _checksum(text[: -len(end)] + "\n}") == stored:  # the text is unchanged
-        return document
-    if stored != _checksum(_text(document)):
-        raise ValueError("it is damaged: its checksum is wrong")
-    return document
 
 
 @dataclass(frozen=True)
