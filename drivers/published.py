@@ -1,4 +1,4 @@
-"""Compare published ply constants and energy release rates with computed values.
+"""Compare published ply constants and energy release rates, and measured plies, with computed values.
 
     mpirun -n 2 .venv/bin/python drivers/published.py --out results/published
 
@@ -6,6 +6,9 @@ Constants in GPa: boron/aluminium of a square arrangement by the finite elements
 Technol. 56, 1996, 171) and by multipole series.  Energy release rates by finite elements (Di Stasio,
 thinPlyMechanics): one debonded fibre in a large matrix, G / G0, and a square arrangement of 60 %, whose fibres are
 debonded towards each other, side by side, G in J/m2.
+
+Measured: four plies of the World-Wide Failure Exercise (WWFE; Soden, Hinton, Kaddour, Compos. Sci. Technol. 58, 1998,
+1011) beside hexagonal arrangements of their fibres and matrices; GPa, 1/K.
 """
 
 import argparse
@@ -40,9 +43,14 @@ class Ply(NamedTuple):
     constants: dict[str, float]
 
 
-def isotropic(young: float, poisson: float) -> dict[str, float]:
+def isotropic(young: float, poisson: float, expansion: float | None = None) -> dict[str, float]:
     """Return a phase of the case file."""
-    return {"young": young, "poisson": poisson}
+    return {"young": young, "poisson": poisson} | ({} if expansion is None else {"expansion": expansion})
+
+
+def measured(fibre: dict[str, float], matrix: dict[str, float], fraction: float, *values: float) -> Ply:
+    """Return a ply of the WWFE and its values, the first ones of OF_PLY."""
+    return Ply(fibre, matrix, fraction, "hexagonal", dict(zip(OF_PLY, values, strict=False)))
 
 
 BORON, ALUMINIUM = isotropic(379.3, 0.1), isotropic(68.3, 0.3)
@@ -55,6 +63,20 @@ PLIES = {
     "B/Al, multipole series": Ply(BORON, ALUMINIUM, 0.47, "square", dict(zip(OF_CELL, SERIES, strict=True))),
 }
 OF_PLIES = dict(zip(OF_CELL, ("E1", "E2", "G12", "G23", "nu23"), strict=True))
+# Constants of the nearest transversely isotropic material.
+OF_PLY = ("E_axial", "E_transverse", "G_axial", "nu_axial", "expansion_axial", "expansion_transverse")
+OF_PLIES |= dict(zip(OF_PLY, ("E1", "E2", "G12", "nu12", "alpha1", "alpha2"), strict=True))
+CARBON = {"E_axial": 225.0, "E_transverse": 15.0, "G_axial": 15.0, "nu_axial": 0.2, "G_transverse": 7.0}
+AS4 = CARBON | {"expansion_axial": -0.5e-6, "expansion_transverse": 15e-6}
+T300 = CARBON | {"E_axial": 230.0, "expansion_axial": -0.7e-6, "expansion_transverse": 12e-6}
+GEVETEX, SILENKA = isotropic(80.0, 0.2, 4.9e-6), isotropic(74.0, 0.2, 4.9e-6)
+EPOXY = isotropic(3.35, 0.35, 58e-6)  # LY556/HT907/DY063, and MY750/HY917/DY063
+MEASURED = {
+    "WWFE, AS4/3501-6": measured(AS4, isotropic(4.2, 0.34, 45e-6), 0.6, 126.0, 11.0, 6.6, 0.28, -1e-6, 26e-6),
+    "WWFE, T300/BSL914C": measured(T300, isotropic(4.0, 0.35, 55e-6), 0.6, 138.0, 11.0, 5.5, 0.28, -1e-6, 26e-6),
+    "WWFE, E-glass/LY556": measured(GEVETEX, EPOXY, 0.62, 53.48, 17.7, 5.83, 0.278, 8.6e-6, 26.4e-6),
+    "WWFE, E-glass/MY750": measured(SILENKA, EPOXY, 0.6, 45.6, 16.2, 5.83, 0.278),
+}
 GLASS_EPOXY = {"fibre": isotropic(70.0, 0.2), "matrix": isotropic(3.5, 0.4)}
 ONE_FIBRE = {20: 0.3485, 40: 0.5963, 60: 0.6859, 80: 0.6085, 100: 0.3563}  # G / G0 by half the opening in degrees
 TWO_FIBRES = {10: 2.1239, 60: 0.9416, 90: 0.2767, 120: 0.0327}  # J/m2, the same
@@ -64,8 +86,9 @@ COLUMNS = ("source", "quantity", "published", "computed", "difference %")
 
 def main(given: argparse.Namespace, comm: Intracomm) -> None:
     """Compute all; print, write and draw the differences."""
-    rows = [row for name in PLIES for row in of_ply(given, comm, name)]
+    rows = [row for name, own in PLIES.items() for row in of_ply(given, comm, name, own)]
     rows += one_fibre(given, comm) + two_fibres(given, comm)
+    rows += [row for name, own in MEASURED.items() for row in of_ply(given, comm, name, own)]
     figures.finish(comm, write, given.out, rows)
 
 
@@ -75,9 +98,8 @@ def solved(given: argparse.Namespace, comm: Intracomm, name: str, **sections: An
     return figures.computed(comm, Case.parse({"name": name, "output": figures.written(given), **sections}), folder)
 
 
-def of_ply(given: argparse.Namespace, comm: Intracomm, name: str) -> list[Row]:
+def of_ply(given: argparse.Namespace, comm: Intracomm, name: str, own: Ply) -> list[Row]:
     """Return the constants of a ply."""
-    own = PLIES[name]
     mesh_size = 0.2 if given.quick else 0.1
     cell = {"geometry": own.geometry, "fibre_fraction": own.fraction, "mesh_size": mesh_size, "refine": 1, "order": 2}
     material, analysis = {"fibre": own.fibre, "matrix": own.matrix}, {"type": "stiffness", "plane": "generalized"}
@@ -133,15 +155,18 @@ def write(folder: Path, rows: list[Row]) -> list[Path]:
     off = [100 * (row.own / row.published - 1) for row in rows]
     for row, percent in zip(rows, off, strict=True):
         print(f"{row.source:<24}{row.quantity:<18}{row.published:>11.5g}{row.own:>11.5g}{percent:>10.2f} %")
-    figure = Figure(figsize=(8.4, 0.22 * len(rows) + 1.2), layout="constrained")
-    axes = figure.subplots()
-    sources = list(dict.fromkeys(row.source for row in rows))
-    for k, (row, percent) in enumerate(zip(rows, off, strict=True)):
-        axes.plot([0.0, percent], [k, k], "-o", markevery=[1], color=INK[sources.index(row.source) % len(INK)])
-    axes.set_yticks(range(len(rows)), [f"{row.source}: {row.quantity}" for row in rows], fontsize=8)
-    axes.axvline(0.0, color="0.5", linewidth=0.8)
-    axes.set(xlabel="computed beside published (%)", ylim=(len(rows) - 0.5, -0.5))
-    axes.grid(color="0.92", linewidth=0.6, axis="x")
+    figure = Figure(figsize=(8.4, 0.22 * len(rows) + 1.8), layout="constrained")
+    parts = [[k for k, row in enumerate(rows) if (row.source in MEASURED) == chosen] for chosen in (False, True)]
+    ratios = {"height_ratios": [len(part) for part in parts]}
+    for part, axes, kind in zip(parts, figure.subplots(2, gridspec_kw=ratios), ("published", "measured"), strict=True):
+        sources = list(dict.fromkeys(rows[k].source for k in part))
+        for place, k in enumerate(part):
+            ink = INK[sources.index(rows[k].source) % len(INK)]
+            axes.plot([0.0, off[k]], [place, place], "-o", markevery=[1], color=ink)
+        axes.set_yticks(range(len(part)), [f"{rows[k].source}: {rows[k].quantity}" for k in part], fontsize=8)
+        axes.axvline(0.0, color="0.5", linewidth=0.8)
+        axes.set(xlabel=f"computed beside {kind} (%)", ylim=(len(part) - 0.5, -0.5))
+        axes.grid(color="0.92", linewidth=0.6, axis="x")
     figure.savefig(folder / "published.png")
     table = [[*row, percent] for row, percent in zip(rows, off, strict=True)]
     return [figures.tabulate(folder / "published.csv", COLUMNS, table), folder / "published.png"]

@@ -32,9 +32,9 @@ REMARKABLE_LOSS = 0.005  # fraction of the fibre area that straight edges cut of
 
 
 def run(
-    case: Case, directory: Path, comm: MPI.Intracomm, quiet: bool, resume: bool = False, keep_fields: bool = False
+    case: Case, directory: Path, progress: progress_bar.Progress, resume: bool = False, keep_fields: bool = False
 ) -> Result:
-    """Run a case, write its result to `directory`, and return the result.  Collective.
+    """Run a case, write its result to `directory`, and return the result.  Collective over `progress.comm`.
 
     `resume` continues from the checkpoint, or reads the finished result; `keep_fields` adds the fields.
 
@@ -42,7 +42,8 @@ def run(
         CaseError, MeshError: before any result is written; also for another run's checkpoint and a folder in use.
         ConvergenceError: after the result has been written and marked.
     """
-    progress = _begun(case, comm, quiet)
+    comm = progress.comm
+    _say_warnings(case, progress)
     if resume:
         from feti_homog.analysis import stored_result  # loads readers that most runs do not use
 
@@ -65,7 +66,8 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
         CaseError, MeshError: the case cannot be run.
         ConvergenceError: a solve did not converge or a check failed.
     """
-    progress = _begun(case, comm, quiet)
+    progress = progress_bar.Progress(comm, quiet)
+    _say_warnings(case, progress)
     with _torn(case, comm, progress) as cell:
         states = StateRecorder(cell, None, keep_fields, progress.say)
         context = AnalysisContext.of(cell, progress, states)
@@ -76,13 +78,11 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
     return result
 
 
-def _begun(case: Case, comm: MPI.Intracomm, quiet: bool) -> progress_bar.Progress:
-    """Print the warnings and remarks about a case; return the progress display of the run."""
-    progress = progress_bar.Progress(comm, quiet)
+def _say_warnings(case: Case, progress: progress_bar.Progress) -> None:
+    """Print the warnings and remarks about a case."""
     for label, lines in (("warning", case.warnings()), ("remark", case.remarks())):
         for line in lines:
             progress.say(f"{label}: {line}")
-    return progress
 
 
 @contextmanager

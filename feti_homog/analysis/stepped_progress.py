@@ -14,12 +14,15 @@ SECONDS_A_LINE = 60.0
 @contextmanager
 def shown(
     progress: progress_bar.Progress, label: str, clock: Callable[[], float] = time.monotonic
-) -> Iterator[Callable[[float, int, str, bool], None]]:
+) -> Iterator[Callable[[float, int, str, bool], object]]:
     """Show the finished share of a computation, the rate of steps, and the time used and left.
 
     The block calls `advance(share, count, text, known)` after each step; `known` steps were not computed here.  The
     time left supposes that the rest of the share takes as long as the share since the last known step.
     """
+    if (within := progress.within) is not None:
+        yield lambda share, count, text, known: within(share, f"{label} {share:.0%}, {text}")
+        return
     begin = clock()
     reached, next_line, since = 0.0, begin + SECONDS_A_LINE, (begin, 0.0, 0)
     bar: Any = None

@@ -19,11 +19,16 @@ def verify(words: Sequence[str]) -> int:
 
     try:
         arguments = command_parser().parse_args(words)
-        if os.path.isfile(path := arguments.directory / "result.h5"):
+        directory = arguments.directory
+        if os.path.isdir(directory) and not os.path.lexists(directory / "result.json"):
+            from feti_homog.results import output_folder
+
+            output_folder.refuse_begun(directory)
+        if os.path.isfile(path := directory / "result.h5"):
             from feti_homog.results import field_guard
 
             field_guard.require_own(path)
-        outcome = certificate.verify(arguments.directory)
+        outcome = certificate.verify(directory)
         if prints:
             standard_streams.print_product(json.dumps(outcome.document, indent=1) if arguments.json else outcome.text)
     except PermissionError as error:

@@ -161,8 +161,7 @@ def refine(submesh: Submesh, lattice: ReferenceLattice) -> FineMesh:
         is_bent = (on_arc[:, None, None, :] & on_edge).any(axis=3)
         x[:, middles] = np.where(is_bent[..., None], x[:, middles], midway)
     points[plane] = x
-    n_classes += n_edges * inner + interior
-    return FineMesh(points, plane, np.asarray(on_arc.any(axis=1)), node_class, n_classes, lattice)
+    return FineMesh(points, plane, on_arc.max(axis=1), node_class, n_classes + n_edges * inner + interior, lattice)
 
 
 def joined(meshes: Sequence[FineMesh]) -> FineMesh:

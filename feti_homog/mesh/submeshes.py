@@ -36,7 +36,7 @@ class Submesh:
         debonded: (torus edges,) whether a torus edge is debonded from the start.
         touching: (classes,) as `Torus.touching`.
         class_keys, edge_keys: global numbers of classes and torus edges.
-        period: (2,) width and height of the cell.
+        period, origin: (2,) width and height of the cell; its lower left corner in the coordinates of the user.
         pinned: local number of the class that is pinned against translations of the cell, Eq. (15), or -1.
     """
 
@@ -59,6 +59,7 @@ class Submesh:
     class_keys: Int
     edge_keys: Int
     period: Float
+    origin: Float
     pinned: int
 
 
@@ -111,8 +112,7 @@ class SubmeshesOfRank:
 
     def cut(self) -> list[Submesh]:
         """Cut the triangles of the rank into one submesh for each subdomain."""
-        order = np.argsort(self.member, kind="stable")
-        members = np.split(order, np.cumsum(self.loads))[:-1]
+        members = np.split(np.argsort(self.member, kind="stable"), np.cumsum(self.loads))[:-1]
         pieces = [part(self.whole, triangles) for triangles in members]
         table = zip(pieces, self.index.tolist(), self.body.tolist(), self.phase, strict=True)
         return [replace(piece, index=index, body=body, phase=phase) for piece, index, body, phase in table]
@@ -224,6 +224,7 @@ def _whole(torus: Torus, pinned: int) -> Submesh:
         class_keys=torus.class_keys,
         edge_keys=torus.edge_keys,
         period=mesh.period,
+        origin=np.array(mesh.origin),
         pinned=int(pinned_here[0]) if len(pinned_here) else -1,
     )
 

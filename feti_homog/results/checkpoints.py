@@ -20,13 +20,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from feti_homog.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.results import atomic
 from feti_homog.system.parallel import mpi_errors
+from feti_homog.typing import Intracomm
 
 FOLDER, DROPPED, NAME = "checkpoint", "checkpoint.dropped", "events"  # DROPPED is the folder name during its removal
 FORMAT = 12  # raise when the content of an event changes
@@ -57,7 +57,7 @@ class EventsInMemory:
         room: bytes of events, after which further events have no multipliers; None without a limit.
     """
 
-    def __init__(self, comm: MPI.Intracomm, room: int | None = WHOLE_BYTES) -> None:
+    def __init__(self, comm: Intracomm, room: int | None = WHOLE_BYTES) -> None:
         self.comm, self.room, self._events, self._bytes = comm, room, list[bytes](), 0
 
     def clear(self) -> int:
@@ -110,7 +110,7 @@ class Checkpoint(EventsInMemory):
         signature: a line of case, subdomains and ranks, required to resume, and the text of entries of result.json.
     """
 
-    def __init__(self, directory: Path, comm: MPI.Intracomm, signature: str, room: int | None = WHOLE_BYTES) -> None:
+    def __init__(self, directory: Path, comm: Intracomm, signature: str, room: int | None = WHOLE_BYTES) -> None:
         super().__init__(comm, room)
         self.path, self.signature = directory / FOLDER / NAME, signature
         self._ends: list[int] = []  # ends of the records on rank 0; the first record is the signature

@@ -136,6 +136,22 @@ def latest(directory: Path) -> dict[str, Any]:
     return opening | {"path": points, "status": place, "unfinished": place}
 
 
+def refuse_begun(directory: Path) -> None:
+    """Refuse the folder of a begun run that has no result.json yet.  Call on one rank.
+
+    Raises:
+        CaseError: the run goes on, or ended early; of a path the message has the points and the load.
+    """
+    is_begun = any(os.path.lexists(directory / name) for name in (LOCK, "checkpoint"))
+    if not is_begun or os.path.lexists(directory / result_json.NAME):
+        return
+    place, resume, who = "unfinished, without a point", "", file_locks.holder(directory / LOCK)
+    with contextlib.suppress(CaseError):  # no event yet, or an unreadable one, which the next run names
+        place, resume = latest(directory)["unfinished"], " --resume"
+    way = f"{who} goes on with it" if who else f"go on by `feti-homog run CASE --out {directory}{resume}`"
+    raise CaseError(f"{directory}: the run is {place}; {way}")
+
+
 @contextmanager
 def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iterator[None]:
     """Create the result folder, and lock the folder during a block.  Collective.

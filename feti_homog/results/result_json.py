@@ -24,6 +24,7 @@ from feti_homog.system.runtime import described, input_files, records
 NAME = "result.json"
 KEY = "checksum"
 BLOCK = 1 << 26  # bytes of one read
+ENCODE = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
 SCHEMA = 1  # version of the layout: raise when a key changes name or meaning, or disappears
 
 
@@ -160,22 +161,22 @@ def loads(text: str) -> dict[str, Any]:
     """
     try:
         document = json.loads(text)
+        if not isinstance(document, dict):
+            raise ValueError("it is damaged: no table of keys and values")
+        if KEY not in document:
+            *rest, (_, last) = document.items() if document else [("", None)]
+            if isinstance(last, str) and len(last) == 8 and last == _checksum(_text(dict(rest))):
+                raise ValueError("it is damaged: the key of its checksum has another name")
+            return document
+        stored = document.pop(KEY)
+        end = _sealed("{\n}", stored)[1:]
+        if text.endswith(end) and _checksum(text[: -len(end)] + "\n}") == stored:  # the text is unchanged
+            return document
+        if stored != _checksum(_text(document)):
+            raise ValueError("it is damaged: its checksum is wrong")
+        return document
     except RecursionError as error:
         raise ValueError("it is nested too deeply") from error
-    if not isinstance(document, dict):
-        raise ValueError("it is damaged: no table of keys and values")
-    if KEY not in document:
-        *rest, (_, last) = document.items() if document else [("", None)]
-        if isinstance(last, str) and len(last) == 8 and last == _checksum(_text(dict(rest))):
-            raise ValueError("it is damaged: the key of its checksum has another name")
-        return document
-    stored = document.pop(KEY)
-    end = _sealed("{\n}", stored)[1:]
-    if text.endswith(end) and _checksum(text[: -len(end)] + "\n}") == stored:  # the text is unchanged
-        return document
-    if stored != _checksum(_text(document)):
-        raise ValueError("it is damaged: its checksum is wrong")
-    return document
 
 
 @dataclass(frozen=True)
@@ -225,5 +226,11 @@ def _sealed(text: str, checksum: Any) -> str:
     return f'{begin}\n "{KEY}": {json.dumps(checksum)}\n}}\n'
 
 
-def _text(content: Mapping[str, Any]) -> str:
-    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)
+def _text(value: Any, begin: str = "\n ") -> str:
+    """Serialize with indents; an array of numbers, and each row of a matrix, has one line."""
+    if isinstance(value, dict) and value:
+        lines = [f"{ENCODE(key)}: {_text(item, begin + ' ')}" for key, item in value.items()]
+        return f"{{{begin}{(',' + begin).join(lines)}{begin[:-1]}}}"
+    if isinstance(value, list | tuple) and any(isinstance(item, dict | list | tuple | str) for item in value):
+        return f"[{begin}{(',' + begin).join(_text(item, begin + ' ') for item in value)}{begin[:-1]}]"
+    return ENCODE(value)

@@ -2,7 +2,7 @@
 
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum, auto
@@ -160,7 +160,7 @@ class CaseRunner:
                 while timeouts:
                     outcomes = list[Outcome]()
                     for number, entry in enumerate(self.sweep.entries, 1):
-                        outcomes.append(self.run(entry, timeouts[0])[0])
+                        outcomes.append(self.run(entry, timeouts[0], advance)[0])
                         is_known = outcomes[-1] is not Outcome.COMPUTED
                         advance(number / count, number, f"{number} of {count} cases", is_known)
                     timeouts = timeouts if Outcome.COMPUTED in outcomes else timeouts[1:]
@@ -172,20 +172,32 @@ class CaseRunner:
             return error
         return None
 
-    def run(self, entry: SweepCase, timeout: float = file_locks.LOCK_TIMEOUT_S) -> tuple[Outcome, str]:
+    def run(
+        self,
+        entry: SweepCase,
+        timeout: float = file_locks.LOCK_TIMEOUT_S,
+        advance: Callable[..., Any] = lambda *_: None,
+    ) -> tuple[Outcome, str]:
         """Run a case unless it has finished or failed, or another process holds it.  Collective.
 
-        The group waits `timeout` seconds for the lock of the case.  Returns the outcome, and the name of another
-        process that holds the case.  Raises FetiHomogError if the folder cannot be written.
+        The group waits `timeout` seconds for the lock of the case; `advance` shows the share of all cases.  Returns the
+        outcome, and the name of another process that holds the case.  Raises FetiHomogError if the folder cannot be
+        written.
         """
         case, folder = self.sweep.cases[entry.number - 1], self.directory / entry.folder
         lock = file_locks.Lock(folder / case_folders.LOCK_FILE, timeout=timeout)
+        before, count = entry.number - 1, len(self.sweep.entries)
+
+        def within(share: float, text: str) -> None:
+            advance((before + share) / count, before, f"case {entry.number} of {count}: {text}", False)
+
         try:
             outcome, holder = mpi_errors.on_root(self.comm, self._claim, lock, entry, case)
             if outcome is Outcome.COMPUTED:
                 start, status = time.perf_counter(), str(case_folders.Status.DONE)
                 try:
-                    runner.run(case, folder, self.comm, quiet=True, resume=case.section.is_followed)
+                    progress = progress_bar.Progress(self.comm, True, within)
+                    runner.run(case, folder, progress, resume=case.section.is_followed)
                 except (CaseError, MeshError, ConvergenceError) as error:  # a failure of this case alone
                     if not mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
                         raise

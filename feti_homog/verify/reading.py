@@ -201,10 +201,10 @@ def altered(directory: Path) -> tuple[str, ...]:
     if not path.is_file():
         has_fields = document["case"].get("output", {}).get("fields", False)
         raise CaseError(f"{path}: {'it is missing; run the case again' if has_fields else MISSING_FIELDS}")
-    # `checksum` is the CRC-32 of all other keys in the layout of the writer.
-    content = {key: value for key, value in document.items() if key != "checksum"}
-    text = json.dumps(content, indent=1, ensure_ascii=False)
-    unchanged = {JSON: document.get("checksum") == f"{zlib.crc32(text.encode('utf-8', 'surrogatepass')):08x}"}
+    # `checksum` is the CRC-32 of the text without this last key.
+    end = f',\n "checksum": {json.dumps(document.get("checksum"))}\n}}\n'.encode()
+    text = input_files.read(directory / JSON).removesuffix(end) + b"\n}"
+    unchanged = {JSON: document.get("checksum") == f"{zlib.crc32(text):08x}"}
     seal = document.get("result_h5")
     with _reading(path), input_files.opened(path) as stream:
         size, checksum = os.fstat(stream.fileno()).st_size, 0

@@ -57,10 +57,38 @@ def test_published_numbers_are_met(tmp_path):
     # G12 and nu23 of Sun and Vaidya are not those of the exact solution.
     within = {"B/Al, multipole series": 0.01, "B/Al, Sun and Vaidya": 0.25}
     within |= {"one debonded fibre": 0.5, "debonds side by side": 0.35}
-    assert {source for source, _ in off} == set(within)
+    measured = {source for source, _ in off if source.startswith("WWFE")}
+    assert len(measured) == 4 and {source for source, _ in off} == set(within) | measured
     for (source, quantity), percent in off.items():
-        if not ("Vaidya" in source and quantity in ("G12", "nu23")):
+        if source not in measured and not ("Vaidya" in source and quantity in ("G12", "nu23")):
             assert abs(percent) < within[source], (source, quantity)
+    computed = {(row["source"], row["quantity"]): float(row["computed"]) for row in rows}
+    for source in measured:
+        # Hashin's composite cylinders, nearly exact for hexagonal arrangements; measured shear moduli are larger.
+        E, nu = composite_cylinders(json.loads((tmp_path / folder_of(source) / "result.json").read_text())["case"])
+        assert computed[source, "E1"] == pytest.approx(E, rel=2e-5)
+        assert computed[source, "nu12"] == pytest.approx(nu, rel=1e-3)
+        assert abs(off[source, "E1"]) < 9 and abs(off[source, "nu12"]) < 11
+        assert -30 < off[source, "E2"] < -15 and -35 < off[source, "G12"] < -15
+
+
+def folder_of(source):
+    return source.replace(", ", "_").replace("/", "-")
+
+
+def composite_cylinders(case):
+    """Return E1 and nu12 of composite cylinders, Hashin (1979)."""
+    c, matrix = case["cell"]["fibre_fraction"], case["material"]["matrix"]
+    Em, nm = matrix["young"], matrix["poisson"]
+    km, Gm = Em / (2 * (1 + nm) * (1 - 2 * nm)), Em / (2 * (1 + nm))
+    x = case["material"]["fibre"]
+    if "young" in x:
+        Ef, nf, kf = x["young"], x["poisson"], x["young"] / (2 * (1 + x["poisson"]) * (1 - 2 * x["poisson"]))
+    else:
+        Ef, nf = x["E_axial"], x["nu_axial"]
+        kf = 1 / (4 / x["E_transverse"] - 1 / x["G_transverse"] - 4 * nf**2 / Ef)
+    mixed = c * (1 - c) / (c / km + (1 - c) / kf + 1 / Gm) * (nf - nm)
+    return c * Ef + (1 - c) * Em + 4 * (nf - nm) * mixed, c * nf + (1 - c) * nm + (1 / km - 1 / kf) * mixed
 
 
 def test_contact_prevents_overlap_and_stiffens(tmp_path):
@@ -95,7 +123,7 @@ def test_onset_is_proportional_to_strength_and_no_point_is_above_the_bonded_line
         onset[float(pair[0])] = load[0]
     # Onset is proportional to the strength: here to R^n, which is reached first.
     low, high = sorted(onset)
-    assert onset[high] / onset[low] == pytest.approx(high / low, rel=1e-6)
+    assert onset[high] / onset[low] == pytest.approx(high / low, rel=5e-4)
 
 
 def test_every_case_of_a_driver_has_its_pictures(stress_strain):

@@ -1,6 +1,7 @@
 """kill -9 of one rank while files are written: the others end, what is there is no result yet, and --resume goes on."""
 
 import json
+import re
 
 from support import events
 from support.command_line import command_line
@@ -32,7 +33,10 @@ def test_a_run_that_is_killed_while_it_writes_goes_on(tmp_path):
         assert (out / "result.json").exists() == (name == "path.csv")
         if name == "result.json":
             refused = command_line(0, "verify", out)
-            assert refused.returncode == 2 and refused.stderr.startswith(f"error: cannot read {out / 'result.json'}")
+            start = f"error: {out}: the run is unfinished, "
+            way = f"; go on by `feti-homog run CASE --out {out} --resume`\n"
+            line = rf"{re.escape(start)}{kept} points up to load [\d.]+{re.escape(way)}"
+            assert refused.returncode == 2 and re.fullmatch(line, refused.stderr)
     job = command_line(2, "run", case, "--out", out, "--resume")
     assert job.returncode == 0 and f"{kept} events are taken from the checkpoint" in job.stdout, job.stderr
     document = json.loads((out / "result.json").read_text())

@@ -2,6 +2,8 @@
 
 import csv
 import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -10,8 +12,10 @@ import pytest
 from support.ranks import PIECES, parallel_assert
 
 from feti_homog import Case, run, run_sweep
+from feti_homog.analysis import stepped_progress
 from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.report import page
+from feti_homog.report.cards import export
 from feti_homog.report.plots import figures, path_picture
 from feti_homog.results import checkpoints, field_file, output_folder, result_json
 from feti_homog.studies import case_folders, case_runs, collect, sweep_cases
@@ -102,6 +106,26 @@ def test_curves_and_page_tell_that_the_path_is_unfinished(comm, shared_path):
     assert on_root(comm, drawn) == ["energy.png", "path.png"]
 
 
+def test_cards_and_certificates_name_the_points_of_an_unfinished_path(comm, shared_path):
+    begun(comm, shared_path, CASE["path"])
+
+    def refused() -> None:
+        place, way = output_folder.latest(shared_path)["unfinished"], f"feti-homog run CASE --out {shared_path}"
+        with pytest.raises(CaseError) as error:
+            export.card(shared_path, "abaqus", "orthotropic")
+        assert error.value.faults == (f"{shared_path}: the run is {place}; go on by `{way} --resume`",)
+        with file_locks.Lock(shared_path / output_folder.LOCK), pytest.raises(CaseError, match=rf"{place}; .* goes on"):
+            output_folder.refuse_begun(shared_path)
+        (shared_path / checkpoints.FOLDER / checkpoints.NAME).write_bytes(b"")
+        with pytest.raises(CaseError, match=rf"the run is unfinished, without a point; go on by `{way}`$"):
+            output_folder.refuse_begun(shared_path)
+        (shared_path / result_json.NAME).write_text("{}")
+        output_folder.refuse_begun(shared_path)
+        output_folder.refuse_begun(shared_path / "none")
+
+    on_root(comm, refused)
+
+
 def test_a_result_that_has_all_points_is_no_unfinished_path(comm, shared_path):
     """A path cut off by `max_events` keeps its checkpoint; further events are newer than its result."""
     short = Case.parse(CASE | {"path": CASE["path"] | {"max_events": 4}})
@@ -155,3 +179,22 @@ def test_sweeps_tell_and_collect_begun_cases(comm, shared_path):
     on_root(comm, told)
     table = run_sweep(document, out, comm)
     parallel_assert(comm, list(table.status) == ["done", "done"])
+
+
+def test_a_sweep_shows_the_load_of_the_path_that_it_computes(comm, shared_path, monkeypatch):
+    calls, shown = list[tuple[Any, ...]](), stepped_progress.shown
+
+    @contextmanager
+    def seen(progress: Any, label: str) -> Iterator[Any]:
+        with shown(progress, label) as advance:
+            yield lambda *words: (calls.append((label, *words)), advance(*words))
+
+    monkeypatch.setattr(stepped_progress, "shown", seen)
+    document = CASE | {"output": {"fields": False}, "sweep": {"interface.normal_strength": [4.0, 4.5]}}
+    run_sweep(document, shared_path, comm)
+    loads = on_root(comm, lambda: [[p["load_factor"] for p in result_json.read(shared_path / f"case-000{k}")["path"]]
+                                   for k in (1, 2)])  # fmt: skip
+    expected = [(k + load) / 2 for k in (0, 1) for load in (*loads[k], 1.0)]
+    of_all = [words for label, *words in calls if label == f"cases of {shared_path.name}"][: len(expected)]
+    parallel_assert(comm, [share for share, *_ in of_all] == expected and len(expected) > 2 * EVENTS)
+    assert of_all[0][2].startswith("case 1 of 2: load ") and of_all[len(loads[0])][2] == "1 of 2 cases"

@@ -13,12 +13,13 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "feti_homog"
 MODULES = sorted(PACKAGE.rglob("*.py"))
-# Lines, of the modules beside the packages under "."; the second numbers: phase stresses, start of damage, figures.
+# Lines, of the modules beside the packages under "."; the second numbers: phase stresses, start of damage, figures,
+# begun runs, the load of a path in the bar of a sweep, arrays of result.json a line each.
 LINES = {
     ".": 470,
-    "analysis": 3000 + 100,
+    "analysis": 3000 + 103,
     "case": 2880 + 40,
-    "commands": 560 + 10,
+    "commands": 560 + 13,
     "fem": 1150,
     "feti": 6300,
     "homogenization": 3230 + 55,
@@ -27,13 +28,13 @@ LINES = {
     "mesh": 5500,
     "microstructure": 2140,
     "report": 3420 + 170,
-    "results": 2430 + 55,
+    "results": 2430 + 75,
     "schema": 430,
     "studies": 2950,
     "system": 1770,
     "verify": 3100 + 160,
 }
-FILES, TOTAL = 310, 45000 + 230
+FILES, TOTAL = 310, 45000 + 280
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.0, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

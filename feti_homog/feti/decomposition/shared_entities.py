@@ -116,7 +116,7 @@ def _check(meshes: SubmeshesOfRank, sharers: Sharers, normals: Float, sums: Floa
         mesh, first = meshes.whole, bad[0]
         keys = mesh.edge_keys[mesh.edge_class] if sharers.is_edge[first] else mesh.class_keys[mesh.vertex_class]
         plane = int(np.flatnonzero(keys == sharers.key[first])[0])
-        x, y = mesh.points[mesh.edges[plane] if sharers.is_edge[first] else [plane]].mean(axis=0)
+        x, y = mesh.points[mesh.edges[plane] if sharers.is_edge[first] else [plane]].mean(axis=0) + mesh.origin
         raise MeshError(f"the interface has no normal at ({x:.9g}, {y:.9g}): its sides are folded or of no length")
 
 

@@ -79,7 +79,7 @@ class Subdomain:
         doubled = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
         inverted = np.flatnonzero(~(doubled > 0))
         if len(inverted):
-            x, y = mesh.points[triangles[inverted[0]]].mean(axis=0)
+            x, y = mesh.points[triangles[inverted[0]]].mean(axis=0) + submesh.origin
             kind = f" of {submesh.phase}" if submesh.phase else ""
             raise MeshError(
                 f"[cell] refine, order: {len(inverted)} refined elements{kind} are inverted, the first "
@@ -238,7 +238,7 @@ def kernel(problem: Problem, positions: Float, rotates: bool, pinned: int) -> Fl
 
 def label(submesh: Submesh) -> str:
     """Describe a subdomain in messages."""
-    x, y = submesh.points[0]
+    x, y = submesh.points[0] + submesh.origin
     kind = f" ({submesh.phase})" if submesh.phase else ""
     return f"subdomain {submesh.index}{kind} near ({x:.6g}, {y:.6g})"
 

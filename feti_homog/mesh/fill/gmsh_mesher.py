@@ -158,6 +158,7 @@ class NodedCell:
             width=self.scale * arrangement.width,
             height=self.scale * arrangement.height,
             scale=self.scale,
+            origin=arrangement.origin,
             phases=arrangement.phases,
             ellipses=lines.ellipses.scaled(self.scale),
             constituent=of_circle,

@@ -153,7 +153,7 @@ class Regions:
     """The regions of a generated cell, which every rank has.
 
     Attributes:
-        width, height, scale: size of the mesh, and mesh lengths / lengths in tiles.
+        width, height, scale, origin: size of the mesh, mesh lengths / lengths in tiles, lower left corner.
         phases: phase names, the matrix first.
         ellipses: the k circles, as in `CoarseMesh`.
         constituent: (k + 1,) the constituent directly within each circle, -1 in a void; the last entry is the matrix.
@@ -164,6 +164,7 @@ class Regions:
     width: float
     height: float
     scale: float
+    origin: tuple[float, float]
     phases: tuple[str, ...]
     ellipses: Ellipses
     constituent: Int
@@ -230,6 +231,7 @@ def tile_mesh(regions: Regions, tiles: Sequence[FilledTile]) -> tuple[CoarseMesh
         arc_edges=arcs[once],
         arc_circle=circle[once].astype(np.int32),
         debonded_edges=np.zeros((0, 2), np.int32),
+        origin=regions.origin,
     )
     return mesh, classes[place], tile_of
 

@@ -26,7 +26,7 @@ import numpy as np
 from feti_homog.errors import CaseError
 from feti_homog.materials import engineering_constants, voigt
 from feti_homog.report.cards import effective_material
-from feti_homog.results import result_json
+from feti_homog.results import output_folder, result_json
 from feti_homog.typing import Document, Float
 
 FIELD, FIELDS = 20, 8  # characters of a number and numbers of a line, of Abaqus
@@ -226,6 +226,7 @@ def card(directory: Path, form: str, symmetry: str) -> str:
     """
     if form not in FORMATS:
         raise CaseError(f"--format {form}".rstrip() + f": expected one of {', '.join(FORMATS)}")
+    output_folder.refuse_begun(directory)
     document = result_json.read(directory)
     path = directory / result_json.NAME
     try:

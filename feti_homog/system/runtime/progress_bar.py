@@ -2,7 +2,7 @@
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 
@@ -14,10 +14,13 @@ from feti_homog.system.runtime.standard_streams import say
 
 
 class Progress:
-    """Print a line for each stage and solve on rank 0, unless quiet, and keep the times of stages."""
+    """Print a line for each stage and solve on rank 0, unless quiet, and keep the times of stages.
 
-    def __init__(self, comm: MPI.Intracomm, quiet: bool) -> None:
-        self.comm = comm
+    `within` gets the finished share of the case and its words, in place of a bar.
+    """
+
+    def __init__(self, comm: MPI.Intracomm, quiet: bool, within: Callable[[float, str], object] | None = None) -> None:
+        self.comm, self.within = comm, within
         self.prints = comm.rank == 0 and not quiet
         # mpirun gives rank 0 a terminal for its output even if mpirun has none itself, but none for its errors.
         self.on_terminal = self.prints and sys.stdout.isatty() and sys.stderr.isatty() and find_spec("tqdm") is not None

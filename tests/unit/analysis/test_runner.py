@@ -48,8 +48,8 @@ def test_the_folder_is_held_before_the_work_begins(tmp_path, monkeypatch):
     monkeypatch.setattr(unit_cell, "tear", no_tear)
     case = make_case(fibre_fraction=0.4, mesh_size=0.3)
     with pytest.raises(CaseError, match="refused"):
-        runner.run(case, tmp_path / "out", MPI.COMM_SELF, quiet=True)
+        runner.run(case, tmp_path / "out", Progress(MPI.COMM_SELF, quiet=True))
     assert held[0] is not None and not (tmp_path / "out").exists()
     with pytest.raises(CaseError, match="cannot be made"):
-        runner.run(case, Path("/proc/results"), MPI.COMM_SELF, quiet=True)
+        runner.run(case, Path("/proc/results"), Progress(MPI.COMM_SELF, quiet=True))
     assert len(held) == 1

@@ -67,6 +67,14 @@ def test_a_snap_back_leaves_the_share():
     ]
 
 
+def test_a_computation_within_another_shows_its_share_there():
+    shown = []
+    progress = Progress(MPI.COMM_SELF, quiet=True, within=lambda *words: shown.append(words))
+    with stepped_progress.shown(progress, "load") as advance:
+        advance(0.25, 3, "3 events", False)
+    assert shown == [(0.25, "load 25%, 3 events")]
+
+
 def test_a_terminal_has_a_bar_with_the_same_numbers(capsys, monkeypatch):
     monkeypatch.setattr("tqdm.tqdm", partial(tqdm.tqdm, mininterval=0, ncols=120))  # drawn after each step
     progress, clock = Words(on_terminal=True), Clock()

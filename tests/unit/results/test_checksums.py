@@ -28,6 +28,27 @@ def test_documents_are_read_in_any_layout_and_without_a_checksum():
     assert result_json.loads(json.dumps(json.loads(result_json.dumps(DOCUMENT)))) == DOCUMENT
 
 
+def test_arrays_and_rows_of_matrices_have_a_line_each():
+    points = [{"E": [0.5, None], "S": [[1.0, 2.0], [3, True]], "none": [], "names": ["a", "µ"], "table": {}}]
+    text = result_json.dumps({"path": points})
+    assert json.loads(text)["path"] == points
+    assert text.splitlines()[:-2] == [
+        "{", ' "path": [', "  {", '   "E": [0.5, null],', '   "S": [', "    [1.0, 2.0],", "    [3, true]", "   ],",
+        '   "none": [],', '   "names": [', '    "a",', '    "µ"', "   ],", '   "table": {}', "  }", " ],",
+    ]  # fmt: skip
+    with pytest.raises(ValueError):
+        result_json.dumps({"path": [[1.0, float("nan")]]})
+
+
+def test_a_line_for_each_number_as_older_versions_wrote_is_read():
+    text = json.dumps(DOCUMENT, indent=1, ensure_ascii=False)
+    checksum = f"{zlib.crc32(text.encode('utf-8', 'surrogatepass')):08x}"
+    old = text.removesuffix("\n}") + f',\n "checksum": "{checksum}"\n}}\n'
+    assert result_json.loads(old) == DOCUMENT
+    with pytest.raises(ValueError, match="its checksum is wrong"):
+        result_json.loads(old.replace("0.1", "0.2"))
+
+
 def test_every_changed_number_or_letter_is_reported():
     text = result_json.dumps(DOCUMENT)
     for place, letter in enumerate(text):
@@ -37,7 +58,18 @@ def test_every_changed_number_or_letter_is_reported():
 
 
 @pytest.mark.parametrize(
-    "text", ["", "[", "[]", "3", "[" * 100_000, '{"a": 1', '{"a": 1, "checksum": "0"}', '{"checksum": 1}']
+    "text",
+    [
+        "",
+        "[",
+        "[]",
+        "3",
+        "[" * 100_000,
+        f'{{"a": {"[" * 600}{"]" * 600}, "checksum": "0"}}',
+        '{"a": 1',
+        '{"a": 1, "checksum": "0"}',
+        '{"checksum": 1}',
+    ],
 )
 def test_other_texts_are_refused(text):
     with pytest.raises(ValueError):

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from mpi4py import MPI
+from support.other_formats import written
 from unit.mesh.faulty_meshes import grid
 
 from feti_homog import Case, draw_state, run
@@ -51,9 +52,13 @@ def test_fibres_of_a_cropped_table_have_the_centres_and_rows_of_the_table(tmp_pa
     assert axes.dataLim.min == pytest.approx(corner, abs=1e-9) and axes.dataLim.size == pytest.approx([50, 40])
 
 
-def test_nodes_of_a_mesh_are_those_of_its_file(tmp_path):
+@pytest.mark.parametrize("suffix", ["msh", "inp", "vtu", "vtk", "mesh"])
+def test_nodes_of_a_mesh_are_those_of_its_file(tmp_path, suffix):
     mesh = grid().moved(**{f"n{tag}": (x - 5, y + 7) for tag, (x, y, _) in grid().nodes.items()})
-    mesh.write(tmp_path / "cell.msh")
-    result_of(tmp_path / "out", geometry="mesh", file=str(tmp_path / "cell.msh"))
+    cell = {"geometry": "mesh", "file": str(written(mesh, tmp_path / f"cell.{suffix}"))}
+    if suffix == "mesh":  # its references are numbers
+        cell["phases"] = {"matrix": 0, "fibre": 1}
+    result = result_of(tmp_path / "out", **cell)
+    assert tuple(result.cell.origin) == (-5.0, 7.0)
     places = {tuple(np.round(place[:2], 9) + 0.0) for place in mesh.nodes.values()}
     assert {tuple(np.round(place[:2], 9) + 0.0) for place in read_state(tmp_path / "out").points} == places

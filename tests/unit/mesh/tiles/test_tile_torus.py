@@ -39,6 +39,7 @@ def are_one_to_one(a, b):
 def test_all_tiles_are_the_cell(name):
     (torus, tile), whole = torus_of(name), Torus.of(mesh_of(name))
     mesh, other = torus.mesh, whole.mesh
+    assert mesh.origin == other.origin == (3.0, -2.0)
     assert np.array_equal(mesh.points[mesh.triangles], other.points[other.triangles])
     assert np.array_equal(torus.constituent, whole.constituent) and np.array_equal(mesh.phase, other.phase)
     assert are_one_to_one(torus.node_class[mesh.triangles], whole.node_class[other.triangles])

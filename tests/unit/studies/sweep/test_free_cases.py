@@ -13,7 +13,7 @@ def test_cases_of_others_are_passed_over_at_once_and_tried_again_at_last():
     """The first case is computed elsewhere, somebody looks at the lock of the second."""
     calls, done = [], set()
 
-    def run(entry, timeout):
+    def run(entry, timeout, _):
         calls.append((entry, timeout))
         if entry == 1 or (entry == 2 and timeout == 0.0):
             return Outcome.HELD_ELSEWHERE, "another"
