@@ -118,12 +118,11 @@ def build(
     options = database_options(thresholds)
     bodies = comm.allreduce(max((s.submesh.body for s in subdomains), default=-1), MPI.MAX) + 1
     are_cut = bool(comm.allreduce(len(subdomains)) > bodies)
-    soft = options.want_soft_modes(are_cut)
     across = comm.allreduce(any(s.material is not None for s in subdomains), MPI.LOR)
     one_each = comm.size > 1 and comm.allreduce(len(subdomains) == 1, MPI.LAND) and across
     springs = jump_operator.gather(compliance) if comm.allreduce(bool(compliance.any()), MPI.LOR) else None
     operator = "explicit" if one_each and options.operator == "auto" else options.operator
-    how = operator, applications, soft, thresholds, springs, recovers and one_each
+    how = operator, applications, options.want_soft_modes(are_cut), thresholds, springs, recovers and one_each
     with PETSc.Log.Event("FETISubdomains"):
         operators = mpi_errors.agree(comm, InterfaceOperators, jump_operator, subdomains, *how)
     dense = [operator.is_dense for operator in operators.operators]

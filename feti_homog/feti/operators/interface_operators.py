@@ -82,10 +82,8 @@ class InterfaceOperators:
         """Factor every local subdomain as `choose` decides, without communication.
 
         `kind`, `applications` and `soft_modes` are as in `choose`.  `compliance` (local rows,) of the springs is None
-        if no rank has springs.  `keep_factors` is as in `ExplicitInterfaceOperator`.
-
-        Raises:
-            MeshError: rounding leaves the stiffness of a subdomain without a factor; perhaps on one rank alone.
+        if no rank has springs.  `keep_factors` is as in `ExplicitInterfaceOperator`.  Raises MeshError, perhaps on one
+        rank alone, if rounding leaves the stiffness of a subdomain without a factor.
         """
         self.comm, self.jump_operator, self.subdomains = jump_operator.comm, jump_operator, subdomains
         self._loads = len(jump_operator.problem.loads)
