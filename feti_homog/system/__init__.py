@@ -1,4 +1,4 @@
-"""The process and its libraries: `runtime` for one rank, `parallel` for many, `petsc` for PETSc.
+"""The process and its libraries.
 
-Main entries: its own floors, from below `runtime`, `parallel` and `petsc`.
+Main entries are the packages, each on the packages before: `runtime` (one rank), `parallel` (all ranks), `petsc`.
 """
