@@ -48,7 +48,7 @@ class FetiSolver:
         adaptive: coarse space of the preconditioner, or None.
         coarse_dimension: number of coarse displacements; without `adaptive`, of rigid-body motions.
         active: rows that carry multipliers.
-        solves: number of loads solved so far.
+        solves: loads solved so far.
         condition: largest condition number of P H P F so far, estimated by the iterations; 0 without iterations.
         method: names of preconditioner and coarse space for the summary.
     """

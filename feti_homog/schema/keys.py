@@ -60,7 +60,7 @@ class Key:
     Attributes:
         type: type of the value.
         meaning: one or two sentences for the reference.
-        unit: symbol of the unit, empty without a unit.
+        unit: unit symbol, empty without a unit.
         default: default value in words, empty without a default.
         only: conditions; the key belongs to a table if all conditions hold.
         required: whether a table must have the key if all conditions hold.

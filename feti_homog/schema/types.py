@@ -53,7 +53,7 @@ def _scatter(value: Any) -> str:
 
 
 def magnitudes_in_words(value: Any) -> str:
-    """Return the limits of magnitudes in words if a number in `value` exceeds them; else empty."""
+    """Return the magnitude limits in words if a number in `value` exceeds a limit; else empty."""
     if isinstance(value, list | tuple):
         return next(filter(None, map(magnitudes_in_words, value)), "")
     is_of_type = isinstance(value, int | float) and not isinstance(value, bool)
@@ -61,7 +61,7 @@ def magnitudes_in_words(value: Any) -> str:
 
 
 def is_number(value: Any) -> bool:
-    """Return whether a value is a number (not a truth value) within the limits of magnitudes."""
+    """Return whether a value is a number (not a truth value) within the magnitude limits."""
     is_of_type = isinstance(value, int | float) and not isinstance(value, bool)
     return is_of_type and (value == 0 or SMALLEST <= abs(value) <= LARGEST)
 

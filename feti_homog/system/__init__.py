@@ -1,4 +1,4 @@
-"""The process and its libraries.
+"""The process and its libraries: `runtime` for one rank, `parallel` for all ranks, `petsc` for PETSc.
 
-Main entries are the packages, each on the packages before: `runtime` (one rank), `parallel` (all ranks), `petsc`.
+Main entries: the three packages; `parallel` imports `runtime`, `petsc` imports both.
 """

@@ -46,7 +46,7 @@ class BondLaw(ABC):
 
     @abstractmethod
     def breaks(self, traction: Float) -> dict[str, float]:
-        """Compute the entries of an envelope point that describe a break by a traction (1, c)."""
+        """Describe a break under the traction (1, c), with the keys that envelope points have."""
 
     def jumps(self, traction: Float) -> Float:
         """Compute the jumps (k, c) of elastic bonds: traction / stiffness."""
@@ -173,7 +173,7 @@ def friction_at(files: ResultFiles, on_damage: bool = False) -> Float:
 def rubbing_force(files: ResultFiles, state: State) -> Float:
     """Compute the friction traction (k,) on the damaged fraction of unbroken bonds, else 0.
 
-    With the slip C_0 t + g under the shear traction t, it is t - g / (C - C_0), C_0 intact and C with damage.
+    If the slip is C_0 t + g under the shear traction t, the damaged fraction bears t - g / (C - C_0); C_0 is intact.
     """
     unit, intact_bonds = np.ones_like(state.traction), np.zeros(len(state.damage))
     intact, damaged = (law_at(files, damage=damage).jumps(unit)[:, 1] for damage in (intact_bonds, state.damage))

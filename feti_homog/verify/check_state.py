@@ -49,7 +49,8 @@ def interface_forces(cell: DiscreteCell, state: State) -> Float:
 def check_gluing(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
     """Check that copies of a node have equal fluctuations, and that forces balance at all nodes.
 
-    Faces balance with the traction.  The fixed node, u* = 0, collects rounding: the root of the sum of all squares.
+    Forces on faces balance with the traction.  The rounding of all nodes adds to the reaction of the fixed node, u* =
+    0.
     """
     nodes, traction, largest = cell.nodes, interface_forces(cell, state), cell.largest_displacement(state)
     # Periodic copies lie in one subdomain.  Glued nodes have one number: the places have even numbers, and the fibre

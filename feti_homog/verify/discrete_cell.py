@@ -184,7 +184,7 @@ class DiscreteCell:
         return np.asarray(strain + np.abs(self.expansions * temperature).max(axis=0))
 
     def scales(self, strain: Float, temperature: float, slip: float = 0.0) -> Scales:
-        """Compute the scales of a load and a slip that friction holds; at least ROUNDING x those of all states."""
+        """Compute the scales of a load and a slip under friction; at least ROUNDING x the largest scales."""
         loads, longest, (width, height) = self.loads(strain, temperature), float(self.files.size.max()), self.files.size
         loads = np.asarray(loads + np.copysign(slip / longest, loads))
         corners = np.array([[width, 0.0], [0.0, height], [width, height]])

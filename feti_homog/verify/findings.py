@@ -222,7 +222,7 @@ class Section(dict[str, Any]):
         return super().__getitem__(key)
 
     def get(self, key: str, default: Any = None) -> Any:
-        """Return an entry and count it as read; without it, return the default."""
+        """Return an entry, which then counts as read; return the default for a missing entry."""
         return self[key] if key in self else default  # noqa: SIM401, because `super().get` would not count it
 
     def hint(self, key: str, default: Any = None) -> Any:

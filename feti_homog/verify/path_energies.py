@@ -160,22 +160,22 @@ def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:
     return least, -_largest(_work(load_forces, answers), energy, load_strains, strains)
 
 
-def _largest(power: float, energy: float, one: Float, other: Float) -> float:
-    """Maximize t power - t^2 energy over t >= 0 with one = t other; -inf if no t fits or the power is NaN."""
-    if not (one.any() or other.any()):
+def _largest(power: float, energy: float, load: Float, unit: Float) -> float:
+    """Maximize t power - t^2 energy over t >= 0 with load = t unit; -inf if no t fits or the power is NaN."""
+    if not (load.any() or unit.any()):
         t = max(power / (2 * energy), 0.0) if energy > 0 else 0.0
     else:
-        k = int(np.abs(other).argmax())
-        t = float(one[k] / other[k]) if other[k] else -1.0
-        if t < 0 or not np.allclose(one, t * other, rtol=ROUNDING, atol=0.0):
+        k = int(np.abs(unit).argmax())
+        t = float(load[k] / unit[k]) if unit[k] else -1.0
+        if t < 0 or not np.allclose(load, t * unit, rtol=ROUNDING, atol=0.0):
             return -np.inf
     value = t * power - t**2 * energy
     return -np.inf if np.isnan(value) else value
 
 
-def _work(one: Float, other: Float) -> float:
-    """Compute one.other without the terms where `one` is 0, in which `other` may be NaN."""
-    return float(one[one != 0.0] @ other[one != 0.0])
+def _work(prescribed: Float, conjugate: Float) -> float:
+    """Compute prescribed.conjugate without terms where `prescribed` is 0: there `conjugate` may be NaN."""
+    return float(prescribed[prescribed != 0.0] @ conjugate[prescribed != 0.0])
 
 
 def check_losses(findings: Findings, cell: DiscreteCell, states: States) -> None:

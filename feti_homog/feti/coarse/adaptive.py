@@ -38,7 +38,7 @@ class AdaptiveCoarseSpace:
 
     Attributes:
         threshold: bound tau of soft modes.
-        counts: number of soft modes of each local subdomain.
+        counts: numbers of soft modes by local subdomain.
         coarse_dimension: number n of all coarse displacements.
         factorizations: number of factorizations of Z_0^T S Z_0.
         solver: solver for the scaled matrix Z_0^T S Z_0.

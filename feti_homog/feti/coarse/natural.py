@@ -25,7 +25,7 @@ class NaturalCoarseSpace:
 
     Attributes:
         kernel_dimension: number m of kernel modes in the cell.
-        owned_modes: slice of all modes with the modes of local subdomains.
+        owned_modes: slice in all modes with the modes of local subdomains.
         R: (boundary dofs, owned modes) kernels on the boundaries.
         G: (owned rows, m).
         body: (m,) body numbers of the modes.

@@ -54,11 +54,11 @@ class ConstraintLayout:
     """The layout of B on one rank: rows and columns of the n shared entities.
 
     Attributes:
-        components: number c of rows of a vector constraint.
-        count: (n,) number of rows of an entity.
-        first: (n,) first local row of an entity.
+        components: rows c of a vector constraint.
+        count: (n,) number of rows at an entity.
+        first: (n,) first local row at an entity.
         rows: (local rows,) global row numbers.
-        dofs: (subdomains + 1,) first local degree of freedom of a subdomain, and the number of all.
+        dofs: (subdomains + 1,) first local dof by subdomain, and the number of all dofs.
         owned: half-open range of the global rows that this rank owns.
         base: (sharers,) local number of the first fine node of a sharer on its entity; -1 on another rank.
     """

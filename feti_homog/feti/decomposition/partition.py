@@ -134,8 +134,8 @@ def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
 def assign_ranks(load: Int, left: Int, right: Int, n_ranks: int) -> Int:
     """Assign subdomains with `load` (s,) triangles to ranks: (s,).
 
-    Neighbours (left, right), one pair for every shared edge, get the same rank as far as the largest load is at most
-    MAX_IMBALANCE times the most even one.  With more ranks than subdomains, some ranks stay empty.
+    METIS puts neighbours (left, right), one pair for every shared edge, on the same rank, if the largest load is at
+    most MAX_IMBALANCE times the largest of balanced loads.  With more ranks than subdomains, some ranks stay empty.
     """
     by_load = dividing.balanced(load, n_ranks)
     if n_ranks == 1 or len(load) <= n_ranks:

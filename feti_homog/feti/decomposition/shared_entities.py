@@ -46,7 +46,7 @@ def side_lengths(ends: Float, turn: Float, low: Float, order: int, side: float) 
 def breakable_pairs(meshes: SubmeshesOfRank, table: submeshes.SubdomainTable, pairs: Int, sharers: Sharers) -> Int:
     """Return the case interface (n,) of every shared entity, as in `SharedEntities.pair`.
 
-    It is -1 where bonds never break, where a third body touches, and where two bodies meet in a point.
+    The number is -1 where bonds never break, where a third body touches, and where two bodies meet in a point.
     """
     body, copies = table.body[sharers.sharer], sharers.copies
     outer, inner = body[sharers.pointer[:-1]], body[sharers.pointer[1:] - 1]
@@ -68,7 +68,7 @@ def interface_geometry(
 ) -> tuple[Float, Float, Bool]:
     """Compute normal, turn and precracked of `SharedEntities` on owned entities.  Collective.
 
-    They are 0 on other entities and where bonds never break.  `pairs` and `lattice` are as in `share_entities`.
+    Results are 0 on other entities, and where bonds never break.  `pairs` and `lattice` are as in `share_entities`.
     """
     n, owner = len(sharers.key), table.rank[sharers.innermost]
     can_part = (owner == comm.rank) & (breakable_pairs(meshes, table, pairs, sharers) >= 0)
@@ -104,7 +104,7 @@ def interface_geometry(
 def _check(meshes: SubmeshesOfRank, sharers: Sharers, normals: Float, sums: Float) -> None:
     """Raise MeshError if a normal of an interface entity is 0, not finite, or ambiguous.
 
-    It is ambiguous if the interface folds back onto itself at a vertex.
+    A normal is ambiguous if the interface folds back onto itself at a vertex.
 
     Args:
         normals: (n, 2, 2) normals at both ends of each entity.
@@ -191,7 +191,7 @@ class SharedEntities(Sharers):
 
     @property
     def pieces(self) -> set[int]:
-        """Return the subdomains that share a node with their own body or with several other bodies."""
+        """Return the subdomains with a node in another piece of their body, or in several other bodies."""
         body = self.body
         between_two = (self.copies == 2) & (body[self.pointer[:-1]] != body[self.pointer[1:] - 1])
         return set(self.sharer[~np.repeat(between_two, self.copies)].tolist())

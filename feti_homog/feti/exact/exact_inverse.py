@@ -2,7 +2,8 @@
 
 Let Gamma be the response of a reference cell with active rows A (`reference_cell`), and C the rows that have changed
 since: their bonds broke, closed or softened.  `followed_response` updates the columns of C in the present response at
-every change.  With these columns, `reference_changes` turns any response of the reference cell into the present one.
+every change.  With these columns, `reference_changes` turns any response of the reference cell into the present
+response.
 
 When C has more rows than `feti_influence_columns`, the cell in its present state, but with the initial compliance, is
 factored as the new reference cell.  Where an update would lose too many digits, the cell is factored too, and columns
@@ -214,7 +215,7 @@ class ExactInverse(Preconditioner):
     def answer(self, d: Float, E: Float, free: int = 0) -> tuple[Float, Float] | None:
         """Return H d E and the jumps on inactive rows, both (owned rows, k).  Collective.
 
-        They are updated from state to state; arguments as in `multipliers`.  Jumps hold for one position of free
+        Both are updated from state to state; arguments as in `multipliers`.  Jumps hold for one position of free
         bodies.  Returns None if the number of free motions in the columns differs from `free`.
         """
         if len(self._followed.pins) != free:
@@ -227,9 +228,10 @@ class ExactInverse(Preconditioner):
         return lam, U - lam
 
     def renew_answer(self, d: Float) -> Float:
-        """Compute the answer U (owned rows, v) to `d` (owned rows, v) from the reference cell.  Collective.
+        """Compute U (owned rows, v) anew, by the response of the reference cell to `d`.  Collective.
 
-        This removes the rounding of earlier updates, and stores U for the next updates.
+        `d` (owned rows, v) holds the jumps of the torn cell under unit loads.  The new U has no rounding from earlier
+        updates, and replaces the stored U.
         """
         changes = self._up_to_date()
         if self._answer is None:

@@ -2,7 +2,7 @@
 
 U has multipliers on active rows and jumps on inactive rows, under the unit loads.  Gamma maps jumps on active rows and
 forces on inactive rows to multipliers and jumps.  U and Gamma are principal pivot transforms.  If springs on the
-active rows I gain the compliance dC, they become
+active rows I gain the compliance dC, U and Gamma become
 
     U <- U - Gamma_:I B U_I,  Gamma <- Gamma - Gamma_:I B Gamma_I:,  B = (dC^-1 + Gamma_II)^-1.
 

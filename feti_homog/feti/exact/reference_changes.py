@@ -1,8 +1,8 @@
 """The present response Gamma' from the reference cell's Gamma, by followed columns of the changed rows C.
 
-Let W be diagonal: s on rows that became inactive (1) or active (-1) since, and dC on rows whose springs gained the
-compliance dC.  The transforms of `followed_response` give Gamma_:C B = Gamma'_:C W.  So a column or an answer U of the
-reference cell becomes the present
+Let W be diagonal: s = 1 on rows that became inactive, s = -1 on rows that became active, dC on rows whose springs
+gained the compliance dC.  The transforms of `followed_response` give Gamma_:C B = Gamma'_:C W.  So a column or an
+answer U of the reference cell becomes the present column or answer
 
     U' = U - Gamma'_:C W U_C,  after U is set to 0 on rows that became inactive or active.
 """
@@ -38,7 +38,7 @@ class ReferenceChanges:
         self._places = places[self._mine]
 
     def present(self, columns: Float) -> Float:
-        """Compute U' (owned rows, k) for U = `columns` (owned rows, k).  Collective."""
+        """Compute U' = U - Gamma'_:C W U_C (owned rows, k) for U = `columns` (owned rows, k).  Collective."""
         response = columns.copy()
         response[self._places[self._signs[self._mine, 0] != 0.0]] = 0.0
         response -= self._followed.product(self.rows, self._weights * self._gathered(columns))
@@ -47,7 +47,7 @@ class ReferenceChanges:
     def refined(self, columns: Float) -> Float:
         """Compute U' by `present` and one step of iterative refinement.  Collective.
 
-        This removes the rounding of followed columns.  c = B U_C solves (Gamma_CC + D) c = U_C with Gamma of the
+        The step removes the rounding of followed columns.  c = B U_C solves (Gamma_CC + D) c = U_C with Gamma of the
         reference cell; D is diagonal.
         """
         response = self.present(columns)

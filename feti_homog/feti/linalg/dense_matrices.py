@@ -27,7 +27,7 @@ def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) ->
     """Compute the Schur complement (n, n) of a matrix (dofs, dofs) on `rows` (n,), in Fortran order.
 
     CHOLMOD eliminates the other rows in the `order` (dofs,), if the diagonal on `rows` is positive.  Without `order`,
-    or with options under `feti_schur_`, MUMPS eliminates them.
+    or with options under `feti_schur_`, MUMPS eliminates these rows.
 
     Raises:
         LinAlgError: the block of the other rows is not positive definite, or the matrix is not finite.
@@ -178,7 +178,7 @@ class DenseSolver:
     """A solver X = A^-1 B for one SPD matrix A (n, n), by LAPACK."""
 
     def __init__(self, A: Float) -> None:
-        """Factor A, which the factor overwrites if in Fortran order; raise as `cholesky`."""
+        """Factor A as `cholesky`; a matrix in Fortran order is overwritten."""
         self._L = cholesky(A, clean=False)
 
     def solve(self, B: Float) -> Float:

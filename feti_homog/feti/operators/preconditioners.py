@@ -8,7 +8,7 @@ C their compliances.  The preconditioner H, which is M^-1 or H_0, then becomes
 
     H - H X (C^-1 + X^T H X)^-1 X^T H.
 
-Where H is definite, as H_0 is on G^T lam = 0, this is (H^-1 + X C X^T)^-1.  On the rows of X it equals
+Where H is definite, as H_0 is on G^T lam = 0, the result is (H^-1 + X C X^T)^-1.  Its rows at the springs are
 
     C^-1 (C^-1 + X^T H X)^-1 X^T H,
 

@@ -144,7 +144,7 @@ def compliance_root(B: csr_matrix, compliance: Float, copies: Int, of_inner: Boo
         B: (rows, n) constraints of the body.
         compliance: (rows,) diagonal of C, length per nodal force.
         copies: (rows, 2) number of node copies in the outer and in the inner body.
-        of_inner: (n,) whether this body is the inner one of two bodies, at every degree of freedom.
+        of_inner: (n,) whether the body is the inner body at a degree of freedom.
     """
     inner_is_whole = copies[:, 1] == 1
     belongs = np.where(abs(B) @ of_inner > 0, inner_is_whole, ~inner_is_whole & (copies[:, 0] == 1))

@@ -46,7 +46,7 @@ def on_root_only(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs
 def agree(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
     """Call a function on every rank; if a rank raises an exception, every rank raises.  Collective.
 
-    `function` must not communicate.  A rank with a defect raises its own.  Other ranks raise RemoteError for the first
+    `function` must not communicate.  A rank raises its own defect.  Other ranks raise RemoteError for the first
     rank with a defect or, without defects, the FetiHomogError of the first rank with one (NoMemoryError for a
     MemoryError).
     """

@@ -137,7 +137,7 @@ def suggestion(name: str) -> str:
 
 
 def solver_prefix(name: str) -> str:
-    """Return the longest prefix in PREFIXES with which a name begins; or empty."""
+    """Return the longest prefix in PREFIXES with which a name begins, else an empty text."""
     return max((prefix for prefix in PREFIXES if name.startswith(prefix) and name != prefix), key=len, default="")
 
 

@@ -1,4 +1,4 @@
-"""PETSc's options for one run: those of the case below those of the command line; none is ignored silently."""
+"""PETSc's options for one run: the command line overrides the case, and no option is ignored silently."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -66,7 +66,7 @@ def choices(prefix: str) -> list[str]:
 
 
 def without_iterations() -> str:
-    """Return a remark on options that print iterations, for a run without iterations; or empty."""
+    """Return a remark on options that print iterations, for runs without iterations, else an empty text."""
     printing = [f"-{name}" for name in given_options() if name.startswith("feti_ksp_") and table.only_prints(name)]
     return f"{', '.join(printing)}: the run has no iterations to print" if printing else ""
 

@@ -107,7 +107,7 @@ class Lock:
 
 
 def _is_taken(file: int, kind: int) -> bool:
-    """Lock an open file; return False if another process has the lock, raise OSError for other failures."""
+    """Lock an open file with flock's `kind`; return False if another process has the lock, else raise OSError."""
     try:
         fcntl.flock(file, kind | fcntl.LOCK_NB)
     except OSError as error:
