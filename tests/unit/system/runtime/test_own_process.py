@@ -26,7 +26,7 @@ def test_an_answer_comes_back(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("function", "words"), [(crash, "reads them crashes"), (refuse, "no"), (ask_for_too_much, "256 TiB")]
+    ("function", "words"), [(crash, "reads it crashes"), (refuse, "no"), (ask_for_too_much, "256 TiB")]
 )
 def test_what_goes_wrong_is_reported(tmp_path, function, words):
     with pytest.raises(CaseError, match=f"^{tmp_path}: .*{words}$"):
