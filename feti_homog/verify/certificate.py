@@ -61,7 +61,6 @@ class Certificate:
 
 def verify(directory: Path) -> Certificate:
     """Check all laws on a result folder; raise CaseError, one line, if a file is unreadable."""
-    # Files that have changed since the run are read in a separate process.
     return input_files.in_own_process(directory, _verified) if altered(directory) else _verified(directory)
 
 
