@@ -1,15 +1,15 @@
-"""The dual problem of the torn cell: subdomains, multipliers, dual operator, coarse spaces, preconditioners, solver.
+"""The dual problem of the torn cell, from subdomains and multipliers to the projected Krylov solver.
 
 Imports `fem`, `feti.coarse`, `feti.decomposition`, `feti.exact`, `feti.linalg`, `feti.operators`, `mesh` and `system`.
-Main entry: `solver.FetiSolver`. Its own floors, each on the floors below:
+Main entry: `solver.FetiSolver`.  The floors of this package; imports point downwards:
 
     solver, factory, solver_plan, krylov, dual_solution, confirmation
-    coarse           natural and adaptive coarse space, the preconditioner with the latter
+    coarse           natural coarse space; adaptive coarse space and its preconditioner
     exact            exact inverses of F from influence columns
-    operators        S and S+ of subdomains, the dual operator F, preconditioners without coarse space
+    operators        S and S+ of subdomains, the dual operator F, preconditioners without a coarse space
     decomposition    subdomains, kernels, the jump operator B
-    linalg           factorizations and matrices on one rank and on all
-    thresholds       every tuning constant, with the command that measured it
+    linalg           factorizations and matrices, local or distributed
+    thresholds       all tuned constants, with the command that measured each constant
 """
 
 from feti_homog.feti.dual_solution import DualSolution

@@ -1,4 +1,4 @@
-"""Solutions of the dual problem, and projected jumps on the active rows."""
+"""The solution of the dual problem under one load, and the jumps on active rows."""
 
 from dataclasses import dataclass
 
@@ -16,17 +16,17 @@ from feti_homog.typing import Float
 
 @dataclass(frozen=True)
 class DualSolution:
-    """The multipliers under one load, with the resulting jumps.
+    """The solution of the dual problem, Eqs. (36) and (37), under one load.
 
     Attributes:
         strain: (v,) load E, the macroscopic strain first, then the other loads of the problem.
         lam: (owned rows,) multipliers, nodal forces between the faces; 0 on inactive rows.
         jump: (owned rows,) B u* - C lam, 0 up to tolerance on active rows, gap and slip on inactive rows.
-        alpha: (kernel dimension,) rigid-body amplitudes; None if F lambda did not confirm the multipliers.
+        alpha: (kernel dimension,) rigid-body amplitudes; None if F lambda was not computed for these multipliers.
         iterations, reason: iterations of the Krylov method, and PETSc's KSPConvergedReason.
-        residual: |B u* - C lam| on the active rows, relative to the jump of the torn cell; without alpha, the residual
-            of the last confirmed solution.
-        compliance: (owned rows,) C of the springs in this state.
+        residual: |B u* - C lam| on the active rows, relative to the jump of the torn cell there; without alpha, the
+            residual of the last solution with alpha.
+        compliance: (owned rows,) compliance C of the springs, length per nodal force.
     """
 
     strain: Float
@@ -40,23 +40,23 @@ class DualSolution:
 
     @property
     def opening(self) -> Float:
-        """Return B u* (owned rows,): spring elongations on active rows, jumps on inactive rows."""
+        """Return the jumps B u* (owned rows,): spring elongations on active rows, else gap and slip."""
         return self.jump + self.compliance * self.lam
 
 
 class ActiveRows:
-    """The owned rows that carry multipliers: `mask` (owned rows,) is 1 on active rows, else 0."""
+    """The active rows, which carry multipliers: `mask` (owned rows,) is 1 on active rows, else 0."""
 
     def __init__(self, rows: int) -> None:
         self.mask = np.ones(rows)
 
     def restrict(self, x: Float) -> Float:
-        """Set x (rows,) or (rows, k) to 0 on the inactive rows."""
+        """Return a copy of x (owned rows,) or (owned rows, k) with 0 on the inactive rows."""
         return distributed_arrays.scale_rows(self.mask, x)
 
 
 class ActiveJumps:
-    """The projection of jumps on the active rows, and norms over all ranks.  All calls are collective."""
+    """Projections, norms and rounding bounds of jumps on the active rows.  All methods are collective."""
 
     def __init__(
         self, comm: MPI.Intracomm, operator: DualOperator, natural: NaturalCoarseSpace, active: ActiveRows
@@ -70,24 +70,25 @@ class ActiveJumps:
         return norms
 
     def projected(self, x: Float) -> Float:
-        """Project the jumps x (owned rows, k) on the active rows.
+        """Compute P x for jumps x (owned rows, k), restricted to the active rows.
 
-        A single projection leaves rounding of rigid-body motions, on which a Krylov method stalls.
+        P is applied twice: a single product leaves rounding of rigid-body motions, on which a Krylov method stalls.
         """
         return self.natural.project(self.natural.project(self.active.restrict(x)))
 
-    def rounding(self, displacement: Float, loads: Float, seen: Float, torn: Float) -> Float:
-        """Bound the rounding (k,) in the torn cell's active jumps under loads (v, k).
+    def rounding(self, displacement: Float, loads: Float, active: Float, torn: Float) -> Float:
+        """Bound the rounding (k,) in active jumps of the torn cell under loads (v, k).
 
-        Only a jump that may be rounding needs the estimate of `jump_rounding`.
+        The bound is ZERO_JUMP `torn`.  If an `active` norm is above this bound, but below the square root of the
+        machine precision times `torn`, the bound is at least ROUNDING_MARGIN times the estimate by `jump_rounding`.
 
         Args:
             displacement: (boundary dofs, v) displacements of the torn cell under the unit loads, equal at every call.
-            seen: (k,) norms of the projected jumps on the active rows.
+            active: (k,) norms of the projected jumps on the active rows.
             torn: (k,) norms of the jumps on all rows.
         """
         rounding = ZERO_JUMP * torn
-        if ((seen > rounding) & (seen < np.sqrt(np.finfo(float).eps) * torn)).any():
+        if ((active > rounding) & (active < np.sqrt(np.finfo(float).eps) * torn)).any():
             if self._rounding is None:
                 self._rounding = jump_rounding(self.operator, displacement)
             projected = self.natural.project(self.active.restrict(self._rounding @ loads))
@@ -97,15 +98,16 @@ class ActiveJumps:
     def solutions(
         self, strains: Float, lam: Float, jump: Float, iterations: int, reason: int, scale: Float
     ) -> list[DualSolution]:
-        """Complete the multipliers `lam` (owned rows, k) to solutions with amplitudes, jumps and residuals.
+        """Compute amplitudes alpha, jumps and residuals for multipliers `lam` (owned rows, k).
 
-        `jump` (owned rows, k) is d E - F lam, without rigid-body motions; residuals are relative to `scale` (k,).
+        `strains` (k, v) are the loads E; `jump` (owned rows, k) is d E - (F + C) lam, without rigid-body motions; the
+        residuals are relative to `scale` (k,).
         """
         alpha = np.zeros((self.natural.kernel_dimension, len(strains)))
         if self.natural.kernel_dimension:
             alpha -= self.natural.amplitudes(self.active.restrict(jump))
             jump = jump + self.natural.G @ alpha
-        # A free body takes the position of the least jump, so that cuts do not change the result.
+        # The position of a free body minimizes the jumps, so that cuts do not change the result.
         if (Z := self.natural.unconstrained_modes).shape[1]:
             M = self.natural.G @ Z
             squares = allreduce_sparse(self.comm, (M.T @ M).tocsr())
@@ -118,9 +120,9 @@ class ActiveJumps:
         return [DualSolution(E, x, g, a, iterations, reason, float(size), C) for E, x, g, a, size in rows]
 
     def completed(self, solution: DualSolution, d: Float) -> DualSolution:
-        """Complete a solution of the present state by the product F lambda.
+        """Compute F lambda for a solution of the present state, which adds alpha.
 
-        The argument d (owned rows, v) is the jumps of the torn cell under the unit loads.
+        `d` (owned rows, v) holds the jumps of the torn cell under the unit loads.
         """
         torn = (d @ solution.strain)[:, None]
         jump = torn - self.operator.apply(solution.lam[:, None])
@@ -130,10 +132,11 @@ class ActiveJumps:
 
 
 def jump_rounding(operator: DualOperator, displacement: Float) -> Float:
-    """Estimate the rounding (owned rows, v) in jumps B u of displacements u (boundary dofs, v).  Collective.
+    """Estimate the rounding (owned rows, v) of jumps B u.  Collective.
 
-    For u = K+ f, the estimate is B K+ (eps diag(K) |u|) with random signs: the jumps under forces as large as the
-    rounding of K u.  Every subdomain has a scale, and a soft subdomain beside stiff subdomains moves far.
+    For displacements u = K+ f (boundary dofs, v), the estimate is B K+ (eps diag(K) |u|) with random signs: the jumps
+    under forces as large as the rounding of K u.  Subdomains differ in scale: between stiff ones, a soft subdomain
+    moves far.
     """
     signs = np.random.default_rng(0).choice([-1.0, 1.0], displacement.shape)
     forces = operator.boundary.body_diagonal[:, None] * np.abs(displacement) * signs

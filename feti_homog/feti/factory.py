@@ -1,4 +1,4 @@
-"""The parts of the solver, built as `solver_plan` chooses: boundary operators, preconditioner and coarse spaces."""
+"""Construction of boundary operators, preconditioner and coarse spaces, as `solver_plan` chooses them."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
 
 def construct(name: str, operators: InterfaceOperators) -> Preconditioner:
-    """Construct the preconditioner with a given name.  Collective.
+    """Construct the preconditioner `name`, as in `SolverPlan`.  Collective.
 
-    Only a solver with an exact inverse imports the modules of exact inverses.
+    The modules of `feti.exact` are imported only where a preconditioner needs them.
     """
     if name == "influence":
         from feti_homog.feti.exact.exact_inverse import ExactInverse
@@ -43,12 +43,12 @@ def construct(name: str, operators: InterfaceOperators) -> Preconditioner:
 
 @dataclass(frozen=True)
 class SolverParts:
-    """The boundary operators, preconditioner and coarse spaces of a solver.
+    """The parts of a solver: boundary operators, preconditioner and coarse spaces.
 
     Attributes:
-        adaptive: the coarse space of the preconditioner, or None.
-        exact_inverse: the preconditioner, if it leaves nothing to iterate; else None.
-        method: the preconditioner and the coarse space in words.
+        adaptive: coarse space of the preconditioner, or None.
+        exact_inverse: the preconditioner if it is made from influence columns, else None.
+        method: names of preconditioner and coarse space for the summary.
     """
 
     operators: InterfaceOperators
@@ -60,12 +60,12 @@ class SolverParts:
 
     @property
     def coarse_dimension(self) -> int:
-        """Return the number of coarse displacements, or of rigid-body motions without `adaptive`."""
+        """Return the number of coarse displacements; without `adaptive`, of rigid-body motions."""
         return self.natural.kernel_dimension if self.adaptive is None else self.adaptive.coarse_dimension
 
     def describe(self, comm: MPI.Intracomm) -> str:
-        """Describe subdomains, operators, preconditioner and coarse space for -feti_view.  Collective."""
-        operators, adaptive = self.operators, self.adaptive
+        """Return the lines that -feti_view prints about subdomains and coarse space.  Collective."""
+        operators, adaptive, dimension = self.operators, self.adaptive, self.coarse_dimension
         sizes = np.array([n for part in comm.allgather([len(d) for d in operators.dofs]) for n in part])
         dense = comm.allreduce(sum(o.is_dense for o in operators.operators))
         lines = [
@@ -78,20 +78,16 @@ class SolverParts:
             lines.append(f"  influence columns by the bonded cell, {size} dofs on its shared nodes")
         if adaptive is not None:
             counts = np.array([n for part in comm.allgather(adaptive.counts) for n in part])
-            lines.append(
-                f"  soft modes below {adaptive.threshold:g}: {counts.sum()}, at most {counts.max()} of a subdomain, "
-                f"mean {counts.mean():.2f}"
-            )
+            numbers = f"{counts.sum()}, at most {counts.max()} of a subdomain, mean {counts.mean():.2f}"
+            lines.append(f"  soft modes below {adaptive.threshold:g}: {numbers}")
             facewise = comm.allreduce(sum(operators.facewise))
             lines += [f"  {facewise} examined face by face"] if facewise else []
-        lines.append(
-            f"  coarse dimension {self.coarse_dimension}, {self.coarse_dimension / len(sizes):.2f} a subdomain"
-        )
+        lines.append(f"  coarse dimension {dimension}, {dimension / len(sizes):.2f} a subdomain")
         return "\n".join(lines)
 
 
 def database_options(thresholds: Thresholds = DEFAULTS) -> SolverOptions:
-    """Read the options from PETSc's database.  Raises CaseError for a value that an option does not have."""
+    """Read the solver options from PETSc's database; raise CaseError for an unknown value."""
     database = PETSc.Options("feti_")
     return SolverOptions.read(database.getString, database.getReal, thresholds)
 
@@ -106,25 +102,27 @@ def build(
     thresholds: Thresholds = DEFAULTS,
     recovers: bool = False,
 ) -> SolverParts:
-    """Factor the subdomains, and set up the solver parts that options and sizes select.  Collective.
-
-    `compliance` (owned rows,) is C, which may grow if the springs `soften`.  If the run `recovers` interior
-    displacements, a rank with one subdomain keeps the factor, because a later factor would take the same memory.
+    """Factor the subdomains, and construct the parts of the solver.  Collective.
 
     Options: `feti_dual_operator`, `feti_pc_type`, `feti_coarse_space`, `feti_coarse_threshold`.
 
+    Args:
+        applications: expected number of products with F.
+        compliance: (owned rows,) compliance C of the intact springs, which may grow if they `soften`.
+        recovers: whether the run needs interior displacements.  If every rank has one subdomain, its factor is then
+            kept, because a second factorization would take the same memory.
+
     Raises:
-        CaseError: an option has no such value, or two exclude each other; a library has no such factorization.
+        CaseError: the value of an option is unknown, options exclude each other, or a library lacks a factorization.
     """
     options = database_options(thresholds)
     bodies = comm.allreduce(max((s.submesh.body for s in subdomains), default=-1), MPI.MAX) + 1
     are_cut = bool(comm.allreduce(len(subdomains)) > bodies)
-    soft = options.want_soft_modes(are_cut)
     across = comm.allreduce(any(s.material is not None for s in subdomains), MPI.LOR)
     one_each = comm.size > 1 and comm.allreduce(len(subdomains) == 1, MPI.LAND) and across
     springs = jump_operator.gather(compliance) if comm.allreduce(bool(compliance.any()), MPI.LOR) else None
     operator = "explicit" if one_each and options.operator == "auto" else options.operator
-    how = operator, applications, soft, thresholds, springs, recovers and one_each
+    how = operator, applications, options.want_soft_modes(are_cut), thresholds, springs, recovers and one_each
     with PETSc.Log.Event("FETISubdomains"):
         operators = mpi_errors.agree(comm, InterfaceOperators, jump_operator, subdomains, *how)
     dense = [operator.is_dense for operator in operators.operators]

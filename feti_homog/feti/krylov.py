@@ -2,8 +2,8 @@
 
 H is the preconditioner: M^-1, or H_0 of `coarse.adaptive.Balanced`.
 
-A PETSc vector holds the multipliers of k load cases, with the k values of a row side by side, so that one iteration
-serves all load cases.  `CallbackErrors` keeps errors of the contexts until PETSc has returned.
+A PETSc vector holds the multipliers of k load cases, with the k values of a row side by side, so that one Krylov
+iteration advances all load cases.  `CallbackErrors` stores exceptions of the contexts until PETSc has returned.
 """
 
 from collections.abc import Callable
@@ -18,23 +18,23 @@ from feti_homog.system.parallel import distributed_arrays
 from feti_homog.system.petsc import c_functions
 from feti_homog.typing import Float
 
-# PETSc's reasons to stop where rounding prevents progress.
 REASON = PETSc.KSP.ConvergedReason
+# PETSc's reasons for a stop by rounding.
 BREAKDOWNS = (REASON.DIVERGED_INDEFINITE_PC, REASON.DIVERGED_INDEFINITE_MAT, REASON.DIVERGED_BREAKDOWN)
-# Methods that apply the preconditioner to the residual itself, which gives the jump.  With other methods, the
-# convergence test has only the forces; the checks of a response test the jump.
+# Methods that apply the preconditioner to the residual itself, which gives the jump.  With other methods the
+# convergence test sees the forces alone, and the checks of a response test the jump.
 PRECONDITION_TRUE_RESIDUAL = (PETSc.KSP.Type.CG, PETSc.KSP.Type.FCG)
 
 ESTIMATES_SINGULAR_VALUES = (PETSc.KSP.Type.CG, PETSc.KSP.Type.GMRES, PETSc.KSP.Type.FGMRES)
 
 
 class ProjectedProblem:
-    """The shell matrix P F and the shell preconditioner P H on the active rows, which keeps the last residual r."""
+    """The shell matrix P F and the shell preconditioner P H on the active rows; keeps the last residual r."""
 
     def __init__(
         self, errors: c_functions.CallbackErrors, preconditioner: Preconditioner, jumps: ActiveJumps, columns: int
     ) -> None:
-        """Set up the products for vectors with a number of load `columns`."""
+        """Set up products with vectors that hold a number of load cases, `columns`."""
         self._errors, self._preconditioner, self._jumps = errors, preconditioner, jumps
         self._residual = np.zeros((0, columns))
         self._events = PETSc.Log.Event("FETIDual"), PETSc.Log.Event("FETIPrecond")
@@ -57,13 +57,13 @@ class ProjectedProblem:
         return self._errors.call(lambda: self._jumps.natural.project(vectors()), nothing).ravel()
 
     def jump_norm(self) -> float:
-        """Compute the norm |P r| of the last jump r, without rigid-body motions.  Collective."""
+        """Compute |P r| for the residual r of the last `apply`.  Collective."""
         r = self._jumps.natural.project(self._residual)
         return float(np.sqrt(distributed_arrays.allreduce_sum(self._jumps.comm, np.array([(r * r).sum()]))[0]))
 
 
 class Stall:
-    """A test for a norm that has not halved for `patience` iterations."""
+    """A test whether a norm has not halved within `patience` iterations."""
 
     def __init__(self, patience: int) -> None:
         self._patience = patience
@@ -80,14 +80,15 @@ class Stall:
 
 
 class PrimalTest:
-    """A convergence test for PETSc on two primal residuals, which must both fall below rtol.
+    """PETSc's convergence test: two primal residuals must fall below rtol.
 
-    The residuals are the jump |P r| relative to the jump of the torn cell, and the forces |P H r| that would close the
-    jump relative to the torn cell's forces |P M^-1 P d|.  A small dual residual can hide a large primal residual.
+    The jump residual is |P r| / |P d|, relative to the jump d of the torn cell; the force residual is
+    |P H r| / |P M^-1 P d|, relative to the forces that close d.  A small dual residual can hide a large primal
+    residual.
 
     Attributes:
         ends_on_stall: whether a stall is a breakdown.
-        jump_scale, force_scale: norms of the torn cell's jump and closing forces, for the next solve.
+        jump_scale, force_scale: |P d| and |P M^-1 P d| for the next solve.
     """
 
     def __init__(self, problem: ProjectedProblem) -> None:
@@ -95,12 +96,8 @@ class PrimalTest:
         self.jump_scale, self.force_scale = 1.0, 1.0
         self._jump_stall, self._force_stall = Stall(STALL_ITERATIONS), Stall(FORCE_STALL_ITERATIONS)
 
-    def is_met(self, rtol: float, jump: float, forces: float) -> bool:
-        """Return whether the norms of jump and forces are below rtol, or the jump is zero."""
-        return jump == 0.0 or (jump <= rtol * self.jump_scale and forces <= rtol * self.force_scale)
-
     def __call__(self, ksp: PETSc.KSP, iteration: int, residual: float) -> PETSc.KSP.ConvergedReason:
-        """Test for convergence; `residual` is the norm |P H r|.  Collective."""
+        """Return PETSc's reason to stop, or ITERATING; `residual` is |P H r|.  Collective."""
         rtol, atol, divtol, _ = ksp.getTolerances()
         if iteration == 0:
             self._jump_stall.reset()
@@ -170,20 +167,19 @@ class Krylov:
     def solve(self, lam: Float, right: Float) -> tuple[Float, Float, int, int]:
         """Solve P F lam = right for projected jumps (rows, k) from multipliers lam (rows, k).  Collective.
 
-        With an adaptive coarse space the condition number is small: proven with all rows active, measured otherwise.
-        So only rounding stalls the iteration.  A stalled iteration restarts from the last multipliers with a newly
-        computed residual; after MAX_RESTARTS restarts, the iteration continues through a stall.
+        With an adaptive coarse space the condition number is small (proven with all rows active, measured otherwise),
+        so that only rounding stalls the iteration.  A stalled iteration restarts from its last multipliers, with their
+        residual computed anew; after MAX_RESTARTS restarts, the iteration continues through a stall.
 
-        An error in the operator, the preconditioner or the test is raised again if it occurs on all ranks; otherwise
-        the job ends.
+        An exception in a product or in the convergence test is raised again if all ranks have it; else the job ends.
 
         Returns:
-            Multipliers lam, F lam on all rows, the number of iterations, and PETSc's converged reason.
+            Multipliers lam (rows, k), F lam (rows, k) on all rows, number of iterations, PETSc's converged reason.
         """
         iterations, jumps = 0, self._jumps
         for restart in range(MAX_RESTARTS + 2):
             self.test.ends_on_stall = self._restarts and restart <= MAX_RESTARTS
-            # A load starts from 0 if `lam` leaves a larger residual.
+            # The start for a load is 0 if `lam` leaves a larger residual.
             applied, residual = np.zeros_like(lam), right
             if jumps.norms(lam).any():
                 applied = jumps.operator.apply(lam)
@@ -192,7 +188,8 @@ class Krylov:
             lam, applied = np.where(is_better, lam, 0.0), np.where(is_better, applied, 0.0)
             residual = np.where(is_better, residual, right)
             jump = float(np.linalg.norm(jumps.norms(residual)))
-            if self.test.is_met(self.ksp.getTolerances()[0], jump, self._preconditioner.norm * jump):
+            rtol, test, forces = self.ksp.getTolerances()[0], self.test, self._preconditioner.norm * jump
+            if jump == 0.0 or (jump <= rtol * test.jump_scale and forces <= rtol * test.force_scale):
                 return lam, applied, iterations, int(REASON.CONVERGED_RTOL)
             self._right.setArray(residual.ravel())
             self._solution.zeroEntries()
@@ -206,7 +203,7 @@ class Krylov:
         return lam, jumps.operator.apply(lam), iterations, reason
 
     def describe(self, iterations: int) -> str:
-        """Describe the iterations and the condition number of the last solve for -feti_view."""
+        """Return the line that -feti_view prints about the last solve."""
         line = f"FETI: {self._columns} load case{'s' * (self._columns > 1)}, {iterations} iterations"
         if not iterations or self.extreme_values is None:
             return line

@@ -1,10 +1,10 @@
-"""The FETI solver: one set-up for a mesh, then a projected Krylov solve for every load and set of active rows.
+"""The FETI solver: one set-up for a mesh, then projected Krylov solves for any loads and active rows.
 
-With f = -Q E for the v unit loads E, the macroscopic strain first, Eqs. (34), (36), (37) read on the active rows
+With f = -Q E for a load E (v,), which begins with the macroscopic strain, Eqs. (34), (36), (37) read on the active rows
 
     (F + C) lam - G alpha = d E,  G^T lam = 0,  u* = K+ (-Q E - B^T lam) + R alpha,  d = -B K+ Q.
 
-C is the compliance of elastic bonds, across which the faces part by B u* = C lam; glue has C = 0.
+C is the compliance of elastic bonds: their faces part by B u* = C lam.  Rigid bonds (glue) have C = 0.
 """
 
 import weakref
@@ -32,25 +32,25 @@ from feti_homog.typing import Float
 
 
 class FetiSolver:
-    """A solver for the dual problem of a torn cell under many loads and in many interface states.
+    """A solver for the dual problem of a torn cell under any loads and interface states.
 
     The set-up factors every subdomain; `displacement` may factor interiors.  Options have the prefix `feti_`.
 
     Attributes:
-        problem: the displacements and the unit loads.
+        problem: components of the displacement, and unit loads.
         jump_operator: B and the layout of the multipliers.
         interface_operators: S and S+ of the local subdomains.
         intact_compliance: (owned rows,) C of the intact springs.
         operator: F + C.
         preconditioner: M^-1, or H_0 with the adaptive coarse space.
-        exact_inverse: the preconditioner, if it inverts the dual operator; else None.
-        natural: the rigid-body motions, G and P.
-        adaptive: the coarse space of the preconditioner, or None.
-        coarse_dimension: number of coarse displacements, or of rigid-body motions without `adaptive`.
-        active: the rows that carry multipliers.
-        solves: number of dual problems so far, counted load by load.
+        exact_inverse: the preconditioner if it is made from influence columns, else None.
+        natural: rigid-body motions, G and P.
+        adaptive: coarse space of the preconditioner, or None.
+        coarse_dimension: number of coarse displacements; without `adaptive`, of rigid-body motions.
+        active: rows that carry multipliers.
+        solves: loads solved so far.
         condition: largest condition number of P H P F so far, estimated by the iterations; 0 without iterations.
-        method: the preconditioner and the coarse space in words.
+        method: names of preconditioner and coarse space for the summary.
     """
 
     def __init__(
@@ -65,12 +65,10 @@ class FetiSolver:
         problem: Problem = PLANE,
         recovers: bool = False,
     ) -> None:
-        """Set up the solver for `applications` expected products with F; `recovers` is as in `factory.build`.
+        """Factor the subdomains and the coarse problem.  Collective.
 
-        Collective.
-
-        Raises:
-            CaseError: an option has no such value, or two exclude each other.
+        `applications`, the expected number of products with F, and `recovers` are as in `factory.build`, which also
+        states the exceptions.
         """
         self.comm, self.subdomains, self.problem = comm, subdomains, problem
         self.jump_operator = JumpOperator(comm, shared, subdomains, lattice, problem)
@@ -91,8 +89,7 @@ class FetiSolver:
 
             self._by_columns = InfluenceSolutions(comm, self.exact_inverse, self.operator, self.natural, self._jumps)
         self._view = PETSc.Options("feti_").getBool("view", False)
-        # The shells call Python, so they are destroyed with the solver: PETSc's own finalization comes when the
-        # interpreter has already shut down.
+        # Shell contexts call Python, so the solver destroys them: PETSc finalizes after the interpreter has shut down.
         self._krylov: dict[int, Krylov] = {}
         self._shells = ExitStack()
         self._shells.callback(self._krylov.clear)
@@ -124,32 +121,32 @@ class FetiSolver:
 
     @cached_property
     def _torn_displacement(self) -> Float:
-        """Return the displacements -K+ Q (boundary dofs, v) of the torn cell under the unit loads."""
+        """Compute the displacements -K+ Q (boundary dofs, v) of the torn cell under the unit loads."""
         operators, u = self.interface_operators, self.interface_operators.apply_flexibility(-self.condensed.boundary)
         parts = zip(self.subdomains, operators.dofs, operators.slices, strict=True)
         return np.concatenate([u[:0], *(s.without_rounding(u[span], dofs) for s, dofs, span in parts)])
 
     @cached_property
     def d(self) -> Float:
-        """Return the jumps d = -B K+ Q (owned rows, v) of the torn cell under the unit loads."""
+        """Compute the jumps d = -B K+ Q (owned rows, v) of the torn cell.  Collective."""
         return self.operator.jump(self._torn_displacement)
 
     @cached_property
     def torn_stiffness(self) -> Float:
-        """Return the torn cell's stress integrals (v, v) sum |Omega_s| L_s - Q^T K+ Q under the unit loads."""
+        """Compute the stiffness sum_s |Omega_s| L_s - Q^T K+ Q (v, v) of the torn cell.  Collective."""
         local = self.condensed.stiffness + self.condensed.boundary.T @ self._torn_displacement
         return np.asarray(self.comm.allreduce(local))
 
     def stress_integral(self, solution: DualSolution) -> Float:
-        """Compute the stress integral |UC| Sigma = int sigma (v,): torn cell plus d^T lam.  Collective."""
+        """Compute |UC| Sigma = int sigma dA = torn_stiffness E + d^T lam (v,).  Collective."""
         forces = self.comm.allreduce(self.d.T @ solution.lam)
         return np.asarray(self.torn_stiffness @ solution.strain + forces)
 
     def set_state(self, active: Float, compliance: Float) -> None:
-        """Set the active rows, where `active` is 1, and the compliance C (owned rows,).  Collective.
+        """Set the active rows and the spring compliance.  Collective.
 
-        C must not fall below the intact compliance.  Only the coarse problem needs a new factor.  Raises as
-        `Preconditioner.soften`.
+        `active` (owned rows,) is 1 on rows that carry multipliers, else 0; C = `compliance` (owned rows,) is at least
+        the intact compliance.  Only the coarse problem needs a new factor.  Raises as `Preconditioner.soften`.
         """
         changed = bool((active != self.active.mask).any()) + 2 * bool((compliance != self.operator.compliance).any())
         change = self.comm.allreduce(changed, MPI.BOR)
@@ -163,21 +160,23 @@ class FetiSolver:
             self.preconditioner.activate(active)
 
     def solve(self, strain: Float, start: Float) -> DualSolution:
-        """Solve the dual problem for a load (v,) from initial multipliers (owned rows,).  Collective."""
+        """Solve the dual problem for a load `strain` (v,).  Collective; see `solve_many`."""
         return self.solve_many(strain[None], start[:, None])[0]
 
     def solve_many(self, strains: Float, starts: Float) -> list[DualSolution]:
-        """Solve the dual problems for loads (k, v) from initial multipliers (owned rows, k).  Collective.
+        """Solve the dual problems for k loads together.  Collective.
 
-        One Krylov method solves all k problems together.  The scale of a load is its jump in the torn cell.
+        One Krylov method iterates on all loads, scaled to unit jumps; `DualSolution.reason` tells whether it converged.
+        With influence columns, raises as `InfluenceSolutions.record`.
+
+        Args:
+            strains: (k, v) loads E.
+            starts: (owned rows, k) initial multipliers.
         """
-        k = len(strains)
+        k, columns = len(strains), self._by_columns
         self.solves += k
-        if (
-            self._by_columns is not None
-            and (solutions_by_columns := self._by_columns.solutions(strains, self.d)) is not None
-        ):
-            return solutions_by_columns
+        if columns is not None and (solutions := columns.solutions(strains, self.d)) is not None:
+            return solutions
         krylov = self._krylov_for(k)
         torn_jump = self.d @ strains.T
         torn = self._jumps.norms(torn_jump)
@@ -185,19 +184,18 @@ class FetiSolver:
         jump = self._jumps.norms(right)
         # A load without a jump on the active rows has no multipliers.
         rounding = self._jumps.rounding(self._torn_displacement, strains.T, jump, torn)
-        is_seen = jump > rounding
-        scale = np.where(is_seen, jump, 1.0)
-        right = np.where(is_seen, right, 0.0) / scale
-        E, columns = np.where(is_seen, strains.T, 0.0) / scale, self._by_columns
-        forces = self.preconditioner.closing_forces
-        closing = forces(right) if columns is None else columns.closing(self.d, E, is_seen / scale)
+        has_jump = jump > rounding
+        scale = np.where(has_jump, jump, 1.0)
+        right = np.where(has_jump, right, 0.0) / scale
+        E, forces = np.where(has_jump, strains.T, 0.0) / scale, self.preconditioner.closing_forces
+        closing = forces(right) if columns is None else columns.closing(self.d, E, has_jump / scale)
         closing = self.natural.project(closing)
-        krylov.test.jump_scale = float(np.sqrt(is_seen.sum()))
+        krylov.test.jump_scale = float(np.sqrt(has_jump.sum()))
         krylov.test.force_scale = float(np.linalg.norm(self._jumps.norms(closing)))
-        starts = np.where(is_seen, self.natural.project(self.active.restrict(starts)), 0.0) / scale
+        starts = np.where(has_jump, self.natural.project(self.active.restrict(starts)), 0.0) / scale
         lam = closing if self.preconditioner.is_exact else starts
         applied, iterations, reason = np.zeros_like(lam), 0, int(PETSc.KSP.ConvergedReason.CONVERGED_ATOL)
-        if is_seen.any():
+        if has_jump.any():
             lam, applied, iterations, reason = krylov.solve(lam, right)
             smallest, largest = (iterations and krylov.extreme_values) or (1.0, self.condition)
             self.condition = max(self.condition, largest / smallest)
@@ -205,18 +203,18 @@ class FetiSolver:
                 PETSc.Sys.Print(krylov.describe(iterations), comm=self.comm)
         parts = lam * scale, torn_jump - applied * scale, iterations, reason, np.maximum(jump, rounding)
         solutions = self._jumps.solutions(strains, *parts)
-        if self._by_columns is not None:
-            self._by_columns.record(solutions if is_seen.all() else [], self.d)
+        if columns is not None:
+            columns.record(solutions if has_jump.all() else [], self.d)
         return solutions
 
     def completed(self, solution: DualSolution) -> DualSolution:
-        """Complete a solution of the present state by the product F lambda, if alpha is missing.  Collective."""
+        """Return the solution with alpha; without, it must belong to the present state.  Collective."""
         return solution if solution.alpha is not None else self._jumps.completed(solution, self.d)
 
     def boundary_displacement(self, solution: DualSolution) -> Float:
-        """Compute the boundary displacements u* (boundary dofs,), Eq. (34), of a solution.  Collective.
+        """Compute the boundary displacements u* (boundary dofs,), Eq. (34).  Collective.
 
-        The solution must be complete or belong to the present state.
+        Without alpha, the solution must belong to the present state.
         """
         solution = self.completed(solution)
         assert solution.alpha is not None
@@ -224,22 +222,22 @@ class FetiSolver:
         return np.asarray(u + self.natural.rigid_body_motion(solution.alpha))
 
     def displacement(self, solution: DualSolution) -> Float:
-        """Compute the displacements u* (local dofs,); the first call may factor interiors.  Collective."""
+        """Compute the displacements u* (local dofs,), Eq. (34).  Collective; the first call may factor interiors."""
         u, positions = self.boundary_displacement(solution), range(len(self.subdomains))
         return np.concatenate([np.zeros(0), *(self.extended(i, u, solution.strain) for i in positions)])
 
     def extended(self, place: int, u: Float, loads: Float, keep: bool = True) -> Float:
-        """Extend boundary displacements u (boundary dofs, k) to all (dofs, k) of the subdomain at `place`.
+        """Extend displacements u (boundary dofs, k) into the subdomain at position `place`.
 
-        The other arguments are as of `InterfaceOperators.extend`.
+        `loads` and `keep` are as in `InterfaceOperators.extend`, which returns (dofs, k).
         """
         operators = self.interface_operators
         return operators.extend(place, u[operators.slices[place]], loads, keep)
 
     def destroy(self) -> None:
-        """Free the Krylov methods and the coarse factor, after the last solve; collective.
+        """Free the Krylov methods and the coarse factors after the last solve.  Collective.
 
-        Without this call, a rank frees its Krylov methods with the last reference to the solver.
+        Without this call, a rank frees its Krylov methods when the last reference to the solver goes.
         """
         self._destroy_krylov()
         self.natural.destroy()
@@ -247,7 +245,7 @@ class FetiSolver:
             self.adaptive.destroy()
 
     def _krylov_for(self, columns: int) -> Krylov:
-        """Return the Krylov method for a number of load cases; the first call sets it up."""
+        """Return the Krylov method for `columns` load cases; the first call sets it up."""
         if columns not in self._krylov:
             parts = self.jump_operator.vector, self.preconditioner, self._jumps, columns
             self._krylov[columns] = Krylov(*parts, restarts=self.adaptive is not None)

@@ -1,4 +1,4 @@
-"""Choice of the preconditioner and the coarse space, from the options and the sizes of the problem."""
+"""Choice of preconditioner and coarse space, from the options and the sizes of the problem."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 
 PRECONDITIONERS = ("auto", "none", "lumped", "dirichlet", "influence")
 BONDED = "bonded"
-"""The preconditioner of bonded cells with few large subdomains, which no option selects."""
+"""The preconditioner of bonded cells with one subdomain a rank; no option selects it."""
 COARSE_SPACES = ("auto", "natural", "adaptive")
 WITHOUT_INVERSE = (
-    f"[interface] friction: needs influence columns, which are taken up to {DEFAULTS.assembled_schur_dofs} degrees of "
-    "freedom on shared nodes unless -feti_pc_type asks for others; -feti_pc_type influence has them in any cell"
+    "[interface] friction: needs influence columns, the default of cells with at most "
+    f"{DEFAULTS.assembled_schur_dofs} degrees of freedom on shared nodes; expected -feti_pc_type influence in this cell"
 )
 """The message for friction without influence columns."""
 
@@ -25,10 +25,10 @@ class SolverOptions:
     """The values of the solver options.
 
     Attributes:
-        preconditioner: `-feti_pc_type`, a value in PRECONDITIONERS.
-        operator: `-feti_dual_operator`, a value in KINDS.
-        coarse_space: `-feti_coarse_space`, a value in COARSE_SPACES.
-        threshold: `-feti_coarse_threshold`, tau.
+        preconditioner: `-feti_pc_type`, one of PRECONDITIONERS.
+        operator: `-feti_dual_operator`, one of KINDS.
+        coarse_space: `-feti_coarse_space`, one of COARSE_SPACES.
+        threshold: `-feti_coarse_threshold`, the bound tau of soft modes.
     """
 
     preconditioner: str = "auto"
@@ -40,10 +40,10 @@ class SolverOptions:
     def read(
         cls, text: Callable[[str, str], str], number: Callable[[str, float], float], thresholds: Thresholds = DEFAULTS
     ) -> SolverOptions:
-        """Read the options by text(name, default) and number(name, default), with names without `feti_`.
+        """Read the options by `text(name, default)` and `number(name, default)`; names lack `feti_`.
 
         Raises:
-            CaseError: an option has no such value.
+            CaseError: the value of an option is unknown.
         """
 
         def choice(name: str, allowed: tuple[str, ...], default: str) -> str:
@@ -61,23 +61,23 @@ class SolverOptions:
         )
 
     def want_soft_modes(self, bodies_are_cut: bool) -> bool:
-        """Return whether to search for soft modes: by option, or where METIS cuts bodies into soft webs."""
+        """Return whether to search for soft modes: if an option says so, or by default in cut bodies."""
         return self.coarse_space == "adaptive" or (self.coarse_space == "auto" and bodies_are_cut)
 
 
 @dataclass(frozen=True)
 class ProblemSizes:
-    """The properties of the problem, over all ranks, that determine the solver plan.
+    """The properties of the whole problem that determine the solver plan.
 
     Attributes:
         applications: expected number of products with the dual operator.
         bodies_are_cut: whether there are more subdomains than bodies.
         all_dense: whether all boundary operators are dense.
-        all_searchable: whether all subdomains can be searched for soft modes, as a whole or face by face.
-        shared_dofs: dofs on the shared nodes of the cell with all bonds intact.
-        has_thin: whether some bodies are thin.  A thin ring bends easily but resists a change of its thickness, which
-            no scaling reflects: the Dirichlet preconditioner takes hundreds of iterations then, or does not converge.
-        one_each: whether each of several ranks has one subdomain, and some subdomain has several materials.
+        all_searchable: whether every subdomain can be searched for soft modes, as a whole or face by face.
+        shared_dofs: degrees of freedom on shared nodes, with all bonds intact.
+        has_thin: whether a body is thin.  A thin ring bends easily but resists a change of its thickness.  No scaling
+            reflects both, so that the Dirichlet preconditioner takes hundreds of iterations or does not converge.
+        one_each: whether there are several ranks with one subdomain each, and a subdomain has several materials.
     """
 
     applications: int
@@ -94,8 +94,8 @@ class SolverPlan:
     """The chosen preconditioner and coarse space.
 
     Attributes:
-        preconditioner: a value in PRECONDITIONERS except auto, or BONDED.
-        adaptive: whether the coarse space has soft modes as well as rigid-body motions.
+        preconditioner: one of PRECONDITIONERS except "auto", or BONDED.
+        adaptive: whether the coarse space has soft modes beside rigid-body motions.
     """
 
     preconditioner: str
@@ -103,7 +103,7 @@ class SolverPlan:
 
     @property
     def in_words(self) -> str:
-        """Return the words for preconditioner and coarse space, which `check` prints."""
+        """Return the name of the method, as `check` prints it."""
         if self.preconditioner == "influence":
             return "influence columns, an inverse of the bonded cell"
         if self.preconditioner == BONDED:
@@ -112,7 +112,11 @@ class SolverPlan:
 
 
 def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds = DEFAULTS) -> SolverPlan:
-    """Choose the preconditioner and the coarse space for a problem of these sizes.
+    """Choose the preconditioner and the coarse space from sizes and options.
+
+    By default, influence columns serve dense problems with a thin body, and dense problems with at least
+    `influence_applications` products and at most `assembled_schur_dofs` shared dofs; BONDED serves `one_each` with at
+    most `dense_boundary_dofs` shared dofs, "dirichlet" all other problems.
 
     Raises:
         CaseError: two options exclude each other.

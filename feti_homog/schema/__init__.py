@@ -1,6 +1,6 @@
-"""Key tables: value types, tables read with all their faults, fault wording.
+"""Tables of keys: value types, a reader that collects all faults of a table, and the wording of faults.
 
-Imports nothing.  Main entries: `types`, types each with words and a test; `keys.key`, `keys.TableReader`.
+Imports nothing.  Main entries: `types` (types with a description and a test), `keys.key`, `keys.TableReader`.
 """
 
 from feti_homog.schema.keys import TableReader, key

@@ -1,4 +1,4 @@
-"""Read case file tables into frozen dataclasses, whose fields hold the rules of their keys."""
+"""Reading of case file tables into frozen dataclasses, whose fields have the rules of their keys."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ T = TypeVar("T")
 class Selector:
     """A key whose value decides which other keys belong to the case.
 
-    `word` is the key name in messages, if different.
+    `word` is the name of the key in messages, if it is not `key`.
     """
 
     section: str
@@ -27,30 +27,30 @@ class Selector:
     word: str = ""
 
     def among(self, *values: str) -> Condition:
-        """Return the condition that the selector has one of these values."""
+        """Return the condition that the selector has one of the `values`."""
         return Condition(self, values)
 
 
 @dataclass(frozen=True)
 class Condition:
-    """The condition that a selector has one of several values."""
+    """The condition that a selector has one of the `values`."""
 
     selector: Selector
     values: tuple[str, ...]
 
     def holds(self, selected: Selected) -> bool:
-        """Return whether the condition holds; False if the selector is faulty."""
+        """Return whether the condition holds; False if the value of the selector is faulty."""
         return selected.get(self.selector) in self.values
 
     def in_words(self, section: str) -> str:
-        """Write the condition for a fault in a section."""
+        """Write the condition as in a message about `section`: key = value or value."""
         word = self.selector.word or self.selector.key
         name = word if section == self.selector.section else f"[{self.selector.section}] {word}"
         return f"{name} = {' or '.join(map(toml_value, self.values))}"
 
 
 Selected = Mapping[Selector, str | None]
-"""The value of each selector; None if faulty, which turns off all checks that depend on the selector."""
+"""The value of every selector; None for a faulty value, which turns off all checks that depend on the selector."""
 
 
 @dataclass(frozen=True)
@@ -60,14 +60,14 @@ class Key:
     Attributes:
         type: type of the value.
         meaning: one or two sentences for the reference.
-        unit: unit symbol, may be empty.
-        default: default value in words, may be empty.
-        only: conditions; the key belongs to the table if all hold.
-        required: whether a table must have the key if the conditions hold.
-        instead: replacement if a condition fails, may be empty.
-        unless: other table keys, any of which makes the key optional.
-        by_pair: whether several [[interface]] sections may differ in the key.
-        presentation: whether the key changes only how results look, and no number.
+        unit: unit symbol, empty without a unit.
+        default: default value in words, empty without a default.
+        only: conditions; the key belongs to a table if all conditions hold.
+        required: whether a table must have the key if all conditions hold.
+        instead: hint to another key for tables where a condition fails, or empty.
+        unless: other keys of the table; a table with one of them does not need the key.
+        by_pair: whether sections [[interface]] may have different values of the key.
+        presentation: whether the key changes the appearance of results alone, and no number.
     """
 
     type: ValueType
@@ -82,9 +82,9 @@ class Key:
     presentation: bool = False
 
     def fault(self, name: str, table: Mapping[str, Any]) -> str:
-        """Return the fault of the key in a table, empty if there is none.
+        """Return the fault of the key `name` in a table; empty without a fault.
 
-        Conditions on other sections are not checked.
+        The conditions in `only` are not checked.
         """
         if name not in table:
             return f": missing; expected {self.type.expected}" if self.required and not self.only else ""
@@ -102,10 +102,10 @@ def key(
     only: Condition | tuple[Condition, ...] = (),
     **attributes: Any,
 ) -> Any:
-    """Return a dataclass field for the key of the same name.
+    """Return a dataclass field for the key with the name of the field.
 
-    A key with neither `default` nor `absent` is required. `absent` describes what a missing key means, whose value is
-    None; `default_words` describe a default. `attributes` are further `Key` attributes.
+    Without `default` and `absent`, the key is required.  `absent` says what a missing key means: the value is then
+    None. `default_words` describe the default.  `attributes` are further attributes of `Key`.
     """
     conditions = only if isinstance(only, tuple) else (only,)
     default = None if absent else default
@@ -117,18 +117,18 @@ def key(
 
 
 def keys_of(table_class: type[Any]) -> dict[str, Key]:
-    """Return the keys of a table class by name; derived fields are left out."""
-    return {each.name: each.metadata["key"] for each in dataclasses.fields(table_class) if "key" in each.metadata}
+    """Return the keys of a table class by name, without derived fields."""
+    return {entry.name: entry.metadata["key"] for entry in dataclasses.fields(table_class) if "key" in entry.metadata}
 
 
 @dataclass
 class TableReader:
-    """A reader of tables that gathers their faults.
+    """A reader of tables that collects their faults.
 
     Attributes:
         selected: values of the selectors.
-        owners: sections of each key, in words, to place keys that are unknown in a table.
-        faults: one line for each fault.
+        owners: sections of every key, in words, for hints about keys that are in a wrong table.
+        faults: one line for every fault.
     """
 
     selected: Selected = field(default_factory=dict)
@@ -136,9 +136,9 @@ class TableReader:
     faults: list[str] = field(default_factory=list)
 
     def read(self, table_class: type[T], table: object, section: str, prefix: str = "") -> T | None:
-        """Return the table as a `table_class` instance; None if the table is faulty.
+        """Convert a table to an instance of `table_class`; return None if the table is faulty.
 
-        Each fault adds a line to `faults`, where `prefix` precedes the table keys within a section.
+        Every fault adds a line to `faults`, where keys stand as [`section`] `prefix` key.
         """
         if not isinstance(table, dict):
             self.faults.append(f"{section} = {toml_value(table)}: expected a section [{section}]")
@@ -156,7 +156,7 @@ class TableReader:
         return table_class(**values) if len(self.faults) == before else None
 
     def _stored(self, type_: ValueType, value: Any, section: str, place: str) -> Any:
-        """Convert a valid value, with its tables, to the form in the dataclass."""
+        """Convert a valid value, and tables within it, to the stored form."""
         if type_.item is not None:
             return tuple(self._stored(type_.item, item, section, f"{place}[{k}]") for k, item in enumerate(value))
         if type_.table is not None and isinstance(value, dict):
@@ -165,9 +165,9 @@ class TableReader:
 
 
 def to_table(instance: Any, selected: Selected) -> dict[str, Any]:
-    """Convert an instance to a table of TOML values, the inverse of `TableReader.read`.
+    """Convert an instance to a table of TOML values, as the inverse of `TableReader.read`.
 
-    Keys without a value, and keys that do not belong to the case, are left out.
+    The table lacks keys without a value, and keys whose conditions do not hold.
     """
 
     def to_toml(value: Any) -> Any:
@@ -182,5 +182,5 @@ def to_table(instance: Any, selected: Selected) -> dict[str, Any]:
     return {
         name: to_toml(value)
         for name, entry in keys_of(type(instance)).items()
-        if (value := getattr(instance, name)) is not None and all(each.holds(selected) for each in entry.only)
+        if (value := getattr(instance, name)) is not None and all(rule.holds(selected) for rule in entry.only)
     }

@@ -1,4 +1,4 @@
-"""Define the value types of a case file, each by its description, test and stored form."""
+"""The types of values in a case file: description, test and stored form."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from typing import Any
 from feti_homog.schema.wording import toml_value
 
 SMALLEST, LARGEST = 1e-100, 1e100
-"""Limits for the magnitude of nonzero numbers: products of a few numbers neither overflow nor underflow."""
+"""Limits for magnitudes of numbers other than 0, so that products of a few numbers neither overflow nor underflow."""
 Test = Callable[[Any], bool]
 INF = "inf"
-"""Form of an infinite number in resolved cases, which JSON requires."""
+"""The text for an infinite number in resolved cases, because JSON has no such number."""
 MAGNITUDES = f"; numbers other than 0 have magnitudes from {SMALLEST:g} to {LARGEST:g}"
 
 
@@ -24,11 +24,11 @@ class ValueType:
     """The type of a value.
 
     Attributes:
-        expected: description for faults and the reference.
-        accepts: tests whether a value of a TOML type is valid.
-        store: converts a valid value to its form in the dataclass.
+        expected: description for messages and the reference.
+        accepts: test whether a TOML value is valid.
+        store: conversion of a valid value to the form in the dataclass.
         table: dataclass of a table, which `TableReader` reads; None for other values.
-        item: entry type of a list that has tables.
+        item: type of the entries of a list with tables; None for other values.
         options: valid texts of a choice.
     """
 
@@ -40,12 +40,12 @@ class ValueType:
     options: tuple[str, ...] = ()
 
     def complaint(self, value: Any) -> str:
-        """Return the expectation that a value fails, empty for a valid value."""
+        """Return "expected ..." for an invalid value, empty for a valid value."""
         return "" if self.accepts(value) else f"expected {self.expected}{magnitudes_in_words(value)}{_scatter(value)}"
 
 
 def _scatter(value: Any) -> str:
-    """Return a hint to `feti-homog uncertainty` for values {mean, std} or {mean, cv}; else empty."""
+    """Return a hint to `feti-homog uncertainty` for a value {mean, std} or {mean, cv}; else empty."""
     if isinstance(value, list):
         return next(filter(None, map(_scatter, value)), "")
     has_scatter = isinstance(value, dict) and set(value) in ({"mean", "std"}, {"mean", "cv"})
@@ -53,7 +53,7 @@ def _scatter(value: Any) -> str:
 
 
 def magnitudes_in_words(value: Any) -> str:
-    """Return the magnitude limits in words if a number exceeds them; else empty."""
+    """Return the magnitude limits in words if a number in `value` exceeds a limit; else empty."""
     if isinstance(value, list | tuple):
         return next(filter(None, map(magnitudes_in_words, value)), "")
     is_of_type = isinstance(value, int | float) and not isinstance(value, bool)
@@ -61,25 +61,23 @@ def magnitudes_in_words(value: Any) -> str:
 
 
 def is_number(value: Any) -> bool:
-    """Return whether a value is a number, no truth value, within the magnitude limits."""
+    """Return whether a value is a number (not a truth value) within the magnitude limits."""
     is_of_type = isinstance(value, int | float) and not isinstance(value, bool)
     return is_of_type and (value == 0 or SMALLEST <= abs(value) <= LARGEST)
 
 
 def real(**limits: float) -> ValueType:
-    """Return the type of numbers within limits.
-
-    The limits `above` and `below` are excluded, `least` and `most` included.
-    """
+    """Return the type of numbers within limits: `above` < number < `below`, `least` <= number <= `most`."""
     return _within("a number", is_number, float, limits)
 
 
 def integer(**limits: float) -> ValueType:
-    """Return the type of integers within limits, as `real`."""
+    """Return the type of integers within limits; see `real`."""
     return _within("an integer", lambda value: is_number(value) and isinstance(value, int), int, limits)
 
 
 def _within(name: str, is_of_type: Test, store: Callable[[Any], Any], limits: Mapping[str, float]) -> ValueType:
+    """Return the type of numbers that pass `is_of_type` and the limits, described as `name`."""
     kinds = {"above": operator.gt, "at least": operator.ge, "below": operator.lt, "at most": operator.le}
     bounds = [(words, limits.get(words.split()[-1], math.inf)) for words in kinds]
     finite = [(words, limit) for words, limit in bounds if math.isfinite(limit)]
@@ -94,9 +92,10 @@ def _within(name: str, is_of_type: Test, store: Callable[[Any], Any], limits: Ma
 def list_of(
     item: ValueType, expected: str, *, least: int = 0, most: int = 0, count: int | None = None, unique: bool = False
 ) -> ValueType:
-    """Return the type of lists with entries of one type.
+    """Return the type of lists whose entries have the type `item`.
 
-    A list has `least` to `most`, if given, or exactly `count` entries, all different if `unique`.
+    A list has at least `least` and at most `most` entries (0: any number), or exactly `count`; entries differ if
+    `unique`.
     """
     fewest, largest = (least, most or math.inf) if count is None else (count, count)
     expected += f", at most {most} of them" if most else ""
@@ -109,12 +108,12 @@ def list_of(
 
 
 def either(expected: str, *types: ValueType) -> ValueType:
-    """Return the union of several types."""
-    table = next((each.table for each in types if each.table is not None), None)
+    """Return the type of values that one of several types accepts."""
+    table = next((kind.table for kind in types if kind.table is not None), None)
     return ValueType(
         expected,
-        lambda value: any(each.accepts(value) for each in types),
-        lambda value: next(each.store(value) for each in types if each.accepts(value)),
+        lambda value: any(kind.accepts(value) for kind in types),
+        lambda value: next(kind.store(value) for kind in types if kind.accepts(value)),
         table,
     )
 
@@ -125,12 +124,12 @@ def table_of(table: type[Any], expected: str, *, least: int = 0) -> ValueType:
 
 
 def file_name(expected: str, *suffixes: str) -> ValueType:
-    """Return the type of file names with one of these suffixes."""
+    """Return the type of file names with one of the `suffixes`, in upper or lower case."""
     return ValueType(expected, lambda value: text.accepts(value) and value.lower().endswith(suffixes), Path)
 
 
 def choice(*options: str) -> ValueType:
-    """Return the type of values that equal one of these texts."""
+    """Return the type of texts that equal one of the `options`."""
     words = "one of " + ", ".join(map(toml_value, options))
     return ValueType(words, lambda value: value in options, str, options=options)
 
@@ -138,6 +137,6 @@ def choice(*options: str) -> ValueType:
 POSITIVE_OR_INF = ValueType(
     "a positive number, or inf", lambda value: value in (math.inf, INF) or (is_number(value) and value > 0), float
 )
-"""For keys in which inf differs from a missing value."""
+"""The type of keys in which inf differs from a missing value."""
 boolean = ValueType("true or false", lambda value: isinstance(value, bool), bool)
 text = ValueType("a text in one line", lambda value: isinstance(value, str) and value.isprintable(), str)

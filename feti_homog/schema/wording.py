@@ -1,4 +1,4 @@
-"""Word the faults of a case: values and keys as in TOML, and suggestions for unknown names."""
+"""The wording of messages about a case: values and keys as in TOML, hints for unknown names."""
 
 import difflib
 import json
@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 
 LONGEST_VALUE = 60  # characters of a value in a message
-# Names for keys in other programs and textbooks, in lower case, each with keys of this program.
+# Names of quantities in other programs and textbooks, in lower case, and keys of this program for them.
 SYNONYMS: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(("e", "youngs_modulus", "young_modulus", "modulus"), ("young", "E1")),
     **dict.fromkeys(("nu", "v", "poisson_ratio", "poissons_ratio"), ("poisson", "nu12")),
@@ -21,7 +21,7 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(("gc", "g_c", "gic", "fracture_energy"), ("toughness",)),
     **dict.fromkeys(("vf", "fraction", "volume_fraction", "fibre_volume_fraction"), ("fibre_fraction",)),
 }
-# Names without a key, each with an explanation.
+# Names of quantities and old keys for which this program has no key, with a hint.
 ABSENT = {
     "g": "it follows from young and poisson",
     "cone": "Coulomb's cone of both shears is round, so no path is straight between changes",
@@ -33,12 +33,13 @@ ABSENT = {
 
 
 def toml_value(value: object) -> str:
-    """Write a value nearly as in TOML, in one short line."""
+    """Write a value nearly as in TOML, in one line of at most LONGEST_VALUE characters."""
     line = _line(value)
     return line if len(line) <= LONGEST_VALUE else line[: LONGEST_VALUE - 3] + "..."
 
 
 def _line(value: object) -> str:
+    """Write a value nearly as in TOML, in one line."""
     if isinstance(value, dict):
         return f"{{{', '.join(f'{toml_key(str(name))} = {_line(entry)}' for name, entry in value.items())}}}"
     if isinstance(value, list) and any(isinstance(entry, dict) for entry in value):
@@ -49,24 +50,24 @@ def _line(value: object) -> str:
 
 
 def toml_key(name: str) -> str:
-    """Write a key nearly as in TOML, in one short line, with quotes if needed."""
+    """Write a key nearly as in TOML, in one short line, with quotes if it is no bare key."""
     is_bare = re.fullmatch(rf"[A-Za-z0-9_-]{{1,{LONGEST_VALUE}}}", name)
     return name if is_bare else toml_value(name)
 
 
 def dotted_key(path: Iterable[str]) -> str:
-    """Join nested keys as in TOML: a.b.c."""
+    """Join the keys of nested tables as in TOML: a.b.c."""
     return ".".join(map(toml_key, path))
 
 
 def suggestion(name: str, known: Iterable[str], owners: Mapping[str, str]) -> str:
-    """Return a hint for an unknown name: its section, the nearest known name, or all known names.
+    """Return a hint for an unknown name: its section, the nearest `known` name, or all known names.
 
-    `owners` maps each key of the file to its sections, in words.
+    `owners` maps every key of the file to its sections, in words.
     """
     known = list(known)
-    if meant := [key for key in SYNONYMS.get(name.lower(), ()) if key in known]:
-        return f"did you mean {' or '.join(meant)}?"
+    if keys := [key for key in SYNONYMS.get(name.lower(), ()) if key in known]:
+        return f"did you mean {' or '.join(keys)}?"
     if name.lower() in ABSENT:
         return ABSENT[name.lower()]
     if name in owners:
@@ -77,6 +78,6 @@ def suggestion(name: str, known: Iterable[str], owners: Mapping[str, str]) -> st
 
 
 def limit_in_words(limit: float, value: float, digits: int) -> str:
-    """Write a limit with the fewest digits, at least `digits`, that show `value` >= limit."""
+    """Write a limit with so many digits (at least `digits`) that `value` >= the written limit."""
     texts = (f"{limit:.{count}g}" for count in range(digits, 18))
     return next((text for text in texts if value >= float(text)), repr(limit))

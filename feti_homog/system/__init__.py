@@ -1,4 +1,4 @@
-"""The process and its libraries: `runtime` for one rank, `parallel` for many, `petsc` for PETSc.
+"""The process and its libraries: `runtime` for one rank, `parallel` for all ranks, `petsc` for PETSc.
 
-Main entries: its own floors, from below `runtime`, `parallel` and `petsc`.
+Main entries: the three packages; `parallel` imports `runtime`, `petsc` imports both.
 """

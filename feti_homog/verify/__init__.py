@@ -1,7 +1,7 @@
-"""A certificate of results: every law that they must obey, checked anew from the files alone.
+"""The certificate of a result: all laws that the result must obey, checked from its files alone.
 
-Imports `case` and `system`. Has its own reader, elements and torus, so that a solver defect cannot hide itself; uses
-neither MPI nor PETSc.  Main entry: `certificate.verify`, which `feti-homog verify DIR` prints.
+Imports `case` and `system`.  The package has its own reader, elements and torus, so that a defect of the solver cannot
+hide itself; it uses neither MPI nor PETSc.  Main entry: `certificate.verify`, which `feti-homog verify DIR` prints.
 """
 
 __all__ = ["certificate", "constitutive_law"]

@@ -1,6 +1,7 @@
-"""Bond laws by independent formulas, and the bonds of interface nodes by the case.
+"""Bond laws by independent formulas, and the law at every interface node.
 
-A law is a class with the name that `case/bond_laws.py` gives it, here or in `softening`.
+A law is a class, here or in `softening`, with the name that `case/bond_laws.py` lists.  Tractions (k, c) have a normal
+and a tangential component, and an axial one in generalized plane strain.
 """
 
 from abc import ABC, abstractmethod
@@ -14,7 +15,7 @@ from feti_homog.case import bond_laws
 from feti_homog.typing import AnyInt, Bool, Float, Int
 from feti_homog.verify.reading import ResultFiles, State
 
-# Keys with one number a section, and the keys of their defaults.
+# Keys of a section with one number, and the key whose number is the default, if any.
 NUMBERS = {
     "normal_stiffness": "", "tangential_stiffness": "", "axial_stiffness": "tangential_stiffness",
     "normal_strength": "", "tangential_strength": "", "axial_strength": "tangential_strength",
@@ -23,9 +24,9 @@ NUMBERS = {
 
 
 class BondLaw(ABC):
-    """Law of some bonds; its section [[interface]] has numbers for all bonds or (k,).
+    """The law of k bonds; numbers of its `section` [[interface]] are scalars or (k,).
 
-    Laws with toughness take the energy `lost` in breaking; laws with tips have energies at crack tips in result.json.
+    If `has_toughness`, a break takes the energy `lost`; if `has_tips`, result.json has energies at crack tips.
     """
 
     has_toughness: ClassVar[bool] = False
@@ -36,54 +37,54 @@ class BondLaw(ABC):
 
     @property
     def grows_by_release(self) -> bool:
-        """Return True if bonds at tips break by energy release, which is not in the files."""
+        """Return whether bonds at tips break by energy release, which is not in the files."""
         return bool(self.section.get("growth") == "released")
 
     @abstractmethod
     def utilisation(self, traction: Float) -> Float:
-        """Return the fraction (k,) of the strength that tractions (k, c) use; compression uses none."""
+        """Compute the utilisation (k,) of the strength by tractions (k, c); 0 in compression, 1 at a break."""
 
     @abstractmethod
     def breaks(self, traction: Float) -> dict[str, float]:
-        """Describe how a traction (1, c) breaks a bond, by the names in an envelope's points."""
+        """Describe a break under the traction (1, c), with the keys that envelope points have."""
 
     def jumps(self, traction: Float) -> Float:
-        """Return the jumps (k, c) of elastic bonds: traction / stiffness."""
+        """Compute the jumps (k, c) of elastic bonds: traction / stiffness."""
         return np.asarray(traction / self._components("stiffness", traction))
 
     def mode(self, traction: Float) -> Float:
-        """(k,) psi of tractions (k, c), 0 opens, pi/2 shears; with toughness tan^2 psi = G_II / G_I."""
+        """Compute the modes psi (k,): 0 opens, pi/2 shears, tan^2 psi = G_II / G_I if `has_toughness`."""
         pulls = np.sqrt(self.energies(traction)) if self.has_toughness else pulled(traction)
         return np.asarray(np.arctan2(np.sqrt(np.square(pulls[:, 1:]).sum(axis=1)), pulls[:, 0]))
 
     def lost(self, psi: Float) -> Float:
-        """Return the fracture energies per area (k,) in the modes psi (k,)."""
+        """Return the fracture energies per area (k,) in modes psi (k,)."""
         return np.zeros(len(psi))
 
     def absorbed(self, psi: Float, before: Float, after: Float) -> Float:
-        """(k,) energies per area for damage from `before` to `after` in the modes psi (k,)."""
+        """Compute energies per area (k,) for a rise of damage `before` to `after` (k,), in modes psi (k,)."""
         return self.lost(psi)
 
     def absorbed_range(self, before: Float, after: Float) -> tuple[Float, Float]:
-        """Return the lower and upper bounds (k,) of `absorbed` over all modes."""
+        """Compute lower and upper bounds, both (k,), of `absorbed` over all modes."""
         low, high = (self.lost(np.full(len(after), psi)) for psi in (0.0, np.pi / 2))
         return low, high
 
     def onset(self, traction: Float) -> Float:
-        """Return the utilisation (k,) of intact bonds, 1 at break or first damage."""
+        """Compute the utilisation (k,) of intact bonds: 1 at a break or first damage."""
         return self.utilisation(traction)
 
     def energies(self, traction: Float) -> Float:
-        """Return the spring energies per area (k, 2), opening and shear, of tractions (k, c)."""
+        """Compute the spring energies per area G_I and G_II (k, 2): opening and shear."""
         energies = pulled(traction) ** 2 / (2 * self._components("stiffness", traction))
         return np.column_stack([energies[:, 0], energies[:, 1:].sum(axis=1)])
 
     def shares(self, traction: Float) -> Float:
-        """Return the ratios (k, c) of traction components to strengths."""
+        """Compute the ratios (k, c) of traction components to their strengths."""
         return np.asarray(pulled(traction) / self._components("strength", traction))
 
     def _components(self, kind: str, traction: Float) -> Float:
-        """(c,) or (k, c) normal, tangential and axial stiffness or strength; axial defaults to tangential."""
+        """Return the stiffness or strength (`kind`) of all components, (c,) or (k, c); default inf."""
         normal, tangential = (self.section.get(f"{name}_{kind}", np.inf) for name in ("normal", "tangential"))
         components = normal, tangential, self.section.get(f"axial_{kind}", tangential)
         stacked = np.stack(np.broadcast_arrays(*(np.asarray(value, float) for value in components)), axis=-1)
@@ -91,65 +92,65 @@ class BondLaw(ABC):
 
 
 class MaxStrength(BondLaw):
-    """A bond breaks at the largest ratio of a traction component to its strength."""
+    """The law of the largest ratio: max_i <t_i> / R_i = 1 breaks the bond."""
 
     def utilisation(self, traction: Float) -> Float:
-        """(k,) largest ratio of a component."""
+        """Compute max_i <t_i> / R_i (k,)."""
         return np.asarray(self.shares(traction).max(axis=1, initial=0.0))
 
     def breaks(self, traction: Float) -> dict[str, float]:
-        """Return the ratios of the components."""
+        """Return the ratios <t_i> / R_i by component."""
         return dict(zip(("normal", "tangential", "axial"), self.shares(traction)[0].tolist(), strict=False))
 
 
 class QuadraticStrength(MaxStrength):
-    """A bond breaks at the root of the summed squared ratios of its components."""
+    """The quadratic law: sum_i (<t_i> / R_i)^2 = 1 breaks the bond."""
 
     def utilisation(self, traction: Float) -> Float:
-        """(k,) root of the summed squared ratios."""
+        """Compute sqrt(sum_i (<t_i> / R_i)^2) (k,)."""
         return np.asarray(np.sqrt(np.square(self.shares(traction)).sum(axis=1)))
 
 
 class SpringEnergy(BondLaw):
-    """G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)] breaks the bond.
+    """The energy law: G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)] breaks the bond.
 
-    G_I = <t_n>^2 / (2 k_n) and G_II = t_t^2 / (2 k_t) + t_a^2 / (2 k_a) are the spring energies.
+    The spring energies are G_I = <t_n>^2 / (2 k_n) and G_II = t_t^2 / (2 k_t) + t_a^2 / (2 k_a).
     """
 
     has_toughness: ClassVar[bool] = True
     has_tips: ClassVar[bool] = True
 
     def utilisation(self, traction: Float) -> Float:
-        """(k,) sqrt((G_I + G_II) / G_c)."""
+        """Compute sqrt((G_I + G_II) / G_c) (k,)."""
         return np.asarray(np.sqrt(self.energies(traction).sum(axis=1) / self.lost(self.mode(traction))))
 
     def lost(self, psi: Float) -> Float:
-        """Return the toughness G_c (k,) in the modes psi (k,)."""
-        turned = (1 - np.asarray(self.section["mode_sensitivity"], float)) * psi
-        return np.asarray(np.asarray(self.section["toughness"], float) * (1 + np.tan(turned) ** 2))
+        """Compute the toughness G_c (k,), energy per area, in modes psi (k,)."""
+        angle = (1 - np.asarray(self.section["mode_sensitivity"], float)) * psi
+        return np.asarray(np.asarray(self.section["toughness"], float) * (1 + np.tan(angle) ** 2))
 
     def breaks(self, traction: Float) -> dict[str, float]:
-        """Return the mode in degrees."""
+        """Return the mode psi in degrees."""
         return {"psi": float(np.degrees(self.mode(traction))[0])}
 
 
 def pulled(traction: Float) -> Float:
-    """Return the magnitudes (k, c) of traction components, 0 in compression."""
+    """Compute <t_i> (k, c): magnitudes of traction components, 0 for a normal compression."""
     return np.column_stack([np.maximum(traction[:, 0], 0.0), np.abs(traction[:, 1:])])
 
 
 def law_of(section: Mapping[str, Any]) -> BondLaw:
-    """Return the law that a section [[interface]] names, or the default law."""
+    """Construct the law that a section [[interface]] names by `criterion`."""
     module, name = bond_laws.LAWS[section.get("criterion", bond_laws.DEFAULT)].implementation.split(".")
-    home = import_module(f"{__package__}.{module if module == 'softening' else 'bonds'}")
-    law: BondLaw = getattr(home, name)(section)
+    implementations = import_module(f"{__package__}.{module if module == 'softening' else 'bonds'}")
+    law: BondLaw = getattr(implementations, name)(section)
     return law
 
 
 def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None), damage: Float | None = None) -> BondLaw:
-    """Return the bond law at some interface nodes.
+    """Return the bond law at p of the k interface nodes.
 
-    `damage` (k,) is at all nodes. With several sections or fibre strengths the law has numbers (p,), one for each node.
+    `damage` (k,) belongs to all nodes.  With several sections or scattered strengths, the numbers of the law are (p,).
     """
     sections, strength = files.interfaces, files.fibres.strength
     section = {**sections[0]} if sections else {}
@@ -157,22 +158,22 @@ def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None), damag
         pair, factor = files.interface.pair[nodes], strength[files.interface.fibre[nodes] - 1]
         for name, default in NUMBERS.items():
             power = 1 if name.endswith("strength") else 2 if name.endswith("toughness") else 0
-            numbers = [[own[key] for key in (name, default) if own.get(key) is not None] for own in sections]
+            numbers = [[table[key] for key in (name, default) if table.get(key) is not None] for table in sections]
             section[name] = np.array([float((values or [np.inf])[0]) for values in numbers])[pair] * factor**power
     return law_of(section if damage is None else section | {"damage": damage[nodes]})
 
 
 def friction_at(files: ResultFiles, on_damage: bool = False) -> Float:
-    """Return friction coefficients (k,) on debonded faces, or on the damaged fraction of bonds."""
+    """Return the friction coefficients (k,): of debonded faces, or `on_damage` of damaged bonds."""
     key = "friction_on_damage" if on_damage else "friction"
     mu = [float(section.get("friction", 0.0)) * bool(section.get(key)) for section in files.interfaces or [{}]]
     return np.asarray(np.array(mu)[np.minimum(files.interface.pair, len(mu) - 1)])
 
 
 def rubbing_force(files: ResultFiles, state: State) -> Float:
-    """Return the shear traction (k,) on the damaged fraction of unbroken bonds with friction, else 0.
+    """Compute the friction traction (k,) on the damaged fraction of unbroken bonds, else 0.
 
-    The slip is C_0 traction + g, the force is traction - g / (C - C_0).
+    If the slip is C_0 t + g under the shear traction t, the damaged fraction bears t - g / (C - C_0); C_0 is intact.
     """
     unit, intact_bonds = np.ones_like(state.traction), np.zeros(len(state.damage))
     intact, damaged = (law_at(files, damage=damage).jumps(unit)[:, 1] for damage in (intact_bonds, state.damage))
@@ -182,14 +183,14 @@ def rubbing_force(files: ResultFiles, state: State) -> Float:
 
 
 def cohesive_traction(files: ResultFiles, state: State) -> Float:
-    """Return tractions (k, c) without friction on the damaged fraction."""
+    """Compute the tractions (k, c) without the friction on damaged fractions."""
     traction = state.traction.copy()
     traction[:, 1] -= state.damage * rubbing_force(files, state)
     return traction
 
 
 def pairs_of(files: ResultFiles) -> Int:
-    """Return the section index (phases, phases) between two phases, -1 where bonds never part."""
+    """Return the number (phases, phases) of the section between two phases, -1 where bonds never part."""
     pairs = np.full((len(files.phases),) * 2, -1)
     for number, section in enumerate(files.interfaces or [{}]):
         if "between" not in section:

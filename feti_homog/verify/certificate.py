@@ -1,4 +1,4 @@
-"""All laws on a result folder, if need be in a separate process, and the certificate as text."""
+"""The certificate: all laws on the files of a result folder, as text and as JSON."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,15 +21,15 @@ from feti_homog.verify.findings import Finding, Findings, checks, unchecked
 from feti_homog.verify.path_energies import check_heat, check_losses, check_stored
 from feti_homog.verify.reading import COATING, altered, opened
 
-# Raised by numbers of unexpected kind or shape.
+# Exceptions that numbers with an unexpected kind or shape cause.
 DAMAGE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, MemoryError, RecursionError)
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """Findings of all laws that apply; a title with case, mesh and states; the run's status and faults.
+    """The findings of all laws that apply; `title` names case, mesh and states.
 
-    `unchecked` maps reasons to names of unchecked numbers.
+    `status` has the status and faults that the run reports; `unchecked` maps reasons to numbers that no law reads.
     """
 
     findings: tuple[Finding, ...]
@@ -39,12 +39,12 @@ class Certificate:
 
     @property
     def holds(self) -> bool:
-        """Return True if every law holds."""
+        """Return whether every law holds."""
         return all(finding.holds for finding in self.findings)
 
     @property
     def text(self) -> str:
-        """Return the certificate as text, with a line for each law."""
+        """Write the certificate as text, with one line a law."""
         broken = sum(not finding.holds for finding in self.findings)
         verdict = f"{broken} of {len(self.findings)} laws are broken" if broken else "every law holds"
         names = [f"  {', '.join(names)}: {reason}" for reason, names in self.unchecked.items()]
@@ -53,24 +53,25 @@ class Certificate:
 
     @property
     def document(self) -> dict[str, Any]:
-        """Return the certificate as values of JSON."""
+        """Return the certificate as a table of JSON values."""
         laws = [dict(finding.document) for finding in self.findings]
         about = {"title": self.title, "status": self.status, "holds": self.holds}
         return about | {"laws": laws, "not_checked": self.unchecked}
 
 
 def verify(directory: Path) -> Certificate:
-    """Check the laws on all states of a result folder. Raises CaseError, one line, if it is unreadable."""
+    """Check all laws on a result folder; raise CaseError, one line, if a file is unreadable."""
     return input_files.in_own_process(directory, _verified) if altered(directory) else _verified(directory)
 
 
 def _verified(directory: Path) -> Certificate:
+    """Check all laws in this process."""
     try:
         with opened(directory) as files, np.errstate(all="ignore"):  # numbers that are not finite break their laws
             cell, document = DiscreteCell.of(files), files.document
             findings = Findings(checks_of(cell))
             findings.record("files", len(files.altered), ", ".join(files.altered))
-            for name in ("schema", "checksum", "result_h5"):  # read before
+            for name in ("schema", "checksum", "result_h5"):  # `opened` has checked these entries
                 document.get(name)
             states, faults = laws_of_fields(findings, cell), document.hint("faults", [])
             laws_of_numbers(findings, cell, states)
@@ -80,17 +81,17 @@ def _verified(directory: Path) -> Certificate:
             return Certificate(findings.worst(), title, status, unchecked(document))
     except DAMAGE as error:
         fault = f"{type(error).__name__} {error}"
-        raise CaseError(f"{directory}: its files do not belong together or are incomplete: {fault}") from error
+        raise CaseError(f"{directory}: files do not belong together or are incomplete: {fault}") from error
 
 
 def checks_of(cell: DiscreteCell) -> list[Finding]:
-    """List the laws of a result with their limits."""
+    """List the laws with their limits for a result."""
     case, rtol = cell.files.case, float(cell.files.document["solver"].hint("rtol"))
     return checks(rtol, case["cell"]["geometry"] == "mesh", COATING in case["material"], cell.elements.contrasts)
 
 
 def laws_of_fields(findings: Findings, cell: DiscreteCell) -> list[StateNumbers]:
-    """Check the mesh and all states; returns their numbers."""
+    """Check mesh, interface and the fields of all states; return the states without mesh fields."""
     files = cell.files
     check_mesh(findings, cell)
     check_interface(findings, cell)
@@ -110,14 +111,14 @@ def laws_of_fields(findings: Findings, cell: DiscreteCell) -> list[StateNumbers]
 
 
 def laws_of_numbers(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check the numbers of result.json against the states."""
+    """Check the numbers in result.json against the states."""
     document = cell.files.document
     pairs = check_loads(findings, cell, states, rows_of(cell))
     check_tables(findings, cell, states, pairs)
     check_arcs(findings, cell, states)
     if "path" in document:
         points = document["path"]
-        if all(0 <= state.point < len(points) for state in states):  # others break the law of the load
+        if all(0 <= state.point < len(points) for state in states):  # else `check_loads` reports the state
             for check in (check_breaks, check_strength, check_stored):
                 check(findings, cell, states)
             (check_heat if "friction_heat" in points[0] else check_losses)(findings, cell, states)

@@ -1,4 +1,4 @@
-"""Laws of the summary in result.json: status, reciprocity, moduli, engineering constants, expansion, bounds."""
+"""Laws of result.json alone: status, reciprocity, bounds, compliance, expansion, engineering constants."""
 
 import numpy as np
 
@@ -9,39 +9,39 @@ from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import KKT, Findings, relative, solver_limit
 from feti_homog.verify.reading import Status
 
-RTOL = 1e-8  # of the dual problems, by default
-DIRECTIONS = 720  # across the fibres, in half a turn
+RTOL = 1e-8  # default tolerance of the dual problems
+DIRECTIONS = 720  # number of directions across the fibres in half a turn
 SECTIONS = "moduli", "constants", "transversely_isotropic", "transverse_moduli"
-NOISE = 1e-3  # share of the largest constant of a kind, and Poisson's ratio, below which constants are noise
-# The scale of constants whose names begin so is 1 at least.
+NOISE = 1e-3  # bound of noise: for a constant, relative to the largest of its kind; for Poisson's ratios, absolute
+# Beginnings of names of constants whose scale is at least 1.
 RATIOS = ("eta", "anisotropy", "deviation")
 
 
 def check_status(findings: Findings, cell: DiscreteCell) -> None:
-    """Check that tolerances follow from rtol, and the status from checks, convergence and other faults."""
+    """Check that the tolerances follow from rtol, and the status from checks and faults."""
     document, solver = cell.files.document, cell.files.document["solver"]
-    # Options of the command line are in no file.
+    # A tolerance from the command line is in no other entry, so that no law can check it.
     is_of_case = solver.hint("rtol") == float(cell.files.case.get("petsc", {}).get("feti_ksp_rtol", RTOL))
     rtol = float(solver["rtol"] if is_of_case else solver.hint("rtol"))
-    tolerance, of_contact = document["check_tolerance"], document["kkt_tolerance"]
+    tolerance, contact_tolerance = document["check_tolerance"], document["kkt_tolerance"]
     findings.record("status", abs(tolerance / solver_limit(rtol) - 1.0), "check_tolerance")
-    findings.record("status", abs(of_contact / KKT - 1.0), "kkt_tolerance")
+    findings.record("status", abs(contact_tolerance / KKT - 1.0), "kkt_tolerance")
     checks, faults = document["checks"], document.hint("faults", [])
-    failed = [name for name in checks if not checks.hint(name) <= (of_contact if "kkt_" in name else tolerance)]
+    failed = [name for name in checks if not checks.hint(name) <= (contact_tolerance if "kkt_" in name else tolerance)]
     failed += [reason for reason in solver.hint("converged_reason") if reason < 0]
     failed += [fault for fault in faults if "check " not in fault and "no convergence" not in fault]
     findings.require("status", document["status"] == ("not converged" if failed else "done"), "status")
 
 
 def check_reciprocity(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check that stiffnesses are symmetric, and thermal stresses obey Levin's formula.
+    """Check that stiffnesses are symmetric and thermal stresses obey Levin's formula.
 
-    Contact without tension breaks the reciprocity of debonded cells.
+    Debonded cells with contact are skipped: contact without tension breaks the reciprocity.
     """
     document = cell.files.document
     for number, table in enumerate([document, *document.get("angle", ())], start=-1):
-        of_table = [state for state in states if number < 0 or state.point == number]
-        if cell.files.contact and any((state.status != Status.BONDED).any() for state in of_table):
+        own_states = [state for state in states if number < 0 or state.point == number]
+        if cell.files.contact and any((state.status != Status.BONDED).any() for state in own_states):
             continue
         place = f"angle[{number}]." if number >= 0 else ""
         for name in [name for name in ("effective_stiffness", "stiffness") if name in table]:
@@ -49,13 +49,13 @@ def check_reciprocity(findings: Findings, cell: DiscreteCell, states: States) ->
             findings.compare("symmetry", C, C.T, np.abs(C).max(), place + name)
         if "thermal_stress" in table:
             thermal = np.array(table["thermal_stress"])
-            for state in [state for state in of_table if not state.temperature]:
+            for state in [state for state in own_states if not state.temperature]:
                 error = relative(thermal @ state.strain + state.expanding, np.abs(thermal).max())
                 findings.record("Levin", error, f"{place}thermal_stress, {state.name}")
 
 
 def check_constants(findings: Findings, cell: DiscreteCell) -> None:
-    """Check the bounds, compliance, thermal expansion and constants of the effective stiffness."""
+    """Check bounds, compliance, thermal expansion and constants against the effective stiffness."""
     document = cell.files.document
     C, heat = np.array(document["effective_stiffness"]), document.get("thermal_stress")
     heat = None if heat is None else np.array(heat)
@@ -75,12 +75,12 @@ def check_constants(findings: Findings, cell: DiscreteCell) -> None:
                 pair = 1 / (cell.fractions @ (1 / (phases[:, None] + added))) - added
                 findings.compare("bounds", bounds["hashin_shtrikman"][name], pair, pair[1], f"hashin_shtrikman.{name}")
     if cell.files.is_spatial:
-        # Columns that are secants of one load each have no meaningful inverse.
+        # With contact, the columns are secants under different loads, and have no meaningful inverse.
         is_linear = "effective_stiffness_compression" not in document
         findings.require("compliance", is_linear is ("compliance" in document), "compliance")
         if "compliance" in document:
             S = np.array(document["compliance"])
-            terms = (np.abs(S) @ np.abs(C)).max(axis=1)[:, None]  # of cancelling sums
+            terms = (np.abs(S) @ np.abs(C)).max(axis=1)[:, None]  # the sums in S C cancel
             findings.compare("compliance", S @ C, np.eye(6), terms, "compliance")
         if "thermal_expansion" in document and heat is not None:
             strains, place = -np.linalg.solve(C, heat), "thermal_expansion"
@@ -97,10 +97,9 @@ def check_constants(findings: Findings, cell: DiscreteCell) -> None:
 
 
 def constants_of(C: Float, heat: Float | None) -> dict[str, float]:
-    """Return constants by name from C (3, 3) or (6, 6), and expansions from the thermal stress `heat` (6,).
+    """Compute constants by name from C (3, 3) or (6, 6), and expansions from the thermal stress `heat` (6,).
 
-    From the strains under unit stresses: E_i, nu_ij = -eps_j / eps_i and eta_i = gamma_12 / eps_i under stress along i,
-    G_ij.
+    Strains eps under a unit stress along x_i give E_i = 1 / eps_i, nu_ij = -eps_j / eps_i, eta_i = gamma_12 / eps_i.
     """
     S, n, voigt = np.linalg.inv(C), len(C), VOIGT[len(C)]
     pairs, shears = [(0, 1), (1, 0)], {"G12": 2}
@@ -116,7 +115,7 @@ def constants_of(C: Float, heat: Float | None) -> dict[str, float]:
         table |= {"eta1": S[2, 0] / S[0, 0], "eta2": S[2, 1] / S[1, 1], "bulk": bulk, "shear": shear}
         table["anisotropy"] = _distance(C, nearest)
     else:
-        # Constants of the mean over turns about x3, exact: the turned tensor has no more than four waves in a turn.
+        # The mean over five turns about x3 is exact: entries of the turned tensor have at most four waves in a turn.
         mean = np.mean([turned(C, angle) for angle in np.arange(5) * 72.0], axis=0)
         M, angle = np.linalg.inv(mean), np.pi * np.arange(DIRECTIONS) / DIRECTIONS
         table |= {
@@ -124,7 +123,7 @@ def constants_of(C: Float, heat: Float | None) -> dict[str, float]:
             "nu_axial": -M[0, 2] / M[2, 2], "G_axial": 1 / M[4, 4], "G_transverse": 1 / M[5, 5],
             "K_transverse": (mean[0, 0] + mean[0, 1]) / 2, "deviation": _distance(C, mean),
         }  # fmt: skip
-        # Ranges of E1 and G12 in turned axes.
+        # Ranges of E1 and G12 over all turned axes.
         c, s, none = np.cos(angle), np.sin(angle), np.zeros((3, DIRECTIONS))
         tension, slide = np.vstack([c**2, s**2, none, c * s]), np.vstack([-2 * c * s, 2 * c * s, none, c**2 - s**2])
         for name, stress in (("E", tension), ("G", slide)):
@@ -138,13 +137,13 @@ def constants_of(C: Float, heat: Float | None) -> dict[str, float]:
 
 
 def _isotropic_part(c: Float) -> tuple[float, float]:
-    """Return k, mu of the nearest isotropic stiffness: the invariants C_iijj / 4 and (C_ijij - C_iijj / 2) / 4."""
+    """Compute k = C_iijj / 4 and mu = (C_ijij - C_iijj / 2) / 4 of the nearest isotropic stiffness."""
     spherical, full = c[:2, :2].sum(), c[0, 0] + c[1, 1] + 2 * c[2, 2]
     return float(spherical / 4), float((full - spherical / 2) / 4)
 
 
 def _distance(C: Float, other: Float) -> float:
-    """Return the relative distance ||C - C'|| / ||C|| of two tensors C_ijkl."""
+    """Compute the relative distance ||C - C'|| / ||C|| between tensors C_ijkl."""
     voigt = VOIGT[len(C)]
     off, size = (np.linalg.norm(M[voigt[:, :, None, None], voigt[None, None]]) for M in (C - other, C))
     return float(off / size)

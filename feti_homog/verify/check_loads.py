@@ -1,6 +1,6 @@
-"""Loads that the case prescribes, and the numbers of the states in result.json.
+"""Laws of loads: states and result.json have the loads of the case, and the same numbers.
 
-A case prescribes the strain or the stress of every component; in generalized plane strain the temperature is the last
+A case prescribes the strain or the stress of all n components; in generalized plane strain the temperature is the last
 strain component.
 """
 
@@ -24,23 +24,23 @@ NAMES = {
     6: (("E11", "E22", "E33", "gamma23", "gamma13", "gamma12"), ("S11", "S22", "S33", "S23", "S13", "S12")),
 }
 TEMPERATURE, COUNTS = "temperature", {status.name.lower(): status for status in Status}
-OF_ARCS = "debonded_length", "debonded_share", "debonded_shares"  # of an angle, in all unit loads
+OF_ARCS = "debonded_length", "debonded_share", "debonded_shares"  # entries of an angle, equal in all unit loads
 UNIT_LOADS = {3: [0, 1, 2], 6: [0, 1, 5, 2, 6, 4, 3]}  # components in the order of the states; 6 is the temperature
-FIELDS = ("displacement", "fluctuation", "stress", "mesh_error", "stress_33")  # of a state on its mesh
+FIELDS = ("displacement", "fluctuation", "stress", "mesh_error", "stress_33")  # large fields of a state
 
 
 @dataclass(frozen=True)
 class Prescribed:
-    """A load: the values (n,) of its components, and True (n,) for a stress."""
+    """A load: `values` (n,) of its components, which are stresses where `by_stress` (n,)."""
 
     values: Float
     by_stress: Bool
 
 
 def targets(case: Document) -> list[Prescribed]:
-    """Return the loads that a case names, each with all components.
+    """Return the loads of a case, with all components.
 
-    A component that a load does not name stays; at first it is stress-free.
+    A component that a load does not name keeps its value and kind; at first its stress is 0.
     """
     v = 6 if case["analysis"]["plane"] == "generalized" else 3
     n = v + (v > 3)
@@ -60,10 +60,10 @@ def targets(case: Document) -> list[Prescribed]:
 
 
 def at_points(case: Document, points: Sequence[Document]) -> Iterator[Prescribed]:
-    """Yield the prescribed load at every path point.
+    """Yield the prescribed load at every point of a path.
 
-    The first leg has a share of its end. Later legs are straight from the last prescribed load to their end. A
-    component that changes its kind begins at its value in the last point.
+    The first leg starts at 0, a later leg at the end of the leg before; both are straight.  A component that changes
+    between strain and stress starts at its value in the last point.
     """
     ends, leg, ended = targets(case), 0, False
     by_events = case["path"]["method"] == "events"
@@ -78,24 +78,24 @@ def at_points(case: Document, points: Sequence[Document]) -> Iterator[Prescribed
                 start = np.where(before.by_stress == end.by_stress, start, np.where(end.by_stress, *pairs))
         share = along - leg
         yield Prescribed((1 - share) * start + share * ends[leg].values, ends[leg].by_stress)
-        # After the last break at a waypoint comes a point without breaks.
+        # A leg of events ends with a point at its waypoint without breaks.
         ended, last = abs(share - 1) <= ROUNDING and not (by_events and damaged_at(point)), point
 
 
 def damaged_at(point: Document) -> int:
-    """Count the bonds that break or soften at a point, or in the step to it."""
+    """Return the number of bonds that break or soften at a point, or in the increment before."""
     return int(point["broke"]) + int(point.get("softened") or 0)
 
 
 @dataclass(frozen=True)
 class StateNumbers(State):
-    """A state without its mesh fields, which one state at a time has in memory; with cohesive tractions.
+    """A state without `FIELDS`, which only one state at a time keeps in memory; with cohesive tractions.
 
     Attributes:
-        stored, in_springs: energy per area <sigma : (eps - alpha T)> / 2 with all springs, and in springs alone.
-        released: (k,) True at tips that break by energy release.
-        used: (k,) used strength share at bonded nodes, NaN at these tips.
-        heat: conjugate of the temperature, - <alpha : sigma>.
+        stored, in_springs: energies per area: <sigma : (eps - alpha T)> / 2 with all springs, and in springs alone.
+        released: (k,) whether a bond is at a tip that breaks by energy release.
+        used: (k,) utilisation at bonded nodes, NaN where `released`, else 0.
+        heat: conjugate of the temperature, -<alpha : sigma>.
         expanding: <alpha : L : strain>.
     """
 
@@ -108,7 +108,7 @@ class StateNumbers(State):
 
     @classmethod
     def of(cls, cell: DiscreteCell, state: State, fields: ElementFields) -> Self:
-        """Return the numbers of a state."""
+        """Compute the numbers of a state from its fields."""
         law = law_at(cell.files, damage=state.damage)
         released = cell.tips(state.status) & law.grows_by_release
         traction = cohesive_traction(cell.files, state)
@@ -134,22 +134,21 @@ Pairs = Sequence[tuple[StateNumbers, tuple[Prescribed, Document]]]
 
 
 def check_loads(findings: Findings, cell: DiscreteCell, states: States, rows: Rows) -> Pairs:
-    """Check loads of points and states against the case, and return the states with their rows.
+    """Check the loads of points and states against the case; return states with their rows.
 
-    A path keeps as many states as the case asks for, at points that result.json lists, the first and the last among
-    them; other analyses keep all.
+    A path keeps `[output] states` states, at points that result.json lists, the first and the last among them.
     """
     document, numbers, count = cell.files.document, [state.point for state in states], len(rows)
     largest, imposed = max((float(np.abs(state.mean_stress).max()) for state in states), default=0.0), 0.0
     for state, (load, _) in product(states[:1], rows):
-        # Stress scale of the loads in the bonded cell; computed strains are no scale for prescribed stresses.
+        # The scale of stresses is that of the bonded cell: computed strains are no scale for prescribed stresses.
         strains, v = np.where(load.by_stress, 0.0, load.values), len(state.strain)
         imposed = max(imposed, float(np.abs(cell.reuss @ cell.loads(strains[:v], float(strains[v:].sum()))).max()))
     scales = cell.largest_strain or 1.0, max(largest, imposed) or 1.0
     if "path" in document:
         findings.require("tables", list(document["states"]) == numbers, "states, which differ between the two files")
         in_order = [*numbers[:1], *numbers[-1:]] == [0, count - 1] and numbers == sorted({*numbers})
-        findings.require("load", in_order, "states, which are not from the first point to the last")
+        findings.require("load", in_order, "states, which do not go from the first point to the last")
         for number, (load, entries) in enumerate(rows):
             _check_load(findings, load, entries, scales, f"path[{number}]")
         key = cell.files.case["output"]["states"]
@@ -159,15 +158,15 @@ def check_loads(findings: Findings, cell: DiscreteCell, states: States, rows: Ro
         pairs = list(zip(states, rows, strict=False))
         points = np.arange(len(numbers)) // (count // len(document.get("angle", [None])))
         findings.compare("tables", numbers, points, 1.0, lambda k: f"{states[k].name}, point")
-    findings.compare("load", len(states), count, 1.0, f"{len(states)} states, {count} asked for")
+    findings.compare("load", len(states), count, 1.0, f"{len(states)} states, expected {count}")
     for state, (load, _) in pairs:
-        own = {"strain": state.strain, "stress": state.mean_stress, TEMPERATURE: state.temperature}
-        _check_load(findings, load, own, scales, state.name)
+        entries = {"strain": state.strain, "stress": state.mean_stress, TEMPERATURE: state.temperature}
+        _check_load(findings, load, entries, scales, state.name)
     return pairs
 
 
 def _check_load(findings: Findings, load: Prescribed, numbers: Document, scales: Sequence[float], place: str) -> None:
-    """Check the strains, stresses and temperature that a load prescribes."""
+    """Check prescribed strains, stresses and temperature, relative to `scales` of strain and stress."""
     strain, stress, v = np.array(numbers["strain"]), np.array(numbers["stress"]), len(numbers["strain"])
     values, by_stress = load.values[:v], load.by_stress[:v]
     findings.record("load", np.abs(strain - values)[~by_stress] / scales[0], f"{place}, strain")
@@ -178,16 +177,16 @@ def _check_load(findings: Findings, load: Prescribed, numbers: Document, scales:
 
 
 def check_tables(findings: Findings, cell: DiscreteCell, states: States, pairs: Pairs) -> None:
-    """Check the points or columns of result.json against the states."""
+    """Check the points or columns in result.json against the states."""
     files, nodes, sections = cell.files, cell.files.interface, len(cell.files.interfaces)
-    same = json.loads(str(files.file.attrs["case"])) == files.case
-    findings.require("tables", same, "the case, which differs between the two files")
+    is_same = json.loads(str(files.file.attrs["case"])) == files.case
+    findings.require("tables", is_same, "the case, which differs between the two files")
 
     def lengths(where: Bool) -> Float:
         return np.asarray(np.bincount(nodes.fibre - 1, nodes.length * where, len(files.fibres.radius)), float)
 
     longest = float(lengths(np.ones(len(nodes.length), bool)).max(initial=0.0)) or 1.0
-    whole, kept = nodes.length.sum() or 1.0, {state.point for state in states}
+    total, points_with_state = nodes.length.sum() or 1.0, {state.point for state in states}
     of_section = nodes.length[:, None] * (nodes.pair[:, None] == np.arange(sections))
     stress = max((float(np.abs(state.mean_stress).max()) for state in states), default=0.0) or 1.0
     energy = max([state.stored for state, _ in pairs], default=0.0) + cell.rounded_energy
@@ -201,8 +200,8 @@ def check_tables(findings: Findings, cell: DiscreteCell, states: States, pairs: 
             "stored": (state.stored, energy),
             "stored_in_springs": (state.in_springs, energy),
             "debonded_length": (lengths(debonded), longest),
-            "debonded_share": (lengths(debonded).sum() / whole, 1.0),
-            "damaged_share": (lengths(damaged).sum() / whole, 1.0),
+            "debonded_share": (lengths(debonded).sum() / total, 1.0),
+            "damaged_share": (lengths(damaged).sum() / total, 1.0),
             "debonded_shares": (debonded @ of_section / of_section.sum(axis=0), 1.0),
         }
         numbers |= {name: (np.count_nonzero(state.status == status), 1.0) for name, status in COUNTS.items()}
@@ -212,13 +211,13 @@ def check_tables(findings: Findings, cell: DiscreteCell, states: States, pairs: 
     for number, point in enumerate(files.points):
         count, place = sum(point[name] for name in COUNTS), f"point {number}, {', '.join(COUNTS)}"
         findings.compare("tables", count, len(nodes.length), 1.0, place)
-        names = ["debonded_length"] * (number in kept) + ["debonded_shares"] * (sections > 1)
+        names = ["debonded_length"] * (number in points_with_state) + ["debonded_shares"] * (sections > 1)
         missing = sorted({*names}.difference(point))
         findings.require("tables", not missing, f"point {number}, {', '.join(missing)}")
 
 
 def rows_of(cell: DiscreteCell) -> Rows:
-    """Return the load and the entry in result.json for each point on a path, or for each state without a path."""
+    """Return loads and their entries in result.json, for the points of a path or for the states."""
     document, case = cell.files.document, cell.files.case
     if "path" in document:
         return list(zip(at_points(case, document["path"]), document["path"], strict=True))
@@ -227,7 +226,7 @@ def rows_of(cell: DiscreteCell) -> Rows:
     if strain := case.get("angle", {}).get("strain"):
         values = np.array([*strain, 0.0] if len(strain) > 3 else strain, float)
         return [(Prescribed(values, np.zeros(len(values), bool)), point) for point in document["angle"]]
-    # Unit loads, or minus them, with their stresses: columns of a stiffness, and `thermal_stress`.
+    # Unit loads with both signs, and their stresses: the columns of a stiffness, and `thermal_stress`.
     tables = [(point, "stiffness", "", 1.0) for point in document.get("angle", ())]
     tables = tables or [(document, "effective_stiffness", *signed) for signed in (("", 1.0), ("_compression", -1.0))]
     rows = []

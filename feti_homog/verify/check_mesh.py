@@ -1,6 +1,6 @@
 """Laws of the mesh, its interface nodes, the initially debonded arcs, and the estimated mesh error.
 
-Element shares of the mesh error are compared with averages at nodes (Zienkiewicz and Zhu 1987).
+The mesh error is compared with an estimate by stresses averaged at nodes (Zienkiewicz and Zhu 1987).
 """
 
 from collections.abc import Iterator
@@ -16,31 +16,31 @@ from feti_homog.verify.findings import ROUNDING, Findings, Section
 from feti_homog.verify.reading import COATING, State, Status
 from feti_homog.verify.torus import from_centre
 
-# The mesher moves the tips of arcs by so many degrees at most; nodes nearer to a tip are on neither side.
+# Largest distance in degrees between the tip of an arc and its mesh node; nodes within it are on neither side.
 AT_TIP = 0.06
-# Errors of lengths and normals of straight sides, in place of unknown curves that turn by half a turn at most.
+# Largest errors of lengths and normals if straight sides replace unknown curves, which turn by at most half a turn.
 LENGTH_ERROR, NORMAL_ERROR = np.pi / 2 - 1, np.sqrt(2.0)
-# Errors by fits to several elements over errors by averages: 1.5 to 1.9 of quadratic elements without a bubble, else
-# 0.76 to 1.6, of hexagonal and random cells with contrasts of 1e-3 and 1e3, refined up to twice; of elements as large
-# as a fibre, up to a quarter more.
+# Errors by fits to several elements over errors by averages: 1.5 to 1.9 for quadratic elements without a bubble, else
+# 0.76 to 1.6, in hexagonal and random cells with contrasts of 1e-3 and 1e3, refined up to twice; up to a quarter more
+# for elements as large as a fibre.
 WITHOUT_BUBBLE = 1.7
-# Share of the elements' errors to which arcs may cancel them.
+# Least error of an energy over the sum of the element errors, which arcs may cancel.
 LEAST_SHARE = 0.05
-MODE_LENGTH = 1e-3  # least length for modes / radius
-LOADS = [sign + name for sign in ("", "-") for name in (*NAMES[3][0], "strain")]  # of release rates
-# Middles of sides, a quadrature rule for squares of linear functions.
+MODE_LENGTH = 1e-3  # least length at which modes are evaluated / radius
+LOADS = [sign + name for sign in ("", "-") for name in (*NAMES[3][0], "strain")]  # names of loads of release rates
+# Middles of sides in barycentric coordinates: a quadrature rule, exact for squares of linear functions.
 MIDDLES = np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])
 
 
 def check_mesh(findings: Findings, cell: DiscreteCell) -> None:
-    """Check that elements with positive areas fill the cell except voids, and torn sides have one partner or a void.
+    """Check that elements fill the cell, and that torn sides meet in pairs or at voids.
 
-    Sizes, counts and area fractions in result.json are those of the mesh.
+    Areas are positive, and sizes, counts and area fractions in result.json agree with the mesh.
     """
     elements, sides, section, phases = cell.elements, cell.sides, cell.files.document["cell"], cell.files.phases
     mesh, (width, height), porosity = cell.files.mesh, cell.files.size, section.get("porosity", 0.0)
     findings.record("mesh", np.where(elements.least_jacobian > 0, 0.0, np.inf), "element {}".format)
-    findings.compare("mesh", elements.area.sum(), (1 - porosity) * cell.area, cell.area, "the sum of all areas")
+    findings.compare("mesh", elements.area.sum(), (1 - porosity) * cell.area, cell.area, "the sum of element areas")
     normals = sides.normal[sides.at_void]
     findings.compare("mesh", normals.sum(axis=0), [0, 0], cell.files.size.max(), "the sides at voids are closed")
     agrees = bool(sides.at_void.any()) == (porosity > 0)
@@ -64,11 +64,11 @@ def check_mesh(findings: Findings, cell: DiscreteCell) -> None:
 
 
 def check_interface(findings: Findings, cell: DiscreteCell) -> None:
-    """Check that interface nodes stand where two bodies may part, and their sections, shapes and strengths."""
+    """Check places, bodies, sections, normals, lengths and strengths of interface nodes."""
     rows, faces, at = cell.files.interface, cell.faces, "interface node {}".format
     nodes, k = cell.files.document["solver"]["interface_nodes"], len(rows.points)
     findings.compare("cell", nodes, k, 1.0, "solver.interface_nodes")
-    # Strengths scatter by Weibull's distribution with mean 1; a table may have others.
+    # Strengths scatter by Weibull's distribution with mean 1, except in a table of fibres.
     strength, scatter = cell.files.fibres.strength, next(iter(cell.files.interfaces), {}).get("scatter")
     if cell.files.case["cell"]["geometry"] != "table":
         expected = np.ones_like(strength)
@@ -81,9 +81,9 @@ def check_interface(findings: Findings, cell: DiscreteCell) -> None:
     count = np.bincount(faces.place[faces.place >= 0], minlength=cell.nodes.places)
     wrong = np.flatnonzero(count != (faces.pair >= 0))
     first = [int(cell.nodes.node[np.argmax(cell.nodes.place == place)]) for place in wrong[:1]]
-    text = f"{len(wrong)} places with another number of interface nodes than one, the first at mesh node {first}"
+    text = f"{len(wrong)} places without exactly one interface node, the first at mesh node {first}"
     findings.require("interface", not len(wrong), text)
-    # Nodes on a node's body by the mesh or by body label and fibre number, but not by both.
+    # For every node, the number of nodes that share its body by the mesh or by the labels, but not by both.
     nodes, on_fibre = cell.nodes, (faces.row >= 0) & faces.is_fibre
     fibre = rows.fibre + (int(rows.fibre.max(initial=0)) + 1) * rows.body.astype(np.int64)
     part = np.full(len(fibre), -1)
@@ -104,10 +104,10 @@ def check_interface(findings: Findings, cell: DiscreteCell) -> None:
 
 
 def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
-    """Return normals (k, 2) and tributary lengths (k,) by the mesh, and which (k,) are exact.
+    """Compute normals (k, 2) and tributary lengths (k,) from the mesh, and whether they are exact (k,).
 
-    Round fibres have radial normals.  Linear sides give half their length to each end, quadratic sides int N ds to
-    each node; a node has the mean normal of its sides, weighted by these parts.
+    Round fibres have radial normals.  The length of a node sums half of its linear sides, or int N ds of its quadratic
+    sides; the normal is the mean of the normals of the sides, weighted by these lengths.
     """
     files, rows, nodes = cell.files, cell.files.interface, cell.sides.nodes[cell.inner]
     is_fibre = np.asarray(rows.body == files.fibres.body[rows.fibre - 1])
@@ -119,7 +119,7 @@ def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
     turn = np.stack([np.cos(angle), -np.sin(angle), np.sin(angle), np.cos(angle)], axis=1).reshape(-1, 2, 2)
     of, coats = rows.fibre - 1, np.where(is_fibre, 0.0, thickness[rows.fibre - 1])
     frames = turn[of] * (np.array(axes, float).reshape(-1, 2)[of] + coats[:, None])[:, None]
-    # A side whose nodes are no interface nodes belongs to none of them.
+    # Nodes of a side that are no interface nodes have row -1, and get no share.
     row, is_quadratic, k = cell.inner_rows, nodes.shape[1] == 3, len(rows.length)
     points, frame, (x, weights) = files.mesh.points[nodes], frames[row.max(axis=1)], roots_legendre(7)
     shares = np.stack([x * (x - 1), x * (x + 1), 2 - 2 * x * x]) / 2 if is_quadratic else np.full((2, len(x)), 0.5)
@@ -139,10 +139,10 @@ def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
 
 
 def _tangents(points: Float, frame: Float, places: Float) -> Float:
-    """(s, q, 2) dx / ds, s in [0, 1], of sides with nodes (s, n, 2), ends first, at `places` (q,) in [-1, 1].
+    """Compute dx / dt (s, q, 2), t in [0, 1], along sides, at `places` 2 t - 1 (q,) in [-1, 1].
 
-    A chord is the image of a unit-circle chord under its frame (s, 2, 2); if the frame is NaN, a side is the circular
-    arc through its three nodes, or straight.
+    The nodes of the sides are `points` (s, n, 2), ends first.  A side is an elliptic arc, the image of a unit arc under
+    its `frame` (s, 2, 2); with a frame of NaN it is the circular arc through its three nodes, or straight.
     """
     on_ellipse = np.isfinite(frame[:, 0, 0])
     frame = np.where(on_ellipse[:, None, None], frame, np.eye(2))
@@ -154,9 +154,9 @@ def _tangents(points: Float, frame: Float, places: Float) -> Float:
 
 
 def check_arcs(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check that nodes inside arcs are debonded in all states, and nodes outside bonded until the load breaks them.
+    """Check that nodes inside debonded arcs have no bond, and that nodes outside start with one.
 
-    A user's mesh may have debonded curves that are not in the files; then only the first law is known.
+    A user's mesh may have debonded curves that the files do not list: nodes outside arcs are then unchecked.
     """
     document, case = cell.files.document, cell.files.case
     points, from_mesh = document.get("angle", ()), case["cell"]["geometry"] == "mesh" and "interface" in case
@@ -164,7 +164,7 @@ def check_arcs(findings: Findings, cell: DiscreteCell, states: States) -> None:
     off = [abs(point["angle"] - angle) for point, angle in zip(points, angles, strict=False)]
     findings.record("arcs", off, "the angle of a point")
     for state in states:
-        # A wrong number of a point breaks the law of the tables.
+        # The law of the tables reports a wrong number of a point.
         opening = points[min(max(state.point, 0), len(points) - 1)]["angle"] if points else None
         inside, outside = _sides(cell, opening)
         bonded = state.status == Status.BONDED
@@ -172,9 +172,9 @@ def check_arcs(findings: Findings, cell: DiscreteCell, states: States) -> None:
         # The first state of a path by events is the one at which the first bonds break.
         intact = "path" not in document or (state.point == 0 and case["path"]["method"] == "events")
         if intact and not from_mesh:
-            findings.record("arcs", np.count_nonzero(outside & ~bonded), f"{state.name}, debonded outside of arcs")
+            findings.record("arcs", np.count_nonzero(outside & ~bonded), f"{state.name}, debonded outside arcs")
     if "path" in document and case["path"]["method"] != "events" and not from_mesh:
-        # Before the first increment all nodes outside of the case's arcs, and no others, have bonds.
+        # Before the first increment exactly the nodes outside the arcs have bonds.
         (inside, outside), first = _sides(cell, None), document["path"][0]
         count = first["bonded"] + first["broke"]
         excess = max(np.count_nonzero(outside) - count, count - np.count_nonzero(~inside), 0)
@@ -182,21 +182,21 @@ def check_arcs(findings: Findings, cell: DiscreteCell, states: States) -> None:
 
 
 def _sides(cell: DiscreteCell, opening: float | None) -> tuple[Bool, Bool]:
-    """Return which interface nodes (k,) are inside an arc, and which are outside all arcs."""
+    """Return whether interface nodes (k,) are inside an arc, and whether they are outside all arcs."""
     rows = cell.files.interface
     inside, outside = np.zeros(len(rows.pair), bool), np.ones(len(rows.pair), bool)
     arcs = [(n, arc) for n, section in enumerate(cell.files.interfaces) for arc in section.get("debonded", ())]
     for pair, arc in arcs:
-        of_arc = (rows.pair == pair) & ((arc["fibre"] == "all") | np.isin(rows.fibre, arc["fibre"]))
+        on_curve = (rows.pair == pair) & ((arc["fibre"] == "all") | np.isin(rows.fibre, arc["fibre"]))
         half = (arc["angle"] if arc.get("angle") is not None else float(opening or 0.0)) / 2
-        away = np.abs((cell.directions - arc["centre"] + 180.0) % 360.0 - 180.0)
-        inside |= of_arc & ((away < half - AT_TIP) | (half >= 180.0))
-        outside &= ~of_arc | ((away > half + AT_TIP) & (half < 180.0)) | (half == 0.0)
+        distance = np.abs((cell.directions - arc["centre"] + 180.0) % 360.0 - 180.0)
+        inside |= on_curve & ((distance < half - AT_TIP) | (half >= 180.0))
+        outside &= ~on_curve | ((distance > half + AT_TIP) & (half < 180.0)) | (half == 0.0)
     return inside, outside
 
 
 def check_rates(findings: Findings, cell: DiscreteCell, tips: Section, where: str) -> None:
-    """Check that release rates agree with each other, and tips and their lengths for modes with the mesh."""
+    """Check G = G_I + G_II and their mode psi, and the places and lengths of tips by the mesh."""
     rows, at = cell.files.interface, f"{where}, tip {{}}".format
     table = {name: np.array(tips[name]) for name in ("G", "G_I", "G_II", "psi", "length", "angle", "fibre", "load")}
     G, first, second, psi, length, angle, number, load = table.values()
@@ -207,7 +207,7 @@ def check_rates(findings: Findings, cell: DiscreteCell, tips: Section, where: st
     radii = np.hypot(*from_centre(rows.points, cell.files.fibres.centre[rows.fibre - 1], cell.files.size).T)
     for t in range(len(G)):
         on_curve = (rows.fibre == number[t]) & (rows.pair == pair[t] - 1)
-        # A coating has the number of its fibre and another radius.
+        # A coating has the number of its fibre, but another radius.
         radius = float(np.median(radii[on_curve])) if on_curve.any() else np.nan
         chords = 2 * radius * np.abs(np.sin(np.radians(cell.bond_directions[on_curve] - angle[t]) / 2))
         off = np.abs(np.append(chords, MODE_LENGTH * radius) - length[t]).min() / length[t]
@@ -230,13 +230,13 @@ def check_mesh_error(findings: Findings, cell: DiscreteCell, state: State) -> No
     energy = float(state.strain @ state.mean_stress) * cell.area
     if cell.files.case["analysis"]["type"] != "stiffness" or not energy > 0 or np.isnan(state.mesh_error).all():
         return
-    # int d : S : d, with d the stresses interpolated from averages at nodes less the elements' stresses.
+    # int d : S : d, where d is the stress interpolated from averages at nodes minus the stress of the element.
     mesh, v, elements = cell.files.mesh, cell.stiffnesses.shape[1], cell.elements
     n, is_linear = mesh.triangles.shape[1], mesh.triangles.shape[1] == 3
     r = MIDDLES if is_linear else quadrature_points()  # (q, 3) barycentric coordinates
 
     def stresses() -> Iterator[tuple[slice, Float, Float]]:
-        """Yield elements in portions: weights (e, q), and stresses (e, q, v) at r."""
+        """Yield batches of elements: weights (e, q), and stresses (e, q, v) at r."""
         free = state.temperature * cell.expansions
         for part, _, w, _, _, stress in elements.responses(state.displacement, state.along, free):
             yield part, w * np.ones(len(r)) * w.shape[1] / len(r), stress * np.ones((len(r), 1))
@@ -250,7 +250,7 @@ def check_mesh_error(findings: Findings, cell: DiscreteCell, state: State) -> No
         weights += np.bincount(nodes.ravel(), np.repeat(area, n), len(weights))
         add_at_nodes(sums, nodes, stress * area[:, None, None])
     averages = sums / np.where(weights > 0.0, weights, 1.0)[:, None]
-    components, averaged = np.unique(PLACES[v]), 0.0  # on which displacements work; bubbles are in the plane
+    components, averaged = np.unique(PLACES[v]), 0.0  # stresses that displacements change; bubbles are in the plane
     has_bubble = elements.mixed[:, None] & np.isin(components, PLACES[v][:2])
     factor = np.where(has_bubble | is_linear, 1.0, np.sqrt(WITHOUT_BUBBLE))
     flexibility = np.linalg.inv(cell.stiffnesses[:, components[:, None], components])

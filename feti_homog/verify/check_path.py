@@ -1,6 +1,6 @@
-"""Path and envelope laws: breaking bonds and their loads, tips, the first bond in an envelope at its strength.
+"""Laws of paths and envelopes: breaks and their loads, tips, and the first break in every direction.
 
-Fields may be kept at some points only; the others in result.json obey the same laws of counts.
+Not all points of result.json have a state with fields; laws of counts hold at all points.
 """
 
 from dataclasses import replace
@@ -17,10 +17,10 @@ from feti_homog.verify.reading import Status
 
 
 def check_breaks(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check that bonds break as the points of a path report, never heal, and absorb the fracture energy.
+    """Check the numbers of breaks, that bonds never heal, and the fracture energy of a path.
 
-    This energy grows with the broken length by G_c in the mode of the state before, if the files have that state, else
-    by the range over all modes.
+    A break adds G_c times the broken length, with the mode of the state before; if the files lack this state, the
+    energy must be within the range over all modes.
     """
     points, by_events = cell.files.document["path"], cell.files.case["path"]["method"] == "events"
     for number, (point, after) in enumerate(pairwise(points), start=1):
@@ -33,15 +33,15 @@ def check_breaks(findings: Findings, cell: DiscreteCell, states: States) -> None
         scale = max(points[-1]["fracture_energy"], scale)
         findings.record("energy", points[0]["fracture_energy"] * by_events / scale, "path[0].fracture_energy")
     for state, after in pairwise(states):
-        bonded, still = (each.status == Status.BONDED for each in (state, after))
+        bonded, bonded_after = (numbers.status == Status.BONDED for numbers in (state, after))
         damaged = after.damage > state.damage
         between = points[state.point : after.point] if by_events else points[state.point + 1 : after.point + 1]
-        softened, limit = np.count_nonzero(still & damaged), sum(point.get("softened", 0) for point in between)
+        softened, limit = np.count_nonzero(bonded_after & damaged), sum(point.get("softened", 0) for point in between)
         off = abs(softened - limit) if len(between) == 1 else max(softened - limit, 0)
         findings.record("breaks", off, f"{state.name}, bonds that softened")
         findings.record("breaks", np.count_nonzero(after.damage < state.damage), f"{after.name}, damage that healed")
-        findings.record("breaks", np.count_nonzero(still & ~bonded), f"{after.name}, bonds that healed")
-        broke, expected = np.count_nonzero(bonded & ~still), sum(point["broke"] for point in between)
+        findings.record("breaks", np.count_nonzero(bonded_after & ~bonded), f"{after.name}, bonds that healed")
+        broke, expected = np.count_nonzero(bonded & ~bonded_after), sum(point["broke"] for point in between)
         findings.compare("breaks", broke, expected, 1.0, f"{state.name}, bonds that broke")
         if has_toughness:
             law, damages = law_at(cell.files, damaged), (state.damage[damaged], after.damage[damaged])
@@ -55,13 +55,13 @@ def check_breaks(findings: Findings, cell: DiscreteCell, states: States) -> None
 
 
 def check_strength(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check that no bond exceeds its strength, and events break the worst bonds.
+    """Check that no bond exceeds its strength, and that events break the worst bonds.
 
-    A jump at this load may overload bonds that break.
+    Bonds of `overloaded_by_jump` are exempt.
     """
     points, law = cell.files.document["path"], law_at(cell.files)
-    # Signs are sure where a force or a gap is 20 rtol beyond zero.  While contact changes at one load, all else moves
-    # by 115 rtol then, the median of 276 changes, and by 2100 rtol at most.
+    # Signs of forces and gaps are certain beyond 20 rtol.  When contact changes at constant load, other quantities then
+    # move by 115 rtol (median of 276 changes), and by at most 2100 rtol.
     tolerance = max(STRENGTH, 10.0 * solver_limit(float(cell.files.document["solver"].hint("rtol"))))
     if law.has_tips:
         states = [_check_tips(findings, cell, state, points[state.point]["tips"]) for state in states]
@@ -73,7 +73,7 @@ def check_strength(findings: Findings, cell: DiscreteCell, states: States) -> No
         if not by_events:
             continue
         largest, broke = used.max(initial=1.0), damaged_at(points[state.point])
-        # The next point has the bonds that break; here so many are as near to their strength as the worst.
+        # The number of breaks is known here, their nodes at the next point: as many bonds are as loaded as the worst.
         worst = np.sort(np.where(np.isnan(state.used), np.inf, state.used))[::-1][:broke]
         findings.record("strength", np.maximum(1.0 - worst / largest, 0.0), f"{state.name}, bonds that break")
         if after is not None and after.point == state.point + 1:
@@ -82,32 +82,32 @@ def check_strength(findings: Findings, cell: DiscreteCell, states: States) -> No
 
 
 def overloaded_by_jump(state: StateNumbers, points: Points, tolerance: float) -> Bool:
-    """(k,) bonds that may exceed their strength where some break.
+    """Return the bonds (k,) that may exceed their strength at a point with breaks.
 
-    In a cascade, where one break overloads others, all; where only the contact changed (strains and stresses up to
-    `tolerance`), tips, whose energy release jumps with it.
+    In a cascade, where a break overloads other bonds, all bonds may.  Where only contact has changed (strains and
+    stresses agree to `tolerance`), tips may: their energy release jumps with the contact.
     """
     if state.point == 0 or damaged_at(points[state.point]) == 0:
         return np.zeros(len(state.released), bool)
     before, now = points[state.point - 1 : state.point + 1]
     if damaged_at(before) > 0 and abs(before["load_factor"] - now["load_factor"]) <= ROUNDING:
         return np.ones(len(state.released), bool)
-    same = damaged_at(before) == 0 and before["closed"] != now["closed"]
+    is_contact_alone = damaged_at(before) == 0 and before["closed"] != now["closed"]
     for name in ("strain", "stress", TEMPERATURE):
         old, new = (np.atleast_1d(np.asarray(point.get(name) or 0.0, float)) for point in (before, now))
-        same &= float(np.abs(old - new).max()) <= tolerance * float(np.abs(new).max())
-    return np.asarray(state.released & same)
+        is_contact_alone &= float(np.abs(old - new).max()) <= tolerance * float(np.abs(new).max())
+    return np.asarray(state.released & is_contact_alone)
 
 
 def _check_tips(findings: Findings, cell: DiscreteCell, state: StateNumbers, tips: Section) -> StateNumbers:
-    """Check that tips are the bonds next to broken ones, with the mode of their tractions and their spring energy.
+    """Check that tips are the bonds beside broken bonds, with their modes and spring energies.
 
-    Returns the state with utilisations sqrt(G / G_c), by the rates in the file, at tips that break by energy release.
+    Returns the state with the utilisation sqrt(G / G_c) of tips that break by energy release, G from the file.
     """
-    # By fibre, section and direction.
+    # Tips are sorted by fibre, section and direction.
     node, rows = np.flatnonzero(cell.tips(state.status)), cell.files.interface
-    turned = np.round(cell.bond_directions[node] / ROUNDING)
-    node = node[np.lexsort((turned, rows.pair[node], rows.fibre[node]))]
+    direction = np.round(cell.bond_directions[node] / ROUNDING)
+    node = node[np.lexsort((direction, rows.pair[node], rows.fibre[node]))]
     law, where, used = law_at(cell.files, node), f"{state.name}, tip {{}}".format, state.used.copy()
     psi, first, second = law.mode(state.traction[node]), np.array(tips["G_I"]), np.array(tips["G_II"])
     if len(first) == len(second) == len(node):
@@ -117,8 +117,8 @@ def _check_tips(findings: Findings, cell: DiscreteCell, state: StateNumbers, tip
     is_complete &= {*map(len, tips.values())} == {len(node)}
     findings.require("tables", is_complete, f"{state.name}, tips")
     if is_complete:
-        away = (np.array(tips["angle"]) - cell.bond_directions[node] + 180.0) % 360.0 - 180.0
-        findings.record("tables", np.abs(away) / 360.0, where)
+        difference = (np.array(tips["angle"]) - cell.bond_directions[node] + 180.0) % 360.0 - 180.0
+        findings.record("tables", np.abs(difference) / 360.0, where)
         findings.compare("tables", tips["psi"], np.degrees(psi), 90.0, where)
         findings.compare("tables", first * np.sin(psi) ** 2, second * np.cos(psi) ** 2, first + second, where)
         if law.grows_by_release:
@@ -131,9 +131,9 @@ def _check_tips(findings: Findings, cell: DiscreteCell, state: StateNumbers, tip
 
 
 def check_envelope(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check the points of `envelope` in result.json, by the states of the unit loads.
+    """Check the points of `envelope` in result.json by superposed states of the unit loads.
 
-    Utilisations are 0 at debonded nodes and at tips that break by energy release.
+    Debonded nodes, and tips that break by energy release, have no utilisation.
     """
     document, keys, law = cell.files.document, cell.files.case["envelope"], law_at(cell.files)
     rows, points, n, status = cell.files.interface, document["envelope"], keys["directions"], states[0].status
@@ -141,7 +141,7 @@ def check_envelope(findings: Findings, cell: DiscreteCell, states: States) -> No
     may_break = (status == Status.BONDED) & ~released
     unit_loads = np.array([[*state.strain, state.temperature] for state in states]).T
     unit_tractions = np.stack([state.traction for state in states])
-    findings.compare("load", len(points), n, 1.0, "envelope, which lacks directions or has too many")
+    findings.compare("load", len(points), n, 1.0, "envelope, number of directions")
     stiffness, temperature = np.array(document["effective_stiffness"]), float(keys.get("temperature", 0.0))
     thermal = temperature * np.array(document.get("thermal_stress", np.zeros(len(stiffness))))
     strains, stresses = NAMES[len(stiffness)]
@@ -151,7 +151,7 @@ def check_envelope(findings: Findings, cell: DiscreteCell, states: States) -> No
         at, angle, unit = f"envelope[{number}]", 360.0 * number / len(points), np.zeros(len(stiffness))
         findings.compare("load", point["angle"], angle, 360.0, f"{at}.angle")
         unit[places] = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-        has_factor = "factor" in point  # others are zero, and stress follows from strain
+        has_factor = "factor" in point  # no load in this direction breaks a bond otherwise
         imposed = unit if of_strains else np.linalg.solve(stiffness, unit)
         strain = np.array(point["strain"]) if has_factor else imposed
         shares, *_ = np.linalg.lstsq(unit_loads, np.array([*strain, temperature * has_factor]), rcond=None)
@@ -160,23 +160,23 @@ def check_envelope(findings: Findings, cell: DiscreteCell, states: States) -> No
         if not has_factor:
             noise = CONTACT_PER_RTOL * float(document["solver"].hint("rtol")) * np.abs(stiffness @ strain).max()
             over = used > law.onset(np.full_like(traction, noise))
-            findings.require("onset", not over.any(), f"{at}, where some load breaks a bond")
+            findings.require("onset", not over.any(), f"{at}, where a load breaks a bond")
             continue
         stress, factor = np.array(point["stress"]), float(point["factor"])
         value, terms = strain if of_strains else stress, np.abs(stiffness) @ np.abs(strain) + np.abs(thermal)
         scale = max(factor, float(np.abs(value).max()))
         findings.compare("load", value, factor * unit, scale, f"{at}, {' and '.join(keys['plane'])}")
         findings.compare("load", stress, stiffness @ strain + thermal, terms.max(), f"{at}.stress")
-        # No bond exceeds its strength, and the bond in the file is at its strength and breaks as written.
-        largest, away = float(used.max(initial=0.0)), cell.bond_directions - point["bond_angle"]
+        # No bond exceeds its strength; the bond in the file is at its strength, and breaks as the file says.
+        largest, difference = float(used.max(initial=0.0)), cell.bond_directions - point["bond_angle"]
         on_curve = (rows.fibre == point["fibre"]) & (rows.pair == point.get("interface", 1) - 1)
-        nodes = np.flatnonzero(on_curve & (np.abs((away + 180.0) % 360.0 - 180.0) < ROUNDING))
+        nodes = np.flatnonzero(on_curve & (np.abs((difference + 180.0) % 360.0 - 180.0) < ROUNDING))
         findings.require("tables", bool(len(nodes)), f"{at}, where no bond is")
         if not len(nodes):
             continue
         is_tip, node, off = bool(released[nodes].any()), int(nodes[np.argmax(used[nodes])]), largest - 1.0
         if factor == 0.0:
-            findings.record("onset", 0.0 if is_tip else max(-off, 0.0), f"{at}, of the temperature alone")
+            findings.record("onset", 0.0 if is_tip else max(-off, 0.0), f"{at}, by the temperature alone")
         else:
             findings.record("onset", max(off, 0.0) if is_tip else abs(off), at)
         if not is_tip:

@@ -1,4 +1,4 @@
-"""Laws of the largest stresses of the phases, and of their strengths, by invariants of the stress tensor."""
+"""Laws of the largest stresses in the phases and of phase strengths, by invariants of the stress tensor."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,17 +14,18 @@ from feti_homog.verify.reading import State
 from feti_homog.verify.torus import from_centre
 
 LAW = "phases"
-# Criteria by a key that they have alone.
+# Names of criteria by a key that no other criterion has.
 CRITERIA = dict(principal="maximum principal", von_mises="von Mises", tension="Drucker-Prager", axial_shear="Hashin")
 MODES = ("fibre tension", "fibre compression", "matrix tension", "matrix compression")
-# Values within this of the largest are at its position, too; positions are those of quadrature points, to rounding.
+# Relative differences that count as rounding: of the value at the position of the largest value, from it; and of the
+# position from a quadrature point.
 SAME_VALUE, SAME_PLACE = 1e-5, 1e-9
-# Part of the stress L |E| of a phase below which the limit of the law admits only rounding, as in a free body.
+# Least scale of stresses in a phase, relative to L |E|: smaller stresses, as in a free body, are rounding.
 ROUNDED = 1e-4
 
 
 def check_phases(findings: Findings, cell: DiscreteCell, state: State, number: int) -> None:
-    """Check the largest stresses that result.json has for the phases in state `number`, and their positions."""
+    """Check the largest stresses of the phases in state `number`, their positions and utilisations."""
     table = cell.files.document.get("phase_stresses", [])
     limits = {name: phase_constants(cell.files.case, name).get("strength") for name in cell.files.phases}
     findings.require(LAW, bool(table) or not any(limits.values()), "phase_stresses, which strengths need")
@@ -32,9 +33,9 @@ def check_phases(findings: Findings, cell: DiscreteCell, state: State, number: i
         return
     stress, points = _stresses(cell, state)
     phase_of = np.repeat(cell.files.mesh.phase, len(stress) // len(cell.files.mesh.phase))
-    known = [name for k, name in enumerate(cell.files.phases) if not np.isnan(stress[phase_of == k]).any()]
-    findings.require(LAW, sorted(entry["phase"] for entry in table) == sorted(known), "names of the phases")
-    for entry in (entry for entry in table if entry["phase"] in known):
+    names = [name for k, name in enumerate(cell.files.phases) if not np.isnan(stress[phase_of == k]).any()]
+    findings.require(LAW, sorted(entry["phase"] for entry in table) == sorted(names), "names of the phases")
+    for entry in (entry for entry in table if entry["phase"] in names):
         name, labels = entry["phase"], [str(label) for label in entry["state"]]
         phase, strength = cell.files.phases.index(name), limits[name]
         is_labelled = number < len(labels) and state.name.endswith(f"({labels[number]})")
@@ -64,7 +65,7 @@ def check_phases(findings: Findings, cell: DiscreteCell, state: State, number: i
 
 
 def _stresses(cell: DiscreteCell, state: State) -> tuple[Float, Float]:
-    """Return the stress tensors (n, 3, 3) at the quadrature points (n, 2) of all elements, and the points."""
+    """Compute stress tensors (n, 3, 3) at all quadrature points, and the points (n, 2)."""
     mesh, v = cell.files.mesh, len(state.strain)
     free = state.temperature * cell.expansions
     answers = [answer for *_, answer in cell.elements.responses(state.displacement, state.along, free)]
@@ -72,7 +73,7 @@ def _stresses(cell: DiscreteCell, state: State) -> tuple[Float, Float]:
     tensors = np.zeros((*stress.shape[:2], 3, 3))
     size = len(VOIGT[v])
     tensors[..., :size, :size] = stress[..., VOIGT[v]]
-    # S33 from the stresses in the plane, also where elements have a pressure of their own.
+    # S33 follows from the stresses in the plane, also in elements with an internal pressure.
     if v == 3:
         rules, along = out_of_plane(cell.files.case, cell.files.phases)[:, 0], np.zeros(len(free))
     else:
@@ -88,7 +89,7 @@ def _stresses(cell: DiscreteCell, state: State) -> tuple[Float, Float]:
 
 
 def _measures(stress: Float, strength: Mapping[str, Any] | None) -> dict[str, Float]:
-    """Return principal, von Mises and hydrostatic stress (n,) by invariants, and the utilisation of a strength.
+    """Compute principal, von Mises and hydrostatic stresses (n,), and the utilisation (n,) of a strength.
 
     s1 = p + 2/3 q cos(arccos(27 J3 / (2 q^3)) / 3) with q = sqrt(3/2 s : s) and J3 = det s of the deviator s.
     """
@@ -114,7 +115,7 @@ def _measures(stress: Float, strength: Mapping[str, Any] | None) -> dict[str, Fl
 
 
 def _hashin(stress: Float, limit: Mapping[str, float]) -> list[Float]:
-    """Compute the utilisation 1 / f, with a f^2 + b f = 1, of each of the `MODES` (n,); near zero, of both signs."""
+    """Compute the utilisation 1 / f (n,) of all `MODES`, a f^2 + b f = 1; both matrix modes near 0."""
     zero = SAME_PLACE * float(np.abs(stress).max(initial=0.0))
     shear = (stress[:, 0, 2] ** 2 + stress[:, 1, 2] ** 2) / limit["axial_shear"] ** 2
     along, across = stress[:, 2, 2], stress[:, 0, 0] + stress[:, 1, 1]

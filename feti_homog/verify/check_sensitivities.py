@@ -1,4 +1,4 @@
-"""Sensitivity law: field energies change as in the file where constants of the case change."""
+"""The law of sensitivities: if constants of the case change, energies change as the file says."""
 
 import copy
 from collections.abc import Mapping
@@ -24,16 +24,16 @@ Case = dict[str, Any]
 
 
 def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
-    """Check the values of all constants, and one derivative along a direction in which all parameters change."""
+    """Check values of all constants, and one derivative, in which all parameters change."""
     document = cell.files.document
     if "sensitivities" not in document:
         if cell.files.case.get("output", {}).get("sensitivities"):
-            findings.record("tables", np.inf, "sensitivities, which the case asks for")
+            findings.record("tables", np.inf, "sensitivities, which are missing")
         return
     data = document["sensitivities"]
     names = data["parameters"]
-    # All constants of phases and springs that the answer depends on: names end in .k for one of several numbers, in
-    # .Cij for an entry of a stiffness.
+    # All constants of phases and springs on which the answer depends; their names end in .k for one of several numbers,
+    # in .Cij for an entry of a stiffness.
     material, sections, needed = cell.files.case["material"], cell.files.interfaces, set[str]()
     for phase in {*cell.files.phases} & material.keys():
         for key, value in material[phase].items():
@@ -50,11 +50,11 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
     findings.record("tables", [np.inf] * len(missing), lambda i: f"sensitivities, {missing[i]}")
     places = (_place(dict(cell.files.case), name) for name in names)
     values = np.array([np.array(table[key], float)[index] for table, key, index in places])
-    # Changes over which the laws are nearly linear.
+    # Sizes of changes for which the laws are nearly linear.
     ratios = np.array([name.endswith(".poisson") for name in names]) & (values < 0.5)
     sizes = np.where(ratios, 0.5 - values, np.where(values == 0.0, 1.0, np.abs(values)))
     k = np.arange(1, len(values) + 1)
-    direction = sizes * (-1.0) ** k * (1 + 1 / k)  # of both signs and different sizes, none small
+    direction = sizes * (-1.0) ** k * (1 + 1 / k)  # changes with both signs and different sizes, none of them small
     states = list(cell.files.states())
     if "load" not in document and data.get("at_fixed_status"):
         states = states[: len(states) // 2]  # the second half is under minus the unit loads
@@ -72,10 +72,10 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
 
 
 def _check_moduli(findings: Findings, cell: DiscreteCell, states: list[State], slope: Float, direction: Float) -> None:
-    """Check the constants of a stiffness and their derivatives.
+    """Check constants of a stiffness and their derivatives `slope` (v, v) along `direction` (parameters,).
 
-    Energies of contact states are stationary, too: the diagonal of the secants. Other derivatives need fields under
-    other loads at the same status, which no file has; only values are checked.
+    At fixed contact status, energies are stationary, so that the diagonal C_kk is checked.  Other derivatives need
+    fields under other loads with the same status, which are not in the files: only the values are checked.
     """
     document, data = cell.files.document, cell.files.document["sensitivities"]
     C, heat = np.array(document["effective_stiffness"]), document.get("thermal_stress")
@@ -92,10 +92,8 @@ def _check_moduli(findings: Findings, cell: DiscreteCell, states: list[State], s
             findings.compare("constants", value, energy, max(abs(energy), TINY), name)
     else:
         step = STEP * np.abs(C).max() / max(float(np.abs(slope).max()), TINY)
-        ends = [
-            constants_of(C + change[:, :n], None if heat is None else heat + change[:, n])
-            for change in (step * slope, -step * slope)
-        ]
+        steps = step * slope, -step * slope
+        ends = [constants_of(C + dC[:, :n], None if heat is None else heat + dC[:, n]) for dC in steps]
         changes = {name: (ends[0][name] - ends[1][name]) / (2 * step) for name in constants}
     rows = zip(data["constants"], data["constant_values"], data["derivatives"], strict=True)
     for name, value, derivatives in rows:
@@ -109,10 +107,10 @@ def _check_moduli(findings: Findings, cell: DiscreteCell, states: list[State], s
 
 
 def _check_load(findings: Findings, cell: DiscreteCell, states: list[State], slope: Float, direction: Float) -> None:
-    """Check strains x and stresses s under one load, the stored energy, and the derivatives of all answers.
+    """Check strains x, stresses s and stored energy under one load, and their derivatives.
 
-    With prescribed strains g and stresses f, d(x_g.s_g - x_f.s_f) / 2 is the energy derivative at fixed fields.
-    With a temperature, whose conjugate no file has, only the values are checked.
+    With prescribed strains x_g and stresses s_f, d(x_g.s_g - x_f.s_f) / 2 is the derivative of the energy at fixed
+    fields.  Under a temperature only the values are checked, because its conjugate is not in the files.
     """
     data, point = cell.files.document["sensitivities"], cell.files.document["load"]
     pairs = [*zip(*NAMES[len(point["strain"])], strict=True)]
@@ -122,8 +120,8 @@ def _check_load(findings: Findings, cell: DiscreteCell, states: list[State], slo
     findings.require("tables", is_complete, "sensitivities, constants of the load")
     if not is_complete:
         return
-    of_stored = np.array(rows["stored"][1]) * direction
-    terms, rest = np.zeros_like(direction), of_stored.copy()
+    stored_terms = np.array(rows["stored"][1]) * direction
+    terms, rest = np.zeros_like(direction), stored_terms.copy()
     for (name,), strain, stress, (strain_name, _) in zip(answers, point["strain"], point["stress"], pairs, strict=True):
         value, conjugate, sign = (strain, stress, -1) if name == strain_name else (stress, strain, 1)
         size = max(map(abs, point["strain" if name == strain_name else "stress"]))
@@ -135,13 +133,13 @@ def _check_load(findings: Findings, cell: DiscreteCell, states: list[State], slo
         return
     energy = _energies(cell, states, cell.files.case)[0, 0] / 2
     findings.compare("constants", rows["stored"][0], energy, max(abs(energy), TINY), "stored")
-    scale = max(float(np.abs(terms).max()), float(np.abs(of_stored).max()), abs(energy))
+    scale = max(float(np.abs(terms).max()), float(np.abs(stored_terms).max()), abs(energy))
     off = [terms.sum() - slope[0, 0] / 2, rest.sum()]
     findings.record("sensitivities", relative(off, scale), lambda k: ("the load", "stored")[k])
 
 
 def _place(case: Case, name: str) -> tuple[Any, str, tuple[int, ...]]:
-    """Return the table and the key of a parameter, and its index in an array, () of a scalar."""
+    """Return the table and key of a parameter, and its index in an array, or () for a scalar."""
     section, *keys = name.split(".")
     table: Any = case[section]
     if section == "material" or isinstance(table, list):
@@ -151,13 +149,13 @@ def _place(case: Case, name: str) -> tuple[Any, str, tuple[int, ...]]:
 
 
 def _energies(cell: DiscreteCell, states: list[State], case: Mapping[str, Any]) -> Float:
-    """(v, v) or (6, 7) energies of unit-load field pairs in this case; the first field in a pair is under a strain."""
+    """Compute the energies of fields under strains with all unit loads, (v, v) or (6, 7), by constants of `case`."""
     files, phases = cell.files, cell.files.phases
     growth = float(np.log(case["cell"].get("fibre_fraction", 1.0) / files.case["cell"].get("fibre_fraction", 1.0))) / 2
     x, V = files.mesh.points, np.zeros_like(files.mesh.points)
     fibres, images = files.fibres, np.array([[i, j] for i in (-1, 0, 1) for j in (-1, 0, 1)]) * files.size
-    # Where radii grow, nodes around a fibre move with its circle, less and less to nothing halfway to the next fibre;
-    # the states keep u - E x.
+    # If radii grow, nodes around a fibre move with its circle, by amounts that fall to 0 halfway to the next fibre; the
+    # states keep u - E x.
     for c, R in zip(fibres.centre, fibres.radius, strict=True) if growth else ():
         gaps = np.linalg.norm(fibres.centre[:, None] + images - c, axis=2) - fibres.radius[:, None] - R
         half = np.partition(gaps.ravel(), 1)[1] / 2  # the least is to the fibre itself, -2 R
@@ -167,7 +165,7 @@ def _energies(cell: DiscreteCell, states: list[State], case: Mapping[str, Any]) 
     mesh = replace(files.mesh, points=x + V)
     states = [replace(state, displacement=state.displacement + V @ gradient(state.strain).T) for state in states]
     stiffnesses, free = laws(case, phases)
-    # Elements keep their kind where equal constants change apart.
+    # Elements keep their kind, even if equal constants become different.
     elements = Elements(mesh, stiffnesses, mixed_phases(files.case, phases))
     none, lengths = np.zeros_like(states[0].jump), files.interface.length[:, None]
     flexibility = law_at(replace(files, document=Section({"case": case}))).jumps(none + 1.0)
@@ -181,6 +179,6 @@ def _energies(cell: DiscreteCell, states: list[State], case: Mapping[str, Any]) 
         columns.append([float((other.displacement * fields.force).sum()) + other.along * out for other in strains])
         for row, other in enumerate(strains):
             acts = np.repeat((other.status == Status.BONDED)[:, None], other.jump.shape[1], axis=1)
-            acts[other.status == Status.CLOSED, 0] = True  # closed faces press on the rest of their springs
+            acts[other.status == Status.CLOSED, 0] = True  # springs of closed faces act in compression
             columns[-1][row] += float((springs * other.jump * state.jump)[acts].sum())
     return np.array(columns).T / cell.area

@@ -1,4 +1,4 @@
-"""Laws of one state: stresses, averages; periodicity, continuity, equilibrium; jumps, bonds, contact, friction."""
+"""Laws of one state: stresses, averages, continuity, equilibrium, jumps, bonds, contact and friction."""
 
 import numpy as np
 
@@ -12,11 +12,11 @@ from feti_homog.verify.reading import State, Status
 
 
 def check_state(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
-    """Check stresses and averages of a state; `fields` follow from its displacements."""
+    """Check stresses, their averages, Hill's lemma (8) and S33; `fields` follow from the displacements."""
     element = f"{state.name}, element {{}}".format
     stiffest = np.abs(cell.stiffnesses).max(axis=(1, 2))[cell.files.mesh.phase]
     findings.compare("stress", state.stress, fields.stress, (stiffest * fields.strain_size)[:, None], element)
-    # <sigma> = Sigma, <eps> = E with face openings and void strains, and Hill's condition.
+    # <sigma> = Sigma; <eps> = E with the openings of faces and the strains of voids; Hill's lemma.
     area, weights, v, scales = cell.area, cell.elements.area[:, None], len(state.strain), cell.scales_of(state)
     mean = (weights * fields.stress).sum(axis=0) / area
     size = float(((weights * np.abs(fields.stress)).sum(axis=0) / area).max())
@@ -24,10 +24,11 @@ def check_state(findings: Findings, cell: DiscreteCell, state: State, fields: El
     findings.compare("mean stress", mean, state.mean_stress, max(size, scales.stress), state.name)
     jump = cell.in_axes(state.jump)
     integrals = (cell.elements.node_integrals + cell.void_integrals)[cell.nodes.node]
-    # Voids have their share of E, and int sym(u* (x) n) ds along them; this closes where the boundary cuts one.
+    # A void adds its fraction of E and int sym(u* (x) n) ds, which is closed even where the cell boundary cuts the
+    # void.
     slope = state.fluctuation.T @ cell.void_integrals - jump.T @ cell.faces.sums(integrals, of_fibre=False)
-    opened = np.bincount(PLACES[v].ravel(), slope.ravel(), v) / area + cell.porosity * state.strain
-    strain = (weights * fields.strain).sum(axis=0) / area + opened
+    openings = np.bincount(PLACES[v].ravel(), slope.ravel(), v) / area + cell.porosity * state.strain
+    strain = (weights * fields.strain).sum(axis=0) / area + openings
     findings.compare("mean strain", strain, state.strain, scales.strain, state.name)
     work = area * float(state.mean_stress @ state.strain) - float((interface_forces(cell, state) * jump).sum())
     least = area * scales.stress * scales.strain
@@ -35,24 +36,25 @@ def check_state(findings: Findings, cell: DiscreteCell, state: State, fields: El
     if not cell.files.is_spatial:
         rules = out_of_plane(cell.files.case, cell.files.phases)[cell.files.mesh.phase, 0]
         S33, terms = (np.einsum("ei,ei->e", *pair) for pair in ((rules, state.stress), np.abs((rules, state.stress))))
-        undetermined = np.isnan(S33) & np.isnan(state.stress_33)  # by the constants
+        undetermined = np.isnan(S33) & np.isnan(state.stress_33)  # the constants of the phase leave S33 open
         off = np.where(undetermined, 0.0, state.stress_33 - S33)
         findings.record("stress 33", relative(off, np.where(undetermined, 1.0, terms)), element)
 
 
 def interface_forces(cell: DiscreteCell, state: State) -> Float:
-    """Return the forces (k, c) on the fibre in x1, x2 and x3: traction times tributary length."""
+    """Compute forces (k, c) on the fibre along x1, x2 and x3: traction x tributary length."""
     return cell.in_axes(state.traction * cell.files.interface.length[:, None])
 
 
 def check_gluing(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
-    """Check that copies of a node have one fluctuation and balanced forces, on interface faces with the traction.
+    """Check that copies of a node have equal fluctuations, and that forces balance at all nodes.
 
-    The fixed place, where u* = 0, collects all rounding, with independent signs: the root of summed squares.
+    Forces on faces balance with the traction.  The rounding of all nodes adds to the reaction of the fixed node, u* =
+    0.
     """
     nodes, traction, largest = cell.nodes, interface_forces(cell, state), cell.largest_displacement(state)
-    # Periodic copies lie in one subdomain.  Glued nodes share a number: one at a place, two at an interface node, the
-    # odd number on the fibre.
+    # Periodic copies lie in one subdomain.  Glued nodes have one number: the places have even numbers, and the fibre
+    # side of an interface node has the odd number above.
     in_subdomain = nodes.place * (int(nodes.subdomain.max()) + 1) + nodes.subdomain
     glued = 2 * nodes.place + ((cell.faces.row >= 0) & cell.faces.is_fibre)
     values = state.fluctuation[nodes.node]
@@ -65,11 +67,11 @@ def check_gluing(findings: Findings, cell: DiscreteCell, state: State, fields: E
     scale = max(scale, cell.scales_of(state).stress * float(np.sqrt(cell.elements.area.min())) * 1e-3)
     is_fixed = (state.fluctuation == 0.0).all(axis=1)
     rounding, rounding_of_all = (ROUNDED_TERMS * np.linalg.norm(fields.force_size, order) for order in (np.inf, 2))
-    inner = fields.force.copy()  # of nodes within subdomains
+    inner = fields.force.copy()  # forces at nodes within subdomains
     inner[nodes.node] = 0.0
     scales = scale + np.where(is_fixed, rounding_of_all, rounding)
     findings.record("equilibrium", relative(inner, scales[:, None]), f"{state.name}, mesh node {{}}".format)
-    # Forces of glued nodes, the last group.
+    # Sums of forces over glued nodes, the last group of the loop.
     sums = np.stack([np.bincount(copy, column) for column in fields.force[nodes.node].T], axis=1, dtype=float)
     # The traction pulls the fibre, its reaction the matrix.
     row = cell.faces.row[first]
@@ -85,15 +87,15 @@ def check_gluing(findings: Findings, cell: DiscreteCell, state: State, fields: E
 
 
 def check_bonds(findings: Findings, cell: DiscreteCell, state: State) -> None:
-    """Check jumps by displacements, bonds by their springs, friction by mu p, and contact.
+    """Check jumps, springs of bonds, contact and friction at interface nodes.
 
-    On debonded faces gap >= 0, traction <= 0, gap traction = 0, and only friction acts along them.
+    On debonded faces gap >= 0, normal traction <= 0, gap x traction = 0, and the shear traction is at most mu p.
     """
     files, at = cell.files, f"{state.name}, interface node {{}}".format
     values, bonded = state.fluctuation[cell.nodes.node], state.status == Status.BONDED
-    parted = cell.faces.means(values, of_fibre=False) - cell.faces.means(values, of_fibre=True)
+    difference = cell.faces.means(values, of_fibre=False) - cell.faces.means(values, of_fibre=True)
     largest = cell.largest_displacement(state)
-    findings.compare("jump", cell.in_axes(state.jump), parted, largest, at)
+    findings.compare("jump", cell.in_axes(state.jump), difference, largest, at)
     damage = state.damage.clip(np.where(bonded, 0.0, 1.0), np.where(bonded, np.nextafter(1.0, 0.0), 1.0))
     findings.record("bond", np.abs(damage - state.damage), f"{state.name}, damage of node {{}}".format)
     slack = state.jump - law_at(files, damage=state.damage).jumps(state.traction)

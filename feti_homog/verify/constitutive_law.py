@@ -1,4 +1,4 @@
-"""Stress from strain in each phase: the constants of the case, taken through the three-dimensional compliance."""
+"""The stiffness of every phase, from the constants of the case by the three-dimensional compliance."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -9,18 +9,18 @@ from feti_homog.errors import CaseError
 from feti_homog.typing import Bool, Float
 from feti_homog.verify.findings import ROUNDING
 
-PLANE = [0, 1, 5]  # of the order [11, 22, 33, 23, 13, 12]
-# Places of tensor components in the orders [11, 22, 12] and [11, 22, 33, 23, 13, 12].
+PLANE = [0, 1, 5]  # positions of 11, 22 and 12 in the order [11, 22, 33, 23, 13, 12]
+# Positions of tensor components in the orders [11, 22, 12] and [11, 22, 33, 23, 13, 12].
 VOIGT = {3: np.array([[0, 2], [2, 1]]), 6: np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])}
 Constants = Mapping[str, Any]
 
 
 def laws(case: Mapping[str, Any], phases: Sequence[str]) -> tuple[Float, Float]:
-    """Return stiffnesses (phases, v, v) in the plane state of a case, and strains (phases, v) per temperature.
+    """Compute stiffnesses (phases, v, v) and expansions (phases, v) in the axes of the cell.
 
-    The axes are those of the cell.  Stiffnesses have no E33, gamma13 and gamma23, or in plane stress no S33, S13 and
-    S23.  Strains are R_ip R_jq alpha_pq; zero except in generalized plane strain with expansions of all phases.  Raises
-    CaseError for a phase of the mesh without a material.
+    In plane strain E33, gamma13 and gamma23 are 0, in plane stress S33, S13 and S23.  Expansions are the strains
+    R_ip R_jq alpha_pq per temperature in generalized plane strain, if all phases have alpha; else 0.  Raises CaseError
+    for a phase of the mesh without a material.
     """
     plane, stiffnesses, expansions = case["analysis"]["plane"], list[Float](), list[Float]()
     for constants in (phase_constants(case, phase) for phase in phases):
@@ -39,15 +39,15 @@ def laws(case: Mapping[str, Any], phases: Sequence[str]) -> tuple[Float, Float]:
             turn = _turn(angle, 3)
             tensor = turn @ np.diag(np.broadcast_to(np.array(strains, float), 3)) @ turn.T
             expansions.append(np.array([*np.diag(tensor), 2 * tensor[1, 2], 2 * tensor[0, 2], 2 * tensor[0, 1]]))
-    known = plane == "generalized" and len(expansions) == len(phases)
-    return np.stack(stiffnesses), np.stack(expansions) if known else np.zeros((len(phases), len(stiffnesses[0])))
+    expands = plane == "generalized" and len(expansions) == len(phases)
+    return np.stack(stiffnesses), np.stack(expansions) if expands else np.zeros((len(phases), len(stiffnesses[0])))
 
 
 def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
-    """(phases,) True where quadratic elements have a bubble and a pressure: isotropic phases, not in plane stress.
+    """Return whether quadratic elements of phases (phases,) have a bubble and a pressure.
 
-    One modulus and one ratio determine all constants of an isotropic phase, to rounding.  Cases of older versions may
-    have another `element`.  Raises CaseError as `laws` does.
+    Elements of isotropic phases do, except in plane stress and in cases of older versions with `element`.  In an
+    isotropic phase one modulus and one ratio give all constants, up to rounding.  Raises as `laws`.
     """
     mixed = []
     for constants in (phase_constants(case, phase) for phase in phases):
@@ -62,10 +62,10 @@ def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
 
 
 def out_of_plane(case: Mapping[str, Any], phases: Sequence[str]) -> Float:
-    """(phases, 2, 3) matrices from [S11, S22, S12] to [S33, E33]; NaN where the constants leave S33 or E33 open.
+    """Compute matrices (phases, 2, 3) from [S11, S22, S12] to [S33, E33].
 
-    E33 = s13 S11' + s23 S22' + s36 S12' + s33 S33 with the stresses in the material axes; one of S33, E33 is 0.
-    Raises CaseError as `laws` does.
+    E33 = s13 S11' + s23 S22' + s36 S12' + s33 S33 with the stresses in the material axes; one of S33 and E33 is 0.
+    The matrix is NaN if the constants leave S33 or E33 open.  Raises as `laws`.
     """
     plane, rules = case["analysis"]["plane"], []
     needed = {"young": ["poisson"], "E_transverse": ["E_axial", "nu_axial"],
@@ -83,23 +83,25 @@ def out_of_plane(case: Mapping[str, Any], phases: Sequence[str]) -> Float:
 
 
 def phase_constants(case: Mapping[str, Any], phase: str) -> Constants:
+    """Return the constants of a phase; raise CaseError if it has no material."""
     materials = case["material"]
     constants = materials.get(phase, materials.get(phase.partition(":")[0]))
     if not isinstance(constants, Mapping):
-        raise CaseError(f"result.json: its case has no material for the phase {phase} of result.h5")
+        raise CaseError(f"result.json: the case has no material for the phase {phase} of result.h5")
     return constants
 
 
 def _given_stiffness(constants: Constants) -> Float:
-    """Return the stiffness among the constants, (3, 3) or (6, 6); (0, 0) without one."""
+    """Return the constant `stiffness`, (3, 3) or (6, 6); (0, 0) if it is missing."""
     stiffness = np.array(constants.get("stiffness", np.zeros((0, 0))), float)
     return np.asarray((stiffness + stiffness.T) / 2)
 
 
 def _compliance(constants: Constants) -> Float:
-    """(6, 6) in the material axes; constants that plane stress does not need are arbitrary stable ones.
+    """Compute the compliance (6, 6) in the material axes.
 
-    Young's moduli along three axes, the ratios 12, 13, 23, and the shear moduli 23, 13, 12 determine it.
+    Young's moduli along three axes, ratios 12, 13, 23 and shear moduli 23, 13, 12 determine it; plane stress needs
+    fewer constants, and the others have arbitrary stable values.
     """
     if "stiffness" in constants:
         return np.asarray(np.linalg.inv(_given_stiffness(constants)), float)
@@ -126,7 +128,7 @@ def _compliance(constants: Constants) -> Float:
 
 
 def turned(stiffness: Float, degrees: float) -> Float:
-    """C_ijkl = R_ip R_jq R_kr R_ls C'_pqrs in axes x1, x2, (x3); axis 1 of C' is `degrees` from x1 to x2."""
+    """Compute C_ijkl = R_ip R_jq R_kr R_ls C'_pqrs for C' turned by `degrees` from x1 to x2."""
     voigt = VOIGT[len(stiffness)]
     turn = _turn(degrees, len(voigt))
     tensor = stiffness[voigt[:, :, None, None], voigt[None, None]]
@@ -136,7 +138,7 @@ def turned(stiffness: Float, degrees: float) -> Float:
 
 
 def _turn(degrees: float, axes: int) -> Float:
-    """Return the rotation matrix R (axes, axes) of a turn from x1 to x2."""
+    """Compute the rotation matrix R (axes, axes) for a turn from x1 to x2."""
     angle, turn = np.radians(degrees), np.eye(axes)
     turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     return turn

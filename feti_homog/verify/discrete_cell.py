@@ -1,4 +1,4 @@
-"""The cell in a result: its elements, torn nodes, interface faces, and scales for its states."""
+"""The cell of a result: elements, torn nodes, interface faces, and the scales of its states."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,12 +15,12 @@ from feti_homog.verify.elements import Elements, add_at_nodes
 from feti_homog.verify.findings import ROUNDING
 from feti_homog.verify.reading import ResultFiles, State, Status, gradient
 
-# Share of the terms that adds to the scale of their sum: 1e-15 of the terms are rounding.
+# Share of the terms that is added to the scale of their sum; about 1e-15 of the terms is rounding.
 ROUNDED_TERMS = 1e-5
 
 
 class Scales(NamedTuple):
-    """Sizes of a loaded cell, as if it were bonded: strain, stress, and displacement E x across the cell."""
+    """The scales of a loaded cell, as if all bonds were intact: strain, stress, displacement E x."""
 
     strain: float
     stress: float
@@ -29,13 +29,14 @@ class Scales(NamedTuple):
 
 @dataclass(frozen=True)
 class Faces:
-    """Torn nodes on the two faces at the k interface nodes.
+    """The b torn nodes on both faces of the k interface nodes.
 
     Attributes:
-        row, is_fibre: (b,) interface node at each torn node, or -1, and True on the inner body.
-        copies: (b,) how often a torn node is in its subdomain, by periodic images.
-        distance, place: (k,) distance from an interface node to its place, and this place; infinite and -1 without one.
-        pair: (places,) section for the two bodies, where exactly two meet along one line; -1 where they never part.
+        row: (b,) interface node of a torn node, or -1.
+        is_fibre: (b,) whether a torn node belongs to the inner body.
+        copies: (b,) number of periodic images of a torn node in its subdomain.
+        distance, place: (k,) place of an interface node and the distance to it; -1 and inf without a place.
+        pair: (places,) section of the two bodies, if exactly two bodies meet along one line; else -1.
     """
 
     row: Int
@@ -46,16 +47,13 @@ class Faces:
     place: Int
 
     def sums(self, values: Float, of_fibre: bool) -> Float:
-        """Return the sums (k, c) of values (b, c) over the copies on one face."""
+        """Sum values (b, c) over the copies on one face: (k, c)."""
         on_face = (self.row >= 0) & (self.is_fibre == of_fibre)
         k = len(self.place)
         return np.stack([np.bincount(self.row[on_face], column, k) for column in values[on_face].T], axis=1)
 
     def means(self, values: Float, of_fibre: bool) -> Float:
-        """Average values (b, c) over the subdomains on one face.
-
-        Returns the means (k, c) at the interface nodes, NaN where the face has no subdomain.
-        """
+        """Average values (b, c) over the subdomains on one face: (k, c), NaN without a subdomain."""
         share = 1.0 / self.copies[:, None]
         with np.errstate(invalid="ignore"):
             return self.sums(values * share, of_fibre) / self.sums(np.ones_like(values) * share, of_fibre)
@@ -63,15 +61,15 @@ class Faces:
 
 @dataclass(frozen=True)
 class DiscreteCell:
-    """Mesh, materials and interface of a result.
+    """The mesh, the materials and the interface of a result.
 
     Attributes:
-        stiffnesses: (phases, v, v), v = 3, or 6 in generalized plane strain.
-        expansions: (phases, v), zero if unknown.
-        constituent: (subdomains,) connected parts of phases.
-        inner: (s,) True for torn sides on the inner face of bonds that may break.
+        stiffnesses: (phases, v, v) stiffness of a phase, v = 3, or 6 in generalized plane strain.
+        expansions: (phases, v) strain per temperature, 0 if unknown.
+        constituent: (subdomains,) connected part of a phase.
+        inner: (s,) whether a torn side is the inner face of bonds that may break.
         fractions: (phases,) area fractions.
-        largest_strain: largest component of all states.
+        largest_strain: largest strain component of all states.
     """
 
     files: ResultFiles
@@ -88,13 +86,13 @@ class DiscreteCell:
 
     @classmethod
     def of(cls, files: ResultFiles) -> Self:
-        """Return the cell of a result. Raises CaseError if a phase has no material."""
+        """Build the cell of a result; raise CaseError if a phase has no material."""
         mesh = files.mesh
         stiffnesses, free = laws(files.case, files.phases)
         elements = Elements(mesh, stiffnesses, mixed_phases(files.case, files.phases))
         sides, nodes, radius = torus.torn(mesh, files.size)
         parts, inwards = torus.bodies(mesh, files.phases, sides)
-        # Places where exactly two bodies meet along one line, and the sections of their bonds.
+        # Places where exactly two bodies meet along one line, and the section of their bonds.
         node_depth = inwards[parts[nodes.subdomain]]
         members = np.unique(np.column_stack([nodes.place, node_depth, nodes.phase]), axis=0)
         on_line = torus.along_one_line(sides, nodes, parts[mesh.subdomain])
@@ -123,58 +121,58 @@ class DiscreteCell:
 
     @property
     def area(self) -> float:
-        """Area of the rectangle."""
+        """Return the area of the rectangle."""
         return float(self.files.size.prod())
 
     @property
     def porosity(self) -> float:
-        """Area fraction of voids, 0 unless some side has no partner."""
+        """Return the area fraction of voids; 0 if every torn side has a partner."""
         return 1.0 - float(self.fractions.sum()) if self.sides.at_void.any() else 0.0
 
     @cached_property
     def reuss(self) -> Float:
-        """Return <L^-1>^-1 (v, v), the least stiffness of the bonded cell."""
+        """Compute <L^-1>^-1 (v, v), the lower bound of the bonded cell's stiffness."""
         return np.asarray(np.linalg.inv(np.einsum("p,pij->ij", self.fractions, np.linalg.inv(self.stiffnesses))))
 
     @cached_property
     def inner_rows(self) -> Int:
-        """Return the interface nodes (s, 2 or 3) on the inner torn sides, -1 for other nodes."""
+        """Return the interface nodes (inner sides, 2 or 3) at the nodes of inner torn sides, or -1."""
         row_of = np.full(len(self.files.mesh.points), -1)
         row_of[self.nodes.node] = self.faces.row
         return np.asarray(row_of[self.sides.nodes[self.inner]])
 
     def tips(self, status: AnyInt) -> Bool:
-        """(k,) bonds next to a broken one."""
-        rows, broken, near_break = self.inner_rows, status != Status.BONDED, np.zeros(len(status), bool)
+        """Return whether nodes (k,) are tips: bonds beside a broken bond."""
+        rows, broken, has_broken_neighbour = self.inner_rows, status != Status.BONDED, np.zeros(len(status), bool)
         pairs = (rows[:, [0, 2, 2, 1]] if rows.shape[1] == 3 else rows).reshape(-1, 2)
         pairs = pairs[(pairs >= 0).all(axis=1)].T
         for node, neighbour in (pairs, pairs[::-1]):
-            near_break[node[broken[neighbour]]] = True
-        return np.asarray(near_break & ~broken)
+            has_broken_neighbour[node[broken[neighbour]]] = True
+        return np.asarray(has_broken_neighbour & ~broken)
 
     @cached_property
     def directions(self) -> Float:
-        """Return the directions (k,) from fibre centres to interface nodes, in degrees."""
+        """Compute directions (k,) in degrees from the fibre centres to the interface nodes."""
         rows = self.files.interface
         x, y = torus.from_centre(rows.points, self.files.fibres.centre[rows.fibre - 1], self.files.size).T
         return np.asarray(np.degrees(np.arctan2(y, x)))
 
     @cached_property
     def bond_directions(self) -> Float:
-        """Return `directions` (k,) in (-180, 180], or normal directions on fibres without a centre."""
+        """Return `directions` (k,) in (-180, 180]; without a fibre centre, directions of normals."""
         n1, n2 = self.files.interface.normal.T
         angle = np.where(np.isnan(self.directions), np.degrees(np.arctan2(n2, n1)), self.directions)
         return np.asarray(angle + 360.0 * (angle <= -180.0 + ROUNDING))
 
     def in_axes(self, vectors: Float) -> Float:
-        """(k, c) x1, x2 and x3 components of normal, tangential and axial ones; the tangent is (-n2, n1)."""
+        """Transform vectors (k, c) from normal, tangential (-n2, n1), axial to x1, x2, x3 components."""
         n1, n2 = self.files.interface.normal.T
         normal, tangential, *axial = vectors.T
         return np.stack([n1 * normal - n2 * tangential, n2 * normal + n1 * tangential, *axial], axis=1)
 
     @cached_property
     def void_integrals(self) -> Float:
-        """(n, 2) int N n ds along the voids: int N_a dN_b/ds, turned, times the places of the nodes b of a side."""
+        """Compute int N_a n ds (n, 2) along voids: sum_b int N_a dN_b/ds x_b on a side, turned to the normal."""
         sums, points = np.zeros_like(self.files.mesh.points), self.files.mesh.points
         nodes = self.sides.nodes[self.sides.at_void]
         M = np.array([[-3, -1, 4], [1, 3, -4], [-4, 4, 0]]) / 6 if nodes.shape[1] == 3 else np.array([[-1, 1]] * 2) / 2
@@ -182,30 +180,30 @@ class DiscreteCell:
         return sums
 
     def loads(self, strain: Float, temperature: float) -> Float:
-        """Return the strain (v,) plus the largest thermal strain of a phase."""
+        """Add the largest thermal strain of a phase to a strain (v,)."""
         return np.asarray(strain + np.abs(self.expansions * temperature).max(axis=0))
 
     def scales(self, strain: Float, temperature: float, slip: float = 0.0) -> Scales:
-        """Return the scales of a load and of a slip that friction holds; no scale vanishes with the load."""
+        """Compute the scales of a load and a slip under friction; at least ROUNDING x the largest scales."""
         loads, longest, (width, height) = self.loads(strain, temperature), float(self.files.size.max()), self.files.size
         loads = np.asarray(loads + np.copysign(slip / longest, loads))
         corners = np.array([[width, 0.0], [0.0, height], [width, height]])
         displacement = float(np.abs(corners @ gradient(loads).T).max())
-        displacement += abs(float(loads[2])) * longest if len(loads) > 3 else 0.0  # as much as E33 may contract
+        displacement += abs(float(loads[2])) * longest if len(loads) > 3 else 0.0  # bounds the contraction by E33
         sizes = float(np.abs(loads).max()), float(np.abs(self.reuss @ loads).max()), displacement
-        least = ROUNDING * self.largest_strain  # a path may come back to zero strain
-        return Scales(*map(max, sizes, (least, least * float(np.abs(self.reuss).max()), least * longest)))
+        unit = ROUNDING * self.largest_strain  # a path may come back to strain 0
+        return Scales(*map(max, sizes, (unit, unit * float(np.abs(self.reuss).max()), unit * longest)))
 
     def scales_of(self, state: State) -> Scales:
-        """Return the sizes of a state."""
+        """Compute the scales of a state."""
         slip = float(np.abs(state.jump).max(initial=0.0)) if friction_at(self.files).any() else 0.0
         return self.scales(state.strain, state.temperature, slip)
 
     def largest_displacement(self, state: State) -> float:
-        """Return a scale of displacements that does not vanish with the fluctuation."""
+        """Compute a scale of displacements: the largest fluctuation plus the displacement E x."""
         return float(np.abs(state.fluctuation).max()) + self.scales_of(state).displacement
 
     @property
     def rounded_energy(self) -> float:
-        """Energy per area to add to energy scales: where all has parted the stored energy is rounding."""
+        """Return an energy per area for scales: without bonds, the stored energy may be rounding alone."""
         return ROUNDED_TERMS * float(np.abs(self.reuss).max()) * self.largest_strain**2

@@ -1,9 +1,8 @@
-"""Plane triangles with three and six nodes: strains, stresses, nodal forces and energies of displacements.
+"""Triangles with three or six nodes, for the certificate alone: displacements to strains, stresses and forces.
 
 Displacements have c = 2 components, or 3 in generalized plane strain; strains and stresses have v = 3 or 6, in the
-orders [11, 22, 12] and [11, 22, 33, 23, 13, 12].
-Written for the certificate alone, from barycentric coordinates r: N_a = r_a, or r_a (2 r_a - 1) and 4 r_a r_b on curved
-(isoparametric) sides.
+orders [11, 22, 12] and [11, 22, 33, 23, 13, 12].  In barycentric coordinates r, the shape functions are N_a = r_a, or
+r_a (2 r_a - 1) and 4 r_a r_b in isoparametric elements.
 """
 
 from collections.abc import Iterator
@@ -16,9 +15,9 @@ from feti_homog.typing import Bool, Float, Int
 from feti_homog.verify.reading import Mesh
 
 ELEMENTS_AT_ONCE = 1 << 15
-# (c, 2) place of du_i/dx_d in the strains, by the number of strains.
+# (c, 2) position of du_i/dx_d in the strains, by the number of strains.
 PLACES = {3: np.array([[0, 2], [2, 1]]), 6: np.array([[0, 5], [5, 1], [4, 3]])}
-# r_a = N_a + half of the functions of the two sides at vertex a.
+# r_a is the sum of N_a and half of N_b of the middle nodes b on both sides at vertex a.
 OF_NODES = np.array([[2, 0, 0, 1, 0, 1], [0, 2, 0, 1, 1, 0], [0, 0, 2, 0, 1, 1]]) / 2
 # Components of normal stresses, by the number of stresses.
 NORMAL = {3: [0, 1], 6: [0, 1, 2]}
@@ -26,14 +25,14 @@ NORMAL = {3: [0, 1], 6: [0, 1, 2]}
 
 @dataclass(frozen=True)
 class ElementFields:
-    """Fields from displacements (n, c).
+    """The fields of m elements that follow from displacements (n, c).
 
     Attributes:
         strain, stress: (m, v) element means.
-        strain_size: (m,) size of the summed terms, with whose rounding strains err.
+        strain_size: (m,) size of the terms that the strain sums, which bounds its rounding.
         force: (n, c) int B^T sigma.
-        force_size: (n,) size of the summed terms.
-        largest_force: of a single element.
+        force_size: (n,) size of the terms that the force sums.
+        largest_force: largest nodal force of a single element.
         energy: int sigma : eps.
     """
 
@@ -47,7 +46,7 @@ class ElementFields:
 
 
 class Elements:
-    """Elements of phases with stiffnesses (phases, v, v); quadratic `mixed` ones have bubbles and pressures."""
+    """The elements of a mesh; quadratic elements of `mixed` phases have a bubble and a pressure."""
 
     def __init__(self, mesh: Mesh, stiffnesses: Float, mixed: Bool) -> None:
         self._mesh, self._stiffnesses = mesh, stiffnesses
@@ -55,7 +54,7 @@ class Elements:
 
     @property
     def contrasts(self) -> tuple[float, float]:
-        """Largest lambda / mu of elements with a pressure, and largest mu over their least, or 0."""
+        """Return the largest lambda / mu of mixed elements, and largest mu of all / least mu of mixed; or 0."""
         L, mu = self._stiffnesses[self.mixed], self._stiffnesses[:, -1, -1]
         ratio, contrast = L[:, 0, 1] / L[:, -1, -1], mu.max() / mu[self.mixed]
         return float(ratio.max(initial=0.0)), float(contrast.max(initial=0.0))
@@ -67,22 +66,22 @@ class Elements:
 
     @cached_property
     def least_jacobian(self) -> Float:
-        """(m,) least determinant at the quadrature points / mean determinant of the element."""
+        """Compute the least determinant at the quadrature points / |mean determinant| (m,)."""
         parts = [weights / np.abs(weights.mean(axis=1))[:, None] for _, _, weights in self._parts()]
         return np.concatenate([part.min(axis=1) for part in parts])
 
     @cached_property
     def node_integrals(self) -> Float:
-        """Return int dN/dx (n, 2) over all elements of each node."""
+        """Compute int dN_a/dx (n, 2) over the elements at every node a."""
         sums = np.zeros_like(self._mesh.points)
         for part, gradients, weights in self._parts():
             add_at_nodes(sums, self._mesh.triangles[part], np.einsum("eqad,eq->ead", gradients, weights))
         return sums
 
     def fields(self, displacement: Float, terms_of_u: Float, along: float, free: Float) -> ElementFields:
-        """Return the fields of displacements (n, c), sums of terms with these sizes (n, c).
+        """Compute the fields of displacements (n, c).
 
-        `along` is E33, `free` are the strains (phases, v) of stress-free phases.
+        `terms_of_u` (n, c) has the sizes of the terms in u, `along` is E33, `free` (phases, v) has thermal strains.
         """
         m, v = len(self._mesh.triangles), self._stiffnesses.shape[1]
         strain, stress, size = np.empty((m, v)), np.empty((m, v)), np.empty(m)
@@ -92,7 +91,7 @@ class Elements:
             share = weights / weights.sum(axis=1)[:, None]
             strain[part], stress[part] = (np.einsum("eqi,eq->ei", field, share) for field in (local, answer))
             size[part] = np.einsum("eqad,eai->eq", np.abs(gradients), terms_of_u[nodes]).max(axis=1)
-            # |du/dx| sum |x_a| |dN_a/dx|: gradients are off by the rounding of places, in small elements most.
+            # |du/dx| sum |x_a| |dN_a/dx|: coordinates have rounding, which matters most in small elements.
             lengths = np.einsum("eqad,ead->eq", np.abs(gradients), np.abs(self._mesh.points)[nodes])
             size[part] += (np.abs(slope).max(axis=(2, 3)) * lengths).max(axis=1) + abs(along)
             size[part] += np.abs(free[phase]).max(axis=1)
@@ -107,30 +106,30 @@ class Elements:
     def responses(
         self, displacement: Float, along: float, free: Float
     ) -> Iterator[tuple[slice, Float, Float, Float, Float, Float]]:
-        """Yield elements in portions: gradients, weights, du/dx of nodes (e, q, c, 2), strains, stresses (e, q, v)."""
+        """Yield batches of elements: gradients, weights, du/dx (e, q, c, 2), strains and stresses (e, q, v)."""
         v = self._stiffnesses.shape[1]
         for part, gradients, weights in self._parts():
             phase = self._mesh.phase[part]
             slope = np.einsum("eqad,eai->eqid", gradients, displacement[self._mesh.triangles[part]])
-            local, own_free = _strains(slope, v, along), free[phase]
+            local, thermal = _strains(slope, v, along), free[phase]
             excess, mixed = np.zeros(local.shape[:2]), np.flatnonzero(self.mixed[phase])
-            if len(mixed):  # their pressure less lambda tr eps; bubbles add to the strains
+            if len(mixed):  # the excess is the pressure minus lambda tr eps; bubbles add to the strains
                 lame = np.stack([self._stiffnesses[phase[mixed], 0, 1], self._stiffnesses[phase[mixed], -1, -1]], 1)
-                elastic = local[mixed] - own_free[mixed, None]
+                elastic = local[mixed] - thermal[mixed, None]
                 inner, pressure = inner_fields(gradients[mixed], weights[mixed], elastic, lame)
                 bubble = _strains(inner, v, 0.0)
                 local[mixed] += bubble
                 excess[mixed] = pressure - lame[:, :1] * (elastic + bubble)[..., NORMAL[v]].sum(axis=2)
-            answer = np.einsum("eij,eqj->eqi", self._stiffnesses[phase], local - own_free[:, None])
+            answer = np.einsum("eij,eqj->eqi", self._stiffnesses[phase], local - thermal[:, None])
             answer[..., NORMAL[v]] += excess[..., None]
             yield part, gradients, weights, slope, local, answer
 
     def _parts(self) -> Iterator[tuple[slice, Float, Float]]:
-        """Yield elements in portions, with gradients (e, q, a, 2) and weights (e, q) at their quadrature points.
+        """Yield batches of elements: gradients dN_a/dx (e, q, a, 2) and weights (e, q) of quadrature.
 
-        The rule is exact for constants, or for degree 4: Dunavant's (1985), at `quadrature_points`.
+        Linear elements have one point, quadratic elements Dunavant's rule of degree 4 (1985) at `quadrature_points`.
         """
-        shares, slopes = np.ones(1), np.eye(3)[None]  # weights, their sum 1; dN_a/dr_b (q, a, 3)
+        shares, slopes = np.ones(1), np.eye(3)[None]  # weights with sum 1; dN_a/dr_b (q, a, 3)
         if self._mesh.triangles.shape[1] == 6:
             root, r = np.sqrt(213125 - 53320 * np.sqrt(10.0)), quadrature_points()
             shares, slopes = (620 + root * np.repeat([1.0, -1.0], 3)) / 3720, np.zeros((6, 6, 3))
@@ -145,14 +144,14 @@ class Elements:
             (a, b), (c, d) = np.moveaxis(jacobian, (2, 3), (0, 1))
             determinant = a * d - b * c
             adjugate = np.moveaxis(np.array([[d, -b], [-c, a]]), (0, 1), (2, 3))
-            # Of an element without area nothing is finite, and every law fails.
+            # In an element with area 0 no gradient is finite, so that its laws fail.
             gradients = np.einsum("qas,eqsd->eqad", free, adjugate / determinant[..., None, None])
             yield part, gradients, determinant * shares / 2
 
 
 @cache
 def quadrature_points() -> Float:
-    """(6, 3) barycentric coordinates (b, b, 1 - 2 b), turned, with 18 b = 8 - sqrt(10) +- sqrt(38 - 44 sqrt(2/5))."""
+    """Return points (6, 3), the cycles of (1 - 2 b, b, b): 18 b = 8 - sqrt(10) +- sqrt(38 - 44 sqrt(2/5))."""
     spread, places = np.sqrt(38 - 44 * np.sqrt(0.4)), []
     for sign in (1.0, -1.0):
         b = (8 - np.sqrt(10.0) + sign * spread) / 18
@@ -161,7 +160,7 @@ def quadrature_points() -> Float:
 
 
 def _strains(slope: Float, v: int, along: float) -> Float:
-    """Return strains (e, q, v) from du_i/dx_d (e, q, c, 2), or in the plane (e, q, 2, 2), and E33."""
+    """Compute strains (e, q, v) from du_i/dx_d (e, q, c or 2, 2) and E33 = `along`."""
     local = np.zeros((*slope.shape[:2], v))
     for (i, d), place in np.ndenumerate(PLACES[v][: slope.shape[2]]):
         local[..., place] += slope[..., i, d]
@@ -177,26 +176,26 @@ def add_at_nodes(sums: Float, nodes: Int, values: Float) -> None:
 
 
 def inner_fields(gradients: Float, weights: Float, strain: Float, lame: Float) -> tuple[Float, Float]:
-    """Return du_i/dx_d (e, q, 2, 2) of the bubble, and the pressure (e, q).
+    """Compute du_i/dx_d (e, q, 2, 2) of the bubbles, and the pressures (e, q).
 
-    Gradients of the nodes' functions (e, q, 6, 2), weights (e, q), elastic strains of nodal displacements (e, q, v),
-    lambda and mu (e, 2).
+    Arguments are the gradients dN_a/dx (e, q, 6, 2), the weights (e, q), the elastic strains (e, q, v) without bubbles,
+    and lambda and mu (e, 2).
     """
     (first, shear), places = lame.T, quadrature_points()
     slopes = np.einsum("ab,eqbd->eqad", OF_NODES, gradients)
-    of_bubble = np.einsum("qa,eqad->eqd", places[:, [1, 2, 0]] * places[:, [2, 0, 1]], slopes)
-    square = np.einsum("eq,eqd,eqk->edk", weights, of_bubble, of_bubble)
-    moment = np.einsum("eq,qm,eqd->emd", weights, places, of_bubble)
+    bubble = np.einsum("qa,eqad->eqd", places[:, [1, 2, 0]] * places[:, [2, 0, 1]], slopes)  # gradients
+    square = np.einsum("eq,eqd,eqk->edk", weights, bubble, bubble)
+    moment = np.einsum("eq,qm,eqd->emd", weights, places, bubble)
     matrix, right = np.zeros((len(weights), 5, 5)), np.zeros((len(weights), 5, 1))
     matrix[:, :2, :2] = square + np.trace(square, axis1=1, axis2=2)[:, None, None] * np.eye(2)
-    # The pressure over mu, so that both equations are of strains.
+    # The unknown is pressure / mu, so that both equations have the unit of strains.
     matrix[:, :2, 2:], matrix[:, 2:, :2] = moment.transpose(0, 2, 1), (first / shear)[:, None, None] * moment
     matrix[:, 2:, 2:] = -np.einsum("eq,qm,qn->emn", weights, places, places)
     e11, e22, e12 = (strain[..., k] for k in (0, 1, -1))
-    pulled = np.stack([2 * e11 * of_bubble[..., 0] + e12 * of_bubble[..., 1],
-                       2 * e22 * of_bubble[..., 1] + e12 * of_bubble[..., 0]], axis=-1)  # fmt: skip
+    pulled = np.stack([2 * e11 * bubble[..., 0] + e12 * bubble[..., 1],
+                       2 * e22 * bubble[..., 1] + e12 * bubble[..., 0]], axis=-1)  # fmt: skip
     right[:, :2, 0] = -np.einsum("eq,eqi->ei", weights, pulled)
     trace = strain[..., NORMAL[strain.shape[2]]].sum(axis=2)
     right[:, 2:, 0] = -(first / shear)[:, None] * np.einsum("eq,qm,eq->em", weights, places, trace)
     solution = np.linalg.solve(matrix, right)[..., 0]
-    return np.einsum("ei,eqd->eqid", solution[:, :2], of_bubble), shear[:, None] * (solution[:, 2:] @ places.T)
+    return np.einsum("ei,eqd->eqid", solution[:, :2], bubble), shear[:, None] * (solution[:, 2:] @ places.T)

@@ -1,12 +1,12 @@
-"""Laws of the certificate with their limits, their largest violations, and the numbers that no law reads.
+"""The laws of the certificate with limits and largest violations, and the numbers that no law reads.
 
-Rounding.  Sums over fields err by some units in the last place of their terms; quantities from factorizations in the
-solver by some hundred: forces in a mesh with 119 000 elements by 1.3e-12 at most.  In a very stiff phase, whose strains
-are differences between nearly equal displacements, rounding is 1e-15 of the terms.  Limits are ten to a thousand times
-the measured errors.
+Rounding.  Sums over fields err by a few units in the last place of their terms; quantities from factorizations in the
+solver err by a few hundred: forces in a mesh with 119 000 elements by at most 1.3e-12.  In a very stiff phase, where
+strains are differences of nearly equal displacements, rounding is 1e-15 of the terms.  Limits are ten to a thousand
+times the measured errors.
 
-Solver.  The Krylov method leaves jumps of `rtol`, relative; laws for closed faces hold to the tolerance of a run's
-checks, min(1000 rtol, 1e-4).  `rtol` is written in the result, so 1e-4 is the most that any result may claim.
+Solver.  The Krylov method leaves relative jumps of `rtol`; laws of closed faces hold to the tolerance of the checks in
+a run, min(1000 rtol, 1e-4).  As `rtol` is an entry of the result, 1e-4 bounds what a result may claim.
 """
 
 import re
@@ -21,21 +21,21 @@ from numpy.typing import ArrayLike
 from feti_homog.typing import Float
 
 CHECK_PER_RTOL, LARGEST_CHECK, KKT = 1e3, 1e-4, 1e-6
-# Signs of forces and gaps are solver error below 10 rtol of the largest; the solver's contact check allows 1e-6.
+# Forces and gaps below 10 rtol of the largest have no certain sign; the contact check of a run allows 1e-6.
 CONTACT_PER_RTOL = 100.0
-# Bonds whose utilisation differs by 1e-6 break together.
+# Bonds whose utilisations differ by less than 1e-6 break together.
 STRENGTH = 2e-6
-# Relative step of finite differences of energies, and their error.
+# Relative step of finite differences of energies, and their relative error.
 STEP = 1e-6
-# Relative differences below this are rounding: of loads in proportion, of energies and strains next to their scale.
+# Relative differences that count as rounding: between loads in proportion, and in energies and strains near 0.
 ROUNDING = 1e-9
-# Coordinates of a user's mesh are rounded: sides match to 1e-7 of the cell, circles are round to 1e-6 of their radius.
+# Coordinates in a user's mesh are rounded: sides match to 1e-7 of the cell, circles are round to 1e-6 of their radius.
 USERS_MESH = 1e-5
-# Thin coatings bend by the rounding of the forces on their two faces: measured 4e-9 at a hundredth of the radius.
+# Rounding of the forces on both faces bends thin coatings: measured 4e-9 at a thickness of 1/100 of the radius.
 BODIES, COATINGS = 1e-11, 1e-7
-# Nearly incompressible phases lose digits with lambda / mu beyond this, and stresses, which stiff phases around them
-# raise, with the contrast of mu beyond the next two: at 1e5 to 5e8, with contrasts of 1e-3 to 1e6, violations are a
-# quarter of the limits at most, 0.9 of the limit of jumps.
+# Limits grow with lambda / mu above LARGE_RATIO; limits of forces and stresses at most with the contrast of mu to
+# stiffer phases, above LARGE_CONTRAST and LARGE_OF_PRESSURE.  At ratios of 1e5 to 5e8 and contrasts of 1e-3 to 1e6,
+# violations are at most a quarter of the limits, and 0.9 of the limit of jumps.
 LARGE_RATIO, LARGE_CONTRAST, LARGE_OF_PRESSURE, PRESSURE = 1e5, 50.0, 250.0, 50.0
 
 Place = str | Callable[[int], str]
@@ -43,7 +43,7 @@ Place = str | Callable[[int], str]
 
 @dataclass(frozen=True)
 class Finding:
-    """A law with the limit of its relative violations, the largest violation, and its place."""
+    """A law, the limit of its relative violation, the largest violation and the place where it occurs."""
 
     name: str
     description: str
@@ -53,11 +53,11 @@ class Finding:
 
     @property
     def holds(self) -> bool:
-        """Return True if the violation is within the limit; NaN is not."""
+        """Return whether the violation is within the limit; False for NaN."""
         return self.violation <= self.limit
 
     def line(self) -> str:
-        """Return the finding as a line of the certificate."""
+        """Write the finding as a line of the certificate."""
         verdict = "holds" if self.holds else "BROKEN"
         where = f", at {self.where}" if self.where and self.violation > 0 else ""
         numbers = f"{self.violation:9.1e} of {self.limit:7.1e}"
@@ -65,23 +65,23 @@ class Finding:
 
     @property
     def document(self) -> Mapping[str, Any]:
-        """Return the finding as values of JSON; an infinite violation is null."""
+        """Return the finding as a table of JSON values; an infinite violation is null."""
         violation = self.violation if np.isfinite(self.violation) else None
         law = {"law": self.name, "words": self.description, "limit": self.limit}
         return law | {"violation": violation, "where": self.where, "holds": self.holds}
 
 
 class Findings:
-    """Largest violation of each law so far."""
+    """The largest violation of every law so far."""
 
     def __init__(self, checks: Iterable[Finding]) -> None:
         self._checks = {check.name: check for check in checks}
         self._worst: dict[str, Finding] = {}
 
     def record(self, law: str, violations: ArrayLike, where: Place = "") -> None:
-        """Record the relative violations (), (k,) or (k, n) of a law; `where` names the place of row i.
+        """Record relative violations (), (k,) or (k, n) of a law; NaN counts as infinite.
 
-        Laws without any record do not apply to the result.
+        `where` names the place, or maps row i to its place.  Laws without a record do not apply to the result.
         """
         values = np.atleast_1d(np.asarray(violations, float))
         if not values.size:
@@ -94,39 +94,40 @@ class Findings:
             self._worst[law] = replace(self._checks[law], violation=value, where=place)
 
     def compare(self, law: str, value: Any, expected: Any, scale: ArrayLike, where: Place) -> None:
-        """Record |value - expected| / scale; infinite if their shapes differ."""
+        """Record |value - expected| / scale; inf if the shapes of both differ."""
         value, expected = np.asarray(value, float), np.asarray(expected, float)
         self.record(law, relative(value - expected, scale) if value.shape == expected.shape else np.inf, where)
 
     def require(self, law: str, holds: bool | np.bool_, where: str) -> None:
-        """Record no violation or an infinite one."""
+        """Record the violation 0 if a condition holds, else inf."""
         self.record(law, 0.0 if holds else np.inf, where)
 
     def worst(self) -> tuple[Finding, ...]:
-        """Return the findings of all laws that apply, in order."""
+        """Return the largest violations of all laws that apply, in the order of `checks`."""
         return tuple(self._worst[name] for name in self._checks if name in self._worst)
 
 
 def relative(errors: ArrayLike, scale: ArrayLike) -> Float:
-    """|errors| / scale; over a scale of zero 0 if there is no error, else infinite."""
+    """Compute |errors| / scale; for the scale 0, the result is 0 without an error, else inf."""
     errors, scale = np.broadcast_arrays(np.abs(np.asarray(errors, float)), np.asarray(scale, float))
     return np.asarray(np.divide(errors, scale, out=np.where(errors == 0.0, 0.0, np.inf), where=scale > 0))
 
 
 def solver_limit(rtol: float) -> float:
-    """Limit of laws that hold as far as the dual problems are solved."""
+    """Return min(1000 rtol, 1e-4), the limit of laws that hold to the accuracy of the dual solver."""
     return min(CHECK_PER_RTOL * rtol, LARGEST_CHECK)
 
 
 def checks(rtol: float, users_mesh: bool, has_coatings: bool, mixed: tuple[float, float] = (0.0, 0.0)) -> list[Finding]:
-    """List the laws with their limits, without violations, for dual problems solved to `rtol`.
+    """List the laws with their limits and without violations, for a tolerance `rtol` of the dual problems.
 
-    mixed: largest lambda / mu of mixed elements; largest mu of all / least mu of mixed elements.
+    `mixed` is as `Elements.contrasts`.
     """
     ratio, contrast = mixed[0] / LARGE_RATIO, mixed[1]
-    lost, of_balance = max(1.0, ratio), max(1.0, min(ratio, contrast / LARGE_CONTRAST))
-    of_pressure = max(1.0, min(PRESSURE * ratio, contrast / LARGE_OF_PRESSURE))
-    sums, balance, rounding = 1e-10 * lost, 1e-10 * of_balance, max(COATINGS * has_coatings, BODIES * lost)
+    # Factors by which limits grow with nearly incompressible phases.
+    loss, balance_loss = max(1.0, ratio), max(1.0, min(ratio, contrast / LARGE_CONTRAST))
+    pressure_loss = max(1.0, min(PRESSURE * ratio, contrast / LARGE_OF_PRESSURE))
+    sums, balance, rounding = 1e-10 * loss, 1e-10 * balance_loss, max(COATINGS * has_coatings, BODIES * loss)
     shape, solver = USERS_MESH if users_mesh else ROUNDING, solver_limit(rtol)
     contact = min(max(CONTACT_PER_RTOL * rtol, KKT), LARGEST_CHECK)
     rows = (
@@ -136,7 +137,7 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool, mixed: tuple[float
         ("mesh", "elements have positive areas and fill the cell; torn sides meet in pairs", shape),
         ("interface", "interface nodes are where one fibre meets the matrix, with its normals and lengths", shape),
         ("arcs", "the initially debonded nodes are those of the case, in numbers of nodes", 0.0),
-        ("stress", "stresses of the elements follow from u and the case's materials", 1e-13 * of_pressure),
+        ("stress", "stresses of the elements follow from u and the case's materials", 1e-13 * pressure_loss),
         ("stress 33", "stresses out of the plane follow from those in it and the case's materials", 1e-13),
         ("phases", "largest stresses of the phases follow from u, relative to the largest", 1e-7),
         ("mesh error", "errors of the elements add up to those of averaged stresses, by a factor less 1", 1.5),
@@ -174,7 +175,7 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool, mixed: tuple[float
     return [Finding(*row) for row in rows]
 
 
-# Why laws leave numbers alone, by a part of their names; the first that fits.
+# Reasons why no law reads a number, by parts of its name; the first reason that fits counts.
 REASONS = {
     "names of the program and the case, and how the run went": (
         "version", "date", "digest", "resumed", "solver", "timings", "memory", "iterations", "free_motions",
@@ -184,22 +185,22 @@ REASONS = {
     "closed formulas, which no field bears witness to": ("estimates", "fibre_bounds"),
     "estimates of the mesh's error, but for energies": ("mesh_error",),
     "derivatives under contact or with a temperature, but for energies": ("derivatives",),
-    "what breaks at tips would release": ("G_I", "G_II"),
-    "of the mesher, or of a table that is not in the files": ("match_distance", "mesh_size", "refine"),
+    "energies that breaks at tips would release": ("G_I", "G_II"),
+    "numbers of the mesher, or of a table that is not in the files": ("match_distance", "mesh_size", "refine"),
     "copies of other numbers, for readers": (
         "fibres", "peak", "mark", "debonding_angle", "dissipation_ratio", "parameter_values",
     ),
 }  # fmt: skip
 ATOMS = ("case", "result_h5")
 NO_REASON, THINNED = "no law", "at points whose fields are not in the files"
-# Files and tables of result.h5 that repeat others.
+# Files, and tables of result.h5, that repeat other numbers.
 COPIES = "tables for viewers and spreadsheets"
 COPIED = ("*.csv", "traction_vector", "jump_vector", "displacement_fibre", "displacement_matrix", "fibre_node",
           "matrix_node", "fibre/number", "fibre/phase")  # fmt: skip
 
 
 class Section(dict[str, Any]):
-    """A table of result.json that counts which entries laws have read.  ATOMS count as one number."""
+    """A table of result.json that records which entries the laws have read; ATOMS count as one entry."""
 
     def __init__(self, content: Mapping[str, Any], unread: dict[str, bool] | None = None, place: str = "") -> None:
         super().__init__(content)
@@ -221,15 +222,15 @@ class Section(dict[str, Any]):
         return super().__getitem__(key)
 
     def get(self, key: str, default: Any = None) -> Any:
-        """Return an entry, which counts as read."""
-        return self[key] if key in self else default  # noqa: SIM401, which would be this again
+        """Return an entry, which then counts as read; return the default for a missing entry."""
+        return self[key] if key in self else default  # noqa: SIM401, because `super().get` would not count it
 
     def hint(self, key: str, default: Any = None) -> Any:
-        """Return an entry that a law uses without checking it."""
+        """Return an entry without counting it as read: a law uses the value but does not check it."""
         return super().get(key, default)
 
     def leaves_open(self, *keys: str) -> None:
-        """Count entries as unread for good: laws use their values but do not determine them."""
+        """Count entries as unread from now on: laws use their values but do not determine them."""
         self.unread |= dict.fromkeys((self._prefix + key for key in keys), True)
 
 
@@ -237,9 +238,9 @@ Points = Sequence[Section]
 
 
 def unchecked(document: Section) -> dict[str, list[str]]:
-    """Map reasons to names of numbers that no law has read, such as path[].iterations.
+    """Map reasons to the names of numbers that no law has read, such as path[].iterations.
 
-    A table without any read number goes by its name.  Copies of tables are always in the list.
+    The name of a table stands for its numbers if no law has read one.  Copies of tables are always in the list.
     """
     names = (document.unread, document.places)
     unread, total = (Counter(re.sub(r"\[\d+\]", "[]", place) for place in places) for places in names)

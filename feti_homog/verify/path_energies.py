@@ -1,20 +1,20 @@
-"""Path energy laws: work by the loads is stored, lost where bonds break, or becomes heat by friction.
+"""Laws of energies on a path: the work is stored, lost where bonds break, or becomes heat by friction.
 
-Notation: E and Sigma are all strains at a point, a temperature among them, and their conjugates; W = E.Sigma / 2 is the
-stored energy.  For fixed bonds W is a convex function of E, homogeneous with degree two.  A load prescribes strains E_s
-and stresses Sigma_f; its potential is
+E and Sigma are all strains at a point, with a temperature as the last strain, and their conjugates; W = E.Sigma / 2 is
+the stored energy.  For fixed bonds W is a convex function of E, homogeneous of degree two.  A load prescribes strains
+E_s and stresses Sigma_f; its potential is
 
     P(E_s, Sigma_f) = min over E_f of W - Sigma_f.E_f = 1/2 (E_s.Sigma_s - Sigma_f.E_f),
 
-convex in E_s and concave in Sigma_f, so that the state ' under another load with equal bonds bounds it: for any t >= 0
+convex in E_s and concave in Sigma_f.  So a state ' under another load with the same bonds bounds P: for any t >= 0
 
     P >= t Sigma'_s.E_s - t^2 W'   if Sigma_f = t Sigma'_f,
     P <= t^2 W' - t E'_f.Sigma_f   if E_s = t E'_s.                                                         (P)
 
 Bonds break at constant load and lose P before - P after.  The files have one of these two states; (P) bounds the other
-potential by the state beyond, with equal bounds where the loads are in proportion: on the whole first leg, in a
-cascade, and where a later leg is on a ray.  There the loss obeys an equation; elsewhere it lies between bounds.
-Between event points without breaks the response is straight, so the work is (Sigma + Sigma').(E' - E) / 2.
+potential by the next state with the same bonds.  Both bounds are equal where the loads are in proportion: on the first
+leg, in a cascade, and on a later leg along a ray.  There the loss obeys an equation; elsewhere it lies between bounds.
+Between event points without breaks the response is linear, so that the work is (Sigma + Sigma').(E' - E) / 2.
 """
 
 from dataclasses import dataclass
@@ -33,9 +33,9 @@ from feti_homog.verify.reading import Status
 
 @dataclass(frozen=True)
 class PointNumbers:
-    """Strains and stresses (n,) at a point, the temperature and its conjugate last, NaN if unknown; its energy.
+    """The strains and stresses (n,), stored energy per area and prescribed load at a point of a path.
 
-    `load` is prescribed; `terms` is the least scale for terms in the stored energy, per area.
+    Strains and stresses end with the temperature and its conjugate, NaN if unknown; `terms` scales energies per area.
     """
 
     name: str
@@ -47,9 +47,10 @@ class PointNumbers:
 
     @classmethod
     def of(cls, cell: DiscreteCell, number: int, load: Prescribed, state: StateNumbers | None) -> Self:
-        """Return the numbers of a point, with the fields' energy, or without a state by Hill E.Sigma / 2.
+        """Collect the numbers of a point, from its state if the files have one.
 
-        The conjugate to a temperature follows from the stored energy.
+        Without a state, the stored energy is E.Sigma / 2 by Hill's lemma (8); the conjugate of a temperature follows
+        from the stored energy in the file.
         """
         point, n = cell.files.document["path"][number], len(load.values)
         strain, stress, name = np.array(point["strain"]), np.array(point["stress"]), f"path[{number}]"
@@ -68,30 +69,30 @@ class PointNumbers:
 
     @property
     def potential(self) -> float:
-        """P of the load, per area."""
+        """Compute the potential P of the load, per area."""
         return _work(*self.pairs(by_stress=False)) / 2 - _work(*self.pairs(by_stress=True)) / 2
 
     def pairs(self, by_stress: bool) -> tuple[Float, Float]:
-        """Return the prescribed strains, or stresses, and their conjugates."""
+        """Return the prescribed strains (or stresses, if `by_stress`) and their conjugates."""
         kind = self.load.by_stress == by_stress
         return self.load.values[kind], (self.strain if by_stress else self.stress)[kind]
 
 
 def check_stored(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check stored energies, and dissipation under control of the strain, at all points."""
+    """Check stored energies and the strain-controlled dissipation at all points."""
     points = cell.files.document["path"]
-    # Without temperature and friction the stored energy is E.Sigma / 2.
+    # The stored energy is E.Sigma / 2 without temperature and friction.
     with_fields = {state.point for state in states}
     scale = max([state.stored for state in states], default=0.0) + cell.rounded_energy
     for number, point in enumerate(points):
         if number not in with_fields and not all(point["strain"]):
-            point.leaves_open("stress")  # the conjugate of no strain stores nothing
+            point.leaves_open("stress")  # the conjugate of a strain 0 does no work
         if not point.get(TEMPERATURE) and "friction_heat" not in point:
             work = float(np.dot(point["strain"], point["stress"])) / 2
             findings.compare("energy", point["stored"], work, scale, f"path[{number}].stored")
     by_events = cell.files.case["path"]["method"] == "events"
-    # Under a load that only rises on the first leg of events, breaks at a load below the largest so far lose as much
-    # more as energies grow up to it.
+    # Under strain control the load never falls on the first leg of events: a break at a load below the largest so far
+    # happens at the largest load, and loses more by the square of the ratio.
     names = "dissipated", "dissipated_strain_controlled", "load_factor", "stored"
     lost, rising, factor, stored = np.array([[point[name] for name in names] for point in points]).T
     first_leg = 1.0 / len(targets(cell.files.case)) if by_events else 0.0
@@ -103,34 +104,34 @@ def check_stored(findings: Findings, cell: DiscreteCell, states: States) -> None
 
 
 def check_heat(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check that the work is stored, lost to breaks or heat, which never falls; only breaks change `dissipated`.
+    """Check that the work is stored, lost in breaks, or becomes heat.
 
-    With friction the energy depends on the way, so nothing bounds the loss in breaks.  Bonds break after an event
-    point, before an increment point.
+    Heat never falls, and `dissipated` changes in breaks alone.  With friction the energy depends on the path, so that
+    the loss in breaks has no bounds.  Bonds break after the point of an event, before the point of an increment.
     """
     points, by_events = cell.files.document["path"], cell.files.case["path"]["method"] == "events"
     stored = {number: float(point["stored"]) for number, point in enumerate(points)}
     stored |= {state.point: state.stored for state in states}
     terms = np.array([[p["work"], stored[n], p["dissipated"], p["friction_heat"]] for n, p in enumerate(points)])
-    # Sums along the path have the rounding of their largest terms; its share in an increment is far less.
+    # Sums along the path have the rounding of their largest terms; in an increment it is far less.
     scale = np.maximum.accumulate(np.abs(terms).max(axis=1)) + np.finfo(float).tiny
     steps = np.diff(terms, axis=0, prepend=0.0)
-    of_step = np.abs(steps).max(axis=1) + ROUNDED_TERMS * scale
+    step_scale = np.abs(steps).max(axis=1) + ROUNDED_TERMS * scale
     findings.record("heat", np.abs(terms @ [1.0, -1.0, -1.0, -1.0]) / scale, "path[{}].work".format)
-    findings.record("heat", np.maximum(-steps[:, 3], 0.0) / of_step, "path[{}].friction_heat".format)
+    findings.record("heat", np.maximum(-steps[:, 3], 0.0) / step_scale, "path[{}].friction_heat".format)
     breaks = np.array([damaged_at(point) for point in points])
     breaks = np.r_[0, breaks[:-1]] if by_events else breaks
     lost = np.where(breaks > 0, 0.0, np.abs(steps[:, 2]))
-    findings.record("heat", lost / of_step, "path[{}].dissipated".format)
+    findings.record("heat", lost / step_scale, "path[{}].dissipated".format)
     for before, state in pairwise(states):
         check_step_heat(findings, cell, before, state)
 
 
 def check_step_heat(findings: Findings, cell: DiscreteCell, before: StateNumbers, state: StateNumbers) -> None:
-    """Check that an increment without breaks makes the heat from its slips under the tractions at its end.
+    """Check that an increment without breaks has the heat: tractions at its end times its slips.
 
-    It is relative to the tractions times the slips since the beginning, whose difference it is.  The work of increments
-    is booked as stored, lost or heat, so it is no evidence of heat.
+    The error is relative to the tractions times the total slips.  The work is no evidence of heat: runs compute it as
+    the sum of stored energy, loss and heat.
     """
     files, at = cell.files, state.point
     points = files.document["path"]
@@ -148,52 +149,52 @@ def check_step_heat(findings: Findings, cell: DiscreteCell, before: StateNumbers
 
 
 def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:
-    """Bound the potential of a load on the bonds in another state, by (P)."""
+    """Bound the potential of a load, with the bonds of another state, by (P)."""
     if (load.by_stress != other.load.by_stress).any():
         return -np.inf, np.inf
     (strains, stresses), (forces, answers) = other.pairs(by_stress=False), other.pairs(by_stress=True)
-    own_strains, own_forces = load.values[~load.by_stress], load.values[load.by_stress]
-    # A parted cell stores rounding.
+    load_strains, load_forces = load.values[~load.by_stress], load.values[load.by_stress]
+    # The stored energy of a cell without bonds is rounding.
     energy = other.stored if abs(other.stored) > ROUNDING * other.terms else 0.0
-    least = _largest(_work(own_strains, stresses), energy, own_forces, forces)
-    return least, -_largest(_work(own_forces, answers), energy, own_strains, strains)
+    least = _largest(_work(load_strains, stresses), energy, load_forces, forces)
+    return least, -_largest(_work(load_forces, answers), energy, load_strains, strains)
 
 
-def _largest(power: float, energy: float, one: Float, other: Float) -> float:
-    """max t power - t^2 energy over t >= 0 with one = t other; -inf without any t, or if the power is unknown."""
-    if not (one.any() or other.any()):
+def _largest(power: float, energy: float, load: Float, unit: Float) -> float:
+    """Maximize t power - t^2 energy over t >= 0 with load = t unit; -inf if no t fits or the power is NaN."""
+    if not (load.any() or unit.any()):
         t = max(power / (2 * energy), 0.0) if energy > 0 else 0.0
     else:
-        k = int(np.abs(other).argmax())
-        t = float(one[k] / other[k]) if other[k] else -1.0
-        if t < 0 or not np.allclose(one, t * other, rtol=ROUNDING, atol=0.0):
+        k = int(np.abs(unit).argmax())
+        t = float(load[k] / unit[k]) if unit[k] else -1.0
+        if t < 0 or not np.allclose(load, t * unit, rtol=ROUNDING, atol=0.0):
             return -np.inf
     value = t * power - t**2 * energy
     return -np.inf if np.isnan(value) else value
 
 
-def _work(one: Float, other: Float) -> float:
-    """one.other; unknown entries of `other` count only if they work."""
-    return float(one[one != 0.0] @ other[one != 0.0])
+def _work(prescribed: Float, conjugate: Float) -> float:
+    """Compute prescribed.conjugate without terms where `prescribed` is 0: there `conjugate` may be NaN."""
+    return float(prescribed[prescribed != 0.0] @ conjugate[prescribed != 0.0])
 
 
 def check_losses(findings: Findings, cell: DiscreteCell, states: States) -> None:
     """Check the work, and the loss in breaks by (P).
 
-    The loss is the old bonds' potential less the new bonds', at the load of the break.  At events, bonds that break at
-    a point lose the energy up to the next.  In an increment, bonds break at its end; bonded phases at the strain of the
-    new bonds store no less than the old bonds would.
+    The loss is the potential with the old bonds minus the potential with the new bonds, at the load of the break: after
+    the point of an event, or at the end of an increment.  There, fully bonded phases at the strain of the new state
+    store at least as much as the old bonds would.
     """
     points, by_events = cell.files.document["path"], cell.files.case["path"]["method"] == "events"
     of_point, loads = {state.point: state for state in states}, at_points(cell.files.case, points)
     numbers = [PointNumbers.of(cell, number, load, of_point.get(number)) for number, load in enumerate(loads)]
-    scale = max(each.stored for each in numbers) + cell.rounded_energy or 1e-300
-    C: Float = np.einsum("p,pij->ij", cell.fractions, cell.stiffnesses)  # Voigt's, of strains and temperature
+    scale = max(point.stored for point in numbers) + cell.rounded_energy or 1e-300
+    C: Float = np.einsum("p,pij->ij", cell.fractions, cell.stiffnesses)  # Voigt's mean, later with the temperature
     thermal = np.einsum("p,pij,pj->i", cell.fractions, cell.stiffnesses, cell.expansions)
     square = np.einsum("p,pi,pij,pj->", cell.fractions, cell.expansions, cell.stiffnesses, cell.expansions)
     C = np.block([[C, -thermal[:, None]], [-thermal[None], square]])
     for number, (point, now) in enumerate(zip(points, numbers, strict=True)):
-        off, place = point["work"] - now.stored - point["dissipated"], f"{now.name}, work less stored and dissipated"
+        off, place = point["work"] - now.stored - point["dissipated"], f"{now.name}, work - stored - dissipated"
         findings.record("energy", abs(off) / scale, place)
         state, before = (numbers[number - 1] if number else None), points[number - 1]
         lost, low, high = point["dissipated"] - (before["dissipated"] if number else 0.0), 0.0, 0.0
@@ -201,7 +202,7 @@ def check_losses(findings: Findings, cell: DiscreteCell, states: States) -> None
             if damaged_at(before):
                 least, largest = potentials(state.load, now)
                 low, high = max(state.potential - largest, 0.0), state.potential - least
-            else:  # the response is straight
+            else:  # the response is linear
                 straight = _work(now.strain - state.strain, state.stress + now.stress) / 2
                 off = np.nan_to_num(point["work"] - before["work"] - straight)
                 findings.record("energy", abs(off) / scale, f"{now.name}, work")

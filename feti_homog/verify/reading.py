@@ -1,4 +1,4 @@
-"""The files of a result as arrays: result.json with the resolved case, result.h5 with mesh, interface and states."""
+"""Readers of a result folder: result.json with the case, result.h5 with mesh, interface and states."""
 
 import json
 import os
@@ -27,9 +27,9 @@ COATING = "coating"  # phase
 
 @dataclass(frozen=True)
 class Mesh:
-    """Nodes (n, 2) and elements (m, 3 or 6): vertices, then the nodes on the sides 01, 12, 20.
+    """The mesh: nodes (n, 2) and elements (m, 3 or 6).
 
-    Each subdomain has its nodes to itself. Phase 0 is the matrix.
+    An element has its vertices, then the middles of the sides 01, 12, 20.  Subdomains share no node; phase 0: matrix.
     """
 
     points: Float
@@ -41,9 +41,10 @@ class Mesh:
 
 @dataclass(frozen=True)
 class InterfaceRows:
-    """The k interface nodes: points and normals from fibre to matrix (k, 2), tributary lengths (k,).
+    """The k interface nodes: points (k, 2), normals (k, 2) from fibre to matrix, tributary lengths (k,).
 
-    Fibre numbers from 1, bodies on the fibre side, places of sections [[interface]] (k,).
+    `fibre` (k,) counts from 1, `body` (k,) is the body of the fibre, `pair` (k,) the index of the section
+    [[interface]].
     """
 
     points: Float
@@ -56,9 +57,9 @@ class InterfaceRows:
 
 @dataclass(frozen=True)
 class Fibres:
-    """The f fibres by number: bodies (f,), centres (f, 2), radii (f,), NaN without one.
+    """The f fibres by number: bodies (f,), centres (f, 2) and radii (f,), NaN if a fibre has none.
 
-    `strength` (f,) is bond strength / strength in the case.
+    `strength` (f,) is the strength of bonds / the strength in the case.
     """
 
     body: AnyInt
@@ -68,28 +69,28 @@ class Fibres:
 
 
 class Status(IntEnum):
-    """Status of an interface node in result.h5."""
+    """The status of an interface node in result.h5."""
 
     BONDED, CLOSED, OPEN = range(3)
 
 
 @dataclass(frozen=True)
 class State:
-    """The group /state/K.
+    """A state, the group /state/K of result.h5.
 
-    Vectors have c = 2 and tensors v = 3 components [11, 22, 12]; in generalized plane strain 3 and 6, in the order
-    [11, 22, 33, 23, 13, 12].
+    Vectors have c = 2 and tensors v = 3 components [11, 22, 12]; in generalized plane strain c = 3 and v = 6, in the
+    order [11, 22, 33, 23, 13, 12].
 
     Attributes:
-        strain, mean_stress: (v,) macroscopic.
-        point: number in `path` or `angle` of result.json.
+        strain, mean_stress: (v,) macroscopic strain E and stress Sigma.
+        point: number of the point in `path` or `angle` of result.json.
         displacement, fluctuation: (n, c) u and u - E x.
         stress, stress_33: (m, v) and (m,) element means.
-        traction, jump: (k, c) normal, tangential and axial.
-        status: (k,) numbers of `Status`.
-        damage: (k,) from 0, intact, to 1, broken.
+        traction, jump: (k, c) normal, tangential and axial components.
+        status: (k,) values of `Status`.
+        damage: (k,) from 0 (intact) to 1 (broken).
         sliding: (k,) slip direction -1 or 1 of sliding nodes, else 0.
-        mesh_error: (m,) element shares of the estimated energy error, NaN without an estimate.
+        mesh_error: (m,) share of an element in the estimated energy error, NaN without an estimate.
     """
 
     name: str
@@ -111,12 +112,12 @@ class State:
 
     @property
     def along(self) -> float:
-        """E33, 0 unless in generalized plane strain."""
+        """Return E33; 0 except in generalized plane strain."""
         return float(self.strain[2]) if len(self.strain) > 3 else 0.0
 
 
 def gradient(strain: Float) -> Float:
-    """Return the displacement gradient H (c, 2) of a strain (v,), symmetric in the plane."""
+    """Compute the displacement gradient (c, 2) of a strain (v,), symmetric in the plane."""
     E11, E22, gamma12 = strain[[0, 1, -1]]
     plane = [[E11, gamma12 / 2], [gamma12 / 2, E22]]
     return np.array(plane if len(strain) == 3 else [*plane, strain[[4, 3]]])
@@ -124,7 +125,7 @@ def gradient(strain: Float) -> Float:
 
 @dataclass(frozen=True)
 class ResultFiles:
-    """An open result folder; `size` (2,) is the cell's, `altered` names files changed since the run."""
+    """An open result folder; `size` (2,) belongs to the cell, `altered` names files changed since the run."""
 
     document: Section
     size: Float
@@ -143,29 +144,29 @@ class ResultFiles:
 
     @property
     def is_spatial(self) -> bool:
-        """Return True in generalized plane strain."""
+        """Return whether the case has generalized plane strain."""
         return bool(self.case["analysis"]["plane"] == "generalized")
 
     @property
     def contact(self) -> bool:
-        """Return True if debonded faces must not overlap."""
+        """Return whether debonded faces must not overlap."""
         return any(section.get("contact", False) for section in self.interfaces)
 
     @property
     def interfaces(self) -> Sequence[Mapping[str, Any]]:
-        """Return the sections [[interface]]; none if all bonds are perfect."""
+        """Return the sections [[interface]]; empty if all bonds are perfect."""
         sections: Any = self.case.get("interface", [])
         return sections if isinstance(sections, list) else [sections]
 
     @property
     def points(self) -> Points:
-        """Return the points of a path or an angle, or the load."""
+        """Return the points of a path or of angles, or the single load."""
         document = self.document
         points: Points = document.get("path") or document.get("angle") or []
         return points or ([document["load"]] if "load" in document else [])
 
     def states(self) -> Iterator[State]:
-        """Yield the states in order, one in memory at a time."""
+        """Yield the states in ascending order, with one state in memory at a time."""
         n, m, k = len(self.mesh.points), len(self.mesh.triangles), len(self.interface.points)
         shapes = {"displacement": (n, 2), "stress": (m, 3), "stress_33": (m,), "traction": (k, 2), "jump": (k, 2)}
         for number in sorted(map(int, self.file.get("state", ()))):
@@ -173,10 +174,10 @@ class ResultFiles:
                 group = f"state/{number}"
                 attributes, table = self.file[group].attrs, partial(_table, self.file, group)
                 status = table("status", (k,))
-                # Older results have no damage, nothing that slides and no estimated errors.
-                older = {"damage": np.where(status != Status.BONDED, 1.0, 0.0), "sliding": np.zeros(k, int)}
-                older["mesh_error"] = np.full(m, np.nan)
-                arrays = {name: table(name, value.shape, value) for name, value in older.items()}
+                # Results of older versions lack damage, sliding and mesh errors.
+                defaults = {"damage": np.where(status != Status.BONDED, 1.0, 0.0), "sliding": np.zeros(k, int)}
+                defaults["mesh_error"] = np.full(m, np.nan)
+                arrays = {name: table(name, value.shape, value) for name, value in defaults.items()}
                 arrays |= {name: table(name, shape) for name, shape in shapes.items()}
                 if self.is_spatial:
                     for name, rows in (("displacement", n), ("traction", k), ("jump", k)):
@@ -186,7 +187,7 @@ class ResultFiles:
                 strain, mean = (np.array(attributes[name], float) for name in ("strain", "stress"))
                 v = arrays["stress"].shape[1]
                 has_size = strain.shape == mean.shape == (v,)
-                _expect(has_size, f"/{group} has a strain or a stress of another size than {v}")
+                _expect(has_size, f"/{group} has strain {strain.shape} and stress {mean.shape}, expected size {v}")
                 name, temperature = f"state {number} ({attributes['label']})", float(attributes.get("temperature", 0.0))
                 factor, point = float(attributes["load_factor"]), int(attributes["point"])
                 x = self.mesh.points - self.mesh.points.min(axis=0)
@@ -196,11 +197,11 @@ class ResultFiles:
 
 
 def altered(directory: Path) -> tuple[str, ...]:
-    """Name the files that have changed since the run. Raises CaseError, one line, if one is unreadable."""
+    """Return the names of files changed since the run; raise CaseError if a file is unreadable."""
     document, path = _document(directory / JSON), directory / FIELDS
     if not path.is_file():
         has_fields = document["case"].get("output", {}).get("fields", False)
-        raise CaseError(f"{path}: {'it is missing; run the case again' if has_fields else MISSING_FIELDS}")
+        raise CaseError(f"{path}: {'missing; run the case again' if has_fields else MISSING_FIELDS}")
     # `checksum` is the CRC-32 of the text without this last key.
     end = f',\n "checksum": {json.dumps(document.get("checksum"))}\n}}\n'.encode()
     text = input_files.read(directory / JSON).removesuffix(end) + b"\n}"
@@ -208,16 +209,16 @@ def altered(directory: Path) -> tuple[str, ...]:
     seal = document.get("result_h5")
     with _reading(path), input_files.opened(path) as stream:
         size, checksum = os.fstat(stream.fileno()).st_size, 0
-        if isinstance(seal, dict) and seal.get("bytes") == size:  # else the file is another one, however long
+        if isinstance(seal, dict) and seal.get("bytes") == size:  # a file with another size need not be read
             blocks = [zlib.crc32(block) for block in iter(partial(stream.read, CHECKSUM_BLOCK), b"")]
-            checksum = zlib.crc32(np.array(blocks, "<u4").tobytes())  # the CRC-32 of its blocks' CRC-32s
+            checksum = zlib.crc32(np.array(blocks, "<u4").tobytes())  # the CRC-32 of the CRC-32s of all blocks
     unchanged[FIELDS] = seal == {"bytes": size, "checksum": f"{checksum:08x}"}
     return tuple(name for name, is_unchanged in unchanged.items() if not is_unchanged)
 
 
 @contextmanager
 def opened(directory: Path) -> Iterator[ResultFiles]:
-    """Open the results in a folder. Raises CaseError, one line, if they are unreadable."""
+    """Open the results in a folder; raise CaseError, one line, if a file is unreadable."""
     changed, path = altered(directory), directory / FIELDS
     with _reading(path):
         file = h5py.File(path, "r")
@@ -233,7 +234,7 @@ def opened(directory: Path) -> Iterator[ResultFiles]:
 
             mesh = Mesh(*tables("mesh", points=(n, 2), triangles=(m, columns), subdomain=(m,), phase=(m,), body=(m,)))
             rows = tables("interface", points=(k, 2), normal=(k, 2), length=(k,), fibre_number=(k,), fibre=(k,))
-            # Older results have one section [interface] and bonds of one strength.
+            # Results of older versions have one section [interface], and equal strengths.
             rows.append(_table(file, "interface", "pair", (k,), np.zeros(k, np.int32)))
             interface = InterfaceRows(*rows)
             fibres = tables("fibre", body=(f,), centre=(f, 2), radius=(f,))
@@ -255,6 +256,7 @@ def opened(directory: Path) -> Iterator[ResultFiles]:
 
 
 def _document(path: Path) -> Mapping[str, Any]:
+    """Read result.json; raise CaseError if it is unreadable or has another schema."""
     try:
         document = json.loads(input_files.read(path).decode("utf-8"))
     except OSError as error:
@@ -262,12 +264,12 @@ def _document(path: Path) -> Mapping[str, Any]:
     except (ValueError, RecursionError) as error:
         raise CaseError(f"cannot read {path}: it is damaged: {error}") from error
     if not isinstance(document, dict) or document.get("schema") != SCHEMA or not isinstance(document.get("case"), dict):
-        raise CaseError(f"{path}: is no result of this version: expected schema {SCHEMA} and a case")
+        raise CaseError(f"{path}: no result of this version; expected schema {SCHEMA} and a case")
     return document
 
 
 def _table(file: h5py.File, group: str, name: str, shape: tuple[int, ...], default: Any = None) -> Any:
-    """Read a table of this shape, or return the default, if there is one, where it is missing."""
+    """Read a table with a `shape`; return the default, unless None, if the table is missing."""
     if default is not None and name not in file[group]:
         return default
     array = np.asarray(file[f"{group}/{name}"][()])
@@ -282,7 +284,7 @@ def _expect(holds: bool, fault: str) -> None:
 
 @contextmanager
 def _reading(path: Path) -> Iterator[None]:
-    """Convert errors from damaged or foreign files into one line."""
+    """Convert exceptions by damaged or foreign files to CaseError with one line."""
     try:
         yield
     except OSError as error:

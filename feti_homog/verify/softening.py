@@ -1,6 +1,7 @@
-"""Cohesive laws in openings: delta, from its onset delta_0 to the branch t(delta), damage 1 - t / (K delta).
+"""Cohesive laws t(delta) in the opening delta, with damage d = 1 - t / (K delta) from the onset delta_0 on.
 
-K is the stiffness of a mode: K (delta_n^2 + delta_s^2) = k_n delta_n^2 + k_t delta_s^2.
+K is the stiffness of a mode: K (delta_n^2 + delta_s^2) = k_n delta_n^2 + k_t delta_s^2.  Damage grows in steps, the
+teeth, between discrete levels.  A branch gives t / peak in u = (delta - delta_0) / stretch.
 """
 
 from abc import abstractmethod
@@ -13,31 +14,31 @@ import numpy as np
 from feti_homog.typing import Float
 from feti_homog.verify.bonds import QuadraticStrength, pulled
 
-TAIL = 0.01  # traction / peak at which the last exponential tooth begins
+TAIL = 0.01  # traction / peak at the beginning of the last tooth of an exponential branch
 MODES = np.linspace(0.0, np.pi / 2, 33)
-# Relative excess of the energy that bonds with changing modes absorb over the range of single modes.
+# Largest difference of the energy absorbed in changing modes from the range of constant modes, relative.
 BETWEEN_MODES = 0.25
 
 
 class Cohesive(QuadraticStrength):
-    """A bond softens where delta = sqrt(<delta_n>^2 + delta_s^2) reaches the next tooth."""
+    """A cohesive law: a bond softens when delta = sqrt(<delta_n>^2 + delta_s^2) reaches the next tooth."""
 
     has_toughness: ClassVar[bool] = True
 
     @property
     def damage(self) -> Float:
-        """(k,) or ()."""
+        """Return the damage, (k,) or ()."""
         return np.asarray(self.section.get("damage", 0.0), float)
 
     def jumps(self, traction: Float) -> Float:
-        """Return the jumps (k, c), traction / stiffness; damage spares the normal stiffness in compression."""
+        """Compute the jumps t / ((1 - d) k) (k, c), with d = 0 for normal compression."""
         share = np.broadcast_to(np.where(self.damage < 1.0, 1.0 - self.damage, 1.0), len(traction))[:, None]
         shares = np.repeat(share, traction.shape[1], axis=1)
         shares[:, 0] = np.where(traction[:, 0] > 0.0, shares[:, 0], 1.0)
         return np.asarray(super().jumps(traction) / shares)
 
     def utilisation(self, traction: Float) -> Float:
-        """(k,) delta / delta of the next tooth."""
+        """Compute delta / (delta at the next tooth) (k,)."""
         level = np.abs(np.subtract.outer(np.broadcast_to(self.damage, len(traction)), self.levels)).argmin(axis=1)
         level = np.minimum(level, len(self.levels) - 2)
         low, high = self.levels[level], self.levels[level + 1]
@@ -45,20 +46,20 @@ class Cohesive(QuadraticStrength):
         return np.asarray(np.sqrt(energy * (high - low) / self.absorbed(self.mode(traction), low, high)))
 
     def absorbed(self, psi: Float, before: Float, after: Float) -> Float:
-        """(k,) energies per area for damage from `before` to `after` in the modes psi (k,)."""
+        """Compute energies per area (k,) for a rise of damage `before` to `after` (k,), in modes psi (k,)."""
         return self._area(after, *self._mode(psi)) - self._area(before, *self._mode(psi))
 
     def absorbed_range(self, before: Float, after: Float) -> tuple[Float, Float]:
-        """(k,) lower and upper bound of `absorbed` over all modes."""
+        """Compute lower and upper bounds, both (k,), of `absorbed` over all modes."""
         energies = np.stack([self.absorbed(np.full(len(after), psi), before, after) for psi in MODES])
         return energies.min(axis=0) * (1 - BETWEEN_MODES), energies.max(axis=0) * (1 + BETWEEN_MODES)
 
     def onset(self, traction: Float) -> Float:
-        """(k,) utilisation of the strengths by intact bonds."""
+        """Compute the utilisation (k,) of intact bonds by the quadratic law: 1 at first damage."""
         return super().utilisation(traction)
 
     def shares(self, traction: Float) -> Float:
-        """(k, c) traction components / strengths, along the fibre by the energy of the slip."""
+        """Compute traction components / strengths (k, c); all slips of equal energy have equal shares."""
         shares = pulled(traction)
         shares[:, 0] /= self._number("normal_strength")
         stiffness = self._components("stiffness", traction)[..., 1:]
@@ -68,7 +69,7 @@ class Cohesive(QuadraticStrength):
 
     @cached_property
     def levels(self) -> Float:
-        """(n + 1,) damage between n teeth: openings in constant quotients in the pure mode with more teeth."""
+        """Compute the damage (n + 1,) between n teeth: constant quotients of openings in the harder pure mode."""
         ends = []
         for psi in (0.0, np.pi / 2):
             K, first, stretch = self._mode(np.full(np.size(self.section["normal_stiffness"]), psi))
@@ -91,21 +92,21 @@ class Cohesive(QuadraticStrength):
     @property
     @abstractmethod
     def last(self) -> float:
-        """u = (delta - delta_0) / stretch at the end of the branch, or where its last tooth begins."""
+        """Return u at the end of the branch, or at the beginning of its last tooth."""
 
     @abstractmethod
     def branch(self, u: Float) -> Float:
-        """Traction / peak."""
+        """Compute traction / peak at u."""
 
     @abstractmethod
     def under(self, u: Float) -> Float:
-        """Area under the branch up to u."""
+        """Compute the area under the branch from 0 to u."""
 
     def _number(self, name: str) -> Float:
         return np.asarray(self.section[name], float)
 
     def _mode(self, psi: Float) -> tuple[Float, Float, Float]:
-        """(k,) K, delta_0, and the opening of u = 1, in the modes psi (k,)."""
+        """Compute K, delta_0 and stretch, all (k,), in modes psi (k,)."""
         kn, kt = self._number("normal_stiffness"), self._number("tangential_stiffness")
         # delta_n : delta_s = cos / sqrt(k_n) : sin / sqrt(k_t)
         opens, slips = np.cos(psi) ** 2 / kn, np.sin(psi) ** 2 / kt
@@ -119,7 +120,7 @@ class Cohesive(QuadraticStrength):
         return K, first, rest / (K * first * self.under(np.asarray(np.inf)))
 
     def _area(self, d: Float, K: Float, first: Float, stretch: Float) -> Float:
-        """(k,) area under the law up to the opening of damage d (k,), less the triangle of unloading."""
+        """Compute the area (k,) under t(delta) up to damage d (k,), without the triangle of unloading."""
         low = np.zeros(np.broadcast_shapes(np.shape(d), np.shape(first)))
         high = low + 1.0
         while ((1.0 - d) * (first + stretch * high) < first * self.branch(high)).any() and high.max() < 1e6:
@@ -134,26 +135,26 @@ class Cohesive(QuadraticStrength):
 
 
 class TableLaw(Cohesive):
-    """A branch of straight pieces between the points of a table."""
+    """The law with a piecewise linear branch through the m points of a table."""
 
     @property
     def _points(self) -> tuple[Float, Float]:
-        """(m,) u and tractions / peak."""
+        """Return u and traction / peak, both (m,)."""
         openings, tractions = (np.asarray(self.section[name], float) for name in ("openings", "tractions"))
         return (openings - openings[0]) / openings[0], tractions / tractions[0]
 
     @property
     def last(self) -> float:
-        """The first u without traction."""
+        """Return the first u without traction."""
         places, heights = self._points
         return float(places[heights == 0.0][0])
 
     def branch(self, u: Float) -> Float:
-        """Interpolate the table."""
+        """Interpolate traction / peak at u in the table."""
         return np.interp(u, *self._points)
 
     def under(self, u: Float) -> Float:
-        """Sum up the trapezia up to u."""
+        """Sum the trapezia under the branch from 0 to u."""
         places, heights = self._points
         ends = np.clip(np.minimum(u, self.last)[..., None], places[:-1], places[1:])
         means = (heights[:-1] + np.interp(ends, places, heights)) / 2
@@ -161,20 +162,20 @@ class TableLaw(Cohesive):
 
 
 class BilinearLaw(TableLaw):
-    """A branch of one straight piece."""
+    """The law with a linear branch: traction / peak = 1 - u."""
 
     _points = np.array([0.0, 1.0]), np.array([1.0, 0.0])
 
 
 class ExponentialLaw(Cohesive):
-    """The branch exp(-u)."""
+    """The law with an exponential branch: traction / peak = exp(-u)."""
 
     last = -float(np.log(TAIL))
 
     def branch(self, u: Float) -> Float:
-        """exp(-u)."""
+        """Compute exp(-u)."""
         return np.asarray(np.exp(-u))
 
     def under(self, u: Float) -> Float:
-        """1 - exp(-u)."""
+        """Compute 1 - exp(-u)."""
         return np.asarray(1.0 - np.exp(-u))

@@ -14,7 +14,7 @@ MANY = 100_000
 TABLES: dict[str, tuple[Content, str]] = {
     "a pipe": (os.mkfifo, "it is a pipe"),
     "a folder": (os.mkdir, "Is a directory"),
-    "endless": (lambda path: path.symlink_to("/dev/zero"), "it is no file but a device"),
+    "endless": (lambda path: path.symlink_to("/dev/zero"), "it is a device, not a file"),
     "a link in a circle": (lambda path: path.symlink_to(path), "Too many levels of symbolic links"),
     "sparse": (lambda path: os.truncate(os.open(path, os.O_CREAT | os.O_RDWR), 20 << 30), "more than 64 MiB"),
     "empty": ("", "no rows"),

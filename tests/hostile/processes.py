@@ -45,7 +45,7 @@ SURROUNDINGS: dict[str, tuple[str, str, tuple[int, ...]]] = {
     ),
     "options of a file of itself": (
         "echo -options_file out/o > out/o; PETSC_OPTIONS='-options_file out/o' feti check c.toml",
-        "none of another file",
+        "without options_file",
         (2,),
     ),
     "options of the environment": (

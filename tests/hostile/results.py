@@ -81,7 +81,7 @@ def in_case(**sections: Any) -> Callable[[Path], None]:
 JSON: dict[str, tuple[Content, str]] = {
     "a pipe": (replaced(os.mkfifo), "it is a pipe"),
     "a folder": (replaced(os.mkdir), "Is a directory"),
-    "endless": (link_to("/dev/zero"), "it is no file but a device"),
+    "endless": (link_to("/dev/zero"), "it is a device, not a file"),
     "a link in a circle": (link_to("result.json"), "Too many levels of symbolic links"),
     "sparse": (sparse, "more than 1024 MiB"),
     "empty": ("", "cannot read"),
@@ -160,7 +160,7 @@ TABLES: dict[str, Callable[[Path], None]] = {
 }
 SWEEPS: dict[str, tuple[Content, str]] = {
     "a pipe": (replaced(os.mkfifo), "it is a pipe"),
-    "endless": (link_to("/dev/zero"), "it is no file but a device"),
+    "endless": (link_to("/dev/zero"), "it is a device, not a file"),
     "empty": ("", "is damaged"),
     "nested": ("[" * 100_000, "is damaged"),
     "no cases": (without("cases"), "is damaged"),

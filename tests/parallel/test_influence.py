@@ -201,7 +201,7 @@ def test_multipliers_that_cancel_are_measured_by_those_of_single_strains(comm, s
     influence._followed.answer = right * np.array([1.0, 1.0 + 1e-11, 1.0])
     _, _, unseen = np.linalg.svd(U)
     solution = solver.solve(unseen[1] + unseen[2] + share * unseen[0], np.zeros(solver.rows))
-    assert solver._by_columns._expected is not None and solution.reason > 0 and gathered(cell, solution.lam).any()
+    assert solver._by_columns._prediction is not None and solution.reason > 0 and gathered(cell, solution.lam).any()
     assert np.abs(influence._followed.answer - right).max(initial=0.0) < 1e-14 * np.abs(gathered(cell, right)).max()
 
 

@@ -1,4 +1,4 @@
-"""Coarse spaces: rigid-body motions (natural) and soft modes of the subdomains beside them (adaptive, GenEO).
+"""The natural coarse space of rigid-body motions, and the adaptive coarse space with soft modes (GenEO).
 
 Imports `fem`, `feti`, `feti.decomposition`, `feti.linalg`, `feti.operators`, `mesh` and `system`.  Main entries:
 `natural.NaturalCoarseSpace`, `adaptive.AdaptiveCoarseSpace` and `adaptive.Balanced`.

@@ -1,13 +1,13 @@
 """The adaptive coarse space: rigid-body motions and soft subdomain modes, averaged over node copies.
 
-With the coarse displacements Z_0 (`geneo.AveragedModes`) the boundary stiffness S becomes
+With the coarse displacements Z_0 (`geneo.AveragedModes`) in equilibrium, the boundary stiffness S becomes
 
     S_0 = S - S Z_0 (Z_0^T S Z_0)^+ Z_0^T S,
 
-the stiffness with the coarse displacements in equilibrium.  The preconditioner is M^-1 = B_D S_0 B_D^T.  As B Z_0 = 0,
-it is the exact inverse of the dual operator if Z_0 spans all displacements of the glued cell (T9).  If Z_0 spans the
-soft modes, the preconditioner removes these from the Krylov method (Spillane & Rixen, IJNME 95, 2013).  Z_0^T S Z_0 is
-positive semi-definite, and couples subdomains that have a common neighbour.
+and the preconditioner is H_0 = B_D S_0 B_D^T.  As B Z_0 = 0, H_0 is the exact inverse of the dual operator if Z_0 spans
+all displacements of the glued cell (T9).  If Z_0 spans the soft modes, H_0 removes the soft modes from the Krylov
+method (Spillane & Rixen, IJNME 95, 2013).  Z_0^T S Z_0 is positive semi-definite, and couples subdomains with a common
+neighbour.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ class AdaptiveCoarseSpace:
     outer body has a column for every mode of every inner body.
 
     Attributes:
-        threshold: tau.
-        counts: soft mode counts of the local subdomains.
+        threshold: bound tau of soft modes.
+        counts: numbers of soft modes by local subdomain.
         coarse_dimension: number n of all coarse displacements.
         factorizations: number of factorizations of Z_0^T S Z_0.
         solver: solver for the scaled matrix Z_0^T S Z_0.
@@ -51,10 +51,10 @@ class AdaptiveCoarseSpace:
         threshold: float,
         thresholds: Thresholds = DEFAULTS,
     ) -> None:
-        """Compute the modes below the threshold tau, and factor the coarse problem.  Collective.
+        """Compute the soft modes, and factor the coarse problem.  Collective.
 
-        All boundary operators must be dense, except on large bodies.  Options with the prefix `feti_coarse_` are as in
-        `DistributedSolver`.
+        Soft modes have theta < `threshold`.  Boundary operators must be dense where `operators.facewise` is false.
+        Options with the prefix `feti_coarse_` are as in `DistributedSolver`.
 
         Raises:
             MeshError: a face neighbourhood on some rank is not a valid subdomain.
@@ -85,9 +85,9 @@ class AdaptiveCoarseSpace:
         self.factor(self.part())
 
     def activate(self, active: Float) -> None:
-        """Average the modes over node copies on the active rows, and factor the coarse problem.  Collective.
+        """Average the modes over node copies on active rows, and factor again.  Collective.
 
-        Rows are active where `active` (owned rows,) is 1, as in the scaling.  Raises as `factor`.
+        Rows are active where `active` (owned rows,) is 1; the scaling must have the same rows.  Raises as `factor`.
         """
         mask = self._jump_operator.gather(active).copy()
         changed = mask != self._mask
@@ -99,23 +99,24 @@ class AdaptiveCoarseSpace:
         self.factor(self.part())
 
     def _update(self, which: Sequence[int], BW: Sequence[csr_matrix]) -> None:
-        """Compute S Z_0 and Z_0^T S Z_0 on the subdomains `which` from their scaled constraints `BW`."""
+        """Compute S Z_0 and Z_0^T S Z_0 on subdomains `which`; `BW` are their scaled constraints."""
         for i, constraints in zip(which, BW, strict=True):
             Z = self._modes.of_subdomain(i, constraints)
             self._forces[i] = self._operators.with_springs[i].apply_schur(Z)
             self._energies[i] = Z.T @ self._forces[i]
 
     def part(self) -> csr_matrix:
-        """Sum the local contribution (u, u) to Z_0^T S Z_0."""
+        """Sum Z_0^T S Z_0 (u, u) over the local subdomains."""
         blocks = zip(self._columns, self._columns, self._energies, strict=True)
         return sum_of_blocks((len(self._modes.reaching),) * 2, blocks)
 
     def factor(self, part: csr_matrix) -> None:
-        """Factor the coarse matrix Z_0^T S Z_0, the sum of the parts on all ranks.  Collective.
+        """Factor the coarse matrix Z_0^T S Z_0 of all ranks.  Collective.
 
-        The matrix is scaled to a unit diagonal.  Modes of a free fibre have no energy, and get no equation; other modes
-        may be linearly dependent.  A multiple eps I makes the matrix definite and S_0 larger: the coarse correction
-        leaves the fraction eps / (mu + eps) of the forces of a coarse displacement with the scaled energy mu.
+        `part` (u, u) is the contribution of this rank.  The matrix is scaled to a unit diagonal.  Modes of a free fibre
+        have no energy and get no equation; other modes may be linearly dependent.  A multiple eps I makes the matrix
+        definite: for a coarse displacement with scaled energy mu, S_0 keeps the fraction eps / (mu + eps) of the
+        forces.
 
         Raises:
             LinAlgError: rounding leaves the matrix indefinite with all COARSE_REGULARISATIONS.
@@ -129,13 +130,13 @@ class AdaptiveCoarseSpace:
         energy = distributed_arrays.allreduce_sum(self.comm, energies)[self._modes.reaching]
         if self._free_energy is None:
             largest = self.comm.allreduce(energy.max(initial=0.0), MPI.MAX)
-            # A displacement of rounding size has an energy of rounding squared.
+            # The energy of displacements that are rounding is quadratic in the rounding.
             rounded = (ROUNDING_MARGIN * np.finfo(float).eps) ** 2 * largest
             self._free_energy = ZERO_TOLERANCE * np.where(energy > rounded, energy, largest)
-        # The energy of a free motion is rounding, which the scaling would raise above the added multiple.
-        is_held = energy > self._free_energy
-        root = np.sqrt(np.where(is_held, energy, 0.0))
-        self._weights = np.divide(1.0, root, out=np.zeros_like(root), where=is_held)
+        # The energy of a free motion is rounding, which the scaling would raise above eps.
+        has_energy = energy > self._free_energy
+        root = np.sqrt(np.where(has_energy, energy, 0.0))
+        self._weights = np.divide(1.0, root, out=np.zeros_like(root), where=has_energy)
         matrix, near_kernel = scaled(part, self._weights), self._translations * root[:, None]
         for regularisation in COARSE_REGULARISATIONS:
             try:
@@ -160,11 +161,10 @@ class AdaptiveCoarseSpace:
         return forces
 
     def solve(self, work: Float) -> Float:
-        """Solve the coarse problem for c: Z_0^T S Z_0 c = sum of `work` (u,) or (u, k) over the ranks.  Collective."""
+        """Solve Z_0^T S Z_0 c = w for c (u, k), with w the sum of `work` (u, k) over ranks.  Collective."""
         with self._solve_event:
-            return distributed_arrays.scale_rows(
-                self._weights, self.solver.solve(distributed_arrays.scale_rows(self._weights, work))
-            )
+            right = distributed_arrays.scale_rows(self._weights, work)
+            return distributed_arrays.scale_rows(self._weights, self.solver.solve(right))
 
     def _parts(self) -> zip[tuple[Int, Float, slice]]:
         """Iterate over the subdomains: mode positions, S Z_0, and slice of the boundary dofs."""
@@ -176,9 +176,9 @@ class AdaptiveCoarseSpace:
 
 
 class Balanced(Preconditioner):
-    """The preconditioner z = B_D S_0 B_D^T r, with S_0 of `coarse` and B_D of `scaled`.
+    """The preconditioner H_0 = B_D S_0 B_D^T, with S_0 of `coarse` and B_D of `scaled`.
 
-    S_0 B_D^T B R = S_0 R = 0 for rigid-body motions R, so that G^T z = 0, and a part G a of r does not change z.
+    S_0 B_D^T B R = S_0 R = 0 for rigid-body motions R, so that G^T H_0 r = 0 and H_0 G = 0.
 
     Attributes:
         scaled: the preconditioner without coarse space.
@@ -189,14 +189,14 @@ class Balanced(Preconditioner):
         self.scaled, self.coarse = scaled, coarse
 
     def activate(self, active: Float) -> None:
-        """Restrict scaling and coarse space to the rows where `active` is 1.  Collective."""
+        """Restrict scaling and coarse space to rows where `active` (owned rows,) is 1.  Collective."""
         self.scaled.activate(active)
         self.coarse.activate(active)
 
     def apply(self, r: Float) -> Float:
-        """Apply the preconditioner: B_D S_0 B_D^T r.  Collective."""
+        """Compute H_0 r for r (owned rows,) or (owned rows, k).  Collective."""
         return self.scaled.multipliers(self.coarse.balanced(self.scaled.displacement_with_jump(r)))
 
     def closing_forces(self, jump: Float) -> Float:
-        """Compute the forces B_D S B_D^T jump without the coarse space.  Collective."""
+        """Compute B_D S B_D^T `jump`, without the coarse space.  Collective."""
         return self.scaled.apply(jump)

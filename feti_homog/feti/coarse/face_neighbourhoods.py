@@ -1,11 +1,11 @@
-"""Face neighbourhoods on long boundaries, and trace spaces of piecewise linear displacements.
+"""Face neighbourhoods of large bodies, and trace spaces of piecewise linear displacements.
 
-For face displacements p and any other displacements, the body has at least the energy of the face neighbourhood N:
+For face displacements p, the body has at least the energy of the face neighbourhood N:
 
     min { x^T S x : x = p on the face } >= p^T S_N p.
 
-So every soft displacement of the body is soft in a neighbourhood, which may have more soft displacements.  With all
-other nodes fixed, the face is stiffer than in the body:  S restricted to the face <= S_fixed.
+So every soft displacement of the body is soft in a neighbourhood, which may have additional soft displacements.  With
+all nodes off the face fixed, the face is stiffer than in the body: S restricted to the face <= S_fixed.
 
 Refinement hardly changes the soft modes of a subdomain.  So the search uses the coarsest trace space with enough dofs:
 P q for the values q at the vertices of the coarse mesh and at every k-th node along its edges.
@@ -29,9 +29,10 @@ from feti_homog.typing import Float, Int
 def trace_space(
     submesh: Submesh, lattice: ReferenceLattice, problem: Problem, nodes: Int, min_dofs: int = DEFAULTS.min_trace_dofs
 ) -> csr_matrix:
-    """Build the prolongation P (cn, cm) from a trace space to n boundary nodes; cm >= min(cn, `min_dofs`).
+    """Build the prolongation P (cn, cm) from a trace space to boundary nodes.
 
-    Nodes are sorted classes of the refined piece; edge ends that are not boundary nodes have zero displacement.
+    `nodes` (n,) are sorted node classes of the refined piece, with c components; cm >= min(cn, `min_dofs`).  Edge ends
+    that are not boundary nodes have zero displacement.
     """
     vertices, inner, c = len(submesh.class_keys), lattice.intervals - 1, problem.components
     on_edge = nodes >= vertices
@@ -74,7 +75,7 @@ class FaceNeighbourhood:
         operator: dense boundary operators of the neighbourhood.
         R: (n, k) kernel on the face.
         P: (n, m) trace space.
-        S_fixed: (n, n) stiffness of the face with other faces and all nodes outside the neighbourhood fixed.
+        S_fixed: (n, n) stiffness of the face while the other faces and all nodes outside the neighbourhood are fixed.
     """
 
     at: Int
@@ -87,7 +88,9 @@ class FaceNeighbourhood:
 def face_neighbourhoods(
     body: Subdomain, dofs: Int, face: Int, thresholds: Thresholds = DEFAULTS
 ) -> list[FaceNeighbourhood]:
-    """Build the neighbourhoods of a face: connected triangles near the face, with several face nodes.
+    """Build the neighbourhoods of a face: connected triangles within `face_layers` layers.
+
+    A neighbourhood with a single face node is skipped.
 
     Args:
         dofs: (n,) boundary dofs of the body, sorted.

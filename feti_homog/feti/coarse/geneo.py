@@ -1,12 +1,12 @@
-"""Soft modes of all subdomains, which slow down the convergence, and averages of these modes.
+"""Kernels and soft modes V of all subdomains, and the coarse displacements Z_0 that follow from V.
 
-With the averaged soft modes in equilibrium, the largest eigenvalue of the preconditioned dual operator is at most
+With the soft modes in the coarse space, the largest eigenvalue of the preconditioned dual operator is at most
 1 + N / tau for any geometry and any materials.  N - 1 is the largest number of neighbours of a subdomain (GenEO:
 Spillane & Rixen, IJNME 95, 2013).  Measured values are about 1 / tau.
 
-Subdomain modes are averaged over node copies: Z_0 = (I - B_D^T B) V, the coarse displacements.
-B Z_0 = 0, for B B_D^T = I, so Z_0 are displacements of the cell with glued active rows.  A subdomain mode reaches only
-the subdomains that share nodes with its subdomain.
+Subdomain modes are averaged over node copies: Z_0 = (I - B_D^T B) V.  B Z_0 = 0, because B B_D^T = I: so Z_0 are
+displacements of the cell with glued active rows.  A subdomain mode reaches only subdomains that share nodes with its
+subdomain.
 """
 
 from collections.abc import Iterator, Sequence
@@ -34,7 +34,7 @@ class AveragedModes:
 
     Attributes:
         total: number n of coarse modes in the cell.
-        columns: ascending numbers (m,) of the modes that reach a subdomain, in a list over the subdomains.
+        columns: for every local subdomain, (m,) numbers of the modes that reach the subdomain, ascending.
         reaching: (u,) numbers of the modes that reach any local subdomain, ascending.
         is_own: (u,) whether the mode belongs to a local subdomain.
     """
@@ -42,7 +42,7 @@ class AveragedModes:
     def __init__(
         self, comm: MPI.Intracomm, blocks: Sequence[SubdomainBlocks], neighbours: Neighbours, V: Sequence[Float]
     ) -> None:
-        """Exchange the jumps of the boundary modes `V`, a list over the subdomains.  Collective."""
+        """Exchange the jumps B V; `V` has (boundary dofs, modes) for every local subdomain.  Collective."""
         self._blocks, self._V, self._sizes = blocks, V, [len(rows) for rows in neighbours.rows]
         counts = np.zeros(len(neighbours.rank), np.int64)
         counts[neighbours.index] = [v.shape[1] for v in V]
@@ -54,14 +54,13 @@ class AveragedModes:
             for i, (block, v) in enumerate(zip(blocks, V, strict=True)):
                 Z, s = block.B @ v, neighbours.index[i]
                 first = ends[s] - v.shape[1]
-                for t, common in neighbours.common[i].items():
+                for t, rows in neighbours.common[i].items():
                     # A subdomain has all its modes, even if a mode opens no jump.
-                    some = np.arange(v.shape[1]) if t == s else np.flatnonzero(Z[common].any(axis=0))
-                    yield i, t, (first + some, Z[np.ix_(common, some)])
+                    modes = np.arange(v.shape[1]) if t == s else np.flatnonzero(Z[rows].any(axis=0))
+                    yield i, t, (first + modes, Z[np.ix_(rows, modes)])
 
-        neighbours.exchange(
-            messages(), lambda i, s, message: self._jumps[i].append((neighbours.common[i][s], *message))
-        )
+        common = neighbours.common
+        neighbours.exchange(messages(), lambda i, s, message: self._jumps[i].append((common[i][s], *message)))
         self.total = int(ends[-1]) if len(ends) else 0
         self._first = [int(ends[s]) - v.shape[1] for s, v in zip(neighbours.index, V, strict=True)]
         none = np.zeros(0, np.int64)
@@ -71,9 +70,10 @@ class AveragedModes:
         self.is_own = np.isin(self.reaching, np.concatenate([none, *numbers]))
 
     def of_subdomain(self, i: int, BW: csr_matrix) -> Float:
-        """Compute the averaged modes Z_0 (boundary dofs, m) on subdomain i, without its kernel.
+        """Compute the averaged modes Z_0 (boundary dofs, m) on local subdomain i.
 
-        The kernel has no energy.  Without it, the remaining motion of a stiff subdomain keeps all digits.
+        The kernel of the subdomain, which has no energy, is left out: so the motion of a stiff subdomain keeps all
+        digits.
 
         Args:
             BW: (rows, boundary dofs) scaled constraints W^-1 B D^-1 of the subdomain, on the active rows.
@@ -89,7 +89,7 @@ class AveragedModes:
         return Z
 
     def translations(self, comm: MPI.Intracomm) -> Float:
-        """Compute the amplitudes (u, c) of cell translations, which have little energy.  Collective."""
+        """Compute the amplitudes (u, c) of the c translations of the cell.  Collective."""
         subdomains = [block.subdomain for block in self._blocks]
         c = subdomains[0].problem.components if subdomains else 0
         amplitudes = np.zeros((self.total, comm.allreduce(c, MPI.MAX)))
@@ -101,14 +101,13 @@ class AveragedModes:
 def subdomain_blocks(
     operators: InterfaceOperators, scaling: StiffnessScaled, rows: Sequence[Int]
 ) -> list[SubdomainBlocks]:
-    """Cut the subdomain blocks out of B and W^-1 B D^-1, on the constraint `rows` of every subdomain.  Collective."""
+    """Cut the blocks of every local subdomain out of B and W^-1 B D^-1.  Collective; `rows` as `Neighbours.rows`."""
     B, BW = operators.B.tocsc(), scaled_constraints(scaling)
     blocks = []
     for i, (subdomain, operator) in enumerate(zip(operators.subdomains, operators.with_springs, strict=True)):
         constraints, scaled = (local_columns(matrix, operators.slices[i], rows[i]) for matrix in (B, BW))
-        blocks.append(
-            SubdomainBlocks(subdomain, operators.dofs[i], operator, constraints, scaled, operators.facewise[i])
-        )
+        parts = operators.dofs[i], operator, constraints, scaled, operators.facewise[i]
+        blocks.append(SubdomainBlocks(subdomain, *parts))
     return blocks
 
 
@@ -120,16 +119,16 @@ def scaled_constraints(scaling: StiffnessScaled) -> csc_matrix:
     at = np.searchsorted(jump_operator.rows, jump_operator.owned[0])
     shape = (len(jump_operator.rows), jump_operator.global_rows)
     wide = csr_matrix((inverse.data, (inverse.row + at, inverse.col + jump_operator.owned[0])), shape=shape)
-    W_inverse = add_shared_rows(jump_operator.comm, wide, jump_operator.rows, jump_operator.is_shared_row, owned)[
-        :, jump_operator.rows
-    ]
-    return (W_inverse @ scaling.BD).tocsc()
+    W_inverse = add_shared_rows(jump_operator.comm, wide, jump_operator.rows, jump_operator.is_shared_row, owned)
+    return (W_inverse[:, jump_operator.rows] @ scaling.BD).tocsc()
 
 
 def kernels_and_soft_modes(
     blocks: Sequence[SubdomainBlocks], neighbours: Neighbours, threshold: float, thresholds: Thresholds = DEFAULTS
 ) -> list[Float]:
-    """Compute the modes V (n, k + m) of the local subdomains: kernel and m soft modes.  Collective.
+    """Compute the modes V (n, k + m) of every local subdomain.  Collective.
+
+    A subdomain has k kernel modes and m soft modes with theta < `threshold`.
 
     Raises:
         MeshError: a face neighbourhood on some rank is not a valid subdomain.
@@ -148,8 +147,8 @@ def kernels_and_soft_modes(
     V = []
     for block, problem, shares in zip(blocks, problems, received, strict=True):
         modes = problem.modes(shares, threshold)
-        # Soft modes are scaled to displacements of about 1, as kernels are, so that all energies have the unit of
-        # stress.  Powers of two change no digit.
+        # Like kernels, soft modes are scaled to displacements of about 1, so that all energies have the unit of stress.
+        # Powers of two change no digit.
         exponent = np.frexp(np.abs(modes).max(axis=0, initial=0.0))[1]
         V.append(np.hstack([block.R, np.ldexp(modes, -exponent)]))
         shares.clear()
@@ -157,7 +156,7 @@ def kernels_and_soft_modes(
 
 
 def local_columns(matrix: csc_matrix, span: slice, rows: Int) -> csr_matrix:
-    """Cut the columns `span` out of a matrix; the sorted `rows` contain all entries in these columns."""
+    """Return the columns `span` of a matrix, at sorted `rows` that contain all their entries."""
     indptr = matrix.indptr[span.start : span.stop + 1]
     part = slice(indptr[0], indptr[-1])
     at = np.searchsorted(rows, matrix.indices[part])

@@ -1,13 +1,13 @@
-"""Soft subdomain modes, from one eigenproblem on the boundary or from an eigenproblem on every face.
+"""Soft modes of one subdomain, from an eigenproblem on its boundary or from eigenproblems on its faces.
 
-For a subdomain s with Schur complement S_s and constraints B_s, the displacements p of its boundary with
+For a subdomain s with Schur complement S_s and constraints B_s, boundary displacements p with
 
     S_s p = theta N_s p,  N_s = B_s^T M^-1 B_s,  theta < tau
 
 are soft in s but stiff in the preconditioner.  On a large boundary, this dense eigenproblem is too large.  But if every
 node belongs to one other body only, the weights of M^-1 hardly change along the boundary, s contributes at most S_s to
 M^-1, and the contribution of the neighbour makes p stiff.  Then every face has a separate eigenproblem, with the Schur
-complement of the face neighbourhood in place of S_s.  The eigenproblems are projected to trace spaces.
+complement of the face neighbourhood in place of S_s.  All eigenproblems are projected to trace spaces.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,7 +24,7 @@ from feti_homog.feti.operators.with_springs import BoundaryOperator, DenseOperat
 from feti_homog.feti.thresholds import Thresholds
 from feti_homog.typing import Float, Float32, Int
 
-# Relative size of eigenvalues that are rounding, for a matrix in single precision.
+# Relative size below which eigenvalues of a matrix in single precision are rounding.
 SINGLE_PRECISION_NULL = 10 * np.finfo(np.float32).eps
 
 
@@ -60,7 +60,7 @@ class SubdomainEigenproblem:
     def __init__(
         self, block: SubdomainBlocks, operator: DenseOperator, common: Mapping[int, Int], min_trace_dofs: int
     ) -> None:
-        """Project S to the trace space; `common` maps every neighbour, and s, to the common rows."""
+        """Project S to the trace space; `common` is as in `Neighbours.common`."""
         self.block, self.common, self._operator = block, common, operator
         subdomain, S = block.subdomain, operator.S
         nodes = np.unique(subdomain.problem.nodes(block.dofs))
@@ -71,13 +71,13 @@ class SubdomainEigenproblem:
         self._share = BW @ (BW @ S.astype(np.float32)).T
 
     def preconditioner_shares(self) -> Iterator[tuple[int, Float32]]:
-        """Yield every neighbour, with the contribution to M^-1 on the common rows."""
+        """Yield neighbours t and the part (r, r) of this subdomain in M^-1 on r common rows."""
         for s, rows in self.common.items():
             if s != self.block.subdomain.submesh.index:
                 yield s, self._share[np.ix_(rows, rows)]
 
     def modes(self, shares: Sequence[tuple[int, Float32]], threshold: float) -> Float:
-        """Compute the soft modes (n, m) without the kernel; `shares` are the neighbour contributions to M^-1."""
+        """Compute soft modes (n, m), theta < `threshold`; `shares` are neighbours and their parts of M^-1."""
         M = self._share.copy()
         # Subdomain order, so that rounding does not depend on the ranks.
         for s, share in sorted(shares, key=lambda part: part[0]):
@@ -102,7 +102,7 @@ class FaceEigenproblems:
         }
 
     def preconditioner_shares(self) -> Iterator[tuple[int, Float32]]:
-        """Yield every neighbour, with an upper bound of the contribution to M^-1 on the common rows."""
+        """Yield neighbours t and an upper bound (r, r) of this subdomain in M^-1 on r common rows."""
         for s, neighbourhoods in self._neighbourhoods.items():
             share = np.zeros((len(self.common[s]),) * 2)
             for part in neighbourhoods:
@@ -111,18 +111,18 @@ class FaceEigenproblems:
             yield s, share.astype(np.float32)
 
     def modes(self, shares: Sequence[tuple[int, Float32]], threshold: float) -> Float:
-        """Compute the soft face modes (n, m); `shares` are the neighbour contributions to M^-1.
+        """Compute the soft face modes (n, m) with theta < `face_factor` x `threshold`.
 
-        A face mode continues on the rest of the boundary as in the whole body, down to the decayed displacements.
+        `shares` are the neighbours, with their parts of M^-1 on the common rows.  S+ extends a face mode to the whole
+        boundary; displacements below `decayed` times the largest are set to 0.
         """
         forces = [np.zeros((len(self.block.dofs), 0))]
         for s, share in shares:
             for part in self._neighbourhoods[s]:
                 B = self.block.B[self.common[s]][:, part.at]
                 N = jump_energy(B, part.P, part.R, share)
-                soft = part.P @ soft_modes(
-                    congruent(part.P, part.operator.regularised_schur), N, self._factor * threshold
-                )
+                S = congruent(part.P, part.operator.regularised_schur)
+                soft = part.P @ soft_modes(S, N, self._factor * threshold)
                 forces.append(np.zeros((len(self.block.dofs), soft.shape[1])))
                 forces[-1][part.at] = jump_forces(B, soft, part.R, share)
         modes = self.block.operator.apply_flexibility(np.asfortranarray(np.hstack(forces)))
@@ -133,7 +133,7 @@ class FaceEigenproblems:
 def eigenproblem(
     block: SubdomainBlocks, common: Mapping[int, Int], thresholds: Thresholds
 ) -> SubdomainEigenproblem | FaceEigenproblems:
-    """Set up the eigenproblem of a subdomain, or the eigenproblems of its faces.
+    """Set up the eigenproblem of a subdomain, or of its faces if `block.facewise`.
 
     Raises:
         TypeError: the problem is on the whole boundary, but the operators are not dense.
@@ -146,33 +146,30 @@ def eigenproblem(
 
 
 def jump_forces(B: csr_matrix, p: Float, R: Float, M: Float32) -> Float:
-    """Compute the forces N p (n, m), N = B^T M B, without work on the kernel R (n, k).
+    """Compute the forces N p (n, m), N = B^T M B, projected so that R^T N p = 0.
 
-    S+ N p is a step of inverse iteration, which bends an eigenvector p (n, m) of the trace space as the body bends.
-    The result is as precise as M.
+    S+ N p is a step of inverse iteration: it turns an eigenvector p (n, m) of the trace space into a displacement that
+    the body can have.  `R` (n, k) is the kernel.  The result is as precise as M.
     """
     NR, Np = (np.asarray(B.T @ (M @ (B @ x).astype(np.float32)).astype(float)) for x in (R, p))
-    return np.asfortranarray(
-        Np - NR @ (np.linalg.pinv(R.T @ NR, rcond=SINGLE_PRECISION_NULL, hermitian=True) @ (R.T @ Np))
-    )
+    inverse = np.linalg.pinv(R.T @ NR, rcond=SINGLE_PRECISION_NULL, hermitian=True)
+    return np.asfortranarray(Np - NR @ (inverse @ (R.T @ Np)))
 
 
 def congruent(T: csr_matrix | Float, A: Float | Float32) -> Float:
-    """Compute the congruent matrix T^T A T for symmetric A."""
+    """Compute T^T A T (m, m) for T (n, m) and symmetric A (n, n)."""
     return np.asarray(T.T @ (T.T @ A).T)
 
 
 def jump_energy(B: csr_matrix, P: csr_matrix, R: Float, M: Float32) -> Float:
-    """Compute the energy T^T M T (m + k, m + k) of the jumps T = B [P R] for symmetric M."""
+    """Compute [P R]^T B^T M B [P R] (m + k, m + k) for symmetric M (rows, rows)."""
     TP, TR = (B @ P).astype(np.float32), (B @ R).astype(np.float32)
     MR = M @ TR
     return np.block([[congruent(TP, M), TP.T @ MR], [(TP.T @ MR).T, TR.T @ MR]]).astype(float)
 
 
 def soft_modes(S: Float, N: Float, threshold: float) -> Float:
-    """Compute the soft modes q (m, j), without the kernel of S.
-
-    Soft modes solve P^T S P q = theta P^T N P q with theta < threshold.
+    """Compute the eigenvectors q (m, j) with P^T S P q = theta P^T N P q, theta < `threshold`.
 
     Args:
         S: (m, m) P^T S P, regularised on the kernel of S.
@@ -181,10 +178,10 @@ def soft_modes(S: Float, N: Float, threshold: float) -> Float:
     m = len(S)
     NR, RNR = N[:m, m:], N[m:, m:]
     # Without the kernel part, eigenvectors of N are N-orthogonal to the kernel, and there the regularised matrix is S.
-    rest = N[:m, :m] - NR @ np.linalg.pinv(RNR, rcond=SINGLE_PRECISION_NULL, hermitian=True) @ NR.T
+    reduced = N[:m, :m] - NR @ np.linalg.pinv(RNR, rcond=SINGLE_PRECISION_NULL, hermitian=True) @ NR.T
     # A Cholesky factorization detects soft modes at a tenth of the cost of an eigenproblem.
     try:
-        cholesky(S - threshold * rest)
+        cholesky(S - threshold * reduced)
     except np.linalg.LinAlgError:
-        return np.asarray(eigh(rest, S, subset_by_value=(1.0 / threshold, np.inf), overwrite_a=True)[1])
+        return np.asarray(eigh(reduced, S, subset_by_value=(1.0 / threshold, np.inf), overwrite_a=True)[1])
     return np.zeros((m, 0))

@@ -1,4 +1,4 @@
-"""The natural coarse space: G = B R, the projector P = I - G (G^T G)^-1 G^T and rigid-body amplitudes, Eq. (37)."""
+"""The natural coarse space G = B R of rigid-body motions, Eq. (37), and its projector P."""
 
 from __future__ import annotations
 
@@ -17,20 +17,21 @@ from feti_homog.typing import Float, Int
 
 
 class NaturalCoarseSpace:
-    """The rigid-body motions of all subdomains, and the projector on multipliers in equilibrium, G^T lam = 0.
+    """The rigid-body motions of all subdomains, and P = I - G (G^T G)^-1 G^T.
 
-    The load of a macroscopic strain does no work on rigid-body motions, so e = R^T f vanishes.  G has a row for every
-    multiplier and a column for every kernel mode.  A rank stores its owned rows, and its part in a factor of G^T G.
+    P projects on multipliers in equilibrium, G^T lam = 0: in Eq. (37) R^T f vanishes, because the load of a macroscopic
+    strain does no work on rigid-body motions.  G has a row for every multiplier and a column for every kernel mode.  A
+    rank stores its owned rows of G, and its part of a factor of G^T G.
 
     Attributes:
         kernel_dimension: number m of kernel modes in the cell.
-        owned_modes: slice of the modes of local subdomains among all modes.
+        owned_modes: slice in all modes with the modes of local subdomains.
         R: (boundary dofs, owned modes) kernels on the boundaries.
         G: (owned rows, m).
         body: (m,) body numbers of the modes.
-        pinned_body: body with the pinned class, -1 if no class is pinned.
+        pinned_body: body with the pinned node class, -1 without a pinned class.
         unconstrained_modes: (m, z) orthonormal amplitudes of the motions that no active row resists, sparse.
-        unknowns: (u,) modes in the owned rows of G or in local unconstrained modes, and owned modes.
+        unknowns: (u,) owned modes, and modes in the owned rows of G or in local unconstrained modes.
         factorizations: number of factorizations of G^T G.
         solver: solver for G^T G.
     """
@@ -63,17 +64,17 @@ class NaturalCoarseSpace:
         self.factor()
 
     def activate(self, active: Float) -> None:
-        """Set the active rows, where `active` (owned rows,) is 1; inactive rows have no multiplier.  Collective.
+        """Set the active rows, where `active` (owned rows,) is 1.  Collective.
 
-        The next projection factors G^T G.  Motions Z that no active row resists, for example of a free fibre, get a
-        stiffness s: G^T G + s Z Z^T.
+        The next projection factors G^T G of these rows.  Motions Z that no active row resists, for example of a free
+        fibre, get the largest diagonal entry s of G^T G as stiffness: G^T G + s Z Z^T.
         """
         self._active, self._is_factored = active, False
         self.unconstrained_modes = self.free_motions(active)
 
     @property
     def G_active(self) -> csr_matrix:
-        """Return the matrix G (owned rows, m), with 0 in inactive rows."""
+        """Return G (owned rows, m) with 0 in inactive rows."""
         return (diags(self._active) @ self.G).tocsr()
 
     def factor(self) -> None:
@@ -94,18 +95,18 @@ class NaturalCoarseSpace:
 
     @cached_property
     def _gram(self) -> GramMatrix:
-        """Return the stored products of G, set up at the first inactive row: 36 numbers a row.  Collective.
+        """Return G^T A G with stored products, 36 numbers a row.  The first call is collective.
 
         The pieces of the pinned body are glued to the pinned class and cannot move.
         """
         return GramMatrix(self.comm, self.G, np.flatnonzero(self.body != self.pinned_body))
 
     def free_motions(self, active: Float) -> csc_matrix:
-        """Compute the null space (m, z) of G^T G on the active rows: `unconstrained_modes`.  Collective."""
+        """Compute a basis (m, z) for the null space of G^T G on active rows.  Collective."""
         return self._gram.null_space(active, ZERO_TOLERANCE * self._diagonal)
 
     def amplitudes(self, x: Float) -> Float:
-        """Compute the amplitudes (G^T G)^-1 G^T x of jumps x (owned rows,) or (owned rows, k).  Collective."""
+        """Compute (G^T G)^-1 G^T x (m,) or (m, k) for x (owned rows,) or (owned rows, k).  Collective."""
         if not self._is_factored:
             self.factor()
         positions = np.searchsorted(self.unknowns, np.arange(self.kernel_dimension)[self.owned_modes])
@@ -114,7 +115,7 @@ class NaturalCoarseSpace:
         return distributed_arrays.allreduce_sum(self.comm, amplitudes)
 
     def project(self, x: Float) -> Float:
-        """Compute the projection P x of owned rows x, which are 0 on inactive rows.  Collective."""
+        """Compute P x for x (owned rows,) or (owned rows, k), 0 on inactive rows.  Collective."""
         if not self.kernel_dimension:
             return x.copy()
         if not self._is_factored:
@@ -123,7 +124,7 @@ class NaturalCoarseSpace:
         return projected
 
     def rigid_body_motion(self, amplitudes: Float) -> Float:
-        """Compute the motion R alpha of the boundary dofs for alpha (m,) or (m, k)."""
+        """Compute R alpha on the boundary dofs for alpha (m,) or (m, k)."""
         motion: Float = self.R @ amplitudes[self.owned_modes]
         return motion
 
@@ -133,10 +134,10 @@ class NaturalCoarseSpace:
 
 
 class GramMatrix:
-    """The matrix G^T A G for changing active rows A = diag(a), as sums of stored products."""
+    """The matrix G^T A G for active rows A = diag(a) that change, summed from stored products."""
 
     def __init__(self, comm: MPI.Intracomm, G: csr_matrix, movable: Int) -> None:
-        """Compute the products of all entry pairs in rows of G, and group the `movable` modes.  Collective."""
+        """Multiply all pairs of entries in a row of G, and group the `movable` modes.  Collective."""
         self._comm, self._m = comm, G.shape[1]
         count = np.diff(G.indptr)
         # Pairs of entries of one row.
@@ -147,7 +148,8 @@ class GramMatrix:
         diagonal = np.arange(self._m) * (self._m + 1)
         self._keys = np.unique(np.concatenate([diagonal, *comm.allgather(np.unique(key))]))
         entry = np.searchsorted(self._keys, key)
-        # First product and product count of each row; the entry that each product adds to, and its value.
+        # For every row, its first product and number of products; for every product, the entry it adds to and its
+        # value.
         self._first, self._count = np.cumsum(count**2) - count**2, count**2
         self._entry, self._product = entry, G.data[a] * G.data[b]
         self._active, self._own = np.zeros(G.shape[0]), np.zeros(len(self._keys))
@@ -162,9 +164,9 @@ class GramMatrix:
             self._groups.append((members, numbers, nothing, nothing[..., 0].copy(), nothing.copy()))
 
     def entries(self, active: Float) -> Float:
-        """Compute the entries of G^T A G, row by row, with A = diag(`active`) on the owned rows.  Collective.
+        """Compute the entries of G^T A G, row by row; `active` (owned rows,) is a.  Collective.
 
-        The method adds or subtracts only the products of rows that changed since the last call.
+        Only products of rows that changed since the last call are added or subtracted.
         """
         changed = np.flatnonzero(active != self._active)
         count = self._count[changed]
@@ -175,9 +177,9 @@ class GramMatrix:
         return distributed_arrays.allreduce_sum(self._comm, self._own)
 
     def null_space(self, active: Float, tolerance: Float) -> csc_matrix:
-        """Compute a basis (m, z) of the null space of G^T A G.  Collective.
+        """Compute a basis (m, z) for the null space of G^T A G.  Collective.
 
-        An eigenvalue is zero up to the largest `tolerance` (m,) among the modes of a group.
+        An eigenvalue of a group counts as zero up to the largest `tolerance` (m,) of its modes.
         """
         padded, columns, none = np.append(self.entries(active), 0.0), 0, np.zeros(0, np.int64)
         rows, numbers, values = [none], [none], [np.zeros(0)]
@@ -198,19 +200,19 @@ class GramMatrix:
         Z.sort_indices()
         return Z
 
-    def groups(self, some: Int) -> list[Int]:
-        """Group coupled modes of the set `some`, and return an array (groups, size) for every group size."""
+    def groups(self, modes: Int) -> list[Int]:
+        """Group the modes that G^T G couples: an array (groups, size) for every group size."""
         position = np.full(self._m, -1)
-        position[some] = np.arange(len(some))
+        position[modes] = np.arange(len(modes))
         i, j = position[self._rows], position[self._columns]
         coupled = (i >= 0) & (j >= 0)
-        group = periodic_topology.components(len(some), i[coupled], j[coupled])
+        group = periodic_topology.components(len(modes), i[coupled], j[coupled])
         order, sizes = np.argsort(group, kind="stable"), np.bincount(group)
         starts = np.cumsum(sizes) - sizes
-        return [some[order[starts[sizes == size][:, None] + np.arange(size)]] for size in np.unique(sizes)]
+        return [modes[order[starts[sizes == size][:, None] + np.arange(size)]] for size in np.unique(sizes)]
 
     def places(self, members: Int) -> Int:
-        """Return the entry numbers (g, s, s) of all mode pairs in groups with members (g, s).
+        """Return the numbers (g, s, s) of the entries at all mode pairs in groups `members` (g, s).
 
         A pair without an entry gets the total number of entries.
         """

@@ -1,4 +1,4 @@
-"""The torn cell: subdomains and their kernels, shared entities, and the jump operator B between them.
+"""The torn cell: subdomains with their kernels, shared entities, and the jump operator B.
 
 Imports `fem`, `feti`, `feti.linalg`, `mesh` and `system`.  Main entries: `partition.decompose`,
 `shared_entities.share_entities`, `subdomain.Subdomain` and `jump_operator.JumpOperator`.

@@ -1,4 +1,4 @@
-"""Rows and columns of the gluing constraints B on one rank, and the interface nodes whose bonds can break."""
+"""The layout of the constraints B on one rank, and the interface nodes, whose bonds can break."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from feti_homog.typing import Bool, Float, Int
 
 
 class Meshed(Protocol):
-    """A subdomain or a part of a subdomain: its coarse mesh and its refined mesh."""
+    """A subdomain, or a part of one, with its coarse mesh and its refined mesh."""
 
     @property
     def submesh(self) -> Submesh: ...
@@ -25,10 +25,10 @@ class Meshed(Protocol):
 
 @dataclass(frozen=True)
 class InterfaceNodes:
-    """The k breakable nodes whose multipliers a rank owns.
+    """The k interface nodes whose multipliers this rank owns.
 
     Attributes:
-        row: (k,) first local row of the bond: in the plane the normal row, before the tangential row.
+        row: (k,) first row of the bond among the owned rows: in the plane the normal row, before the tangential row.
         points: (k, 2) position on the fibre.
         normal: (k, 2) unit normal from the inner to the outer body; the tangent is (-n_y, n_x).
         length: (k,) tributary interface length: traction = nodal force / length.
@@ -36,7 +36,7 @@ class InterfaceNodes:
         pair: (k,) number of the interface in the case.
         bodies: (k, 2) outer body and fibre body.
         precracked: (k,) whether the node is debonded in the mesh.
-        fibre_node: (k,) number of the fibre's node copy among the fine nodes of this rank.
+        fibre_node: (k,) number of the node copy in the fibre among the fine nodes of this rank.
     """
 
     row: Int
@@ -51,16 +51,16 @@ class InterfaceNodes:
 
 
 class ConstraintLayout:
-    """The layout of B on one rank: rows and columns of each shared entity.
+    """The layout of B on one rank: rows and columns of the n shared entities.
 
     Attributes:
-        components: c, rows of a vector constraint.
-        count: (n,) number of rows of each shared entity.
-        first: (n,) first local row of each shared entity.
+        components: rows c of a vector constraint.
+        count: (n,) number of rows at an entity.
+        first: (n,) first local row at an entity.
         rows: (local rows,) global row numbers.
-        dofs: (subdomains + 1,) first local degree of freedom of each subdomain, and the number of all.
-        owned: first global row of this rank and the one after its last.
-        base: for each sharer, the local number of its first fine node on the entity; -1 for a sharer on another rank.
+        dofs: (subdomains + 1,) first local dof by subdomain, and the number of all dofs.
+        owned: half-open range of the global rows that this rank owns.
+        base: (sharers,) local number of the first fine node of a sharer on its entity; -1 on another rank.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class ConstraintLayout:
         self.components = components
         begin, end = shared.owned
         self.owned = components * begin, components * end
-        # Whether this rank owns the rows of each entity, and the first of them, counted from this rank's first row.
+        # Whether this rank owns the rows of an entity, and the first row of the entity among the owned rows.
         self._is_owned = (shared.first >= begin) & (shared.first < end)
         self._owned_row = components * (shared.first - begin)
         copies = shared.copies
@@ -95,8 +95,8 @@ class ConstraintLayout:
         component, identity = np.arange(c), np.eye(c)
         none = np.zeros(0, np.int64)
         rows, columns, values = [none], [none], [none.astype(float)]
-        # Groups of entities with equal numbers of copies in their bodies, with and without bonds that can break: where
-        # the copies of a body begin and where all end, and whether bonds can break.
+        # Entities have one code, and form one group, if their bodies have equal numbers of copies and their bonds can
+        # or cannot break: bits mark the first copy of every body, the end of the copies, and breakable bonds.
         entity, copy = expand(np.arange(len(shared.key)), shared.copies)
         codes = np.zeros((len(shared.key), shared.copies.max(initial=0) + 2), bool)
         codes[entity, copy] = (copy == 0) | (np.diff(shared.body, prepend=-1) != 0)
@@ -109,8 +109,8 @@ class ConstraintLayout:
             k, contrasts = int(sizes.sum()), helmert(int(sizes.sum()))
             if len(sizes) == 2:
                 contrasts = np.vstack([block_diag(*map(helmert, sizes)), np.repeat([1.0, -1.0] / sizes, sizes)])
-            some = np.flatnonzero(group.ravel() == number)
-            entity, p = expand(some, shared.nodes[some])
+            members = np.flatnonzero(group.ravel() == number)
+            entity, p = expand(members, shared.nodes[members])
             first, frame = self.first[entity] + p * c * (k - 1), np.tile(identity, (len(entity), 1, 1))
             if code[-1] and c == 2:
                 n = self._normals(entity, p)
@@ -127,17 +127,17 @@ class ConstraintLayout:
         return coo_matrix(parts, shape=(len(self.rows), self.dofs[-1])).tocsr()
 
     def _places(self, entity: Int, p: Int) -> Float:
-        """Compute positions (i,) of fine nodes p, in [0, 1] along edges; 0 at vertices."""
+        """Compute positions s (i,) in [0, 1] of fine nodes p (i,) along their edges; 0 at vertices."""
         return np.where(self.shared.is_edge[entity], (p + 1) / self.lattice.intervals, 0.0)
 
     def _normals(self, entity: Int, p: Int) -> Float:
-        """Compute unit normals (i, 2) at fine nodes p of the entities."""
+        """Compute unit normals (i, 2) at fine nodes p (i,) of entities (i,)."""
         shared = self.shared
         normal = along(shared.normal[entity], shared.turn[entity], self._places(entity, p))
         return np.asarray(normal / np.hypot(*normal.T)[:, None])
 
     def node_rows(self) -> tuple[Int, Int]:
-        """Return the first owned row and the row count of each fine node that this rank owns."""
+        """Return the first owned row and the number of rows of every owned fine node, both (nodes,)."""
         shared = self.shared
         mine = np.flatnonzero(self._is_owned)
         size = self.components * (shared.copies[mine] - 1)
@@ -145,7 +145,7 @@ class ConstraintLayout:
         return self._owned_row[mine][entity] + p * size[entity], size[entity]
 
     def interface_nodes(self) -> InterfaceNodes:
-        """Collect the breakable nodes whose rows this rank owns."""
+        """Collect the interface nodes whose rows this rank owns."""
         shared = self.shared
         breakable = np.flatnonzero(self._is_owned & (shared.fibre >= 0))
         entity, p = expand(breakable, shared.nodes[breakable])
@@ -155,13 +155,12 @@ class ConstraintLayout:
             positions[offset + mesh.node_class] = mesh.points
         # Sharers are sorted inwards: the last sharer belongs to the fibre, and to this rank, which owns the rows.
         copy = self.base[shared.pointer[entity + 1] - 1] + p
-        # int N ds along the curve, summed over the sides of a node; half a side for linear elements.
+        # The length of a node is int N ds along the curve on both sides; half of both sides for linear elements.
         normal, turn, place = shared.normal[entity], shared.turn[entity], self._places(entity, p)
         order = self.lattice.order
         side, in_middle = order / self.lattice.intervals, shared.is_edge[entity] & (p % 2 == 0) & (order == 2)
-        before, after, around = (
-            side_lengths(normal, turn, place - part * side, order, side) for part in (1.0, 0.0, 0.5)
-        )
+        starts = (place - part * side for part in (1.0, 0.0, 0.5))
+        before, after, around = (side_lengths(normal, turn, start, order, side) for start in starts)
         on_edge = np.where(in_middle, around[:, 1], before[:, -1] + after[:, 0])
         return InterfaceNodes(
             row=self._owned_row[entity] + self.components * ((p + 1) * (k - 1) - 1),
@@ -176,9 +175,11 @@ class ConstraintLayout:
         )
 
     def facing(self) -> tuple[Int, Int]:
-        """Count the copies in the outer and the inner body (local rows, 2); return the inner body (local rows,), too.
+        """Count the node copies in both bodies of every row, and return the inner body.
 
-        Rows that do not connect two bodies have the counts 0 and the body -1.
+        Returns:
+            (local rows, 2) copies in the outer and the inner body, and (local rows,) number of the inner body; rows
+            that do not connect two bodies have 0 copies and body -1.
         """
         shared = self.shared
         entity = np.repeat(np.arange(len(shared.key)), shared.copies)
@@ -197,9 +198,9 @@ class ConstraintLayout:
         return copies, inside
 
     def outer_copies(self) -> tuple[Int, Int]:
-        """Find the breakable nodes whose first copy in the outer body is on this rank.
+        """Find the m interface nodes whose first copy in the outer body is on this rank.
 
-        Return the first local row of each bond, and the local number of the copy.
+        Returns the first local row (m,) of their bonds, and the local numbers (m,) of the copies.
         """
         shared = self.shared
         first = self.base[shared.pointer[:-1]]
@@ -209,7 +210,7 @@ class ConstraintLayout:
 
 
 def expand(entities: Int, nodes: Int) -> tuple[Int, Int]:
-    """Return the entity and the position on that entity of every fine node."""
+    """Return the entity and the position p on the entity for every fine node; `nodes` (e,) counts them."""
     ends = np.cumsum(nodes)
     p = np.arange(ends[-1] if len(ends) else 0) - np.repeat(ends - nodes, nodes)
     return np.repeat(entities, nodes), p

@@ -1,4 +1,4 @@
-"""Subdomains that share constraints, messages between these subdomains, and adjacent interface nodes."""
+"""Neighbour subdomains, messages between them, and adjacent interface nodes."""
 
 from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
@@ -12,20 +12,20 @@ from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.typing import Int
 
 Message = TypeVar("Message")
-# Neighbours along the sides of a triangle: vertices 0, 1, 2, and the nodes 3, 4, 5 between them if there are any.
+# Pairs of adjacent nodes along the sides of a triangle, by its number of nodes.
 SIDES = {3: ((0, 1), (1, 2), (2, 0)), 6: ((0, 3), (3, 1), (1, 4), (4, 2), (2, 5), (5, 0))}
 
 
 class Neighbours:
-    """The subdomains that share nodes with each local subdomain, which is its own neighbour, too.
+    """The neighbours of local subdomains: subdomains that share nodes, and the subdomain itself.
 
     Attributes:
         index: global numbers of the local subdomains.
         local: position in `index` by global subdomain number.
         rank: rank of every subdomain in the cell, by global number.
         rows: rows[i] are the local rows at nodes of local subdomain i, ascending.
-        common: common[i][s] are the positions in rows[i] of rows at nodes that local subdomain i shares with
-            subdomain s, in the same order on both sides.
+        common: common[i][s] are the rows at nodes that local subdomain i shares with subdomain s, as positions in
+            rows[i], in the same order on both sides.
     """
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, subdomains: Sequence[Subdomain]) -> None:
@@ -49,20 +49,19 @@ class Neighbours:
         for a, entities in zip(starts.tolist(), np.split(entity, starts)[1:], strict=True):
             shared_rows[self.local[int(first[a])]][int(second[a])] = jump_operator.rows_of(entities)
         none = np.zeros(0, np.int64)
-        self.rows = [of.get(t, none) for t, of in zip(self.index, shared_rows, strict=True)]
-        self.common = [
-            {s: np.searchsorted(indices, rows) for s, rows in of.items()}
-            for indices, of in zip(self.rows, shared_rows, strict=True)
-        ]
+        self.rows = [by_number.get(t, none) for t, by_number in zip(self.index, shared_rows, strict=True)]
+        both = zip(self.rows, shared_rows, strict=True)
+        self.common = [{s: np.searchsorted(at, rows) for s, rows in by_number.items()} for at, by_number in both]
 
     def exchange(
         self, messages: Iterable[tuple[int, int, Message]], deliver: Callable[[int, int, Message], None]
     ) -> None:
-        """Deliver messages between subdomains, at once within a rank.  Collective.
+        """Deliver messages between subdomains.  Collective.
 
         Args:
             messages: (i, s, message) from local subdomain i to the subdomain with global number s.
-            deliver: called on the receiving rank with the position of s, the global number of i, and the message.
+            deliver: called on the rank of s with the local position of s, the global number of the sender, and the
+                message; within a rank at once, while `messages` is read.
         """
         outgoing: list[list[tuple[int, int, Message]]] = [[] for _ in range(self.comm.size)]
         for i, s, message in messages:
@@ -77,19 +76,19 @@ class Neighbours:
 
 
 class InterfaceNeighbours:
-    """All interface nodes in row order, and the adjacency of these nodes.
+    """The n interface nodes of the cell in row order, and their adjacency.
 
     Attributes:
-        rows: (n,) first global row of each bond.
+        rows: (n,) first global row of the bond.
         first: number of the first node on this rank.
-        adjacency: (n, n) matrix with 1 between neighbours.
+        adjacency: (n, n) matrix with 1 between adjacent nodes.
     """
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, subdomains: Sequence[Subdomain]) -> None:
-        """Find the neighbours along interfaces.  Collective."""
+        """Find adjacent nodes along interfaces.  Collective."""
         rows = jump_operator.owned[0] + jump_operator.nodes.row
         if (np.diff(rows) <= 0).any():
-            raise ValueError("the interface nodes of a rank are not in the order of their rows")
+            raise ValueError("interface nodes of a rank: expected ascending rows")
         self.comm = comm
         self.rows: Int = np.concatenate(comm.allgather(rows))
         self.first = int(np.searchsorted(self.rows, rows[0])) if len(rows) else 0
@@ -103,34 +102,38 @@ class InterfaceNeighbours:
             first += s.mesh.n_classes
             ends = nodes[:, SIDES[nodes.shape[1]]].reshape(-1, 2)
             ends = ends[(ends >= 0).all(axis=1)]
-            for body, of_body in zip(bodies.T, codes, strict=True):
+            for body, body_codes in zip(bodies.T, codes, strict=True):
                 low, high = np.sort(ends[(body[ends] == s.submesh.body).all(axis=1)], axis=1).T
-                of_body.append(_once(low * n + high))
-        # Both bodies have the side of an interface once: twice is within a body that is cut, and a void has none.
-        outer, inner = (_once(np.concatenate(comm.allgather(np.concatenate(of_body)))) for of_body in codes)
+                body_codes.append(_once(low * n + high))
+        # A side on an interface occurs once in either body; twice within a body that METIS cuts; never in a void.
+        outer, inner = (_once(np.concatenate(comm.allgather(np.concatenate(body_codes)))) for body_codes in codes)
         a, b = np.divmod(np.intersect1d(outer, inner), n)
         entries = np.ones(2 * len(a)), (np.concatenate([a, b]), np.concatenate([b, a]))
         self.adjacency: csr_matrix = coo_matrix(entries, shape=(n, n)).tocsr()
         self._components = jump_operator.components
-        # (n, most neighbours + 1) each node and its neighbours, padded with the node.
+        # (n, most neighbours + 1) every node and its neighbours, padded with the node.
         count = np.diff(self.adjacency.indptr)
-        self._reached = np.repeat(np.arange(n)[:, None], count.max(initial=0) + 1, axis=1)
+        self._neighbours = np.repeat(np.arange(n)[:, None], count.max(initial=0) + 1, axis=1)
         within = np.arange(self.adjacency.nnz) - np.repeat(self.adjacency.indptr[:-1], count)
-        self._reached[np.repeat(np.arange(n), count), within] = self.adjacency.indices
+        self._neighbours[np.repeat(np.arange(n), count), within] = self.adjacency.indices
 
     def rows_near(self, rows: Int, choose: Callable[[Int], Int], enough: int) -> Int:
-        """Return global rows and the rows near them that `choose` keeps, until there are `enough` rows."""
+        """Extend global rows (k,) by rows of adjacent nodes, until there are `enough` rows.
+
+        `choose` filters the candidates; the search goes from neighbour to neighbour and stops at the ends of
+        interfaces.
+        """
         bonds = np.unique(np.searchsorted(self.rows, rows, side="right") - 1)
         while True:
-            reached_rows = (self.rows[bonds][:, None] + np.arange(self._components)).ravel()
-            reached_rows = np.union1d(rows, choose(reached_rows))
-            reached = np.unique(self._reached[bonds])
-            if len(reached_rows) >= enough or len(reached) == len(bonds):
-                return reached_rows
-            bonds = reached
+            candidates = (self.rows[bonds][:, None] + np.arange(self._components)).ravel()
+            result = np.union1d(rows, choose(candidates))
+            extended = np.unique(self._neighbours[bonds])
+            if len(result) >= enough or len(extended) == len(bonds):
+                return result
+            bonds = extended
 
     def node_numbers(self, jump_operator: JumpOperator) -> Int:
-        """Return the interface node number of each local fine node (local fine nodes,), or -1."""
+        """Return the interface node number (local fine nodes,) of every local fine node, or -1."""
         number = np.full(jump_operator.B.shape[1] // jump_operator.components, -1)
         normal = np.searchsorted(jump_operator.rows, self.rows)
         normal = np.minimum(normal, max(len(jump_operator.rows) - 1, 0))

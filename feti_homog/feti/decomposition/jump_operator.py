@@ -1,9 +1,9 @@
 """The jump operator B on one rank, the layout of the multipliers, interface springs, and node blocks.
 
-Of the k copies of a fine node, copies within one body are glued in x and y by orthonormal contrasts and can never
-part.  A body, such as a fibre, and the one around it are glued by one pair of rows (n, t) between the means of their
-copies; this bond can break.  So B has full row rank, n.(u_outer - u_inner) is the gap, and a multiplier is the nodal
-force that the faces exert on each other: tension is positive.
+A fine node has k copies in the subdomains.  Copies within one body are glued in x and y by orthonormal contrasts, and
+can never part.  An inner body, such as a fibre, and the body around it are glued by one pair of rows (n, t) between
+the means of their copies; this bond can break.  So B has full row rank, n.(u_outer - u_inner) is the gap, and a
+multiplier is the nodal force between the faces, positive in tension.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ from feti_homog.typing import Float, Int
 
 @dataclass(frozen=True)
 class InterfaceSprings:
-    """Springs at all bonded nodes: traction = stiffness x jump, in tension and compression.
+    """The springs at all bonded nodes: traction = stiffness x jump, in tension and compression.
 
     Attributes:
-        stiffness: for each interface of the case stress per opening and per slip, or per slip along the fibre;
-            infinite ones are glue.
-        soften: their compliance may grow while the cell is loaded.
+        stiffness: for every interface of the case, stress per length for opening and slip, or for slip along the
+            fibres; inf is rigid.
+        soften: whether the compliance may grow during the run.
     """
 
     stiffness: tuple[tuple[float, ...], ...]
     soften: bool = False
 
     def compliance(self, jump_operator: JumpOperator) -> Float:
-        """Compute C = 1 / (k l) (owned rows,) on interface rows with tributary lengths l, else 0."""
+        """Compute C = 1 / (k l) (owned rows,) for stiffness k and tributary length l; 0 off interfaces."""
         nodes, C = jump_operator.nodes, np.zeros(jump_operator.owned[1] - jump_operator.owned[0])
         for component, stiffness in enumerate(zip(*self.stiffness, strict=True)):
             C[nodes.row + component] = 1.0 / (np.array(stiffness)[nodes.pair] * nodes.length)
@@ -53,23 +53,21 @@ class JumpOperator:
     """The jump operator B on the local subdomains, and the layout of the multipliers.
 
     Attributes:
-        comm: of all ranks.
-        problem: displacements and unit loads; ranks without subdomains need it.
-        components: rows of a vector constraint.
-        B: (local rows, local dofs) signed, rotated entries; a local row is one that a local dof takes part in.
-        rows: global number of each local row.
-        node_rows: first owned row and row count for each fine node that this rank owns.
+        comm: communicator of all ranks.
+        problem: components of the displacement, and unit loads, also for ranks without subdomains.
+        components: number of rows of a vector constraint.
+        B: (local rows, local dofs) signed and rotated entries; the local rows have an entry at a local dof.
+        rows: (local rows,) global row numbers.
+        node_rows: as `ConstraintLayout.node_rows`.
         shared_dofs: number of displacements at nodes that subdomains share, on all ranks.
-        nodes: the interface nodes that this rank owns.
-        outer_copies: local rows of interface nodes whose outer copy is on this rank, and the copies, as
-            `ConstraintLayout.outer_copies`.
-        copies: (local rows, 2) node copies in the outer and the inner body of a row; 0 within a body.
-        inside: (local rows,) the inner body, usually the fibre; -1 within a body.
-        owned: first global row of this rank and the one after its last.
+        nodes: interface nodes that this rank owns.
+        outer_copies: as `ConstraintLayout.outer_copies`.
+        copies, inside: as `ConstraintLayout.facing`.
+        owned: half-open range of the global rows that this rank owns.
         global_rows: number of rows on all ranks.
-        shared: the vertices and edges that the rows belong to.
-        is_shared_row: whether other ranks have each local row too.
-        vector: a multiplier vector to duplicate.
+        shared: vertices and edges to which the rows belong.
+        is_shared_row: (local rows,) whether another rank has the row, too.
+        vector: PETSc vector with the layout of the multipliers.
     """
 
     def __init__(
@@ -97,22 +95,22 @@ class JumpOperator:
         self._exchanges: dict[int, _Exchange] = {}
 
     def rows_of(self, entities: Int) -> Int:
-        """Return the local rows of shared entities, one entity after the other."""
+        """Return the local rows of shared entities (e,), one entity after the other."""
         entity, p = expand(entities, self._count[entities])
         return np.asarray(self._first[entity] + p)
 
     def gather(self, owned: Float) -> Float:
-        """Return the local rows of distributed vectors (owned rows,) or (owned rows, k)."""
+        """Gather the local rows of x (owned rows,) or (owned rows, k).  Collective."""
         return self._exchange(owned).gather(owned)
 
     def sum(self, local: Float) -> Float:
-        """Return the owned rows of `local`, (local rows,) or (local rows, k), summed over ranks."""
+        """Sum x (local rows,) or (local rows, k) over ranks; return the owned rows.  Collective."""
         return self._exchange(local).sum(local)
 
     def from_outer(self, numbers: Int) -> Int:
-        """Send numbers of outer fine nodes to the ranks that own the interface nodes (k,).  Collective.
+        """Send numbers of outer node copies to the owners of interface nodes: (k,).  Collective.
 
-        Each rank passes one number for each of its fine nodes.
+        Every rank passes `numbers` of all its fine nodes.
         """
         rows, copies = self.outer_copies
         local = np.zeros(len(self.rows))
@@ -120,7 +118,7 @@ class JumpOperator:
         return self.sum(local)[self.nodes.row].astype(np.int64)
 
     def _exchange(self, x: Float) -> _Exchange:
-        """Return the scatter for vectors with as many columns as x; the last KEPT_EXCHANGES are cached."""
+        """Return the scatter for the number of columns of x; the last KEPT_EXCHANGES scatters are cached."""
         columns = x.size // len(x) if len(x) else int(np.prod(x.shape[1:]))
         exchange = self._exchanges.pop(columns, None) or _Exchange(self.vector, self.rows, columns)
         self._exchanges[columns] = exchange
@@ -130,7 +128,7 @@ class JumpOperator:
 
 
 class _Exchange:
-    """Scatters between the owned and the local rows of vectors with k columns; a copy where both are equal."""
+    """The PETSc scatter between owned and local rows for k columns; does nothing where they are equal."""
 
     def __init__(self, vector: PETSc.Vec, rows: Int, columns: int) -> None:
         self._same = vector.comm.size == 1 and np.array_equal(rows, np.arange(len(rows)))
@@ -144,7 +142,7 @@ class _Exchange:
         index_set.destroy()
 
     def gather(self, owned: Float) -> Float:
-        """Return the local rows of x (owned rows,) or (owned rows, k)."""
+        """Gather the local rows of x (owned rows,) or (owned rows, k).  Collective."""
         if self._same:
             return owned
         self._owned.getArray()[:] = owned.ravel()
@@ -153,7 +151,7 @@ class _Exchange:
         return local.copy()
 
     def sum(self, local: Float) -> Float:
-        """Return the owned rows of x (local rows,) or (local rows, k), summed over ranks."""
+        """Sum x (local rows,) or (local rows, k) over ranks; return the owned rows.  Collective."""
         if self._same:
             return local
         self._owned.zeroEntries()
@@ -163,22 +161,22 @@ class _Exchange:
         return owned.copy()
 
     def destroy(self) -> None:
-        """Free vectors and scatter.  Collective."""
+        """Free the vectors and the scatter.  Collective."""
         if not self._same:
             for petsc_object in (self._scatter, self._owned, self._local):
                 petsc_object.destroy()
 
 
 class NodeBlocks:
-    """A block-diagonal matrix with one dense block for the multipliers at each fine node.
+    """A block-diagonal matrix, with one dense block for the multipliers at every fine node.
 
     Attributes:
-        rows: number of rows that this rank owns.
-        blocks: for each block size k the owned rows (b, k) and entries (b, k, k) of the b blocks.
+        rows: number of owned rows.
+        blocks: for every block size k, the owned rows (b, k) and the entries (b, k, k) of b blocks.
     """
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, local: csr_matrix) -> None:
-        """Sum `local` (local rows, local rows) over ranks and keep the owned rows.  Collective."""
+        """Sum `local` (local rows, local rows) over ranks, and store the owned blocks.  Collective."""
         first, last = jump_operator.owned
         matrix = assemble_owned_rows(comm, local, jump_operator.rows, jump_operator.rows, (last - first, last - first))
         entries = matrix[:, first:last].tocoo()
@@ -187,19 +185,17 @@ class NodeBlocks:
         self.blocks: list[tuple[Int, Float]] = []
         block = np.repeat(np.arange(len(starts)), sizes)[entries.row]
         for size in np.unique(sizes):
-            some = np.flatnonzero(sizes == size)
+            chosen = np.flatnonzero(sizes == size)
             number = np.full(len(starts), -1)
-            number[some] = np.arange(len(some))
+            number[chosen] = np.arange(len(chosen))
             mine = number[block] >= 0
-            number_of = block[mine]
-            dense = np.zeros((len(some), size, size))
-            dense[number[number_of], entries.row[mine] - starts[number_of], entries.col[mine] - starts[number_of]] = (
-                entries.data[mine]
-            )
-            self.blocks.append((starts[some][:, None] + np.arange(size), dense))
+            b = block[mine]
+            dense = np.zeros((len(chosen), size, size))
+            dense[number[b], entries.row[mine] - starts[b], entries.col[mine] - starts[b]] = entries.data[mine]
+            self.blocks.append((starts[chosen][:, None] + np.arange(size), dense))
 
     def inverse(self, active: Float) -> csr_matrix:
-        """Invert the part where `active` (owned rows,) is 1; the rest of (owned rows, owned rows) is 0."""
+        """Invert the block of rows where `active` (owned rows,) is 1: (owned rows, owned rows), 0 elsewhere."""
         rows, columns, values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
         for at, dense in self.blocks:
             mask = active[at]

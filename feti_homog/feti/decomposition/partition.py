@@ -1,4 +1,4 @@
-"""Partition: bodies are cut into subdomains, and the subdomains are assigned to ranks."""
+"""Partition of bodies into subdomains, and assignment of subdomains to ranks."""
 
 import heapq
 from dataclasses import dataclass
@@ -15,16 +15,16 @@ from feti_homog.typing import Int
 
 @dataclass(frozen=True)
 class Partition:
-    """The subdomain (m,) of each coarse triangle, and the rank (s,) of each subdomain."""
+    """The subdomain (m,) of every coarse triangle, and the rank (s,) of every subdomain."""
 
     subdomain: Int
     rank: Int
 
 
 def decompose(torus: Torus, parts: Int, pieces: Int, n_ranks: int, length_classes: int = LENGTH_CLASSES) -> Partition:
-    """Cut the bodies of a whole cell into pieces, and assign the pieces to ranks.
+    """Cut the bodies of a whole cell into pieces, and assign the pieces to `n_ranks` ranks.
 
-    The arguments are documented at `cut_into_pieces` and `assign_ranks`.
+    `parts`, `pieces` and `length_classes` are as in `cut_into_pieces`.
     """
     tail, head, edge = torus.sides
     subdomain = cut_into_pieces(torus, parts, pieces, torus.edge_lengths[edge].max(), length_classes)
@@ -34,10 +34,11 @@ def decompose(torus: Torus, parts: Int, pieces: Int, n_ranks: int, length_classe
 
 
 def halves(torus: Torus) -> Partition | None:
-    """Cut a whole cell into two connected strips for two ranks; return None if a strip is not connected.
+    """Cut a whole cell into two connected strips for two ranks.
 
-    Each strip, along x or y, has about half of the triangles, and the cut crosses as few edges as possible.  On the
-    torus, the boundaries between two METIS parts are up to 50 % longer.
+    The strips run along x or y, have about half of the triangles (within STRIP_SLACK), and their boundaries have as few
+    edges as possible; the boundaries of two METIS parts on the torus are up to 50 % longer.  Returns None if a strip is
+    not connected.
     """
     tail, head, _ = torus.sides
     centres = torus.mesh.points[torus.mesh.triangles].mean(axis=1) / torus.mesh.period % 1.0
@@ -47,7 +48,7 @@ def halves(torus: Torus) -> Partition | None:
         place[np.argsort(x, kind="stable")] = np.arange(m)
         low, high = np.sort([place[tail], place[head]], axis=0)
         low, high = np.where(high - low > m / 2, (high, low + m), (low, high))
-        # Number of sides that cross each position of the cyclic order, then that number at both ends of each strip.
+        # Number of sides that cross a position of the cyclic order; then its sum over both ends of a strip.
         crossed = np.bincount(low + 1, minlength=2 * m) - np.bincount(high + 1, minlength=2 * m)
         crossed = np.cumsum(crossed).reshape(2, m).sum(axis=0)
         ends = m // 2 + np.unique((STRIP_SLACK * m * np.linspace(-1.0, 1.0, STRIP_WIDTHS)).astype(np.int64))
@@ -59,22 +60,22 @@ def halves(torus: Torus) -> Partition | None:
     connected = periodic_topology.components(len(piece), tail[together], head[together])
     sizes = np.bincount(connected)
     main = [np.argmax(np.where(np.bincount(connected, piece) == sizes * k, sizes, 0)) for k in range(2)]
-    piece ^= ~np.isin(connected, main)  # a strip takes its islands
+    piece ^= ~np.isin(connected, main)  # islands go to the strip around
     together = piece[tail] == piece[head]
     is_whole = periodic_topology.components(len(piece), tail[together], head[together]).max() == 1
     return Partition(piece, np.arange(2)) if is_whole else None
 
 
 def cut_into_pieces(torus: Torus, parts: Int, pieces: Int, longest: float, length_classes: int = LENGTH_CLASSES) -> Int:
-    """Compute the subdomain (m,) of each triangle.
+    """Compute the subdomain (m,) of every triangle by METIS.
 
-    Subdomains are connected through edges: a METIS part that is not connected becomes several subdomains.
+    Subdomains are connected through edges: a METIS part that is not connected becomes several subdomains.  METIS makes
+    short cuts, which cross narrow gaps instead of following them, so that the iteration converges faster.
 
     Args:
-        parts: (m,) body of each triangle: `torus.constituent`, or `torus.plane_parts()`.
-        pieces: (b,) number of pieces of each body.  METIS makes short cuts, which cross narrow gaps and do not
-            follow them: the iteration converges faster.
-        longest: longest edge length in the cell.
+        parts: (m,) body of every triangle: `torus.constituent`, or `torus.plane_parts()`.
+        pieces: (b,) number of pieces of every body.
+        longest: longest edge in the cell, a length.
         length_classes: number of edge lengths that METIS distinguishes; with 1 all edges have equal weight.
     """
     tail, head, edge = torus.sides
@@ -87,8 +88,8 @@ def cut_into_pieces(torus: Torus, parts: Int, pieces: Int, longest: float, lengt
     number, piece = np.empty(len(parts), np.int64), np.zeros(len(parts), np.int64)
     number[members] = np.arange(len(parts)) - np.repeat(first, load)
     for body in np.flatnonzero(pieces > 1):
-        some = sides[first_edge[body] : first_edge[body] + edges[body]]
-        graph = _graph(load[body], number[left[some]], number[right[some]], weight[some])
+        inner = sides[first_edge[body] : first_edge[body] + edges[body]]
+        graph = _graph(load[body], number[left[inner]], number[right[inner]], weight[inner])
         piece[members[first[body] : first[body] + load[body]]] = _metis(graph, int(pieces[body]))
     key = parts * (piece.max(initial=0) + 1) + piece
     together = key[tail] == key[head]
@@ -98,7 +99,7 @@ def cut_into_pieces(torus: Torus, parts: Int, pieces: Int, longest: float, lengt
 
 
 def pieces_for_count(load: Int, count: int) -> Int:
-    """Divide bodies into `count` pieces (b,), at least one each: the body with the largest pieces gets the next."""
+    """Choose `count` pieces (b,) for bodies with `load` (b,) triangles: the largest pieces are divided first."""
     pieces = np.ones(len(load), np.int64)
     heap = [(-float(size), body) for body, size in enumerate(load)]
     heapq.heapify(heap)
@@ -112,7 +113,7 @@ def pieces_for_count(load: Int, count: int) -> Int:
 
 
 def pieces_for_size(load: Int, dofs_per_load: float, max_dofs: int) -> Int:
-    """Compute piece counts (b,) for which pieces have about `max_dofs` degrees of freedom at most."""
+    """Choose numbers of pieces (b,) with about `max_dofs` dofs at most, for bodies with `load` (b,) triangles."""
     return np.minimum(np.ceil(load * dofs_per_load / max_dofs).astype(np.int64), load)
 
 
@@ -123,19 +124,18 @@ def _graph(n: int, left: Int, right: Int, weight: Int) -> csr_matrix:
 
 
 def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
-    """Compute the part of each vertex by METIS: about equal loads, or vertex counts, and a small edge cut."""
+    """Compute the part (n,) of every vertex by METIS, with even `load` (n,) or vertex counts and a small edge cut."""
     options = pymetis.Options(contig=int(load is None), seed=0)
-    _, part = pymetis.part_graph(
-        count, pymetis.CSRAdjacency(graph.indptr, graph.indices), eweights=graph.data, vweights=load, options=options
-    )
+    adjacency = pymetis.CSRAdjacency(graph.indptr, graph.indices)
+    _, part = pymetis.part_graph(count, adjacency, eweights=graph.data, vweights=load, options=options)
     return np.asarray(part, np.int64)
 
 
 def assign_ranks(load: Int, left: Int, right: Int, n_ranks: int) -> Int:
-    """Assign each subdomain with `load` triangles (s,) to a rank: (s,).
+    """Assign subdomains with `load` (s,) triangles to ranks: (s,).
 
-    Neighbours (left, right), listed once per shared edge, get the same rank as far as the loads stay balanced.  With
-    more ranks than subdomains, some ranks stay empty.
+    METIS puts neighbours (left, right), one pair for every shared edge, on the same rank, if the largest load is at
+    most MAX_IMBALANCE times the largest of balanced loads.  With more ranks than subdomains, some ranks stay empty.
     """
     by_load = dividing.balanced(load, n_ranks)
     if n_ranks == 1 or len(load) <= n_ranks:

@@ -1,8 +1,8 @@
-"""Coarse vertices and edges shared by subdomains: constraints, and the normals and lengths of interfaces.
+"""Coarse vertices and edges that subdomains share: numbers of constraints, normals and lengths of interfaces.
 
-An entity is a vertex class or a torus edge that belongs to several subdomains.  Each fine node on an entity of k
-subdomains needs k - 1 vector constraints.  The rank of the last sharer owns the entity: it numbers the constraints and
-sends the numbers to the ranks of the other sharers.
+An entity is a vertex class or a torus edge that belongs to several subdomains, its sharers.  A fine node on an entity
+with k sharers needs k - 1 vector constraints.  The rank of the last sharer owns the entity: it numbers the constraints
+and sends the numbers to the ranks of the other sharers.
 """
 
 from dataclasses import dataclass
@@ -18,16 +18,17 @@ from feti_homog.mesh import ReferenceLattice, Submesh, SubmeshesOfRank, submeshe
 from feti_homog.system.parallel import distributed_arrays, mpi_errors
 from feti_homog.typing import Array, Bool, Float, Int
 
-# Gauss points of one side of an element, on arcs that the mesh follows well.
+# Gauss points on one side of an element, enough for the arcs of a valid mesh.
 POINTS, WEIGHTS = roots_legendre(6)
-# (p + 1, points) weights of the nodes of a side of order p: 1/2 if linear, N_a if quadratic.
+# (p + 1, points) shares of the nodes of a side of order p at the Gauss points: 1/2 if linear, N_a if quadratic.
 SHARES = {1: np.full((2, 6), 0.5), 2: np.stack([POINTS**2 - POINTS, 2 - 2 * POINTS**2, POINTS**2 + POINTS]) / 2}
 
 
 def along(ends: Float, turn: Float, place: Float) -> Float:
-    """Interpolate y = dx / ds or normals (k, 2) at `place` s (k,) in [0, 1] between `ends` (k, 2, 2).
+    """Interpolate y (k, 2) between its values `ends` (k, 2, 2), at s = `place` (k,) in [0, 1].
 
-    On an arc of an ellipse whose parameter turns by `turn` (k,), y'' = -turn^2 y; on straight edges `turn` is 0.
+    y is dx / ds or a normal.  On an arc of an ellipse whose parameter turns by `turn` (k,), y'' = -turn^2 y; on
+    straight edges `turn` is 0, and y is linear.
     """
     sine = np.where(turn > 0, np.sin(turn), 1.0)
     of_start = np.where(turn > 0, np.sin((1 - place) * turn), 1 - place) / sine
@@ -36,16 +37,16 @@ def along(ends: Float, turn: Float, place: Float) -> Float:
 
 
 def side_lengths(ends: Float, turn: Float, low: Float, order: int, side: float) -> Float:
-    """Integrate the tributary lengths (k, order + 1) from s = `low` (k,) to `low` + `side`, for `along`'s arguments."""
+    """Integrate tributary lengths (k, order + 1) from s = `low` (k,) to `low` + `side`; see `along`."""
     places = low[:, None] + side * (1 + POINTS) / 2
     speeds = [np.hypot(*along(ends, turn, place).T) for place in places.T]
     return np.asarray(np.stack(speeds, axis=1) * WEIGHTS @ SHARES[order].T * (side / 2))
 
 
 def breakable_pairs(meshes: SubmeshesOfRank, table: submeshes.SubdomainTable, pairs: Int, sharers: Sharers) -> Int:
-    """Return the case interface (n,) between the two bodies of each shared entity.
+    """Return the case interface (n,) of every shared entity, as in `SharedEntities.pair`.
 
-    The value is -1 where bonds never break, where a third body touches, or where the bodies meet in a point.
+    The number is -1 where bonds never break, where a third body touches, and where two bodies meet in a point.
     """
     body, copies = table.body[sharers.sharer], sharers.copies
     outer, inner = body[sharers.pointer[:-1]], body[sharers.pointer[1:] - 1]
@@ -65,9 +66,9 @@ def interface_geometry(
     sharers: Sharers,
     lattice: ReferenceLattice,
 ) -> tuple[Float, Float, Bool]:
-    """Compute normal, turn and precracked of `SharedEntities` for entities of this rank.  Collective.
+    """Compute normal, turn and precracked of `SharedEntities` on owned entities.  Collective.
 
-    The results are 0 for other entities and where bonds never break; `pairs` and `lattice` as in `share_entities`.
+    Results are 0 on other entities, and where bonds never break.  `pairs` and `lattice` are as in `share_entities`.
     """
     n, owner = len(sharers.key), table.rank[sharers.innermost]
     can_part = (owner == comm.rank) & (breakable_pairs(meshes, table, pairs, sharers) >= 0)
@@ -101,9 +102,9 @@ def interface_geometry(
 
 
 def _check(meshes: SubmeshesOfRank, sharers: Sharers, normals: Float, sums: Float) -> None:
-    """Raise MeshError if an interface entity has no usable normal.
+    """Raise MeshError if a normal of an interface entity is 0, not finite, or ambiguous.
 
-    A normal is unusable if it is zero or not finite, or if the interface folds back onto itself at a vertex.
+    A normal is ambiguous if the interface folds back onto itself at a vertex.
 
     Args:
         normals: (n, 2, 2) normals at both ends of each entity.
@@ -117,14 +118,13 @@ def _check(meshes: SubmeshesOfRank, sharers: Sharers, normals: Float, sums: Floa
         keys = mesh.edge_keys[mesh.edge_class] if sharers.is_edge[first] else mesh.class_keys[mesh.vertex_class]
         plane = int(np.flatnonzero(keys == sharers.key[first])[0])
         x, y = mesh.points[mesh.edges[plane] if sharers.is_edge[first] else [plane]].mean(axis=0) + mesh.origin
-        raise MeshError(f"the interface has no normal at ({x:.9g}, {y:.9g}): its sides are folded or of no length")
+        raise MeshError(f"interface: no normal at ({x:.9g}, {y:.9g}); its sides are folded or have length 0")
 
 
 def _sums_at_vertices(comm: MPI.Intracomm, sharers: Sharers, owner: Int, ends: Int, edge: Int, parts: Float) -> Float:
-    """Sum edge contributions at vertices over all ranks: (n, k) for entities of this rank.  Collective.
+    """Sum contributions of edges to vertices over all ranks: (n, k) on owned entities.  Collective.
 
-    Edges (p,) contribute `parts` (p, 2, k) to the vertex classes at their `ends` (p, 2).  Each class is an entity or
-    the pinned class.
+    Edges (p,) contribute `parts` (p, 2, k) to the vertex classes at their `ends` (p, 2): entities, or the pinned class.
     """
     order, code = np.argsort(sharers.code), entity_code(ends, False)
     ordered = sharers.code[order]
@@ -133,16 +133,16 @@ def _sums_at_vertices(comm: MPI.Intracomm, sharers: Sharers, owner: Int, ends: I
     to = owner[order[np.searchsorted(ordered, code[is_entity])]]
     code, at, parts = distributed_arrays.exchange(comm, to, code[is_entity], at[is_entity], parts[is_entity])
     sums = np.zeros((len(order), parts.shape[1]))
-    # Edge order on any number of ranks, for rounding depends on the order.
+    # The order of edges is the same on any number of ranks, because rounding depends on it.
     sequence = np.lexsort(at.T)
     np.add.at(sums, order[np.searchsorted(ordered, code[sequence])], parts[sequence])
     return sums
 
 
 def edge_normals(mesh: Submesh, triangle: Int, k: Int) -> tuple[Float, Float]:
-    """Compute outward normals (n, 2, 2) at both ends of edge k (n,) of each triangle, and turns (n,).
+    """Compute outward normals (n, 2, 2) at both ends of edges, and turns (n,), as in `SharedEntities`.
 
-    Lengths of normals, and turns, as in `SharedEntities`.
+    `triangle` (n,) are triangles, `k` (n,) the positions 0 to 2 of the edges.
     """
     a, b = (mesh.points[mesh.triangles[triangle, (k + step) % 3]] for step in (0, 1))
     plane = mesh.triangle_edges[triangle, k]
@@ -165,16 +165,16 @@ class SharedEntities(Sharers):
     """The n shared entities of the local subdomains, in the order of their constraints.
 
     Attributes:
-        nodes: (n,) fine nodes on the entity: 1, or the inner lattice nodes of an edge.
+        nodes: (n,) number of fine nodes on the entity: 1 at a vertex, the inner lattice nodes on an edge.
         first: (n,) number of the first vector constraint.
-        body: constituent of each sharer.
-        fibre: (n,) the inner body, which may debond from the body around it; -1 where no bond can break.
-        pair: (n,) the case interface between these two bodies; -1 where no bond can break.
-        normal: (n, 2, 2) normals from the inner to the outer body at both ends of the edge, with the length of dx / ds
-            for the position s in [0, 1]; at a vertex, with the tributary length of the vertex.
-        turn: (n,) turn of the edge, as in `Submesh`; 0 at vertices.
+        body: (sharers,) body of a sharer.
+        fibre: (n,) inner body, which may debond from the outer body; -1 where no bond can break.
+        pair: (n,) case interface between both bodies; -1 where no bond can break.
+        normal: (n, 2, 2) normals from the inner to the outer body at both ends of the edge, with the length |dx / ds|
+            for s in [0, 1]; at a vertex, with the tributary length of the vertex.
+        turn: (n,) turn of the edge in radians, as in `Submesh`; 0 at vertices.
         precracked: (n,) whether the edge, or every edge at the vertex, is debonded in the mesh.
-        owned: (2,) first vector constraint of this rank and the one after its last.
+        owned: half-open range of the vector constraints that this rank owns.
         constraints: number of vector constraints on all ranks.
     """
 
@@ -191,7 +191,7 @@ class SharedEntities(Sharers):
 
     @property
     def pieces(self) -> set[int]:
-        """Subdomains with a node that belongs to another subdomain of their body, or to several other bodies."""
+        """Return the subdomains with a node in another piece of their body, or in several other bodies."""
         body = self.body
         between_two = (self.copies == 2) & (body[self.pointer[:-1]] != body[self.pointer[1:] - 1])
         return set(self.sharer[~np.repeat(between_two, self.copies)].tolist())
@@ -200,11 +200,14 @@ class SharedEntities(Sharers):
 def share_entities(
     comm: MPI.Intracomm, meshes: SubmeshesOfRank, table: submeshes.SubdomainTable, pairs: Int, lattice: ReferenceLattice
 ) -> SharedEntities:
-    """Find the shared entities of this rank, and number the constraints rank by rank.  Collective.
+    """Find the shared entities of this rank, and number their constraints rank by rank.  Collective.
 
     Args:
-        pairs: (phases, phases) the case interface between two phases, -1 where bonds never break.
+        pairs: (phases, phases) case interface between two phases, -1 where bonds never break.
         lattice: reference lattice of the coarse triangles.
+
+    Raises:
+        MeshError: an interface has no normal, because its sides are folded or have length 0.
     """
     sharers = find_sharers(comm, meshes, table)
     geometry: tuple[Array, ...] = interface_geometry(comm, meshes, table, pairs, sharers, lattice)
@@ -221,9 +224,8 @@ def share_entities(
     mine = (owner == comm.rank)[entity]
     to = np.unique(entity[mine] * comm.size + rank[mine])
     entity, to = to // comm.size, to % comm.size
-    code, *received = distributed_arrays.exchange(
-        comm, to, sharers.code[entity], *(column[entity] for column in (numbers, *geometry))
-    )
+    columns = (column[entity] for column in (sharers.code, numbers, *geometry))
+    code, *received = distributed_arrays.exchange(comm, to, *columns)
     place = np.argsort(code)
     place = place[np.searchsorted(code[place], sharers.code)]
     first, normal, turn, precracked = (column[place] for column in received)

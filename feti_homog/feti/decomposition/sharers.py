@@ -1,7 +1,8 @@
 """Search for the subdomains that share coarse vertices and edges, by all ranks together.
 
-Each key has a home rank, key modulo ranks.  Every rank tells the homes which of its subdomains have a key that other
-subdomains may have, too.  The home sorts the subdomains of a key, and sends them to all ranks that have one.
+A vertex or edge has a key, and a home rank: key modulo ranks.  Every rank sends its keys that other subdomains may
+have, with their subdomains, to the home ranks.  A home rank sorts the subdomains of a key, and sends the list to all
+ranks with one of these subdomains.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ class Sharers:
     Attributes:
         key: (n,) vertex class or torus edge.
         is_edge: (n,) whether the entity is an edge.
-        pointer, sharer: the subdomains that share entity i are sharer[pointer[i]:pointer[i + 1]], sorted by body, from
-            the outermost to the innermost.
+        pointer, sharer: sharer[pointer[i]:pointer[i + 1]] are the subdomains that share entity i, from the outermost
+            body to the innermost.
     """
 
     key: Int
@@ -34,36 +35,33 @@ class Sharers:
 
     @property
     def copies(self) -> Int:
-        """(n,) number of subdomains that share each entity."""
+        """Return the number (n,) of sharers of an entity."""
         return np.diff(self.pointer)
 
     @property
     def innermost(self) -> Int:
-        """(n,) the last sharer of each entity."""
+        """Return the last sharer (n,) of an entity."""
         return np.asarray(self.sharer[self.pointer[1:] - 1])
 
     @property
     def code(self) -> Int:
-        """(n,) one unique number for each entity, not sorted."""
+        """Return the codes (n,) of the entities, not sorted; see `entity_code`."""
         return entity_code(self.key, self.is_edge)
 
     def chosen(self, which: Int) -> Sharers:
-        """Return the entities with the numbers `which` (k,), in that order."""
+        """Return the entities with the numbers `which` (k,), in this order."""
         copies = self.copies[which]
         sharer = self.sharer[dividing.ranges(self.pointer[which], copies)]
         return Sharers(self.key[which], self.is_edge[which], np.r_[0, np.cumsum(copies)], sharer)
 
 
 def entity_code(key: Int, is_edge: Bool | bool) -> Int:
-    """Encode vertex classes or torus edges with the keys (n,) as unique numbers (n,)."""
+    """Encode keys (n,) of vertex classes or torus edges as unique numbers (n,), odd for edges."""
     return np.asarray(2 * key + is_edge)
 
 
 def find_sharers(comm: MPI.Intracomm, meshes: SubmeshesOfRank, table: submeshes.SubdomainTable) -> Sharers:
-    """Find the vertex classes and torus edges that local subdomains share.  Collective.
-
-    The pinned class is left out.
-    """
+    """Find the entities that local subdomains share, without the pinned class.  Collective."""
     mesh = meshes.whole
     corner, side = mesh.vertex_class[mesh.triangles], mesh.edge_class[mesh.triangle_edges]
     one_sided = np.bincount(side.ravel(), minlength=len(mesh.edge_keys)) == 1
@@ -72,14 +70,10 @@ def find_sharers(comm: MPI.Intracomm, meshes: SubmeshesOfRank, table: submeshes.
     if mesh.pinned >= 0:
         corner = np.where(corner == mesh.pinned, -1, corner)
     # Unique pairs of an entity that other ranks may have, as a code, and a local subdomain.
-    kinds = [
-        (entity_code(keys[local], is_edge), meshes.index[member])
-        for is_edge, keys, (local, member) in (
-            (False, mesh.class_keys, _several(corner, meshes.member, at_border)),
-            (True, mesh.edge_keys, _several(side, meshes.member, one_sided)),
-        )
-    ]
-    code, subdomain = (np.concatenate(some) for some in zip(*kinds, strict=True))
+    vertices, edges = _several(corner, meshes.member, at_border), _several(side, meshes.member, one_sided)
+    kinds = (False, mesh.class_keys, *vertices), (True, mesh.edge_keys, *edges)
+    pairs = [(entity_code(keys[i], is_edge), meshes.index[member]) for is_edge, keys, i, member in kinds]
+    code, subdomain = (np.concatenate(column) for column in zip(*pairs, strict=True))
     code, subdomain = distributed_arrays.exchange(comm, code // 2 % comm.size, code, subdomain)
     order = np.lexsort((subdomain, table.nesting[table.body[subdomain]], code))
     code, subdomain = code[order], subdomain[order]
@@ -89,8 +83,8 @@ def find_sharers(comm: MPI.Intracomm, meshes: SubmeshesOfRank, table: submeshes.
     code, first, copies = np.unique(code, return_index=True, return_counts=True)
     # Each rank with a sharer of an entity receives all sharers of this entity.
     entity = np.repeat(np.arange(len(code)), copies)
-    pairs = np.unique(entity * comm.size + table.rank[subdomain])
-    entity, to = pairs // comm.size, pairs % comm.size
+    entity_and_rank = np.unique(entity * comm.size + table.rank[subdomain])
+    entity, to = entity_and_rank // comm.size, entity_and_rank % comm.size
     code, count = distributed_arrays.exchange(comm, to, code[entity], copies[entity])
     whose = dividing.ranges(first[entity], copies[entity])
     (sharer,) = distributed_arrays.exchange(comm, np.repeat(to, copies[entity]), subdomain[whose])
@@ -99,16 +93,16 @@ def find_sharers(comm: MPI.Intracomm, meshes: SubmeshesOfRank, table: submeshes.
 
 
 def _several(keys: Int, member: Int, at_border: Bool) -> tuple[Int, Int]:
-    """Return pairs of key and member for keys (t, 3) that several members have or that lie at the border.
+    """Return unique pairs (key, member) whose key has several members or lies at the border.
 
-    `member` (t,) is the member of each triangle.  Negative keys are left out.
+    `keys` (t, 3) and `member` (t,) belong to triangles; negative keys are skipped.  `at_border` is (number of keys,).
     """
     n = int(member.max(initial=0)) + 1
     low, high = np.full(len(at_border) + 1, n), np.full(len(at_border) + 1, -1)
     for corner in keys.T:
         np.minimum.at(low, corner, member)
         np.maximum.at(high, corner, member)
-    sent = (low[:-1] < high[:-1]) | at_border
-    chosen = (keys >= 0) & sent[keys]
+    may_be_shared = (low[:-1] < high[:-1]) | at_border
+    chosen = (keys >= 0) & may_be_shared[keys]
     pairs = np.unique(keys[chosen] * n + np.broadcast_to(member[:, None], keys.shape)[chosen])
     return pairs // n, pairs % n

@@ -1,4 +1,4 @@
-"""One subdomain: its refined mesh, stiffness, load and kernel."""
+"""The subdomain: its refined mesh, stiffness K, unit loads Q and kernel R."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from feti_homog.typing import Float, Int
 
 @dataclass(eq=False)
 class Subdomain:
-    """One subdomain: a piece of a body or of several bonded bodies.
+    """One subdomain: a piece of one body or of several bonded bodies.
 
-    It has n node classes with c displacements each, and a kernel of dimension k.  K is by far the largest part:
-    `build` assembles it, the first `take_stiffness` hands it over to its caller, and later calls assemble it anew.
+    It has n node classes with c displacements each, and a kernel of dimension k.  K takes by far the most memory:
+    `build` assembles K, the first `take_stiffness` hands it over to its caller, and later calls assemble it anew.
 
     Attributes:
-        submesh: the coarse share.
-        mesh: the refined mesh.
-        problem: the displacements of the problem.
-        L: (v, v) stiffness of the material, see `assemble`; the mean over the area if there are several.
-        laws, material: the arguments of `assemble`; the first is (1, v, v), the second None, of one material.
-        Q: (cn, v) load of the unit strains: f = -Q E.
-        slopes: (n, 2) int dN/dx, 0 of the pinned class.
-        areas: (materials,) of each material.
+        submesh: coarse mesh.
+        mesh: refined mesh.
+        problem: components of the displacement, and unit loads.
+        L: (v, v) stiffness of the material, see `assemble`; with several materials, their mean over the area.
+        laws, material: arguments of `assemble`; with one material, `laws` is (1, v, v) and `material` None.
+        Q: (cn, v) unit loads: f = -Q E.
+        slopes: (n, 2) int dN/dx; 0 at the pinned class.
+        areas: (materials,) area of a material.
         R: (cn, k) orthonormal kernel of K: translations, and a rotation in the plane if the piece can turn,
-            less the motions that the pinned class stops.
+            without the motions that the pinned class stops.
         positions: (n, 2) unwrapped positions of the classes.
-        is_thin: whether the body is, such as a ring much thinner than its radius: the inverse is ill-conditioned.
-        is_outer: whether no other body lies around it.
-        mixed: whether its elements have a bubble and a pressure of their own, see `assemble`.
+        is_thin: whether the body is thin, such as a ring much thinner than its radius: K+ is ill-conditioned.
+        is_outer: whether no other body lies around the body.
+        mixed: whether elements have a bubble and an internal pressure, see `assemble`.
     """
 
     submesh: Submesh
@@ -65,15 +65,15 @@ class Subdomain:
         mixed: assembly.Mixed = False,
         **flags: bool,
     ) -> Subdomain:
-        """Refine and assemble, without communication; `flags` are `is_thin` and `is_outer`.
+        """Refine the submesh and assemble K and Q, without communication.
 
-        One material or several: `laws`, `material` and `mixed` as in `assemble`.
+        `laws`, `material` and `mixed` are as in `assemble`; `flags` are `is_thin` and `is_outer`.
 
         Raises:
-            MeshError: an element is inverted, or the rigid-body modes are not in the kernel of K.
+            MeshError: an element is inverted, or |K R| exceeds ZERO_TOLERANCE |K|.
         """
         mesh = refinement.refine(submesh, lattice)
-        # Bending towards the circles may turn triangles over.
+        # Nodes that are moved to the exact interface may invert triangles.
         triangles = mesh.nodes[mesh.curved][:, mesh.lattice.triangles[:, :3]].reshape(-1, 3)
         a, b, c = (mesh.points[triangles[:, k]] for k in range(3))
         doubled = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
@@ -98,7 +98,7 @@ class Subdomain:
         mixed: assembly.Mixed = False,
         **flags: bool,
     ) -> Subdomain:
-        """Assemble on a refined mesh, without communication.  Arguments and errors as of `build`."""
+        """Assemble K and Q on a refined mesh, without communication; see `build`."""
         body = assembly.assemble(mesh, laws, problem, mixed, material)
         shift, closes = mesh_fibres.unwrap(submesh)
         positions = np.empty((mesh.n_classes, 2))
@@ -120,10 +120,10 @@ class Subdomain:
         )
 
     def mean_strain(self, dofs: Int) -> Float:
-        """Compute weights (k, m): their transpose times the displacements of `dofs` (k,) is a part of int eps*.
+        """Compute weights w (k, m): w^T u is the contribution of u on `dofs` (k,) to int eps*.
 
-        The integral is over the subdomain and its share of the voids beside it, int_Omega eps* + int u (x) n ds, n
-        outward from the voids; 0 at voids.
+        The integral covers the subdomain and its share of adjacent voids: int_Omega eps* + int u (x) n ds over their
+        boundaries, with n outward from the voids.
         """
         m, slopes = self.problem.strains, self.slopes
         if self.submesh.at_void.any():
@@ -132,19 +132,19 @@ class Subdomain:
 
     @property
     def area(self) -> float:
-        """Area of the subdomain."""
+        """Return the area of the subdomain."""
         return float(self.areas.sum())
 
     @property
     def loads_inside(self) -> bool:
-        """Whether unit loads act on nodes that are not shared: at voids, and where materials meet."""
+        """Return whether unit loads act on nodes that are not shared: at voids, or where materials meet."""
         return self.material is not None or bool(self.submesh.at_void.any())
 
     def without_rounding(self, answers: Float, dofs: Int) -> Float:
-        """Remove rounding from the displacements -K+ Q (k, v) of `dofs` (k,).
+        """Remove rounding from the displacements `answers` = -K+ Q (k, v) of `dofs` (k,).
 
-        The displacement of a body that can turn, without voids, under a strain E is -E x and a rigid-body motion.  K+
-        adds rounding in proportion to the stiffness of the body, which may be far above all forces on it.
+        If a body can turn and has no voids, its displacement under a strain E is -E x plus a rigid-body motion.  K+
+        adds rounding in proportion to the stiffness of the body, which may exceed all forces on it by far.
         """
         if self.R.shape[1] < 3 or self.submesh.at_void.any():
             return answers
@@ -156,20 +156,21 @@ class Subdomain:
 
     @property
     def is_mixed(self) -> bool:
-        """Whether any material has mixed elements."""
+        """Return whether any material has mixed elements."""
         return bool(np.any(self.mixed))
 
     @property
     def n_dofs(self) -> int:
-        """Number of degrees of freedom, cn."""
+        """Return the number of degrees of freedom, cn."""
         return len(self.Q)
 
     @property
     def compressible_share(self) -> float:
-        """Fraction to which the diagonal of K is reduced where it scales jumps.
+        """Compute the factor (min(lambda, 2 mu) + 3 mu) / (lambda + 3 mu) on the diagonal of K.
 
-        A boundary that keeps the volume is as stiff as mu, but single nodes of mixed elements are as stiff as lambda:
-        here lambda is at most 2 mu.  The fraction is 1 for several materials, of which none is nearly incompressible.
+        It reduces the stiffness that scales jumps: boundary motions that keep the volume are as stiff as mu, but single
+        nodes of mixed elements are as stiff as lambda.  The factor is 1 without mixed elements, and for several
+        materials, none of which is nearly incompressible.
         """
         if not self.is_mixed or self.material is not None:
             return 1.0
@@ -177,33 +178,33 @@ class Subdomain:
         return (min(first, SCALED_LAME * shear) + 3 * shear) / (first + 3 * shear)
 
     def elimination_order(self) -> Int | None:
-        """Return an elimination order (cn,) of all dofs; None where the library orders at less cost.
+        """Return an elimination order (cn,) of all dofs, or None where the library's order is cheaper.
 
-        The library does if all nodes are coarse nodes, for then all triangles would have to be halved.
+        It is cheaper below LEAST_ORDERED_DOFS, and if all nodes are coarse nodes: then all triangles would be halved.
         """
         pays = self.n_dofs >= LEAST_ORDERED_DOFS and self.mesh.lattice.intervals > 1
         return self.problem.dofs(refinement.elimination_order(self.mesh)) if pays else None
 
     def take_stiffness(self) -> csr_matrix:
-        """Hand K (cn, cn) over to the caller: at first the matrix of `build`, later a new one."""
+        """Hand K (cn, cn) over to the caller: first the matrix of `build`, later a new matrix."""
         K, self._built_stiffness = self._built_stiffness, None
         return self.assemble_stiffness() if K is None else K
 
     def assemble_stiffness(self) -> csr_matrix:
-        """Assemble K (cn, cn), Eq. (28); a scaled unit row eliminates the pinned class (15)."""
+        """Assemble K (cn, cn), Eq. (28), with scaled unit rows for the pinned class (15)."""
         body = assembly.assemble(self.mesh, self.laws, self.problem, self.mixed, self.material)
         return _pinned(body.K, self.problem, self.submesh.pinned)
 
     def fixing(self, K: csr_matrix, candidates: Int) -> tuple[Int, Float]:
-        """Return dofs and a dense block rho Rf Rf^T on them that makes K + block SPD.
+        """Compute rho Rf Rf^T (f, f) on fixing dofs (f,), which makes K + rho Rf Rf^T SPD.
 
-        Its inverse is a generalized inverse K+ of K.  Rf is the kernel restricted to at most three of the
-        `candidates` (nodes), far apart, and orthonormalised (Brzobohaty, Dostal, Kozubek, Kovar, Markopoulos,
-        IJNME 88, 2011); rho is the mean diagonal entry of K there.
+        The inverse of the sum is a generalized inverse K+ of K (Brzobohaty, Dostal, Kozubek, Kovar, Markopoulos, IJNME
+        88, 2011).  Rf is the orthonormalised kernel on at most three nodes of `candidates`, far apart; rho is the mean
+        diagonal entry of K on their dofs.  Returns the dofs and the block.
         """
         if self.R.shape[1] == 0:
             return np.zeros(0, np.int64), np.zeros((0, 0))
-        # Three far-apart nodes for three modes, else the one farthest from the pinned class.
+        # Three far-apart nodes for three modes, else the node farthest from the pinned class.
         x = self.positions[candidates]
         origin = self.positions[self.submesh.pinned] if self.submesh.pinned >= 0 else x.mean(axis=0)
         apart = [np.argmax(((x - origin) ** 2).sum(axis=1))]
@@ -211,21 +212,21 @@ class Subdomain:
             apart.append(np.argmax(((x - x[apart[0]]) ** 2).sum(axis=1)))
             (dx, dy), (ex, ey) = x[apart[1]] - x[apart[0]], (x - x[apart[0]]).T
             apart.append(np.argmax(np.abs(dx * ey - dy * ex)))
-        # On a straight line two are enough, and the third is one of them.
+        # On a straight line two nodes are enough, and the third is a copy.
         nodes = np.unique(candidates[apart])
         dofs = self.problem.dofs(nodes)
         Rf = np.linalg.qr(self.R[dofs])[0]
         return dofs, K.diagonal()[dofs].mean() * Rf @ Rf.T
 
     def regularised(self, K: csr_matrix, candidates: Int) -> csr_matrix:
-        """Add the block of `fixing` to K."""
+        """Compute K + rho Rf Rf^T (cn, cn); see `fixing`."""
         dofs, block = self.fixing(K, candidates)
         rows, columns = np.meshgrid(dofs, dofs, indexing="ij")
         return (K + csr_matrix((block.ravel(), (rows.ravel(), columns.ravel())), shape=K.shape)).tocsr()
 
 
 def kernel(problem: Problem, positions: Float, rotates: bool, pinned: int) -> Float:
-    """Compute orthonormal rigid-body modes (cn, k) of nodes at `positions` (n, 2); `pinned` is a node or -1."""
+    """Compute orthonormal rigid-body modes (cn, k) of nodes at `positions` (n, 2); node `pinned` (or -1) is fixed."""
     n, c = len(positions), problem.components
     free = np.zeros((n, c, 0)) if pinned >= 0 else np.tile(np.eye(c), (n, 1, 1))
     if rotates and problem.turns:
@@ -237,14 +238,14 @@ def kernel(problem: Problem, positions: Float, rotates: bool, pinned: int) -> Fl
 
 
 def label(submesh: Submesh) -> str:
-    """Describe a subdomain in messages."""
+    """Return the name of a subdomain in messages."""
     x, y = submesh.points[0] + submesh.origin
     kind = f" ({submesh.phase})" if submesh.phase else ""
     return f"subdomain {submesh.index}{kind} near ({x:.6g}, {y:.6g})"
 
 
 def _pinned(K: csr_matrix, problem: Problem, pinned: int) -> csr_matrix:
-    """Replace the rows and columns of a pinned node in K by a multiple of I; -1 pins no node."""
+    """Replace the rows and columns of the node `pinned` in K by a multiple of I; -1 pins no node."""
     if pinned < 0:
         return K
     dofs, largest = problem.dofs(np.array([pinned])), K.diagonal().max()

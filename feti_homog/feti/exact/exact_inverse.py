@@ -1,13 +1,13 @@
-"""The inverse H of the projected dual operator, exact for any active rows, by a reference cell and followed columns.
+"""The exact inverse H of the projected dual operator for any active rows, by a reference cell and followed columns.
 
-Let Gamma be the response of a cell whose active rows are A, `reference_cell`, and C the rows that have changed since:
-some of A have left, others have come or their springs gained compliance.  The columns of C in the present response,
-which `followed_response` keeps up, turn any other response of the reference cell into the present one
-(`reference_changes`), new columns among them.
+Let Gamma be the response of a reference cell with active rows A (`reference_cell`), and C the rows that have changed
+since: their bonds broke, closed or softened.  `followed_response` updates the columns of C in the present response at
+every change.  With these columns, `reference_changes` turns any response of the reference cell into the present
+response.
 
-The reference cell stays until there are more changes than an option allows: then the cell as it stands, but for gains
-of compliance, is factored in its place.  Where changes cannot be followed, for they lose too many digits, it is
-factored too, and its response is followed from there.
+When C has more rows than `feti_influence_columns`, the cell in its present state, but with the initial compliance, is
+factored as the new reference cell.  Where an update would lose too many digits, the cell is factored too, and columns
+are followed from its response.
 """
 
 import numpy as np
@@ -27,28 +27,28 @@ from feti_homog.typing import Bool, Float, Int
 
 
 class ExactInverse(Preconditioner):
-    """The preconditioner z = H r, H the inverse of the dual operator on the active rows.
+    """The preconditioner z = H r, with the inverse H of the dual operator on the active rows.
 
     Attributes:
-        neighbours: which bonds lie beside each other.
-        stiffness: (all rows,) bounds for the diagonal of H: the stiffness of both nodes and the spring between them,
-            in a row, while all others are held.
-        norm: bound of |H|.
-        factorizations: reference cells so far.
+        neighbours: adjacent interface nodes.
+        stiffness: (all rows,) upper bounds for the diagonal of H: both nodes and their spring in series, while all
+            other nodes are fixed.
+        norm: upper bound of |H|.
+        factorizations: number of reference cells so far.
         batch: least number of columns that are computed together.
-        most_followed: number of columns from which unused columns are dropped; a change holds from the next restart.
+        most_followed: number of columns from which unused columns are dropped; read at the next restart.
     """
 
     is_exact = True
     reference: ReferenceCell
 
     def __init__(self, operators: InterfaceOperators) -> None:
-        """Factor the cell with all bonds intact; all boundary operators must be dense.  Collective.
+        """Factor the cell with all bonds intact.  Collective.
 
-        Options: `feti_influence_columns`.
+        All boundary operators must be dense.  Options: `feti_influence_columns`.
 
         Raises:
-            CaseError: the option has no such value.
+            CaseError: the value of the option is below 1.
         """
         comm, jump_operator = operators.comm, operators.jump_operator
         is_small = jump_operator.global_rows <= thresholds.NEVER_REFACTORED_ROWS
@@ -69,38 +69,38 @@ class ExactInverse(Preconditioner):
         self.batch = thresholds.COLUMNS_AT_ONCE * comm.size
         self.most_followed = min(max(thresholds.NEVER_REFACTORED_ROWS, 2 * max_changes), jump_operator.global_rows)
         self.factorizations = 0
-        # Of the present state active rows and what springs gained; the latter from the next `activate` on.
+        # Active rows and additional compliance of the present state; additional compliance of the next state.
         self._active, self._more = np.ones(self._rows), np.zeros(self._rows)
         self._next = self._more
         self._restart()
 
     def soften(self, more: Float) -> None:
-        """Add `more` compliance (owned rows,) to the initial one, from the next `activate` on."""
+        """Add `more` (owned rows,) to the intact spring compliance, from the next `activate` on."""
         self._next = more
 
     def activate(self, active: Float) -> None:
-        """Restrict to the rows where `active` is 1.  Collective."""
+        """Restrict H to rows where `active` (owned rows,) is 1.  Collective."""
         if not self._follow(active, self._next, thresholds.LEAST_FOLLOWED):
             self._active, self._more = active, self._next
             self._restart()
 
     def _follow(self, active: Float, more: Float, pivot: float) -> bool:
-        """Follow rows that leave, come or soften; return False if a pivot is below `pivot`.  Collective."""
-        gained, turned = more * active - self._more * self._active, self._active - active
-        places = np.flatnonzero((turned != 0.0) | (gained != 0.0))
-        parts = zip(*self.comm.allgather((self._first + places, turned[places], gained[places])), strict=True)
-        rows, turns, gains = (np.concatenate(part) for part in parts)
+        """Update to the next state; return False if a pivot is below `pivot`.  Collective."""
+        gain, sign = more * active - self._more * self._active, self._active - active
+        places = np.flatnonzero((sign != 0.0) | (gain != 0.0))
+        parts = zip(*self.comm.allgather((self._first + places, sign[places], gain[places])), strict=True)
+        rows, signs, gains = (np.concatenate(part) for part in parts)
         if not len(rows):
             return True
         self._is_fresh = False
         self._add_columns(rows)
-        if not self._followed.follow(rows, turns, gains, pivot):
+        if not self._followed.follow(rows, signs, gains, pivot):
             return False
         self._active, self._more = active, more
         return True
 
     def _restart(self) -> None:
-        """Factor the cell in its present state, and follow its response from there.  Collective."""
+        """Factor the cell in its present state, and follow columns from its response.  Collective."""
         active, more = self._active, self._more
         self._active, self._more = self._ties.tied(active), np.zeros(self._rows)
         nothing = np.zeros((self._rows, 0))
@@ -110,48 +110,47 @@ class ExactInverse(Preconditioner):
         self._is_fresh = True
 
     def _factor(self, active: Float) -> None:
-        """Factor the reference cell with the bonds `active`, which must hold all bodies.  Collective."""
+        """Factor the reference cell with the bonds `active`, which must stop all bodies.  Collective."""
         if self.factorizations:
             self.reference.destroy()  # before the new cell takes memory
             process_memory.trim()
         self.reference = ReferenceCell(self._operators, self._one_sided, active)
         self.factorizations += 1
-        self._unchanged = FollowedResponse(
-            self.comm, self._first, self.stiffness, np.zeros((self._rows, 0)), self.most_followed
-        )
+        nothing = np.zeros((self._rows, 0))
+        self._unchanged = FollowedResponse(self.comm, self._first, self.stiffness, nothing, self.most_followed)
         self._answer: Float | None = None
         self._rounding: float | None = None
-        # Changes without which the reference cell is not the one at hand.
-        self._tied = len(self._changes().rows)
+        # The new reference cell differs from the present cell by ties, which do not count towards the option.
+        self._tie_count = len(self._changes().rows)
 
     @property
-    def _held(self) -> Float:
-        """(owned rows,) 1 on active rows and on pins."""
+    def _rows_with_pins(self) -> Float:
+        """Return 1 on active rows and on pins, else 0 (owned rows,)."""
         holds, pins = self._active.copy(), self._followed.pins - self._first
         holds[pins[(pins >= 0) & (pins < self._rows)]] = 1.0
         return holds
 
     def _changes(self) -> ReferenceChanges:
         """Return the changes since the reference cell.  Collective."""
-        kinds = np.stack([self.reference.active - self._held, self._more * self._active], axis=1)
+        kinds = np.stack([self.reference.active - self._rows_with_pins, self._more * self._active], axis=1)
         places = np.flatnonzero(kinds.any(axis=1))
         parts = zip(*self.comm.allgather((self._first + places, kinds[places])), strict=True)
         return ReferenceChanges(self.comm, self._first, self.reference, self._followed, *map(np.concatenate, parts))
 
     def _up_to_date(self) -> ReferenceChanges:
-        """Return the changes since the reference cell; factor this cell anew if they are too many.  Collective."""
+        """Return the changes since the reference cell, which is renewed after too many changes.  Collective."""
         changes = self._changes()
-        if len(changes.rows) - self._tied <= self._max_changes:
+        if len(changes.rows) - self._tie_count <= self._max_changes:
             return changes
-        tied = self._ties.tied(self._held)
-        # Ties that have left are changes of the new cell, too.
-        rows = np.concatenate(self.comm.allgather(self._first + np.flatnonzero(tied != self._held)))
+        tied = self._ties.tied(self._rows_with_pins)
+        # Broken ties are changes of the new cell, too.
+        rows = np.concatenate(self.comm.allgather(self._first + np.flatnonzero(tied != self._rows_with_pins)))
         self._add(self._followed.lacking(rows), changes, rows)
         self._factor(tied)
         return self._changes()
 
     def _add_columns(self, rows: Int) -> None:
-        """Compute the missing columns of the present response for global rows (k,) and pins.  Collective."""
+        """Compute missing columns of the present response, at global rows (k,) and pins.  Collective."""
         rows = np.union1d(rows, self._followed.pins)
         if not len(self._followed.lacking(rows)):
             return
@@ -164,7 +163,7 @@ class ExactInverse(Preconditioner):
     def _add(
         self, rows: Int, changes: ReferenceChanges, needed: Int, max_error: float = thresholds.MOST_ROUNDING
     ) -> bool:
-        """Follow new columns of global rows (k,), unless they are asymmetric with followed columns.  Collective."""
+        """Follow columns at global rows (k,) if their asymmetry is at most `max_error`.  Collective."""
         if not len(rows):
             return True
         columns = changes.present(self.reference.columns(rows))
@@ -175,25 +174,24 @@ class ExactInverse(Preconditioner):
         return True
 
     def _with_near(self, rows: Int, followed: FollowedResponse) -> Int:
-        """Return the rows without columns, and active rows near them.
+        """Return the `rows` without columns, and active rows without columns beside them.  Collective.
 
-        Near bonds break next, and columns are cheaper together.  If all of the rows are inactive, near rows are left
-        out.  Collective.
+        Neighbours of broken bonds break next, and columns are cheaper together.  Inactive rows get no neighbours.
         """
         rows, active = followed.lacking(rows), self._are_active
         enough = self.batch if active[rows].any() else 0
-        return self.neighbours.rows_near(rows, lambda some: followed.lacking(some[active[some]]), enough)
+        return self.neighbours.rows_near(rows, lambda near: followed.lacking(near[active[near]]), enough)
 
     @property
     def _are_active(self) -> Bool:
-        """Whether each row is active (all rows,).  Collective."""
+        """Return whether rows are active (all rows,).  Collective."""
         return np.asarray(np.concatenate(self.comm.allgather(self._active)) > 0.0)
 
     @property
     def rounding(self) -> float:
-        """Relative error of H: the largest force by jumps of unit rigid-body motions, over `stiffness`.
+        """Compute the relative rounding error of H.  Collective.
 
-        Bodies follow rigid-body motions without force, so that all of this force is rounding.  Collective.
+        Jumps of unit rigid-body motions cause no forces: the error is the largest H r / `stiffness` of such jumps r.
         """
         if self._rounding is None:
             stiffness = self.stiffness[self._first : self._first + self._rows]
@@ -201,24 +199,24 @@ class ExactInverse(Preconditioner):
         return self._rounding
 
     def apply(self, r: Float) -> Float:
-        """H r for r (owned rows,) or (owned rows, k); 0 on inactive rows.  Collective."""
+        """Compute H r for r (owned rows,) or (owned rows, k); 0 on inactive rows.  Collective."""
         z = self._up_to_date().refined(self._of_reference(r if r.ndim == 2 else r[:, None]))
         return distributed_arrays.scale_rows(self._active, z.reshape(r.shape))
 
     def _of_reference(self, g: Float) -> Float:
-        """Compute Gamma g_A + g_R (owned rows, k): jumps g_R on inactive rows stay.  Collective."""
-        at_rest = distributed_arrays.scale_rows(1.0 - self.reference.active, g)
-        return self.reference.respond(distributed_arrays.scale_rows(self.reference.active, g)) + at_rest
+        """Compute Gamma g_A + g_I (owned rows, k): A active in the reference cell, I inactive.  Collective."""
+        inactive = distributed_arrays.scale_rows(1.0 - self.reference.active, g)
+        return self.reference.respond(distributed_arrays.scale_rows(self.reference.active, g)) + inactive
 
     def multipliers(self, d: Float, E: Float) -> Float:
-        """Compute H d E (owned rows, k) for E (v, k).  All calls must pass the same d (owned rows, v).  Collective."""
+        """Compute H d E (owned rows, k) for loads E (v, k); all calls pass the same d (owned rows, v).  Collective."""
         return distributed_arrays.scale_rows(self._active, self.renew_answer(d) @ E)
 
     def answer(self, d: Float, E: Float, free: int = 0) -> tuple[Float, Float] | None:
-        """Return H d E and the jumps on inactive rows, (owned rows, k) each, updated from state to state.
+        """Return H d E and the jumps on inactive rows, both (owned rows, k).  Collective.
 
-        Arguments as in `multipliers`.  Jumps hold for one position of free bodies.  Return None if these have another
-        number of motions than `free`.  Collective.
+        Both are updated from state to state; arguments as in `multipliers`.  Jumps hold for one position of free
+        bodies.  Returns None if the number of free motions in the columns differs from `free`.
         """
         if len(self._followed.pins) != free:
             if not self._is_fresh:
@@ -230,34 +228,36 @@ class ExactInverse(Preconditioner):
         return lam, U - lam
 
     def renew_answer(self, d: Float) -> Float:
-        """Compute U (owned rows, v) for d (owned rows, v) without rounding of the updates, and update this one.
+        """Compute U (owned rows, v) anew, by the response of the reference cell to `d`.  Collective.
 
-        Collective.
+        `d` (owned rows, v) holds the jumps of the torn cell under unit loads.  The new U has no rounding from earlier
+        updates, and replaces the stored U.
         """
         changes = self._up_to_date()
         if self._answer is None:
             self._answer = self._of_reference(d)
-        # Pins bear nothing, and stay.
-        self._followed.answer = distributed_arrays.scale_rows(
-            1.0 - self._held + self._active, changes.refined(self._answer)
-        )
+        # U is 0 on pins, which bear no force and do not move.
+        mask = 1.0 - self._rows_with_pins + self._active
+        self._followed.answer = distributed_arrays.scale_rows(mask, changes.refined(self._answer))
         return self._followed.answer
 
     def inverse_blocks(self, pairs: Int) -> Float:
-        """Return the diagonal blocks (m, 2, 2) of H for pairs (m, 2) of active global rows.  Collective.
+        """Return the diagonal blocks (m, 2, 2) of H at row pairs (m, 2).  Collective.
 
-        All ranks pass the same pairs.  Rows i that leave together open by H_ii^-1 lam_i.
+        All ranks pass the same pairs of active global rows.  If rows i become inactive together, their faces part by
+        H_ii^-1 lam_i.
         """
         self._add_columns(np.unique(pairs))
         return self._followed.blocks(pairs)
 
     def columns(self, rows: Int) -> tuple[Float, Float]:
-        """Return columns (owned rows, k) of H in the reference cell, and their (k, k) block, for global rows (k,).
+        """Return columns of H in the reference cell at global rows (k,).  Collective.
 
-        Before the first `activate` the reference cell is the bonded cell.  Collective.
+        The columns are (owned rows, k), followed by their entries (k, k) at `rows`.  Before the first `activate`, the
+        reference cell is the bonded cell.
         """
         if len(self._unchanged.lacking(rows)):
-            new = self._with_near(rows, self._unchanged)
-            self._unchanged.make_room(len(new), rows, np.ones(len(self.stiffness), bool))
-            self._unchanged.add(new, self.reference.columns(new))
+            missing = self._with_near(rows, self._unchanged)
+            self._unchanged.make_room(len(missing), rows, np.ones(len(self.stiffness), bool))
+            self._unchanged.add(missing, self.reference.columns(missing))
         return self._unchanged.columns(rows), self._unchanged.entries(rows, rows)

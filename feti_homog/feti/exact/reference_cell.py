@@ -1,12 +1,12 @@
-"""The cell with a reference set A of active rows, factored, and its response to unit jumps and forces.
+"""The factored cell with a reference set A of active rows, and its response Gamma to jumps and forces.
 
-Jumps g on the rows of A and forces f on the others I, each on both faces, make multipliers on A and gaps on I,
+Jumps g on the active rows A and forces f on both faces of the inactive rows I cause multipliers on A and gaps on I:
 
     (lam, gap) = Gamma (g, f),  Gamma = [ F_AA^-1          -F_AA^-1 F_AI                  ]
-                                        [ -F_IA F_AA^-1    F_IA F_AA^-1 F_AI - F_II       ],
+                                        [ -F_IA F_AA^-1    F_IA F_AA^-1 F_AI - F_II       ].
 
-the principal pivot transform of the dual operator, with F_AA^-1 the inverse on forces in equilibrium.  It is symmetric,
-positive semi-definite on A and negative definite on I.
+Gamma is the principal pivot transform of the dual operator, with F_AA^-1 the inverse on forces in equilibrium: it is
+symmetric, positive semi-definite on A and negative definite on I.
 """
 
 from collections.abc import Iterator
@@ -29,25 +29,25 @@ from feti_homog.typing import Float, Int
 
 
 class AssembledSchur:
-    """The matrix Z^T S Z of all subdomains, factored once; every rank holds the factor.
+    """The assembled Schur complement Z^T S Z of all subdomains; every rank has the whole factor.
 
-    The shared nodes of the cell with the bonds of its active rows move by u = Z y: B Z = 0 on these rows.
-
-    All copies of a node move together.  But along inactive rows, copies of the inner body move independently.
+    Boundary displacements u = Z y have no jump on active rows, B Z = 0: all copies of a node move together, but along
+    inactive rows the copies of the inner body move independently.
 
     Attributes:
-        size: columns of Z, on all ranks.
+        size: number of columns of Z, over all ranks.
     """
 
     def __init__(self, operators: InterfaceOperators, active: Float) -> None:
-        """Assemble and factor for rows where `active` is 1, which must leave no rigid-body motion free.  Collective.
+        """Assemble and factor Z^T S Z.  Collective.
 
-        Dense matrices by LAPACK; options of sparse ones have the prefix `feti_bonded_` (default: cholesky by CHOLMOD).
+        Rows with `active` (owned rows,) 1 must leave no rigid-body motion free.  LAPACK factors dense matrices; options
+        for sparse matrices have the prefix `feti_bonded_` (default: cholesky by CHOLMOD).
 
         Raises:
             TypeError: a boundary operator is not dense.
         """
-        released, comm, jump_operator = active == 0, operators.comm, operators.jump_operator
+        is_inactive, comm, jump_operator = active == 0, operators.comm, operators.jump_operator
         starts, sizes = jump_operator.node_rows
         first = comm.exscan(len(starts)) or 0
         node = jump_operator.gather(np.repeat(first + np.arange(len(starts)), sizes[np.argsort(starts)]).astype(float))
@@ -56,9 +56,9 @@ class AssembledSchur:
         n, c = len(row), jump_operator.components
         shared = c * node[row].astype(np.int64) + np.arange(n) % c
         together = csr_matrix((np.ones(n), (np.arange(n), shared)), shape=(n, jump_operator.shared_dofs))
-        # Along the direction e of each inactive row u_f = y - e (e . y) + e w, with an extra column for w.
-        counts = comm.allgather(int(released.sum()))
-        number = np.where(released, sum(counts[: comm.rank]) + np.cumsum(released), 0)
+        # The inner body moves by u = y - e (e . y) + e w along the direction e of an inactive row, with a column for w.
+        counts = comm.allgather(int(is_inactive.sum()))
+        number = np.where(is_inactive, sum(counts[: comm.rank]) + np.cumsum(is_inactive), 0)
         number = jump_operator.gather(number.astype(float)).astype(np.int64) - 1
         rows = np.flatnonzero(number >= 0)
         # A row has the mean of the inner copies, with a minus sign.
@@ -66,9 +66,8 @@ class AssembledSchur:
         e = diags(minus_copies) @ operators.B[rows] @ diags(of_inner)
         square = np.asarray(e.multiply(e).sum(axis=1)).ravel()
         rows, e, square = rows[square > 0], e.tocsr()[square > 0], square[square > 0]
-        directions = csr_matrix(
-            (np.ones(len(rows)), (np.arange(len(rows)), number[rows])), shape=(len(rows), sum(counts))
-        )
+        entries = np.ones(len(rows)), (np.arange(len(rows)), number[rows])
+        directions = csr_matrix(entries, shape=(len(rows), sum(counts)))
         common = (together - e.T @ (diags(1.0 / square) @ (e @ together))).tocsr()
         common.eliminate_zeros()
         apart = (e.T @ directions).tocsr()
@@ -83,10 +82,7 @@ class AssembledSchur:
             self._solver = DirectSolver(stiffness, "feti_bonded_")
 
     def relieving_displacement(self, forces: Float) -> Float:
-        """Compute u = -Z (Z^T S Z)^-1 Z^T f, which balances boundary forces f (n,) or (n, k) on Z.
-
-        Collective.
-        """
+        """Compute u = -Z (Z^T S Z)^-1 Z^T f for boundary forces f (n,) or (n, k).  Collective."""
         right = -self._ZT @ forces
         self.comm.Allreduce(MPI.IN_PLACE, right)
         return np.asarray(self._Z @ distributed_arrays.share_columns(self.comm, self._solver.solve, right))
@@ -97,10 +93,10 @@ class AssembledSchur:
 
 
 def assembled_stiffness(operators: InterfaceOperators, Z: csr_matrix) -> csr_matrix | Float:
-    """Sum Z^T S Z over all ranks for Z (n, columns).  Collective.
+    """Sum Z^T S Z (m, m) over all ranks for Z (n, m).  Collective.
 
-    The sum is dense, in Fortran order, where all ranks' blocks have as many entries as the whole matrix and there are
-    no options `feti_bonded_`; sparse otherwise.
+    The sum is dense, in Fortran order, if the blocks of all ranks have at least m^2 entries, m is at most
+    `dense_boundary_dofs`, and no option has the prefix `feti_bonded_`; else it is sparse.
 
     Raises:
         TypeError: a boundary operator is not dense.
@@ -108,27 +104,27 @@ def assembled_stiffness(operators: InterfaceOperators, Z: csr_matrix) -> csr_mat
     comm, size, columns = operators.comm, Z.shape[1], [np.unique(Z[span].indices) for span in operators.slices]
 
     def blocks() -> Iterator[tuple[Int, Int, Float]]:
-        for operator, span, of in zip(operators.with_springs, operators.slices, columns, strict=True):
+        for operator, span, j in zip(operators.with_springs, operators.slices, columns, strict=True):
             if not is_dense(operator):
                 raise TypeError("the assembled Schur complement needs dense boundary operators")
-            T = Z[span][:, of].T.tocsr()
-            yield of, of, T @ (T @ operator.S).T
+            T = Z[span][:, j].T.tocsr()
+            yield j, j, T @ (T @ operator.S).T
 
-    entries = comm.allreduce(sum(len(of) ** 2 for of in columns))
+    entries = comm.allreduce(sum(len(j) ** 2 for j in columns))
     if entries < size**2 or size > DEFAULTS.dense_boundary_dofs or options_database.choices("feti_bonded_"):
         return allreduce_sparse(comm, sum_of_blocks((size, size), blocks()))
     dense = np.zeros((size, size))
-    for of, _, block in blocks():
-        dense[of[:, None], of] += block
+    for j, _, block in blocks():
+        dense[j[:, None], j] += block
     comm.Allreduce(MPI.IN_PLACE, dense)
     return dense.T
 
 
 class BodyTies:
-    """Two bonds that tie each fibre to the body around it, the second farthest from the first."""
+    """Two bonds that tie every fibre to the body around it; the second is the farthest from the first."""
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator) -> None:
-        """Choose the bonds.  Collective."""
+        """Choose the two bonds of every pair of bodies.  Collective."""
         nodes = jump_operator.nodes
         self._comm = comm
         self._rows = nodes.row[:, None] + np.arange(jump_operator.components)
@@ -143,12 +139,11 @@ class BodyTies:
         self._pair = pair[begin : begin + len(nodes.row)]
 
     def tied(self, active: Float) -> Float:
-        """Add the ties of bodies that fewer than two bonds hold to `active` (owned rows,).  Collective."""
+        """Return `active` (owned rows,) with 1 on the ties of bodies with fewer than two bonds.  Collective."""
         bonded = active[self._rows].prod(axis=1)
-        holding = distributed_arrays.allreduce_sum(
-            self._comm, np.bincount(self._pair, bonded, len(self._ties)).astype(float)
-        )
-        ties = self._ties[holding < self._ties.shape[1]].ravel()
+        local = np.bincount(self._pair, bonded, len(self._ties)).astype(float)
+        bonds = distributed_arrays.allreduce_sum(self._comm, local)
+        ties = self._ties[bonds < self._ties.shape[1]].ravel()
         rows = self._rows[ties[(ties >= 0) & (ties < len(self._rows))]]
         tied = active.copy()
         tied[rows] = 1.0
@@ -156,15 +151,15 @@ class BodyTies:
 
 
 class ReferenceCell:
-    """The response operator Gamma of the cell with the reference set A.
+    """The response Gamma of the cell with the active rows A.
 
     Attributes:
-        active: (owned rows,) 1 on A.
-        assembled: the cell with the bonds of A.
+        active: (owned rows,) 1 on A, else 0.
+        assembled: assembled Schur complement with the bonds of A.
     """
 
     def __init__(self, operators: InterfaceOperators, one_sided: csr_matrix, active: Float) -> None:
-        """Factor the cell with the bonds where `active` (owned rows,) is 1; `one_sided` is B_D.  Collective."""
+        """Factor the cell with the active rows A.  Collective; `one_sided` is B_D of `one_sided_jumps`."""
         comm, jump_operator = operators.comm, operators.jump_operator
         self._comm, self.active, self._jump_operator, self._operators = comm, active, jump_operator, operators
         self._BD, self._BDT = one_sided, one_sided.T.tocsr()
@@ -188,19 +183,19 @@ class ReferenceCell:
 
         All ranks pass the same rows.
         """
-        # A few columns too many are cheaper with others than by themselves.
+        # Batches of about COLUMNS_AT_ONCE: a small last batch would cost more than slightly larger batches.
         columns = [np.zeros((len(self.active), 0))]
-        for some in np.array_split(rows, max(round(len(rows) / COLUMNS_AT_ONCE), 1)) if len(rows) else []:
-            unit, place = np.zeros((len(self.active), len(some))), some - self._first
+        for batch in np.array_split(rows, max(round(len(rows) / COLUMNS_AT_ONCE), 1)) if len(rows) else []:
+            unit, place = np.zeros((len(self.active), len(batch))), batch - self._first
             mine = np.flatnonzero((place >= 0) & (place < len(unit)))
             unit[place[mine], mine] = 1.0
             columns.append(self.respond(unit))
         return np.hstack(columns)
 
     def force_of_rigid_motions(self, stiffness: Float) -> float:
-        """Compute the largest force by jumps of unit rigid-body motions, relative to `stiffness` (owned rows,).
+        """Compute the largest |Gamma r| / `stiffness` for jumps r of unit rigid-body motions.  Collective.
 
-        Collective.
+        `stiffness` is (owned rows,); without rounding the result is 0.
         """
         bodies = zip(self._operators.subdomains, self._operators.dofs, strict=True)
         motions = [s.R[dofs].sum(axis=1) for s, dofs in bodies]
@@ -211,18 +206,18 @@ class ReferenceCell:
         return float(self._comm.allreduce(np.abs(force).max(initial=0.0), MPI.MAX))
 
     def _without_springs(self, x: Float) -> Float:
-        """Compute Gamma x without the springs at nodes of A where fibre and matrix are both cut.
+        """Compute Gamma x without the springs at nodes of A where both bodies are cut.  Collective.
 
-        Displacements u = B_D^T g + Z y whose forces S u - B_I^T f vanish on Z; then B_A^T lam = S u - B_I^T f.
+        With x = (g, f), u = B_D^T g + Z y such that Z^T (S u - B_I^T f) = 0; then B_A^T lam = S u - B_I^T f.
         """
         operators, jump_operator = self._operators, self._jump_operator
         g, f = distributed_arrays.scale_rows(self.active, x), distributed_arrays.scale_rows(1.0 - self.active, x)
-        is_pulled = not self._is_bonded and self._comm.allreduce(bool(f.any()), MPI.LOR)
-        pulled = operators.BT @ jump_operator.gather(f) if is_pulled else 0.0
+        has_forces = not self._is_bonded and self._comm.allreduce(bool(f.any()), MPI.LOR)
+        load = operators.BT @ jump_operator.gather(f) if has_forces else 0.0
 
         def forces_by(u: Float) -> Float:
             forces = operators.apply_with_springs(u, self._reached)
-            return forces - pulled if is_pulled else forces
+            return forces - load if has_forces else forces
 
         u = self._BDT @ jump_operator.gather(g)
         u += self.assembled.relieving_displacement(forces_by(u))
@@ -230,29 +225,28 @@ class ReferenceCell:
         if self._is_bonded:
             return lam
         gap = -jump_operator.sum(operators.B @ u)
-        if is_pulled:
+        if has_forces:
             gap -= distributed_arrays.scale_rows(operators.compliance, f)
         return lam + distributed_arrays.scale_rows(1.0 - self.active, gap)
 
 
 def one_sided_jumps(operators: InterfaceOperators) -> csr_matrix:
-    """Build B_D (local rows, boundary dofs), B B_D^T = I, which moves one side of each interface.  Collective.
+    """Build B_D (local rows, boundary dofs) with B B_D^T = I, by motions of one body.  Collective.
 
-    Only this side needs forces: the inner body, unless it is so stiff that its forces lose digits.
+    Only the body that moves needs forces: the inner body, unless it is more than STIFF_FIBRES times as stiff as the
+    outer body, because its forces would lose digits.
     """
     comm, jump_operator = operators.comm, operators.jump_operator
     inside, B = jump_operator.inside, operators.B.tocoo()
     is_bond = inside >= 0
     inner, mine = inside[B.row], is_bond[B.row]
-    # Of each inner body and what is around it: the mean diagonal stiffness.
+    # The mean diagonal stiffness on both sides of every interface, numbered by the inner body.
     side = 2 * inner + operators.of_inner[B.col]
-    count_of_sides = 2 * (comm.allreduce(int(inside.max(initial=-1)), MPI.MAX) + 1)
+    side_count = 2 * (comm.allreduce(int(inside.max(initial=-1)), MPI.MAX) + 1)
     weights = B.data[mine] ** 2
-    sums = [
-        np.bincount(side[mine], values, count_of_sides)
-        for values in (weights * operators.diagonal[B.col[mine]], weights)
-    ]
-    total, count = distributed_arrays.allreduce_sum(comm, np.stack(sums).astype(float))  # of no bonds: integers
+    terms = weights * operators.diagonal[B.col[mine]], weights
+    sums = [np.bincount(side[mine], values, side_count) for values in terms]
+    total, count = distributed_arrays.allreduce_sum(comm, np.stack(sums).astype(float))  # integers without bonds
     outer_mean, inner_mean = (total / np.maximum(count, 1.0)).reshape(-1, 2).T
     moves_inner = np.append(inner_mean <= STIFF_FIBRES * outer_mean, False)[inside]
     moved = ~mine | (operators.of_inner[B.col] == moves_inner[B.row])
@@ -261,33 +255,33 @@ def one_sided_jumps(operators: InterfaceOperators) -> csr_matrix:
 
 
 def stiffness_of_rows(operators: InterfaceOperators) -> Float:
-    """Compute the stiffness 1 / (B D^-1 B^T + C) of each owned row.  Collective.
+    """Compute the stiffness 1 / diag(B D^-1 B^T + C) (owned rows,).  Collective.
 
-    D is the diagonal of the bodies' stiffness, C the compliance of the springs.
+    D is the diagonal of K, C the compliance of the springs.
     """
     flexibility = operators.jump_operator.sum(operators.B.power(2) @ (1.0 / operators.body_diagonal))
     return np.asarray(1.0 / (flexibility + operators.springs))
 
 
 class BondedInverse(Preconditioner):
-    """The preconditioner z = H r by the factor of the assembled Schur complement.
+    """The preconditioner z = H r, with the exact inverse H by a factored cell.
 
-    Unlike `ExactInverse` it follows no rows: another set of active rows is factored anew.
+    Unlike `ExactInverse`, it factors the cell for every new set of active rows.
     """
 
     is_exact = True
 
     def __init__(self, operators: InterfaceOperators) -> None:
-        """Factor the cell with all bonds; all boundary operators must be dense.  Collective."""
+        """Factor the cell with all bonds intact; all boundary operators must be dense.  Collective."""
         self._operators, self._one_sided = operators, one_sided_jumps(operators)
         self._cell = ReferenceCell(operators, self._one_sided, np.ones(len(operators.springs)))
 
     def activate(self, active: Float) -> None:
-        """Factor the cell with the bonds `active`, which must hold all bodies, if they have changed."""
+        """Factor the cell if `active` (owned rows,) has changed; active rows must stop all bodies.  Collective."""
         if self._operators.comm.allreduce(bool((active != self._cell.active).any()), MPI.LOR):
             self._cell.destroy()
             self._cell = ReferenceCell(self._operators, self._one_sided, active)
 
     def apply(self, r: Float) -> Float:
-        """Compute the multipliers that close the jump r on the active rows."""
+        """Compute H r for r (owned rows,) or (owned rows, k).  Collective."""
         return self._cell.respond(distributed_arrays.scale_rows(self._cell.active, r))

@@ -1,10 +1,10 @@
-"""The present response from the response of the reference cell, by followed columns of the changed rows C.
+"""The present response Gamma' from the reference cell's Gamma, by followed columns of the changed rows C.
 
-Let W be s on rows that left (1) or came (-1), and dC on rows whose springs gained compliance.  The transforms of
-`followed_response` give Gamma_:C B = Gamma'_:C W with the present response Gamma'.  So one product turns the other
-columns, and answers U, of the reference cell into present columns and answers:
+Let W be diagonal: s = 1 on rows that became inactive, s = -1 on rows that became active, dC on rows whose springs
+gained the compliance dC.  The transforms of `followed_response` give Gamma_:C B = Gamma'_:C W.  So a column or an
+answer U of the reference cell becomes the present column or answer
 
-    U' = U - Gamma'_:C W U_C,  after U is set to 0 on rows that left or came.
+    U' = U - Gamma'_:C W U_C,  after U is set to 0 on rows that became inactive or active.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ from feti_homog.typing import Float, Int
 
 
 class ReferenceChanges:
-    """The changed rows C of a reference cell, which all have followed columns.
+    """The changed rows C of a reference cell; all of them have followed columns.
 
     Attributes:
         rows: (c,) global numbers of C.
@@ -26,60 +26,60 @@ class ReferenceChanges:
     def __init__(
         self, comm: MPI.Intracomm, first: int, cell: ReferenceCell, followed: FollowedResponse, rows: Int, kinds: Float
     ) -> None:
-        """Store C, the global `rows` (c,), and `kinds` (c, 2): s and dC of each row.
+        """Store the global `rows` (c,) of C, with s and dC in `kinds` (c, 2).
 
-        s is 0 for rows that are active in both cells.  The first owned row is `first`.
+        s is 0 on rows that are active in both cells.  The owned rows begin at `first`.
         """
         self._comm, self._first, self._cell, self._followed, self.rows = comm, first, cell, followed, rows
-        self._turned, self._more = kinds.T[:, :, None]
-        self._weights = np.where(self._turned != 0.0, self._turned, self._more)
+        self._signs, self._more = kinds.T[:, :, None]
+        self._weights = np.where(self._signs != 0.0, self._signs, self._more)
         places = rows - first
         self._mine = np.flatnonzero((places >= 0) & (places < len(cell.active)))
-        self._own = places[self._mine]
+        self._places = places[self._mine]
 
     def present(self, columns: Float) -> Float:
-        """Compute U' (owned rows, k) from U (owned rows, k).  Collective."""
+        """Compute U' = U - Gamma'_:C W U_C (owned rows, k) for U = `columns` (owned rows, k).  Collective."""
         response = columns.copy()
-        response[self._own[self._turned[self._mine, 0] != 0.0]] = 0.0
+        response[self._places[self._signs[self._mine, 0] != 0.0]] = 0.0
         response -= self._followed.product(self.rows, self._weights * self._gathered(columns))
         return response
 
     def refined(self, columns: Float) -> Float:
-        """Compute `present` without rounding of followed columns, by one iterative refinement.  Collective.
+        """Compute U' by `present` and one step of iterative refinement.  Collective.
 
-        c = B U_C solves (Gamma_CC + D) c = U_C with Gamma of the reference cell.
+        The step removes the rounding of followed columns.  c = B U_C solves (Gamma_CC + D) c = U_C with Gamma of the
+        reference cell; D is diagonal.
         """
         response = self.present(columns)
         values = self._gathered(response)
         c = self._weights * values
         residual = columns - self._cell.respond(self._spread(c))
-        # D c on rows that are active in both cells, that came, and that left.
-        stretched = np.where(self._turned == 0.0, values, np.where(self._turned < 0.0, -self._more * c, 0.0))
-        rest = self._spread(self._gathered(residual) - stretched)
-        residual[self._own] = response[self._own]
-        return residual + self.present(rest)
+        # D c on rows that are active in both cells, that became active, and that became inactive.
+        D_c = np.where(self._signs == 0.0, values, np.where(self._signs < 0.0, -self._more * c, 0.0))
+        correction = self._spread(self._gathered(residual) - D_c)
+        residual[self._places] = response[self._places]
+        return residual + self.present(correction)
 
     def error(self, rows: Int, columns: Float, stiffness: Float) -> float:
-        """Compute the asymmetry of new columns (owned rows, k) and followed columns of C.  Collective.
+        """Compute the largest asymmetry of new columns against followed columns.  Collective.
 
-        Gamma' is symmetric.  The new columns belong to global rows (k,), none of C.  The error is relative to the
-        largest entry, after `stiffness` (all rows,) of active rows has removed the units.
+        Gamma' is symmetric.  The error is relative to the largest entry, both scaled by `stiffness` (all rows,) to the
+        unit 1.  The new `columns` (owned rows, k) belong to global `rows` (k,) outside C.
         """
         entries, followed = self._gathered(columns), self._followed.entries(rows, self.rows).T
-        holds = (
-            self._turned[:, 0] <= 0.0,
-            distributed_arrays.gather_rows(self._comm, self._cell.active, self._first, rows) > 0.0,
-        )
-        pairs = zip(holds, (np.sqrt(stiffness[some]) for some in (self.rows, rows)), strict=True)
+        active = distributed_arrays.gather_rows(self._comm, self._cell.active, self._first, rows) > 0.0
+        roots = (np.sqrt(stiffness[numbers]) for numbers in (self.rows, rows))
+        pairs = zip((self._signs[:, 0] <= 0.0, active), roots, strict=True)
         units = np.multiply.outer(*(np.where(is_active, 1.0 / root, root) for is_active, root in pairs))
         error, largest = (np.abs(units * x).max(initial=0.0) for x in (entries - followed, entries))
         return float(self._comm.bcast(error / max(largest, 1.0)))
 
     def _gathered(self, x: Float) -> Float:
+        """Gather the rows C of x (owned rows, k) on every rank: (c, k).  Collective."""
         return distributed_arrays.gather_rows(self._comm, x, self._first, self.rows)
 
     def _spread(self, values: Float) -> Float:
-        """Scatter values (c, k) on C to owned rows (owned rows, k); other rows are 0."""
+        """Return owned rows (owned rows, k) with `values` (c, k) on C, else 0."""
         x = np.zeros((len(self._cell.active), values.shape[1]))
-        x[self._own] = values[self._mine]
+        x[self._places] = values[self._mine]
         return x

@@ -1,4 +1,4 @@
-"""Dense symmetric matrices: Schur complements by sparse elimination, Cholesky by LAPACK, copies of one triangle."""
+"""Dense symmetric matrices: Schur complements by sparse elimination, Cholesky factors and inverses by LAPACK."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from feti_homog.typing import Float, Int
 if TYPE_CHECKING:
     from feti_homog.feti.linalg.partial_cholesky import PartialFactor
 
-# MUMPS' errors for a workspace that is too small, and the percentages by which the estimate then grows.
+# INFOG(1) of MUMPS if the workspace is too small; then the percentages added to the estimate, one after the other.
 TOO_SMALL, MORE_WORKSPACE = (-8, -9), (None, 100, 1000)
 
 
 def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) -> Float:
-    """Compute the Schur complement (n, n) on `rows`, in Fortran order; the rest of the matrix must be SPD.
+    """Compute the Schur complement (n, n) of a matrix (dofs, dofs) on `rows` (n,), in Fortran order.
 
-    With an `order` (dofs,), CHOLMOD eliminates the rest in that order, and the diagonal on `rows` must be positive.
-    Without an order, or with options under `feti_schur_`, MUMPS eliminates the rest.
+    CHOLMOD eliminates the other rows in the `order` (dofs,), if the diagonal on `rows` is positive.  Without `order`,
+    or with options under `feti_schur_`, MUMPS eliminates these rows.
 
     Raises:
-        LinAlgError: the rest of the matrix is not positive definite, or has entries that are not finite.
+        LinAlgError: the block of the other rows is not positive definite, or the matrix is not finite.
         MemoryError: the library cannot factor the matrix, usually for lack of memory.
     """
     if len(rows) == matrix.shape[0]:
@@ -38,11 +38,11 @@ def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) ->
     if order is not None and _can_be_ordered():
         return _by_cholmod(matrix, rows, np.zeros((matrix.shape[0], 0)), order, keep_factor=False).S
     scale = power_of_two(matrix.diagonal())
-    # Scale in place and back, which changes no digit: a copy would be as large as the matrix.
+    # The matrix is scaled in place and back, which changes no digit: a copy would be as large as the matrix.
     matrix.data *= scale
     A = sequential(matrix)
     A.setOption(PETSc.Mat.Option.SPD, True)
-    some, pc = PETSc.IS().createGeneral(rows.astype(PETSc.IntType), comm=PETSc.COMM_SELF), PETSc.PC()
+    index_set, pc = PETSc.IS().createGeneral(rows.astype(PETSc.IntType), comm=PETSc.COMM_SELF), PETSc.PC()
     try:
         for workspace in MORE_WORKSPACE:
             pc.destroy()
@@ -53,18 +53,18 @@ def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) ->
             pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
             pc.setFromOptions()
             pc.setFactorSetUpSolverType()
-            # MUMPS' own scaling loses digits of coarse matrices, which are scaled.
+            # The scaling of MUMPS loses digits of coarse matrices, which are already scaled.
             pc.getFactorMatrix().setMumpsIcntl(8, 0)
             if workspace is not None:
                 pc.getFactorMatrix().setMumpsIcntl(14, workspace)
-            c_functions.set_schur(pc.getFactorMatrix(), some)
+            c_functions.set_schur(pc.getFactorMatrix(), index_set)
             pc.setUp()
             if mumps_error(pc.getFactorMatrix())[0] not in TOO_SMALL:
                 break
         check_factor(pc)
         schur = c_functions.schur_complement(pc.getFactorMatrix(), len(rows))
     finally:
-        for petsc_object in (pc, some, A):
+        for petsc_object in (pc, index_set, A):
             petsc_object.destroy()
         matrix.data /= scale
     schur /= scale
@@ -73,12 +73,12 @@ def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) ->
 
 @dataclass(frozen=True)
 class ShiftedFactor:
-    """Cholesky factor of K + D, for a matrix K (dofs, dofs) that may be singular.
+    """The Cholesky factor of K + D, for a matrix K (dofs, dofs) that may be singular.
 
     Attributes:
         factor: L with L L^T = K + D.
-        rows: (n,) rows of the condensed matrix.
-        D: (n,) positive terms on the diagonal of K at `rows`.
+        rows: (n,) rows of K to which K was condensed.
+        D: (n,) positive diagonal of D on `rows`; D is 0 elsewhere.
     """
 
     factor: PartialFactor
@@ -86,7 +86,7 @@ class ShiftedFactor:
     D: Float
 
     def solution(self, f: Float, x: Float) -> Float:
-        """Solve K u = f (dofs, k) with known values x (n, k) on `rows`, from (K + D) u = f + D x."""
+        """Solve (K + D) u = f + D x for u (dofs, k): K u = f (dofs, k) if u = x (n, k) on `rows`."""
         right = f.copy(order="F")
         right[self.rows] += (self.D * x.T).T
         u = self.factor.solve(right)
@@ -96,7 +96,7 @@ class ShiftedFactor:
 
 @dataclass(frozen=True)
 class CondensedMatrix:
-    """A matrix K and loads Q (dofs, v) condensed to n rows.
+    """A matrix K and loads Q (dofs, v), condensed to n rows b; i are the other rows.
 
     Attributes:
         S: (n, n) Schur complement, in Fortran order.
@@ -114,15 +114,15 @@ class CondensedMatrix:
 def condensed_with_loads(
     matrix: csr_matrix, rows: Int, loads: Float, order: Int | None = None, keep_factor: bool = False
 ) -> CondensedMatrix:
-    """Condense a matrix and loads Q (dofs, v) to `rows` by one elimination; raise as `schur_complement`."""
+    """Condense a matrix and `loads` Q (dofs, v) to `rows` (n,) by one elimination; see `schur_complement`."""
     if order is not None and _can_be_ordered():
         return _by_cholmod(matrix, rows, loads, order, keep_factor)
     v, n = loads.shape[1], len(rows)
     corner = csr_matrix((np.zeros(v), np.arange(v), np.arange(v + 1)), shape=(v, v))  # MUMPS expects a diagonal
     Q = csr_matrix(loads)
     bordered = bmat([[matrix, Q], [Q.T, corner]], format="csr")
-    all_of_it = schur_complement(bordered, np.r_[rows, matrix.shape[0] + np.arange(v)])
-    return CondensedMatrix(np.asfortranarray(all_of_it[:n, :n]), all_of_it[:n, n:].copy(), all_of_it[n:, n:].copy())
+    schur = schur_complement(bordered, np.r_[rows, matrix.shape[0] + np.arange(v)])
+    return CondensedMatrix(np.asfortranarray(schur[:n, :n]), schur[:n, n:].copy(), schur[n:, n:].copy())
 
 
 def _can_be_ordered() -> bool:
@@ -133,10 +133,10 @@ def _can_be_ordered() -> bool:
 
 
 def _by_cholmod(matrix: csr_matrix, rows: Int, loads: Float, order: Int, keep_factor: bool) -> CondensedMatrix:
-    """Condense a matrix and loads by the factorization K + D = L L^T.
+    """Condense a matrix K and loads Q by the factorization K + D = L L^T.
 
-    D > 0 on `rows` makes K + D definite even if K is singular. With y = L^-1 Q and the block L_bb of L on `rows`,
-    S = L_bb L_bb^T - D and q = L_bb y_b.
+    D > 0 on `rows` makes K + D definite even if K is singular.  With y = L^-1 Q and the block L_bb of L on `rows` b,
+    S = L_bb L_bb^T - D, q = L_bb y_b and C = -y_i^T y_i.
     """
     from feti_homog.feti.linalg.partial_cholesky import PartialFactor  # only large subdomains need it
 
@@ -149,7 +149,7 @@ def _by_cholmod(matrix: csr_matrix, rows: Int, loads: Float, order: Int, keep_fa
     inner, last = y[:-n], y[-n:]
     q = dtrmm(1.0, U, last[::-1])[::-1].copy()
     if not np.isfinite(U.diagonal()).all():
-        raise np.linalg.LinAlgError("not positive definite (entries that are not finite)")
+        raise np.linalg.LinAlgError("not positive definite (entries are not finite)")
     check_lapack("dlauum", dlauum(U, lower=0, overwrite_c=1)[1])
     S = full_from_lower(U[::-1, ::-1]).T
     S[np.diag_indices(n)] -= shift
@@ -157,12 +157,9 @@ def _by_cholmod(matrix: csr_matrix, rows: Int, loads: Float, order: Int, keep_fa
 
 
 def cholesky(A: Float, lower: bool = True, clean: bool = True) -> Float:
-    """Compute the Cholesky factor L of A = L L^T (n, n), or the upper triangle L^T.
+    """Compute the Cholesky factor L (n, n) of A = L L^T, or L^T if not `lower`.
 
-    The factor overwrites A if A is in Fortran order.
-
-    Args:
-        clean: set the other triangle to 0.
+    The factor overwrites A if A is in Fortran order.  With `clean`, the other triangle is set to 0.
 
     Raises:
         LinAlgError: A is not positive definite, or has entries that are not finite.
@@ -171,17 +168,17 @@ def cholesky(A: Float, lower: bool = True, clean: bool = True) -> Float:
         return A
     L, info = dpotrf(A, lower=lower, clean=clean, overwrite_a=1)
     check_lapack("dpotrf", info)
-    # OpenBLAS returns 0 for NaN, which the factorization carries to the last pivot.
+    # OpenBLAS reports success for NaN, which the factorization carries to the last pivot.
     if not np.isfinite(L[-1, -1]):
-        raise np.linalg.LinAlgError("not positive definite (entries that are not finite)")
+        raise np.linalg.LinAlgError("not positive definite (entries are not finite)")
     return np.asarray(L)
 
 
 class DenseSolver:
-    """Solver X = A^-1 B for one SPD matrix A (n, n).  The factor overwrites A in Fortran order."""
+    """A solver X = A^-1 B for one SPD matrix A (n, n), by LAPACK."""
 
     def __init__(self, A: Float) -> None:
-        """Factor A.  Raises LinAlgError as `cholesky`."""
+        """Factor A as `cholesky`; a matrix in Fortran order is overwritten."""
         self._L = cholesky(A, clean=False)
 
     def solve(self, B: Float) -> Float:
@@ -191,12 +188,12 @@ class DenseSolver:
         return np.asarray(X)
 
     def destroy(self) -> None:
-        """Free the factor now."""
+        """Free the factor."""
         self._L = self._L[:0, :0].copy()
 
 
 def check_lapack(routine: str, info: int) -> None:
-    """Check the `info` that a LAPACK routine returned.
+    """Raise an exception if LAPACK's `info` reports an error.
 
     Raises:
         LinAlgError: the matrix is not positive definite, or singular.
@@ -209,9 +206,9 @@ def check_lapack(routine: str, info: int) -> None:
 
 
 def invert_upper(A: Float) -> None:
-    """Invert an SPD matrix A (n, n) in place, in its upper triangle.
+    """Invert an SPD matrix A (n, n), in Fortran order, in its upper triangle.
 
-    A is in Fortran order.  The entries below the diagonal stay as they are.
+    Entries below the diagonal do not change.
 
     Raises:
         LinAlgError: A is not positive definite.
@@ -222,7 +219,7 @@ def invert_upper(A: Float) -> None:
 
 
 def _invert_triangle(U: Float) -> None:
-    """Invert the upper triangle U in place, by halves: OpenBLAS inverts large triangles column by column."""
+    """Invert the upper triangle U (n, n) in place, by halves: OpenBLAS would go column by column."""
     n = len(U)
     if n <= BLOCK_ROWS:
         U[:], info = dtrtri(U, lower=0)
@@ -235,28 +232,30 @@ def _invert_triangle(U: Float) -> None:
 
 
 def full_from_lower(A: Float, block: int = BLOCK_ROWS) -> Float:
-    """Return the symmetric matrix, in C order, with the lower triangle of A (n, n).
+    """Copy the lower triangle of A (n, n) to a symmetric matrix (n, n), in C order.
 
-    The copy proceeds by blocks that fit the cache.
+    The copy proceeds by blocks of `block` rows, which fit the cache.
     """
     full, lower = A.copy(order="F"), np.tri(block, dtype=bool)
     for j in range(0, len(A), block):
-        some = slice(j, j + block)
-        full[:j, some] = full[some, :j].T
-        corner = full[some, some]
-        full[some, some] = np.where(lower[: len(corner), : len(corner)], corner, corner.T)
+        rows = slice(j, j + block)
+        full[:j, rows] = full[rows, :j].T
+        corner = full[rows, rows]
+        full[rows, rows] = np.where(lower[: len(corner), : len(corner)], corner, corner.T)
     return np.asarray(full.T)
 
 
 def product_with_some(columns: Float, at: Int, x: Float) -> Float:
-    """Compute columns[:, at] x for columns (n, m) and x (c,) or (c, k); copy only a few columns at a time."""
+    """Compute columns[:, at] x for columns (n, m), `at` (c,) and x (c,) or (c, k).
+
+    Columns are copied COLUMNS_AT_ONCE at a time, unless a product with all m columns costs less.
+    """
     k = x.size // max(len(x), 1)
     if len(at) * (k + COPIED_COLUMNS) > columns.shape[1] * k:
-        # The product with all columns is cheaper than a copy of the columns `at`.
         padded = np.zeros((columns.shape[1], *x.shape[1:]))
         padded[at] = x
         return np.asarray(columns @ padded)
     product = np.zeros((len(columns), *x.shape[1:]))
-    for some in np.array_split(np.arange(len(at)), len(at) // COLUMNS_AT_ONCE + 1):
-        product += columns[:, at[some]] @ x[some]
+    for batch in np.array_split(np.arange(len(at)), len(at) // COLUMNS_AT_ONCE + 1):
+        product += columns[:, at[batch]] @ x[batch]
     return product

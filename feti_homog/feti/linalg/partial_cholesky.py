@@ -1,7 +1,7 @@
-"""Partial Cholesky factorizations by PETSc's CHOLMOD library; the interface of PETSc has no partial factorization.
+"""Partial Cholesky factorizations by the CHOLMOD library of PETSc, which has no interface for them.
 
-MUMPS orders the eliminated rows without regard to the rows that stay, and is slower if many rows stay.  CHOLMOD
-accepts an order of all rows.  The structures below follow its manual, and are equal in KNOWN_VERSIONS.
+MUMPS orders the eliminated rows without regard to the remaining rows, and is slower if many rows remain.  CHOLMOD
+accepts an order of all rows.  The structures below follow the manual of CHOLMOD, and are equal in KNOWN_VERSIONS.
 """
 
 import ctypes
@@ -18,26 +18,26 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.typing import Array, Float, Int
 
-# Bytes for `cholmod_common`, which takes less than 4 KiB; this module reads none of its members.
+# Bytes for `cholmod_common`, which takes less than 4 KiB; this module reads no member.
 COMMON_BYTES = 2**16
-GIVEN, LOWER = 1, -1  # an order of rows, the triangle that is stored
+GIVEN, LOWER = 1, -1  # CHOLMOD_GIVEN: the caller orders the rows; stype: the lower triangle is stored
 KNOWN_VERSIONS = range(2, 6)
 
 
 class System(IntEnum):
-    """The matrices that `cholmod_solve` solves with."""
+    """The system that `cholmod_solve` solves: A x = b or L x = b."""
 
     A, L = 0, 4
 
 
 class XType(IntEnum):
-    """The entries of a CHOLMOD matrix: their positions alone, or their values too."""
+    """The content of a CHOLMOD matrix: positions of entries alone, or positions and values."""
 
     PATTERN, REAL = 0, 1
 
 
 class _Sparse(ctypes.Structure):
-    """`cholmod_sparse`."""
+    """CHOLMOD's structure `cholmod_sparse`."""
 
     _fields_ = (
         *((name, c_size_t) for name in ("nrow", "ncol", "nzmax")),
@@ -47,7 +47,7 @@ class _Sparse(ctypes.Structure):
 
 
 class _Dense(ctypes.Structure):
-    """`cholmod_dense`."""
+    """CHOLMOD's structure `cholmod_dense`."""
 
     _fields_ = (
         *((name, c_size_t) for name in ("nrow", "ncol", "nzmax", "d")),
@@ -57,7 +57,7 @@ class _Dense(ctypes.Structure):
 
 
 class _Factor(ctypes.Structure):
-    """`cholmod_factor`."""
+    """CHOLMOD's structure `cholmod_factor`."""
 
     _fields_ = (
         *((name, c_size_t) for name in ("n", "minor")),
@@ -83,22 +83,22 @@ def is_available() -> bool:
 
 
 class PartialFactor:
-    """Factor L of A = L L^T (n, n), where `rows` (m,) come last and other rows follow `order` (n,).
+    """The Cholesky factor L of A = L L^T (n, n) that eliminates m chosen rows last.
 
     The destructor of this object frees the factor.
     """
 
     def __init__(self, A: csr_matrix, rows: Int, order: Int) -> None:
-        """Factor A.
+        """Factor A (n, n); `rows` (m,) come last, the other rows follow `order` (n,).
 
         Raises:
             LinAlgError: A is not positive definite.
-            MemoryError: CHOLMOD could not factor, usually for lack of memory.
+            MemoryError: CHOLMOD cannot factor, usually for lack of memory.
         """
         n, is_last = A.shape[0], np.zeros(A.shape[0], bool)
         is_last[rows] = True
         A.sort_indices()
-        # CHOLMOD reads these arrays directly.
+        # CHOLMOD reads these arrays in place.
         p, i = (indices.astype(np.int32, copy=False) for indices in (A.indptr, A.indices))
         x = np.asarray(A.data, np.float64)
         matrix = _Sparse(n, n, A.nnz, _address(p), _address(i), None, _address(x), None, LOWER, 0, XType.REAL, 0, 1, 1)
@@ -119,7 +119,7 @@ class PartialFactor:
             *map(_address, (parent, post, count, *work)), common,
         )  # fmt: skip
         if not (done and self._factor):
-            raise MemoryError("CHOLMOD could not analyse the matrix")
+            raise MemoryError("CHOLMOD cannot analyse a matrix, probably for lack of memory")
         self._place = np.empty(n, np.int64)
         self._place[post] = np.arange(n)
         parent = np.where(parent[post] < 0, -1, self._place[parent[post]]).astype(np.int32)
@@ -132,16 +132,16 @@ class PartialFactor:
         done = upper and library.cholmod_super_symbolic(upper, None, _address(parent), self._factor, common)
         library.cholmod_free_sparse(byref(upper), common)
         if not done:
-            raise MemoryError("CHOLMOD could not analyse the matrix")
+            raise MemoryError("CHOLMOD cannot analyse a matrix, probably for lack of memory")
         if not library.cholmod_factorize(byref(matrix), self._factor, common):
-            raise MemoryError("CHOLMOD could not factor")
+            raise MemoryError("CHOLMOD cannot factor a matrix, probably for lack of memory")
         if factor.minor < n:
             raise np.linalg.LinAlgError(f"not positive definite (cholmod: pivot {factor.minor})")
 
     def last_block(self) -> Float:
-        """Return the block (m, m) of L on `rows` in reverse order: an upper triangle.
+        """Return the block U (m, m) of L on `rows` in reverse order, an upper triangle.
 
-        Entry (m - 1 - i, m - 1 - j) belongs to L on rows i and j of `rows`.  Entries below the diagonal are arbitrary.
+        U[m - 1 - i, m - 1 - j] = L[rows[i], rows[j]]; entries below the diagonal are arbitrary.
         """
         factor, place = self._factor.contents, self._place[len(self._place) - self._m :]
         m, k = len(place), factor.nsuper
@@ -162,7 +162,7 @@ class PartialFactor:
         return U
 
     def forward(self, B: Float) -> Float:
-        """Compute L^-1 B (n, k) for B (n, k): first the eliminated rows in `order`, then `rows`."""
+        """Compute L^-1 B (n, k) for B (n, k); rows of the result are in the order of elimination."""
         if not B.shape[1]:
             return B
         permuted = np.empty(B.shape, order="F")
@@ -174,15 +174,15 @@ class PartialFactor:
         return self._solve(System.A, np.asfortranarray(B.reshape(len(B), -1), np.float64)).reshape(B.shape)
 
     def _solve(self, system: System, B: Float) -> Float:
-        """Solve one of CHOLMOD's systems for B (n, k) in Fortran order: (n, k).
+        """Solve A X = B or L X = B for B (n, k) in Fortran order, in CHOLMOD's order of rows.
 
         Raises:
-            MemoryError: CHOLMOD could not solve, usually for lack of memory.
+            MemoryError: CHOLMOD cannot solve, usually for lack of memory.
         """
         right = _Dense(len(B), B.shape[1], B.size, len(B), _address(B), None, XType.REAL, 0)
         solved = _library().cholmod_solve(system, self._factor, byref(right), self._common)
         if not solved:
-            raise MemoryError("CHOLMOD could not solve")
+            raise MemoryError("CHOLMOD cannot solve, probably for lack of memory")
         try:
             return _array(solved.contents.x, B.size, c_double).reshape(B.shape[::-1]).T.copy(order="F")
         finally:
@@ -194,20 +194,20 @@ def _address(values: Array) -> c_void_p:
 
 
 def _array(pointer: int, size: int, kind: Any) -> Array:
-    """Return `size` numbers in memory as an array, without a copy."""
+    """Wrap `size` numbers of a C type at `pointer` as an array, without a copy."""
     return np.ctypeslib.as_array(ctypes.cast(pointer, POINTER(kind)), (size,))
 
 
 @cache
 def _library() -> ctypes.CDLL:
-    """Load the CHOLMOD library that petsc4py's extension module is linked with."""
+    """Load the CHOLMOD library that petsc4py is linked with."""
     library = ctypes.CDLL(PETSc.__file__)
     library.cholmod_allocate_factor.restype = POINTER(_Factor)
     library.cholmod_ptranspose.restype = POINTER(_Sparse)
     library.cholmod_solve.restype = POINTER(_Dense)
-    try:  # CHOLMOD prints no warnings: this module raises errors in their place
+    try:  # CHOLMOD must not print warnings: this module raises exceptions instead
         library.SuiteSparse_config_printf_func_set(None)
-    except AttributeError:  # before SuiteSparse 6 the function is the fifth of a structure
+    except AttributeError:  # before SuiteSparse 6, the function for prints is the fifth member of a structure
         with suppress(ValueError):
             (c_void_p * 5).in_dll(library, "SuiteSparse_config")[4] = None
     return library

@@ -1,6 +1,6 @@
-"""Factor and solve sparse matrices on one rank by PETSc; scale and check the factors of all direct solvers.
+"""Sparse direct solvers on one rank by PETSc, with scaling and checks for all direct solvers.
 
-Libraries have absolute thresholds: for a Schur complement, MUMPS replaces pivots below about 1e-16.  So each matrix is
+Libraries have absolute thresholds: for a Schur complement, MUMPS replaces pivots below about 1e-16.  So matrices are
 scaled to a largest diagonal entry between 1 and 2.  The scale is a power of two, which changes no digit.
 """
 
@@ -21,41 +21,41 @@ from feti_homog.system.petsc import c_functions
 from feti_homog.typing import Float
 
 Options = Mapping[str, bool | int | str]
-# INFOG(1) of MUMPS where a pivot is zero.
+# INFOG(1) of MUMPS if a pivot is zero.
 SINGULAR = -10
-# PETSc's error code for a factorization that the chosen library does not have (PETSC_ERR_MISSING_FACTOR).
+# PETSc's error code if the library has no such factorization (PETSC_ERR_MISSING_FACTOR).
 MISSING_FACTOR = 92
 # End of PETSc's message if CHOLMOD is out of memory.
 CHOLMOD_OUT_OF_MEMORY = "failed with status -2"
-# With these options CHOLMOD computes L L^T for small matrices too, and fails if the matrix is indefinite: D of the
-# default L D L^T may have any sign.
+# With these options CHOLMOD computes L L^T for small matrices, too, and fails if the matrix is indefinite: with the
+# default L D L^T, entries of D may have any sign.
 DEFINITE: Options = {"mat_cholmod_final_asis": False, "mat_cholmod_final_ll": True}
-# Rows are eliminated in their order, and CHOLMOD tries no other order.
+# With these options CHOLMOD eliminates the rows in their order, and tries no other order.
 ORDERED: Options = {"pc_factor_mat_ordering_type": "natural", "mat_cholmod_nmethods": 1}
 
 
 def power_of_two(diagonal: Float, comm: MPI.Intracomm | None = None) -> float:
-    """Return the power of two that scales the largest diagonal entry to between 1 and 2.
+    """Return the power of two that scales the largest diagonal entry to [1, 2).
 
-    The factor is 1 if no entry is positive.  With a communicator, the diagonal is distributed; collective then.
+    It is 1 if no entry is positive.  With `comm`, the diagonal is distributed, and the call is collective.
 
     Raises:
-        LinAlgError: an entry is not finite; on all ranks.
+        LinAlgError: an entry is not finite; with `comm`, on all ranks.
     """
     largest = float(diagonal.max(initial=0.0)) if np.isfinite(diagonal).all() else math.inf
     if comm is not None:
         largest = comm.allreduce(largest, MPI.MAX)
     if math.isinf(largest):
-        raise np.linalg.LinAlgError("a matrix has entries that are not finite")
+        raise np.linalg.LinAlgError("matrix: entries are not finite")
     return math.ldexp(1.0, 1 - max(math.frexp(largest)[1], sys.float_info.min_exp)) if largest > 0.0 else 1.0
 
 
 def check_factor(pc: PETSc.PC) -> None:
-    """Check the status of a factorization in the library of `pc`.
+    """Raise an exception if the library of `pc` reports an error or wrong pivots.
 
     Raises:
-        LinAlgError: the matrix of a Cholesky factorization is not positive definite, or pivots are too small for MUMPS.
-        MemoryError: MUMPS could not factor, usually for lack of memory.
+        LinAlgError: the matrix of a Cholesky factorization is not positive definite, or MUMPS has replaced tiny pivots.
+        MemoryError: MUMPS cannot factor, usually for lack of memory.
     """
     library, is_cholesky = pc.getFactorSolverType(), pc.getType() == PETSc.PC.Type.CHOLESKY
     negative = 0
@@ -69,26 +69,26 @@ def check_factor(pc: PETSc.PC) -> None:
         replaced = int(factor.getMumpsInfog(25))
         if replaced:
             raise np.linalg.LinAlgError(f"nearly singular (MUMPS: INFOG(25) = {replaced} tiny pivots were replaced)")
-        # Without symmetry INFOG(12) counts exchanged pivots.
+        # For unsymmetric matrices INFOG(12) counts exchanged pivots.
         negative = int(factor.getMumpsInfog(12)) if is_cholesky else 0
     elif library == PETSc.Mat.SolverType.PETSC and is_cholesky:
         negative, zero, _ = pc.getFactorMatrix().getInertia()
         negative += zero
     if negative:
-        raise np.linalg.LinAlgError(f"not positive definite ({library}: {negative} pivots that are not positive)")
+        raise np.linalg.LinAlgError(f"not positive definite ({library}: {negative} pivots are not positive)")
 
 
 def mumps_error(factor: PETSc.Mat) -> tuple[int, int]:
-    """Return MUMPS' INFOG(1) and INFOG(2) after an error, which PETSc may not report; else zeros."""
+    """Return MUMPS' error INFOG(1), INFOG(2), which PETSc may not report; (0, 0) without an error."""
     first, second = (int(factor.getMumpsInfog(k)) for k in (1, 2))
     return (first, second) if first < 0 else (0, 0)
 
 
 class DirectSolver:
-    """Solver X = A^-1 B for one symmetric definite matrix A (n, n) on one rank."""
+    """A solver X = A^-1 B for one symmetric definite matrix A (n, n) on one rank."""
 
     def __init__(self, matrix: csr_matrix, prefix: str, is_ordered: bool = False) -> None:
-        """Factor A; options under `prefix` (default: cholesky by CHOLMOD).  Arguments as of `factored`.
+        """Factor A = `matrix`, by default by CHOLMOD's Cholesky; see `factored`.
 
         Raises:
             LinAlgError, MemoryError, CaseError: as `factored`.
@@ -99,7 +99,7 @@ class DirectSolver:
         self._x, self._b = self._ksp.getOperators()[0].createVecs()
         pc, A = self._ksp.getPC(), self._ksp.getOperators()[0]
         is_cholesky = pc.getType() == PETSc.PC.Type.CHOLESKY
-        # A CHOLMOD factor does not need its matrix any more: an empty matrix of equal size replaces it.
+        # A factor of CHOLMOD needs no matrix: an empty matrix with the same size saves the memory.
         if is_cholesky and pc.getFactorSolverType() == PETSc.Mat.SolverType.CHOLMOD and is_direct(self._ksp):
             empty = PETSc.Mat().createAIJ(A.getSizes(), nnz=0, comm=A.comm)
             empty.assemble()
@@ -115,20 +115,19 @@ class DirectSolver:
         return X.reshape(B.shape)
 
     def destroy(self) -> None:
-        """Free the factor now; otherwise the destructor of this object frees it."""
+        """Free the factor; without this call, the destructor frees the factor."""
         self._destroy()
 
 
 def is_direct(ksp: PETSc.KSP) -> bool:
-    """Return whether the solver applies a factor once and does not iterate."""
+    """Return whether the solver applies a factor and does not iterate."""
     return bool(ksp.getType() == PETSc.KSP.Type.PREONLY)
 
 
 def solve_columns(ksp: PETSc.KSP, x: PETSc.Vec, b: PETSc.Vec, B: Float) -> Float:
-    """Compute the owned rows (owned rows, k) of A^-1 B, in Fortran order, for owned rows B (owned rows, k).
+    """Compute X = A^-1 B (owned rows, k), in Fortran order, for B (owned rows, k).
 
-    `x` and `b` are work vectors.  Iterative methods solve one column after the other.  Collective on the ranks of the
-    matrix.
+    Collective on the ranks of A.  `x` and `b` are work vectors.  Iterative methods solve column by column.
     """
     X = np.empty(B.shape, order="F")
     if B.shape[1] > 1 and is_direct(ksp):
@@ -146,17 +145,15 @@ def solve_columns(ksp: PETSc.KSP, x: PETSc.Vec, b: PETSc.Vec, B: Float) -> Float
 
 
 def factored(A: PETSc.Mat, prefix: str, library: str, is_ordered: bool = False) -> PETSc.KSP:
-    """Factor a symmetric definite matrix by Cholesky in a `library`; return the KSP.
+    """Return a KSP with the Cholesky factor of a symmetric definite matrix A.
 
-    Options under `prefix` may choose another method.  If the matrix `is_ordered`, rows are eliminated one after the
-    other.  Collective on the ranks of the matrix.
-
-    Rows and columns should have similar size: MUMPS does not scale here, for its scaling loses all digits of coarse
-    problems with contrasts of 1e6.
+    Collective on the ranks of A.  `library` is the default, and options with `prefix` may choose another method.  With
+    `is_ordered`, the rows are eliminated in their order.  Rows and columns should have similar size, because MUMPS does
+    not scale here: its scaling loses all digits of coarse problems with contrasts of 1e6.
 
     Raises:
-        LinAlgError: the matrix is not positive definite, or nearly singular.
-        MemoryError: MUMPS could not factor, or CHOLMOD is out of memory.
+        LinAlgError: A is not positive definite, or nearly singular.
+        MemoryError: MUMPS cannot factor, or CHOLMOD is out of memory.
         CaseError: the library in the options has no such factorization.
     """
     A.setOption(PETSc.Mat.Option.SPD, True)
@@ -178,8 +175,8 @@ def factored(A: PETSc.Mat, prefix: str, library: str, is_ordered: bool = False) 
                 raise
             where = f"on {A.comm.size} ranks" if A.comm.size > 1 else "on one rank"
             raise CaseError(
-                f"-{prefix}pc_factor_mat_solver_type {pc.getFactorSolverType()}: it has no {pc.getType()} "
-                f"factorization of a matrix {where}; mumps has"
+                f"-{prefix}pc_factor_mat_solver_type {pc.getFactorSolverType()}: no {pc.getType()} "
+                f"factorization of a matrix {where}; expected mumps"
             ) from error
         if pc.getFactorSolverType() == PETSc.Mat.SolverType.MUMPS:
             pc.getFactorMatrix().setMumpsIcntl(8, 0)
@@ -197,7 +194,7 @@ def factored(A: PETSc.Mat, prefix: str, library: str, is_ordered: bool = False) 
 
 @contextmanager
 def _unless_given(options: Options, prefix: str) -> Iterator[None]:
-    """Set options within the block, unless the user has set them."""
+    """Set PETSc options within the block, except options that the user has set."""
     database = PETSc.Options(prefix)
     added = {name: value for name, value in options.items() if not database.hasName(name)}
     for name, value in added.items():
@@ -210,13 +207,13 @@ def _unless_given(options: Options, prefix: str) -> Iterator[None]:
 
 
 def _destroy(ksp: PETSc.KSP, *vectors: PETSc.Vec) -> None:
-    """Free a factor at once: objects that Python only drops wait for PETSc's garbage collection."""
+    """Destroy a KSP, its matrix and vectors at once, not in PETSc's garbage collection."""
     for petsc_object in (ksp.getOperators()[0], ksp, *vectors):
         petsc_object.destroy()
 
 
 def sequential(matrix: csr_matrix) -> PETSc.Mat:
-    """Wrap a matrix as a PETSc matrix on this rank, with the arrays in common."""
+    """Wrap a matrix as a PETSc matrix on this rank, which shares its arrays."""
     matrix.sort_indices()
     csr = matrix.indptr, matrix.indices, matrix.data
     return PETSc.Mat().createAIJWithArrays(matrix.shape, csr, comm=PETSc.COMM_SELF)

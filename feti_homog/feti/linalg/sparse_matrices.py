@@ -1,4 +1,4 @@
-"""Sparse matrices: sums of dense blocks, symmetric scaling, sums over ranks, and solvers with such sums."""
+"""Sparse matrices: sums of dense blocks, sums over ranks, and a solver for such sums."""
 
 from collections.abc import Iterable
 
@@ -16,10 +16,10 @@ from feti_homog.typing import Bool, Float, Int, Int32
 def sum_of_blocks(
     shape: tuple[int, int], blocks: Iterable[tuple[Int, Int, Float]], max_buffered_entries: int = MAX_BUFFERED_ENTRIES
 ) -> csr_matrix:
-    """Sum dense blocks: rows, columns, and values (rows, columns) of each.
+    """Sum dense blocks (rows (r,), columns (c,), values (r, c)) to a sparse matrix of a `shape`.
 
-    Blocks wait in a buffer until the buffer has more than `max_buffered_entries` entries and more entries than the sum.
-    So the memory is at most about twice the sum, and each copy of the sum doubles its entries.
+    Blocks wait in a buffer until it has more entries than `max_buffered_entries` and than the sum.  So the memory is at
+    most about twice the sum, and a copy of the sum happens only after its entries have doubled.
     """
     total, buffer, buffered_entries = csr_matrix(shape), [], 0
     for rows, columns, values in blocks:
@@ -32,10 +32,10 @@ def sum_of_blocks(
 
 
 def _with_buffered(total: csr_matrix, buffer: list[tuple[Int, Int, Int32, Float]]) -> csr_matrix:
-    """Add blocks to a sum: rows of each block, entry counts of the rows, columns and values."""
+    """Add buffered blocks, each as rows, entry counts of the rows, columns and values, to `total`."""
     rows, counts, columns, values = (np.concatenate(part) for part in zip(*buffer, strict=True))
     m, n = total.shape
-    # A product sums faster than a conversion from coordinates, which sorts.
+    # A product adds faster than a conversion from coordinates, which sorts.
     stacked = csr_matrix((values, columns, np.r_[0, np.cumsum(counts)]), shape=(len(rows), n))
     place = csr_matrix((np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=(m, len(rows)))
     # A sum copies both terms, even if one is empty.
@@ -43,27 +43,24 @@ def _with_buffered(total: csr_matrix, buffer: list[tuple[Int, Int, Int32, Float]
 
 
 def scaled(A: csr_matrix, weights: Float) -> csr_matrix:
-    """Compute diag(weights) A diag(weights) for weights (n,), in the pattern of A (n, n).
+    """Compute diag(w) A diag(w) for w = `weights` (n,), in the pattern of A (n, n).
 
     Products with diagonal matrices would compute the pattern again.
     """
     data = A.data * weights[A.indices] * np.repeat(weights, np.diff(A.indptr))
-    # Copies of the indices: a sort of one matrix must not shuffle the other.
+    # Copies of the indices, because a sort of one matrix must not shuffle the other.
     return csr_matrix((data, A.indices.copy(), A.indptr.copy()), shape=A.shape)
 
 
 def assemble_owned_rows(
     comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, owned: tuple[int, int]
 ) -> csr_matrix:
-    """Sum local matrices over ranks, and return the owned rows.  Collective.
+    """Sum local matrices over ranks; return the owned rows (owned rows, all columns).  Collective.
 
     Args:
-        local: (r, c) this rank's contribution.
-        rows, columns: (r,) and (c,) global numbers of its rows and columns.
-        owned: numbers of rows and columns that this rank owns.
-
-    Returns:
-        (owned rows, all columns).
+        local: (r, c) contribution of this rank.
+        rows, columns: (r,) and (c,) global numbers of the rows and columns of `local`.
+        owned: how many rows and how many columns this rank owns.
     """
     A = _assemble(comm, local, rows, columns, owned)
     indptr, indices, values = A.getValuesCSR()
@@ -72,25 +69,14 @@ def assemble_owned_rows(
     return csr_matrix((values, indices, indptr), shape=sizes)
 
 
-def gathered_sum(comm: MPI.Intracomm, part: csr_matrix, unknowns: Int, total: int) -> csr_matrix:
-    """Sum `part` (u, u) on the `unknowns` (u,) over ranks into (n, n), on every rank.  Collective."""
-    entries = part.tocoo()
-    triples = unknowns[entries.row], unknowns[entries.col], entries.data
-    rows, columns, values = (np.concatenate(parts) for parts in zip(*comm.allgather(triples), strict=True))
-    return csr_matrix((values, (rows, columns)), shape=(total, total))
-
-
 def add_shared_rows(comm: MPI.Intracomm, local: csr_matrix, rows: Int, is_shared_row: Bool, owned: int) -> csr_matrix:
-    """Add the entries of other ranks in shared rows to `local`.  Collective.
+    """Sum local matrices over ranks; return the local rows (r, n).  Collective.
 
     Args:
-        local: (r, n) this rank's contribution; the n columns are common to all ranks.
+        local: (r, n) contribution of this rank; all ranks have the same n columns.
         rows: (r,) global row numbers.
-        is_shared_row: (r,) whether other ranks have the row, too; only shared rows are sent.
+        is_shared_row: (r,) whether another rank has the row, too; only shared rows are sent.
         owned: number of rows that this rank owns.
-
-    Returns:
-        (r, n) local rows of the sum over ranks.
     """
     if comm.size == 1:
         return local
@@ -98,7 +84,7 @@ def add_shared_rows(comm: MPI.Intracomm, local: csr_matrix, rows: Int, is_shared
     used, indices = np.unique(shared.indices, return_inverse=True)
     narrow = csr_matrix((shared.data, indices, shared.indptr), shape=(shared.shape[0], len(used)))
     A = _assemble(comm, narrow, rows[is_shared_row], used, (owned, _even_share(comm, n)))
-    # Descending order: PETSc 3.18 mixes up the columns if every rank requests all rows in ascending order.
+    # Descending order, because PETSc 3.18 mixes up the columns if every rank requests all rows in ascending order.
     asked_rows = PETSc.IS().createGeneral(rows[is_shared_row][::-1].astype(PETSc.IntType), comm=PETSc.COMM_SELF)
     all_columns = PETSc.IS().createStride(n, 0, 1, comm=PETSc.COMM_SELF)
     sums = A.createSubMatrices(asked_rows, all_columns)[0]
@@ -112,20 +98,20 @@ def add_shared_rows(comm: MPI.Intracomm, local: csr_matrix, rows: Int, is_shared
 
 
 def assemble_distributed(comm: MPI.Intracomm, part: csr_matrix, numbers: Int, total: int) -> PETSc.Mat:
-    """Sum parts (k, k) over ranks into a matrix (n, n) with evenly distributed rows.  Collective.
+    """Sum parts (k, k) over ranks into a PETSc matrix (n, n), n = `total`.  Collective.
 
-    Rows and columns of the parts have the `numbers` (k,).
+    Rows and columns of `part` have the global `numbers` (k,); the rows of the sum are evenly distributed.
     """
     share = _even_share(comm, total)
     return _assemble(comm, part, numbers, numbers, (share, share))
 
 
 def allreduce_sparse(comm: MPI.Intracomm, part: csr_matrix) -> csr_matrix:
-    """Sum small sparse square matrices over ranks, on every rank.  Collective."""
+    """Sum sparse matrices (n, n) over ranks, on every rank.  Collective."""
     if comm.size == 1:
         return part
-    some = np.union1d(np.flatnonzero(np.diff(part.indptr)), part.indices)
-    A = assemble_distributed(comm, part[some][:, some], some, part.shape[0])
+    numbers = np.union1d(np.flatnonzero(np.diff(part.indptr)), part.indices)
+    A = assemble_distributed(comm, part[numbers][:, numbers], numbers, part.shape[0])
     parts = A.getValuesCSR()
     A.destroy()
     counts, entries = (np.array(comm.allgather(n)) for n in (len(parts[0]) - 1, len(parts[1])))
@@ -135,12 +121,12 @@ def allreduce_sparse(comm: MPI.Intracomm, part: csr_matrix) -> csr_matrix:
 
 
 def _even_share(comm: MPI.Intracomm, n: int) -> int:
-    """Return the row count of this rank in an even distribution of n rows."""
+    """Return the number of rows of this rank in an even distribution of n rows."""
     return n // comm.size + (comm.rank < n % comm.size)
 
 
 def _assemble(comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, owned: tuple[int, int]) -> PETSc.Mat:
-    """Sum local matrices into a distributed PETSc matrix; arguments as of `assemble_owned_rows`."""
+    """Sum local matrices into a distributed PETSc matrix, as `assemble_owned_rows`.  Collective."""
     maps = [PETSc.LGMap().create(i.astype(PETSc.IntType), comm=comm) for i in (rows, columns)]
     sizes = tuple((n, comm.allreduce(n)) for n in owned)
     A = PETSc.Mat().createIS(sizes, lgmapr=maps[0], lgmapc=maps[1], comm=comm)
@@ -156,14 +142,15 @@ def _assemble(comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, o
 
 
 class DistributedSolver:
-    """Solver X = A^-1 B for a definite matrix A (n, n), a sum over ranks that may be replaced.
+    """A solver X = A^-1 B for definite matrices A (n, n), sums over ranks.
 
-    Every rank factors a whole small matrix, by CHOLMOD; all ranks together factor a large matrix, by MUMPS.  Options
-    under the prefix choose other solvers; with `ksp_type` or `pc_type` all ranks solve together.
+    Up to n = REPLICATED_UNKNOWNS, every rank factors the whole matrix, by CHOLMOD; above, all ranks factor the matrix
+    together, by MUMPS.  Options with the prefix choose other solvers; with `ksp_type` or `pc_type` all ranks solve
+    together for any n.
     """
 
     def __init__(self, comm: MPI.Intracomm, total: int, prefix: str, most_whole: int = REPLICATED_UNKNOWNS) -> None:
-        """Choose the solver for n = `total`: up to n = `most_whole`, every rank factors the whole matrix."""
+        """Choose the solver for n = `total`; `most_whole` replaces REPLICATED_UNKNOWNS."""
         self.comm, self.total, self._prefix = comm, total, prefix
         self._ksp: PETSc.KSP | None = None
         options = PETSc.Options(prefix)
@@ -171,16 +158,15 @@ class DistributedSolver:
         self.is_distributed = comm.size > 1 and together
 
     def factor(self, unknowns: Int, part: csr_matrix, near_kernel: Float | None = None) -> None:
-        """Assemble and factor A, and free the last factor.  Collective.
+        """Sum and factor A, and free the last factor.  Collective.
 
         Args:
-            unknowns: (u,) numbers of the local unknowns, ascending; ranks may have unknowns in common.
-            part: (u, u) this rank's part of the sum.
+            unknowns: (u,) global numbers of the local unknowns, ascending; ranks may have unknowns in common.
+            part: (u, u) contribution of this rank.
             near_kernel: (u, c) vectors with little energy, for multigrid.
 
         Raises:
-            LinAlgError: A is not positive definite on some rank, for rounding may differ between processors; all
-                ranks raise the error.
+            LinAlgError: A is not positive definite on a rank (rounding may differ between processors); all ranks raise.
             MemoryError, CaseError: as `factored`.
         """
         self.destroy()
@@ -190,11 +176,14 @@ class DistributedSolver:
             if self.is_distributed:
                 matrix = assemble_distributed(self.comm, part, unknowns, self.total)
             else:
-                matrix = sequential(gathered_sum(self.comm, part, unknowns, self.total))
+                entries = part.tocoo()
+                triples = self.comm.allgather((unknowns[entries.row], unknowns[entries.col], entries.data))
+                rows, columns, values = (np.concatenate(parts) for parts in zip(*triples, strict=True))
+                matrix = sequential(csr_matrix((values, (rows, columns)), shape=(self.total, self.total)))
             self._scale = power_of_two(matrix.getDiagonal().getArray(readonly=True), self.comm)
             matrix.scale(self._scale)
             library = PETSc.Mat.SolverType.MUMPS if self.is_distributed else PETSc.Mat.SolverType.CHOLMOD
-            # Before a factor that may fail on one rank alone.
+            # The vectors need all ranks; the factorization may fail on one rank alone.
             self._x, self._b = matrix.createVecs()
             if near_kernel is not None:
                 # A basis (n, m), without zero columns and equal on all ranks.
@@ -206,23 +195,23 @@ class DistributedSolver:
                 space = PETSc.NullSpace().create(vectors=vectors, comm=matrix.comm)
                 if vectors:
                     matrix.setNearNullSpace(space)
-                # The matrix holds references, which its destructor frees.
+                # The matrix has references to these objects, which its destructor frees.
                 for petsc_object in (space, *vectors):
                     petsc_object.destroy()
             self._ksp = factored(matrix, self._prefix, library)
         except np.linalg.LinAlgError as caught:
             error = caught
         if self.comm.allreduce(error is not None, MPI.LOR):
-            # Left to PETSc's garbage collection: a rank that failed alone could not take part in `destroy`.
+            # PETSc's garbage collection frees the KSP: a rank that failed alone cannot take part in `destroy`.
             self._ksp = None
-            raise np.linalg.LinAlgError(f"a coarse matrix is singular: {error or 'on another rank'}") from error
+            raise np.linalg.LinAlgError(f"coarse matrix: singular, {error or 'on another rank'}") from error
 
     def solve(self, B: Float) -> Float:
-        """Solve for right-hand sides summed over ranks; return the local unknowns.  Collective.
+        """Solve A X = sum of B over ranks; return the local unknowns (u,) or (u, k).  Collective.
 
-        Each rank passes its part B (u,) or (u, k) of the right-hand sides.
+        B (u,) or (u, k) is the part of this rank; `factor` must precede.
         """
-        assert self._ksp is not None, "nothing is factored"
+        assert self._ksp is not None, "no matrix is factored"
         right = self._sum(B if B.ndim == 2 else B[:, None])[slice(*self._b.getOwnershipRange())]
         X = solve_columns(self._ksp, self._x, self._b, right)
         X *= self._scale
@@ -231,15 +220,15 @@ class DistributedSolver:
         return np.asarray(X[self._unknowns]).reshape(B.shape)
 
     def _sum(self, B: Float) -> Float:
-        """Sum right-hand sides B (u, k) over ranks: (n, k)."""
+        """Sum B (u, k) over ranks: (n, k).  Collective."""
         part = np.zeros((self.total, B.shape[1]))
         part[self._unknowns] = B
         return distributed_arrays.allreduce_sum(self.comm, part)
 
     @property
     def iterations(self) -> int:
-        """Iterations of the last solve for one column by an iterative method; 1 for a direct method."""
-        assert self._ksp is not None, "nothing is factored"
+        """Return the iterations of the last solve for one column; 1 for a direct method."""
+        assert self._ksp is not None, "no matrix is factored"
         return 1 if is_direct(self._ksp) else int(self._ksp.getIterationNumber())
 
     def destroy(self) -> None:

@@ -1,4 +1,4 @@
-"""Boundary operators of subdomains, S and S+, explicit or implicit; the dual operator F and its preconditioners.
+"""Boundary operators S and S+ of subdomains, the dual operator F, and its preconditioners.
 
 Imports `feti`, `feti.decomposition`, `feti.linalg` and `system`.  Main entries: `choice.choose`,
 `interface_operators.InterfaceOperators`, `interface_operators.DualOperator` and `preconditioners.Preconditioner`.

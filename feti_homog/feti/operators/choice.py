@@ -1,6 +1,6 @@
-"""Choice of dense or sparse boundary operators, and of soft modes by faces or by whole boundaries.
+"""Choice of dense or sparse boundary operators, and of face eigenproblems for soft modes.
 
-A pure function of sizes: it needs no mesh and no MPI.
+`choose` is a pure function of sizes: it needs no mesh and no MPI.
 """
 
 from collections.abc import Sequence
@@ -13,13 +13,13 @@ KINDS = ("auto", "implicit", "explicit")
 
 @dataclass(frozen=True)
 class SubdomainSize:
-    """Quantities that the choice depends on.
+    """The sizes and properties of one subdomain, from which `choose` decides.
 
     Attributes:
-        dofs: degrees of freedom of the subdomain.
-        boundary_dofs: degrees of freedom that constraints act on.
-        is_whole_body: whether each shared node of the subdomain belongs to one other body only.
-        has_springs: whether springs hold the subdomain; its stiffness with springs is a dense matrix.
+        dofs: number of degrees of freedom.
+        boundary_dofs: number n of degrees of freedom on nodes with constraints.
+        is_whole_body: whether every shared node belongs to a single other body.
+        has_springs: whether the inner body of springs: its stiffness with springs is a dense matrix.
     """
 
     dofs: int
@@ -30,7 +30,7 @@ class SubdomainSize:
 
 @dataclass(frozen=True)
 class OperatorChoice:
-    """Choice for one subdomain.
+    """The boundary operators and eigenproblems chosen for one subdomain.
 
     Attributes:
         explicit: whether the boundary operators are dense matrices, not sparse factorizations.
@@ -49,16 +49,18 @@ def choose(
     can_condense: bool,
     thresholds: Thresholds,
 ) -> list[OperatorChoice]:
-    """Choose the boundary operators of each subdomain.
+    """Choose the boundary operators of every subdomain.
 
-    Dense matrices pay if their inverse takes no longer than all applications of sparse factors.  Soft modes need dense
-    matrices, except on large whole bodies, whose soft modes are computed face by face.
+    By default a subdomain gets dense matrices if n <= `dense_boundary_dofs` and a reason holds: their inverse takes no
+    longer than all products by sparse factors, DENSE_INVERSE_COST n^3 <= dofs x applications; or springs; or soft modes
+    of the whole boundary.  Whole bodies without springs and n > `whole_boundary_dofs` get soft modes face by face.
 
     Args:
-        kind: of KINDS, the user's choice; `auto` leaves it to this function.
-        applications: how many times the operators are expected to be applied.
+        sizes: sizes of the subdomains; the result has the same order.
+        kind: the option `-feti_dual_operator`, one of KINDS; a subdomain with n = 0 never gets dense matrices.
+        applications: expected number of products with the operators.
         soft_modes: whether soft modes will be computed.
-        can_condense: whether PETSc has MUMPS, which condenses subdomains to their boundaries.
+        can_condense: whether PETSc has MUMPS, which condenses subdomains; without it the default is sparse factors.
     """
     choices = []
     for size in sizes:

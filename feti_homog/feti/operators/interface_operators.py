@@ -1,4 +1,4 @@
-"""Boundary operators of all subdomains of this rank, and the dual operator, Eq. (36)."""
+"""The boundary operators of the local subdomains, and the dual operator, Eq. (36)."""
 
 from __future__ import annotations
 
@@ -24,42 +24,46 @@ InterfaceOperator = one_subdomain.ExplicitInterfaceOperator | one_subdomain.Impl
 
 
 class DualOperator:
-    """The dual operator F + C: symmetric positive definite, since B has full row rank and K+ is definite.
+    """The dual operator F + C, with F = sum_s B K+ B^T.
+
+    F is symmetric positive definite: B has full row rank, and K+ is definite.
 
     Attributes:
-        compliance: (owned rows,) the diagonal C.
+        compliance: (owned rows,) diagonal of C.
     """
 
     def __init__(self, boundary: InterfaceOperators, compliance: Float) -> None:
         self.jump_operator, self.boundary, self.compliance = boundary.jump_operator, boundary, compliance
 
     def apply(self, x: Float) -> Float:
-        """Compute sum_s B K+ B^T x + C x for x (owned rows,) or (owned rows, k)."""
+        """Compute (F + C) x for x (owned rows,) or (owned rows, k).  Collective."""
         return self.jump(self.displacement(x)) + distributed_arrays.scale_rows(self.compliance, x)
 
     def displacement(self, lam: Float) -> Float:
-        """Compute K+ B^T lam on the boundary dofs: minus the displacement by multipliers in Eq. (34)."""
+        """Compute K+ B^T lam (boundary dofs, k), which Eq. (34) subtracts.  Collective."""
         return self.boundary.apply_flexibility(self.boundary.BT @ self.jump_operator.gather(lam))
 
     def jump(self, u: Float) -> Float:
-        """Compute the jumps B u, Eq. (33), for displacements u (boundary dofs,) or (boundary dofs, k)."""
+        """Compute the jumps B u (owned rows, k), Eq. (33), of u (boundary dofs, k).  Collective."""
         return self.jump_operator.sum(self.boundary.B @ u)
 
 
 class InterfaceOperators:
-    """Boundary operators on the n boundary dofs of this rank, one subdomain after the other.
+    """S and S+ on the n boundary dofs of this rank, one subdomain after the other.
 
     Attributes:
-        dofs: for each subdomain, (n_s,) local numbers of its boundary dofs, sorted.
-        offsets: (subdomains + 1,) where each subdomain begins among the n.
-        local_dofs: (n,) their numbers among all dofs of this rank.
-        operators: of each subdomain, dense matrices or sparse factors.
-        with_springs: operators of bodies together with their springs, for preconditioner and coarse space.
-        facewise: of each subdomain, whether soft modes are computed face by face.
-        B: (local rows, n) the constraints on them, and `BT` its transpose.
-        body_diagonal: (n,) the diagonal of K.
-        diagonal: (n,) its compressible share, in series with the springs of the body: it scales jumps.
-        interiors: kept interior factors, by the position of the subdomain.
+        dofs: for every local subdomain, (n_s,) numbers of its boundary dofs in the subdomain, ascending.
+        offsets: (subdomains + 1,) first boundary dof of every subdomain, and n.
+        local_dofs: (n,) numbers of the boundary dofs among all dofs of this rank.
+        operators: for every subdomain, S and S+ as dense matrices or by sparse factors.
+        with_springs: for every subdomain, S~ and S+ + C of the body with its springs, for preconditioner and coarse
+            space.
+        facewise: for every subdomain, whether soft modes are computed face by face.
+        B, BT: (local rows, n) constraints, and their transpose.
+        body_diagonal: (n,) diagonal of K.
+        diagonal: (n,) stiffness that scales jumps: diagonal of K times `Subdomain.compressible_share`, in series with
+            the springs of the body.
+        interiors: factored interiors by position of the subdomain, kept by `extend`.
         springs: (owned rows,) compliance of the springs.
         compliance: (owned rows,) compliance of springs between two cut bodies, which belong to no subdomain; else 0.
     """
@@ -75,20 +79,21 @@ class InterfaceOperators:
         compliance: Float | None = None,
         keep_factors: bool = False,
     ) -> None:
-        """Factor every subdomain as `choose` decides; arguments as in `choose`.
+        """Factor every local subdomain as `choose` decides, without communication.
 
-        `compliance` (local rows,) is that of the interface springs, None if no rank has springs.  `keep_factors` keeps
-        the factors of dense operators for `extend`.  Without communication: a rank may fail alone.
+        `kind`, `applications` and `soft_modes` are as in `choose`.  `compliance` (local rows,) of the springs is None
+        if no rank has springs.  `keep_factors` is as in `ExplicitInterfaceOperator`.  Raises MeshError, perhaps on one
+        rank alone, if rounding leaves the stiffness of a subdomain without a factor.
         """
         self.comm, self.jump_operator, self.subdomains = jump_operator.comm, jump_operator, subdomains
         self._loads = len(jump_operator.problem.loads)
         first = np.cumsum([0, *(s.n_dofs for s in subdomains)])
         # All degrees of freedom of nodes with a constraint.
         constrained = np.split(jump_operator.B.getnnz(axis=0) > 0, first[1:])[:-1]
-        nodes = (s.problem.nodes(np.flatnonzero(mine)) for s, mine in zip(subdomains, constrained, strict=True))
-        self.dofs = [s.problem.dofs(np.unique(some)) for s, some in zip(subdomains, nodes, strict=True)]
+        nodes = (s.problem.nodes(np.flatnonzero(mask)) for s, mask in zip(subdomains, constrained, strict=True))
+        self.dofs = [s.problem.dofs(np.unique(nodes_s)) for s, nodes_s in zip(subdomains, nodes, strict=True)]
         self.offsets = np.cumsum([0, *(len(d) for d in self.dofs)])
-        numbers = (of + dofs for of, dofs in zip(first[:-1], self.dofs, strict=True))
+        numbers = (offset + dofs for offset, dofs in zip(first[:-1], self.dofs, strict=True))
         self.local_dofs = np.concatenate([np.zeros(0, np.int64), *numbers])
         self.B = jump_operator.B[:, self.local_dofs].tocsr()
         self.BT = self.B.T.tocsr()
@@ -126,12 +131,12 @@ class InterfaceOperators:
 
     @cached_property
     def slices(self) -> list[slice]:
-        """Slice of each subdomain in the n boundary dofs."""
+        """Return the slice of every subdomain in the n boundary dofs."""
         return [slice(a, b) for a, b in pairwise(self.offsets.tolist())]
 
     @cached_property
     def of_inner(self) -> Bool:
-        """(n,) whether each boundary dof belongs to the inner of two bodies; of more, to any but the outermost."""
+        """Return whether boundary dofs (n,) belong to an inner body: to any but the outermost at the node."""
         sizes = np.diff(self.offsets)
         of_inner = np.repeat(np.array([not s.is_outer for s in self.subdomains], bool), sizes)
         body = np.repeat(np.array([s.submesh.body for s in self.subdomains], np.int64), sizes)
@@ -146,43 +151,44 @@ class InterfaceOperators:
         return self._each([o.apply_schur for o in self.operators], x)
 
     def apply_with_springs(self, x: Float, which: Sequence[bool] | None = None) -> Float:
-        """Compute S~ x, the stiffness with springs, for x (n,) or (n, k).
+        """Compute S~ x, with the stiffness S~ of bodies with springs, for x (n,) or (n, k).
 
-        With `which`, the result is 0 on subdomains for which this is false or x is 0.
+        `which` (subdomains,) selects subdomains; the result is 0 on the others.
         """
-        some = None if which is None else [k for k, span in enumerate(self.slices) if which[k] and x[span].any()]
-        return self._each([o.apply_schur for o in self.with_springs], x, some)
+        chosen = None if which is None else [k for k, span in enumerate(self.slices) if which[k] and x[span].any()]
+        return self._each([o.apply_schur for o in self.with_springs], x, chosen)
 
     def apply_flexibility(self, x: Float) -> Float:
         """Compute the boundary part of K+ x for x (n,) or (n, k)."""
         return self._each([o.apply_flexibility for o in self.operators], x)
 
     def _each(
-        self, applied: Sequence[Callable[[Float, Float], Float]], x: Float, some: Sequence[int] | None = None
+        self, products: Sequence[Callable[[Float, Float], Float]], x: Float, chosen: Sequence[int] | None = None
     ) -> Float:
-        """Apply the operators of `some` subdomains, or of all, to their parts of x (n,) or (n, k)."""
+        """Apply the products of all or the `chosen` subdomains to their parts of x (n,) or (n, k)."""
         x = np.asfortranarray(x)
         y = np.zeros(x.shape, order="F")
-        for k in range(len(applied)) if some is None else some:
-            applied[k](x[self.slices[k]], y[self.slices[k]])
+        for k in range(len(products)) if chosen is None else chosen:
+            products[k](x[self.slices[k]], y[self.slices[k]])
         return y
 
     @cached_property
     def condensed(self) -> one_subdomain.CondensedLoads:
-        """Unit loads condensed to all boundaries, with the sum of the stiffnesses."""
+        """Collect the unit loads of the local subdomains: q (n, v), and the sums of C (v, v) and energies."""
         v = self._loads
         parts = [operator.condensed for operator in self.operators]
         boundary = np.concatenate([np.zeros((0, v)), *(part.boundary for part in parts)])
-        of_stresses = sum((part.stiffness for part in parts), np.zeros((v, v)))
-        return one_subdomain.CondensedLoads(
-            boundary, of_stresses, sum((part.energy for part in parts), np.zeros((v, v)))
-        )
+        stiffness = sum((part.stiffness for part in parts), np.zeros((v, v)))
+        energy = sum((part.energy for part in parts), np.zeros((v, v)))
+        return one_subdomain.CondensedLoads(boundary, stiffness, energy)
 
     def extend(self, place: int, x: Float, loads: Float | None = None, keep: bool = True) -> Float:
-        """Extend boundary displacements x (n_s, k) into the subdomain at position `place`: (dofs, k).
+        """Extend boundary displacements x (n_s, k) into one subdomain: (dofs, k).
 
-        `loads` (v, k) act inside.  Without a kept factor of the subdomain its interior is factored: by the first call
-        if that may `keep` it, else by every call.
+        Args:
+            place: position of the subdomain.
+            loads: (v, k) unit loads that act inside, if any.
+            keep: whether to store the interior that this call factors because the subdomain has no factor.
         """
         operator, s = self.operators[place], self.subdomains[place]
         if isinstance(operator, one_subdomain.ExplicitInterfaceOperator) and operator.factor is not None:
@@ -198,7 +204,7 @@ class InterfaceOperators:
         u = np.empty((s.n_dofs, *x.shape[1:]))
         inside = None
         if loads is not None and s.loads_inside:
-            if interior.answers is not None:  # of all of the subdomain
+            if interior.answers is not None:  # the subdomain has no boundary
                 u[interior.dofs] = interior.answers @ loads
                 return u
             inside = s.Q[interior.dofs] @ loads
@@ -207,12 +213,12 @@ class InterfaceOperators:
 
 
 def _factor(subdomain: Subdomain, dofs: Int, explicit: bool, keep_factor: bool) -> tuple[InterfaceOperator, Float]:
-    """Factor one subdomain; return its boundary operator and the diagonal of K on its boundary `dofs`.
+    """Factor one subdomain; return its boundary operator and the diagonal of K on `dofs` (n_s,).
 
-    K is freed.  `keep_factor` as in `ExplicitInterfaceOperator`.
+    The subdomain gives up K.  `keep_factor` is as in `ExplicitInterfaceOperator`.
 
     Raises:
-        MeshError: rounding leaves K no factor.
+        MeshError: rounding leaves K without a factor.
     """
     K = subdomain.take_stiffness()
     operator: InterfaceOperator

@@ -1,8 +1,8 @@
-"""Boundary operators of a subdomain, its Schur complement S and flexibility S+: dense matrices, or sparse factors.
+"""The boundary operators of one subdomain: Schur complement S and flexibility S+, dense or by sparse factors.
 
-The dense matrices are symmetric and stored in one square array, so that a product reads n^2 / 2 numbers.  One partial
-factorization gives S.  The dual problem needs only the boundary, so that the factor is kept only for displacements
-inside.  Sparse factors replace dense matrices that would be too large.
+S and S+ are symmetric and stored in one square array, so that a product reads n^2 / 2 numbers.  One partial
+factorization gives S.  The dual problem needs the boundary alone: the factor is kept only if displacements inside are
+needed.  Sparse factors replace dense matrices that would be too large.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from feti_homog.typing import Float, Int
 
 
 class ExplicitInterfaceOperator:
-    """S and S+ of one subdomain on its n boundary dofs, as dense matrices.
+    """S and S+ of one subdomain as dense matrices (n, n) on its n boundary dofs.
 
     With the fixing nodes on the boundary, the inverse of S + rho Rf Rf^T is the boundary part of K+.
 
     Attributes:
         condensed: unit loads on the boundary.
-        factor: factor of the whole subdomain, with which `extend` computes displacements inside; None if not kept.
+        factor: factor of the whole subdomain for displacements inside; None if not kept.
     """
 
     is_dense = True
 
     def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int, keep_factor: bool = False) -> None:
-        """Condense K (cn, cn) to `dofs` (n,), which are sorted local numbers.  Options under `feti_schur_`.
+        """Condense K (all dofs, all dofs) to the boundary `dofs` (n,), which are ascending.
 
-        `keep_factor` has an effect on subdomains with loads inside that CHOLMOD condenses.
+        Options have the prefix `feti_schur_`.  `keep_factor` keeps the factor, if CHOLMOD condenses loads inside.
 
         Raises:
             LinAlgError: the Schur complement is not positive definite on the complement of the kernel.
@@ -68,14 +68,14 @@ class ExplicitInterfaceOperator:
         self._both = both
 
     def apply_schur(self, x: Float, out: Float | None = None) -> Float:
-        """Compute S x for x (n,) or (n, k), into `out` or in Fortran order."""
+        """Compute S x for x (n,) or (n, k), into `out` if given, else in Fortran order."""
         return self._product(x, out, self._schur_diagonal, lower=1)
 
     def apply_flexibility(self, x: Float, out: Float | None = None) -> Float:
-        """Compute S+ x for x (n,) or (n, k), into `out` or in Fortran order.
+        """Compute S+ x for x (n,) or (n, k), into `out` if given, else in Fortran order.
 
-        The inverse of a thin or nearly incompressible body is ill-conditioned: it gets one step of iterative
-        refinement.
+        For a thin or nearly incompressible body, with a stiffness ratio above ILL_CONDITIONED, the product gets one
+        step of iterative refinement.
         """
         y = self._product(x, out, self._flexibility_diagonal, lower=0)
         if self._refines:
@@ -85,7 +85,7 @@ class ExplicitInterfaceOperator:
         return y
 
     def _product(self, x: Float, out: Float | None, diagonal: Float, lower: int) -> Float:
-        """Multiply x by the symmetric matrix with a triangle of the array and a diagonal.
+        """Multiply x by the symmetric matrix in the lower or upper triangle of the array, with `diagonal` (n,).
 
         Fortran order is fastest.
         """
@@ -102,7 +102,7 @@ class ExplicitInterfaceOperator:
         return out
 
     def extend(self, x: Float, loads: Float | None) -> Float:
-        """Extend boundary displacements x (n, k) to (dofs, k) under loads (v, k), if any, by the kept factor."""
+        """Extend boundary displacements x (n, k) under loads (v, k) to (all dofs, k), by the kept factor."""
         assert self.factor is not None
         forces, reactions = np.zeros((self._subdomain.n_dofs, *x.shape[1:])), self.apply_schur(x)
         if loads is not None:
@@ -112,32 +112,34 @@ class ExplicitInterfaceOperator:
 
     @property
     def S(self) -> Float:
-        """(n, n) S."""
+        """Copy the Schur complement S (n, n)."""
         S = full_from_lower(self._both)
         np.fill_diagonal(S, self._schur_diagonal)
         return S
 
     @property
     def regularised_schur(self) -> Float:
-        """(n, n) S + rho Rf Rf^T, positive definite; see `Subdomain.fixing`."""
+        """Compute S + rho Rf Rf^T (n, n), positive definite; see `Subdomain.fixing`."""
         S = self.S
         S[np.ix_(self._fixed, self._fixed)] += self._term
         return S
 
     def regularisation(self, P: csr_matrix) -> Float:
-        """(m, m) P^T rho Rf Rf^T P for P (n, m)."""
+        """Compute P^T rho Rf Rf^T P (m, m) for P (n, m)."""
         at_fixed = P[self._fixed].toarray()
         return np.asarray(at_fixed.T @ self._term @ at_fixed)
 
 
 @dataclass(frozen=True)
 class CondensedLoads:
-    """The v unit loads condensed to the n boundary dofs of subdomains.
+    """The v unit loads, condensed to the n boundary dofs b of one or several subdomains.
 
-    Inside pieces of one material, loads vanish except at voids.  With K_ii u_i = -Q_i E - K_ib u_b, the stress
-    integral is C E + q^T u_b and the forces on the boundary are S u_b + q E, where
+    With K_ii u_i = -Q_i E - K_ib u_b on the inner dofs i, the stress integral is C E + q^T u_b and the boundary forces
+    are S u_b + q E, where
 
         q = Q_b - K_bi K_ii^-1 Q_i,  C = |Omega| L - Q_i^T K_ii^-1 Q_i.
+
+    In a piece of one material without voids, Q_i = 0.
 
     Attributes:
         boundary: (n, v) q.
@@ -152,15 +154,15 @@ class CondensedLoads:
 
 
 class ImplicitInterfaceOperator:
-    """S and the boundary part of K+ for one subdomain, on its n boundary dofs."""
+    """S and S+ of one subdomain on its n boundary dofs, by sparse factors of K."""
 
     is_dense = False
 
     def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int) -> None:
-        """Factor K + rho Rf Rf^T; `dofs` (n,) are sorted local numbers.  Options under `feti_sub_`."""
+        """Factor K + rho Rf Rf^T; `dofs` (n,) are ascending.  Options have the prefix `feti_sub_`."""
         self.n, self.dofs, self._subdomain = len(dofs), dofs, subdomain
         if not len(dofs) and not subdomain.R.shape[1]:
-            # A pinned subdomain without a boundary has no other forces than the unit loads: solve for these now.
+            # A pinned subdomain without a boundary bears the unit loads alone: solve for their displacements now.
             s, u = subdomain, np.empty(subdomain.Q.shape)
             self.interior = Interior(K, dofs, s.elimination_order())
             self.interior.answers = self.interior.solve(-s.Q[self.interior.dofs])
@@ -168,19 +170,19 @@ class ImplicitInterfaceOperator:
             C = s.area * s.L + s.Q.T @ u
             self.condensed = CondensedLoads(s.Q[dofs], C, C + s.Q.T @ u + u.T @ (K @ u))
             return
-        # A single subdomain has no boundary: any of its nodes can be fixed.
+        # In a subdomain without a boundary any nodes can be fixed.
         boundary = subdomain.problem.nodes(dofs)
         nodes = np.unique(boundary) if len(dofs) else np.arange(subdomain.mesh.n_classes)
         self._solver = DirectSolver(subdomain.regularised(K, nodes), "feti_sub_")
 
     @cached_property
     def interior(self) -> Interior:
-        """The interior, factored at the first access, after K is assembled again."""
+        """Assemble K again and factor its interior, at the first access."""
         return Interior(self._subdomain.take_stiffness(), self.dofs, self._subdomain.elimination_order())
 
     @cached_property
     def condensed(self) -> CondensedLoads:
-        """The condensed loads; loads inside need the interior."""
+        """Condense the unit loads to the boundary; loads inside need the interior."""
         s, q, C = self._subdomain, self._subdomain.Q[self.dofs], self._subdomain.area * self._subdomain.L
         if s.loads_inside:
             inside = s.Q[self.interior.dofs]
@@ -189,11 +191,11 @@ class ImplicitInterfaceOperator:
         return CondensedLoads(q, C, C)
 
     def apply_schur(self, x: Float, out: Float | None = None) -> Float:
-        """Compute S x = K_bb x - K_bi K_ii^-1 K_ib x for x (n,) or (n, k), into `out` if any."""
+        """Compute S x = K_bb x - K_bi K_ii^-1 K_ib x for x (n,) or (n, k), into `out` if given."""
         return _by_columns(self.interior.reactions, x, out)
 
     def apply_flexibility(self, x: Float, out: Float | None = None) -> Float:
-        """Compute the boundary part of K+ x for x (n,) or (n, k), into `out` if any."""
+        """Compute S+ x, the boundary part of K+, for x (n,) or (n, k), into `out` if given."""
 
         def solve(x: Float) -> Float:
             load = np.zeros((self._subdomain.n_dofs, *x.shape[1:]), order="F")
@@ -204,19 +206,20 @@ class ImplicitInterfaceOperator:
 
 
 class Interior:
-    """The factored interior of one subdomain: the dofs without constraints.
+    """The inner dofs i of one subdomain, which no constraint reaches, with a factor of K_ii.
 
     Attributes:
-        dofs: local numbers of the inner dofs, in elimination order if there is one, else sorted.
-        answers: (inner dofs, v) displacements under the unit loads; None if not kept.
+        dofs: (inner dofs,) numbers in the subdomain, in the given elimination order, else ascending.
+        answers: (inner dofs, v) displacements under the unit loads; None unless stored.
     """
 
     answers: Float | None = None
 
     def __init__(self, K: csr_matrix, dofs: Int, order: Int | None = None) -> None:
-        """Split K (cn, cn) at the boundary `dofs` (n,) and factor K_ii.  Options under `feti_interior_`.
+        """Factor K_ii; `K` (all dofs, all dofs) is split at boundary `dofs` (n,).
 
-        `order` (cn,) is an elimination order of all dofs; without it the library chooses one.
+        Options have the prefix `feti_interior_`.  `order` (all dofs,) is an elimination order; without `order` the
+        library chooses one.
         """
         inside = np.ones(K.shape[0], bool)
         inside[dofs] = False
@@ -235,28 +238,28 @@ class Interior:
 
     @cached_property
     def coupling(self) -> csr_matrix:
-        """(n, inner dofs) K_bi."""
+        """Return K_bi (n, inner dofs)."""
         return self._Kib.T.tocsr()
 
     def extend(self, x: Float, load: Float | None = None) -> Float:
-        """Compute -K_ii^-1 (K_ib x + q), in equilibrium with boundary displacements x (n,) or (n, k).
+        """Compute u_i = -K_ii^-1 (K_ib x + q) for boundary displacements x (n,) or (n, k).
 
-        The `load` q (inner dofs,) or (inner dofs, k) acts on the interior, if any.
+        `load` is q, (inner dofs,) or (inner dofs, k); 0 if None.
         """
         forces = self._Kib @ x
         return self.solve(-forces if load is None else -forces - load)
 
     def solve(self, forces: Float) -> Float:
-        """Compute K_ii^-1 f for forces (inner dofs,) or (inner dofs, k) with a fixed boundary."""
+        """Compute K_ii^-1 f for `forces` f (inner dofs,) or (inner dofs, k)."""
         return self._solver.solve(forces) if len(self.dofs) else np.zeros(forces.shape)
 
     def reactions(self, x: Float) -> Float:
-        """Compute the forces S x of boundary displacements x (n,) or (n, k)."""
+        """Compute the boundary forces S x for x (n,) or (n, k)."""
         return np.asarray(self._Kbb @ x + self.coupling @ self.extend(x))
 
 
 def _by_columns(apply: Callable[[Float], Float], x: Float, out: Float | None) -> Float:
-    """Apply a function to x (n,), or to at most COLUMNS_AT_ONCE columns of x (n, k) at a time."""
+    """Apply a function to x (n,), or to batches of COLUMNS_AT_ONCE columns of x (n, k)."""
     if out is None:
         out = np.empty_like(x)
     if not len(x):
@@ -265,6 +268,6 @@ def _by_columns(apply: Callable[[Float], Float], x: Float, out: Float | None) ->
         out[:] = apply(x)
         return out
     for first in range(0, x.shape[1], thresholds.COLUMNS_AT_ONCE):
-        some = slice(first, first + thresholds.COLUMNS_AT_ONCE)
-        out[:, some] = apply(x[:, some])
+        batch = slice(first, first + thresholds.COLUMNS_AT_ONCE)
+        out[:, batch] = apply(x[:, batch])
     return out

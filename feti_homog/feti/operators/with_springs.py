@@ -1,16 +1,14 @@
 """The protocol of boundary operators, and the operators of a body with springs on its boundary.
 
-At the far ends of the springs the flexibility is S+ + C, with C = T T^T, and the stiffness is
+At the far ends of the springs, with compliance C = T T^T, the flexibility is S+ + C, and the stiffness is
 
     S~ = G - G R (R^T G R)^-1 R^T G,
     G = A - A T (I + T^T A T)^-1 T^T A,  A = S + s R R^T,
 
-for the orthonormal kernel R, and a stiffness s of the size of S.  However soft the springs are, no digits cancel: A has
-no kernel, R is the kernel of S~ up to rounding, and along the springs
+for the orthonormal kernel R of S, and a number s of the size of S.  No digits cancel, however soft the springs are: A
+has no kernel, R is the kernel of S~ up to rounding, and along the springs the difference in G is replaced by
 
-    T^T G = (I + T^T A T)^-1 T^T A
-
-replaces the difference.
+    T^T G = (I + T^T A T)^-1 T^T A.
 """
 
 from typing import Protocol, TypeGuard
@@ -23,27 +21,27 @@ from feti_homog.typing import Bool, Float, Int
 
 
 class BoundaryOperator(Protocol):
-    """S and a generalized inverse S+ of one subdomain on its n boundary dofs.
+    """Products with S and with a generalized inverse S+ of one subdomain, on its n boundary dofs.
 
     Attributes:
-        is_dense: whether it is a `DenseOperator`.
+        is_dense: whether the operator is a `DenseOperator`.
     """
 
     is_dense: bool
 
     def apply_schur(self, x: Float, out: Float | None = None) -> Float:
-        """S x for x (n,) or (n, k), into `out` if it is given."""
+        """Compute S x for x (n,) or (n, k), into `out` if given."""
 
     def apply_flexibility(self, x: Float, out: Float | None = None) -> Float:
-        """S+ x for x (n,) or (n, k), into `out` if it is given."""
+        """Compute S+ x for x (n,) or (n, k), into `out` if given."""
 
 
 class DenseOperator(BoundaryOperator, Protocol):
-    """A boundary operator with its dense matrix."""
+    """A boundary operator that has S as a dense matrix."""
 
     @property
     def S(self) -> Float:
-        """(n, n) S."""
+        """Return the Schur complement S (n, n)."""
 
     def regularisation(self, P: csr_matrix) -> Float:
         """Compute P^T A P (m, m) for P (n, m), with a matrix A that makes S + A definite."""
@@ -55,15 +53,15 @@ def is_dense(operator: BoundaryOperator) -> TypeGuard[DenseOperator]:
 
 
 class _Softening:
-    """The change from products with S to products with S~.
+    """The matrix S~, by products with S.
 
     Attributes:
-        kernel: (n, k) orthonormal kernel of S.
-        stiffness: s, the mean of S along the springs.
+        kernel: (n, k) orthonormal kernel R of S.
+        stiffness: s, the mean stiffness of S along the springs.
     """
 
     def __init__(self, T: csr_matrix, ST: Float, kernel: Float) -> None:
-        """`T` (n, r) has orthogonal columns, S T is `ST`, and `kernel` (n, k) spans the kernel of S."""
+        """Factor I + T^T A T for `T` (n, r) with orthogonal columns, `ST` = S T, and a `kernel` (n, k) of S."""
         self.kernel, squares = np.linalg.qr(kernel)[0], np.asarray(T.power(2).sum(axis=0)).ravel()
         # T divided by its squared column norms: T^T times these directions is I.
         self._directions = (T @ diags(1.0 / squares)).tocsr()
@@ -89,16 +87,21 @@ class _Softening:
         """Compute the symmetric matrix S~ (n, n)."""
         A = S + self.stiffness * self.kernel @ self.kernel.T
         G = self._relaxed(A)
-        # Replace the differences in columns along the springs, too.
+        # By symmetry, the differences in columns along the springs are replaced, too.
         G += (self._directions @ (self._T.T @ G - (G @ self._T).T)).T
         return np.asarray((G + G.T) / 2 - self._root_of_kernel.T @ self._root_of_kernel, order="F")
 
 
 class WithSprings:
-    """A body with springs on its boundary: S~ and S+ + C, dense if the body's operators are."""
+    """The boundary operator of a body with springs: S~ in place of S, S+ + C in place of S+.
+
+    Attributes:
+        is_dense: whether the operator of the body is a `DenseOperator`; then this operator is one, too.
+        S: (n, n) dense matrix S~, in Fortran order; only if `is_dense`.
+    """
 
     def __init__(self, body: BoundaryOperator, T: csr_matrix, kernel: Float) -> None:
-        """Set up for the root `T` (n, r) of the spring compliance, and the `kernel` (n, k) of S."""
+        """Compute S~ for the root `T` (n, r) of the compliance C = T T^T, and the `kernel` (n, k) of S."""
         self._body, self._T = body, T
         self.is_dense = body.is_dense
         if is_dense(body):
@@ -109,7 +112,7 @@ class WithSprings:
             self._softening = _Softening(T, body.apply_schur(T.toarray(order="F")), kernel)
 
     def apply_schur(self, x: Float, out: Float | None = None) -> Float:
-        """S~ x for x (n,) or (n, k), into `out` if it is given."""
+        """Compute S~ x for x (n,) or (n, k), into `out` if given."""
         y = self.S @ x if self.is_dense else self._softening.apply(x, self._body.apply_schur(x))
         if out is None:
             return y
@@ -117,31 +120,31 @@ class WithSprings:
         return out
 
     def apply_flexibility(self, x: Float, out: Float | None = None) -> Float:
-        """Compute (S+ + C) x for x (n,) or (n, k), into `out` if any."""
+        """Compute (S+ + C) x for x (n,) or (n, k), into `out` if given."""
         y = self._body.apply_flexibility(x, out)
         y += self._T @ (self._T.T @ x)
         return y
 
     def regularisation(self, P: csr_matrix) -> Float:
-        """Compute P^T rho Rf Rf^T P (m, m) for P (n, m), with rho as soft as the springs.
+        """Compute P^T A P (m, m) for P (n, m): the term of the body, as soft as its springs.
 
-        This term makes S~ definite, for S and S~ have the same kernel.  The operators must be dense.
+        S~ + A is definite, because S and S~ have the same kernel.  The operator must be dense.
         """
         assert is_dense(self._body)
         return self._softer * self._body.regularisation(P)
 
 
 def compliance_root(B: csr_matrix, compliance: Float, copies: Int, of_inner: Bool) -> csr_matrix | None:
-    """Compute T (n, r) of the springs on one body, None without springs.
+    """Compute the root T (n, r), C = T T^T, for the r springs that belong to one body.
 
-    A spring softens one body alone: the inner of two bodies, or the outer one if the inner one is cut there.  If both
-    are cut, the spring belongs to neither; see `preconditioners.SpringUpdate`.
+    A spring belongs to the inner of its two bodies, or to the outer body if METIS cuts the inner body at this node.  If
+    both are cut, the spring belongs to neither; see `preconditioners.SpringUpdate`.  Returns None without springs.
 
     Args:
         B: (rows, n) constraints of the body.
-        compliance: (rows,) diagonal C.
+        compliance: (rows,) diagonal of C, length per nodal force.
         copies: (rows, 2) number of node copies in the outer and in the inner body.
-        of_inner: (n,) whether the body is the inner one of two at each degree of freedom.
+        of_inner: (n,) whether the body is the inner body at a degree of freedom.
     """
     inner_is_whole = copies[:, 1] == 1
     belongs = np.where(abs(B) @ of_inner > 0, inner_is_whole, ~inner_is_whole & (copies[:, 0] == 1))

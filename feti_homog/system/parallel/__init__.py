@@ -1,4 +1,4 @@
-"""Many ranks: errors that reach all of them, objects and arrays of all of them, work divided among them.
+"""Work on many ranks: exceptions that reach all ranks, distributed arrays, division of loads.
 
 Imports `system.runtime`.  Main entries: `mpi_errors.run_main` and `mpi_errors.agree`.
 """

@@ -1,7 +1,7 @@
-"""Sums, gathered, exchanged and scaled rows of arrays that ranks own, and exchanged Python objects of any size.
+"""Communication of distributed arrays (sums, gathers, exchanges of rows) and of Python objects of any size.
 
-MPI's own exchange of objects would pickle all parts at once and fail from 2 GiB on; here arrays are sent from where
-they are.
+mpi4py's exchange of objects would pickle all parts at once and fail from 2 GiB on; here arrays in objects are sent in
+place.
 """
 
 from collections.abc import Callable
@@ -18,7 +18,10 @@ T = TypeVar("T")
 
 
 def scatter(comm: MPI.Intracomm, parts: list[T]) -> T:
-    """Send part r of rank 0's list to rank r and return this rank's; the list is empty afterwards.  Collective."""
+    """Send part r of the list on rank 0 to rank r, and return the received part.  Collective.
+
+    The list on rank 0 is empty afterwards.
+    """
     large = pkl5.Intracomm(comm)
     if comm.rank:
         received: T = large.recv(source=0)
@@ -29,7 +32,7 @@ def scatter(comm: MPI.Intracomm, parts: list[T]) -> T:
 
 
 def gather(comm: MPI.Intracomm, part: T) -> list[T]:
-    """Return the parts of all ranks, by rank, on rank 0, and none on others.  Collective."""
+    """Gather the parts of all ranks on rank 0, by rank; other ranks return [].  Collective."""
     large = pkl5.Intracomm(comm)
     if comm.rank:
         large.send(part, dest=0)
@@ -38,7 +41,7 @@ def gather(comm: MPI.Intracomm, part: T) -> list[T]:
 
 
 def alltoall(comm: MPI.Intracomm, parts: list[T]) -> list[T]:
-    """Send part r to rank r and return the parts that all ranks have for this one, by rank.  Collective."""
+    """Send part r to rank r, and return the received parts, by rank of the sender.  Collective."""
     large = pkl5.Intracomm(comm)
     received = list(parts)
     for step in range(1, comm.size):
@@ -50,18 +53,19 @@ def alltoall(comm: MPI.Intracomm, parts: list[T]) -> list[T]:
 
 
 def allreduce_sum(comm: MPI.Intracomm, part: Float) -> Float:
-    """sum_rank part_rank of arrays of one shape, on every rank.  Collective."""
+    """Sum arrays `part` of equal shape over ranks, on every rank.  Collective."""
     total = np.empty_like(part)
     comm.Allreduce(part, total)
     return total
 
 
 def gather_rows(comm: MPI.Intracomm, owned: Float, first: int, rows: Int) -> Float:
-    """x[rows] on every rank, for x of which each rank owns the rows `owned` (m,) or (m, k).  Collective.
+    """Gather rows (r,) or (r, k) of a distributed array on every rank.  Collective.
 
     Args:
-        first: global number of this rank's first row.
-        rows: global numbers, equal on all ranks.
+        owned: (m,) or (m, k) rows of this rank.
+        first: global number of the first owned row.
+        rows: (r,) global row numbers, equal on all ranks.
     """
     mine = (rows >= first) & (rows < first + len(owned))
     values = np.zeros((len(rows), *owned.shape[1:]))
@@ -71,14 +75,11 @@ def gather_rows(comm: MPI.Intracomm, owned: Float, first: int, rows: Int) -> Flo
 
 
 def allgather_rows(comm: MPI.Intracomm, part: Array, counts: Int) -> Array:
-    """Return the rows of all ranks below each other, on every rank. Collective.
+    """Concatenate the rows of all ranks, on every rank: (sum(counts),) or (sum(counts), k).  Collective.
 
     Args:
         part: (counts[rank],) or (counts[rank], k) rows of this rank.
-        counts: (ranks,) row count of each rank.
-
-    Returns:
-        (sum of counts,) or (sum of counts, k).
+        counts: (ranks,) numbers of rows.
     """
     rows = np.empty((int(counts.sum()), *part.shape[1:]), part.dtype)
     comm.Allgatherv(np.ascontiguousarray(part), (rows, counts * int(np.prod(part.shape[1:]))))
@@ -86,7 +87,10 @@ def allgather_rows(comm: MPI.Intracomm, part: Array, counts: Int) -> Array:
 
 
 def share_columns(comm: MPI.Intracomm, solve: Callable[[Float], Float], B: Float) -> Float:
-    """Return solve(B) for B (n,) or (n, k), equal on all ranks, each of which solves for some columns.  Collective."""
+    """Return solve(B) on every rank for B (n,) or (n, k); every rank solves for a share of the columns.  Collective.
+
+    B is equal on all ranks.
+    """
     columns = B.shape[1] if B.ndim == 2 else 1
     if comm.size == 1 or columns == 1:
         return solve(B)
@@ -97,23 +101,23 @@ def share_columns(comm: MPI.Intracomm, solve: Callable[[Float], Float], B: Float
 
 
 def exchange(comm: MPI.Intracomm, to: Int, *columns: Array) -> list[Array]:
-    """Send row i of each column, (k,) or (k, ...), to rank `to[i]`; return the received rows.
+    """Send row i of all columns, (k,) or (k, ...), to rank `to[i]`; return the received rows.  Collective.
 
-    Rows are ordered by the rank that sent them, and rows of one rank as on that rank.  Collective.
+    Received rows are sorted by sender; rows of one sender keep their order.
     """
     order = np.argsort(to, kind="stable")
-    sent = np.bincount(to, minlength=comm.size)
-    come = np.empty_like(sent)
-    comm.Alltoall(sent, come)
+    sent_counts = np.bincount(to, minlength=comm.size)
+    counts = np.empty_like(sent_counts)
+    comm.Alltoall(sent_counts, counts)
     received = []
     for column in columns:
         width = int(np.prod(column.shape[1:], dtype=np.int64))
-        rows = np.empty((int(come.sum()), *column.shape[1:]), column.dtype)
-        comm.Alltoallv((np.ascontiguousarray(column[order]), sent * width), (rows, come * width))
+        rows = np.empty((int(counts.sum()), *column.shape[1:]), column.dtype)
+        comm.Alltoallv((np.ascontiguousarray(column[order]), sent_counts * width), (rows, counts * width))
         received.append(rows)
     return received
 
 
 def scale_rows(weights: Float, x: Float) -> Float:
-    """Return diag(weights) x for weights (m,) and x (m,) or (m, k)."""
+    """Compute diag(weights) x for weights (m,) and x (m,) or (m, k)."""
     return np.asarray((weights if x.ndim == 1 else weights[:, None]) * x)

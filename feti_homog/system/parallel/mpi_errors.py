@@ -1,4 +1,4 @@
-"""Calls on rank 0 and on all ranks whose exceptions are raised on every rank, so that none waits for ever."""
+"""Calls on rank 0 or on all ranks whose exceptions are raised on every rank, so that no rank waits for ever."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ if TYPE_CHECKING:
     from mpi4py.MPI import Comm, Request
 
 T = TypeVar("T")
-# A rank with an error waits so long for the others to come with theirs, before it ends the job.
+# Seconds that a rank with an exception waits for exceptions of the other ranks, before it ends the job.
 ARRIVAL_TIMEOUT_S = SILENT_SECONDS
 
 
 class RemoteError(RuntimeError):
-    """A defect met on another rank; the text is that rank's traceback."""
+    """A defect on another rank; the text is its traceback."""
 
 
 def on_root(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
-    """Return function(...) of rank 0, on every rank; its errors are raised on every rank.
+    """Call a function on rank 0, and return the result on every rank.  Collective.
 
-    Collective; the other ranks' arguments do not matter. The result must be picklable; `function` must
-    not communicate.
+    Every rank raises an exception of rank 0.  Arguments on other ranks are ignored.  The result must be picklable, and
+    `function` must not communicate.
     """
     result: T = comm.bcast(on_root_only(comm, function, *args, **kwargs), root=0)
     return result
 
 
 def on_root_only(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T | None:
-    """Return function(...) on rank 0, None on the others; its errors are raised on every rank.  Collective."""
+    """Call a function on rank 0, and return the result there, None elsewhere; see `on_root`.  Collective."""
     result, error = _attempt(function, *args, **kwargs) if comm.rank == 0 else (None, None)
     message = comm.bcast(_portable(comm, error), root=0)
     if message is not None:
@@ -44,16 +44,17 @@ def on_root_only(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs
 
 
 def agree(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
-    """Return function(...) of each rank on that rank; if it raises on any, every rank raises.
+    """Call a function on every rank; if a rank raises an exception, every rank raises.  Collective.
 
-    A rank that met a defect raises it; all others raise the defect of the first such rank or, if there was none, the
-    FetiHomogError of the first rank that met one, NoMemoryError of one without memory. Collective; `function` must not
-    communicate.
+    `function` must not communicate.  A rank raises its own defect.  Other ranks raise RemoteError for the first
+    rank with a defect or, without defects, the FetiHomogError of the first rank with one (NoMemoryError for a
+    MemoryError).
     """
     return _agreed(comm, *_attempt(function, *args, **kwargs))
 
 
 def _agreed(comm: Comm, result: T | None, error: Exception | None) -> T:
+    """Return the result, or raise as `agree`.  Collective."""
     messages = [message for message in comm.allgather(_portable(comm, error)) if message is not None]
     if messages:
         if error is not None and not isinstance(error, FetiHomogError | MemoryError):
@@ -63,17 +64,17 @@ def _agreed(comm: Comm, result: T | None, error: Exception | None) -> T:
 
 
 def agree_after(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
-    """Return function(...) of all ranks, a library's collective call.
+    """Call a function that communicates, such as a collective call of a library.  Collective.
 
-    If any raises a FetiHomogError, every rank does.  Any other exception is raised by its rank alone, without a word
-    to the others, which may be waiting for it within `function`: it must end the job, as does a FetiHomogError for
-    which the others do not come in time.  Collective.
+    If a rank raises a FetiHomogError, every rank raises.  A rank raises other exceptions alone, because the other ranks
+    may wait for it within `function`: the caller must end the job.  The job also ends if the other ranks do not return
+    within ARRIVAL_TIMEOUT_S after a FetiHomogError.
     """
     result = error = None
     try:
         result = function(*args, **kwargs)
-    except FetiHomogError as met:
-        error = met
+    except FetiHomogError as caught:
+        error = caught
     failed_here, failed = array("i", [error is not None]), array("i", [0])
     request = comm.Iallreduce(failed_here, failed)
     if error is None:
@@ -84,10 +85,10 @@ def agree_after(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs:
 
 
 def run_main(comm: Comm, main: Callable[[], int]) -> int:
-    """Return the exit code of main(), run by every rank.
+    """Call main() on every rank, and return its exit code.  Collective.
 
-    A FetiHomogError that every rank raises is printed once, by rank 0, and gives its exit code. One that the
-    others do not raise in time, and any other exception, is printed by its rank and aborts the job.
+    If every rank raises a FetiHomogError within ARRIVAL_TIMEOUT_S, rank 0 prints it, and its exit code is returned.
+    After any other exception, or a FetiHomogError on some ranks alone, the rank prints it and aborts the job.
     """
     try:
         return main()
@@ -102,10 +103,10 @@ def run_main(comm: Comm, main: Callable[[], int]) -> int:
 
 
 def end_job(comm: Comm, error: BaseException) -> NoReturn:
-    """Tell of an error that one rank has met alone, and end the processes of all."""
-    ending = _without_memory(comm, error) if isinstance(error, MemoryError) else error
-    if isinstance(ending, FetiHomogError):
-        code, lines = ending.exit_code, _lines(ending)
+    """Print an exception of this rank alone, and end the processes of all ranks."""
+    reported = _without_memory(comm, error) if isinstance(error, MemoryError) else error
+    if isinstance(reported, FetiHomogError):
+        code, lines = reported.exit_code, _lines(reported)
     else:
         code = ExitCode.DEFECT
         lines = f"rank {comm.rank} of {comm.size}:\n{''.join(traceback.format_exception(error))}"
@@ -116,27 +117,27 @@ def end_job(comm: Comm, error: BaseException) -> NoReturn:
 
 
 def _without_memory(comm: Comm, error: MemoryError) -> NoMemoryError:
-    """Return the error in a line for the user."""
+    """Convert a MemoryError to one line for the user."""
     detail = f": {error}" if str(error) else ""
-    hint = "`feti-homog check` estimates what a case needs, and more ranks share it"
+    hint = "`feti-homog check` estimates the memory of a case, which more ranks share"
     return NoMemoryError(f"rank {comm.rank} of {comm.size} has no memory left{detail}; {hint}")
 
 
 def others_come(comm: Comm, timeout: float) -> bool:
-    """Return whether every rank calls this within `timeout` seconds of this one."""
+    """Return whether every rank calls `others_come` within `timeout` seconds after this rank."""
     return _comes(comm.Ibarrier(), timeout)
 
 
 def all_raise(comm: Comm, error: BaseException) -> bool:
-    """Return whether all ranks have met an error for the user, so that they can clean up together.
+    """Return whether all ranks raise a FetiHomogError, so that they can clean up together.
 
-    Each rank with such an error calls it, and waits ARRIVAL_TIMEOUT_S for the others; a defect is one rank's own.
+    A rank with a FetiHomogError waits ARRIVAL_TIMEOUT_S for the calls of the other ranks.
     """
     return isinstance(error, FetiHomogError) and others_come(comm, ARRIVAL_TIMEOUT_S)
 
 
 def _comes(request: Request, timeout: float) -> bool:
-    """Wait for a request, `timeout` seconds at most; return True if it is fulfilled."""
+    """Wait at most `timeout` seconds for a request; return whether it is fulfilled."""
     deadline = time.monotonic() + timeout
     while not (is_fulfilled := request.Test()) and time.monotonic() < deadline:
         time.sleep(0.001)
@@ -144,23 +145,24 @@ def _comes(request: Request, timeout: float) -> bool:
 
 
 def _lines(error: FetiHomogError) -> str:
-    """Return a line for each fault."""
+    """Return one line for every fault."""
     return "\n".join(f"error: {fault}" for fault in error.faults)
 
 
 def _attempt(function: Callable[..., T], *args: Any, **kwargs: Any) -> tuple[T | None, Exception | None]:
+    """Call a function; return its result and None, or None and its exception."""
     try:
         return function(*args, **kwargs), None
     except OSError as error:
         if error.filename is None:
             return None, error
-        return None, FetiHomogError(f"{error.filename}: {error.strerror}")  # a file's fault, not the program's
+        return None, FetiHomogError(f"{error.filename}: {error.strerror}")  # a fault of the file, no defect
     except Exception as error:
         return None, error
 
 
 def _portable(comm: Comm, error: Exception | None) -> Exception | None:
-    """Return the exception as it is sent to other ranks: a defect as its traceback, for it may not be picklable."""
+    """Convert an exception for other ranks: a defect becomes its traceback, as it may not be picklable."""
     if error is None or isinstance(error, FetiHomogError):
         return error
     if isinstance(error, MemoryError):

@@ -1,4 +1,4 @@
-"""PETSc's options and their faults, its libraries, errors of its callbacks, C functions that petsc4py lacks.
+"""PETSc: its options and their faults, its libraries, exceptions in callbacks, C functions without a binding.
 
 Imports `system.parallel` and `system.runtime`.  Main entry: `options_database.case_options`.
 """

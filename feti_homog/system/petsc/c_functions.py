@@ -1,6 +1,6 @@
-"""The few functions of PETSc's C interface that petsc4py 3.18 does not bind, and errors of callbacks from C.
+"""Functions of PETSc's C interface that petsc4py 3.18 does not bind, and exceptions in callbacks.
 
-petsc4py's extension module resolves PETSc's symbols, so no library has to be found.
+The extension module of petsc4py resolves PETSc's symbols, so that no library has to be found.
 """
 
 import ctypes
@@ -28,22 +28,22 @@ def option_was_used(name: str) -> bool:
 
 
 def error_words(error: PETSc.Error) -> str:
-    """Return the fault that an error of PETSc names: its last line, without the rank."""
+    """Return the last line of a PETSc error, without the rank: its fault."""
     return str(error).splitlines()[-1].split("] ", 1)[-1]
 
 
 def finalize() -> int:
-    """End PETSc, which prints its logs; return the error code, 0 on success.  Collective over all ranks."""
+    """End PETSc, which writes its logs; return the error code, 0 for success.  Collective."""
     return int(_library().PetscFinalize())
 
 
 def set_schur(factor: PETSc.Mat, rows: PETSc.IS) -> None:
-    """Ask the factor matrix, before it is factored, to leave the Schur complement on `rows`."""
+    """Request the Schur complement on `rows` from a factor matrix, before its factorization."""
     _call("MatFactorSetSchurIS", Pointer(factor.handle), Pointer(rows.handle))
 
 
 def schur_complement(factor: PETSc.Mat, size: int) -> Float:
-    """Return the dense (size, size) Schur complement, in Fortran order, that a symmetric factorization has left."""
+    """Copy the Schur complement (size, size), in Fortran order, from a symmetric factorization."""
     schur, values = Pointer(), ctypes.POINTER(ctypes.c_double)()
     _call("MatFactorCreateSchurComplement", Pointer(factor.handle), ctypes.byref(schur), None)
     try:
@@ -65,10 +65,10 @@ def _library() -> ctypes.CDLL:
 
 
 class CallbackErrors:
-    """Calls functions within PETSc's callbacks, and keeps the first exception that one raises.
+    """A guard for callbacks of PETSc: stores the first exception until PETSc has returned.
 
-    No exception may pass through PETSc's C code: petsc4py 3.22 crashes. Instead the callback returns a value that ends
-    PETSc's method, such as NaN, and so do all later ones, until `raised` raises the exception.
+    No exception may pass through PETSc's C code: petsc4py 3.22 crashes.  Instead the callback, and all later callbacks,
+    return a value that ends PETSc's method, such as NaN, until `raised` raises the exception.
     """
 
     def __init__(self, comm: Comm) -> None:
@@ -76,10 +76,10 @@ class CallbackErrors:
         self._error: BaseException | None = None
 
     def call(self, function: Callable[[], T], otherwise: T) -> T:
-        """Return function(), or `otherwise` if that, or an earlier call, has raised. Collective.
+        """Return function(), or `otherwise` after an exception in this or an earlier call.  Collective.
 
-        An error for the user that all ranks raise is kept on all. A rank that raises alone, or meets a defect, ends
-        the job: the others, in the middle of `function`, would wait for it.
+        A FetiHomogError that all ranks raise is stored on all ranks.  A rank that raises alone, or has a defect, ends
+        the job, because the other ranks would wait within `function`.
         """
         if self._error is not None:
             return otherwise
@@ -93,7 +93,7 @@ class CallbackErrors:
 
     @contextmanager
     def raised(self) -> Iterator[None]:
-        """At the end of the block, which calls PETSc, raise the first exception."""
+        """Raise the stored exception at the end of the block, which calls PETSc."""
         try:
             yield
         except PETSc.Error:

@@ -1,4 +1,4 @@
-"""The libraries that are built on one MPI, which pip does not bring: found, started, or reported in a sentence."""
+"""Search and start of the libraries that need one common MPI, which pip does not install."""
 
 import atexit
 import importlib
@@ -19,10 +19,10 @@ H5PY = "install the Debian packages python3-h5py and python3-h5py-mpi, or load y
 
 
 def require() -> None:
-    """Import mpi4py, petsc4py and h5py, which starts MPI, not PETSc.
+    """Import mpi4py, petsc4py and h5py, which starts MPI but not PETSc.
 
     Raises:
-        LibraryError: one line for each that is missing, broken or without MPI, with the remedy.
+        LibraryError: a library is missing, broken or without MPI; one line for every library, with the remedy.
     """
     faults = []
     for name, advice in (("mpi4py", MPI4PY), ("petsc4py", petsc4py_advice()), ("h5py", H5PY)):
@@ -42,10 +42,9 @@ def require() -> None:
 def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
     """Start PETSc with the words of a command line, the program's name first.  Collective over `comm`.
 
-    Files .petscrc and petscrc, which lie in the current folder without being asked for, are not read.
-    PETSc ends when Python does; a rank on which it cannot, for its logs cannot be written, ends the job: the others
-    would wait for it.  At its end PETSc does not list options that nobody read, unless -options_left asks for it: the
-    program refuses misspelt ones, and one set of options serves all runs.
+    PETSc reads no file .petscrc or petscrc, and ends with Python.  A rank on which PETSc cannot end, because its logs
+    cannot be written, ends the job: the other ranks would wait.  PETSc lists unread options only with -options_left:
+    the program refuses misspelt options itself, and one set of options serves all runs.
 
     Raises:
         LibraryError: petsc4py was built for another NumPy.
@@ -61,9 +60,9 @@ def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
     from feti_homog.system.petsc import c_functions
 
     def end() -> None:
-        code = 0 if PETSc.Sys.isFinalized() else c_functions.finalize()  # each start asks for its end
+        code = 0 if PETSc.Sys.isFinalized() else c_functions.finalize()  # an earlier start may have ended PETSc
         if code:
-            complain(f"error: PETSc cannot end (error code {code}); results are written")
+            complain(f"error: PETSc cannot end (error code {code}); the results are complete")
             comm.Abort(ExitCode.DEFECT)
 
     atexit.register(end)
@@ -71,7 +70,7 @@ def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
         import numpy as np
         from scipy.linalg import blas
 
-        # Each BLAS has its buffers while there are addresses: OpenBLAS, which finds none later, tries for ever.
+        # Every BLAS takes its buffers now: under a limit of addresses, OpenBLAS would later search for ever.
         square = np.eye(200)
         blas.dgemm(1.0, square @ square, square)
         matrix = PETSc.Mat().createDense(square.shape, array=square.copy(), comm=PETSc.COMM_SELF)
@@ -84,9 +83,9 @@ def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
 
 
 def petsc4py_advice(debian: Path = DEBIAN_PETSC, path: Sequence[str] = sys.path) -> str:
-    """Return the advice where petsc4py is not on the `path`.
+    """Return the advice for a missing petsc4py.
 
-    Debian has it in a folder of `debian` that PETSC_DIR names.
+    Debian has petsc4py in a folder of `debian` that PETSC_DIR names; `path` is Python's search path.
     """
     folders = [folder for folder in debian.glob("petsc*/*-real") if (folder / "lib/python3/dist-packages").is_dir()]
     if not folders:
@@ -100,7 +99,7 @@ def petsc4py_advice(debian: Path = DEBIAN_PETSC, path: Sequence[str] = sys.path)
 
 
 def _unfit(name: str, error: Exception, advice: str) -> str:
-    """Text on a module that cannot be imported; errors about NumPy's types mean that it fits another release."""
+    """Return the fault of a module that cannot be imported; errors about NumPy mean another release."""
     if "numpy" not in str(error):
         return f"{name} cannot be imported ({error}): {advice}"
     import numpy as np

@@ -1,4 +1,4 @@
-"""Names of PETSc's options: the solver's own, PETSc's, and names that are almost theirs."""
+"""Names of options: of the solver, of PETSc, and misspelt names."""
 
 import difflib
 import re
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Option:
-    """A PETSc option of the solver: name without dash, values, default, one line of help."""
+    """An option of the solver: name without dash, values, default, and one line of help."""
 
     name: str
     value: str
@@ -17,7 +17,7 @@ class Option:
 
 
 def _direct_solver(prefix: str, matrix: str, library: str = "cholmod") -> tuple[Option, Option]:
-    """Return the options of a direct solver."""
+    """Return the options of a direct solver with a prefix, for a matrix in words."""
     return (
         Option(f"{prefix}pc_type", "cholesky|lu", "cholesky", f"factorization of {matrix}"),
         Option(f"{prefix}pc_factor_mat_solver_type", "cholmod|mumps|...", library, f"library of {matrix}"),
@@ -25,7 +25,7 @@ def _direct_solver(prefix: str, matrix: str, library: str = "cholmod") -> tuple[
 
 
 def _coarse_solver(prefix: str, matrix: str) -> tuple[Option, ...]:
-    """Return the options of the solver of a matrix distributed over all ranks."""
+    """Return the options of the solver with a prefix, for a distributed matrix in words."""
     library = f"library of {matrix}; on one rank cholmod by default"
     return (
         Option(f"{prefix}ksp_type", "preonly|cg|...", "preonly", f"one factor of {matrix}, or an iterative method"),
@@ -65,17 +65,17 @@ OPTIONS = (
     *_coarse_solver("feti_coarse_", "the adaptive coarse problem"),
     *_direct_solver("feti_bonded_", "the cell with all bonds intact, for influence columns"),
 )
-"""Every option that a run accepts whether or not it makes the solver which reads it."""
+"""The options that every run accepts, even if the run does not make the solver that reads an option."""
 TABLE = {option.name: option for option in OPTIONS}
 
 DIRECT_PREFIXES = tuple(f"feti_{name}_" for name in ("sub", "interior", "schur", "natural", "coarse", "bonded"))
 """Prefixes of PETSc's direct solvers."""
 
 MUMPS_PREFIXES = ("feti_schur_",)
-"""Those of them that are MUMPS by default."""
+"""Prefixes of direct solvers whose default library is MUMPS."""
 
 PREFIXES = ("feti_ksp_", "feti_pc_", *DIRECT_PREFIXES)
-"""Prefixes of PETSc solvers: PETSc reads what follows."""
+"""Prefixes of all PETSc solvers; the rest of a name is an option of PETSc."""
 
 # Options that PETSc reads when it starts, logs and ends.
 PETSC_NAMES = (
@@ -86,21 +86,21 @@ PETSC_NAMES = (
     *("skip_petscrc", "on_error_abort", "on_error_mpiabort", "error_output_stdout", "error_output_none"),
     *("no_signal_handler", "fp_trap", "check_pointer_intensity", "mpidump"),
 )
-# With options of these beginnings PETSc waits for somebody, runs other code, or reads what nobody has checked.
+# Beginnings of options with which PETSc waits for a person, runs other code, or reads unchecked files.
 NOT_IN_BATCH = re.compile("history|citations|python|options_.*yaml|start_|stop_|debug|dll|on_error_(att|em)")
-# More of each beginning, of which every release of PETSc has others.
+# Beginnings of further options, which differ between releases of PETSc.
 PETSC_BEGINNINGS = ("log_", "malloc_", "device_", "cuda_", "hip_", "sf_", "viewer_", "use_gpu_aware_mpi")
 
-# Words of the names of options that show what solvers are and do; a level of printing has a number.
+# Parts of the names of options that print; options in LEVEL have a number, the level of printing.
 SHOWING = re.compile(r"(^|_)(view|monitor|converged_reason|converged_rate)(_|$)|_(compute|plot)_(singular|eigen)values")
 LEVEL = re.compile(r"_(print|printstat|statprint)$|_mumps_icntl_[1-4]$")
 
 CLOSE = 0.9
-"""Similarity (difflib's, 1 for equal names) from which on a name is taken for a misspelt one: a letter or two."""
+"""Least similarity (by difflib; 1 for equal names) of a misspelt name: one or two letters differ."""
 
 
 def unknown_options(names: Iterable[str]) -> list[str]:
-    """Return one fault for each name (without dash) that neither the solver nor PETSc knows."""
+    """Return one fault for every name (without dash) that is no option of the solver or of PETSc."""
     faults = []
     for name in names:
         hint = ""
@@ -119,30 +119,30 @@ def unknown_options(names: Iterable[str]) -> list[str]:
 
 
 def only_prints(name: str) -> bool:
-    """Return whether an option (name without dash) shows the work of solvers, and chooses nothing."""
+    """Return whether an option (name without dash) prints and changes no solver."""
     return any(kind.search(name) for kind in (SHOWING, LEVEL))
 
 
 def almost_in_table(name: str) -> bool:
-    """Return whether the name is probably a misspelt one of OPTIONS with the same solver prefix."""
+    """Return whether a name is probably a misspelt option of the table with the same prefix."""
     prefix = solver_prefix(name)
-    table = [other for other in TABLE if solver_prefix(other) == prefix]
+    table = [option for option in TABLE if solver_prefix(option) == prefix]
     return bool(prefix and name not in TABLE and difflib.get_close_matches(name, table, 1, CLOSE))
 
 
 def suggestion(name: str) -> str:
-    """Return a hint: the closest option in the table, or all prefixes."""
+    """Return a hint for an unknown option: the closest option in the table, or all prefixes."""
     nearest = difflib.get_close_matches(name, TABLE, n=1)
     return f"did you mean -{nearest[0]}?" if nearest else f"prefixes: -{', -'.join(PREFIXES)}"
 
 
 def solver_prefix(name: str) -> str:
-    """Return the longest of PREFIXES with which the name begins; empty without one."""
+    """Return the longest prefix in PREFIXES with which a name begins, else an empty text."""
     return max((prefix for prefix in PREFIXES if name.startswith(prefix) and name != prefix), key=len, default="")
 
 
 def help_text() -> str:
-    """Return a table of the solver's options, one line each."""
+    """Return the help on the options of the solver, one line an option."""
     usages = [f"-{option.name} {option.value}".strip() for option in OPTIONS]
     width = max(map(len, usages))
     lines = [

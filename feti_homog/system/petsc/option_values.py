@@ -1,4 +1,4 @@
-"""PETSc's options before PETSc has started: words of the command line, values that can be checked, files."""
+"""PETSc's options before PETSc starts: words of the command line, options files, checks of values."""
 
 import math
 import os
@@ -12,7 +12,7 @@ from feti_homog.system.runtime import input_files
 
 Value = str | int | float | bool
 OptionRule = tuple[str, Callable[[str], bool]]
-"""Values that an option takes, in words and as a test of a text, which is empty if no value is given."""
+"""The valid values of an option, in words and as a test of the text; the text is empty without a value."""
 TRUE, FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 VIEWER = re.compile(r"(ascii)?(:(?P<file>[^:]*)(:(default|ascii_\w+)?(:(write|append))?)?)?")
 FLAGS = (
@@ -23,9 +23,9 @@ CASE_FILE = ".toml"
 
 
 def can_be_written(file: str) -> bool:
-    """Return whether a file of this name can be opened for writing: there is one that can, or a folder for it.
+    """Return whether a file can be opened for writing, or created in its folder.
 
-    A pipe can if somebody reads from it; else opening it would wait.
+    A pipe without a reader cannot, because opening it would wait.
     """
     if not file or "\0" in file or file.endswith(os.sep):
         return False
@@ -45,7 +45,7 @@ def can_be_written(file: str) -> bool:
 
 
 def faulty_values(options: Mapping[str, Value]) -> list[str]:
-    """Return one fault for each option (name without dash) with an impossible value."""
+    """Return one fault for every option (name without dash) with an invalid value."""
     texts = {name: _text(value) for name, value in options.items()}
     return sorted(
         f"{in_words(name, text)}: expected {rule[0]}"
@@ -55,28 +55,28 @@ def faulty_values(options: Mapping[str, Value]) -> list[str]:
 
 
 def in_words(name: str, value: str) -> str:
-    """Return an option (name without dash) as on the command line."""
+    """Write an option (name without dash) as on the command line."""
     return f"-{name} {value}".strip()
 
 
 def flag_value(value: Value) -> str | None:
-    """Return PETSc's value of a flag: empty if it is set, None if it is not; a viewer stays."""
+    """Return PETSc's value of a flag: empty for true, None for false, else the text (a viewer)."""
     text = _text(value)
     return "" if text.lower() in TRUE else None if text.lower() in FALSE else text
 
 
 def is_flag(name: str) -> bool:
-    """Return whether an option (name without dash) is a flag, which needs no value and may have a viewer's."""
+    """Return whether an option (name without dash) is a flag; a flag needs no value, but may have a viewer."""
     return name in FLAGS or is_viewer(name) or (name.startswith("feti_") and SHOWING.search(name) is not None)
 
 
 def is_viewer(name: str) -> bool:
-    """Return whether a flag (name without dash) prints, and its value may be a place."""
+    """Return whether a flag (name without dash) prints, so that its value may be a viewer."""
     return name in ("log_view", "options_view") or (name.startswith("feti_ksp_") and SHOWING.search(name) is not None)
 
 
 def is_own_flag(name: str) -> bool:
-    """Return whether an option (name without dash) is a flag of PETSc itself, which it reads when it starts or ends."""
+    """Return whether an option (name without dash) is a flag that PETSc reads when it starts or ends."""
     return is_flag(name) and not name.startswith("feti_")
 
 
@@ -85,7 +85,7 @@ def _text(value: Value) -> str:
 
 
 def _real(text: str) -> float:
-    """Return the number, NaN if there is none."""
+    """Convert a text to a number, or NaN if it is none."""
     try:
         return math.nan if "_" in text else float(text)
     except ValueError:
@@ -108,16 +108,16 @@ def _is_switch(text: str) -> bool:
 
 
 def _is_place(text: str) -> bool:
-    """Return whether the text is a switch, or a place to print in a folder that exists."""
+    """Return whether the text is a switch, or a viewer whose file can be written."""
     match = VIEWER.fullmatch(text)
     return _is_switch(text) or (match is not None and (not match["file"] or can_be_written(match["file"])))
 
 
 def _words_of(file: str) -> list[str]:
-    """Return the words of an options file; none of a file that cannot be read, or has other words or files."""
+    """Return the words of an options file; [] if it is unreadable, or has more than PETSc's options."""
     try:
         lines = input_files.read(Path(file), 1 << 20).decode("utf-8", "replace").splitlines()
-    except (OSError, ValueError):  # ValueError: of a null character
+    except (OSError, ValueError):  # ValueError: the name has a null character
         return []
     words = [word for line in lines for word in re.split(r"(^|\s)#|^ *[!%]", line)[0].split()]
     return [] if split_argv(words)[0] or "-options_file" in map(str.lower, words) else words
@@ -125,7 +125,7 @@ def _words_of(file: str) -> list[str]:
 
 SWITCH: OptionRule = "true or false, or no value", _is_switch
 PRINTS: OptionRule = "true or false, no value, or ascii:FILE of an existing folder", _is_place
-# With a relative tolerance of 1 or more nothing is solved.
+# A relative tolerance of 1 or more would end every solve at once.
 SHARE: OptionRule = "a number above 0 and below 1", lambda text: 0.0 < _real(text) < 1.0
 NEW_FILE = "a file of an existing folder, or no value"
 
@@ -140,27 +140,27 @@ RULES: dict[str, OptionRule] = {
     "feti_coarse_threshold": SHARE,
     "feti_ksp_atol": ("a number of at least 0", lambda text: 0.0 <= _real(text) < math.inf),
     "feti_ksp_divtol": ("a number above 1", lambda text: 1.0 < _real(text) < math.inf),
-    "feti_ksp_max_it": _integer(1, 2**31 - 1),  # of a PETSc with 32-bit integers
+    "feti_ksp_max_it": _integer(1, 2**31 - 1),  # PETSc may have 32-bit integers
     "feti_schur_mat_mumps_icntl_14": _integer(0, 10_000),
-    "feti_schur_pc_type": ("cholesky, for what is condensed is symmetric", "cholesky".__eq__),
-    "feti_schur_pc_factor_mat_solver_type": ("mumps, which alone makes Schur complements", "mumps".__eq__),
-    "feti_ksp_error_if_not_converged": ("nothing: the run reports it and keeps its results", _is_false),
-    "fp_trap": ("nothing: numbers that are not finite are checked where they may occur", _is_false),
+    "feti_schur_pc_type": ("cholesky, because condensed matrices are symmetric", "cholesky".__eq__),
+    "feti_schur_pc_factor_mat_solver_type": ("mumps, the only library with Schur complements", "mumps".__eq__),
+    "feti_ksp_error_if_not_converged": ("false: a run reports such solves, and keeps its results", _is_false),
+    "fp_trap": ("false: the program checks where numbers may not be finite", _is_false),
     **dict.fromkeys(
         ("info", "malloc_dump", "malloc_view"),  # up to its first colon the text is a switch or a file
         (NEW_FILE, lambda text: _is_switch(file := text.partition(":")[0]) or can_be_written(file)),
     ),
-    "options_file": ("a file with an option of PETSc in each line, none of another file", lambda text: False),
+    "options_file": ("a file with one option of PETSc a line, without options_file", lambda text: False),
     "log_trace": (NEW_FILE, lambda text: not text or can_be_written(text)),
 }
-"""For each of these options, what is expected in words, and whether a text is that."""
+"""The valid values of options, by name."""
 
 
 def split_argv(argv: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return the program's own words and PETSc's, each in their order.
+    """Split a command line into words of the program and words of PETSc.
 
-    PETSc's are single-dash options with the word after each as its value, unless that word begins another option
-    or cannot be the value; a negative number can.
+    PETSc has the options with a single dash, and the word after an option as its value, unless that word begins another
+    option or cannot be the value.  A negative number can be a value.
     """
     ours: list[str] = []
     petsc: list[str] = []
@@ -171,7 +171,7 @@ def split_argv(argv: Sequence[str]) -> tuple[list[str], list[str]]:
             name = word[1:]
         else:
             is_flag_value = _is_switch(word) or VIEWER.fullmatch(word) is not None
-            # A value, right or wrong, is no case file, and no path after a flag.
+            # No value, valid or invalid, is a case file; no value of a flag is a path.
             is_path = not is_flag_value and (os.sep in word or os.path.exists(word))
             is_ours = re.match("--|-h$", word) or (word.endswith(CASE_FILE) and name != "options_file")
             (petsc if name and not is_ours and not (is_flag(name) and is_path) else ours).append(word)
@@ -180,7 +180,10 @@ def split_argv(argv: Sequence[str]) -> tuple[list[str], list[str]]:
 
 
 def named_values(words: Sequence[str]) -> dict[str, str]:
-    """Return the values of PETSc's options by name, without dash, also from options files; empty without a value."""
+    """Return the values of PETSc's options by name without dash, also from options files.
+
+    An option without a value has an empty text.
+    """
     values: dict[str, str] = {}
     name = ""
     for word in words:
@@ -196,12 +199,13 @@ def named_values(words: Sequence[str]) -> dict[str, str]:
 
 
 def petsc_words(options: Mapping[str, str]) -> list[str]:
-    """Return the words of options by name without dash, for PETSc's start.
+    """Return the words with which PETSc starts, from options by name without dash.
 
-    Its own flags are there or not, true or false.  False flags of the solver stay, for a case may have them true.
+    Flags that PETSc reads itself are set or left out.  False flags of the solver stay, because a case may set them
+    true.
     """
-    settled = {name: flag_value(text) if is_own_flag(name) else text for name, text in options.items()}
-    pairs = [(f"-{name}", text) for name, text in settled.items() if text is not None]
+    texts = {name: flag_value(text) if is_own_flag(name) else text for name, text in options.items()}
+    pairs = [(f"-{name}", text) for name, text in texts.items() if text is not None]
     return [word for pair in pairs for word in pair if word]
 
 

@@ -1,4 +1,4 @@
-"""PETSc's options for one run: the case's defaults below the command line's, none ignored in silence."""
+"""PETSc's options for one run: the command line overrides the case, and no option is ignored silently."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -10,19 +10,19 @@ from feti_homog.system.petsc import option_table as table
 from feti_homog.system.petsc import option_values as values
 from feti_homog.system.petsc.c_functions import error_words, option_was_used
 
-# Options that PETSc looks for only in KSPSolve.
+# Options that PETSc reads only in KSPSolve.
 READ_WHEN_SOLVING = {f"feti_ksp_{key}" for key in ("converged_reason", "converged_rate", "view", "view_final_residual")}
 
 
 @contextmanager
 def case_options(options: Mapping[str, values.Value]) -> Iterator[None]:
-    """Insert the case's options below those of the command line, and remove them afterwards.
+    """Insert the options of a case below the options of the command line, for the block.
 
-    PETSc has no flags that are true or false, but flags that are there or not: false ones are taken out meanwhile.
+    PETSc's flags have no value false: false flags are removed for the block.
 
     Raises:
-        CaseError: before the block, if an option of ours is misspelt or has no such value, or a solver cannot be
-            made with the options.
+        CaseError: before the block, if an option of this program is misspelt or has an invalid value, or if a solver
+            cannot be made with the options.
     """
     database = PETSc.Options()
     on_command_line = given_options()
@@ -30,17 +30,17 @@ def case_options(options: Mapping[str, values.Value]) -> Iterator[None]:
     options_of_run = {**options, **on_command_line}
     if faults := [*table.unknown_options(options), *values.faulty_values(options_of_run)]:
         raise CaseError(*faults)
-    settled = {name: values.flag_value(text) if values.is_flag(name) else text for name, text in options_of_run.items()}
+    texts = {name: values.flag_value(text) if values.is_flag(name) else text for name, text in options_of_run.items()}
     settable = [name for name in options_of_run if not values.is_own_flag(name)]
-    changed = [name for name in settable if settled[name] != on_command_line.get(name)]
+    changed = [name for name in settable if texts[name] != on_command_line.get(name)]
     try:
         for name in changed:
-            _set(database, name, settled[name])
-        given = given_options()
-        if faults := faults_of_solvers(given):
+            _set(database, name, texts[name])
+        in_database = given_options()
+        if faults := faults_of_solvers(in_database):
             raise CaseError(*faults)
-        # Larger solvers alone read some options: names that are not almost ours are left to `refuse_unused`.
-        _refuse_unread([name for name in given if table.almost_in_table(name) and not values.is_flag(name)])
+        # Some options are read by larger solvers alone: `refuse_unused` judges names that are not nearly in the table.
+        _refuse_unread([name for name in in_database if table.almost_in_table(name) and not values.is_flag(name)])
         yield
     finally:
         for name in changed:
@@ -48,7 +48,7 @@ def case_options(options: Mapping[str, values.Value]) -> Iterator[None]:
 
 
 def _set(database: PETSc.Options, name: str, value: values.Value | None) -> None:
-    """Set an option, with no value for an empty text, or delete the option for None."""
+    """Set an option, without a value for an empty text; delete the option for None."""
     if value is None:
         database.delValue(name)
     else:
@@ -56,48 +56,48 @@ def _set(database: PETSc.Options, name: str, value: values.Value | None) -> None
 
 
 def given_options() -> dict[str, str]:
-    """Return the PETSc options by lower-case name; an option without a value has an empty text."""
+    """Return PETSc's options by lower-case name; an option without a value has an empty text."""
     return {name.lower(): value or "" for name, value in PETSc.Options().getAll().items()}
 
 
 def choices(prefix: str) -> list[str]:
-    """Return the options under a prefix that choose something and do not only print."""
+    """Return the options with a prefix, except options that only print."""
     return [name for name in given_options() if name.startswith(prefix) and not table.only_prints(name)]
 
 
 def without_iterations() -> str:
-    """Return a line on the given options that print iterations, for a run that has none; empty without any."""
+    """Return a remark on options that print iterations, for runs without iterations, else an empty text."""
     printing = [f"-{name}" for name in given_options() if name.startswith("feti_ksp_") and table.only_prints(name)]
     return f"{', '.join(printing)}: the run has no iterations to print" if printing else ""
 
 
 def refuse_unused() -> None:
-    """Refuse options that no solver has read, after the setup of all solvers.
+    """Refuse options with the prefix `feti_` that no solver has read, after the set-up of all solvers.
 
-    Accepts options in the table, and options of direct solvers that the run makes only for fields or not at all.
+    Options in the table are accepted, because a run may make their solvers later or not at all.
 
     Raises:
-        CaseError: an option with our prefix is no option of any solver.
+        CaseError: no solver has such an option.
     """
     names = PETSc.Options().getAll().keys() - READ_WHEN_SOLVING
     _refuse_unread([name for name in names if name.startswith("feti_") and name not in table.TABLE])
 
 
 def _refuse_unread(names: list[str]) -> None:
-    """Raise a CaseError with one fault for each name that no solver has read, if there is any."""
+    """Raise CaseError, with one fault for every name that no solver has read."""
     if unread := [name for name in sorted(names) if not option_was_used(name)]:
         raise CaseError(*(f"-{name}: no solver has such an option; {table.suggestion(name)}" for name in unread))
 
 
-# Options with the prefixes of PETSc's solvers that the program reads itself.
+# Options that this program reads, with prefixes of PETSc's solvers.
 OWN = ("feti_pc_type", "feti_coarse_space", "feti_coarse_threshold")
 SOLVERS = {"feti_": ("feti_ksp_", "feti_pc_")} | {prefix: (prefix,) for prefix in table.DIRECT_PREFIXES}
-"""Prefixes of options that each solver reads, by the solver's own."""
+"""Prefixes of the options that a solver reads, by the prefix of the solver."""
 NO_SUCH_METHOD = "requested KSP type"
 
 
 class _Identity:
-    """A 1 x 1 matrix and preconditioner in Python alone, as the dual problem has."""
+    """The identity as a 1 x 1 shell matrix and shell preconditioner, like the dual problem."""
 
     def mult(self, mat: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         x.copy(y)
@@ -107,11 +107,11 @@ class _Identity:
 
 
 def faults_of_solvers(options: Mapping[str, str]) -> list[str]:
-    """Return the faults of options in the database with which PETSc's solvers cannot be made.
+    """Return the faults of options with which PETSc's solvers cannot be made.
 
-    `options` has their names without dash.  Each solver is made for a 1 x 1 matrix and applied once: some methods fail
-    only then.  PETSc marks the options that the solvers read, and prints all readable ones with -help.  Options that
-    print are hidden meanwhile.
+    `options` has the names without dash and the values in the database.  Every solver is made for a 1 x 1 matrix and
+    applied once, because some methods fail only then.  PETSc marks the options that it reads, and prints all readable
+    options with -help.  Options that print are removed for this time.
     """
     faults, viewers, database, comm = [], [*filter(values.is_viewer, options)], PETSc.Options(), PETSc.COMM_SELF
     try:
@@ -147,7 +147,7 @@ def faults_of_solvers(options: Mapping[str, str]) -> list[str]:
                 ksp.solve(b, x)
             except PETSc.Error as error:
                 fault = error_words(error)
-                names.sort(key=lambda name: not name.endswith("_type"))  # types first: they decide what others mean
+                names.sort(key=lambda name: not name.endswith("_type"))  # other options depend on the types
                 words = " ".join(values.in_words(name, options[name]) for name in names)
                 faults.append(f"{words}: {'PETSc has no such Krylov method' if NO_SUCH_METHOD in fault else fault}")
             finally:

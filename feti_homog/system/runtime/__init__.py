@@ -1,4 +1,4 @@
-"""The process: memory, progress, locks of files, interrupts, standard streams; records that become documents.
+"""The process: memory, progress, locks of files, signals, standard streams; records for documents.
 
 Imports nothing.  Main entries: `progress_bar.Progress`, `file_locks`, `standard_streams`.
 """

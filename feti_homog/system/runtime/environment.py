@@ -1,4 +1,4 @@
-"""Settings that a process needs before it imports NumPy, h5py and MPI, and libraries that are optional."""
+"""Settings of the environment before NumPy, h5py and MPI are imported, and imports of Matplotlib."""
 
 import importlib
 import os
@@ -9,7 +9,7 @@ from pathlib import Path
 
 SETTINGS = {
     "OMP_NUM_THREADS": "1",  # one core per rank: threads of BLAS would compete with the ranks
-    "OMP_THREAD_LIMIT": "1",  # CHOLMOD starts four whatever the number of threads is: half of its time is theirs
+    "OMP_THREAD_LIMIT": "1",  # CHOLMOD starts four threads for any OMP_NUM_THREADS, which take half of its time
     "H5PY_ALWAYS_USE_MPI": "1",  # Debian has a serial h5py beside the parallel one
     "OMPI_MCA_btl_vader_single_copy_mechanism": "none",  # containers forbid the default of Open MPI 4
     "OMPI_MCA_smsc": "^cma",  # and of Open MPI 5
@@ -17,11 +17,10 @@ SETTINGS = {
 
 
 def prefer_own_toolkits() -> None:
-    """Let `mpl_toolkits` be found beside the `matplotlib` that will be imported; Matplotlib itself is not imported.
+    """Search `mpl_toolkits` first beside the `matplotlib` that Python finds, without importing Matplotlib.
 
-    An environment with --system-site-packages takes `matplotlib` from its own folder, but Debian's
-    matplotlib-nspkg.pth has bound `mpl_toolkits` to Debian's at the start of Python: Matplotlib cannot import its 3-D
-    axes from there, and warns whenever it is loaded.
+    In an environment with --system-site-packages, Debian's matplotlib-nspkg.pth binds `mpl_toolkits` to Debian's folder
+    at the start of Python.  A Matplotlib in the environment cannot import its 3-D axes from there, and would warn.
     """
     matplotlib = find_spec("matplotlib")
     if matplotlib is None or matplotlib.origin is None:
@@ -33,9 +32,9 @@ def prefer_own_toolkits() -> None:
 
 
 def ignore_settings_of_the_folder() -> None:
-    """Load Matplotlib without the current folder's `matplotlibrc`, and let it draw without windows.
+    """Import Matplotlib without the `matplotlibrc` of the current folder, and draw without windows.
 
-    Matplotlib looks for that file first, when it is imported, and ends with a traceback where it is damaged.
+    Matplotlib reads this file first, when it is imported, and raises an exception if the file is damaged.
     """
     os.environ["MPLBACKEND"] = "agg"
     if not os.path.exists("matplotlibrc") or "matplotlib" in sys.modules:
@@ -50,7 +49,7 @@ def ignore_settings_of_the_folder() -> None:
 
 
 def prepare(environment: MutableMapping[str, str]) -> None:
-    """Set the variables of SETTINGS that are unset; OMP_THREAD_LIMIT only for one thread."""
+    """Set unset variables of SETTINGS; OMP_THREAD_LIMIT only if OMP_NUM_THREADS is 1."""
     for name, value in SETTINGS.items():
         if name != "OMP_THREAD_LIMIT" or environment["OMP_NUM_THREADS"] == "1":
             environment.setdefault(name, value)

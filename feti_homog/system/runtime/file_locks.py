@@ -1,6 +1,6 @@
-"""Locks between processes, on one machine or on several that share a file system, and files that end with a process.
+"""Locks between processes on machines that share a file system, and files that are removed with a process.
 
-The system takes a lock back when its process ends, however that ends: none is left behind by a kill.
+The system releases a lock at any end of its process, even by SIGKILL.
 """
 
 import contextlib
@@ -15,13 +15,13 @@ from typing import Self
 
 from feti_homog.errors import FetiHomogError
 
-# Seconds that a lock is tried for: one who only looks whether it is held, holds it for a moment.
+# Seconds for which a lock is tried: a process that only asks for the holder has the lock for a moment.
 LOCK_TIMEOUT_S = 0.2
-# Errors of the system for a lock that somebody else has, and for a file system without locks.
+# Errors of the system if another process has the lock, and if the file system has no locks.
 HELD = (errno.EAGAIN, errno.EACCES)
 UNSUPPORTED = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP)
 TAG = re.compile(r"(?P<host>.+)\.(?P<process>\d+)\.(?P<began>\d+)")
-# Files that are of no use when this process has ended: locks that it holds, and what it writes.
+# Files to remove at the end of this process: its lock files and unfinished files.
 files: set[Path] = set()
 
 
@@ -34,9 +34,9 @@ class LocksUnsupported(FetiHomogError):
 
 
 class Lock:
-    """A lock on the file `path`, removed by its last holder; shared locks exclude exclusive locks only.
+    """A lock on the file `path`, which the last holder removes; `shared` locks exclude exclusive locks alone.
 
-    `acquire` tries for `timeout` seconds.  As a context manager the lock is held during the block.
+    `acquire` tries for `timeout` seconds.  A lock is a context manager, too.
     """
 
     def __init__(self, path: Path, shared: bool = False, timeout: float = LOCK_TIMEOUT_S) -> None:
@@ -47,20 +47,20 @@ class Lock:
         """Take the lock.
 
         Raises:
-            LockHeld: another process has it.
+            LockHeld: another process has the lock.
             LocksUnsupported: the file system has no locks.
-            FetiHomogError: the file cannot be made or locked.
+            FetiHomogError: the file cannot be created or locked.
         """
         self._take()
-        while not self._is_at_path():  # its last holder removed the file after it was opened here
+        while not self._is_at_path():  # the last holder removed the file after it was opened here
             self._close()
             self._take()
         if not self.shared:
             files.add(self.path)
 
     def release(self) -> None:
-        """Give the lock back, if it is held, and remove its file unless others share it."""
-        with contextlib.suppress(OSError):  # of others that share it
+        """Release the lock, if it is held, and remove its file unless other processes share it."""
+        with contextlib.suppress(OSError):  # other processes share the lock
             if self._file >= 0:
                 fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 if self._is_at_path():
@@ -84,7 +84,7 @@ class Lock:
                     raise LockHeld(_written(self._file))
                 time.sleep(0.01)
             if not self.shared:
-                with contextlib.suppress(OSError):  # it holds on a full disk too, without the name of its holder
+                with contextlib.suppress(OSError):  # on a full disk the lock holds without the name of its holder
                     os.truncate(self._file, 0)
                     os.pwrite(self._file, this_process().encode(), 0)
         except (OSError, LockHeld) as error:
@@ -107,7 +107,7 @@ class Lock:
 
 
 def _is_taken(file: int, kind: int) -> bool:
-    """Lock an open file; False if another process holds the lock.  Raises OSError where locks fail otherwise."""
+    """Lock an open file with flock's `kind`; return False if another process has the lock, else raise OSError."""
     try:
         fcntl.flock(file, kind | fcntl.LOCK_NB)
     except OSError as error:
@@ -118,14 +118,14 @@ def _is_taken(file: int, kind: int) -> bool:
 
 
 def holder(path: Path) -> str | None:
-    """Describe the process that holds the lock exclusively; None without one."""
+    """Return the name of the process with the exclusive lock, as `this_process`; None without a lock."""
     with contextlib.suppress(OSError), path.open("rb+") as stream:
         return None if _is_taken(stream.fileno(), fcntl.LOCK_SH) else _written(stream.fileno())
     return None
 
 
 def this_process() -> str:
-    """Name the machine, the process and the SLURM or PBS job, as in lock files."""
+    """Return the name of this process in lock files: machine, process, and SLURM or PBS job."""
     names = [socket.gethostname(), f"process {os.getpid()}"]
     job = os.environ.get("SLURM_JOB_ID") or os.environ.get("PBS_JOBID")
     return ", ".join([*names, f"job {job}"] if job else names)
@@ -136,25 +136,25 @@ def _written(file: int) -> str:
 
 
 def tag() -> str:
-    """Return a name for files of this process that no other process has, neither now nor later."""
+    """Return a name for files of this process that no other process ever has."""
     return f"{socket.gethostname()}.{os.getpid()}.{_began(os.getpid())}"
 
 
 def has_ended(name: str) -> bool:
-    """Return whether a `tag` names a process of this machine that has ended; False for other machines."""
+    """Return whether the process of a `tag` has ended; False on other machines."""
     match = TAG.fullmatch(name)
     return match is not None and match["host"] == socket.gethostname() and match["began"] != _began(match["process"])
 
 
 def remove_files() -> None:
-    """Remove the files of this process, which is about to end."""
+    """Remove the `files` of this process before it ends."""
     for path in tuple(files):
         with contextlib.suppress(OSError):
             path.unlink()
 
 
 def _began(process: int | str) -> str:
-    """Return when a process began, in clock ticks since boot; empty if there is none.  See proc(5)."""
+    """Return the start of a process in clock ticks since boot, by proc(5); empty without the process."""
     try:
         return Path(f"/proc/{process}/stat").read_text(errors="replace").rpartition(")")[2].split()[19]
     except OSError:

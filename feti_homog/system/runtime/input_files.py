@@ -1,6 +1,6 @@
-"""Files that users name: regular ones, of bounded size; files that wait for a writer or have no end are refused.
+"""Reading of files that users name: regular files of bounded size, no pipes or devices, which may never end.
 
-A library that may crash on a damaged file reads it in a process of its own.
+A library that may crash on a damaged file reads the file in a separate process.
 """
 
 import errno
@@ -22,12 +22,12 @@ STATM = Path("/proc/self/statm")
 
 
 def opened(path: Path, pipes: bool = False) -> BinaryIO:
-    """Open a file for reading.
+    """Open a regular file for reading.
 
-    With `pipes` it may be anything but a folder, as in a shell's `<(...)`; a device may never end.
+    With `pipes`, pipes and devices are accepted, too, such as `<(...)` of a shell.
 
     Raises:
-        OSError: it cannot be opened, or is no regular file.
+        OSError: the file cannot be opened, or is no regular file.
     """
     descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | (0 if pipes else os.O_NONBLOCK))
     kind = os.fstat(descriptor).st_mode
@@ -36,17 +36,17 @@ def opened(path: Path, pipes: bool = False) -> BinaryIO:
     os.close(descriptor)
     if stat.S_ISDIR(kind):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
-    raise OSError(errno.EINVAL, "it is a pipe" if stat.S_ISFIFO(kind) else "it is no file but a device")
+    raise OSError(errno.EINVAL, "it is a pipe" if stat.S_ISFIFO(kind) else "it is a device, not a file")
 
 
 def read(path: Path, most: int = MOST_BYTES, pipes: bool = False) -> bytes:
-    """Return the content of a file opened by `opened`.
+    """Return the content of a file; see `opened`.
 
     Raises:
-        OSError: as `opened`; also for a file of more than `most` bytes.
+        OSError: as `opened`, and for a file with more than `most` bytes.
     """
     with opened(path, pipes) as stream:
-        size = os.fstat(stream.fileno()).st_size  # 0 of pipes
+        size = os.fstat(stream.fileno()).st_size  # 0 for pipes
         content = b"" if size > most else stream.read((size or most) + 1)
     if size > most or len(content) > most:
         raise OSError(errno.EFBIG, f"it has more than {most >> 20} MiB")
@@ -54,7 +54,7 @@ def read(path: Path, most: int = MOST_BYTES, pipes: bool = False) -> bytes:
 
 
 def unreadable(path: Path, error: OSError) -> FetiHomogError:
-    """Return the error to raise for a file of results: bad input where it is missing or no file, else a failure."""
+    """Return the exception for an unreadable file: CaseError, or FetiHomogError without permission."""
     kind = FetiHomogError if isinstance(error, PermissionError) else CaseError
     return kind(f"cannot read {path}: {error.strerror or error}")
 
@@ -65,15 +65,15 @@ def in_own_process(
     """Return function(path), computed in a child process with at most `memory` further bytes.
 
     Raises:
-        FetiHomogError: from the function.
-        CaseError: its process crashes or outlasts `patience`.
+        FetiHomogError: the function raises it.
+        CaseError: the process crashes, lacks memory, or takes longer than `patience` seconds.
     """
     context = multiprocessing.get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
 
     def send() -> None:
-        # The parent's thread listens for signals; Ctrl-C ends both processes.  Handlers of PETSc, in a program that has
-        # started it, would not come to an end here.
+        # The child has no thread that waits for signals, so that Ctrl-C ends both processes.  PETSc's handlers, if
+        # PETSc has started, would not end here.
         for number in (signal.SIGINT, signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT):
             signal.signal(number, signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_SETMASK, ())
@@ -86,17 +86,17 @@ def in_own_process(
         except FetiHomogError as error:
             sender.send(error)
         except MemoryError as error:
-            sender.send(CaseError(f"{path}: its files are damaged: {error}"))
+            sender.send(CaseError(f"{path}: damaged, {error}"))
 
     process = context.Process(target=send, daemon=True)
     process.start()
     sender.close()
     try:
         if not receiver.poll(patience):
-            raise CaseError(f"{path}: its files are damaged: reading them does not come to an end")
+            raise CaseError(f"{path}: damaged, reading does not end within {patience:g} s")
         answer = receiver.recv()
     except EOFError:
-        raise CaseError(f"{path}: its files are damaged: the library that reads them crashes") from None
+        raise CaseError(f"{path}: damaged, the library that reads it crashes") from None
     finally:
         process.kill()
         process.join()

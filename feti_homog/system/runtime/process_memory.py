@@ -1,4 +1,4 @@
-"""The memory of the process, and limits under which the program would hang or crash without a word."""
+"""The memory of the process, and limits under which the program would hang or crash without a message."""
 
 import ctypes
 import math
@@ -10,29 +10,29 @@ from feti_homog.errors import FetiHomogError
 
 # Writing 5 to this file resets the peak of resident memory; see proc(5).
 CLEAR_REFS, RESET_PEAK = Path("/proc/self/clear_refs"), "5"
-# Bytes: of a stack, with a quarter of which MPI does not start; of the addresses of a small run on one rank.
+# Bytes: a stack for MPI, which does not start with a quarter of it; addresses for a small run on one rank.
 STACK, ADDRESSES = 1 << 20, 1 << 30
 
 
 def trim(kept: int = 0) -> None:
-    """Return the freed memory that glibc keeps to the system, if it is more than `kept` bytes."""
+    """Give freed memory of glibc back to the system, if it is more than `kept` bytes."""
     if spare() > kept:
         ctypes.CDLL(None).malloc_trim(0)
 
 
 def peak() -> int:
-    """Return the largest resident memory (bytes) since `forget_peak`."""
+    """Return the largest resident memory in bytes since `forget_peak`."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
 class _Heap(ctypes.Structure):
-    """Counts of glibc about its memory, mallinfo2(3)."""
+    """The structure of mallinfo2(3): counts of glibc about its memory."""
 
     _fields_ = tuple((f"field_{k}", ctypes.c_size_t) for k in range(10))
 
 
 def spare() -> float:
-    """Return the freed bytes that glibc keeps; infinite before version 2.33, which does not count them."""
+    """Return the freed bytes that glibc keeps; inf before glibc 2.33, which has no such count."""
     try:
         count = ctypes.CDLL(None).mallinfo2
     except AttributeError:
@@ -42,17 +42,17 @@ def spare() -> float:
 
 
 def forget_peak(clear_refs: Path = CLEAR_REFS, kept: int = 0) -> None:
-    """Trim the memory as `trim`, and reset its peak; where the system refuses that, the old peak stays."""
+    """Call `trim`, and reset the peak of memory; if the system refuses, the old peak stays."""
     trim(kept)
     with suppress(OSError):
         clear_refs.write_text(RESET_PEAK)
 
 
 def require_limits() -> None:
-    """Check the limits of the stack and of addresses, before libraries are loaded.
+    """Check the limits of stack and addresses, before libraries are loaded.
 
     Raises:
-        FetiHomogError: one is too small; a line for each.
+        FetiHomogError: a limit is below STACK or ADDRESSES; one line for every limit.
     """
     limits = ("stack (ulimit -s)", resource.RLIMIT_STACK, STACK), ("memory (ulimit -v)", resource.RLIMIT_AS, ADDRESSES)
     faults = [

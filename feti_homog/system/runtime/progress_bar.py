@@ -1,4 +1,4 @@
-"""Stages of a run: printed on rank 0, timed on every rank, and shown by PETSc's -log_view."""
+"""The stages of a run: printed on rank 0, timed on every rank, and logged for PETSc's -log_view."""
 
 import sys
 import time
@@ -14,7 +14,7 @@ from feti_homog.system.runtime.standard_streams import say
 
 
 class Progress:
-    """Print a line for each stage and solve on rank 0, unless quiet, and keep the times of stages.
+    """The progress of a run: lines on rank 0, unless `quiet`, and `seconds` by stage.
 
     `within` gets the finished share of the case and its words, in place of a bar.
     """
@@ -22,13 +22,13 @@ class Progress:
     def __init__(self, comm: MPI.Intracomm, quiet: bool, within: Callable[[float, str], object] | None = None) -> None:
         self.comm, self.within = comm, within
         self.prints = comm.rank == 0 and not quiet
-        # mpirun gives rank 0 a terminal for its output even if mpirun has none itself, but none for its errors.
+        # Even without a terminal, mpirun gives rank 0 a terminal for its output, but none for its errors.
         self.on_terminal = self.prints and sys.stdout.isatty() and sys.stderr.isatty() and find_spec("tqdm") is not None
         self.seconds: dict[str, float] = {}
-        self._within = [0.0]  # seconds that stages within those now open took, the innermost last
+        self._inner_seconds = [0.0]  # times of stages within the open stages, with the innermost open stage last
 
     def say(self, line: str) -> None:
-        """Print one line on rank 0, past the progress bar if there is one."""
+        """Print one line on rank 0, above a progress bar."""
         if self.on_terminal:
             from tqdm import tqdm
 
@@ -39,27 +39,28 @@ class Progress:
 
     @contextmanager
     def stage(self, name: str) -> Iterator[list[str]]:
-        """Provide a PETSc log stage.
+        """Time a block as a stage of the run and of PETSc's log, and print its time.
 
-        The block may append words to the list, which are printed with its time; stages within it count apart.
+        The block may append remarks to the list, which are printed with the time; the times of inner stages are
+        subtracted.
         """
         remarks: list[str] = []
         start = time.perf_counter()
-        self._within.append(0.0)
+        self._inner_seconds.append(0.0)
         try:
             with PETSc.Log.Stage(name):
                 yield remarks
         finally:
             seconds = time.perf_counter() - start
-            took = seconds - self._within.pop()
-            self._within[-1] += seconds
-        self.seconds[name] = self.seconds.get(name, 0.0) + took
-        self.say(f"{name:<9} {took:8.2f} s  {' '.join(remarks)}".rstrip())
+            own_seconds = seconds - self._inner_seconds.pop()
+            self._inner_seconds[-1] += seconds
+        self.seconds[name] = self.seconds.get(name, 0.0) + own_seconds
+        self.say(f"{name:<9} {own_seconds:8.2f} s  {' '.join(remarks)}".rstrip())
 
     def timings(self) -> dict[str, float]:
-        """Return the seconds of each stage, the maximum over ranks.  Collective."""
-        return {name: self.comm.allreduce(took, MPI.MAX) for name, took in self.seconds.items()}
+        """Return the seconds by stage, the maximum over ranks.  Collective."""
+        return {name: self.comm.allreduce(seconds, MPI.MAX) for name, seconds in self.seconds.items()}
 
     def memory(self) -> int:
-        """Return the peak resident memory of the case (bytes), the maximum over ranks.  Collective."""
+        """Return the peak of resident memory in bytes, the maximum over ranks.  Collective."""
         return int(self.comm.allreduce(process_memory.peak(), MPI.MAX))

@@ -1,7 +1,7 @@
-"""Records: dataclasses whose fields carry their meaning, unit and the names under which they are written.
+"""Records: dataclasses whose fields have descriptions (meaning, unit, names in files).
 
-The writers of files take names and types from these descriptions, and so do the reference tables of the manual.
-Fields without a description are not written.
+Writers of files and the reference tables of the manual take names and types from the descriptions.  Fields without a
+description are not written.
 """
 
 import dataclasses
@@ -20,17 +20,17 @@ KINDS = {float: int | float, int: int, str: str, bool: bool, Mapping: Mapping}
 
 @dataclass(frozen=True)
 class Description:
-    """Content of a field.
+    """The description of a field.
 
     Attributes:
-        meaning: in words.
-        unit: empty for pure numbers, counts and texts.
-        shape: of an array, as "(3, 3)" or "(n, 2)".
-        components: the names of the columns that an array fills in a table.
-        spatial_components: `components` of generalized plane strain, if there are more.
-        entries: the keys of a mapping and their meanings; a single key in capitals stands for any.
-        dtype: of an array in an HDF5 file.
-        name: under which an HDF5 file has it, if not the field's.
+        meaning: meaning in words.
+        unit: unit, empty for pure numbers, counts and texts.
+        shape: shape of an array, as "(3, 3)" or "(n, 2)"; empty for other values.
+        components: names of the columns that an array fills in a table.
+        spatial_components: `components` in generalized plane strain, if they differ.
+        entries: keys of a mapping and their meanings; a single key in capitals stands for any key.
+        dtype: type of an array in an HDF5 file.
+        name: name in an HDF5 file, if it is not the name of the field.
     """
 
     meaning: str
@@ -52,20 +52,20 @@ def described(
     default: Any = dataclasses.MISSING,
     **attributes: Any,
 ) -> Any:
-    """Return a dataclass field with a description; `attributes` are further ones of it."""
+    """Return a dataclass field with a `Description` of these arguments."""
     description = Description(meaning, unit, shape, components, **attributes)
     return dataclasses.field(default=default, metadata={DESCRIPTION: description})
 
 
 def descriptions(record: type | Any) -> dict[str, Description]:
-    """Return the described fields of a record, or of its class, by name."""
+    """Return the descriptions of the fields of a record, or of its class, by name."""
     return {f.name: f.metadata[DESCRIPTION] for f in dataclasses.fields(record) if DESCRIPTION in f.metadata}
 
 
 def plain(value: Any) -> Any:
-    """Return the value, with a mapping of its described fields for each record.
+    """Convert a value to plain mappings and lists: a record becomes a mapping of its described fields.
 
-    A field whose default is None is left out while it is None.
+    Fields with default None are left out if they are None.
     """
     if dataclasses.is_dataclass(value):
         defaults = {f.name: f.default for f in dataclasses.fields(value)}
@@ -79,11 +79,11 @@ def plain(value: Any) -> Any:
 
 
 def restored(kind: type[T], document: Mapping[str, Any]) -> T:
-    """Return the record of a class from its document by `plain`; other keys are left out.
+    """Construct a record of class `kind` from the output of `plain`; unknown keys are ignored.
 
     Raises:
         KeyError: a key without a default is missing.
-        TypeError: a value is of another kind than the record's.
+        TypeError: a value has another type, or an array another number of axes, than the field.
     """
     _require(document, Mapping)
     hints, values = typing.get_type_hints(kind), {}
@@ -95,11 +95,12 @@ def restored(kind: type[T], document: Mapping[str, Any]) -> T:
         shape = field.metadata[DESCRIPTION].shape
         axes = [words.rstrip("(),").count(",") + 1 for words in shape.split(" or ")]
         if getattr(value, "ndim", axes[0]) not in axes:
-            raise TypeError(f"{field.name} is no array {shape}")
+            raise TypeError(f"{field.name}: expected an array {shape}")
     return kind(**values)
 
 
 def _restored_value(hint: Any, value: Any) -> Any:
+    """Convert a value of a document to the type `hint`."""
     if value is None and without_none(hint) != hint:
         return None
     hint = without_none(hint)
@@ -107,7 +108,7 @@ def _restored_value(hint: Any, value: Any) -> Any:
         return restored(typing.cast(type, hint), value)
     origin = typing.get_origin(hint) or hint
     if origin.__module__ == "numpy":
-        import numpy as np  # it reads the environment
+        import numpy as np  # NumPy reads the environment when it is imported
 
         return np.asarray(value, dtype=float)
     if origin is tuple:
@@ -121,13 +122,13 @@ def _restored_value(hint: Any, value: Any) -> Any:
 
 
 def _require(value: Any, kind: Any) -> None:
-    """Raise TypeError for a value of another kind; truth is no number."""
+    """Raise TypeError for a value of another type; a truth value is no number."""
     if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
-        raise TypeError(f"{value!r:.40} is of another type than expected")
+        raise TypeError(f"{value!r:.40} has another type than expected")
 
 
 def without_none(hint: Any) -> Any:
-    """Return X, the type in `X | None`."""
+    """Return X for the type `X | None`, and any other type as it is."""
     if typing.get_origin(hint) not in (types.UnionType, typing.Union):
         return hint
     (kind,) = (part for part in typing.get_args(hint) if part is not type(None))

@@ -1,9 +1,9 @@
-"""Standard output and error, without which work goes on, and signals that end the process.
+"""Standard output and error, whose failure does not stop a run, and signals that end the process.
 
-Ctrl-C and a launcher's or batch system's order to end print one line, and the process ends at once.  Python runs its
-signal handlers between two of its own steps, which a mesher or a factorization may keep it from for long, libraries
-take handlers away, and an exception in the middle of a collective call would leave other ranks waiting.  So the signals
-are blocked, and a thread waits for them.
+After Ctrl-C, or a signal of a launcher or batch system, the process prints one line and ends at once.  Python runs
+signal handlers between two of its own steps, which a mesher or a factorization may delay for long; libraries replace
+handlers; and an exception in the middle of a collective call would leave other ranks waiting.  So the signals are
+blocked, and a thread waits for them.
 """
 
 import contextlib
@@ -17,19 +17,19 @@ import time
 from feti_homog.errors import FetiHomogError, escaped
 from feti_homog.system.runtime import file_locks
 
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGXCPU)  # the last: the limit of CPU time
-# Variables in which launchers give the rank of a process before MPI has started.
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGXCPU)  # SIGXCPU: the limit of CPU time
+# Variables with the rank of a process, which launchers set before MPI starts.
 RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
-# How long the others wait for rank 0, which a library may keep from the signal: then Open MPI drops what rank 0 prints.
+# Seconds that other ranks wait for the message of rank 0: Open MPI drops it after the end of another rank.
 SILENT_SECONDS = 5.0
-KEPT = "\n\t"  # of the characters that are not printable; others may come from files
+KEPT = "\n\t"  # characters that are printed although they are not printable; others, from files, are escaped
 
 
 def end_on_signals() -> None:
-    """Let SIGINT, SIGTERM and SIGXCPU end the process with the exit code 128 + signal: 130, 143 and 152.
+    """End the process after SIGINT, SIGTERM or SIGXCPU, with exit code 130, 143 or 152 (128 + signal).
 
-    Files of locks and unfinished ones are removed before.  Rank 0 reports it on standard error.  Signals that are
-    ignored, as in a background job of a shell, stay so.  Call it before any other thread starts.
+    Before, rank 0 prints a line on standard error, and lock files and unfinished files are removed.  Ignored signals,
+    as in a background job of a shell, remain ignored.  This function must be called before any thread starts.
     """
     awaited = {number for number in ENDING if signal.getsignal(number) is not signal.SIG_IGN}
     # Writing shows that the reader of a pipe has closed it.
@@ -49,16 +49,16 @@ def end_on_signals() -> None:
 
 
 def launched_rank() -> int:
-    """Return the rank that the launcher gives this process, 0 without one; needs no MPI."""
+    """Return the rank of this process by the launcher's variables, without MPI; 0 without a launcher."""
     return int(next((os.environ[name] for name in RANK_VARIABLES if os.environ.get(name, "").isdecimal()), 0))
 
 
 def prepare() -> None:
-    """Call before anything is printed: characters that the locale lacks are escaped, and closed streams are silent."""
+    """Escape characters that the locale lacks, and replace closed standard streams, before any output."""
     for number in (0, 1, 2):
         try:
             os.fstat(number)
-        except OSError:  # the next file that is opened would take its place, and what is printed
+        except OSError:  # the next file that is opened would have this number, and receive the output
             os.open(os.devnull, os.O_RDWR)
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
@@ -69,7 +69,7 @@ def prepare() -> None:
 
 
 def say(text: str) -> None:
-    """Print a line beside the results.  If that fails, nothing more is printed, and standard error reports it once."""
+    """Print a line about the run; after a failure, report it once on standard error and print no more."""
     try:
         print_product(text)
     except FetiHomogError as error:
@@ -77,21 +77,21 @@ def say(text: str) -> None:
 
 
 def print_product(text: str) -> None:
-    """Print the product of a command.
+    """Print the product of a command, such as a table.
 
     Raises:
-        FetiHomogError: it cannot be written, and not because the reader left.
+        FetiHomogError: standard output cannot be written, except where the reader of a pipe has left.
     """
     try:
         print(escaped(text, KEPT), flush=True)
     except OSError as error:
-        with contextlib.suppress(OSError, ValueError):  # PETSc's output goes nowhere too, and Python's last
+        with contextlib.suppress(OSError, ValueError):  # later output of PETSc and Python is dropped, too
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        if not isinstance(error, BrokenPipeError):  # a reader that left, as `head` does, wants no more
+        if not isinstance(error, BrokenPipeError):  # a reader such as `head` has left
             raise FetiHomogError(f"standard output cannot be written: {error.strerror}") from error
 
 
 def complain(*lines: str) -> None:
-    """Print lines on standard error, if that can be written."""
+    """Print lines on standard error; a failure is ignored."""
     with contextlib.suppress(OSError):
         print(*(escaped(line, KEPT) for line in lines), sep="\n", file=sys.stderr, flush=True)
