@@ -19,7 +19,7 @@ from feti_homog.interface.friction import coulomb_faces, sliding_cell
 from feti_homog.interface.laws import BondLaw
 from feti_homog.interface.path import coulomb_leg, frictionless_leg, path_following, path_points
 from feti_homog.materials import voigt
-from feti_homog.results import checkpoints, landmarks, path_curves
+from feti_homog.results import landmarks, path_curves
 
 OF_FIBRES = ("debonded_length", "debonding_angle")  # lists of a point, kept where its fields are
 NAMED_FIBRES = 8  # most fibre names in a remark
@@ -101,7 +101,7 @@ def _points(
     for number in range(stored_events):
         event = context.checkpoint.read(number)
         point, before = path_events.restored(event, cell)
-        if number == stored_events - 1 and not checkpoints.has_multipliers(event):  # the path continues from this point
+        if number == stored_events - 1 and "lam" not in event:  # the path continues from this point
             point = path_events.found_again(point, cell)
         begin, responses = point.after, path_events.averages(event, point, context.loads)
         yield point, before, responses

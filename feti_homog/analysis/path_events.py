@@ -172,7 +172,7 @@ def read(context: AnalysisContext, number: int) -> tuple[checkpoints.Arrays, pat
     """Read an event and rebuild its path point; solve for missing multipliers.  Collective."""
     event, cell = context.checkpoint.read(number), context.loads.interfaces
     point, _ = restored(event, cell)
-    return event, point if checkpoints.has_multipliers(event) else found_again(point, cell)
+    return event, point if "lam" in event else found_again(point, cell)
 
 
 def resumable(context: AnalysisContext) -> int:

@@ -11,6 +11,7 @@ record shorter than its length, which does not count.
 
 import contextlib
 import json
+import os
 import re
 import struct
 import zlib
@@ -31,8 +32,6 @@ from feti_homog.typing import Intracomm
 FOLDER, DROPPED, NAME = "checkpoint", "checkpoint.dropped", "events"  # DROPPED is the folder name during its removal
 FORMAT = 12  # raise when the content of an event changes
 HEAD = re.compile(rb"feti-homog checkpoint, format (\d+)\n")
-# Formats up to 10 had one file for each event; the pattern matches them too, and their unfinished files.
-EVENT_FILE = re.compile(rf"{NAME}|\d{{6,}}\.h5(\..+\.\d+\.part)?")
 PREFIX = struct.Struct("<QII")
 # Bytes of events, after which further events have no multipliers.
 WHOLE_BYTES = 64 * 2**20
@@ -170,15 +169,8 @@ class Checkpoint(EventsInMemory):
         mpi_errors.on_root(self.comm, append)
 
     def _count_records(self) -> int:
-        if former := sorted(path.name for path in self.path.parent.glob("[0-9]*.h5")):
-            raise _other_format(self.path.parent / former[0], "10 or less")
         self._ends = [end for end, _ in records(self.path)] if self.path.is_file() else []
         return max(len(self._ends) - 1, 0)
-
-
-def has_multipliers(event: Arrays) -> bool:
-    """Return whether an event holds its multipliers."""
-    return "lam" in event
 
 
 def begin(signature: str) -> bytes:
@@ -202,15 +194,18 @@ def records(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
     """
     try:
         with path.open("rb") as stream:
-            place = stream.seek(start)
+            place, end = stream.seek(start), os.fstat(stream.fileno()).st_size
             if not place:
-                line, expected = stream.readline(), begin("").partition(b"\n")[0] + b"\n"
+                line, expected = stream.readline(64), begin("").partition(b"\n")[0] + b"\n"
                 if line != expected and expected.startswith(line):  # the first line is unfinished
                     return
                 if (match := HEAD.fullmatch(line)) is None:
                     raise CaseError(f"{path} is damaged: it does not begin as an event file")
                 if int(match[1]) != FORMAT:
-                    raise _other_format(path, int(match[1]))
+                    raise CaseError(
+                        f"{path} has the checkpoints' format {int(match[1])}, this program reads format {FORMAT}; "
+                        "go on with the program that wrote it, or start again without --resume"
+                    )
                 place = len(line)
             for number in count():
                 prefix = stream.read(PREFIX.size)
@@ -218,22 +213,15 @@ def records(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
                     return
                 size, checksum, of_both = PREFIX.unpack(prefix)
                 is_sound = of_both == zlib.crc32(b"%d %d" % (size, checksum))
-                content = stream.read(size) if is_sound else b""
-                if is_sound and len(content) < size:
+                if is_sound and place + PREFIX.size + size > end:
                     return
+                content = stream.read(size) if is_sound else b""
                 if not is_sound or zlib.crc32(content) != checksum:
                     raise CaseError(f"{path} is damaged: the checksum of record {number} is wrong")
                 place += PREFIX.size + size
                 yield place, content
     except OSError as error:
         raise CaseError(f"{path} is no readable event file: {error.strerror}") from error
-
-
-def _other_format(path: Path, number: int | str) -> CaseError:
-    return CaseError(
-        f"{path} has the checkpoints' format {number}, this program reads format {FORMAT}; "
-        "go on with the program that wrote it, or start again without --resume"
-    )
 
 
 def packed(event: Arrays) -> bytes:
@@ -243,12 +231,15 @@ def packed(event: Arrays) -> bytes:
 
 
 def unpacked(content: bytes) -> Arrays:
-    """Decompress the content of a record into an event."""
-    layout, _, data = zlib.decompress(content).partition(b"\n")
-    event, start = Arrays(), 0
-    for name, kind, shape in json.loads(layout):
-        event[name] = np.frombuffer(data, kind, int(np.prod(shape)), start).reshape(shape).copy()
-        start += event[name].nbytes
+    """Decompress the content of a record into an event, up to a size that no event has.  Raises CaseError."""
+    try:
+        data = zlib.decompressobj().decompress(content, max(8 * WHOLE_BYTES, 64 * len(content)))
+        event, start = Arrays(), data.index(b"\n", 0, 1 << 16) + 1
+        for name, kind, shape in json.loads(data[:start]):
+            event[name] = np.frombuffer(data, kind, int(np.prod(shape)), start).reshape(shape).copy()
+            start += event[name].nbytes
+    except (ArithmeticError, RecursionError, SyntaxError, TypeError, ValueError, zlib.error) as error:
+        raise CaseError(f"an event of the checkpoint is damaged: {error}") from error
     return event
 
 
@@ -265,7 +256,8 @@ def refuse_others(directory: Path) -> None:
             raise CaseError(
                 f"--out {directory}: {folder.name} is a {kind} there, and a run makes a folder of that name"
             )
-        foreign = [path.name for path in folder.iterdir() if not _is_event(path)] if folder.is_dir() else []
+        paths = list(folder.iterdir()) if folder.is_dir() else []
+        foreign = [path.name for path in paths if path.name != NAME or not path.is_file()]
         if foreign:
             raise CaseError(
                 f"--out {directory}: no run of this program wrote {folder.name}/{min(foreign)}, and a run removes "
@@ -291,10 +283,6 @@ def _remove_events(folder: Path) -> None:
     """Remove the events of a folder as far as possible; the next run removes the rest."""
     with contextlib.suppress(OSError):
         for path in folder.iterdir():
-            if _is_event(path):
+            if path.name == NAME:
                 path.unlink()
         folder.rmdir()
-
-
-def _is_event(path: Path) -> bool:
-    return EVENT_FILE.fullmatch(path.name) is not None and path.is_file()

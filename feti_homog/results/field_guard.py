@@ -1,4 +1,4 @@
-"""Check that result.h5 has no tables beyond its own bytes, before a table is read."""
+"""Check that result.h5 has no tables beyond its own bytes, nor of other sizes, before a table is read."""
 
 from pathlib import Path
 from typing import Any
@@ -6,11 +6,12 @@ from typing import Any
 import h5py
 
 from feti_homog.errors import CaseError
+from feti_homog.results.field_layout import FibrePart, InterfacePart, MeshPart, SpatialStatePart, StatePart, tables
 from feti_homog.system.runtime import input_files
 
 
 def require_own(path: Path) -> None:
-    """Refuse links other than hard links, and tables that are larger than the file or lie elsewhere.
+    """Refuse links other than hard links, tables that are larger than the file or lie elsewhere, and other layouts.
 
     Other links may lead to pipes, other files or back.  Raises CaseError; FetiHomogError for an unreadable file.
     """
@@ -32,5 +33,21 @@ def require_own(path: Path) -> None:
                         is_table = not entry.is_virtual or {s.file_name for s in entry.virtual_sources()} == {"."}
                     if not is_table or min(room.values()) < 0:
                         raise CaseError(f"{path}: no result: {group.name}/{name} is no table of numbers within it")
-    except (OSError, RuntimeError, KeyError) as error:
-        raise input_files.unreadable(path, error if isinstance(error, OSError) else OSError(str(error))) from error
+            _require_layout(path, file)
+    except (AttributeError, OSError, RuntimeError, KeyError) as error:
+        raise input_files.unreadable(path, error if isinstance(error, OSError) else OSError(error.args[0])) from error
+
+
+def _require_layout(path: Path, file: Any) -> None:
+    """Compare shapes and types with `field_layout`; rows are those of points, triangles and fibres in the file."""
+    counted = {"n": "mesh/points", "m": "mesh/triangles", "k": "interface/points", "f": "fibre/number"}
+    counts = {symbol: (*file[table].shape, 0)[0] for symbol, table in counted.items()}
+    states = [f"state/{number}" for number in range(len(file.get("state", ())))]
+    of_state = SpatialStatePart if any("axial_stress" in file[state] for state in states) else StatePart
+    parts = {"mesh": MeshPart, "fibre": FibrePart, "interface": InterfacePart, **dict.fromkeys(states, of_state)}
+    for group, part in parts.items():
+        for name, d in tables(part).items():
+            table, expected = file[f"{group}/{name}"], f"{d.dtype} ({counts[d.shape[1]]}{d.shape[2:]}"
+            shown = f"{table.dtype.newbyteorder('=')} {table.shape}"
+            if shown not in (expected, *(expected.replace("3 or 6", columns) for columns in "36")):
+                raise CaseError(f"cannot read {path}: /{group}/{name} is {shown}, expected {expected}")

@@ -33,11 +33,6 @@ class View:
     columns: Mapping[int, tuple[str, int | None]]
     meaning: str
 
-    @property
-    def words(self) -> str:
-        """Return the description for the file, which says that the view is virtual."""
-        return f"{self.meaning}; virtual"
-
     def path(self, group: str) -> str:
         """Return the path of the view in the file."""
         return f"{self.kind}/{group}/{self.name}"
@@ -100,7 +95,7 @@ def add_views(file: Any) -> None:
             target: Any = (slice(None), place) if view.components else slice(None)
             layout[target] = source if column is None else source[:, column]
         dataset = file.create_virtual_dataset(view.path(group), layout, np.zeros((), layout.dtype)[()])
-        dataset.attrs["meaning"] = view.words
+        dataset.attrs["meaning"] = f"{view.meaning}; virtual"
         dataset.attrs["unit"] = original.attrs["unit"]
 
 

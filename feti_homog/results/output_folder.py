@@ -105,7 +105,7 @@ def _is_own(path: Path) -> bool:
     if path.name == result_json.NAME:
         try:
             document = json.loads(input_files.read(path))
-        except ValueError:
+        except (ValueError, RecursionError):
             return False
         return isinstance(document, dict) and {"version", "case", "solver"} <= document.keys()
     with input_files.opened(path) as stream:
@@ -127,12 +127,15 @@ def latest(directory: Path) -> dict[str, Any]:
     records = checkpoints.records(path) if path.is_file() else ()
     first, *events = [content for _, content in records] or [b""]
     stored = result_json.read(directory) if not events or os.path.lexists(directory / result_json.NAME) else {}
-    opening = result_json.loads(first.decode().partition("\n")[2] or "{}")
-    if not events or (stored.get("digest") == opening["digest"] and len(stored.get("path", ())) >= len(events)):
-        return stored
-    points = [result_json.loads(str(checkpoints.unpacked(event)["point"])) for event in events]
-    opening["solver"]["iterations"] = [point["iterations"] for point in points]
-    place = f"unfinished, {len(points)} points up to load {max(point['load_factor'] for point in points):.4f}"
+    try:
+        opening = result_json.loads(first.decode().partition("\n")[2] or "{}")
+        if not events or (stored.get("digest") == opening["digest"] and len(stored.get("path", ())) >= len(events)):
+            return stored
+        points = [result_json.loads(str(checkpoints.unpacked(event)["point"])) for event in events]
+        opening["solver"]["iterations"] = [point["iterations"] for point in points]
+        place = f"unfinished, {len(points)} points up to load {max(point['load_factor'] for point in points):.4f}"
+    except (LookupError, TypeError, ValueError) as error:
+        raise CaseError(f"{path} is damaged: {error}") from error
     return opening | {"path": points, "status": place, "unfinished": place}
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from feti_homog.errors import CaseError
 from feti_homog.fem import AXIAL, PLANE, assembly
 from feti_homog.materials import voigt
-from feti_homog.results import atomic, field_file, xdmf
+from feti_homog.results import atomic, field_file, field_guard, xdmf
 from feti_homog.results.field_views import AXIAL as AXIAL_DISPLACEMENT
 from feti_homog.typing import Array, Float
 from feti_homog.verify import constitutive_law
@@ -59,14 +59,12 @@ def read_state(out: str | Path, number: int = 0) -> ViewedState:
         CaseError: result.h5 is missing or cannot be read, or has no such state.
     """
     path = Path(out) / field_file.NAME
-    try:
-        with h5py.File(path, "r", locking=False) as file:
-            count = len(file.get("state", ()))
-            if not 0 <= number < count:
-                raise CaseError(f"{path}: has no state {number}: its {count} states are numbered from 0")
-            return cell_state(file, number)
-    except (OSError, KeyError) as error:
-        raise CaseError(f"cannot read {path}: {error}") from error
+    field_guard.require_own(path)
+    with h5py.File(path, "r", locking=False) as file:
+        count = len(file.get("state", ()))
+        if not 0 <= number < count:
+            raise CaseError(f"{path}: has no state {number}: its {count} states are numbered from 0")
+        return cell_state(file, number)
 
 
 def cell_state(file: Any, state: int) -> ViewedState:
@@ -110,9 +108,8 @@ def interface_state(file: Any, state: int) -> ViewedState:
 
 
 def _tables(file: Any, state: int, places: Mapping[str, str]) -> dict[str, Array]:
-    """Read the existing tables of a state; files from earlier versions have fewer tables."""
-    existing = {name: place.replace("/K/", f"/{state}/") for name, place in places.items()}
-    return {name: file[place][()] for name, place in existing.items() if place in file}
+    """Read the tables of a state."""
+    return {name: file[place.replace("/K/", f"/{state}/")][()] for name, place in places.items()}
 
 
 FORMATS = ("vtu", "vtkhdf")
@@ -144,7 +141,7 @@ def write_vtk(directory: Path, kind: str) -> list[Path]:
                 continue
             collection = ET.Element("VTKFile", type="Collection", version="0.1")
             listed = ET.SubElement(collection, "Collection")
-            for number in range(len(file["state"])):
+            for number in range(len(file.get("state", ()))):
                 path = directory / f"{name}_{number:04d}.vtu"
                 paths.append(atomic.replace(path, ET.ElementTree(_grid(read(file, number))).write))
                 ET.SubElement(listed, "DataSet", timestep=str(number), file=path.name)
@@ -180,7 +177,7 @@ def _grid(state: ViewedState) -> ET.Element:
 
 def _write_vtkhdf(read: Any, file: Any, path: Path) -> None:
     """Write a .vtkhdf file: the common mesh, and the fields of each state."""
-    count = len(file["state"])
+    count = len(file.get("state", ()))
     with h5py.File(path, "w") as out:
         root = out.create_group("VTKHDF")
         root.attrs["Version"] = np.array([2, 0])

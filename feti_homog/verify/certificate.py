@@ -1,4 +1,4 @@
-"""The certificate: all laws on the files of a result folder, as text and as JSON."""
+"""The certificate: all laws on the files of a result folder, in a separate process, as text and as JSON."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,10 +16,11 @@ from feti_homog.verify.check_path import check_breaks, check_envelope, check_str
 from feti_homog.verify.check_phases import check_phases
 from feti_homog.verify.check_sensitivities import check_sensitivities
 from feti_homog.verify.check_state import check_bonds, check_gluing, check_state
+from feti_homog.verify.constitutive_law import rounding
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Finding, Findings, checks, unchecked
 from feti_homog.verify.path_energies import check_heat, check_losses, check_stored
-from feti_homog.verify.reading import COATING, altered, opened
+from feti_homog.verify.reading import COATING, FIELDS, JSON, opened
 
 # Exceptions that numbers with an unexpected kind or shape cause.
 DAMAGE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, MemoryError, RecursionError)
@@ -61,7 +62,9 @@ class Certificate:
 
 def verify(directory: Path) -> Certificate:
     """Check all laws on a result folder; raise CaseError, one line, if a file is unreadable."""
-    return input_files.in_own_process(directory, _verified) if altered(directory) else _verified(directory)
+    # Damaged numbers may ask for any memory and time: the limits are five times the need of results of 3 to 5 MB.
+    size = sum(path.stat().st_size for path in (directory / JSON, directory / FIELDS) if path.is_file())
+    return input_files.in_own_process(directory, _verified, input_files.PATIENCE + size / 1e5, (1 << 30) + 32 * size)
 
 
 def _verified(directory: Path) -> Certificate:
@@ -87,7 +90,8 @@ def _verified(directory: Path) -> Certificate:
 def checks_of(cell: DiscreteCell) -> list[Finding]:
     """List the laws with their limits for a result."""
     case, rtol = cell.files.case, float(cell.files.document["solver"].hint("rtol"))
-    return checks(rtol, case["cell"]["geometry"] == "mesh", COATING in case["material"], cell.elements.contrasts)
+    phases = *cell.elements.contrasts, *rounding(case, cell.files.phases, cell.stiffnesses)
+    return checks(rtol, case["cell"]["geometry"] == "mesh", COATING in case["material"], phases)
 
 
 def laws_of_fields(findings: Findings, cell: DiscreteCell) -> list[StateNumbers]:

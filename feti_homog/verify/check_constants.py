@@ -101,7 +101,9 @@ def constants_of(C: Float, heat: Float | None) -> dict[str, float]:
 
     Strains eps under a unit stress along x_i give E_i = 1 / eps_i, nu_ij = -eps_j / eps_i, eta_i = gamma_12 / eps_i.
     """
-    S, n, voigt = np.linalg.inv(C), len(C), VOIGT[len(C)]
+    # By way of unit diagonals, beside which stiff directions do not round others off.
+    n, voigt, sizes = len(C), VOIGT[len(C)], np.sqrt(np.outer(C.diagonal(), C.diagonal()))
+    S = np.linalg.inv(C / sizes) / sizes
     pairs, shears = [(0, 1), (1, 0)], {"G12": 2}
     if n == 6:
         pairs, shears = [(0, 1), (0, 2), (1, 2)], {"G23": 3, "G13": 4, "G12": 5}
@@ -116,8 +118,9 @@ def constants_of(C: Float, heat: Float | None) -> dict[str, float]:
         table["anisotropy"] = _distance(C, nearest)
     else:
         # The mean over five turns about x3 is exact: entries of the turned tensor have at most four waves in a turn.
-        mean = np.mean([turned(C, angle) for angle in np.arange(5) * 72.0], axis=0)
-        M, angle = np.linalg.inv(mean), np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+        mean = np.mean([turned((C + C.T) / 2, angle) for angle in np.arange(5) * 72.0], axis=0)
+        sizes = np.sqrt(np.outer(mean.diagonal(), mean.diagonal()))
+        M, angle = np.linalg.inv(mean / sizes) / sizes, np.pi * np.arange(DIRECTIONS) / DIRECTIONS
         table |= {
             "E_axial": 1 / M[2, 2], "E_transverse": 1 / M[0, 0], "nu_transverse": -M[0, 1] / M[0, 0],
             "nu_axial": -M[0, 2] / M[2, 2], "G_axial": 1 / M[4, 4], "G_transverse": 1 / M[5, 5],

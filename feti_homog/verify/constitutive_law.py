@@ -46,8 +46,8 @@ def laws(case: Mapping[str, Any], phases: Sequence[str]) -> tuple[Float, Float]:
 def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
     """Return whether quadratic elements of phases (phases,) have a bubble and a pressure.
 
-    Elements of isotropic phases do, except in plane stress and in cases of older versions with `element`.  In an
-    isotropic phase one modulus and one ratio give all constants, up to rounding.  Raises as `laws`.
+    Elements of isotropic phases do, except in plane stress.  In an isotropic phase one modulus and one ratio give all
+    constants, up to rounding.  Raises as `laws`.
     """
     mixed = []
     for constants in (phase_constants(case, phase) for phase in phases):
@@ -57,8 +57,14 @@ def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
             isotropic = {"young": constants["E_transverse"], "poisson": -compliance[0, 1] / compliance[0, 0]}
             is_isotropic = np.allclose(compliance, _compliance(isotropic), rtol=ROUNDING, atol=0)
         mixed.append(is_isotropic)
-    has_mixed = case["cell"].get("element", "mixed") == "mixed" and case["analysis"]["plane"] != "stress"
-    return np.asarray(np.array(mixed, bool) & has_mixed)
+    return np.asarray(np.array(mixed, bool) & (case["analysis"]["plane"] != "stress"))
+
+
+def rounding(case: Mapping[str, Any], phases: Sequence[str], stiffnesses: Float) -> tuple[float, float]:
+    """Return n eps times the largest condition of a compliance, and times the contrast of the stiffnesses."""
+    conditions = [np.linalg.cond(_compliance(phase_constants(case, phase))) for phase in phases]
+    sizes, lost = np.abs(stiffnesses).max(axis=(1, 2)), 6 * np.finfo(float).eps
+    return float(lost * max(conditions)), float(lost * sizes.max() / sizes.min())
 
 
 def out_of_plane(case: Mapping[str, Any], phases: Sequence[str]) -> Float:

@@ -118,18 +118,19 @@ def solver_limit(rtol: float) -> float:
     return min(CHECK_PER_RTOL * rtol, LARGEST_CHECK)
 
 
-def checks(rtol: float, users_mesh: bool, has_coatings: bool, mixed: tuple[float, float] = (0.0, 0.0)) -> list[Finding]:
+def checks(rtol: float, users_mesh: bool, has_coatings: bool, phases: Sequence[float] = (0, 0, 0, 0)) -> list[Finding]:
     """List the laws with their limits and without violations, for a tolerance `rtol` of the dual problems.
 
-    `mixed` is as `Elements.contrasts`.
+    `phases` has both numbers of `Elements.contrasts`, then both of `constitutive_law.rounding`.
     """
-    ratio, contrast = mixed[0] / LARGE_RATIO, mixed[1]
+    ratio, contrast, of_law, of_contrast = phases[0] / LARGE_RATIO, *phases[1:]
     # Factors by which limits grow with nearly incompressible phases.
     loss, balance_loss = max(1.0, ratio), max(1.0, min(ratio, contrast / LARGE_CONTRAST))
-    pressure_loss = max(1.0, min(PRESSURE * ratio, contrast / LARGE_OF_PRESSURE))
-    sums, balance, rounding = 1e-10 * loss, 1e-10 * balance_loss, max(COATINGS * has_coatings, BODIES * loss)
+    law = max(1e-13, 1e-13 * min(PRESSURE * ratio, contrast / LARGE_OF_PRESSURE), of_law)
+    sums, balance = max(1e-10 * loss, of_law), 1e-10 * balance_loss
+    rounding = max(COATINGS * has_coatings, BODIES * loss)
     shape, solver = USERS_MESH if users_mesh else ROUNDING, solver_limit(rtol)
-    contact = min(max(CONTACT_PER_RTOL * rtol, KKT), LARGEST_CHECK)
+    contact, work = min(max(CONTACT_PER_RTOL * rtol, KKT), LARGEST_CHECK), max(solver, of_contrast)
     rows = (
         ("files", "the files are unchanged since the run, by their checksums", 0.0),
         ("status", "the status follows from the checks, tolerances from rtol", 1e-9),
@@ -137,7 +138,7 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool, mixed: tuple[float
         ("mesh", "elements have positive areas and fill the cell; torn sides meet in pairs", shape),
         ("interface", "interface nodes are where one fibre meets the matrix, with its normals and lengths", shape),
         ("arcs", "the initially debonded nodes are those of the case, in numbers of nodes", 0.0),
-        ("stress", "stresses of the elements follow from u and the case's materials", 1e-13 * pressure_loss),
+        ("stress", "stresses of the elements follow from u and the case's materials", law),
         ("stress 33", "stresses out of the plane follow from those in it and the case's materials", 1e-13),
         ("phases", "largest stresses of the phases follow from u, relative to the largest", 1e-7),
         ("mesh error", "errors of the elements add up to those of averaged stresses, by a factor less 1", 1.5),
@@ -153,12 +154,12 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool, mixed: tuple[float
         ("sliding", "friction opposes the slip of sliding faces, relative to the largest traction", contact),
         ("mean stress", "the mean of the stresses is the state's, relative to the largest component", balance),
         ("mean strain", "the mean of the strains is E and the opening of the faces, relative to E", solver),
-        ("Hill", "mean of stress : strain = mean stress : E less the interface's work, relative to it", solver),
+        ("Hill", "mean of stress : strain = mean stress : E less the interface's work, relative to it", work),
         ("load", "the states have the strains and temperatures that the case asks for, relative to the largest", 1e-12),
         ("stress load", "the states have the stresses that the case asks for, relative to the largest", solver),
         ("tables", "points and columns in result.json are the states in result.h5, relative to the largest", 1e-12),
         ("rates", "release rates at tips of arcs agree with their modes, and tips with the mesh, relative to G", 1e-9),
-        ("symmetry", "stiffnesses of bonded or free faces are symmetric, relative to the largest entry", solver),
+        ("symmetry", "stiffnesses of bonded or free faces are symmetric, relative to the largest entry", work),
         ("breaks", "bonds break as the points report and never heal, in numbers of bonds", 0.0),
         ("strength", "bonds that hold are within their strength, those that break are at it", STRENGTH),
         ("onset", "the load of every direction of an envelope is that at which the first bond breaks", 1e-9),

@@ -168,17 +168,13 @@ class ResultFiles:
     def states(self) -> Iterator[State]:
         """Yield the states in ascending order, with one state in memory at a time."""
         n, m, k = len(self.mesh.points), len(self.mesh.triangles), len(self.interface.points)
-        shapes = {"displacement": (n, 2), "stress": (m, 3), "stress_33": (m,), "traction": (k, 2), "jump": (k, 2)}
+        shapes = {"displacement": (n, 2), "stress": (m, 3), "stress_33": (m,), "mesh_error": (m,)}
+        shapes |= {"traction": (k, 2), "jump": (k, 2), "status": (k,), "damage": (k,), "sliding": (k,)}
         for number in sorted(map(int, self.file.get("state", ()))):
             with _reading(Path(self.file.filename)):
                 group = f"state/{number}"
                 attributes, table = self.file[group].attrs, partial(_table, self.file, group)
-                status = table("status", (k,))
-                # Results of older versions lack damage, sliding and mesh errors.
-                defaults = {"damage": np.where(status != Status.BONDED, 1.0, 0.0), "sliding": np.zeros(k, int)}
-                defaults["mesh_error"] = np.full(m, np.nan)
-                arrays = {name: table(name, value.shape, value) for name, value in defaults.items()}
-                arrays |= {name: table(name, shape) for name, shape in shapes.items()}
+                arrays = {name: table(name, shape) for name, shape in shapes.items()}
                 if self.is_spatial:
                     for name, rows in (("displacement", n), ("traction", k), ("jump", k)):
                         arrays[name] = np.column_stack([arrays[name], table(f"axial_{name}", (rows,))])
@@ -192,7 +188,7 @@ class ResultFiles:
                 factor, point = float(attributes["load_factor"]), int(attributes["point"])
                 x = self.mesh.points - self.mesh.points.min(axis=0)
                 arrays["fluctuation"] = arrays["displacement"] - x @ gradient(strain).T
-                state = State(name, strain, mean, factor, point, status=status, temperature=temperature, **arrays)
+                state = State(name, strain, mean, factor, point, temperature=temperature, **arrays)
             yield state
 
 
@@ -233,12 +229,9 @@ def opened(directory: Path) -> Iterator[ResultFiles]:
                 return [_table(file, group, name, shape) for name, shape in shapes.items()]
 
             mesh = Mesh(*tables("mesh", points=(n, 2), triangles=(m, columns), subdomain=(m,), phase=(m,), body=(m,)))
-            rows = tables("interface", points=(k, 2), normal=(k, 2), length=(k,), fibre_number=(k,), fibre=(k,))
-            # Results of older versions have one section [interface], and equal strengths.
-            rows.append(_table(file, "interface", "pair", (k,), np.zeros(k, np.int32)))
-            interface = InterfaceRows(*rows)
-            fibres = tables("fibre", body=(f,), centre=(f, 2), radius=(f,))
-            fibres.append(_table(file, "fibre", "strength", (f,), np.ones(f)))
+            numbers = dict.fromkeys(("length", "fibre_number", "fibre", "pair"), (k,))
+            interface = InterfaceRows(*tables("interface", points=(k, 2), normal=(k, 2), **numbers))
+            fibres = tables("fibre", body=(f,), centre=(f, 2), radius=(f,), strength=(f,))
             size = np.array([file.attrs["width"], file.attrs["height"]], float)
             phases = tuple(map(str, file.attrs["phases"]))
             document = Section(_document(directory / JSON))
@@ -268,10 +261,8 @@ def _document(path: Path) -> Mapping[str, Any]:
     return document
 
 
-def _table(file: h5py.File, group: str, name: str, shape: tuple[int, ...], default: Any = None) -> Any:
-    """Read a table with a `shape`; return the default, unless None, if the table is missing."""
-    if default is not None and name not in file[group]:
-        return default
+def _table(file: h5py.File, group: str, name: str, shape: tuple[int, ...]) -> Any:
+    """Read a table with a `shape`."""
     array = np.asarray(file[f"{group}/{name}"][()])
     _expect(array.shape == shape, f"/{group}/{name} has shape {array.shape}, expected {shape}")
     return array

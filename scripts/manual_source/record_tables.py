@@ -92,7 +92,7 @@ def _items_of(part: type, group: str, views: Iterable[View]) -> Iterator[Item]:
     for view in views:
         d = descriptions(part)[view.source]
         shape = f"({rows_of(d)}, {view.components})" if view.components else f"({rows_of(d)},)"
-        yield Item(f"/{view.path(group)}", "dataset", shape, d.dtype, d.unit, view.words)
+        yield Item(f"/{view.path(group)}", "dataset", shape, d.dtype, d.unit, f"{view.meaning}; virtual")
 
 
 def _type_words(hint: Any, description: Description) -> str:

@@ -35,7 +35,7 @@ def prepare(folder: Path) -> None:
     for name, (command, case) in results.PREPARED.items():
         (folder / f"{name}.toml").write_text(case)
         job = mpirun(0, "-m", "feti_homog", command, folder / f"{name}.toml", "--out", folder / name)
-        assert job.returncode == 0, job.stderr
+        assert job.returncode == (3 if name == "unfinished" else 0), job.stderr
 
 
 def tried(folder: Path, only: str) -> dict[str, list[str]]:

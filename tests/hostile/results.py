@@ -2,16 +2,18 @@
 
 import json
 import os
+import zlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import h5py
+import numpy as np
 from support.base_case import changed
 from support.small_path import PATH
 
-from feti_homog.results import result_json
+from feti_homog.results import checkpoints, result_json
 from hostile.attempts import Attempt, Content, copy_of
 
 SMALL = changed(
@@ -19,6 +21,7 @@ SMALL = changed(
 )
 PREPARED = {
     "path": ("run", PATH),
+    "unfinished": ("run", PATH.replace("[path]\n", "[path]\nmax_events = 3\n")),
     "card": ("run", SMALL),
     "sweep": ("sweep", SMALL + '[sweep]\n"cell.fibre_fraction" = [0.2, 0.3]\n'),
 }
@@ -78,6 +81,10 @@ def in_case(**sections: Any) -> Callable[[Path], None]:
     return sealed(lambda document: document["case"].update(sections))
 
 
+def nested(depth: int) -> str:
+    return f'{{"schema": 1, "version": "", "solver": {{}}, "case": {"[" * depth}{"]" * depth}}}'
+
+
 JSON: dict[str, tuple[Content, str]] = {
     "a pipe": (replaced(os.mkfifo), "it is a pipe"),
     "a folder": (replaced(os.mkdir), "Is a directory"),
@@ -88,6 +95,8 @@ JSON: dict[str, tuple[Content, str]] = {
     "zeros": (b"\0" * 1000, "cannot read"),
     "not UTF-8": (b"\xff" * 1000, "cannot read"),
     "nested": ("[" * 100_000, "cannot read"),
+    "nested a thousand deep": (nested(1000), "cannot read"),
+    "nested 900 deep": (nested(900), ""),
     "a number of a megabyte": ("1" * 1_000_000, "cannot read"),
     "a list": ("[]", ""),
     "another layout": (with_entries(schema=[]), "schema"),
@@ -158,6 +167,49 @@ TABLES: dict[str, Callable[[Path], None]] = {
     "2000 hard links": with_tables(lambda f: [f.__setitem__(f"state/x{k}", f["state/0"]) for k in range(2000)]),
     "texts": in_place(STRESS, lambda f, name: f.create_dataset(name, (9, 3), h5py.string_dtype())),
 }
+
+
+def tables_with(name: str, value: Any) -> Callable[[Path], None]:
+    """Return a function that replaces a table, or its last number."""
+
+    def change(file: h5py.File) -> None:
+        if isinstance(value, np.ndarray):
+            del file[name]
+            file[name] = value
+        else:
+            file[name][(-1,) * file[name].ndim] = value
+
+    return with_tables(change)
+
+
+LAYOUT: dict[str, tuple[Callable[[Path], None], str]] = {
+    "a scalar": (tables_with("mesh/points", np.array(0.0)), "/mesh/points is float64 (), expected float64 (0, 2)"),
+    "another shape": (tables_with(STRESS, np.zeros((9, 3))), "/state/0/stress is float64 (9, 3), expected float64 ("),
+    "another type": (tables_with("mesh/phase", np.zeros(9)), "/mesh/phase is float64 (9,), expected int32 ("),
+    "half a precision": (tables_with("fibre/radius", np.zeros(1, "f2")), "/fibre/radius is float16 (1,), expected"),
+    "no state 0": (with_tables(lambda f: f.move("state/0", "state/x")), "cannot read"),
+}
+
+
+def in_events(change: Callable[[list[checkpoints.Arrays]], Any]) -> Callable[[Path], None]:
+    """Return a function that changes the events of a checkpoint, or returns others, and renews their checksums."""
+
+    def make(path: Path) -> None:
+        signature, *contents = [content for _, content in checkpoints.records(path)]
+        events = [checkpoints.unpacked(content) for content in contents]
+        events = change(events) or events
+        contents = [event if isinstance(event, bytes) else checkpoints.packed(event) for event in events]
+        path.write_bytes(checkpoints.begin(signature.decode()) + b"".join(map(checkpoints.record, contents)))
+
+    return make
+
+
+EVENTS: dict[str, Callable[[Path], None]] = {
+    "a gigabyte of zeros": in_events(lambda events: [*events, zlib.compress(bytes(1 << 30), 1)]),
+    "zeros": in_events(lambda events: [*events, zlib.compress(bytes(1000))]),
+    "no compression": in_events(lambda events: [*events, b"[]"]),
+    "an array of objects": in_events(lambda events: [*events, zlib.compress(b'[["a", "O", [1]]]\n12345678')]),
+}
 SWEEPS: dict[str, tuple[Content, str]] = {
     "a pipe": (replaced(os.mkfifo), "it is a pipe"),
     "endless": (link_to("/dev/zero"), "it is a device, not a file"),
@@ -172,16 +224,31 @@ SWEEPS: dict[str, tuple[Content, str]] = {
 HARMLESS = ("no path", "a status of control characters")  # commands that do not need it go on
 OUTS: dict[str, tuple[str, Mapping[str, Content], str]] = {
     "a pipe": ("@/out", {"out": os.mkfifo}, "is a file"),
+    "a nested result": ("@/out", {"out/result.json": nested(1000)}, "no run of this program wrote result.json"),
     "of the system": ("/proc/1", {}, ""),
     "a lock elsewhere": ("@/out", {"mine": "mine", "out/result.lock": link_to("../mine")}, "result.lock is a link"),
     "a checkpoint elsewhere": ("@/out", {"out/checkpoint": link_to("/etc")}, "checkpoint is a link"),
 }
 
 
+def of_layout_and_events(prepared: Path) -> Iterator[Attempt]:
+    """Yield attempts on tables and events of right checksums."""
+    for name, (make, expected) in LAYOUT.items():
+        for command in ("plot", "verify", "fields"):
+            files = {"out": copy_of(prepared / "path", result_h5=make)}
+            yield Attempt("layout of fields", f"{name}, {command}", (command, "@/out"), expected, files, (2,))
+    resume, plot = ("run", "@/c.toml", "--out", "@/out", "--resume"), COMMANDS["plot"]
+    for command, words in (("resume", resume), ("plot", plot)):
+        for name, make in EVENTS.items():
+            changes = {"checkpoint/events": make, "result_json": os.unlink}
+            files = {"c.toml": PREPARED["unfinished"][1], "out": copy_of(prepared / "unfinished", **changes)}
+            yield Attempt("checkpoints", f"{name}, {command}", words, "checkpoint", files, (2,))
+
+
 def attempts(prepared: Path) -> Iterator[Attempt]:
     """Yield those that damage copies of the `PREPARED` folders."""
     for name, (content, expected) in JSON.items():
-        for command in READERS if name in ("a pipe", "endless", "a link in a circle", "nested") else COMMANDS:
+        for command in READERS if name in ("a pipe", "endless", "a link in a circle") or "nested" in name else COMMANDS:
             if command == "collect":
                 continue
             files = {"out": copy_of(prepared / "path", result_json=content)}
@@ -195,6 +262,7 @@ def attempts(prepared: Path) -> Iterator[Attempt]:
         for command in ("plot", "report", "verify", "fields"):
             files = {"pipe": os.mkfifo, "out": copy_of(prepared / "path", result_h5=make)}
             yield Attempt("tables of fields", f"{name}, {command}", (command, "@/out"), NO_RESULT, files, (2,))
+    yield from of_layout_and_events(prepared)
     files = {"out": copy_of(prepared / "path", path_csv=link_to("/dev/zero"))}
     yield Attempt("tables of points", "endless, which is none", COMMANDS["verify"], "", files, (0,))
     for name, (content, expected) in SWEEPS.items():

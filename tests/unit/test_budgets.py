@@ -32,9 +32,9 @@ LINES = {
     "schema": 430,
     "studies": 2950,
     "system": 1770,
-    "verify": 3100 + 160,
+    "verify": 3100 + 165,
 }
-FILES, TOTAL = 310, 45000 + 280
+FILES, TOTAL = 310, 45000 + 290
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.0, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

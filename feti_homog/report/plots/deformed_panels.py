@@ -20,7 +20,7 @@ from PIL import Image
 from feti_homog.errors import FetiHomogError
 from feti_homog.report.plots import decimation, drawn_cell, plot_helpers
 from feti_homog.report.text.summary import reported
-from feti_homog.results import atomic, field_file, landmarks
+from feti_homog.results import atomic, field_file, field_guard, landmarks
 from feti_homog.typing import Array, Document
 
 MAX_PANELS = 6
@@ -119,7 +119,7 @@ def draw_state(
     Raises:
         FetiHomogError: result.h5 cannot be read, or has no such state.
     """
-    path = Path(out) / field_file.NAME
+    field_guard.require_own(path := Path(out) / field_file.NAME)
     try:
         with h5py.File(path, "r") as file:
             cell = DeformedCell.of_states(file, [number], {"case": {"output": {"stress": stress}}}, scale, 60_000)

@@ -215,15 +215,6 @@ def test_a_falsified_copy_breaks_its_laws(results, tmp_path, name):
     assert broken(falsified(results(kind), tmp_path / "copy", edit)) == laws | {"files"}
 
 
-def test_a_file_from_before_there_were_pairs_is_verified(results, tmp_path):
-    """There was one section [[interface]] then."""
-
-    def edit(_, file):
-        del file["interface/pair"]
-
-    assert broken(falsified(results("path"), tmp_path / "copy", edit)) == {"files"}
-
-
 def test_an_element_without_area_is_noticed(results, tmp_path):
     def edit(_, file):
         file["mesh/triangles"][5] = file["mesh/triangles"][5][[0, 0, 0, 0, 0, 0]]
