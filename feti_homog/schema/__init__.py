@@ -1,8 +1,8 @@
 """Key tables: value types, tables read with all their faults, fault wording.
 
-Imports nothing.  Main entries: `types`, types each with words and a test; `keys.key`, `keys.TableReader`.
+Imports nothing.  Main entries: `limits`; `types`, types each with words and a test; `keys.key`, `keys.TableReader`.
 """
 
 from feti_homog.schema.keys import TableReader, key
 
-__all__ = ["TableReader", "key", "keys", "types", "wording"]
+__all__ = ["TableReader", "key", "keys", "limits", "types", "wording"]

@@ -6,9 +6,11 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
+from feti_homog.errors import MOST_FAULTS
 from feti_homog.schema.types import INF, ValueType
 from feti_homog.schema.wording import suggestion, toml_key, toml_value
 
@@ -116,6 +118,7 @@ def key(
     return dataclasses.field(default=None if required and conditions else default, metadata={"key": entry})
 
 
+@cache
 def keys_of(table_class: type[Any]) -> dict[str, Key]:
     """Return the keys of a table class by name; derived fields are left out."""
     return {each.name: each.metadata["key"] for each in dataclasses.fields(table_class) if "key" in each.metadata}
@@ -145,7 +148,8 @@ class TableReader:
             return None
         keys, before = keys_of(table_class), len(self.faults)
         faults = {
-            name: f" = {toml_value(table[name])}: unknown key; {suggestion(name, keys, self.owners)}"
+            name: f" = {toml_value(table[name])}: unknown key; "
+            + (suggestion(name, keys, self.owners) if before < MOST_FAULTS else "")  # slow, and not to be seen
             for name in table
             if name not in keys
         }

@@ -26,9 +26,9 @@ CELLS = {
 }
 UNKNOWN = "material.fibre.young = {start = 70.0, lower = 10.0, upper = 200.0}\n"
 FILES: dict[str, tuple[Content, str]] = {
-    "endless": (lambda path: path.symlink_to("/dev/zero"), "more than 16 MiB"),
+    "endless": (lambda path: path.symlink_to("/dev/zero"), "more than 4 MiB"),
     "a link in a circle": (lambda path: path.symlink_to(path), "Too many levels of symbolic links"),
-    "sparse": (lambda path: os.truncate(os.open(path, os.O_CREAT | os.O_RDWR), 20 << 30), "more than 16 MiB"),
+    "sparse": (lambda path: os.truncate(os.open(path, os.O_CREAT | os.O_RDWR), 20 << 30), "more than 4 MiB"),
     "colours": ("[cell]\n\x1b[31m = 1\n", "not TOML"),
     "colours of a key": (changed(("young = 88.0", '"\\u001b[31m" = 88.0')), r"\u001b[31m"),
     "colours of a name": (changed(('"strain"', '"\\u001b[31m"')), r"\u001b[31m"),
@@ -49,6 +49,13 @@ FILES: dict[str, tuple[Content, str]] = {
     ),
     "a bad range of 1e4 cases": (
         BASE + '[sweep]\n"cell.fibre_fraction" = {from = 1.0, to = 2.0, step = 1e-4}\n',
+        "more faults",
+    ),
+    "1e5 interfaces": (BASE + "[[interface]]\nx = 1\n" * 100_000, "100000 sections; expected at most 1000"),
+    "1e5 arcs": (BASE + f"[interface]\ndebonded = [{'{fibre = 1}, ' * 100_000}]\n", "at most 10000 of them"),
+    "2e4 cases": (BASE + '[sweep]\n"cell.fibre_fraction" = [' + "'a', " * 20_000 + "]\n", "expected at most 10000"),
+    "1e6 unknown keys": (
+        BASE + "".join(f"[path.x{k}]\n" + "".join(f"y{n}=1\n" for n in range(100)) for k in range(5000)),
         "more faults",
     ),
     "1e5 waypoints": (changed(SMALL, PATH, end=f"[path]\nwaypoints = [{'[1, 0, 0], ' * 100_000}]\n"), "at most 10000"),
