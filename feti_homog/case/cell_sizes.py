@@ -224,7 +224,8 @@ def mix_faults(cell: Cell) -> list[str]:
         return faults
     expected_counts = _expected_counts(cell)
     if (count := fsum(expected_counts.values())) > limits.FIBRES:
-        return [f"{given}: makes {count:.2g} fibres; expected at most {limits.FIBRES}, of larger radii or a smaller cell"]
+        words = f"expected at most {limits.FIBRES}, of larger radii or a smaller cell"
+        return [f"{given}: makes {count:.2g} fibres; {words}"]
     return [
         f"{given}: makes {expected:.2g} fibres of {phase}; expected at least 0.5, of more fibres or a wider cell"
         for phase, expected in expected_counts.items()

@@ -55,7 +55,7 @@ class Scatter:
     )
 
 
-ARCS = types.list_of(types.table_of(Arc, ""), "a list of arcs {fibre, centre, angle}", most=limits.ARCS)
+ARCS = types.list_of(types.table_of(Arc, ""), "a list of arcs {fibre, centre, angle}", most=limits.ROWS)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -64,7 +64,7 @@ WAYPOINTS = types.list_of(
     types.either("", kinds.STRAIN, LOAD),
     f"a list of strains {kinds.STRAIN_COMPONENTS} or of tables such as {{S11 = 60.0}}",
     least=1,
-    most=limits.WAYPOINTS,
+    most=limits.ROWS,
 )
 
 

@@ -94,8 +94,8 @@ def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[I
     tables = interface_tables(document)
     if document.get("interface") == []:
         reader.faults.append("interface = []: expected a section [interface]")
-    elif len(tables) > limits.INTERFACES:
-        reader.faults.append(f"[[interface]]: {len(tables)} sections; expected at most {limits.INTERFACES}")
+    elif len(tables) > limits.SECTIONS:
+        reader.faults.append(f"[[interface]]: {len(tables)} sections; expected at most {limits.SECTIONS}")
         return None
     labels = [interface_label(n, len(tables)) for n in range(len(tables))]
     interfaces: list[InterfaceSection] = []

@@ -41,7 +41,7 @@ RANGE_KEYS = {
     "to": keys.Key(types.real(), "Last value.", required=True),
     "step": keys.Key(types.real(above=0.0), "Distance of the values, at most to - from; of linear ranges."),
     "count": keys.Key(
-        types.integer(least=2, most=limits.CASES),
+        types.integer(least=2, most=limits.ROWS),
         "Number of values, both ends included. Without step and count, samples in [sweep] gives the number.",
     ),
     "scale": keys.Key(
@@ -62,7 +62,7 @@ class SweepSection:
         default="grid",
     )
     samples: int | None = key(
-        types.integer(least=1, most=limits.CASES),
+        types.integer(least=1, most=limits.ROWS),
         "Number of points in the box of the ranges that have neither step nor count.",
         default=None,
     )
@@ -71,7 +71,7 @@ class SweepSection:
     )
     seed: int = key(SEED, "Seed of the samples.", default=0)
     realisations: int | None = key(
-        types.integer(least=1, most=limits.CASES),
+        types.integer(least=1, most=limits.ROWS),
         "Arrangements of each point with a random cell; the k-th has the seed [cell] seed + k - 1 at all points.",
         default=None,
     )

@@ -127,8 +127,8 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
             lines.append((number, contents))
     if not lines:
         raise CaseError(*faults.lines, f"{name}: no rows; expected a line of names such as x, y, radius, then fibres")
-    if len(lines) > limits.ROWS:
-        raise CaseError(f"{name}: {len(lines)} lines; expected at most {limits.ROWS}")
+    if len(lines) > 2 * limits.FIBRES:
+        raise CaseError(f"{name}: {len(lines)} lines; expected at most {2 * limits.FIBRES}")
     delimiter = table_columns.delimiter_of(lines[0][1])
     head = [table_columns.cells_of(line, delimiter) for _, line in lines[:2]]
     words = head[0] if columns is None else list(columns)

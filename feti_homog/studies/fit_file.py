@@ -92,8 +92,8 @@ class FitReader:
             )
             return [], []
         rows = [{sections.MEASURED: measured}] if tests is None else tests
-        if not isinstance(rows, list) or len(rows) > limits.TESTS or not all(isinstance(row, dict) for row in rows):
-            words = f"expected sections [[{sections.TEST}]], at most {limits.TESTS}"
+        if not isinstance(rows, list) or len(rows) > limits.SECTIONS or not all(isinstance(row, dict) for row in rows):
+            words = f"expected sections [[{sections.TEST}]], at most {limits.SECTIONS}"
             self.faults.append(f"{sections.TEST} = {wording.toml_value(rows)}: {words}")
             return [], []
         assignments, data = list[Assignment](), list[Datum]()
@@ -163,8 +163,8 @@ def _curve_rows(path: Path) -> tuple[tuple[str, str], list[tuple[float, float]]]
     strains, stresses = ([k for k, head in enumerate(heads) if head in kind] for kind in names)
     if (len(strains), len(stresses)) != (1, 1):
         raise CaseError(f"{path}: expected one column of a strain, as E11, and one of a stress, as S11")
-    if not 1 < len(lines) <= limits.POINTS + 1:
-        raise CaseError(f"{path}: {len(lines) - 1} rows; expected at least one and at most {limits.POINTS}")
+    if not 1 < len(lines) <= limits.ROWS + 1:
+        raise CaseError(f"{path}: {len(lines) - 1} rows; expected at least one and at most {limits.ROWS}")
     rows = list[tuple[float, float]]()
     for number, line in lines[1:]:
         cells, place = table_columns.cells_of(line, delimiter), f"{path}, line {number}"

@@ -62,8 +62,8 @@ def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty
     given = [(path, value) for path, value in stds if value != {}]
     for section in document:
         document[section] = _means(document[section], (section,), given, faults)
-    if len(given) > limits.NUMBERS:
-        faults.append(f"[{sections.UNCERTAINTY}]: {len(given)} uncertain numbers; expected at most {limits.NUMBERS}")
+    if len(given) > limits.SECTIONS:
+        faults.append(f"[{sections.UNCERTAINTY}]: {len(given)} uncertain numbers; expected at most {limits.SECTIONS}")
         return Uncertainty({})
     paths, named = [path for path, _ in given], {".".join(path): value for path, value in given}
     for path, value in dict(given).items():
