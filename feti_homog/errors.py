@@ -5,7 +5,7 @@ from enum import IntEnum
 from typing import Any, Self
 
 # Limits of the length and number of faults, since a file may cause any number of long faults.
-LONGEST_LINE, KEPT_END, MOST_FAULTS = 1000, 200, 30
+LONGEST_LINE, KEPT_END, MOST_FAULTS = 1000, 200, 20
 
 
 class ExitCode(IntEnum):
@@ -34,7 +34,7 @@ class FetiHomogError(Exception):
     def __init__(self, *faults: str) -> None:
         more = len(faults) - MOST_FAULTS
         if more > 1:  # one more is as short as the count, or is the count
-            faults = (*faults[:MOST_FAULTS], f"{more} more faults")
+            faults = (*faults[:MOST_FAULTS], f"and {more} more faults")
         lines = map(escaped, faults)
         end = LONGEST_LINE - KEPT_END - 3
         # The reason stands at the end of a line.

@@ -12,7 +12,7 @@ import numpy as np
 from feti_homog.case.cell_section import TOUCHING, Cell
 from feti_homog.case.cell_sizes import mix_faults
 from feti_homog.case.section_values import MESH_SUFFIXES, TABLE_SUFFIXES
-from feti_homog.errors import CaseError
+from feti_homog.errors import MOST_FAULTS, CaseError
 from feti_homog.schema import wording
 from feti_homog.typing import Bool
 
@@ -23,7 +23,6 @@ SUFFIXES = {"mesh": MESH_SUFFIXES, "table": TABLE_SUFFIXES}
 LIST = "fibre_list"
 # Distance from a cut window / radius, up to which a centre outside counts as on the border.
 LEFT_OUT = 0.01
-MOST_LISTED = 20
 FEWEST_MATCHED = 10  # fibres: the distances between fewer fibres have no distribution
 
 
@@ -135,7 +134,7 @@ def _with_table(cell: Cell, faults: list[str]) -> Cell:
         outside = over > LEFT_OUT * table.radius
         if outside.any() and not outside.all():
             rows = table.row[outside]
-            listed = ", ".join(map(str, rows[:MOST_LISTED])) + (", ..." if len(rows) > MOST_LISTED else "")
+            listed = ", ".join(map(str, rows[:MOST_FAULTS])) + (", ..." if len(rows) > MOST_FAULTS else "")
             left = "1 row with its centre" if len(rows) == 1 else f"{len(rows)} rows with centres"
             line = f'[cell] window = "cut": leaves out {left} outside: {listed}'
             table = replace(table.rows(np.flatnonzero(~outside)), remarks=(*table.remarks, line))

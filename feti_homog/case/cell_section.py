@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from feti_homog.case import section_values as kinds
 from feti_homog.microstructure import phase_names
-from feti_homog.schema import key, keys, types
+from feti_homog.schema import key, keys, limits, types
 
-MOST_FIBRES = 100_000  # largest number of fibres, and of voids, in a cell
+MOST_FIBRES = limits.FIBRES
 
 if TYPE_CHECKING:
     from feti_homog.microstructure import fibre_pattern, fibre_table

@@ -7,7 +7,7 @@ from typing import Any
 
 from feti_homog.case import section_values as kinds
 from feti_homog.case.bond_laws import DEFAULT, LAWS, REGISTRY
-from feti_homog.schema import key, types
+from feti_homog.schema import key, limits, types
 
 pair_key = partial(key, by_pair=True)
 """Return a key in which several [[interface]] sections may differ; they agree in all other keys."""
@@ -15,7 +15,7 @@ pair_key = partial(key, by_pair=True)
 
 @dataclass(frozen=True, kw_only=True)
 class Arc:
-    """An arc of a fibre's interface that is debonded from the start, any number of them. Its tips stay bonded.
+    """An arc of a fibre's interface that is debonded from the start. Its tips stay bonded.
 
     In type = "angle" the opening is None: [angle] values has the openings.
     """
@@ -55,7 +55,7 @@ class Scatter:
     )
 
 
-ARCS = types.list_of(types.table_of(Arc, ""), "a list of arcs {fibre, centre, angle}")
+ARCS = types.list_of(types.table_of(Arc, ""), "a list of arcs {fibre, centre, angle}", most=limits.ROWS)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 
 from feti_homog.errors import CaseError
-from feti_homog.schema import wording
+from feti_homog.schema import limits, wording
 from feti_homog.system.runtime import input_files
 
-MAX_BYTES, MAX_DEPTH = 1 << 24, 50
+MAX_DEPTH = 50
 MAX_BITS = 10_000  # of an integer: Python writes none of more than 4 300 digits into messages
-MOST_KEYS, MOST_ENTRIES = 10_000, 100_000  # of a table, of a list
 DEEP_KEY = re.compile(rf"""(?<![\w-])((?>[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*+\.[ \t]*+){{{MAX_DEPTH}}}""")
 TOO_DEEP = f"tables and arrays are nested more than {MAX_DEPTH} deep"
 
@@ -30,7 +29,7 @@ def read_document(path: str | Path) -> dict[str, Any]:
     if "\0" in str(path):
         raise CaseError(f"{str(path)!r}: no file has a name with a null character")
     try:
-        content = input_files.read(path, MAX_BYTES, pipes=True).decode("utf-8-sig")
+        content = input_files.read(path, limits.BYTES, pipes=True).decode("utf-8-sig")
         if DEEP_KEY.search(content):
             raise RecursionError  # for tomllib takes time in the square of the length
         document = tomllib.loads(content)
@@ -76,7 +75,7 @@ def _to_toml(value: Any, path: TomlPath, faults: list[str], depth: int = 0) -> A
     if isinstance(value, np.ndarray):
         value = value.tolist()
     if isinstance(value, Mapping | list | tuple):
-        most, noun = (MOST_KEYS, "keys") if isinstance(value, Mapping) else (MOST_ENTRIES, "entries")
+        most, noun = (limits.KEYS, "keys") if isinstance(value, Mapping) else (limits.ENTRIES, "entries")
         if depth > MAX_DEPTH or len(value) > most:
             words = TOO_DEEP if depth > MAX_DEPTH else f"{len(value)} {noun}; expected at most {most}"
             raise CaseError(f"{wording.dotted_key(path) or 'the file'}: {words}")
@@ -169,8 +168,9 @@ def short_digest(content: bytes) -> str:
 def _named_items(table: Mapping[Any, Any], path: TomlPath, faults: list[str]) -> list[tuple[str, Any]]:
     """Return the items of a table, and report all keys that are no text."""
     wrong = [name for name in table if not isinstance(name, str)]
-    place = f"[{wording.dotted_key(path)}] " if path else ""
-    faults += [f"{place}{name!r}: expected a text as key, not {_article(name)}" for name in wrong]
+    if wrong:
+        place = f"[{wording.dotted_key(path)}] " if path else ""
+        faults += [f"{place}{name!r}: expected a text as key, not {_article(name)}" for name in wrong]
     return [(str(name), value) for name, value in table.items() if isinstance(name, str)]
 
 

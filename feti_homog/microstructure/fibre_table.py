@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.errors import CaseError
+from feti_homog.errors import MOST_FAULTS, CaseError
 from feti_homog.microstructure import table_columns
 from feti_homog.microstructure.phase_names import MATRIX, PHASE, VOID
 from feti_homog.microstructure.shapes.outlines import Columns, Outlines
 from feti_homog.microstructure.shapes.shapes import REPLACING, outlines_of
-from feti_homog.schema import types, wording
+from feti_homog.schema import limits, types, wording
 from feti_homog.typing import Bool, Float, Int
 
 COLUMNS = (*list(table_columns.NUMBERS)[:3], "phase", *list(table_columns.NUMBERS)[3:])
@@ -127,6 +127,8 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
             lines.append((number, contents))
     if not lines:
         raise CaseError(*faults.lines, f"{name}: no rows; expected a line of names such as x, y, radius, then fibres")
+    if len(lines) > 2 * limits.FIBRES:
+        raise CaseError(f"{name}: {len(lines)} lines; expected at most {2 * limits.FIBRES}")
     delimiter = table_columns.delimiter_of(lines[0][1])
     head = [table_columns.cells_of(line, delimiter) for _, line in lines[:2]]
     words = head[0] if columns is None else list(columns)
@@ -156,9 +158,8 @@ def table_of(entries: Sequence[Mapping[str, Any]], name: str) -> FibreTable:
     faults = _Faults(name)
     for number, entry in enumerate(entries, 1):
         for key in entry.keys() - set(COLUMNS):
-            faults.add(
-                number, f"{key} = {wording.toml_value(entry[key])}: unknown key; {wording.suggestion(key, COLUMNS, {})}"
-            )
+            hint = wording.suggestion(key, COLUMNS, {}) if len(faults.lines) < MOST_FAULTS else ""
+            faults.add(number, f"{key} = {wording.toml_value(entry[key])}: unknown key; {hint}")
     return _table(name, dict(enumerate(entries, 1)), {key for entry in entries for key in entry}, {}, faults)
 
 

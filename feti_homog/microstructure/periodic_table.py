@@ -130,7 +130,7 @@ def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
         over = np.maximum(-centres[:, axis], centres[:, axis] - width)
         reach = radius if (table.left, table.bottom)[axis] is not None else np.full_like(radius, 2 * radius.max())
         for k in np.flatnonzero(over > (SAME_FIBRE * radius if is_cut else (1 + SAME_FIBRE) * reach)).tolist():
-            value = table.centres[k, axis]
+            value = table.columns["xy"[axis]][k]
             faults.append(f"row {table.row[k]}: {'xy'[axis]} = {value:g}: lies outside the cell, of {name} {width:g}")
     for k in np.flatnonzero((2 * radius >= size.min()) | (radius < arrangements.SMALLEST_RADIUS * size[0])).tolist():
         limits = f"from {arrangements.SMALLEST_RADIUS * size[0]:g} to below {size.min() / 2:g} in this cell"

@@ -9,8 +9,9 @@ import io
 import json
 import math
 import os
+import re
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, get_type_hints
@@ -125,17 +126,12 @@ def write_csv(path: Path, points: Sequence[Any]) -> Path:
         for name, value in records.plain(point).items():
             if name in fields:
                 values, components = np.ravel(value).tolist(), fields[name].components or (name,)
-                if len(values) > len(components):
-                    components = fields[name].spatial_components
+                components = fields[name].spatial_components if len(values) > len(components) else components
                 row |= dict(zip(components, values, strict=True))
         rows.append(row)
     present = {name for row in rows for name in row}
     names = [column.name for column in columns(type(points[0])) if column.name in present] if rows else []
-    stream = io.StringIO(newline="")
-    writer = csv.DictWriter(stream, names)
-    writer.writeheader()
-    writer.writerows(rows)
-    return atomic.replace_text(path, stream.getvalue())
+    return atomic.replace_text(path, csv_text([names, *(map(row.get, names) for row in rows)], "\r\n"))
 
 
 def _in_columns(kind: type) -> dict[str, records.Description]:
@@ -143,6 +139,14 @@ def _in_columns(kind: type) -> dict[str, records.Description]:
     hints = get_type_hints(kind)
     entry = {name: d for name, d in records.descriptions(kind).items() if d.components or not d.shape}
     return {name: d for name, d in entry.items() if not is_dataclass(records.without_none(hints[name]))}
+
+
+def csv_text(rows: Iterable[Iterable[Any]], end: str = "\n") -> str:
+    """Return rows as CSV, with an apostrophe before texts that a spreadsheet would compute."""
+    stream, formula = io.StringIO(newline=""), re.compile(r"[=@]|[+-](?![0-9.]+([eE][+-][0-9]+)?$)")
+    texts = ([f"'{cell}" if isinstance(cell, str) and formula.match(cell) else cell for cell in row] for row in rows)
+    csv.writer(stream, lineterminator=end).writerows(texts)
+    return stream.getvalue()
 
 
 def dumps(document: Mapping[str, Any]) -> str:

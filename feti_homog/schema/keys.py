@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
+from feti_homog.errors import MOST_FAULTS
 from feti_homog.schema.types import INF, ValueType
 from feti_homog.schema.wording import suggestion, toml_key, toml_value
 
@@ -145,7 +146,8 @@ class TableReader:
             return None
         keys, before = keys_of(table_class), len(self.faults)
         faults = {
-            name: f" = {toml_value(table[name])}: unknown key; {suggestion(name, keys, self.owners)}"
+            name: f" = {toml_value(table[name])}: unknown key; "
+            + (suggestion(name, keys, self.owners) if before < MOST_FAULTS else "")  # slow, and not to be seen
             for name in table
             if name not in keys
         }

@@ -7,11 +7,9 @@ DIR/case-0001/error.txt       the reason of a failure
 """
 
 import contextlib
-import csv
-import io
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -32,6 +30,7 @@ INDEX_FILE, TABLE_FILE, ERROR_FILE, CASE_FILE, LOCK_FILE = (
 )  # fmt: skip
 SWEEP_ENTRIES = re.compile(r"(cases|statistics)\.csv|lock|moduli\.png|report\.html|case-\d{4,}")
 """Files and folders that a sweep and its collection write beside sweep.json."""
+DOCUMENTS = (INDEX_FILE, "fit.json", "uncertainty.json")
 INDEX_LOCK_FILE, INDEX_LOCK_TIMEOUT_S = "index.lock", 30.0
 
 
@@ -79,13 +78,15 @@ class SweepIndex:
 
 
 def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str) -> None:
-    """Refuse a folder with foreign files under names that a study would write.  On one rank.
+    """Refuse a folder of another study, or with foreign files under names that a study would write.  On one rank.
 
     Raises:
-        CaseError: such a file or subfolder is not empty.
+        CaseError: the document of a study is there, or such a file or subfolder is not empty.
         OSError: the folder cannot be read.
     """
     for path in sorted(directory.iterdir()):
+        if path.name in DOCUMENTS:
+            raise CaseError(f"--out {directory} holds another study, whose file is {path.name}; choose another folder")
         if entries.fullmatch(path.name) and (any(path.iterdir()) if path.is_dir() else path.lstat().st_size):
             raise output_folder.foreign(directory, path.name, kind)
 
@@ -128,20 +129,13 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
             for entry in sweep.entries:
                 values = [entry.inputs.get(name, "") for name in inputs]
                 table.append([entry.number, entry.folder, entry.point, entry.realisation, *values])
-            atomic.replace_text(directory / TABLE_FILE, csv_text(table))
+            atomic.replace_text(directory / TABLE_FILE, result_json.csv_text(table))
     except file_locks.LockHeld as error:
         raise CaseError(f"--out {directory}: {error} has been writing its list of cases for long") from error
 
 
 def _stored_entries(directory: Path) -> tuple[SweepCase, ...]:
     return read_index(directory).entries if (directory / INDEX_FILE).exists() else ()
-
-
-def csv_text(rows: Iterable[Iterable[Any]]) -> str:
-    """Return the rows of a table as CSV text."""
-    stream = io.StringIO()
-    csv.writer(stream, lineterminator="\n").writerows(rows)
-    return stream.getvalue()
 
 
 def read_index(directory: Path) -> SweepIndex:

@@ -167,8 +167,6 @@ class CaseRunner:
         except FetiHomogError as error:
             if not mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
                 raise
-            if self.comm.rank == 0:
-                standard_streams.complain(*error.faults)
             return error
         return None
 

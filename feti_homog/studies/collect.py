@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.report.text import point_tables, tables
-from feti_homog.results import atomic
+from feti_homog.results import atomic, result_json
 from feti_homog.studies import case_folders
 from feti_homog.studies.outputs import numbers, outputs
 from feti_homog.studies.predictions import responses
@@ -96,7 +96,7 @@ def write(directory: Path, table: SweepTable) -> list[Path]:
         is_nothing = value is None or (isinstance(value, float) and math.isnan(value))
         return "" if is_nothing else json.dumps(value) if isinstance(value, list | dict) else value
 
-    texts = [case_folders.csv_text(map(cell, row) for row in rows) for rows in (cases, statistics)]
+    texts = [result_json.csv_text(map(cell, row) for row in rows) for rows in (cases, statistics)]
     return [atomic.replace_text(directory / f"{name}.csv", text)
             for name, text in zip(("cases", "statistics"), texts, strict=True)]  # fmt: skip
 

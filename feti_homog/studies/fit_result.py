@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.case import sections
-from feti_homog.studies.case_folders import csv_text
+from feti_homog.results import result_json
 from feti_homog.studies.estimation import CONFIDENCE, ParameterEstimates, names_of
 from feti_homog.studies.predictions import Datum
 
@@ -61,4 +61,4 @@ def _finite(value: float) -> float | None:
 
 def measured_csv(document: Mapping[str, Any]) -> str:
     """Return the table of measured and computed values as CSV text."""
-    return csv_text([HEAD, *([datum[name] for name in HEAD] for datum in document["measured"])])
+    return result_json.csv_text([HEAD, *([datum[name] for name in HEAD] for datum in document["measured"])])

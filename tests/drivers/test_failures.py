@@ -1,13 +1,15 @@
 """Failures of jobs of the command line: exit codes, messages, no rank left waiting."""
 
 import json
+import os
+import signal
 import subprocess
 import sys
 
 import pytest
 from support.base_case import BASE
 from support.command_line import case_file, command_line
-from support.hooks import KILL, NO_MEMORY, Hook, hooked
+from support.hooks import KILL, NO_MEMORY, Hook, HookedJob, hooked
 from support.small_path import PATH
 from unit.case.faulty_cases import FAULTY_CASES
 from unit.mesh.faulty_meshes import FAULTY_MESHES, write_faulty
@@ -133,6 +135,19 @@ def test_a_rank_that_is_killed_ends_the_job(tmp_path):
     hook = Hook(DUAL_OPERATOR, KILL, rank=1, call=3)
     job = hooked(2, [hook], "run", case_file(tmp_path), "--out", tmp_path / "results", *IMPLICIT)
     assert job.returncode != 0
+
+
+@pytest.mark.parametrize("way", ["it combines", "it waits"])
+def test_a_rank_that_is_killed_within_a_collective_call_ends_the_job(tmp_path, way):
+    """No rank is left when the job has ended, whether they wait for the lost one or it waited for them."""
+    of_all = Hook(DUAL_OPERATOR, f"comm.allreduce(0, op=lambda *_: {KILL})", rank=None, call=3)
+    alone = Hook(DUAL_OPERATOR, "report(str(os.getpid())); comm.barrier()", rank=1, call=3)
+    words = ("run", case_file(tmp_path), "--out", tmp_path / "results", *IMPLICIT)
+    with HookedJob(3, [of_all if way == "it combines" else alone], *words) as job:
+        if way == "it waits":
+            os.kill(int(job.reported().split()[1]), signal.SIGKILL)
+        assert job.ended().returncode not in (0, 2, 3)
+    assert not (tmp_path / "results" / "result.json").exists()
 
 
 # Where one of three ranks finds no memory: the rank, and the function that it begins then, in the order of a run.

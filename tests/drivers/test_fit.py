@@ -73,6 +73,54 @@ def test_a_study_of_scatter_that_is_killed_goes_on(tmp_path):
     assert job.returncode == 2 and (out / "uncertainty.json").read_text() == "{}"
 
 
+SCATTERED = FIT.partition("[unknown]")[0].replace("young = 70.0", "young = {mean = 70.0, cv = 0.05}")
+STUDIES = {
+    "sweep": SCATTERED.replace("{mean = 70.0, cv = 0.05}", "70.0") + "[sweep]\ncell.fibre_fraction = [0.3, 0.4]\n",
+    "fit": FIT,
+    "uncertainty": SCATTERED.replace("0.4", "{mean = 0.4, std = 0.02}"),
+}
+FULL = "raise OSError(28, os.strerror(28))"
+
+
+@pytest.mark.parametrize(("kind", "name", "call"), [
+    ("fit", "result.json", 2), ("fit", "measured.csv", 1), ("fit", "fit.json", 2), ("fit", "sweep.json", 1),
+    ("uncertainty", "result.json", 1), ("uncertainty", "uncertainty.json", 2),
+])  # fmt: skip
+def test_a_study_whose_disk_is_full_goes_on(tmp_path, kind, name, call):
+    """The file is named once, and results that are there are neither lost nor computed again."""
+    path, out = tmp_path / "case.toml", tmp_path / "out"
+    path.write_text(STUDIES[kind])
+    hook = Hook(COMMIT, FULL, call=call, when=f"args[1].name == {name!r}")
+    job = hooked(0, [hook], kind, path, "--out", out)
+    faults = [line for line in job.stderr.splitlines() if "No space left on device" in line]
+    assert job.returncode == 1 and len(faults) == 1 and faults[0].startswith("error: cannot write "), job.stderr
+    assert name in faults[0] and "Traceback" not in job.stderr and not list(out.rglob("*.part"))
+    results = {each: each.stat().st_mtime_ns for each in out.rglob("case-*/result.json")}
+    assert bool(results) == (name != "sweep.json" and (kind, name) != ("uncertainty", "result.json"))
+    again = command_line(0, kind, path, "--out", out)
+    assert again.returncode == 0, again.stderr
+    assert results.items() <= {each: each.stat().st_mtime_ns for each in out.rglob("case-*/result.json")}.items()
+    assert json.loads((out / f"{kind}.json").read_text())["status"] == "done"
+
+
+@pytest.mark.parametrize("other", ["sweep", "fit", "uncertainty"])
+@pytest.mark.parametrize("first", ["sweep", "fit"])
+def test_a_second_study_in_the_folder_of_another_ends_in_one_line(tmp_path, first, other):
+    """The first one waits before its first result, and ends as if it were alone."""
+    for name, text in STUDIES.items():
+        (tmp_path / f"{name}.toml").write_text(text)
+    out = tmp_path / "out"
+    wait = Hook(COMMIT, WAIT, when="args[1].name == 'result.json'")
+    with HookedJob(0, [wait], first, tmp_path / f"{first}.toml", "--out", out) as job:
+        assert job.reported() == "0 here"
+        before = {each: each.stat().st_mtime_ns for each in out.rglob("*")}
+        refused = command_line(0, other, tmp_path / f"{other}.toml", "--out", out)
+        assert refused.returncode == 2 and refused.stderr.startswith("error: ") and refused.stderr.count("\n") == 1
+        assert {each: each.stat().st_mtime_ns for each in out.rglob("*")} == before
+        job.release()
+        assert job.ended().returncode == 0
+
+
 TRUTH = {
     "carbon_fibre": {"E_transverse": 14.0, "nu_transverse": 0.25, "G_axial": 28.0},
     "interface_toughness": {"toughness": 2.0, "strength in opening": 90.0},

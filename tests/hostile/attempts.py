@@ -8,7 +8,7 @@ from pathlib import Path
 Content = str | bytes | Callable[[Path], object]
 LIMIT_S = 60  # of the processor, of each attempt: what takes longer does not end
 PATIENCE_S = 10 * LIMIT_S  # of the clock, on a busy machine too: what takes longer waits for ever
-MOST_LINES = 31
+MOST_LINES = 21
 # How lines on standard error begin; mpirun's own are left out before.
 BEGINNINGS = ("error: ", "warning: ", "interrupted by ")
 

@@ -15,7 +15,7 @@ def test_texts_of_errors_are_escaped_and_cut():
 
 def test_many_faults_are_counted_once():
     error = CaseError(*map(str, range(1000)))
-    assert error.faults == (*map(str, range(MOST_FAULTS)), f"{1000 - MOST_FAULTS} more faults")
+    assert error.faults == (*map(str, range(MOST_FAULTS)), f"and {1000 - MOST_FAULTS} more faults")
     again = pickle.loads(pickle.dumps(error))
     assert again.faults == error.faults == CaseError(*error.faults).faults and str(again) == "\n".join(error.faults)
     assert len(CaseError(*map(str, range(MOST_FAULTS + 1))).faults) == MOST_FAULTS + 1

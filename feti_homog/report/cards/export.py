@@ -16,8 +16,6 @@ of `symmetric21` the upper triangle by rows in the order [11, 22, 33, 23, 13, 12
 components 11, 22, 33, 23, 13, 12 of a tensor, so half of the engineering shears.
 """
 
-import csv
-import io
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
@@ -193,10 +191,8 @@ def csv_table(material: effective_material.EffectiveMaterial) -> str:
         digits = "".join(str(axis + 1) for axis in effective_material.PAIRS[i])
         meaning = f"stiffness: stress {digits} under the unit strain {COMPONENTS[j]}"
         rows.append((f"C{i + 1}{j + 1}", C[i, j], unit, meaning))
-    stream = io.StringIO()
-    texts = ((name, effective_material.number(value), *words) for name, value, *words in rows)
-    csv.writer(stream, lineterminator="\n").writerows([CSV_COLUMNS, *texts])
-    return stream.getvalue().removesuffix("\n")
+    texts = [(name, effective_material.number(value), *words) for name, value, *words in rows]
+    return result_json.csv_text([CSV_COLUMNS, *texts]).removesuffix("\n")
 
 
 FORMATS: dict[str, Callable[[effective_material.EffectiveMaterial], str]] = {

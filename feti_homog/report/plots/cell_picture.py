@@ -45,7 +45,9 @@ def figure(cell: drawn_cell.DrawnCell) -> Figure:
     text = "\nbelow the numbers: strength / that of [interface]" if varies else ""
     axes.set_title(_title(attributes, _count(drawn.body.max() + 1, "body", "bodies")) + text)
     present = np.unique(drawn.phase)
-    entries = [Patch(facecolor=inks[k], edgecolor="black", linewidth=0.6, label=phases[k]) for k in present[:IN_LEGEND]]
+    # Legends leave out labels that begin with "_".
+    labels = [f" {name}" if name.startswith("_") else name for name in phases]
+    entries = [Patch(facecolor=inks[k], edgecolor="black", linewidth=0.6, label=labels[k]) for k in present[:IN_LEGEND]]
     if len(present) > IN_LEGEND:
         entries.append(Patch(facecolor="none", edgecolor="none", label=f"and {len(present) - IN_LEGEND} others"))
     drawn_cell.legend_below(axes, entries, 3)

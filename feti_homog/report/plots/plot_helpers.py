@@ -20,6 +20,7 @@ from matplotlib.text import Text
 from matplotlib.tri import Triangulation
 
 from feti_homog.case import bond_laws
+from feti_homog.errors import escaped
 from feti_homog.materials import voigt
 from feti_homog.report.plots.decimation import DrawnMesh, node_means, triangle_means
 from feti_homog.results import atomic, path_curves
@@ -268,8 +269,8 @@ def _limits(bond: Document, units: tuple[str, str]) -> str:
 
 
 def plain(text: str) -> str:
-    """Escape the dollar signs of a user's text, which Matplotlib would read as formula marks."""
-    return text.replace("$", r"\$")
+    """Escape control characters of a user's text, and dollar signs, which mark formulas of Matplotlib."""
+    return escaped(text, "\n").replace("$", r"\$")
 
 
 def unit_label(label: str) -> str:

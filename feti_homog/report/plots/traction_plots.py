@@ -179,8 +179,8 @@ def coordinate(cell: drawn_cell.DrawnCell, body: int) -> Coordinate:
     # A vertex is the start of an edge, not an end.
     best = np.arange(len(nodes)), (distance + SAME_PLACE * length * fraction).argmin(axis=1)
     at = before[nearest[best]] + (fraction * length)[best]
-    order, unit = np.argsort(at, kind="stable"), file.attrs["length_unit"] or "cell units"
-    label = f"arc length, counterclockwise ({unit})"
+    order, unit = np.argsort(at, kind="stable"), plot_helpers.unit_label(file.attrs["length_unit"])
+    label = f"arc length, counterclockwise {unit or '(cell units)'}"
     return Coordinate(of_body[order], at[order], (0.0, float(before[-1])), label, False)
 
 

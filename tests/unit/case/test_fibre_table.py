@@ -60,7 +60,7 @@ def test_all_faults_are_reported_and_many_are_counted(tmp_path):
         fibres(tmp_path / "t.csv", HEAD + "1,here,-3\n" * 100)
     assert len(error.value.faults) == MOST_FAULTS + 1
     assert error.value.faults[1] == "t.csv: row 2: radius = -3.0: expected a number above 0"
-    assert error.value.faults[-1] == "170 more faults"
+    assert error.value.faults[-1] == "and 180 more faults"
 
 
 def test_a_file_that_is_not_there_is_reported(tmp_path):

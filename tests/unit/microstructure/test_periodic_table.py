@@ -124,4 +124,4 @@ def test_every_overlap_is_reported_until_there_are_many():
     with pytest.raises(MeshError) as error:
         arrange(cell_of(table(centres, np.full(50, 0.011), (1.0, 1.0))))
     assert len(error.value.faults) == MOST_FAULTS + 1
-    assert error.value.faults[-1] == "21 more faults"
+    assert error.value.faults[-1] == "and 31 more faults"

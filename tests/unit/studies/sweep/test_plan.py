@@ -143,7 +143,7 @@ FAULTY = {
     "twice": ("cell.order = [1]\n'cell.order' = [2]", ["[sweep] cell.order: given twice"]),
     "twice by table": ("cell = [{order = 2}]\n'cell.order' = [1]", ["[sweep] cell.order: given twice"]),
     "regular realisations": ("realisations = 2\ncell.order = [1]", ['only cells with geometry = "random"']),
-    "too many": ("samples = 20000\ncell.order = [1, 2]\ncell.fibre_fraction = {from = 0.1, to = 0.2}", ["40000"]),
+    "too many": ("samples = 10000\ncell.order = [1, 2]\ncell.fibre_fraction = {from = 0.1, to = 0.2}", ["20000"]),
     "two units": ("output.stress_unit = ['GPa', 'MPa']", ["[output] stress_unit: expected the same in all cases"]),
     "a case's fault": (
         "cell.fibre_fraction = [0.4, 0.95, 0.99]",

@@ -1,0 +1,98 @@
+"""Regular expressions take a time in proportion to the length of a text: hostile texts are long."""
+
+import ast
+import importlib
+import re
+import time
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+PACKAGE = Path(__file__).parents[2] / "feti_homog"
+METHODS = ("fullmatch", "match", "search", "split", "sub", "finditer", "findall")
+# Patterns that are arguments of a function: (module, text of the argument).
+ARGUMENTS = {
+    ("mesh.readers.abaqus_file", "pattern"),
+    ("results.output_folder", "re.escape(target.name)"),  # of one name
+    ("results.atomic", "f'({names.pattern})\\\\.(?P<tag>.+\\\\.\\\\d+)\\\\.part'"),  # of names in a folder
+}
+RUNS = (
+    *" \t\n19aAe_-+.,:;=#$<>/'\"([{|\\x%!~\x00é",
+    *("a.", "a .", '"" .', "' '.", "1.", ".1", "1e", "1e5", "-1", "1 ", "a ", " =", "= ", "a=", "#\n", "\n ", "[1]"),
+    *("width", "width:", "width =", "width=1 ", "width = 1,", "<AppendedData", "</AppendedData", "_mm", "mm", "(mm"),
+    *("[m", "C11", "E1", "S11_", "case-1", ".1.1"),
+    *("$Nodes ", "$Nodes\n", "$a", '1 1 "', '1 1 "a"\n', "1 1 ", "1 2 3\n", "nan ", "1.5e-3 "),
+)  # fmt: skip
+ENDS, STARTS = ("", "!"), ("", '"')
+# Characters, the slowest texts alone from one length to the next; times of a linear pattern, and least seconds of one.
+LENGTHS, SLOWEST, ALLOWED, SHORTEST = (1000, 20_000, 100_000, 1_000_000), 1, 50, 0.01
+
+
+@cache
+def expressions() -> dict[str, tuple[Any, set[str]]]:
+    """Return the patterns of the package, and the methods with which they are applied, by module and line."""
+    texts = {path: path.read_text() for path in sorted(PACKAGE.rglob("*.py"))}
+    every, functions = "\n".join(texts.values()), {f"re.{name}" for name in (*METHODS, "compile")}
+    found: dict[str, tuple[Any, set[str]]] = {}
+    for path, text in texts.items():
+        tree, name = ast.parse(text), ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
+        assignments = [node for node in ast.walk(tree) if isinstance(node, ast.Assign)]
+        assigned = {id(node): ast.unparse(each.targets[0]) for each in assignments for node in ast.walk(each)}
+        calls = [n for n in ast.walk(tree) if isinstance(n, ast.Call) and ast.unparse(n.func) in functions]
+        for call in calls:
+            method, first = ast.unparse(call.func)[3:], call.args[0]
+            if (name, ast.unparse(first)) in ARGUMENTS:
+                continue
+            others = [ast.unparse(each) for each in (*call.args[1:], *(k.value for k in call.keywords))]
+            flags = eval(" | ".join(each for each in others if each.startswith("re.")) or "0")
+            uses = {method}
+            if method == "compile":
+                word = rf"\b{assigned.get(id(call), '')}(\[[^]]*\])?"
+                uses = {m for m in METHODS if re.search(rf"{word}\.{m}\(", every)} or {"fullmatch"}
+            module = vars(importlib.import_module(f"feti_homog.{name}"))
+            for choice in [first.body, first.orelse] if isinstance(first, ast.IfExp) else [first]:
+                pattern = re.compile(eval(ast.unparse(choice), dict(module)), flags)
+                found[f"{name}:{choice.lineno}:{choice.col_offset}"] = pattern, uses
+    return found
+
+
+def seconds(pattern: Any, method: str, text: Any) -> float:
+    """Return the processor time of all matches in a text."""
+    begin = time.process_time()
+    result = pattern.sub(text[:0], text) if method == "sub" else getattr(pattern, method)(text)
+    if method == "finditer":
+        list(result)
+    return time.process_time() - begin
+
+
+def fault(pattern: Any, methods: set[str]) -> str:
+    """Return the first text on which a pattern takes ALLOWED times as long as a linear one on the same machine.
+
+    Short texts come first: a time in the square of the length shows before it lasts.
+    """
+    linear = re.compile(r"\S+")
+    for method in sorted(methods):
+        texts = [(start, run, end) for start in STARTS for run in RUNS for end in ENDS]
+        for length in LENGTHS:
+            least = max(seconds(linear, "finditer", "a " * (length // 2)), SHORTEST)
+            took = []
+            for start, run, end in texts:
+                text = f"{start}{run * (length // len(run))}{end}"
+                value = seconds(pattern, method, text.encode() if isinstance(pattern.pattern, bytes) else text)
+                took.append((value, (start, run, end)))
+                if value > ALLOWED * least:
+                    return f"{method} of {start!r}, {run!r}..., {end!r}: {value:.3g} s at {length}"
+            texts = [text for _, text in sorted(took, reverse=True)[:SLOWEST]]
+    return ""
+
+
+@pytest.mark.parametrize("name", sorted(expressions()))
+def test_regular_expressions_are_linear(name):
+    assert not fault(*expressions()[name])
+
+
+@pytest.mark.parametrize("pattern", [r"\s*=", r"<A.*?>"])
+def test_regular_expressions_that_are_not_linear_are_found(pattern):
+    assert fault(re.compile(pattern), {"search"})
