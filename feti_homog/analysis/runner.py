@@ -47,7 +47,7 @@ def run(
     if resume:
         from feti_homog.analysis import stored_result  # loads readers that most runs do not use
 
-        if mpi_errors.on_root(comm, stored_result.finished, directory, case):
+        if mpi_errors.on_root(comm, stored_result.finished, directory, case, comm.size):
             progress.say(f"{directory} holds the finished result of this case: nothing to do")
             return Result.of(mpi_errors.on_root(comm, result_json.read, directory))
     mpi_errors.on_root(comm, output_folder.usable, directory)
