@@ -10,6 +10,7 @@ from feti_homog.studies.case_folders import csv_text
 from feti_homog.studies.estimation import CONFIDENCE, ParameterEstimates, names_of
 from feti_homog.studies.predictions import Datum
 
+LEAST_CHANCE = 1e-3  # of residuals as large, below which the model is refused
 HEAD = ("test", "name", "strain", "value", "std", "computed", "residual")
 
 
@@ -18,7 +19,16 @@ def content(
 ) -> dict[str, Any]:
     """Return the content of fit.json without its name; numbers that are not finite are None."""
     faults = [] if estimates.converged else [f"no minimum after {estimates.evaluations} evaluations"]
-    faults += names_of(estimates.undetermined, [*unknowns])
+    misfits = estimates.chance is not None and estimates.chance < LEAST_CHANCE
+    if misfits and estimates.undetermined:
+        place = ", ".join(f"{name} = {value:.6g}" for name, value in zip(unknowns, estimates.x, strict=True))
+        faults.append(f"the search stalled at {place}, where the values change in jumps or not at all: start elsewhere")
+    elif misfits:
+        faults.append(
+            f"the model does not describe the measurements (chance {estimates.chance:.2g}): the intervals do not hold; "
+            "another start may fit better"
+        )
+    faults += [] if misfits else names_of(estimates.undetermined, [*unknowns])
     faults += [
         f"[unknown] {name}: the measured values hardly determine it: its standard deviation {std:.3g} is more than the "
         f"width {unknown.upper - unknown.lower:.3g} of its bounds"

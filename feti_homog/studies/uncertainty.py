@@ -19,7 +19,9 @@ import numpy as np
 
 from feti_homog.case import sections, toml_files
 from feti_homog.errors import CaseError
+from feti_homog.materials import voigt
 from feti_homog.report.text import constant_tables, study_tables
+from feti_homog.results import path_curves
 from feti_homog.schema import wording
 from feti_homog.studies.axes import Assignment, read_points
 from feti_homog.studies.predictions import Datum, exact_derivatives, responses
@@ -183,9 +185,13 @@ def _path(name: str) -> toml_files.TomlPath:
 
 
 def _data(documents: Documents) -> list[Datum]:
-    """Return placeholder data for the numbers that all results have."""
+    """Return placeholder data for the numbers that all results have, of a path in the leading component."""
     named = [responses(document) for document in documents]
-    return [Datum(0, name, 0.0, 1.0) for name in named[0] if all(name in values for values in named)]
+    names = [name for name in named[0] if all(name in values for values in named)]
+    if path := documents[0].get("path"):  # others are largest at other points, or differ from zero by the mesh alone
+        leading = [pair[path_curves.leading_component(documents[0])] for pair in voigt.voigt_names(len(path[0]["stress"]))]
+        names = [name for name in names if name.partition("_")[2] in ("load_factor", *leading)]
+    return [Datum(0, name, 0.0, 1.0) for name in names]
 
 
 def _values(documents: Documents, data: Sequence[Datum]) -> Float:
