@@ -127,8 +127,9 @@ def _run_and_write(
         context.opening = lambda of: result_json.text_of(records.plain(_opening(of)))
         analysis = _analyse(context)
         seal = states.seal()
-        if states.error is not None and not keep_fields:
-            analysis.pop("states", None)
+        if states.error is not None:
+            context.checks.faults.append(str(states.error))
+            analysis = analysis if keep_fields else {k: v for k, v in analysis.items() if k != "states"}
     result = replace(_result(context, analysis, states.fields()), result_h5=seal)
     _write(result, directory, cell)
     if states.error is not None:

@@ -21,7 +21,7 @@ def read(directory: Path) -> dict[str, Any]:
     document = output_folder.latest(directory)
     if "unfinished" not in document:
         result = _restored(directory, document)
-        if result.case["output"].get("fields", True):
+        if output_folder.has_fields(document):
             _check_fields(directory, result)
     return document
 
@@ -29,14 +29,18 @@ def read(directory: Path) -> dict[str, Any]:
 def check_to_draw(directory: Path) -> str:
     """Check that the plottable files in `directory` belong to one run.  Call on one rank.
 
-    The file result.h5 is required, result.json is optional.  Returns the status of an unfinished path, else nothing.
+    The file result.h5 is required, result.json is optional.  Returns a line on fields that are missing, or nothing.
 
     Raises:
         CaseError: result.h5 is missing, or a file is damaged, or from another program or run.
     """
     # Also true for a circular link.
     if os.path.lexists(directory / result_json.NAME) or (directory / checkpoints.FOLDER).is_dir():
-        return str(read(directory).get("unfinished", ""))
+        document = read(directory)
+        if "unfinished" in document:
+            return f"{directory}: {document['unfinished']}; pictures of its fields follow at its end"
+        is_whole = output_folder.has_fields(document) or not document["case"]["output"].get("fields", True)
+        return "" if is_whole else f"{directory}: without fields: {document['faults'][-1]}"
     field_guard.require_own(directory / field_file.NAME)
     return ""
 

@@ -117,6 +117,14 @@ def test_every_file_may_be_the_one_that_does_not_fit(comm, shared_path, capsys, 
     told_once(comm, capsys, ["error: cannot write ", f"{name}: No space left on device"])
     count = events.count(out)
     parallel_assert(comm, count == 2 if name == "events" else count > 2)
+    if name == "result.h5":  # pictures of curves and the page are drawn without fields
+        document = json.loads((out / "result.json").read_text())
+        assert document["status"] == "not converged" and "result.h5: No space left on device" in document["faults"][0]
+        assert cli.main(["plot", str(out)]) == cli.main(["report", str(out)]) == 0
+        printed = capsys.readouterr().out
+        assert f"{out}: without fields: {document['faults'][0]}\n" in printed and f"{out / 'path.png'}\n" in printed
+        assert cli.main(["fields", str(out)]) == 2
+        capsys.readouterr()
     later = ("result.json", "events")
     parallel_assert(comm, (out / "result.json").exists() == (name not in later) and not (out / name).exists())
     comm.barrier()
