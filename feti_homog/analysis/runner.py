@@ -22,7 +22,7 @@ from feti_homog.homogenization import partition_policy, uniform_parts, unit_cell
 from feti_homog.results import field_file, field_parts, output_folder, result_json, xdmf
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.petsc import options_database
-from feti_homog.system.runtime import process_memory, progress_bar, records
+from feti_homog.system.runtime import process_memory, progress_bar, records, standard_streams
 from feti_homog.version import __version__
 
 # Bytes that a process keeps between cases: their release would cost a small case 10 % of its time.
@@ -127,15 +127,17 @@ def _run_and_write(
         context.opening = lambda of: result_json.text_of(records.plain(_opening(of)))
         analysis = _analyse(context)
         seal = states.seal()
-        if states.error is not None:
-            context.checks.faults.append(str(states.error))
-            analysis = analysis if keep_fields else {k: v for k, v in analysis.items() if k != "states"}
+        if states.error is not None and not keep_fields:
+            analysis.pop("states", None)
     result = replace(_result(context, analysis, states.fields()), result_h5=seal)
+    if states.error is not None:  # the numbers are sound, and so the status is "done"
+        result = replace(result, faults=(*result.faults, str(states.error)))
     _write(result, directory, cell)
     if states.error is not None:
         raise states.error
     if cell.case.section.is_followed and not result.faults:
         context.checkpoint.clear()
+    standard_streams.remarks.clear()
 
     def draw() -> list[Path]:
         from feti_homog.report.plots import figures  # loads Matplotlib, on this rank only

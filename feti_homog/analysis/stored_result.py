@@ -3,7 +3,7 @@
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from feti_homog.analysis.result import Result
 from feti_homog.case import Case, cases, sections, toml_files
@@ -21,7 +21,7 @@ def read(directory: Path) -> dict[str, Any]:
     document = output_folder.latest(directory)
     if "unfinished" not in document:
         result = _restored(directory, document)
-        if output_folder.has_fields(document):
+        if result.case["output"].get("fields", True):
             _check_fields(directory, result)
     return document
 
@@ -29,18 +29,14 @@ def read(directory: Path) -> dict[str, Any]:
 def check_to_draw(directory: Path) -> str:
     """Check that the plottable files in `directory` belong to one run.  Call on one rank.
 
-    The file result.h5 is required, result.json is optional.  Returns a line on fields that are missing, or nothing.
+    The file result.h5 is required, result.json is optional.  Returns the status of an unfinished path, else nothing.
 
     Raises:
         CaseError: result.h5 is missing, or a file is damaged, or from another program or run.
     """
     # Also true for a circular link.
     if os.path.lexists(directory / result_json.NAME) or (directory / checkpoints.FOLDER).is_dir():
-        document = read(directory)
-        if "unfinished" in document:
-            return f"{directory}: {document['unfinished']}; pictures of its fields follow at its end"
-        is_whole = output_folder.has_fields(document) or not document["case"]["output"].get("fields", True)
-        return "" if is_whole else f"{directory}: without fields: {document['faults'][-1]}"
+        return str(read(directory).get("unfinished", ""))
     field_guard.require_own(directory / field_file.NAME)
     return ""
 
@@ -58,16 +54,15 @@ def finished(directory: Path, case: Case, ranks: int) -> bool:
         except CaseError as error:
             raise CaseError(f"--resume: {error}") from error
         signature, _, opening = content.decode().partition("\n")
-        stored = result_json.loads(opening or "{}")
         is_alike = f"case {case.digest(False)}," in signature and f" on {ranks} ranks" in signature
-        if stored and not is_alike:  # events are the same for any [output]
-            raise _of_another(f"--resume: {directory} holds the events of another run", stored, case, ranks, "output")
+        if opening and not is_alike:  # events are the same for any [output]
+            _refuse_other(f"{directory} holds the events", result_json.loads(opening), case, ranks, "output")
         return False
     if not (directory / result_json.NAME).is_file():
         return False
     result = _restored(directory, document := result_json.read(directory))
     if result.digest != case.digest():
-        raise _of_another(f"--resume: {directory} holds the result of another case", document, case)
+        _refuse_other(f"{directory} holds the result", document, case, result.solver.ranks)
     if case.output.fields:
         if not (directory / field_file.NAME).exists():
             return False
@@ -75,20 +70,20 @@ def finished(directory: Path, case: Case, ranks: int) -> bool:
     return result.status == "done"
 
 
-def _of_another(
-    line: str, stored: Mapping[str, Any], case: Case, ranks: int | None = None, skipped: str = "name"
-) -> CaseError:
-    """Return the error with the keys in which a case, or its `ranks`, differ from a stored run."""
-    before, now = (dict(toml_files.leaves(document)) for document in (stored["case"], case.resolved()))
+def _refuse_other(start: str, stored: Mapping[str, Any], case: Case, ranks: int, skipped: str = "name") -> NoReturn:
+    """Raise CaseError with the keys in which a case differs from a stored one, and other `ranks`."""
     idle = [("output", name) for name, entry in keys.keys_of(sections.Output).items() if entry.presentation]
     idle += [("path", "max_events"), ("cell", "file"), ("cell", "match")]  # the digest has the content of files
-    paths = [path for path in now | before if path[0] not in ("name", "petsc", skipped) and path not in idle]
-    lines = [f"{wording.dotted_key(path)}: {' now '.join(map(wording.toml_value, values))}" for path in paths
-             if (values := (before.get(path, "none"), now.get(path, "none")))[0] != values[1]]  # fmt: skip
-    if ranks not in (None, was := stored["solver"]["ranks"]):
-        lines.append(f"ranks: {was} now {ranks}")
+    before, now = (
+        {path: value for path, value in toml_files.leaves(document | {"ranks": count})
+         if path[0] not in ("name", "petsc", skipped) and path not in idle}
+        for document, count in ((stored["case"], stored["solver"]["ranks"]), (case.resolved(), ranks))
+    )  # fmt: skip
+    pairs = {path: (before.get(path, "none"), now.get(path, "none")) for path in now | before}
+    lines = [f"{wording.dotted_key(path)}: {wording.toml_value(old)} now {wording.toml_value(new)}"
+             for path, (old, new) in pairs.items() if old != new]  # fmt: skip
     where = f", which differs in {', '.join(lines)}" if lines else ""
-    return CaseError(f"{line}{where}; choose another folder")
+    raise CaseError(f"--resume: {start} of another case{where}; choose another folder")
 
 
 def _restored(directory: Path, document: Mapping[str, Any]) -> Result:

@@ -26,7 +26,7 @@ def plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
     for path in paths or []:
         standard_streams.say(str(path))
     if place:
-        standard_streams.say(place)
+        standard_streams.say(f"{directory}: {place}; pictures of its fields follow at its end")
 
 
 def report(arguments: argparse.Namespace, comm: Intracomm) -> None:

@@ -100,7 +100,7 @@ def case_remarks(case: Case) -> tuple[str, ...]:
     """Note the teeth that follow from a tolerance, and a fibre fraction other than that of the matched table."""
     cell, lines = case.cell, tuple[str, ...]()
     if phase_laws.has_softening(case) and case.interfaces[0].teeth is None:
-        count = len(phase_laws.bond_law(case.interfaces, np.zeros(0, np.int64)).levels) - 1
+        count = len(vars(phase_laws.bond_law(case.interfaces, np.zeros(0, np.int64)))["levels"]) - 1
         lines = (f"[interface] softening_tolerance = {case.interfaces[0].softening_tolerance:g}: {count} teeth a bond",)
     if cell.match is None or cell.matched is None or cell.fibre_fraction is None:
         return lines
@@ -195,7 +195,7 @@ def _law_warnings(case: Case) -> list[str]:
     if law.overshoot > most * (1.0 + SAME_RATIO):
         cause = f"softening_tolerance = {bond.softening_tolerance:g}" if bond.teeth is None else f"teeth = {bond.teeth}"
         lines.append(
-            f"[interface] {cause}: the first tooth exceeds the peak traction by {law.overshoot:.1%}, and so may the peak "
-            f"of the cell; by default at most by {most:.1%}"
+            f"[interface] {cause}: the first tooth exceeds the peak traction by {law.overshoot:.1%}, and so may the "
+            f"peak of the cell; by default at most by {most:.1%}"
         )
     return lines

@@ -8,7 +8,7 @@ import contextlib
 import json
 import os
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TextIO
@@ -134,12 +134,6 @@ def latest(directory: Path) -> dict[str, Any]:
     opening["solver"]["iterations"] = [point["iterations"] for point in points]
     place = f"unfinished, {len(points)} points up to load {max(point['load_factor'] for point in points):.4f}"
     return opening | {"path": points, "status": place, "unfinished": place}
-
-
-def has_fields(document: Mapping[str, Any]) -> bool:
-    """Return whether a result has fields: not if the path is unfinished, or result.h5 could not be written."""
-    is_lost = "unfinished" in document or (document.get("faults") and document.get("result_h5") is None)
-    return not is_lost and document.get("case", {}).get("output", {}).get("fields", True)
 
 
 def refuse_begun(directory: Path) -> None:

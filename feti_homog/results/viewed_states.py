@@ -18,7 +18,7 @@ import numpy as np
 from feti_homog.errors import CaseError
 from feti_homog.fem import AXIAL, PLANE, assembly
 from feti_homog.materials import voigt
-from feti_homog.results import atomic, field_file, xdmf
+from feti_homog.results import atomic, field_file, field_guard, xdmf
 from feti_homog.results.field_views import AXIAL as AXIAL_DISPLACEMENT
 from feti_homog.typing import Array, Float
 from feti_homog.verify import constitutive_law
@@ -58,7 +58,7 @@ def read_state(out: str | Path, number: int = 0) -> ViewedState:
     Raises:
         CaseError: result.h5 is missing or cannot be read, or has no such state.
     """
-    path = Path(out) / field_file.NAME
+    field_guard.require_own(path := Path(out) / field_file.NAME)
     try:
         with h5py.File(path, "r", locking=False) as file:
             count = len(file.get("state", ()))

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from feti_homog.case import sections
-from feti_homog.studies.case_folders import csv_text
 from feti_homog.studies.estimation import CONFIDENCE, ParameterEstimates, names_of
 from feti_homog.studies.predictions import Datum
 
@@ -24,10 +23,7 @@ def content(
         place = ", ".join(f"{name} = {value:.6g}" for name, value in zip(unknowns, estimates.x, strict=True))
         faults.append(f"the search stalled at {place}, where the values change in jumps or not at all: start elsewhere")
     elif misfits:
-        faults.append(
-            f"the model does not describe the measurements (chance {estimates.chance:.2g}): the intervals do not hold; "
-            "another start may fit better"
-        )
+        faults.append(f"the model does not describe the measurements (chance {estimates.chance:.2g}): intervals fail")
     faults += [] if misfits else names_of(estimates.undetermined, [*unknowns])
     faults += [
         f"[unknown] {name}: the measured values hardly determine it: its standard deviation {std:.3g} is more than the "
@@ -67,8 +63,3 @@ def content(
 
 def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
-
-
-def measured_csv(document: Mapping[str, Any]) -> str:
-    """Return the table of measured and computed values as CSV text."""
-    return csv_text([HEAD, *([datum[name] for name in HEAD] for datum in document["measured"])])

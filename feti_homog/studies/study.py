@@ -29,18 +29,14 @@ SILENT = {"fields": False, "pictures": False, "report": False}
 
 @dataclass(frozen=True)
 class Evaluator:
-    """A runner of the cases of a study, in subfolders; groups of `ranks_per_case` ranks work concurrently.
-
-    Attributes:
-        warnings: warnings about the first cases.
-    """
+    """A runner of the cases of a study, in subfolders; groups of `ranks_per_case` ranks work concurrently."""
 
     directory: Path
     comm: Intracomm
     ranks_per_case: int
     retry: bool
     quiet: bool
-    warnings: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)  # about the first cases
 
     def results(self, name: str, sweep: Sweep) -> list[dict[str, Any]]:
         """Run the sweep cases in the subfolder `name`.  Collective.

@@ -174,6 +174,16 @@ def test_a_finished_run_is_left_alone(tmp_path, reference):
     assert before == {path.name: path.stat().st_mtime_ns for path in reference.iterdir()}
 
 
+def test_an_interrupted_path_says_what_is_kept(tmp_path):
+    out = tmp_path / "out"
+    with HookedJob(0, [Hook(WRITE, WAIT, when="args[1] == 2")], "run", case_file(tmp_path), "--out", out) as job:
+        assert job.reported() == "0 here"
+        job.process.terminate()
+        ended = job.ended()
+    line = f"2 points kept in {out}: --resume goes on, plot and report show them"
+    assert ended.stderr == f"interrupted by SIGTERM\n{line}\n" and events.count(out) == 2
+
+
 def test_without_checkpoint_or_resume_a_run_begins_anew(tmp_path, interrupted):
     coarse = case_file(tmp_path, name="coarse", mesh_size="mesh_size = 0.2")
     job = command_line(2, "run", coarse, "--out", tmp_path / "new", "--resume")

@@ -57,10 +57,12 @@ def test_warnings_of_the_first_cases_are_printed_once_and_kept(comm, shared_path
     assert len(kept) == 1 and kept[0].startswith("-feti_ksp_rtol 2e-07 asks for less than the checks do")
     assert printed.count(f"warning: {kept[0]}") == (comm.rank == 0)
     sweep = {name: document[name] for name in ("cell", "analysis", "petsc")}
-    sweep["material"] = dict.fromkeys(("matrix", "fibre"), {"young": 3.0, "poisson": 0.3})
+    sweep["material"] = {phase: {"young": 3.0, "poisson": 0.3} for phase in ("matrix", "fibre")}
     run_sweep(sweep | {"sweep": {"cell": {"refine": [0, 1]}}}, shared_path / "sweep", comm, quiet=False)
-    printed = [line for line in capsys.readouterr().out.splitlines() if line.startswith("warning: case-0001: -feti")]
-    assert len(printed) == (comm.rank == 0) and all(line.endswith("(and 1 more)") for line in printed)
+    printed = capsys.readouterr().out.splitlines()
+    assert printed.count(f"warning: case-0001: {kept[0]}") == (comm.rank == 0) and "warning: case-0002" not in str(
+        printed
+    )
 
 
 def test_an_interrupted_fit_goes_on_with_what_it_has(comm, shared_path, glass, monkeypatch):

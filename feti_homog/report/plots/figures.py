@@ -45,7 +45,7 @@ def plot(
     if component is not None:
         document.setdefault("case", {}).setdefault("output", {})["stress"] = component
     with mpl.rc_context(plot_helpers.STYLE):
-        if output_folder.has_fields(document):
+        if "unfinished" not in document and document.get("case", {}).get("output", {}).get("fields", True):
             try:
                 with h5py.File(directory / field_file.NAME, "r") as file:
                     paths = of_fields(directory, file, document, look, state)

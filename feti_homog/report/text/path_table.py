@@ -38,9 +38,8 @@ def path_table(document: Document, limit: int | None = None) -> Table:
         [k, *(without_noise(column[k]) for column in first.values()), points[k]["load_factor"], *counts(points[k])]
         for k in numbers
     ]
-    noun = document["case"]["path"]["method"].removesuffix("s")
-    columns = [Column(noun, len(noun), "d"), *(Column(name, max(11, len(name) + 1)) for name in first)]
-    columns += [Column("load", 9, ".6f"), *COUNTS]
+    columns = [Column(noun := document["case"]["path"]["method"].removesuffix("s"), len(noun), "d")]
+    columns += [*(Column(name, max(11, len(name) + 1)) for name in first), Column("load", 9, ".6f"), *COUNTS]
     label = stress_label(document)
     totals = [*_peak_lines(document, landmarks.peak_of(document)), *_path_energies(document, label)]
     totals += [f"Also in path.csv: {', '.join(rest)}"] if rest else []
@@ -112,7 +111,6 @@ def _path_energies(document: Document, label: str) -> list[str]:
                 lines[-1] += f", area of the last closed loop {ends[-1]['work'] - point['work']:.6g}"
                 break
     if "dissipation_ratio" in last:
-        ratio = f"{last['dissipation_ratio']:.4f} times it was dissipated"
-        bonds = "bonds that broke or softened" if "softened" in last else "broken bonds"
-        lines.append(f"Toughness of {bonds} per area{label}: {last['fracture_energy']:.6g}; {ratio}")
+        ratio = f"dissipated: {last['dissipation_ratio']:.4f} times that"
+        lines.append(f"Fracture energy per area{label}: {last['fracture_energy']:.6g}; {ratio}")
     return [*lines, *debonded(document, last)]

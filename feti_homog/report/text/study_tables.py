@@ -18,7 +18,7 @@ def fit_text(document: Document) -> str:
     strains = ["" if d["strain"] is None else f"({d['strain_name']} = {d['strain']:g})" for d in measured]
     data = [f"{test}{d['name']}{strain}" for test, d, strain in zip(tests, measured, strains, strict=True)]
     heads = [FIRST, tables.Column("estimate"), tables.Column("std")]
-    mark = "?" * any("intervals do not hold" in fault for fault in document["faults"])
+    mark = "?" * any("intervals fail" in fault for fault in document["faults"])
     heads += [tables.Column(f"{document['confidence']:.0%} interval{mark}", 14), tables.Column("", 12)]
     heads += [tables.Column("  determined by", -40)]
     rows = list[list[Any]]()

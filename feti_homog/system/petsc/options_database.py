@@ -113,7 +113,8 @@ def faults_of_solvers(options: Mapping[str, str]) -> list[str]:
     only then.  PETSc marks the options that the solvers read, and prints all readable ones with -help.  Options that
     print are hidden meanwhile.
     """
-    faults, viewers, database, comm = [], [*filter(values.is_viewer, options)], PETSc.Options(), PETSc.COMM_SELF
+    faults, database, comm = list[str](), PETSc.Options(), PETSc.COMM_SELF
+    viewers = [name for name in options if values.is_viewer(name) or table.SHOWING.search(name)]
     try:
         for name in viewers:
             database.delValue(name)

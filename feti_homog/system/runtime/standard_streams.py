@@ -22,6 +22,7 @@ ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGXCPU)  # the last: the limit 
 RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
 # How long the others wait for rank 0, which a library may keep from the signal: then Open MPI drops what rank 0 prints.
 SILENT_SECONDS = 5.0
+remarks = list[str]()  # that rank 0 prints where a signal ends the process
 KEPT = "\n\t"  # of the characters that are not printable; others may come from files
 
 
@@ -38,7 +39,7 @@ def end_on_signals() -> None:
     def wait_and_end() -> None:
         number = signal.sigwait(awaited)
         if launched_rank() == 0:
-            complain(f"interrupted by {signal.Signals(number).name}")
+            complain(f"interrupted by {signal.Signals(number).name}", *remarks)
         else:
             time.sleep(SILENT_SECONDS)
         file_locks.remove_files()

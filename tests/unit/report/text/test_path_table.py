@@ -40,8 +40,8 @@ def along(stresses: list[float], broke: int = 0) -> dict[str, Any]:
         ([30, 51.95, 51.75], 0, "Largest S11: 51.95 at", "; the path ends near its peak, 0.4% below it",
          "largest stress"),
         ([-30, -51.95, -51.75], 0, "Largest S11: -51.95 at", "near its peak, 0.4% below it", "largest stress"),
-        ([30, 100, 96], 1, "Largest S11: 100 at", "; 96 after the largest stress, 4.0% less (increment 2); the path ends "
-         "near its peak, 4.0% below it", "largest stress"),
+        ([30, 100, 96], 1, "Largest S11: 100 at", "; 96 after the largest stress, 4.0% less (increment 2); the path "
+         "ends near its peak, 4.0% below it", "largest stress"),
         ([30, 100, 94], 1, "Peak S11: 100 at", "; 94 after the peak, 6.0% less (increment 2)", "peak"),
         ([10, 60, 40, 59], 1, "Peak S11: 60 at", "; 40 after the peak, 33.3% less (increment 2)", "peak"),
         ([10, 60, 40, 90], 1, "Peak S11: 60 at", "; 40 after the peak, 33.3% less (increment 2); later up to 90 "

@@ -166,7 +166,7 @@ def test_a_path_is_a_table_of_chosen_points() -> None:
     assert line(text, "Dissipated").endswith("per area (GPa): 50 along all equilibria, 60 if the strain only rises")
     assert line(text, "Work") == "Work per area (GPa): 120"
     assert line(text, "Stored").endswith("per area (GPa): 70, 10 of it in springs")
-    assert line(text, "Toughness").endswith("per area (GPa): 40; 1.2500 times it was dissipated")
+    assert line(text, "Fracture energy") == "Fracture energy per area (GPa): 40; dissipated: 1.2500 times that"
     assert line(text, "Debonded") == "Debonded: 50.0 % of the interfaces"
     assert line(text, "Largest") == "Largest S22 (GPa): -350 at E22 = -0.2 (event 100); first break 0 at 0 (event"
     points[100] |= {"mesh_error": 1e-4}

@@ -50,7 +50,7 @@ def test_residuals_that_a_correct_model_hardly_has_are_a_fault(slope, residual, 
     fit = parse(tomllib.loads(BASE + TEXT + "C22 = {value = 150.0, std = 1.5}\n"), Path())
     y, std, J = np.full(2, 150.0), np.full(2, 1.5), np.array([[slope], [0.0]])
     bounds = np.array([50.0]), np.array([500.0])
-    estimates = summarize(np.array([200.0]), y + [0.0, 1.5 * residual], (y, std), J, bounds)
+    estimates = summarize(np.array([200.0]), y + 1.5 * residual * np.array([0.0, 1.0]), (y, std), J, bounds)
     found = fit_result.content(fit.unknowns, fit.data, estimates)
     stalls = slope == 0.0  # and two degrees of freedom: exp(-x / 2) = 1e-3 at 3.72^2
     words = "stalled at material.fibre.young = 200, " if stalls else "does not describe the measurements (chance"
