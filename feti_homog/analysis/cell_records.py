@@ -130,6 +130,8 @@ class SolverInfo:
     def of(cls, cell: unit_cell.TornCell, iterations: Sequence[int], reasons: Sequence[int]) -> SolverInfo:
         """Return the record of the solvers in all problems.  Collective."""
         plan, solvers = cell.summary, [problem.solver for problem in cell.problems]
+        cut = "pieces across the materials, for nothing can part" if plan.across else "bodies and pieces of bodies"
+        uncut = "one subdomain, for nothing can part: one factor of the whole cell"
         return cls(
             ranks=cell.comm.size,
             bodies=plan.bodies,
@@ -141,21 +143,13 @@ class SolverInfo:
             coarse_dim=sum(s.coarse_dimension for s in solvers),
             factorizations=cell.sum_over_ranks(sum(len(s.interface_operators.operators) for s in solvers)),
             coarse_factorizations=sum(s.natural.factorizations for s in solvers),
-            method=_method(cell),
+            method=f"{cut}: {cell.solver.method}" if cell.solver.jump_operator.global_rows else uncut,
             condition=max(s.condition for s in solvers) or None,
             rtol=cell.solver.rtol,
             solves=sum(s.solves for s in solvers),
             iterations=tuple(iterations),
             converged_reason=tuple(reasons),
         )
-
-
-def _method(cell: unit_cell.TornCell) -> str:
-    """Describe how the cell is cut and solved."""
-    if not cell.solver.jump_operator.global_rows:
-        return "one subdomain, for nothing can part: one factor of the whole cell"
-    cut = "pieces across the materials, for nothing can part" if cell.summary.across else "bodies and pieces of bodies"
-    return f"{cut}: {cell.solver.method}"
 
 
 @dataclass(frozen=True)

@@ -84,7 +84,6 @@ def _cost_lines(
     yield f"solver     {solver}"
     for rank, (count, n) in enumerate(zip(subdomains, nodes, strict=True)):
         yield f"rank {rank:<5} {_subdomains(count)}, about {2 * n} degrees of freedom"
-    yield from [f"events     each tooth of damage is one{case.fewer_events}"] if case.fewer_events else []
     columns = multipliers if plan.preconditioner == "influence" else 0
     components = [problem.components for problem in problems]
     memory = partition_policy.memory(nodes, subdomains, components, columns)

@@ -20,6 +20,7 @@ from feti_homog.interface.laws import BondLaw
 from feti_homog.interface.path import coulomb_leg, frictionless_leg, path_following, path_points
 from feti_homog.materials import voigt
 from feti_homog.results import landmarks, path_curves
+from feti_homog.system.runtime import standard_streams
 
 OF_FIBRES = ("debonded_length", "debonding_angle")  # lists of a point, kept where its fields are
 NAMED_FIBRES = 8  # most fibre names in a remark
@@ -57,6 +58,8 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
                 cell, light = context.loads.interfaces, point.broke == 0 < point.softened
                 event = path_events.stored(point, bond, responses, work, cell, _without_lists(entry))
                 context.checkpoint.write(number, *event, light=light)  # many small drops are cheap to compute again
+                line = f"{number + 1} points kept in {context.directory}: --resume goes on, plot and report show them"
+                standard_streams.remarks[:] = [line] * (context.directory is not None)
             for response, problem in zip(responses, ("", ", along the fibres"), strict=False):
                 faults = len(context.checks.faults)
                 line = context.checks.record(f"{_label(path, number)} {place}{problem}", response)

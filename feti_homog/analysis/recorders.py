@@ -21,6 +21,7 @@ CHECK_ERROR_PER_RTOL = 1e3
 MAX_CHECK_ERROR = 1e-4
 # Largest error of the KKT conditions that passes, relative to the scales of `contact.states.kkt_errors`.
 CONTACT_TOLERANCE = 1e-6
+MOST_ITERATIONS, CURE = -3, "; raise -feti_ksp_max_it"  # KSP_DIVERGED_ITS
 
 
 @dataclass
@@ -57,9 +58,10 @@ class CheckRecorder:
         if state.free_motions:
             line += f", {state.free_motions} free motions"
         if state.solution.reason < 0:
+            is_first = state.solution.reason == MOST_ITERATIONS and not any(CURE in fault for fault in self.faults)
             self.faults.append(
                 f"{name}: no convergence after {state.iterations} iterations, {jump} "
-                f"(KSPConvergedReason {state.solution.reason}); result marked"
+                f"(KSPConvergedReason {state.solution.reason}); result marked{CURE if is_first else ''}"
             )
         self.require(name, response.checks)
         return f"  {name}: {line}"

@@ -22,7 +22,7 @@ from feti_homog.homogenization import partition_policy, uniform_parts, unit_cell
 from feti_homog.results import field_file, field_parts, output_folder, result_json, xdmf
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.petsc import options_database
-from feti_homog.system.runtime import process_memory, progress_bar, records
+from feti_homog.system.runtime import process_memory, progress_bar, records, standard_streams
 from feti_homog.version import __version__
 
 # Bytes that a process keeps between cases: their release would cost a small case 10 % of its time.
@@ -47,7 +47,7 @@ def run(
     if resume:
         from feti_homog.analysis import stored_result  # loads readers that most runs do not use
 
-        if mpi_errors.on_root(comm, stored_result.finished, directory, case):
+        if mpi_errors.on_root(comm, stored_result.finished, directory, case, comm.size):
             progress.say(f"{directory} holds the finished result of this case: nothing to do")
             return Result.of(mpi_errors.on_root(comm, result_json.read, directory))
     mpi_errors.on_root(comm, output_folder.usable, directory)
@@ -130,11 +130,14 @@ def _run_and_write(
         if states.error is not None and not keep_fields:
             analysis.pop("states", None)
     result = replace(_result(context, analysis, states.fields()), result_h5=seal)
+    if states.error is not None:  # the numbers are sound, and so the status is "done"
+        result = replace(result, faults=(*result.faults, str(states.error)))
     _write(result, directory, cell)
     if states.error is not None:
         raise states.error
     if cell.case.section.is_followed and not result.faults:
         context.checkpoint.clear()
+    standard_streams.remarks.clear()
 
     def draw() -> list[Path]:
         from feti_homog.report.plots import figures  # loads Matplotlib, on this rank only

@@ -3,12 +3,13 @@
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from feti_homog.analysis.result import Result
-from feti_homog.case import Case, cases
+from feti_homog.case import Case, cases, sections, toml_files
 from feti_homog.errors import CaseError
 from feti_homog.results import checkpoints, field_file, field_guard, output_folder, result_json
+from feti_homog.schema import keys, wording
 
 
 def read(directory: Path) -> dict[str, Any]:
@@ -40,25 +41,49 @@ def check_to_draw(directory: Path) -> str:
     return ""
 
 
-def finished(directory: Path, case: Case) -> bool:
+def finished(directory: Path, case: Case, ranks: int) -> bool:
     """Return whether a folder without checkpoint has a case's whole result.  Call on one rank.
 
     Raises:
-        CaseError: the result is damaged, or belongs to another case.
+        CaseError: the result is damaged or belongs to another case, the checkpoint also to another number of ranks.
     """
-    if (directory / checkpoints.FOLDER).is_dir() or not (directory / result_json.NAME).is_file():
+    path = directory / checkpoints.FOLDER / checkpoints.NAME
+    if path.parent.is_dir():
+        try:
+            content = next(checkpoints.records(path), (0, b""))[1] if path.is_file() else b""
+        except CaseError as error:
+            raise CaseError(f"--resume: {error}") from error
+        signature, _, opening = content.decode().partition("\n")
+        is_alike = f"case {case.digest(False)}," in signature and f" on {ranks} ranks" in signature
+        if opening and not is_alike:  # events are the same for any [output]
+            _refuse_other(f"{directory} holds the events", result_json.loads(opening), case, ranks, "output")
         return False
-    result = _restored(directory, result_json.read(directory))
+    if not (directory / result_json.NAME).is_file():
+        return False
+    result = _restored(directory, document := result_json.read(directory))
     if result.digest != case.digest():
-        now = case.resolved()
-        changed = [f"[{k}]" for k in now if k not in ("name", "petsc") and now[k] != result.case.get(k)]
-        where = f", which differs in {', '.join(changed)}" if changed else ""
-        raise CaseError(f"--resume: {directory} holds the result of another case{where}; choose another folder")
+        _refuse_other(f"{directory} holds the result", document, case, result.solver.ranks)
     if case.output.fields:
         if not (directory / field_file.NAME).exists():
             return False
         _check_fields(directory, result)
     return result.status == "done"
+
+
+def _refuse_other(start: str, stored: Mapping[str, Any], case: Case, ranks: int, skipped: str = "name") -> NoReturn:
+    """Raise CaseError with the keys in which a case differs from a stored one, and other `ranks`."""
+    idle = [("output", name) for name, entry in keys.keys_of(sections.Output).items() if entry.presentation]
+    idle += [("path", "max_events"), ("cell", "file"), ("cell", "match")]  # the digest has the content of files
+    before, now = (
+        {path: value for path, value in toml_files.leaves(document | {"ranks": count})
+         if path[0] not in ("name", "petsc", skipped) and path not in idle}
+        for document, count in ((stored["case"], stored["solver"]["ranks"]), (case.resolved(), ranks))
+    )  # fmt: skip
+    pairs = {path: (before.get(path, "none"), now.get(path, "none")) for path in now | before}
+    lines = [f"{wording.dotted_key(path)}: {wording.toml_value(old)} now {wording.toml_value(new)}"
+             for path, (old, new) in pairs.items() if old != new]  # fmt: skip
+    where = f", which differs in {', '.join(lines)}" if lines else ""
+    raise CaseError(f"--resume: {start} of another case{where}; choose another folder")
 
 
 def _restored(directory: Path, document: Mapping[str, Any]) -> Result:

@@ -88,7 +88,7 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     except CaseError as error:
         faults += [f"[cell] match: {fault}" for fault in error.faults]
         return cell
-    if not random_fibres.knows_neighbours(window):
+    if not random_fibres.nearest_neighbours(window, random_fibres.SHELLS).weights.any(axis=0).all():
         faults.append(f"{given}: the window is too small to find the nearest and second neighbours of any fibre")
     if cell.fibres is None and window.count < FEWEST_MATCHED:
         faults.append(f"[cell] fibres = {window.count}: expected at least {FEWEST_MATCHED} with match")

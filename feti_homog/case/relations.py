@@ -81,7 +81,7 @@ def stress_free(
 ) -> tuple[str, ...]:
     """List the components that loads leave free of stress, one line per waypoint."""
     first = load_sections.first_named(tuple(placed.values()), plane)
-    words = ["", *(f"stress-free until {place}" for place in [*placed][1:]), "never named: stress-free"]
+    words = ["", *(f"stress-free before the leg to {place}" for place in [*placed][1:]), "never named: stress-free"]
     unnamed = {k: [name for name, number in first.items() if number == k] for k in range(1, len(words))}
     return tuple(f"[{section}] {', '.join(names)}: {words[k]}" for k, names in unnamed.items() if names)
 

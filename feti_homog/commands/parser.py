@@ -37,8 +37,8 @@ COLLECT_HELP = (
 FIT_HELP = (
     "Fit the unknowns of a file to measured values by least squares, with exact derivatives where there are some. "
     "Every evaluation is kept: the same command resumes. Prints estimates with confidence intervals, their "
-    "correlation, and measured beside computed values; unknowns that the data do not determine are named, with exit "
-    "code 3."
+    "correlation, and measured beside computed values. Exit code 3 with the names of unknowns that the data do not "
+    "determine, and for a model that does not describe the data (a chance below 1e-3)."
 )
 SCATTER_HELP = (
     "Find the scatter of the constants, onsets and peaks of a case whose numbers are {mean, std} or {mean, cv}, with "
@@ -102,7 +102,9 @@ def _add_products(commands: argparse._SubParsersAction[Parser]) -> None:
     )
     plot.add_argument("--state", type=integer, metavar="N", help="draw state N of result.h5 alone, counted from 0")
     stresses = ("S11", "S22", "S12", "S33", "S23", "S13")
-    plot.add_argument("--component", choices=stresses, metavar="NAME", help="stress to draw: S11, S22, S12, ...")
+    plot.add_argument(
+        "--component", choices=stresses, metavar="NAME", help="stress to draw: S11, S22, S12, ... (von Mises: `fields`)"
+    )
     plot.add_argument("--size", type=size, metavar="WxH", help="width and height in centimetres, such as 9x7")
     plot.add_argument("--title", metavar="TEXT", help='title of the pictures; "" for none')
     fields.add_argument(
@@ -174,10 +176,9 @@ def integer(word: str) -> int:
 
 
 def size(word: str) -> tuple[float, float]:
-    """Convert a word such as 9x7.5 to two lengths above zero.  Raises ValueError."""
-    if not re.fullmatch(r"[0-9]{1,3}(\.[0-9]{1,3})?x[0-9]{1,3}(\.[0-9]{1,3})?", word):
-        raise ValueError
+    """Convert a word such as 9x7.5 to two lengths.  Raises ArgumentTypeError."""
+    is_pair = re.fullmatch(r"[0-9]{1,3}(\.[0-9]{1,3})?x[0-9]{1,3}(\.[0-9]{1,3})?", word)
+    if not is_pair or min(map(float, word.split("x"))) < 2.0:  # less than a picture's text needs
+        raise argparse.ArgumentTypeError(f"{word!r}: expected width and height of at least 2 cm, such as 9x7")
     width, height = map(float, word.split("x"))
-    if min(width, height) < 2.0:  # less than a picture's text needs
-        raise ValueError
     return width, height

@@ -219,7 +219,7 @@ class FetiSolver:
         solution = self.completed(solution)
         assert solution.alpha is not None
         u = self._torn_displacement @ solution.strain - self.operator.displacement(solution.lam)
-        return np.asarray(u + self.natural.rigid_body_motion(solution.alpha))
+        return np.asarray(u + self.natural.R @ solution.alpha[self.natural.owned_modes])
 
     def displacement(self, solution: DualSolution) -> Float:
         """Compute the displacements u* (local dofs,), Eq. (34).  Collective; the first call may factor interiors."""

@@ -108,7 +108,8 @@ class SolverPlan:
             return "influence columns, an inverse of the bonded cell"
         if self.preconditioner == BONDED:
             return "inverse of the assembled Schur complement, no iterations"
-        return f"{self.preconditioner} preconditioner, {'adaptive' if self.adaptive else 'natural'} coarse space"
+        name = "no" if self.preconditioner == "none" else self.preconditioner
+        return f"{name} preconditioner, {'adaptive' if self.adaptive else 'natural'} coarse space"
 
 
 def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds = DEFAULTS) -> SolverPlan:

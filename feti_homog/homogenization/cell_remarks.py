@@ -96,17 +96,20 @@ def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles
     return (f"[decomposition] subdomains = {asked}: {subdomains} were made: {why}",)
 
 
-def table_remarks(case: Case) -> tuple[str, ...]:
-    """Note a fibre fraction that differs from the fraction of the matched table."""
-    cell = case.cell
+def case_remarks(case: Case) -> tuple[str, ...]:
+    """Note the teeth that follow from a tolerance, and a fibre fraction other than that of the matched table."""
+    cell, lines = case.cell, tuple[str, ...]()
+    if phase_laws.has_softening(case) and case.interfaces[0].teeth is None:
+        count = len(vars(phase_laws.bond_law(case.interfaces, np.zeros(0, np.int64)))["levels"]) - 1
+        lines = (f"[interface] softening_tolerance = {case.interfaces[0].softening_tolerance:g}: {count} teeth a bond",)
     if cell.match is None or cell.matched is None or cell.fibre_fraction is None:
-        return ()
+        return lines
     fraction = cell.matched.fibre_fraction
     remark = (
         f"[cell] fibre_fraction = {cell.fibre_fraction:g}: {cell.match.name} has {fraction:.4g}; neighbours are as far "
         "away as there, in diameters"
     )
-    return (remark,) if abs(cell.fibre_fraction / fraction - 1.0) > SAME_RATIO else ()
+    return (*lines, remark) if abs(cell.fibre_fraction / fraction - 1.0) > SAME_RATIO else lines
 
 
 def longest(ends: Float) -> float:
@@ -188,10 +191,11 @@ def _law_warnings(case: Case) -> list[str]:
                 f"changes depends on the way; expected {similar * bond.normal_stiffness:.7g}, of normal_stiffness "
                 "(normal_toughness / tangential_toughness) (tangential_strength / normal_strength)^2"
             )
-    excess, tolerance = law.overshoot, case.interfaces[0].softening_tolerance
-    if excess > tolerance * (1.0 + SAME_RATIO):
+    bond, most = case.interfaces[0], interface_section.InterfaceSection.softening_tolerance
+    if law.overshoot > most * (1.0 + SAME_RATIO):
+        cause = f"softening_tolerance = {bond.softening_tolerance:g}" if bond.teeth is None else f"teeth = {bond.teeth}"
         lines.append(
-            f"[interface] teeth = {case.interfaces[0].teeth}: the first exceeds the peak traction by {excess:.1%}, "
-            f"softening_tolerance is {tolerance:.1%}; without teeth the program chooses their number"
+            f"[interface] {cause}: the first tooth exceeds the peak traction by {law.overshoot:.1%}, and so may the "
+            f"peak of the cell; by default at most by {most:.1%}"
         )
     return lines

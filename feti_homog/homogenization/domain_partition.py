@@ -174,7 +174,7 @@ def distribute(
         origin=mesh.origin,
         voids=coarse_mesh.voids(mesh) if torus.at_void.any() else 0,
         match_distance=match_distance(case, mesh.width, mesh.height, centres[is_fibre], circles[is_fibre, 2]),
-        remarks=(*cell_remarks.table_remarks(case), *cell_remarks.mesh_remarks(case, torus, pairs), *notes),
+        remarks=(*cell_remarks.case_remarks(case), *cell_remarks.mesh_remarks(case, torus, pairs), *notes),
         across=across,
         interface_nodes=_interface_nodes(torus, pairs, lattice) if across else None,
     )
@@ -212,7 +212,7 @@ def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triang
         match_distance=match_distance(case, regions.width, regions.height, centres[is_fibre], radii[is_fibre]),
         remarks=(
             *arrangement.remarks,
-            *cell_remarks.table_remarks(case),
+            *cell_remarks.case_remarks(case),
             *cell_remarks.subdomain_remarks(case, len(regions.phase), subdomains, triangles),
         ),
     )

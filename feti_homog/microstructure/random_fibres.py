@@ -97,11 +97,6 @@ def nearest_neighbours(pattern: FibrePattern, count: int = 3) -> NearestNeighbou
     return NearestNeighbours(distances, directions, raw / np.where(total > 0, total, 1.0))
 
 
-def knows_neighbours(measured: FibrePattern) -> bool:
-    """Return whether distances to nearest and second nearest neighbours count in a pattern."""
-    return bool(nearest_neighbours(measured, SHELLS).weights.any(axis=0).all())
-
-
 def wanted_distances(measured: FibrePattern, count: int) -> Float:
     """Return the quantiles (count, SHELLS) of the neighbour distances in a pattern.
 

@@ -30,9 +30,9 @@ LONGEST = "case_minus_temperature.png"  # longest file name of a run
 RESULT_FILE = re.compile(
     r"report\.html|events\.log|result\.(json|h5|xdmf)|interface\.xdmf"
     r"|(angle|path|load|envelope)\.csv|path\.gif"
-    r"|(cell|partition|mesh_error|sensitivities|energy|interface|load|envelope|(angle|path)(_states)?)\.png"
+    r"|(cell|partition|mesh_error|sensitivities|energy|interface|load|envelope|(angle|path)(_states)?)\.(png|pdf|svg)"
     r"|(cell|interface)(_\d{4,}\.vtu|\.pvd|\.vtkhdf)"
-    rf"|case_(minus_)?({'|'.join(voigt.SPATIAL_STRAINS)}|temperature)\.png|state_\d+\.png"
+    rf"|case_(minus_)?({'|'.join(voigt.SPATIAL_STRAINS)}|temperature)\.(png|pdf|svg)|state_\d+\.(png|pdf|svg)"
 )
 # Files that show that a run has written to the folder.
 SIGNS = (result_json.NAME, field_file.NAME, LOG, LOCK)
@@ -202,7 +202,11 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
 
 
 def remove_other_results(directory: Path, written: Collection[str]) -> None:
-    """Remove the result files whose names are not in `written`.  Call on one rank."""
+    """Remove the result files whose names are not in `written`, and events without a log.  Call on one rank."""
+    if LOG not in written and (directory / "checkpoint").is_dir():
+        from feti_homog.results import checkpoints  # only paths have checkpoints
+
+        checkpoints.remove(directory)
     for path in directory.iterdir():
         if RESULT_FILE.fullmatch(path.name) and path.name not in written and not path.is_dir():
             with contextlib.suppress(OSError):

@@ -24,6 +24,7 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
 # Names of quantities and old keys for which this program has no key, with a hint.
 ABSENT = {
     "g": "it follows from young and poisson",
+    **{f"e{ij}": f"expected a shear strain as gamma{ij} = 2 E{ij}" for ij in (12, 13, 23)},
     "cone": "Coulomb's cone of both shears is round, so no path is straight between changes",
     "axial_friction": "leave it out: debonded faces slip freely along the fibres",
     "accuracy_check": "leave it out: a remark names the mesh that would do",

@@ -74,8 +74,11 @@ def run_all(
     states = mpi_errors.on_root(comm, lambda: [case_folders.case_state(directory, entry) for entry in sweep.entries])
     failed = [(entry, state) for entry, state in zip(sweep.entries, states, strict=True) if state.status.is_failure]
     if comm.rank == 0 and quiet is False:
-        done = sum(state.status is case_folders.Status.DONE for state in states)
-        standard_streams.say(f"{done} of {len(states)} cases done in {directory}")
+        done, first = sum(state.status is case_folders.Status.DONE for state in states), dict[str, str]()
+        for entry, state in zip(sweep.entries, states, strict=True):
+            for line in (state.document or {}).get("warnings", ()):  # one of each setting, which stands before a colon
+                first.setdefault(line.partition(": ")[0], f"warning: {entry.folder}: {line}")
+        standard_streams.say("\n".join([*first.values(), f"{done} of {len(states)} cases done in {directory}"]))
     if failed:
         if comm.rank == 0:
             standard_streams.say("\n".join(case_folders.failure_lines(failed, sweep.stress_unit)))

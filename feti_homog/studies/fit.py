@@ -16,8 +16,8 @@ import numpy as np
 from feti_homog.case import interface_section, sections, toml_files
 from feti_homog.materials import engineering_constants, voigt
 from feti_homog.report.text import study_tables
-from feti_homog.results import atomic
-from feti_homog.studies import estimation, fit_result
+from feti_homog.results import atomic, result_json
+from feti_homog.studies import case_folders, estimation, fit_result
 from feti_homog.studies.axes import Assignment, rounded
 from feti_homog.studies.predictions import Datum, exact_derivatives, predicted
 from feti_homog.studies.study import SILENT, Evaluator, Study
@@ -111,7 +111,8 @@ class Fit(Study):
             from feti_homog.studies import pictures  # only a rank that draws loads Matplotlib
 
             document = {"name": self.name, **fit_result.content(self.unknowns, self.data, estimates)}
-            atomic.replace_text(evaluator.directory / "measured.csv", fit_result.measured_csv(document))
+            rows = [[datum[name] for name in fit_result.HEAD] for datum in document["measured"]]
+            atomic.replace_text(evaluator.directory / "measured.csv", result_json.csv_text([fit_result.HEAD, *rows]))
             pictures.draw_fit(evaluator.directory / "fit.png", document)
             return document
 

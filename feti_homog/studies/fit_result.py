@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from feti_homog.case import sections
-from feti_homog.results import result_json
 from feti_homog.studies.estimation import CONFIDENCE, ParameterEstimates, names_of
 from feti_homog.studies.predictions import Datum
 
+LEAST_CHANCE = 1e-3  # of residuals as large, below which the model is refused
 HEAD = ("test", "name", "strain", "value", "std", "computed", "residual")
 
 
@@ -18,7 +18,13 @@ def content(
 ) -> dict[str, Any]:
     """Return the content of fit.json without its name; numbers that are not finite are None."""
     faults = [] if estimates.converged else [f"no minimum after {estimates.evaluations} evaluations"]
-    faults += names_of(estimates.undetermined, [*unknowns])
+    misfits = estimates.chance is not None and estimates.chance < LEAST_CHANCE
+    if misfits and estimates.undetermined:
+        place = ", ".join(f"{name} = {value:.6g}" for name, value in zip(unknowns, estimates.x, strict=True))
+        faults.append(f"the search stalled at {place}, where the values change in jumps or not at all: start elsewhere")
+    elif misfits:
+        faults.append(f"the model does not describe the measurements (chance {estimates.chance:.2g}): intervals fail")
+    faults += [] if misfits else names_of(estimates.undetermined, [*unknowns])
     faults += [
         f"[unknown] {name}: the measured values hardly determine it: its standard deviation {std:.3g} is more than the "
         f"width {unknown.upper - unknown.lower:.3g} of its bounds"
@@ -57,8 +63,3 @@ def content(
 
 def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
-
-
-def measured_csv(document: Mapping[str, Any]) -> str:
-    """Return the table of measured and computed values as CSV text."""
-    return result_json.csv_text([HEAD, *([datum[name] for name in HEAD] for datum in document["measured"])])

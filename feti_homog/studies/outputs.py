@@ -213,6 +213,8 @@ OUTPUT_COLUMNS = (
     Column("seconds_STAGE", "s", "wall time of a stage, the largest over ranks"),
     Column("memory", "bytes", "peak resident memory, the largest over ranks"),
 )
+
+
 COLUMNS = (*CASE_COLUMNS, *INPUT_COLUMNS, *OUTPUT_COLUMNS)
 STATISTICS_COLUMNS = (
     Column("point", "", "number of the point, from 1"),

@@ -10,7 +10,7 @@ import json
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -36,6 +36,7 @@ class Evaluator:
     ranks_per_case: int
     retry: bool
     quiet: bool
+    warnings: list[str] = field(default_factory=list)  # about the first cases
 
     def results(self, name: str, sweep: Sweep) -> list[dict[str, Any]]:
         """Run the sweep cases in the subfolder `name`.  Collective.
@@ -45,10 +46,15 @@ class Evaluator:
         """
         folder = self.directory / name
         case_runs.run_all(sweep, folder, self.comm, self.ranks_per_case, self.retry, quiet=self.quiet or None)
-        states = mpi_errors.on_root_only(
+        documents = mpi_errors.on_root_only(
             self.comm, lambda: [case_folders.case_state(folder, entry).document or {} for entry in sweep.entries]
         )
-        return states or []
+        if not self.warnings:
+            lines = dict.fromkeys(line for document in documents or () for line in document.get("warnings", ()))
+            self.warnings.extend(self.comm.bcast([*lines]))
+            if self.comm.rank == 0 and not self.quiet and lines:
+                standard_streams.say("\n".join(f"warning: {line}" for line in lines))
+        return documents or []
 
 
 @dataclass(frozen=True)
@@ -139,7 +145,8 @@ class Study(ABC):
             directory, comm, lambda line: standard_streams.complain(line) if comm.rank == 0 else None
         ):
             mpi_errors.on_root(comm, begin)
-            document = head | self.answer(Evaluator(directory, comm, size, retry, quiet))
+            evaluator = Evaluator(directory, comm, size, retry, quiet)
+            document = head | self.answer(evaluator) | {"warnings": evaluator.warnings}
             mpi_errors.on_root_only(comm, atomic.replace_text, path, result_json.dumps(document))
         if comm.rank == 0 and not quiet:
             standard_streams.say(self.text(document))

@@ -20,6 +20,7 @@ import numpy as np
 from feti_homog.case import sections, toml_files
 from feti_homog.errors import CaseError
 from feti_homog.report.text import constant_tables, study_tables
+from feti_homog.results import landmarks
 from feti_homog.schema import wording
 from feti_homog.studies.axes import Assignment, read_points
 from feti_homog.studies.predictions import Datum, exact_derivatives, responses
@@ -54,7 +55,7 @@ class ScatterStudy(Study):
     def differing(self, names: Sequence[str]) -> Sweep:
         """Return the cases one standard deviation below and above the mean of each number."""
         ends = [(name, self.means[name] + sign * self.uncertainty.std[name]) for name in names for sign in (-1, 1)]
-        return self.cases([{_path(name): end} for name, end in ends], mesh_error=False)
+        return self.cases([{tuple(name.split(".")): end} for name, end in ends], mesh_error=False)
 
     def identity(self, cases: list[str]) -> Any:
         return [cases, self.uncertainty.to_table()]
@@ -158,7 +159,7 @@ def parse(values: Mapping[str, Any], folder: Path) -> ScatterStudy:
         places & {*SECTIONS} or "cell.fibre_fraction" in uncertainty.std
     ):
         output["sensitivities"] = True
-    means = {name: number_at(document, _path(name)) or 0.0 for name in uncertainty.std}
+    means = {name: number_at(document, tuple(name.split("."))) or 0.0 for name in uncertainty.std}
     study = ScatterStudy(document, folder, uncertainty, means, settings.realisations)
     for name, std in uncertainty.std.items():  # cases one standard deviation from the means
         if not output.get("sensitivities") or name.partition(".")[0] not in SECTIONS:
@@ -178,14 +179,14 @@ def is_study(values: Mapping[str, Any]) -> bool:
     return sections.UNCERTAINTY in document or bool(read_uncertainty(document, []).std)
 
 
-def _path(name: str) -> toml_files.TomlPath:
-    return tuple(name.split("."))
-
-
 def _data(documents: Documents) -> list[Datum]:
-    """Return placeholder data for the numbers that all results have."""
+    """Return placeholder data for the numbers that all results have, of a path in the leading component."""
     named = [responses(document) for document in documents]
-    return [Datum(0, name, 0.0, 1.0) for name in named[0] if all(name in values for values in named)]
+    names = [name for name in named[0] if all(name in values for values in named)]
+    if "path" in documents[0]:  # others are largest at other points, or differ from zero by the mesh alone
+        peak = landmarks.peak_of(documents[0])
+        names = [n for n in names if n.partition("_")[2] in ("load_factor", peak["stress_name"], peak["strain_name"])]
+    return [Datum(0, name, 0.0, 1.0) for name in names]
 
 
 def _values(documents: Documents, data: Sequence[Datum]) -> Float:

@@ -280,6 +280,6 @@ def _reading(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise input_files.unreadable(path, error) from error
-    except (AttributeError, RuntimeError, KeyError, ValueError, TypeError) as error:
+    except (AttributeError, RuntimeError, LookupError, ValueError, TypeError) as error:
         message = error.args[0] if error.args else error
         raise CaseError(f"cannot read {path}: {' '.join(str(message).split())}") from error

@@ -102,6 +102,7 @@ def test_no_convergence_ends_with_3_and_keeps_what_was_computed(tmp_path, ranks)
     job = command_line(ranks, "run", case, "--out", out, "-feti_ksp_max_it", "2")
     assert job.returncode == 3
     assert job.stderr.count("error: E11: no convergence after 2 iterations") == 1
+    assert job.stderr.count("; raise -feti_ksp_max_it\n") == 1
     document = json.loads((out / "result.json").read_text())
     assert document["status"] == "not converged"
     assert document["solver"]["iterations"] == [2, 2, 2]

@@ -174,6 +174,16 @@ def test_a_finished_run_is_left_alone(tmp_path, reference):
     assert before == {path.name: path.stat().st_mtime_ns for path in reference.iterdir()}
 
 
+def test_an_interrupted_path_says_what_is_kept(tmp_path):
+    out = tmp_path / "out"
+    with HookedJob(0, [Hook(WRITE, WAIT, when="args[1] == 2")], "run", case_file(tmp_path), "--out", out) as job:
+        assert job.reported() == "0 here"
+        job.process.terminate()
+        ended = job.ended()
+    line = f"2 points kept in {out}: --resume goes on, plot and report show them"
+    assert ended.stderr == f"interrupted by SIGTERM\n{line}\n" and events.count(out) == 2
+
+
 def test_without_checkpoint_or_resume_a_run_begins_anew(tmp_path, interrupted):
     coarse = case_file(tmp_path, name="coarse", mesh_size="mesh_size = 0.2")
     job = command_line(2, "run", coarse, "--out", tmp_path / "new", "--resume")
@@ -186,10 +196,10 @@ def test_without_checkpoint_or_resume_a_run_begins_anew(tmp_path, interrupted):
 @pytest.mark.parametrize(
     ("ranks", "changes", "message"),
     [
-        (2, {"normal_strength": "normal_strength = 4.1"}, "is of another run: expected case"),
-        (2, {"refine": "refine = 1"}, "is of another run: expected case"),
-        (1, {}, "on 1 ranks"),
-        (2, {r"\[output\]": "[decomposition]\nsubdomains = 4\n\n[output]"}, "is of another run"),
+        (2, {"normal_strength": "normal_strength = 4.1"}, "differs in interface.normal_strength: 4.0 now 4.1; choose"),
+        (2, {"refine": "refine = 1"}, "differs in cell.refine: 0 now 1; choose"),
+        (1, {}, "differs in ranks: 2 now 1; choose"),
+        (2, {r"\[output\]": "[decomposition]\nsubdomains = 4\n\n[output]"}, "decomposition.subdomains: "),
     ],
 )
 def test_checkpoints_of_another_case_are_refused(tmp_path, interrupted, ranks, changes, message):
@@ -202,7 +212,7 @@ def test_checkpoints_of_another_case_are_refused(tmp_path, interrupted, ranks, c
     kept = events.count(tmp_path / "out")
     job = command_line(ranks, "run", tmp_path / "case.toml", "--out", tmp_path / "out", "--resume")
     assert job.returncode == 2 and message in job.stderr and "Traceback" not in job.stderr
-    assert job.stderr.count("error: --resume:") == 1
+    assert job.stderr.count("error: --resume:") == 1 and "coarse triangles" not in job.stdout  # before meshing
     assert events.count(tmp_path / "out") == kept
 
 
@@ -219,7 +229,7 @@ def test_a_path_does_not_go_on_with_another_mesh(tmp_path):
     kept = events.count(tmp_path / "out")
     shutil.copy(meshes / "two_fibres.msh", mesh)
     job = command_line(2, *words, "--resume")
-    assert kept > 0 and job.returncode == 2 and "is of another run: expected case" in job.stderr
+    assert kept > 0 and job.returncode == 2 and "the events of another run; choose" in job.stderr
     assert "Traceback" not in job.stderr and events.count(tmp_path / "out") == kept
 
 

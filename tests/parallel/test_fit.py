@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support.fitted_composites import COMPOSITES, fit, model, truth
 
-from feti_homog import CaseError, ConvergenceError, run, run_fit
+from feti_homog import CaseError, ConvergenceError, run, run_fit, run_sweep
 from feti_homog.studies import case_runs, fit_file
 from feti_homog.studies.predictions import exact_derivatives, predicted
 from feti_homog.system.parallel.mpi_errors import on_root
@@ -48,6 +48,21 @@ def test_a_shear_modulus_is_fitted_to_plies_that_were_made_with_a_ratio(comm, sh
     document["unknown"] = {"material.fibre.G_transverse": {"start": 9.0, "lower": 4.0, "upper": 20.0}}
     found = run_fit(document, shared_path / "out", comm)["unknowns"]["material.fibre.G_transverse"]
     assert found["estimate"] == pytest.approx(14.0 / (2 * 1.25), rel=1e-6)
+
+
+def test_warnings_of_the_first_cases_are_printed_once_and_kept(comm, shared_path, glass, capsys):
+    document = glass | {"petsc": {"feti_ksp_rtol": 2e-7}}
+    kept = run_fit(document, shared_path / "out", comm, quiet=False)["warnings"]
+    printed = capsys.readouterr().out.splitlines()
+    assert len(kept) == 1 and kept[0].startswith("-feti_ksp_rtol 2e-07 asks for less than the checks do")
+    assert printed.count(f"warning: {kept[0]}") == (comm.rank == 0)
+    sweep = {name: document[name] for name in ("cell", "analysis", "petsc")}
+    sweep["material"] = {phase: {"young": 3.0, "poisson": 0.3} for phase in ("matrix", "fibre")}
+    run_sweep(sweep | {"sweep": {"cell": {"refine": [0, 1]}}}, shared_path / "sweep", comm, quiet=False)
+    printed = capsys.readouterr().out.splitlines()
+    assert printed.count(f"warning: case-0001: {kept[0]}") == (comm.rank == 0) and "warning: case-0002" not in str(
+        printed
+    )
 
 
 def test_an_interrupted_fit_goes_on_with_what_it_has(comm, shared_path, glass, monkeypatch):

@@ -117,6 +117,9 @@ def test_every_file_may_be_the_one_that_does_not_fit(comm, shared_path, capsys, 
     told_once(comm, capsys, ["error: cannot write ", f"{name}: No space left on device"])
     count = events.count(out)
     parallel_assert(comm, count == 2 if name == "events" else count > 2)
+    if name == "result.h5":
+        document = json.loads((out / "result.json").read_text())
+        assert document["status"] == "done" and "result.h5: No space left on device" in document["faults"][0]
     later = ("result.json", "events")
     parallel_assert(comm, (out / "result.json").exists() == (name not in later) and not (out / name).exists())
     comm.barrier()
@@ -156,7 +159,8 @@ def test_numbers_survive_when_the_fields_do_not_fit(comm, shared_path, capsys):
     told_once(comm, capsys, ["error: cannot write ", "result.h5: File too large"])
     if comm.rank == 0:
         document = json.loads((out / "result.json").read_text())
-        assert document["status"] == "done" and document["path"][-1]["load_factor"] == 1.0
+        assert document["status"] == "done" and "result.h5: File too large" in document["faults"][0]
+        assert document["path"][-1]["load_factor"] == 1.0
         assert (
             "result_h5" not in document
             and "states" not in document

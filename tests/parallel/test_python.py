@@ -110,7 +110,9 @@ def test_a_finished_run_is_no_answer_to_a_case_that_asks_for_more(comm, shared_p
     document["output"] |= {"length_unit": "mm"}
     assert run(Case.parse(document), comm, out=shared_path / "out", resume=True).sensitivities is None
     document["output"] |= {"sensitivities": True}
-    with pytest.raises(CaseError, match=r"holds the result of another case, which differs in \[output\]; choose"):
+    with pytest.raises(
+        CaseError, match=r"holds the result of another case, which differs in output.sensitivities: false now true; c"
+    ):
         run(Case.parse(document), comm, out=shared_path / "out", resume=True)
 
 

@@ -123,11 +123,6 @@ class NaturalCoarseSpace:
         projected: Float = x - self._G @ self.solver.solve(self._GT @ x)
         return projected
 
-    def rigid_body_motion(self, amplitudes: Float) -> Float:
-        """Compute R alpha on the boundary dofs for alpha (m,) or (m, k)."""
-        motion: Float = self.R @ amplitudes[self.owned_modes]
-        return motion
-
     def destroy(self) -> None:
         """Free the factor of G^T G.  Collective."""
         self.solver.destroy()

@@ -73,7 +73,8 @@ def partition(cell: drawn_cell.DrawnCell) -> Figure:
     colours = np.column_stack([(1.0 - tones) * base[rank_of] + tones, np.ones(parts)])
     picture, axes = _outlined(cell, colours[drawn.subdomain])
     plot_helpers.draw_segments(axes, drawn.points[decimation.outline_edges(drawn, drawn.subdomain)], "black", 0.5)
-    text = f"{_count(drawn.body.max() + 1, 'body', 'bodies')} in {_count(parts, 'part', 'parts')}"
+    text = _count(bodies := drawn.body.max() + 1, "body", "bodies")
+    text += f" in {parts} parts" if parts != bodies else ""
     axes.set_title(_title(cell.file.attrs, f"{text} on {_count(len(ranks), 'rank', 'ranks')}"))
     entries = [Patch(facecolor=0.55 * base[k] + 0.45, edgecolor="black", label=f"rank {k}") for k in ranks[:IN_LEGEND]]
     if len(entries) > 1:

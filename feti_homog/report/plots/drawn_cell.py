@@ -137,7 +137,7 @@ def figure_of(attributes: Any) -> tuple[Figure, Axes]:
 
     The places are given in inches: a layout engine would draw all text twice to find them.
     """
-    width, height = cell_size(attributes)
+    width, height = (cell_scale(attributes) * float(attributes[name]) for name in ("width", "height"))
     size = width + 1.9, max(height, width / 4) + 1.2
     figure, sides = Figure(figsize=size), {"left": 0.7 / size[0], "right": (0.7 + width) / size[0]}
     return figure, figure.subplots(gridspec_kw=sides | {"bottom": 0.6 / size[1], "top": 1.0 - 0.6 / size[1]})
@@ -154,12 +154,6 @@ def legend_below(axes: Axes, handles: Sequence[Any], columns: int) -> None:
 def cell_scale(attributes: Any) -> float:
     """Return the inches in the picture per length unit of the cell."""
     return 4.8 / max(float(attributes["width"]), float(attributes["height"]))
-
-
-def cell_size(attributes: Any) -> tuple[float, float]:
-    """Return the width and height of the cell in the picture, in inches."""
-    scale = cell_scale(attributes)
-    return scale * float(attributes["width"]), scale * float(attributes["height"])
 
 
 def label_cell_axes(axes: Axes, attributes: Any) -> None:

@@ -74,7 +74,8 @@ def of_fields(
 
     if chosen is not None:
         if str(chosen) not in states:
-            raise CaseError(f"--state {chosen}: expected a state from 0 to {len(states) - 1} of {directory}")
+            labels = ", ".join(f"{number} ({state.attrs['label']})" for number, state in states.items())
+            raise CaseError(f"--state {chosen}: expected the number of a state of {directory}: {labels}")
         return [save(cell_picture.deformed(cell, states[str(chosen)], document), f"state_{chosen}")]
     pictures = {"cell": cell_picture.figure, "partition": cell_picture.partition, "mesh_error": cell_picture.mesh_error}
     figures = ((name, draw(cell)) for name, draw in pictures.items())

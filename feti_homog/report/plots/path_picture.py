@@ -68,7 +68,11 @@ def figure(document: Document) -> Figure:
         axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
         plot_helpers.finish_curves(axes)
     upper.margins(y=0.12)  # room for numbers
-    _number_points(upper, curve, numbers)
+    text: dict[str, Any] = {"color": "0.3", "fontsize": 7, "ha": "center", "va": "center", "bbox": LEGIBLE}
+    pointer: dict[str, Any] = {"arrowstyle": "-", "color": "0.3", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
+    for number, rise in zip(numbers, np.diff(curve[numbers, 1], prepend=0.0), strict=True):
+        offset = (-6, 16) if rise >= 0.0 else (16, -12)  # clear of the curve at peaks and at the ends of drops
+        upper.annotate(str(number), curve[number], offset, textcoords="offset points", arrowprops=pointer, **text)
     if "damaged_share" in points[0]:  # softening laws have damaged bonds that hold
         right = lower.twinx()
         right.plot(strain, [p["damaged_share"] for p in points], color="0.5", linestyle="--", linewidth=1.0)
@@ -129,15 +133,6 @@ def _records(document: Document) -> Array | None:
         return None
     load = np.array([point["load_factor"] for point in document["path"]])
     return np.flatnonzero(load >= np.maximum.accumulate(load))
-
-
-def _number_points(axes: Axes, curve: Array, numbers: Sequence[int]) -> None:
-    """Write point numbers with lines to a curve (points, 2)."""
-    style: dict[str, Any] = {"color": "0.3", "fontsize": 7, "ha": "center", "va": "center", "bbox": LEGIBLE}
-    pointer: dict[str, Any] = {"arrowstyle": "-", "color": "0.3", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
-    for number, rise in zip(numbers, np.diff(curve[numbers, 1], prepend=0.0), strict=True):
-        offset = (-6, 16) if rise >= 0.0 else (16, -12)  # clear of the curve at peaks and at the ends of drops
-        axes.annotate(str(number), curve[number], offset, textcoords="offset points", arrowprops=pointer, **style)
 
 
 def energies(document: Document) -> Figure | None:

@@ -182,7 +182,7 @@ def value_range(values: Array, areas: Array | None = None) -> tuple[Normalize, s
         colour range, and the ends of the range beyond which values lie.
     """
     low, high = float(values.min()), float(values.max())
-    if _is_uniform(values):
+    if np.ptp(values) <= 0.01 * max(np.abs(values).max(), 1e-300):
         middle = 0.5 * (low + high)
         half = 0.5 * (abs(middle) or 1.0)
         return Normalize(middle - half, middle + half), "neither"
@@ -192,16 +192,8 @@ def value_range(values: Array, areas: Array | None = None) -> tuple[Normalize, s
     bottom, top = np.interp([OUTLIERS, 1.0 - OUTLIERS], below / max(float(below[-1]), 1e-300), values[order]).tolist()
     slack = 0.05 * (top - bottom)
     bottom, top = (low if bottom - low < slack else bottom), (high if high - top < slack else top)
-    return Normalize(bottom, top), _outside(values, bottom, top)
-
-
-def _is_uniform(values: Array) -> bool:
-    return bool(np.ptp(values) <= 0.01 * max(np.abs(values).max(), 1e-300))
-
-
-def _outside(values: Array, bottom: float, top: float) -> str:
-    ends = (bool(values.min() < bottom), bool(values.max() > top))
-    return {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}[ends]
+    ends = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
+    return Normalize(bottom, top), ends[low < bottom, high > top]
 
 
 def magnification(displacement: float, size: float, opening: float = 0.0, largest: float = math.inf) -> float:

@@ -38,34 +38,35 @@ def path_table(document: Document, limit: int | None = None) -> Table:
         [k, *(without_noise(column[k]) for column in first.values()), points[k]["load_factor"], *counts(points[k])]
         for k in numbers
     ]
-    columns = [Column("point", 5, "d"), *(Column(name, max(11, len(name) + 1)) for name in first)]
-    columns += [Column("load", 9, ".6f"), *COUNTS]
+    columns = [Column(noun := document["case"]["path"]["method"].removesuffix("s"), len(noun), "d")]
+    columns += [*(Column(name, max(11, len(name) + 1)) for name in first), Column("load", 9, ".6f"), *COUNTS]
     label = stress_label(document)
     totals = [*_peak_lines(document, landmarks.peak_of(document)), *_path_energies(document, label)]
     totals += [f"Also in path.csv: {', '.join(rest)}"] if rest else []
-    return Table(f"Path{label}: {len(points)} points{some}; {broke} bonds broke", columns, rows, totals)
+    return Table(f"Path{label}: {len(points)} {noun}s{some}; {broke} bonds broke", columns, rows, totals)
 
 
 def _peak_lines(document: Document, peak: Document) -> list[str]:
     """Describe the peak, the first break, the path after the peak, and scaling by the toughness."""
     strain, stress = (without_noise(peak[name]) for name in ("strain", "stress"))
     largest, name = landmarks.name_of(document, peak), peak["stress_name"] + stress_label(document)
+    noun = document["case"]["path"]["method"].removesuffix("s")
     begins = {landmarks.PEAK: f"Peak {name}", landmarks.LARGEST: f"Largest {name}"}
     text = begins.get(largest, f"Largest {name} so far, the path being cut off")
     text += f": {stress:.6g} at {peak['strain_name']} = {strain:.6g}"
-    text += f" ({_place(peak, '')})"
+    text += f" ({_place(peak, '', noun)})"
     for title in ("first_softening_", "first_break_"):
         if f"{title}event" in peak:
             first, at = peak[f"{title}stress"], peak[f"{title}strain"]
-            text += f"; {title.replace('_', ' ')}{first:.6g} at {at:.6g} ({_place(peak, title)})"
+            text += f"; {title.replace('_', ' ')}{first:.6g} at {at:.6g} ({_place(peak, title, noun)})"
     stresses = landmarks.stresses_of(document, peak)
     if "event_left" in peak:
         lost = 1.0 - peak["stress_left"] / peak["stress"]
         rises = f" as the {path_curves.what_rises(document)} rises" if path_curves.is_proportional(document) else ""
-        text += f"; {peak['stress_left']:.6g} after the {largest}{rises}, {lost:.1%} less (point {peak['event_left']})"
+        text += f"; {peak['stress_left']:.6g} after the {largest}{rises}, {lost:.1%} less ({noun} {peak['event_left']})"
     later = max(range(len(stresses)), key=lambda number: abs(stresses[number]))
     if later > peak["event"] and abs(stresses[later]) > abs(peak["stress"]):
-        text += f"; later up to {stresses[later]:.6g} (point {later})"
+        text += f"; later up to {stresses[later]:.6g} ({noun} {later})"
     if largest == landmarks.LARGEST:
         at_end = peak["event"] == len(stresses) - 1
         place = "there" if at_end else f"near its peak, {landmarks.fall_of(document, peak):.1%} below it"
@@ -86,9 +87,9 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     return lines
 
 
-def _place(peak: Document, title: str) -> str:
-    """Name the point, fibre and direction of a landmark."""
-    return ", ".join(filter(None, [f"point {peak[f'{title}event']}", landmarks.bond_of(peak, title)]))
+def _place(peak: Document, title: str, noun: str) -> str:
+    """Name the event or increment, fibre and direction of a landmark."""
+    return ", ".join(filter(None, [f"{noun} {peak[f'{title}event']}", landmarks.bond_of(peak, title)]))
 
 
 def _path_energies(document: Document, label: str) -> list[str]:
@@ -116,7 +117,6 @@ def _path_energies(document: Document, label: str) -> list[str]:
                 lines[-1] += f", area of the last closed loop {ends[-1]['work'] - point['work']:.6g}"
                 break
     if "dissipation_ratio" in last:
-        ratio = f"{last['dissipation_ratio']:.4f} times it was dissipated"
-        bonds = "bonds that broke or softened" if "softened" in last else "broken bonds"
-        lines.append(f"Toughness of {bonds} per area{label}: {last['fracture_energy']:.6g}; {ratio}")
+        ratio = f"dissipated: {last['dissipation_ratio']:.4f} times that"
+        lines.append(f"Fracture energy per area{label}: {last['fracture_energy']:.6g}; {ratio}")
     return [*lines, *debonded(document, last)]

@@ -92,7 +92,8 @@ def thermal(document: Document) -> list[Table]:
     rows = list(zip(names, *rounded, *errors.values(), strict=True))
     columns = [Column("", -6), *(Column(title, 22, ".7g") for title in present.values())]
     columns += [Column(f"{key.rpartition('_')[2]}: error", 18, ".1e") for key in errors]
-    title = f"Per unit of temperature, {engineering_constants.CELL_AXES}{stress_label(document)}"
+    unit = f"; stresses{label}" if (label := stress_label(document)) else ""
+    title = f"Per unit of temperature, {engineering_constants.CELL_AXES}{unit}"
     return [Table(title, columns, rows)] if present else []
 
 

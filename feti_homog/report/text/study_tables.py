@@ -18,7 +18,8 @@ def fit_text(document: Document) -> str:
     strains = ["" if d["strain"] is None else f"({d['strain_name']} = {d['strain']:g})" for d in measured]
     data = [f"{test}{d['name']}{strain}" for test, d, strain in zip(tests, measured, strains, strict=True)]
     heads = [FIRST, tables.Column("estimate"), tables.Column("std")]
-    heads += [tables.Column(f"{document['confidence']:.0%} interval", 14), tables.Column("", 12)]
+    mark = "?" * any("intervals fail" in fault for fault in document["faults"])
+    heads += [tables.Column(f"{document['confidence']:.0%} interval{mark}", 14), tables.Column("", 12)]
     heads += [tables.Column("  determined by", -40)]
     rows = list[list[Any]]()
     for name, unknown in document["unknowns"].items():
@@ -77,6 +78,10 @@ def scatter_text(document: Document) -> str:
     lines = tables.Table(title, columns, rows).lines if rows else ["No result depends on the uncertain numbers."]
     differing = ", ".join(number["name"] for number in inputs if number["by"] == "differences")
     lines = ["", *lines, f"By differences of runs: {differing or 'none'}"]
+    if any(min(result["shares"]) < -LEAST_SHARE for result in results):
+        lines.append("Negative shares: correlated numbers act against each other")
+    if any(result["mesh_error"] is None for result in results):
+        lines.append("+- mesh: estimated for stiffnesses and constants alone, with [output] mesh_error = true")
     for k, number in enumerate(inputs):
         noisy = [
             result["name"]

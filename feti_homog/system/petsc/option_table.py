@@ -45,7 +45,7 @@ OPTIONS = (
     Option("feti_ksp_converged_reason", "", "", "print why each solve ended"),
     Option("feti_ksp_view", "", "", "print the solver's settings"),
     Option("feti_ksp_view_singularvalues", "", "", "print the estimated condition number"),
-    Option("feti_pc_type", PC_TYPES, "auto", "dual preconditioner; influence: exact, by unit jumps"),
+    Option("feti_pc_type", PC_TYPES, "auto", "dual preconditioner; influence: exact; adaptive space: dirichlet alone"),
     Option("feti_dual_operator", "auto|implicit|explicit", "auto", "subdomains by triangular solves or dense matrices"),
     Option("feti_coarse_space", "auto|natural|adaptive", "auto", "rigid-body motions only, or soft modes too"),
     Option("feti_coarse_threshold", "<real>", "0.35", "softer modes join the coarse space; fewer iterations if larger"),

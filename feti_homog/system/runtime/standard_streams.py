@@ -22,6 +22,7 @@ ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGXCPU)  # SIGXCPU: the limit o
 RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
 # Seconds that other ranks wait for the message of rank 0: Open MPI drops it after the end of another rank.
 SILENT_SECONDS = 5.0
+remarks = list[str]()  # that rank 0 prints where a signal ends the process
 KEPT = "\n\t"  # characters that are printed although they are not printable; others, from files, are escaped
 
 
@@ -38,7 +39,7 @@ def end_on_signals() -> None:
     def wait_and_end() -> None:
         number = signal.sigwait(awaited)
         if launched_rank() == 0:
-            complain(f"interrupted by {signal.Signals(number).name}")
+            complain(f"interrupted by {signal.Signals(number).name}", *remarks)
         else:
             time.sleep(SILENT_SECONDS)
         file_locks.remove_files()

@@ -42,6 +42,7 @@ FAULTY_LOADS: dict[str, str] = {
     "[path] to.E11, to.S11: exclude each other; give one": path("to = {E11 = 0.1, S11 = 1.0}"),
     "[path] waypoints[1].gamma13, waypoints[1].S13: exclude each other; give one":
         path("waypoints = [{S11 = 1.0}, {gamma13 = 0.1, S13 = 1.0}]", state="generalized"),
+    "[load] to.E12 = 0.1: unknown key; expected a shear strain as gamma12 = 2 E12": load("to = {E12 = 0.1}"),
     "[load] to.gamma12, to.S12: exclude each other; give one": load("to = {gamma12 = 0.1, S12 = 1.0}"),
     "[path] to.s11 = 1.0: unknown key; did you mean S11?": path("to = {s11 = 1.0}"),
     "[path] waypoints[1].gama12 = 1.0: unknown key; did you mean gamma12?":

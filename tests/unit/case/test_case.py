@@ -203,6 +203,21 @@ def test_high_contrast_is_warned_of(tmp_path, plane):
     assert case_of(tmp_path, case.replace("1e13", "1e11")).warnings() == ()
 
 
+def test_strengths_above_a_stiffness_are_warned_of():
+    """E / (1 - nu^2) of plane stress is 3.2: a matrix in GPa, strengths in MPa."""
+    asked = {
+        "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.3},
+        "material": {"matrix": {"young": 3.0, "poisson": 0.25}, "fibre": {"young": 7e4, "poisson": 0.2}},
+        "analysis": {"type": "path", "plane": "stress"},
+        "path": {"waypoints": [{"E11": 0.01}]},
+        "interface": {"normal_strength": 60.0, "tangential_strength": 3.1},
+    }
+    asked["material"]["fibre"]["strength"] = {"principal": 3.3}
+    end = "above 3.2, the stiffness of a phase: are the units alike?"
+    expected = (f"[interface] normal_strength = 60: {end}", f"[material.fibre.strength] principal = 3.3: {end}")
+    assert parse(asked, Path()).warnings() == expected
+
+
 def test_keys_of_friction_without_friction_are_warned_of():
     numbers = {"stiffness": 10.0, "strength": 1.0, "toughness": 1.0}
     interface = {f"{side}_{name}": value for side in ("normal", "tangential") for name, value in numbers.items()}

@@ -84,11 +84,11 @@ def test_a_strain_is_a_table_of_its_components(plane):
 def test_what_is_free_of_stress_is_reported():
     assert path("[{S11 = 60}]").remarks() == ("[path] S22, S12: never named: stress-free",)
     assert path("[{S11 = 60}, {gamma12 = 0.1}, {S12 = 0, E11 = 0}, [0, 0, 1]]").remarks() == (
-        "[path] S12: stress-free until waypoints[1]",
-        "[path] S22: stress-free until waypoints[3]",
+        "[path] S12: stress-free before the leg to waypoints[1]",
+        "[path] S22: stress-free before the leg to waypoints[3]",
     )
     assert path("[{temperature = -100}, {S33 = 1}]", "generalized").remarks() == (
-        "[path] S33: stress-free until waypoints[1]",
+        "[path] S33: stress-free before the leg to waypoints[1]",
         "[path] S11, S22, S23, S13, S12: never named: stress-free",
         "[path] S33 is stress along the fibres; across them S11, S22",
     )

@@ -14,7 +14,7 @@ from unit.mesh.faulty_meshes import RIGHT_SIDE, grid
 from feti_homog import run
 from feti_homog.analysis.description import describe
 from feti_homog.case.cases import Case
-from feti_homog.homogenization.cell_remarks import table_remarks
+from feti_homog.homogenization.cell_remarks import case_remarks, warnings
 from feti_homog.homogenization.domain_partition import CellSummary
 
 
@@ -24,9 +24,23 @@ def test_another_fraction_than_that_of_a_matched_table_is_reported(fraction):
     del content["sweep"]
     if fraction is not None:
         content["cell"]["fibre_fraction"] = fraction
-    found = table_remarks(Case.parse(content, ROOT / "drivers"))
+    found = case_remarks(Case.parse(content, ROOT / "drivers"))
     assert len(found) == (fraction is not None)
     assert all(line.startswith("[cell] fibre_fraction = 0.3: clustered.csv has 0.") for line in found)
+
+
+@pytest.mark.parametrize("key", [{"teeth": 3}, {"softening_tolerance": 0.15}, {}], ids=str)
+def test_teeth_that_exceed_the_peak_are_a_warning_however_they_are_chosen(key):
+    """W_0 = N^2 / (2 K): the opening of tooth j is rho^(j / n) of the onset, rho = 2 K G / N^2; n follows from rho."""
+    law = {"law": "bilinear", "normal_stiffness": 1000.0, "normal_strength": 0.06, "normal_toughness": 1e-4}
+    law |= {name.replace("normal", "tangential"): value for name, value in law.items() if name != "law"}
+    content = tomllib.loads(VALID_CASES["base"]) | {"interface": law | key, "path": {"to": {"E11": 0.003}}}
+    case = Case.parse(content | {"analysis": {"type": "path", "plane": "strain"}})
+    rho, found = 2 * 1000.0 * 1e-4 / 0.06**2, [line for line in warnings(case, 1.0, 1e-9)]
+    counts = [int(re.search(r": (\d+) teeth a bond", line)[1]) for line in case_remarks(case)]
+    assert len(counts) == ("teeth" not in key) and len(found) == bool(key)
+    excess = rho ** (1 / (2 * (counts or [3])[0])) - 1.0
+    assert all(f"exceeds the peak traction by {excess:.1%}" in line for line in found) and (found or excess <= 0.02)
 
 
 @pytest.mark.parametrize(

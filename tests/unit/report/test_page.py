@@ -187,7 +187,7 @@ def test_many_points_are_some_rows(tmp_path: Path) -> None:
     last = dict(zip((column.name for column in table.columns), table.cells[-1], strict=True))
     expected = {"bonded": "5", "open": "3", "closed": "2", "load": "1.000000", "S11": "3", "S22": "1"}
     assert {name: last[name] for name in expected} == expected
-    assert len(table.rows) == page.MOST_ROWS and "500 points, 60 shown" in table.title
+    assert len(table.rows) == page.MOST_ROWS and "500 events, 60 shown" in table.title
     assert (table.cells[0][0], table.cells[-1][0]) == ("0", "499")
 
 

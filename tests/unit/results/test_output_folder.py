@@ -44,6 +44,8 @@ def test_files_of_an_earlier_result_are_removed_and_nothing_else(tmp_path):
     earlier += [
         "interface.xdmf",
         "cell.png",
+        "cell.pdf",
+        "state_3.svg",
         "mesh_error.png",
         "partition.png",
         "sensitivities.png",
@@ -54,9 +56,13 @@ def test_files_of_an_earlier_result_are_removed_and_nothing_else(tmp_path):
         "case_E11.png",
         "angle_states.png",
     ]
-    others = ["case.toml", "my.png", "case_mine.png", "cell.svg", "checkpoint", "result.h5.old", "statistics.csv"]
+    others = ["case.toml", "my.png", "case_mine.png", "my.svg", "result.h5.old", "statistics.csv"]
     for name in [*earlier, *others, "result.json"]:
         (tmp_path / name).touch()
+    (tmp_path / "checkpoint").mkdir()
+    (tmp_path / "checkpoint" / "events").touch()  # of a path, which has a log
+    output_folder.remove_other_results(tmp_path, {*earlier, "events.log", "result.json"})
+    assert (tmp_path / "checkpoint" / "events").exists()
     output_folder.remove_other_results(tmp_path, {"result.json", "path.csv"})
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*others, "result.json", "path.csv"])
 

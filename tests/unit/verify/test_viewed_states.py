@@ -128,3 +128,8 @@ def test_vtk_reads_the_states_as_steps(folder):
 def test_a_missing_state_is_named(results):
     with pytest.raises(CaseError, match="has no state 99: its"):
         read_state(results("contact"), 99)
+
+
+def test_a_result_without_fields_is_one_line(tmp_path):
+    with pytest.raises(CaseError, match=r"^cannot read .*result.h5: it is missing; run the case again$"):
+        read_state(tmp_path)

@@ -162,13 +162,13 @@ def test_a_path_is_a_table_of_chosen_points() -> None:
     document["solver"] |= {"iterations": [*range(5, 30)], "factorizations": 3, "coarse_factorizations": 30}
     text = summary(document)
     assert max(map(len, text.splitlines())) < 80
-    assert "101 points, 15 shown; 101 bonds broke" in text
+    assert "101 events, 15 shown; 101 bonds broke" in text
     assert line(text, "Dissipated").endswith("per area (GPa): 50 along all equilibria, 60 if the strain only rises")
     assert line(text, "Work") == "Work per area (GPa): 120"
     assert line(text, "Stored").endswith("per area (GPa): 70, 10 of it in springs")
-    assert line(text, "Toughness").endswith("per area (GPa): 40; 1.2500 times it was dissipated")
+    assert line(text, "Fracture energy") == "Fracture energy per area (GPa): 40; dissipated: 1.2500 times that"
     assert line(text, "Debonded") == "Debonded: 50.0 % of the interfaces"
-    assert line(text, "Largest") == "Largest S22 (GPa): -350 at E22 = -0.2 (point 100); first break 0 at 0 (point"
+    assert line(text, "Largest") == "Largest S22 (GPa): -350 at E22 = -0.2 (event 100); first break 0 at 0 (event"
     points[100] |= {"mesh_error": 1e-4}
     words = " ".join(summary(document).split())
     assert "; mesh error of the energy 1.0e-04 at the largest stress" in words
@@ -203,8 +203,8 @@ def test_a_path_in_space_tells_what_is_named_or_there_in_100_columns() -> None:
     document["case"]["path"] = {"waypoints": [{"temperature": -100.0}, {"S22": 120.0, "S13": 50.0}], "method": "events"}
     text = summary(document)
     assert max(map(len, text.splitlines())) <= 100
-    head = ["point", "E22", "S22", "S13", "temperature", "E11", "load", "bonded", "open", "closed"]
-    assert line(text, "point").split() == head
+    head = ["event", "E22", "S22", "S13", "temperature", "E11", "load", "bonded", "open", "closed"]
+    assert line(text, "event").split() == head
     assert line(text, "1 ").split()[1:6] == ["0.1", "120", "50", "-100", "-0.02"]
     assert "Also in path.csv: E33, gamma13" in text and "if the load only rises" in text
 

@@ -43,6 +43,22 @@ def test_a_fit_that_its_bounds_keep_from_the_data_has_a_remark(computed, words):
     assert last.endswith(words) and ("material.fibre.young at its upper bound" in last) == bool(words)
 
 
+@pytest.mark.parametrize("slope", [1.0, 0.0])
+@pytest.mark.parametrize(("residual", "is_fault"), [(4.0, True), (3.0, False)])
+def test_residuals_that_a_correct_model_hardly_has_are_a_fault(slope, residual, is_fault):
+    """One unknown, two values: chi^2 of one degree of freedom has a chance of 1e-3 at 3.29^2."""
+    fit = parse(tomllib.loads(BASE + TEXT + "C22 = {value = 150.0, std = 1.5}\n"), Path())
+    y, std, J = np.full(2, 150.0), np.full(2, 1.5), np.array([[slope], [0.0]])
+    bounds = np.array([50.0]), np.array([500.0])
+    estimates = summarize(np.array([200.0]), y + 1.5 * residual * np.array([0.0, 1.0]), (y, std), J, bounds)
+    found = fit_result.content(fit.unknowns, fit.data, estimates)
+    stalls = slope == 0.0  # and two degrees of freedom: exp(-x / 2) = 1e-3 at 3.72^2
+    words = "stalled at material.fibre.young = 200, " if stalls else "does not describe the measurements (chance"
+    expected = [words] if is_fault else ["no measured value depends"] * stalls
+    assert len(found["faults"]) == len(expected) and all(w in f for w, f in zip(expected, found["faults"], strict=True))
+    assert ("interval?" in study_tables.fit_text(found)) == (is_fault and not stalls)
+
+
 def test_every_printed_number_is_that_of_the_normal_equations():
     """Two unknowns of three values: estimates, intervals, shares, correlation and residuals, in their columns."""
     more = "material.matrix.young = {start = 90.0, lower = 50.0, upper = 120.0}\n[measured]"

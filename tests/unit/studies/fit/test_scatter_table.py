@@ -2,7 +2,11 @@
 
 import re
 
+import pytest
+from support.sweep_tables import path_document
+
 from feti_homog.report.text.study_tables import scatter_text
+from feti_homog.studies import uncertainty
 
 
 def test_stresses_have_their_unit_and_strains_none():
@@ -31,7 +35,7 @@ def test_every_number_stands_under_its_head():
         {"name": "C11", "value": 30.0, "std_inputs": 3.0, "std_cells": 4.0, "std": 5.0, "mesh_error": 0.25},
         {"name": "nu12", "value": 0.5, "std_inputs": 0.03, "std_cells": 0.04, "std": 0.05, "mesh_error": None},
     ]
-    shares = [[0.75, 0.25], [0.36, 0.64]]
+    shares = [[1.25, -0.25], [0.36, 0.64]]
     document = {
         "stress_unit": "GPa", "cells": 3,
         "parameters": [{"name": names[0], "by": "derivatives"}, {"name": names[1], "by": "differences"}],
@@ -45,9 +49,25 @@ def test_every_number_stands_under_its_head():
     assert head == ["value", "+- inputs", "+- cells", "+- both", "+- mesh", "matrix.young", names[1]]
     cells = [re.split(r"\s{2,}", line.strip())[1:] for line in lines[3:5]]
     assert [[float(cell) for cell in row if cell != "-"] for row in cells] == [
-        [30.0, 3.0, 4.0, 5.0, 0.25, 75.0, 25.0],
+        [30.0, 3.0, 4.0, 5.0, 0.25, 125.0, -25.0],
         [0.5, 0.03, 0.04, 0.05, 36.0, 64.0],
     ]
     assert cells[1][4] == "-" and lines[5] == f"By differences of runs: {names[1]}"
     words = "Standard error over the cells above half of the slope by"
-    assert lines[6:] == [f"{words} {names[0]}: nu12", f"{words} {names[1]}: C11"]
+    assert lines[6] == "Negative shares: correlated numbers act against each other"
+    assert lines[7].startswith("+- mesh: estimated for stiffnesses and constants alone")
+    assert lines[8:] == [f"{words} {names[0]}: nu12", f"{words} {names[1]}: C11"]
+
+
+@pytest.mark.parametrize("leading", [0, 1])
+def test_a_path_has_its_onset_and_peak_in_the_leading_component(leading):
+    """The others are largest at other points, or differ from zero by the mesh alone."""
+    document = path_document(4, 0.0)
+    strain = [0.0, 0.0, 0.0]
+    for number, point in enumerate(document["path"]):
+        strain[leading] = 0.01 * (number + 1)
+        point |= {"strain": [*strain], "stress": [3.0, 2.0, 1e-5]}
+    document["case"]["path"]["strain"] = strain
+    component = f"{leading + 1}{leading + 1}"
+    names = [f"{mark}_{kind}{component}" for mark in ("onset", "peak") for kind in "ES"]
+    assert {datum.name for datum in uncertainty._data([document] * 2)} == {"onset_load_factor", *names}
