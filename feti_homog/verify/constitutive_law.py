@@ -10,6 +10,7 @@ from feti_homog.typing import Bool, Float
 from feti_homog.verify.findings import ROUNDING
 
 PLANE = [0, 1, 5]  # of the order [11, 22, 33, 23, 13, 12]
+GRADIENT = [4, 3, 2]  # places of dT/dx1, dT/dx2, dT/dx3 in that order
 # Places of tensor components in the orders [11, 22, 12] and [11, 22, 33, 23, 13, 12].
 VOIGT = {3: np.array([[0, 2], [2, 1]]), 6: np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])}
 Constants = Mapping[str, Any]
@@ -19,11 +20,14 @@ def laws(case: Mapping[str, Any], phases: Sequence[str]) -> tuple[Float, Float]:
     """Return stiffnesses (phases, v, v) in the plane state of a case, and strains (phases, v) per temperature.
 
     The axes are those of the cell.  Stiffnesses have no E33, gamma13 and gamma23, or in plane stress no S33, S13 and
-    S23.  Strains are R_ip R_jq alpha_pq; zero except in generalized plane strain with expansions of all phases.  Raises
-    CaseError for a phase of the mesh without a material.
+    S23.  Strains are R_ip R_jq alpha_pq; zero except in generalized plane strain with expansions of all phases.  In
+    conduction the temperature is a displacement along x3.  Raises CaseError for a phase of the mesh without a material.
     """
     plane, stiffnesses, expansions = case["analysis"]["plane"], list[Float](), list[Float]()
     for constants in (phase_constants(case, phase) for phase in phases):
+        if plane == "conduction":
+            stiffnesses.append(_conducting(constants["conductivity"]))
+            continue
         angle, law = float(constants.get("angle", 0.0)), _given_stiffness(constants)
         if len(law) != 3:
             law = law if len(law) else np.asarray(np.linalg.inv(_compliance(constants)), float)
@@ -46,8 +50,8 @@ def laws(case: Mapping[str, Any], phases: Sequence[str]) -> tuple[Float, Float]:
 def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
     """(phases,) True where quadratic elements have a bubble and a pressure: isotropic phases, not in plane stress.
 
-    One modulus and one ratio determine all constants of an isotropic phase, to rounding.  Cases of older versions may
-    have another `element`.  Raises CaseError as `laws` does.
+    Nor in conduction.  One modulus and one ratio determine all constants of an isotropic phase, to rounding.  Cases of
+    older versions may have another `element`.  Raises CaseError as `laws` does.
     """
     mixed = []
     for constants in (phase_constants(case, phase) for phase in phases):
@@ -57,7 +61,8 @@ def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
             isotropic = {"young": constants["E_transverse"], "poisson": -compliance[0, 1] / compliance[0, 0]}
             is_isotropic = np.allclose(compliance, _compliance(isotropic), rtol=ROUNDING, atol=0)
         mixed.append(is_isotropic)
-    has_mixed = case["cell"].get("element", "mixed") == "mixed" and case["analysis"]["plane"] != "stress"
+    has_mixed = case["cell"].get("element", "mixed") == "mixed"
+    has_mixed &= case["analysis"]["plane"] not in ("stress", "conduction")
     return np.asarray(np.array(mixed, bool) & has_mixed)
 
 
@@ -88,6 +93,15 @@ def phase_constants(case: Mapping[str, Any], phase: str) -> Constants:
     if not isinstance(constants, Mapping):
         raise CaseError(f"result.json: its case has no material for the phase {phase} of result.h5")
     return constants
+
+
+def _conducting(k: Any) -> Float:
+    """(6, 6) C_3i3j = k_ij for a displacement along x3 alone; the rest is arbitrary, of the size of k."""
+    given = [k["transverse"], k["transverse"], k["axial"]] if isinstance(k, Mapping) else k
+    tensor = np.array(given, float) * np.eye(3) if np.ndim(given) < 2 else np.array(given, float)
+    law = np.abs(tensor).max() * np.eye(6)
+    law[np.ix_(GRADIENT, GRADIENT)] = (tensor + tensor.T) / 2
+    return np.asarray(law)
 
 
 def _given_stiffness(constants: Constants) -> Float:

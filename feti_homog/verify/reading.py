@@ -78,7 +78,7 @@ class State:
     """The group /state/K.
 
     Vectors have c = 2 and tensors v = 3 components [11, 22, 12]; in generalized plane strain 3 and 6, in the order
-    [11, 22, 33, 23, 13, 12].
+    [11, 22, 33, 23, 13, 12].  In conduction the temperature is the third displacement, minus the flux [33, 23, 13].
 
     Attributes:
         strain, mean_stress: (v,) macroscopic.
@@ -143,8 +143,8 @@ class ResultFiles:
 
     @property
     def is_spatial(self) -> bool:
-        """Return True in generalized plane strain."""
-        return bool(self.case["analysis"]["plane"] == "generalized")
+        """Return True in generalized plane strain and conduction."""
+        return self.case["analysis"]["plane"] in ("generalized", "conduction")
 
     @property
     def contact(self) -> bool:
@@ -153,9 +153,10 @@ class ResultFiles:
 
     @property
     def interfaces(self) -> Sequence[Mapping[str, Any]]:
-        """Return the sections [[interface]]; none if all bonds are perfect."""
+        """Return the sections [[interface]], conductances as axial stiffnesses; none if all bonds are perfect."""
         sections: Any = self.case.get("interface", [])
-        return sections if isinstance(sections, list) else [sections]
+        sections = sections if isinstance(sections, list) else [sections]
+        return [{"axial_stiffness": own["conductance"], **own} if "conductance" in own else own for own in sections]
 
     @property
     def points(self) -> Points:

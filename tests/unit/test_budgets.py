@@ -13,27 +13,28 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "feti_homog"
 MODULES = sorted(PACKAGE.rglob("*.py"))
-# Lines, of the modules beside the packages under "."; the second numbers: phase stresses, start of damage, figures.
+# Lines, of the modules beside the packages under "."; the second numbers: phase stresses, start of damage, figures,
+# conductivity.
 LINES = {
     ".": 470,
-    "analysis": 3000 + 100,
-    "case": 2880 + 40,
+    "analysis": 3000 + 210,
+    "case": 2880 + 70,
     "commands": 560 + 10,
-    "fem": 1150,
+    "fem": 1150 + 5,
     "feti": 6300,
     "homogenization": 3230 + 55,
     "interface": 4000,
-    "materials": 1430 + 95,
+    "materials": 1430 + 205,
     "mesh": 5500,
     "microstructure": 2140,
-    "report": 3420 + 160,
+    "report": 3420 + 210,
     "results": 2430 + 30,
     "schema": 430,
     "studies": 2950,
     "system": 1770,
-    "verify": 3100 + 160,
+    "verify": 3100 + 205,
 }
-FILES, TOTAL = 310, 45000 + 200
+FILES, TOTAL = 310, 45000 + 560
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.0, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.
