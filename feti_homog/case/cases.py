@@ -223,6 +223,8 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
         default = getattr(section, selector.key, None)
         value = table.get(selector.key, default) if isinstance(table, Mapping) else default
         selected[selector] = value if keys.keys_of(section)[selector.key].type.accepts(value) else None
+    if (selected[ANALYSIS_TYPE] == "conductivity") != (selected[PLANE] == voigt.CONDUCTION.name):
+        selected[PLANE] = None
     faults = [f"[{section}]: missing section" for section in sections.REQUIRED if section not in document]
     for name, value in document.items():
         if name in STUDIES:

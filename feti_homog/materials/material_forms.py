@@ -52,7 +52,7 @@ class FibreConductivity:
 
 
 CONDUCTIVITY = types.either(
-    "a number above 0, a table {axial, transverse}, or a symmetric 3x3 array of numbers",
+    "a table {axial, transverse}, a symmetric 3x3 array of numbers or a number above 0",
     POSITIVE,
     types.table_of(FibreConductivity, ""),
     types.list_of(types.list_of(types.real(), "", count=3), "", count=3),
