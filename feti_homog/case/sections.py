@@ -265,6 +265,7 @@ TABLES = (
         for form, contents in material_forms.MATERIAL_FORMS.items()
     ),
     SectionTable("material", "[material.PHASE] strength", material_forms.PhaseStrength),
+    SectionTable("material", "[material.PHASE] conductivity", material_forms.FibreConductivity),
     SectionTable("interface", "an arc of [interface] debonded", Arc),
     SectionTable("interface", "[interface] scatter", Scatter),
     SectionTable("path", "a load of [path] to or waypoints", MixedLoad),

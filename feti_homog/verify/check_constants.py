@@ -100,16 +100,21 @@ def check_conductivity(findings: Findings, cell: DiscreteCell) -> None:
     """Check the bounds and the estimate of the effective conductivity by their formulas."""
     k, forms = np.array(cell.files.document["effective_conductivity"]), cell.files.document["conductivity_estimates"]
     share, (axial, across) = cell.fractions, (cell.stiffnesses[:, place, place] for place in GRADIENT[::-2])
-    limits = np.array([1 / (share @ (1 / across)), share @ across])
+    limits, bounds = (
+        np.array([1 / (share @ (1 / across)), share @ across]),
+        [forms["wiener"], forms["hashin_shtrikman"]],
+    )
     findings.compare("bounds", forms["axial"], share @ axial, axial.max(), "conductivity_estimates.axial")
-    if forms["wiener"] is not None:
-        findings.compare("bounds", forms["wiener"], limits, limits[1], "conductivity_estimates.wiener")
+    resists = any("conductance" in section for section in cell.files.interfaces)
+    findings.require("bounds", bounds == [None, None] if resists else None not in bounds, "conductivity_estimates")
+    if not resists:
+        findings.compare("bounds", bounds[0], limits, limits[1], "conductivity_estimates.wiener")
         inside = np.linalg.eigvalsh((k + k.T)[:2, :2] / 2)
         off = [limits[0] - inside.min(), inside.max() - limits[1], 0.0]
         findings.record("bounds", max(off) / limits[1], "effective_conductivity")
         pair = [1 / (share @ (1 / (across + k0))) - k0 for k0 in (across.min(), across.max())]
         place = "conductivity_estimates.hashin_shtrikman"
-        findings.compare("bounds", forms["hashin_shtrikman"], pair, limits[1], place)
+        findings.compare("bounds", bounds[1], pair, limits[1], place)
 
 
 def constants_of(C: Float, heat: Float | None) -> dict[str, float]:

@@ -97,8 +97,8 @@ def phase_constants(case: Mapping[str, Any], phase: str) -> Constants:
 
 def _conducting(k: Any) -> Float:
     """(6, 6) C_3i3j = k_ij for a displacement along x3 alone; the rest is arbitrary, of the size of k."""
-    given = [k["transverse"], k["transverse"], k["axial"]] if isinstance(k, Mapping) else k
-    tensor = np.array(given, float) * np.eye(3) if np.ndim(given) < 2 else np.array(given, float)
+    tensor = np.array([k["transverse"], k["transverse"], k["axial"]] if isinstance(k, Mapping) else k, float)
+    tensor = tensor * np.eye(3) if tensor.ndim < 2 else tensor
     law = np.abs(tensor).max() * np.eye(6)
     law[np.ix_(GRADIENT, GRADIENT)] = (tensor + tensor.T) / 2
     return np.asarray(law)

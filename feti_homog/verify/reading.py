@@ -156,7 +156,9 @@ class ResultFiles:
         """Return the sections [[interface]], conductances as axial stiffnesses; none if all bonds are perfect."""
         sections: Any = self.case.get("interface", [])
         sections = sections if isinstance(sections, list) else [sections]
-        return [{"axial_stiffness": own["conductance"], **own} if "conductance" in own else own for own in sections]
+        return [
+            {"axial_stiffness": bond["conductance"], **bond} if "conductance" in bond else bond for bond in sections
+        ]
 
     @property
     def points(self) -> Points:

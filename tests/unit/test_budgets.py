@@ -32,9 +32,9 @@ LINES = {
     "schema": 430,
     "studies": 2950,
     "system": 1770,
-    "verify": 3100 + 205,
+    "verify": 3100 + 210,
 }
-FILES, TOTAL = 310, 45000 + 560
+FILES, TOTAL = 310, 45000 + 570
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.0, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

@@ -140,7 +140,7 @@ FAULTY_MATERIALS: dict[str, str] = {
         conducting(fibre="conductivity = [[1.0, 2.0, 0.0], [2.0, 1, 0], [0, 0, 1]]"),
     "[material.fibre], [material.matrix]: conductivities that differ by a factor of 5.0e+16: expected at most":
         conducting(fibre="conductivity = 1e16"),
-    '[interface] normal_stiffness = 3.0: belongs to [analysis] type = "stiffness" or "angle" or "path" or "load" or "en':
+    '[interface] normal_stiffness = 3.0: belongs to [analysis] type = "stiffness" or "angle" or "path" or "load" or':
         conducting("[interface]", "debonded = []", "normal_stiffness = 3.0"),
     '[interface] normal_strength = 3.0: belongs to [analysis] type = "path" or "envelope", not "conductivity"':
         conducting("[interface]", "debonded = []", "normal_strength = 3.0"),
