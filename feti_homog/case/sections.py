@@ -169,6 +169,7 @@ class Output:
         "Factor of the displacements drawn; by default such that displacements and openings are seen and no element "
         "turns over, but at least 1 under a given strain.",
         absent="automatic",
+        only=MECHANICAL,
         presentation=True,
     )
     length_unit: str = key(types.text, "A label, such as mm; nothing is converted.", default="", presentation=True)

@@ -8,7 +8,7 @@ from mpi4py import MPI
 from reference.spatial_forms import axial_shear_modulus
 from support.void_cells import write_voids
 
-from feti_homog import run
+from feti_homog import run, run_fit, run_sweep
 from feti_homog.analysis.runner import compute
 from feti_homog.case.cases import Case
 from feti_homog.verify.certificate import verify
@@ -132,6 +132,36 @@ def test_dilute_fibres_with_kapitza_resistance(comm, h):
     assert result.conductivity_estimates.wiener is None
 
 
+@pytest.mark.parametrize(("geometry", "fraction", "h"), [("square", 0.65, 2.0), ("hexagonal", 0.75, 30.0)])
+def test_close_fibres_with_kapitza_resistance(comm, geometry, fraction, h):
+    """Rayleigh's series, in which a multipole of the order n sees the conductivity 1 / (1/k + n/(h a))."""
+    case = {"geometry": geometry, "fibre_fraction": fraction, "order": 2, "mesh_size": 0.1, "refine": 1}
+    k = solved(comm, matrix=1.0, fibre=20.0, interface={"conductance": h, "debonded": []}, **case)[:2, :2]
+    area = {"square": 1.0, "hexagonal": np.sqrt(3) / 2}[geometry]  # of the cell of one fibre
+    a = np.sqrt(fraction * area / np.pi)
+    expected = axial_shear_modulus(geometry, fraction, lambda n: 1 / (1 / 20.0 + n / (h * a)))
+    assert np.abs(k - expected * np.eye(2)).max() < 1e-5 * expected
+
+
+def test_coated_fibres_with_two_resistances(comm, shared_path):
+    case = document(order=2, coating=0.15, mesh_size=0.1, fibre_fraction=0.3)
+    case["material"]["coating"] = {"conductivity": 0.7}
+    pairs = (["coating", "matrix"], 3.0), (["fibre", "coating"], 5.0)
+    case["interface"] = [{"between": pair, "conductance": h, "debonded": []} for pair, h in pairs]
+    k = run(Case.parse(case), comm, out=shared_path).effective_conductivity
+    case["analysis"] = {"type": "stiffness", "plane": "generalized"}
+    for bonds in case["interface"]:
+        bonds |= {"axial_stiffness": bonds.pop("conductance"), "contact": False}
+    phases = {name: 2 * (1 + POISSON) * own["conductivity"] for name, own in case["material"].items()}
+    case["material"] = {name: {"young": young, "poisson": POISSON} for name, young in phases.items()}
+    C = compute(Case.parse(case), comm).effective_stiffness
+    assert k[:2, :2] == pytest.approx(C[np.ix_([4, 3], [4, 3])], rel=1e-11, abs=1e-11)
+    if comm.rank == 0:
+        certificate = verify(shared_path)
+        assert certificate.holds and NO_REASON not in certificate.unchecked, certificate.text
+    comm.barrier()
+
+
 def test_bounds_and_maxwell_of_bonded_fibres(comm):
     result = compute(Case.parse(document(order=2)), comm)
     forms, f, k = result.conductivity_estimates, result.cell.fractions["fibre"], result.effective_conductivity
@@ -182,3 +212,20 @@ def test_files_hold_all_laws_and_show_a_falsified_entry(comm, shared_path, bonds
         broken = {finding.name for finding in verify(shared_path).findings if not finding.holds}
         assert {"tables", "symmetry"} <= broken
     comm.barrier()
+
+
+def test_sweeps_and_fits_take_entries(comm, shared_path):
+    case = document(order=2, interface={"conductance": 3.0, "debonded": []})
+    del case["cell"]["fibre_fraction"]
+    table = run_sweep(case | {"sweep": {"cell.fibre_fraction": [0.2, 0.4]}}, shared_path / "sweep", comm)
+    if comm.rank == 0:
+        f = table.outputs["fraction_meshed"]
+        assert table.outputs["k33"] == pytest.approx((1 - f) * MATRIX + f * FIBRE, rel=1e-12)
+        assert np.diff(table.outputs["k11"])[0] > 10 * table.outputs["k11_mesh_error"].max()
+    truth = compute(Case.parse(case | {"cell": case["cell"] | {"fibre_fraction": 0.4}}), comm).effective_conductivity
+    start = {"interface": {"conductance": {"start": 1.0, "lower": 0.1, "upper": 50.0}}}
+    measured = {"k11": {"value": float(truth[0, 0]), "std": 1e-3}}
+    fit = run_fit(document(order=2, interface=case["interface"]) | {"unknown": start, "measured": measured},
+                  shared_path / "fit", comm)  # fmt: skip
+    (estimate,) = fit["unknowns"].values()
+    assert estimate["estimate"] == pytest.approx(3.0, rel=1e-5)

@@ -154,6 +154,8 @@ FAULTY_MATERIALS: dict[str, str] = {
     '[output] sensitivities = true: belongs to [analysis] type = "stiffness" or "load"':
         conducting("[output]", "sensitivities = true"),
     '[output] stress = "S11": belongs to [analysis] type = "stiffness"': conducting("[output]", 'stress = "S11"'),
+    '[output] deformation_scale = 2.0: belongs to [analysis] type = "stiffness"':
+        conducting("[output]", "deformation_scale = 2.0"),
     '[analysis] plane = "strain": expected "conduction", or no plane, in type = "conductivity"':
         conducting().replace('type = "conductivity"', 'type = "conductivity"\nplane = "strain"'),
     '[analysis] plane = "conduction": belongs to type = "conductivity"': cell('"strain"', '"conduction"'),
