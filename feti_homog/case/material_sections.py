@@ -89,7 +89,7 @@ def _read_material(
     for name, (form, *further) in FORMS_OF.items():
         if isinstance(table, dict) and name in table and not further:
             given.setdefault(form, []).append(name)
-    is_bare = isinstance(table, dict) and table.keys() == {"conductivity"}
+    is_bare = isinstance(table, dict) and "conductivity" in table
     forms = list(given) or ["conductor" if is_bare else "isotropic"]
     if len(forms) > 1:
         groups = " and ".join(f"{', '.join(keys)} ({form})" for form, keys in given.items())
