@@ -77,32 +77,37 @@ def _comparisons(cell: unit_cell.TornCell, fractions: Mapping[str, float]) -> di
     """
     from feti_homog.materials import estimates  # unused for bonded cells in the plane
 
-    summary, case, has_springs = cell.summary, cell.case, phase_laws.has_springs(cell.case)
-    matrix, *fibre_phases = summary.phases
-    radii = {phase: summary.radii[summary.constituent_phase == k] for k, phase in enumerate(summary.phases)}
-    phases = {}
+    case, has_springs, phases = cell.case, phase_laws.has_springs(cell.case), {}
+    matrix, *fibre_phases = cell.summary.phases
     for phase in fractions:
         material = case.material_of(phase)
         stiffness, expansion = laws.spatial_stiffness(material), laws.expansion(material)
         phases[phase] = engineering_constants.transversely_isotropic_part(stiffness, expansion)
     entries: dict[str, Any] = {}
-    is_plain = phase_names.COATING not in phases and all(bond.between is None for bond in case.interfaces)
-    is_round = not any(np.isnan(radii[phase]).any() for phase in fibre_phases)  # the radii of other fibres are NaN
-    # Circles are fitted to the nodes of users' meshes: equal radii differ by rounding.
-    is_like = not has_springs or all(np.allclose(radii[phase], radii[phase][0], atol=0.0) for phase in fibre_phases)
-    if is_plain and is_round and is_like:
+    if (radii := fibre_radii(cell)) is not None:
         fibres = []
         for phase in fibre_phases:
             springs = None
             if has_springs:
                 ((normal, tangential),) = phase_laws.springs(case).stiffness
                 ((axial,),) = phase_laws.springs(case, cell.problems[1].solver.problem).stiffness
-                springs = phase_bounds.Springs(normal, tangential, axial, float(radii[phase][0]))
+                springs = phase_bounds.Springs(normal, tangential, axial, radii[phase])
             fibres.append(phase_bounds.Fibres(fractions[phase], phases[phase], springs))
         entries["estimates"] = estimates.estimates(phases[matrix], fibres)
     if not has_springs and all(map(engineering_constants.is_transversely_isotropic, phases.values())):
         entries["fibre_bounds"] = phase_bounds.fibre_bounds(list(fractions.values()), list(phases.values()))
     return entries
+
+
+def fibre_radii(cell: unit_cell.TornCell) -> dict[str, float] | None:
+    """Return a radius of each fibre phase; None unless closed estimates hold, for which springs need equal radii."""
+    summary, case, has_springs = cell.summary, cell.case, phase_laws.has_springs(cell.case)
+    radii = {phase: summary.radii[summary.constituent_phase == k] for k, phase in enumerate(summary.phases) if k}
+    is_plain = phase_names.COATING not in summary.phases and all(bond.between is None for bond in case.interfaces)
+    is_round = not any(np.isnan(radius).any() for radius in radii.values())  # the radii of other fibres are NaN
+    # Circles are fitted to the nodes of users' meshes: equal radii differ by rounding.
+    is_like = not has_springs or all(np.allclose(radius, radius[0], atol=0.0) for radius in radii.values())
+    return {phase: float(radius[0]) for phase, radius in radii.items()} if is_plain and is_round and is_like else None
 
 
 def unit_errors(
@@ -191,6 +196,13 @@ def _note_bounds(
         limits |= {"shear": plane.hashin_shtrikman.shear} if is_isotropic else {}
     if secants.get("fibre_bounds") is not None and values["deviation"] <= errors["deviation"]:
         limits |= {name: pair for name, pair in records.plain(secants["fibre_bounds"]).items() if pair is not None}
+    note_outside(context, limits, values, errors, energy)
+
+
+def note_outside(
+    context: AnalysisContext, limits: Mapping[str, Sequence[float]], values: Named, errors: Named, energy: float
+) -> None:
+    """Note each value outside its limits; record a fault beyond any mesh error, as `_note_bounds`."""
     for name, (lower, upper) in limits.items():
         value, error = float(values[name]), float(errors[name])
         outside = max(lower - value, value - upper)

@@ -36,7 +36,7 @@ class CellLoads:
 
     def __init__(self, cell: unit_cell.TornCell, contact: bool) -> None:
         self.problems = tuple(
-            averaging.Homogenization(problem, contact and problem is cell) for problem in cell.problems
+            averaging.Homogenization(problem, contact and problem.solver.problem.turns) for problem in cell.problems
         )
         self.interfaces = coupled_interfaces.CoupledInterfaces(*(problem.interface for problem in self.problems))
         self.names = tuple(name for problem in self.problems for name in problem.loads)
@@ -173,7 +173,8 @@ class AnalysisContext:
         self, responses: Sequence[averaging.Response], load_factor: float, label: str, point: int
     ) -> None:
         """Record one state for each unit load, in its problem.  Collective."""
-        in_plane, pairs = len(self.plane.loads), dict[str, Sequence[averaging.Response | None]]()
+        in_plane = len(self.plane.loads) * self.cell.solver.problem.turns
+        pairs = dict[str, Sequence[averaging.Response | None]]()
         for number, (name, response) in enumerate(zip(self.loads.names, responses, strict=True)):
             pairs[f"{label}{name}"] = (response, None) if number < in_plane else (None, response)
         self.states.record(pairs, load_factor, point)

@@ -26,7 +26,8 @@ def describe(case: Case, comm: MPI.Intracomm) -> str:
         part = tile_tearing.cut(case, lattice, comm, partition_policy.BY_COST)
         constraints = shared_entities.share_entities(comm, part.submeshes, part.table, part.pairs, lattice).constraints
         loads = comm.gather((len(part.submeshes.index), len(part.submeshes.member))) or []
-        options, summary, multipliers = factory.database_options(), part.summary, 2 * constraints
+        c = phase_laws.problems(case)[0].components
+        options, summary, multipliers = factory.database_options(), part.summary, c * constraints
 
         def described() -> str:
             cell, subdomains = case.cell, [count for count, _ in loads]
@@ -39,7 +40,7 @@ def describe(case: Case, comm: MPI.Intracomm) -> str:
                 f"cell       {summary.width:g} x {summary.height:g}, phases {', '.join(summary.phases)}",
                 *([f"voids      {summary.voids}"] if summary.voids else []),
                 f"mesh       {summary.coarse_triangles} coarse triangles, {elements} "
-                f"elements of order {cell.order}, about {2 * sum(nodes)} degrees of freedom",
+                f"elements of order {cell.order}, about {c * sum(nodes)} degrees of freedom",
                 *([] if cell.accuracy is None else [f"sizes      {sizes}"]),
                 *_fibre_lines(case, summary),
                 f"tearing    {summary.bodies} bodies, {_subdomains(summary.subdomains)}, {multipliers} multipliers",
@@ -83,7 +84,7 @@ def _cost_lines(
     solver = plan.in_words if multipliers else "one factor of the whole cell: no multipliers, no iterations"
     yield f"solver     {solver}"
     for rank, (count, n) in enumerate(zip(subdomains, nodes, strict=True)):
-        yield f"rank {rank:<5} {_subdomains(count)}, about {2 * n} degrees of freedom"
+        yield f"rank {rank:<5} {_subdomains(count)}, about {problems[0].components * n} degrees of freedom"
     columns = multipliers if plan.preconditioner == "influence" else 0
     components = [problem.components for problem in problems]
     memory = partition_policy.memory(nodes, subdomains, components, columns)

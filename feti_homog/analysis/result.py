@@ -78,6 +78,7 @@ class Result:
         effective_stiffness: L^ef, (3, 3) or in generalized plane strain (6, 6); its columns are the stresses under the
             unit strains.
         effective_stiffness_compression: L^ef under minus the unit strains, if debonded faces touch without tension.
+        effective_conductivity: k^ef (3, 3), whose columns are -<q> under unit gradients of the temperature.
         compliance, thermal_stress, thermal_expansion: in generalized plane strain, (6, 6) and (6,).
         moduli, bounds: for perfectly bonded cells.
         mesh_error: estimated mesh errors of a stiffness and its constants.
@@ -112,6 +113,12 @@ class Result:
     effective_stiffness_compression: Float | None = described(
         "the same under minus these, with contact", records.STRESS, result_records.EITHER_STIFFNESS, default=None
     )
+    effective_conductivity: Float | None = described(
+        "k^ef in the axes x1, x2, x3: columns are minus the mean fluxes under unit gradients of the temperature",
+        result_records.CONDUCTIVITY,
+        "(3, 3)",
+        default=None,
+    )
     compliance: Float | None = described(
         "of generalized plane strain: inverse of L^ef", f"1 / {records.STRESS}", "(6, 6)", default=None
     )
@@ -137,6 +144,9 @@ class Result:
         "closed estimates of the same, of a cell without debonding", default=None
     )
     fibre_bounds: phase_bounds.FibreBounds | None = described("bounds of the same, of rigid bonds", default=None)
+    conductivity_estimates: phase_bounds.ConductivityEstimates | None = described(
+        "closed forms of a conductivity, without debonding and voids", default=None
+    )
     mesh_error: result_records.MeshErrors | None = described(
         "estimated errors of a stiffness by its mesh", default=None
     )

@@ -13,6 +13,7 @@ from feti_homog.typing import Float
 
 EITHER, EITHER_STIFFNESS = "(3,) or (6,)", "(3, 3) or (6, 6)"
 ENERGY = f"{records.STRESS} times that of the cell"
+CONDUCTIVITY = "conductivity"
 PER_DEGREE = f"{records.STRESS} per unit of temperature"
 TEMPERATURE = "change of temperature, in generalized plane strain with expansions"
 DEBONDED_LENGTH, KEPT = "debonded length of each fibre's interface", "of points whose fields `states` keeps"
@@ -29,10 +30,11 @@ DEBONDED_SHARES = "the same of the interfaces of each section [[interface]], in 
 class MeshErrors:
     """The estimated mesh errors, from the distance between recovered and element stresses."""
 
-    effective_stiffness: Float = described("error of each entry", records.STRESS, EITHER_STIFFNESS)
+    effective_stiffness: Float | None = described("error of each entry", records.STRESS, EITHER_STIFFNESS, default=None)
     effective_stiffness_compression: Float | None = described(
         "the same under minus the unit strains, with contact", records.STRESS, EITHER_STIFFNESS, default=None
     )
+    effective_conductivity: Float | None = described("error of each entry", CONDUCTIVITY, "(3, 3)", default=None)
     thermal_stress: Float | None = described("error of each entry", PER_DEGREE, "(6,)", default=None)
     thermal_stress_compression: Float | None = described(
         "the same under minus a unit of temperature, with contact", PER_DEGREE, "(6,)", default=None

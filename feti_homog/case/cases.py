@@ -19,7 +19,7 @@ from feti_homog.case.rules import RULES
 from feti_homog.case.section_values import ANALYSIS_TYPE, CRITERION, METHOD, PLANE
 from feti_homog.case.toml_files import leaves, read_document, short_digest, to_document, with_values
 from feti_homog.errors import CaseError
-from feti_homog.materials import laws, material_forms
+from feti_homog.materials import laws, material_forms, voigt
 from feti_homog.schema import TableReader, keys, types, wording
 from feti_homog.system.runtime import input_files
 
@@ -217,6 +217,9 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
 
     Without a folder, the files of [cell] remain unread.
     """
+    analysis = document.get("analysis")
+    if isinstance(analysis, dict) and analysis.get("type") == "conductivity":
+        document = document | {"analysis": {"plane": voigt.CONDUCTION.name} | analysis}
     first = next(iter(interface_tables(document)), None)
     if isinstance(first, dict) and "law" in first:
         first = first | {"criterion": first["law"]}
@@ -226,6 +229,8 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
         default = getattr(section, selector.key, None)
         value = table.get(selector.key, default) if isinstance(table, Mapping) else default
         selected[selector] = value if keys.keys_of(section)[selector.key].type.accepts(value) else None
+    if (selected[ANALYSIS_TYPE] == "conductivity") != (selected[PLANE] == voigt.CONDUCTION.name):
+        selected[PLANE] = None
     faults = [f"[{section}]: missing section" for section in sections.REQUIRED if section not in document]
     for name, value in document.items():
         if name in STUDIES:

@@ -25,7 +25,7 @@ ROUNDING_POISSON = 0.49999999
 
 def is_mixed(order: int, material: material_forms.Material, plane: str) -> bool:
     """Return whether a material has mixed elements in the plane problem."""
-    return order == 2 and laws.isotropic_ratio(material) is not None and not voigt.PLANE_STATES[plane].is_sheet
+    return order == 2 and voigt.PLANE_STATES[plane].locks and laws.isotropic_ratio(material) is not None
 
 
 def warnings(materials: Mapping[str, material_forms.Material], plane: str) -> list[str]:
@@ -42,8 +42,8 @@ def remarks(materials: Mapping[str, material_forms.Material], plane: str) -> tup
 
 
 def _above(limit: float, materials: Mapping[str, material_forms.Material], plane: str) -> list[str]:
-    """List the phases with a Poisson's ratio above a limit; none in plane stress."""
-    if voigt.PLANE_STATES[plane].is_sheet:
+    """List the phases with a Poisson's ratio above a limit; none in plane stress and conduction."""
+    if not voigt.PLANE_STATES[plane].locks:
         return []
     lines = []
     for phase, material in materials.items():
@@ -144,8 +144,10 @@ def coarse_error(materials: Mapping[str, material_forms.Material], plane: str, o
         ratios.append(np.zeros(1))
     mixed = [is_mixed(order, material, plane) for material in materials.values()]
     scale, conditions = np.sqrt([1.0, 1.0, 2.0]), []  # to orthonormal components, [E11, E22, gamma12 / sqrt(2)]
-    for material, has_pressure in zip(materials.values(), mixed, strict=True):
-        condition = float(np.linalg.cond(laws.plane_stiffness(material, plane) * np.outer(scale, scale)))
+    for (phase, material), has_pressure in zip(materials.items(), mixed, strict=True):
+        is_scalar = voigt.PLANE_STATES[plane].is_scalar
+        law = stiffness[phase] if is_scalar else laws.plane_stiffness(material, plane) * np.outer(scale, scale)
+        condition = float(np.linalg.cond(law))
         conditions.append(min(condition, MIXED_CONDITION if has_pressure else inf))
     eigenvalues = np.concatenate([np.ones(1), *ratios])
     beta = (eigenvalues - 1) / (eigenvalues + 1)

@@ -35,7 +35,7 @@ class Arc:
         "Whole opening of the arc, measured at the centre of the fibre. 0 is perfect bonding; at 360 nothing holds the "
         "fibre, and its rigid motions are left out.",
         unit="degrees",
-        only=kinds.ANALYSIS_TYPE.among("stiffness", "path", "load", "envelope"),
+        only=kinds.ANALYSIS_TYPE.among("stiffness", "path", "load", "envelope", "conductivity"),
     )
 
 
@@ -73,6 +73,7 @@ class InterfaceSection:
         "true: debonded faces do not overlap, they touch, with friction where there is a coefficient. false: they "
         "overlap freely.",
         default=True,
+        only=kinds.MECHANICAL,
     )
     friction: float = pair_key(
         types.real(least=0.0),
@@ -102,12 +103,14 @@ class InterfaceSection:
         "Normal traction / opening, k_n: of bonds that hold in tension and compression, of broken faces in contact.",
         unit="stress / length",
         absent="inf",
+        only=kinds.MECHANICAL,
     )
     tangential_stiffness: float | None = pair_key(
         kinds.STIFFNESS,
         "Tangential traction / slip, k_t, of the bonds that hold.",
         unit="stress / length",
         absent="inf",
+        only=kinds.MECHANICAL,
     )
     axial_stiffness: float | None = pair_key(
         types.POSITIVE_OR_INF,
@@ -115,6 +118,13 @@ class InterfaceSection:
         unit="stress / length",
         absent="tangential_stiffness",
         only=kinds.GENERALIZED,
+    )
+    conductance: float | None = pair_key(
+        kinds.CONDUCTANCE,
+        "Flux / jump of the temperature, h, of the bonds that hold: 1 / Kapitza's resistance. Debonded faces insulate.",
+        unit="conductivity / length",
+        absent="inf",
+        only=kinds.CONDUCTIVITY,
     )
     normal_strength: float | None = pair_key(
         kinds.STRENGTH,

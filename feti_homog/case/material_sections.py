@@ -89,7 +89,8 @@ def _read_material(
     for name, (form, *further) in FORMS_OF.items():
         if isinstance(table, dict) and name in table and not further:
             given.setdefault(form, []).append(name)
-    forms = list(given) or ["isotropic"]
+    is_bare = isinstance(table, dict) and "conductivity" in table
+    forms = list(given) or ["conductor" if is_bare else "isotropic"]
     if len(forms) > 1:
         groups = " and ".join(f"{', '.join(keys)} ({form})" for form, keys in given.items())
         reader.faults.append(f"[{section}] {groups}: exclude each other; a material is of one kind")
@@ -97,7 +98,7 @@ def _read_material(
     material: material_forms.Material | None = reader.read(material_forms.MATERIAL_FORMS[forms[0]], table, section)
     if material is not None:
         checks: list[Callable[[Any], object]] = [] if plane is None else [partial(laws.stiffness_of, plane=plane)]
-        if material.strength is not None:
+        if material.strength is not None and plane != voigt.CONDUCTION.name:
             checks += [lambda material: strength.criterion(material.strength), partial(_known_stress, plane=plane)]
         for check in (*checks, laws.expansion):
             try:

@@ -22,7 +22,7 @@ INDENTED = textwrap.TextWrapper(WIDTH, initial_indent=6 * " ", subsequent_indent
 
 MATERIAL_MEANING = (
     "One section for each phase: [material.matrix], [material.fibre] and, for phases of a mesh or a table, sections of "
-    "their names, [material.glass]; fibre:2 without its own has the constants of fibre. Each in one of four forms."
+    "their names, [material.glass]; fibre:2 without its own has the constants of fibre. Each in one of five forms."
 )
 
 

@@ -62,7 +62,7 @@ def axes_lines(
     kind: str, section: load_sections.AnalysisSection, materials: Mapping[str, material_forms.Material], plane: str
 ) -> tuple[str, ...]:
     """Return a remark on axes that a user could mistake for ply axes, in generalized plane strain alone."""
-    if not voigt.PLANE_STATES[plane].is_spatial:
+    if plane != voigt.GENERALIZED.name:
         return ()
     from feti_homog.materials import engineering_constants  # needed in generalized plane strain alone
 

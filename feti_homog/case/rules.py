@@ -245,6 +245,11 @@ def _loads_and_outputs() -> Iterator[Rule]:
     yield Rule(("path", "waypoints", ITEMS), lambda value: not isinstance(value, list), line, (kinds.GENERALIZED,))
     for path, pair in product(PLACES_OF_LOADS, voigt.PLANE_STATES["generalized"].components):
         yield exclusive(path, *pair)
+    plane, scalar = ("analysis", "plane"), voigt.CONDUCTION.name
+    line = f'expected {wording.toml_value(scalar)}, or no plane, in type = "conductivity"'
+    yield Rule(plane, lambda value: value == scalar, line, (kinds.CONDUCTIVITY,))
+    line = 'belongs to type = "conductivity"'
+    yield Rule(plane, lambda value: value != scalar, line, (kinds.MECHANICAL,))
     others = kinds.ANALYSIS_TYPE.among(*(name for name in _values(kinds.ANALYSIS_TYPE) if name not in DIFFERENTIABLE))
     line = f"belongs to [analysis] type = {' or '.join(map(wording.toml_value, DIFFERENTIABLE))}"
     yield Rule(("output", "sensitivities"), lambda value: value is not True, line, (others,))

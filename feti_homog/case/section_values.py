@@ -77,7 +77,7 @@ FIBRES = replace(
 KEPT = types.integer(least=2, most=10**9)
 STATES = types.either(f'"all", "peaks" or {KEPT.expected}', types.choice("all", "peaks"), KEPT)
 PAIR = types.list_of(types.text, f"the names of two phases, such as {PAIR_EXAMPLE}", count=2, unique=True)
-STRENGTH, STIFFNESS = _positive_or_inf("a traction"), _positive_or_inf("a stiffness")
+STRENGTH, STIFFNESS, CONDUCTANCE = map(_positive_or_inf, ("a traction", "a stiffness", "a conductance"))
 TOUGHNESS = replace(types.real(above=0.0), expected="an energy per area above 0")
 NUMBERS_ABOVE = types.list_of(types.real(least=0.0), "a list of two numbers or more, none below 0", least=2, most=1000)
 _ANGLES = types.list_of(
@@ -91,6 +91,8 @@ PLANE = keys.Selector("analysis", "plane")
 METHOD = keys.Selector("path", "method")
 CRITERION = keys.Selector("interface", "criterion", word="law")
 
+MECHANICAL = ANALYSIS_TYPE.among("stiffness", "angle", "path", "load", "envelope")
+CONDUCTIVITY = ANALYSIS_TYPE.among("conductivity")
 ANGLE_ANALYSIS, PATH_ANALYSIS = ANALYSIS_TYPE.among("angle"), ANALYSIS_TYPE.among("path")
 ENVELOPE_ANALYSIS, BREAKING = ANALYSIS_TYPE.among("envelope"), ANALYSIS_TYPE.among("path", "envelope")
 BY_ENERGY, BY_STRENGTH, BY_AXIAL_STRENGTH, SOFTENING, BY_TABLE = (

@@ -12,7 +12,7 @@ from typing import Any
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.interface_section import Arc, InterfaceSection, Scatter
 from feti_homog.case.load_sections import Angle, Envelope, LoadPath, MixedLoad, SingleLoad
-from feti_homog.case.section_values import ANALYSIS_TYPE, PATH_ANALYSIS, SEED, STATES
+from feti_homog.case.section_values import ANALYSIS_TYPE, MECHANICAL, PATH_ANALYSIS, SEED, STATES
 from feti_homog.materials import material_forms
 from feti_homog.schema import key, keys, limits, types, wording
 
@@ -85,15 +85,17 @@ class Analysis:
     """Type of the analysis and its plane state."""
 
     type: str = key(
-        types.choice("stiffness", "angle", "path", "load", "envelope"),
+        types.choice("stiffness", "angle", "path", "load", "envelope", "conductivity"),
         '"stiffness": the effective stiffness; "angle": the response against the debonding angle, see [angle]; '
         '"path": debonding by the load, see [path]; "load": the response to one load, under which nothing breaks, see '
-        '[load]; "envelope": the loads at which debonding begins, see [envelope].',
+        '[load]; "envelope": the loads at which debonding begins, see [envelope]; "conductivity": the effective '
+        "conductivity, of heat, electricity or diffusion, or the dielectric constant.",
     )
     plane: str = key(
-        types.choice("strain", "stress", "generalized"),
+        types.choice("strain", "stress", "generalized", "conduction"),
         'Plane state: "strain" for long fibres along x3, "stress" for a thin sheet; "generalized" is '
-        "generalized plane strain: long fibres under all six strains, also along x3.",
+        'generalized plane strain: long fibres under all six strains, also along x3. "conduction" is that of type = '
+        '"conductivity", where the key may be left out.',
     )
 
 
@@ -158,6 +160,7 @@ class Output:
         'Component to draw; "auto": the component of the unit strain. "S33", "S23" and "S13" exist in generalized '
         "plane strain.",
         default="auto",
+        only=MECHANICAL,
         presentation=True,
     )
     deformation_scale: float | None = key(
@@ -165,6 +168,7 @@ class Output:
         "Factor of the displacements drawn; by default such that displacements and openings are seen and no element "
         "turns over, but at least 1 under a given strain.",
         absent="automatic",
+        only=MECHANICAL,
         presentation=True,
     )
     length_unit: str = key(types.text, "A label, such as mm; nothing is converted.", default="", presentation=True)
@@ -261,6 +265,7 @@ TABLES = (
         for form, contents in material_forms.MATERIAL_FORMS.items()
     ),
     SectionTable("material", "[material.PHASE] strength", material_forms.PhaseStrength),
+    SectionTable("material", "[material.PHASE] conductivity", material_forms.FibreConductivity),
     SectionTable("interface", "an arc of [interface] debonded", Arc),
     SectionTable("interface", "[interface] scatter", Scatter),
     SectionTable("path", "a load of [path] to or waypoints", MixedLoad),

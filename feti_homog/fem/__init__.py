@@ -3,9 +3,9 @@
 Imports `mesh`.  Main entry: `assembly.assemble`, the stiffness matrix and load columns of one subdomain.
 """
 
-from feti_homog.fem.problem import AXIAL, GENERALIZED, PLANE, Problem
+from feti_homog.fem.problem import AXIAL, CONDUCTION, GENERALIZED, PLANE, Problem
 
 __all__ = [
-    "AXIAL", "GENERALIZED", "PLANE", "Problem", "arc_error", "assembly", "bubble", "local_fits", "point_fields",
-    "shape_functions", "stress_recovery",
+    "AXIAL", "CONDUCTION", "GENERALIZED", "PLANE", "Problem", "arc_error", "assembly", "bubble", "local_fits",
+    "point_fields", "shape_functions", "stress_recovery",
 ]  # fmt: skip

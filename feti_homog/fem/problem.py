@@ -68,3 +68,6 @@ GENERALIZED = replace(PLANE, loads=(*PLANE.loads, "E33", "temperature"))
 
 AXIAL = Problem(((0, 1),), turns=False, loads=("gamma13", "gamma23"))
 """Axial shear: the displacement along x3."""
+
+CONDUCTION = replace(AXIAL, loads=("dT/dx1", "dT/dx2", "dT/dx3"))
+"""Conduction: the temperature, under a uniform gradient along x3 as well."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from feti_homog.case import Case, bond_laws
-from feti_homog.fem import AXIAL, Problem
+from feti_homog.fem import Problem
 from feti_homog.feti import thresholds
 from feti_homog.feti.decomposition import partition
 from feti_homog.homogenization import phase_laws
@@ -153,7 +153,7 @@ def applications(case: Case, problem: Problem, across: bool = False) -> int:
     """Estimate the number of dual operator applications, also for pieces `across` phases."""
     has_arcs = bool(case.arcs) or case.cell.has_own_mesh  # the mesh may have a curve "debonded"
     touches = case.interface is not None and case.interface.contact and (has_arcs or case.section.is_followed)
-    contact = touches and problem != AXIAL  # along the fibres nothing touches
+    contact = touches and problem.turns  # along the fibres nothing touches
     bond = case.interface
     by_energy = bond is not None and bond.criterion in bond_laws.laws_with("growth") and bond.growth == "released"
     # Envelopes with arcs need the inverse operator, which pays for many solves.

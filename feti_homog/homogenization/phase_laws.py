@@ -13,23 +13,27 @@ from typing import Any
 import numpy as np
 
 from feti_homog.case import Case, bond_laws, cell_sizes, interface_section
-from feti_homog.fem import AXIAL, GENERALIZED, PLANE, Problem
+from feti_homog.fem import AXIAL, CONDUCTION, GENERALIZED, PLANE, Problem
 from feti_homog.feti.decomposition import jump_operator
 from feti_homog.interface.laws import BondLaw, law_class
 from feti_homog.materials import laws, material_derivatives, voigt
 from feti_homog.typing import Float, Int
 
-IN_PLANE, AXIAL_SHEAR = [0, 1, 5, 2], [4, 3]
-"""Indices of the plane problem's strains, with E33, and of the axial strains among the six strains in space."""
+IN_PLANE, AXIAL_SHEAR, GRADIENT = [0, 1, 5, 2], [4, 3], [4, 3, 2]
+"""Indices among the six strains in space: of the plane problem with E33, of axial shear, of conduction."""
 # Exponent of the fibre factor for keys with these endings.  Laws remain similar, because all openings grow by the
 # factor too, and the process zone keeps its length.
 POWERS = {"strength": 1, "toughness": 2}
 
 
 def problems(case: Case) -> tuple[Problem, ...]:
-    """Return the plane problem and, in generalized plane strain, the axial problem; expansions add a temperature."""
-    if not voigt.PLANE_STATES[case.analysis.plane].is_spatial:
-        return (PLANE,)
+    """Return the plane problem and, in generalized plane strain, the axial problem; expansions add a temperature.
+
+    Conduction is a problem of its own.
+    """
+    state = voigt.PLANE_STATES[case.analysis.plane]
+    if not state.is_spatial or state.is_scalar:
+        return (CONDUCTION if state.is_scalar else PLANE,)
     if any(laws.expansion(material) is None for material in case.materials.values()):
         return replace(GENERALIZED, loads=GENERALIZED.loads[:4]), AXIAL
     return GENERALIZED, AXIAL
@@ -38,8 +42,12 @@ def problems(case: Case) -> tuple[Problem, ...]:
 def law(case: Case, phase: str, problem: Problem) -> Float:
     """Return the phase stiffness A (v, v) in a problem."""
     material = case.material_of(phase)
-    if problem == PLANE:
-        return laws.plane_stiffness(material, case.analysis.plane)
+    if problem in (PLANE, CONDUCTION):
+        return (
+            laws.conductivity(material)
+            if problem == CONDUCTION
+            else laws.plane_stiffness(material, case.analysis.plane)
+        )
     C = laws.spatial_stiffness(material)
     if problem == AXIAL:
         return C[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)]
@@ -91,20 +99,25 @@ def components(plane: Float, *axial: Float) -> Float:
 
 
 def spatial_vector(plane: Float | None, axial: Float | None) -> Float:
-    """Join the components of the plane and the axial problem to a vector (6,); None is zero."""
+    """Join the components of the plane and the axial problem, or of conduction, to a vector (6,); None is zero."""
     vector = np.zeros(6)
     if plane is not None:
         vector[IN_PLANE] = plane[:4]
     if axial is not None:
-        vector[AXIAL_SHEAR] = axial
+        vector[GRADIENT[: len(axial)]] = axial
     return vector
 
 
 def springs(case: Case, problem: Problem = PLANE) -> jump_operator.InterfaceSprings:
-    """Return the springs of a problem; by default axial springs are like tangential springs."""
-    along = [(bond.axial_stiffness or bond.tangential_stiffness or math.inf,) for bond in case.interfaces]
+    """Return the springs of a problem; by default axial springs are like tangential springs.
+
+    The springs of conduction are conductances.
+    """
+    along = [
+        (bond.conductance or bond.axial_stiffness or bond.tangential_stiffness or math.inf,) for bond in case.interfaces
+    ]
     around = [(bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf) for bond in case.interfaces]
-    return jump_operator.InterfaceSprings(tuple(along if problem == AXIAL else around), has_softening(case))
+    return jump_operator.InterfaceSprings(tuple(along if problem.components == 1 else around), has_softening(case))
 
 
 def has_softening(case: Case) -> bool:

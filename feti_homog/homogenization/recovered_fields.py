@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.fem import assembly, stress_recovery
+from feti_homog.fem import Problem, assembly, stress_recovery
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.domain_partition import in_cell
@@ -44,9 +44,9 @@ class RecoveredFields:
     shares: Float
 
 
-def recover(cell: TornCell, response: Response | None) -> RecoveredFields:
-    """Recover the response fields; all fields are zero without a response.  Collective."""
-    nodes, problem = cell.jumps.nodes, cell.solver.problem
+def recover(cell: TornCell, response: Response | None, problem: Problem | None = None) -> RecoveredFields:
+    """Recover the response fields; without a response those of `problem`, by default the cell's, are 0.  Collective."""
+    nodes, problem = cell.jumps.nodes, problem or cell.solver.problem
     m, (c, v) = problem.strains, (problem.components, len(problem.loads))
     if response is None:
         n, e = sum(len(s.mesh.points) for s in cell.parts), sum(len(s.mesh.triangles) for s in cell.parts)

@@ -31,16 +31,20 @@ NEEDED: dict[
 OF_DATA_SHEETS = "axis 3 is along the fibres: with constants of a data sheet give E_axial, E_transverse, nu_axial, ..."
 # Relative rounding in the constants and the stiffness of an isotropic, or transversely isotropic, material.
 ISOTROPY = 1e-9
+# Relative asymmetry of a symmetric matrix by its digits.
+NOISE = 1e-9
 # Beyond the first contrast the rounding of displacements costs the soft phase its allowed stress error; beyond the
 # second contrast it leaves nothing of the soft phase's stresses.
 WORRYING_CONTRAST, LARGEST_CONTRAST = 1e10, 1e14
 
 
 def stiffness_of(material: material_forms.Material, plane: str) -> Float:
-    """Return the stiffness (3, 3) in the plane, or (6, 6) if the plane state is spatial.
+    """Return the stiffness (3, 3) in the plane, (6, 6) if the plane state is spatial, or `conductivity`.
 
     Raises as `plane_stiffness`.
     """
+    if voigt.PLANE_STATES[plane].is_scalar:
+        return conductivity(material)
     return spatial_stiffness(material) if voigt.PLANE_STATES[plane].is_spatial else plane_stiffness(material, plane)
 
 
@@ -50,6 +54,7 @@ def plane_stiffness(material: material_forms.Material, plane: str) -> Float:
     `plane` is "stress" (S33 = 0), "strain" (E33 = 0), or "generalized", where C is the block at E33 = 0. Raises
     ValueError, with the keys at fault, if the constants leave C open or belong to no stable material.
     """
+    material = _elastic(material)
     if isinstance(material, material_forms.Isotropic):
         lame, shear = _lame(material, plane)
         return np.array([[lame + 2 * shear, lame, 0.0], [lame, lame + 2 * shear, 0.0], [0.0, 0.0, shear]])
@@ -66,6 +71,19 @@ def plane_stiffness(material: material_forms.Material, plane: str) -> Float:
         out = compliance[voigt.IN_PLANE, 2]
         reduced = reduced - np.outer(out, out) / compliance[2, 2]
     return voigt.rotated(np.asarray(np.linalg.inv(reduced), float), _angle(material))
+
+
+def conductivity(material: material_forms.Material) -> Float:
+    """Return k (3, 3): q = -k grad T in the cell's axes, symmetric positive definite.
+
+    Raises ValueError, with the key at fault, for a phase without conductivity, and for another matrix.
+    """
+    k = material.conductivity
+    if k is None:
+        raise ValueError('conductivity: missing; [analysis] type = "conductivity" needs it')
+    if isinstance(k, material_forms.FibreConductivity):
+        return np.diag([k.transverse, k.transverse, k.axial])
+    return k * np.eye(3) if isinstance(k, float) else _positive_definite("conductivity", _symmetric("conductivity", k))
 
 
 def isotropic_ratio(material: material_forms.Material) -> float | None:
@@ -87,6 +105,7 @@ def spatial_stiffness(material: material_forms.Material) -> Float:
 
     Raises ValueError as `plane_stiffness` does.
     """
+    material = _elastic(material)
     if isinstance(material, material_forms.Isotropic):
         lame, shear = _lame(material, voigt.GENERALIZED.name)
         stiffness = np.diag([2 * shear] * 3 + [shear] * 3)
@@ -130,6 +149,7 @@ def out_of_plane(material: material_forms.Material, plane: str) -> tuple[Float, 
     S33 vanishes in plane stress, E33 in plane strain.  Rows that the constants leave open are NaN.
     """
     # E33 = row . [S11, S22, S12] + S33 / young
+    material = _elastic(material)
     if isinstance(material, material_forms.Isotropic):
         ratio = -material.poisson / material.young
         row, young = np.array([ratio, ratio, 0.0]), material.young
@@ -143,6 +163,13 @@ def out_of_plane(material: material_forms.Material, plane: str) -> tuple[Float, 
         to_axes = voigt.strain_rotation(-_angle(material)).T[voigt.IN_PLANE_BLOCK]
         row, young = np.array([compliance[2, 0], compliance[2, 1], 0.0]) @ to_axes, 1.0 / compliance[2, 2]
     return (np.zeros(3), row) if voigt.PLANE_STATES[plane].is_sheet else (-young * row, np.zeros(3))
+
+
+def _elastic(material: material_forms.Material) -> material_forms.Elastic:
+    """Return a material with a stiffness; ValueError for a conductor."""
+    if isinstance(material, material_forms.Conductor):
+        raise ValueError('young, poisson: missing; conductivity alone serves [analysis] type = "conductivity"')
+    return material
 
 
 def _lame(material: material_forms.Isotropic, plane: str) -> tuple[float, float]:
@@ -162,11 +189,8 @@ def _angle(material: material_forms.Material) -> float:
 
 def _checked_stiffness(material: material_forms.General) -> Float:
     """Check and return the given stiffness of a phase, (3, 3) or (6, 6)."""
-    matrix = np.array(material.stiffness)
-    noise = 1e-9 * np.abs(matrix).max()
-    if not np.allclose(matrix, matrix.T, rtol=0.0, atol=noise):
-        raise ValueError(f"stiffness = {wording.toml_value(material.stiffness)}: expected a symmetric matrix")
-    stiffness = np.asarray((matrix + matrix.T) / 2.0)
+    stiffness = _symmetric("stiffness", material.stiffness)
+    noise = NOISE * np.abs(stiffness).max()
     if len(stiffness) == 6:
         i, j = max(COUPLINGS, key=lambda entry: float(abs(stiffness[entry])))
         if abs(stiffness[i, j]) > noise:
@@ -174,9 +198,22 @@ def _checked_stiffness(material: material_forms.General) -> Float:
             raise ValueError(f"stiffness: {entry}: expected 0; x3 must be normal to a plane of symmetry")
         rows, columns = np.transpose(COUPLINGS)
         stiffness[rows, columns] = stiffness[columns, rows] = 0.0
-    if not voigt.is_positive_definite(stiffness):
-        raise ValueError(f"stiffness = {wording.toml_value(material.stiffness)}: expected a positive definite matrix")
-    return stiffness
+    return _positive_definite("stiffness", stiffness)
+
+
+def _symmetric(name: str, rows: material_forms.Matrix) -> Float:
+    """Return a matrix without its asymmetry, which is rounding; ValueError for more."""
+    matrix = np.array(rows)
+    if not np.allclose(matrix, matrix.T, rtol=0.0, atol=NOISE * np.abs(matrix).max()):
+        raise ValueError(f"{name} = {wording.toml_value(rows)}: expected a symmetric matrix")
+    return np.asarray((matrix + matrix.T) / 2.0)
+
+
+def _positive_definite(name: str, matrix: Float) -> Float:
+    """Return the matrix; ValueError if it is not positive definite."""
+    if not voigt.is_positive_definite(matrix):
+        raise ValueError(f"{name} = {wording.toml_value(matrix.tolist())}: expected a positive definite matrix")
+    return matrix
 
 
 def stable_compliance(material: material_forms.Orthotropic | material_forms.TransverselyIsotropic, plane: str) -> Float:
@@ -239,16 +276,17 @@ def _numbers(*constants: float | None) -> list[float]:
 
 
 def contrast_lines(materials: Mapping[str, material_forms.Material], plane: str) -> tuple[list[str], list[str]]:
-    """Return the faults and warnings about a large stiffness contrast between stable phases."""
+    """Return the faults and warnings about a large contrast of stiffness or conductivity between stable phases."""
+    noun = "conductivities" if voigt.PLANE_STATES[plane].is_scalar else "stiffnesses"
     with np.errstate(over="ignore"):
         sizes = {phase: float(np.abs(stiffness_of(material, plane)).max()) for phase, material in materials.items()}
     stiffest, softest = max(sizes, key=sizes.__getitem__), min(sizes, key=sizes.__getitem__)
     phases = ", ".join(f"[material.{wording.toml_key(phase)}]" for phase in (stiffest, softest))
     contrast = sizes[stiffest] / sizes[softest]
     if contrast > LARGEST_CONTRAST:
-        words = f"stiffnesses that differ by a factor of {contrast:.1e}: expected at most {LARGEST_CONTRAST:g}"
+        words = f"{noun} that differ by a factor of {contrast:.1e}: expected at most {LARGEST_CONTRAST:g}"
         return [f"{phases}: {words}"], []
     if contrast > WORRYING_CONTRAST:
-        words = f"stiffnesses differ by {contrast:.1e}: rounding may exceed the tolerance of the checks"
+        words = f"{noun} differ by {contrast:.1e}: rounding may exceed the tolerance of the checks"
         return [], [f"{phases}: {words}"]
     return [], []

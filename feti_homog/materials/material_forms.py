@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 from feti_homog.schema import key, types
 
@@ -14,7 +15,7 @@ MATRIX = types.either(
     *(types.list_of(types.list_of(types.real(), "", count=size), "", count=size) for size in (3, 6)),
 )
 EXPANSION = types.either("a number or a list of three numbers", types.real(), types.list_of(types.real(), "", count=3))
-PER_TEMPERATURE = "1 / temperature"
+PER_TEMPERATURE, CONDUCTIVITY_UNIT = "1 / temperature", "conductivity"
 EXPANSION_PAIR = ("expansion_axial", "expansion_transverse")
 """Keys that are given together, in place of one expansion."""
 
@@ -42,6 +43,26 @@ STRENGTH = types.table_of(PhaseStrength, "a table such as {principal = 80.0}", l
 UTILISATION = "Strength of the phase, whose utilisation is computed with its largest stresses."
 
 
+@dataclass(frozen=True, kw_only=True)
+class FibreConductivity:
+    """Conductivities of a phase that conducts alike in all directions of the plane."""
+
+    axial: float = key(POSITIVE, "Along x3.", unit=CONDUCTIVITY_UNIT)
+    transverse: float = key(POSITIVE, "In the plane.", unit=CONDUCTIVITY_UNIT)
+
+
+CONDUCTIVITY = types.either(
+    "a table {axial, transverse}, a symmetric 3x3 array of numbers or a number above 0",
+    POSITIVE,
+    types.table_of(FibreConductivity, ""),
+    types.list_of(types.list_of(types.real(), "", count=3), "", count=3),
+)
+CONDUCTS = (
+    'The same in all directions, along x3 and in the plane, or the tensor; type = "conductivity" needs this key alone.'
+)
+Conductivity = float | FibreConductivity | Matrix
+
+
 @dataclass(frozen=True)
 class Isotropic:
     """Young's modulus and Poisson's ratio."""
@@ -50,6 +71,7 @@ class Isotropic:
     poisson: float = key(types.real(above=-1.0, most=0.5), "Poisson's ratio; 0.5 in plane stress alone.")
     expansion: float | None = key(types.real(), "Thermal expansion.", unit=PER_TEMPERATURE, default=None)
     strength: PhaseStrength | None = key(STRENGTH, UTILISATION, default=None)
+    conductivity: Conductivity | None = key(CONDUCTIVITY, CONDUCTS, unit=CONDUCTIVITY_UNIT, default=None)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,6 +99,7 @@ class Orthotropic:
         default=None,
     )
     strength: PhaseStrength | None = key(STRENGTH, UTILISATION, default=None)
+    conductivity: Conductivity | None = key(CONDUCTIVITY, CONDUCTS, unit=CONDUCTIVITY_UNIT, default=None)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,6 +135,7 @@ class TransverselyIsotropic:
         types.real(), "Thermal expansion in the plane; with expansion_axial.", unit=PER_TEMPERATURE, default=None
     )
     strength: PhaseStrength | None = key(STRENGTH, UTILISATION, default=None)
+    conductivity: Conductivity | None = key(CONDUCTIVITY, CONDUCTS, unit=CONDUCTIVITY_UNIT, default=None)
 
 
 @dataclass(frozen=True)
@@ -133,12 +157,24 @@ class General:
         default=None,
     )
     strength: PhaseStrength | None = key(STRENGTH, UTILISATION, default=None)
+    conductivity: Conductivity | None = key(CONDUCTIVITY, CONDUCTS, unit=CONDUCTIVITY_UNIT, default=None)
 
 
-Material = Isotropic | Orthotropic | TransverselyIsotropic | General
-MATERIAL_FORMS: dict[str, type[Isotropic] | type[Orthotropic] | type[TransverselyIsotropic] | type[General]] = {
+@dataclass(frozen=True)
+class Conductor:
+    """Conductivity alone, of phases whose stiffness is not asked for."""
+
+    conductivity: Conductivity = key(CONDUCTIVITY, CONDUCTS, unit=CONDUCTIVITY_UNIT)
+    expansion: None = None
+    strength: None = None
+
+
+Elastic = Isotropic | Orthotropic | TransverselyIsotropic | General
+Material = Elastic | Conductor
+MATERIAL_FORMS: dict[str, type[Any]] = {
     "isotropic": Isotropic,
     "orthotropic": Orthotropic,
     "transversely isotropic": TransverselyIsotropic,
     "general": General,
+    "conductor": Conductor,
 }

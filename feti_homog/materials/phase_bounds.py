@@ -117,6 +117,27 @@ class Estimates:
     self_consistent: Estimate = described("Christensen and Lo 1979, generalized self-consistent")
 
 
+@dataclass(frozen=True)
+class ConductivityEstimates:
+    """Closed forms for the conductivity of phases that conduct alike in all directions of the plane."""
+
+    axial: float = described("along the fibres: the mean, which is exact", "conductivity")
+    wiener: Pair | None = described(
+        "bounds across bonded fibres in any arrangement: harmonic and arithmetic mean", "conductivity", "(2,)"
+    )
+    hashin_shtrikman: Pair | None = described(
+        "bounds across bonded fibres of a cell that conducts alike in all directions across", "conductivity", "(2,)"
+    )
+    maxwell: float | None = described(
+        "estimate across round fibres: Maxwell 1873, with conductances Hasselman and Johnson 1987", "conductivity"
+    )
+
+
+def dispersed(fractions: ArrayLike, values: ArrayLike, reference: float) -> float:
+    """Return 1 / sum c/(p + p0) - p0 of cylinders p in a medium p0 under equal far fields."""
+    return float(1 / np.sum(np.asarray(fractions, float) / (np.asarray(values, float) + reference)) - reference)
+
+
 def voigt(fractions: ArrayLike, stiffnesses: ArrayLike) -> Float:
     """Return the upper bound sum c_i C_i, (3, 3), from fractions (n,) and stiffnesses (n, 3, 3)."""
     return np.asarray(np.einsum("i,ijk->jk", np.asarray(fractions, float), np.asarray(stiffnesses, float)))
@@ -147,7 +168,7 @@ def hashin_shtrikman(fractions: ArrayLike, stiffnesses: Sequence[ArrayLike]) -> 
 
     def bounds(k0: float, mu0: float) -> tuple[float, float]:
         h0 = k0 * mu0 / (k0 + 2 * mu0)
-        return float(1 / np.sum(c / (bulk + mu0)) - mu0), float(1 / np.sum(c / (shear + h0)) - h0)
+        return dispersed(c, bulk, mu0), dispersed(c, shear, h0)
 
     lower, upper = bounds(bulk.min(), shear.min()), bounds(bulk.max(), shear.max())
     return Bounds(bulk=(lower[0], upper[0]), shear=(lower[1], upper[1]))
@@ -173,7 +194,7 @@ def aligned_cylinders(
     across, along, x = 2 * nu * k, E + 4 * nu**2 * k, k + m0
     h = k0 * m0 / (k0 + 2 * m0)
     stiff = 1 / np.sum(c / x)  # k* + m0
-    bulk, shear = stiff - m0, 1 / np.sum(c / (m + h)) - h
+    bulk, shear = stiff - m0, dispersed(c, m, h)
     mean = np.sum(c * across / x)  # L
     coupling = stiff * mean
     poisson = coupling / (2 * bulk)
@@ -192,8 +213,8 @@ def aligned_cylinders(
         E_transverse=float(E_transverse),
         nu_axial=float(poisson),
         nu_transverse=float(nu_transverse),
-        G_axial=float(1 / np.sum(c / (p + p0)) - p0),
-        G_transverse=float(shear),
+        G_axial=dispersed(c, p, p0),
+        G_transverse=shear,
         K_transverse=float(bulk),
         expansion_axial=strains[0],
         expansion_transverse=strains[1],

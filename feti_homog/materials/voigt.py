@@ -3,7 +3,7 @@
 The order is [11, 22, 12] in plane strain and stress, [11, 22, 33, 23, 13, 12] in space and generalized plane strain.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,6 +34,8 @@ class PlaneState:
         is_sheet: whether S33 vanishes; otherwise E33 vanishes or is a load.
         is_spatial: whether all six strains and a temperature are loads: then axial shear is a separate problem, the
             stiffness is (6, 6), and constants, estimates and bounds are spatial.
+        is_scalar: whether the unknown is a temperature: its gradient has the places [13, 23, 33] of strains, and the
+            flux -q those of stresses.
         numbers: index of each plane strain in the names Cij of stiffness entries.
     """
 
@@ -43,12 +45,18 @@ class PlaneState:
     stresses: tuple[str, ...] = STRESSES
     is_sheet: bool = False
     is_spatial: bool = False
+    is_scalar: bool = False
     numbers: tuple[int, int, int] = (1, 2, 3)
 
     @property
     def components(self) -> tuple[tuple[str, str], ...]:
         """The strain name and the stress name of each component."""
         return tuple(zip(self.strains, self.stresses, strict=True))
+
+    @property
+    def locks(self) -> bool:
+        """Whether elements of nearly incompressible phases lock."""
+        return not (self.is_sheet or self.is_scalar)
 
     @property
     def normals(self) -> int:
@@ -61,7 +69,8 @@ PLANE_STRESS = PlaneState("stress", "plane stress", is_sheet=True)
 GENERALIZED = PlaneState(
     "generalized", "generalized plane strain", SPATIAL_STRAINS, SPATIAL_STRESSES, is_spatial=True, numbers=(1, 2, 6)
 )
-PLANE_STATES = {state.name: state for state in (PLANE_STRAIN, PLANE_STRESS, GENERALIZED)}
+CONDUCTION = replace(GENERALIZED, name="conduction", title="conduction", is_scalar=True)
+PLANE_STATES = {state.name: state for state in (PLANE_STRAIN, PLANE_STRESS, GENERALIZED, CONDUCTION)}
 
 
 def plane_state_of(document: Document) -> PlaneState:

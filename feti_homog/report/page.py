@@ -23,6 +23,7 @@ PICTURES = {
     "partition": "The subdomains",
     **{f"case_{load}": f"Deformed cell under {load}" for load in UNIT_LOADS},
     **{f"case_minus_{load}": f"Deformed cell under minus {load}" for load in UNIT_LOADS},
+    **{f"case_dT_dx{k}": f"Flux and isotherms under a unit gradient along x{k}" for k in (1, 2)},
     "angle": "Response against the debonding angle",
     "angle_states": "Deformed cell at several angles",
     "path": "Response along the path of load",

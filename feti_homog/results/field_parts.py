@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from feti_homog.fem import GENERALIZED
 from feti_homog.homogenization import averaging, phase_laws, recovered_fields, unit_cell
 from feti_homog.results.field_layout import FibrePart, Header, InterfacePart, MeshPart, SpatialStatePart, StatePart
 from feti_homog.typing import Float, Float32
@@ -109,15 +110,17 @@ def spatial_state_part(
 ) -> SpatialStatePart:
     """Return the fields in generalized plane strain, from responses of the plane and the axial problem.
 
-    A problem without a response has zero fields.  Collective when first called.
+    A problem without a response has zero fields.  Conduction takes the place of the axial problem.  Collective when
+    first called.
 
     Raises:
-        ValueError: there is no response, or no axial problem.
+        ValueError: there is no response.
     """
     response = plane or axial
-    if response is None or cell.axial is None:
-        raise ValueError("expected a response of a cell with an axial problem")
-    in_plane, along = recovered_fields.recover(cell, plane), recovered_fields.recover(cell.axial, axial)
+    if response is None:
+        raise ValueError("expected a response")
+    in_plane = recovered_fields.recover(cell, plane, None if cell.axial else GENERALIZED)
+    along = recovered_fields.recover(cell.axial or cell, axial)
     return SpatialStatePart(
         strain=phase_laws.spatial_vector(*(r if r is None else r.strain for r in (plane, axial))),
         stress_mean=phase_laws.spatial_vector(*(r if r is None else r.stress for r in (plane, axial))),
@@ -126,10 +129,10 @@ def spatial_state_part(
         point=point,
         label=label,
         stress=in_plane.stress[:, :3],
-        stress_33=in_plane.stress[:, 3],
+        stress_33=in_plane.stress[:, 3] + along.stress[:, 2:].sum(axis=1),
         mesh_error=_relative(in_plane.shares + along.shares, plane, axial),
         axial_displacement=along.displacement[:, 0],
-        axial_stress=along.stress[:, ::-1],  # the axial problem has [13, 23], the file [23, 13]
+        axial_stress=along.stress[:, 1::-1],  # the axial problem has [13, 23], the file [23, 13]
         axial_traction=along.traction[:, 0],
         axial_jump=along.jump[:, 0],
         **_at_nodes(cell, response, in_plane, along),

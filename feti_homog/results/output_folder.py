@@ -32,7 +32,8 @@ RESULT_FILE = re.compile(
     r"|(angle|path|load|envelope)\.csv|path\.gif"
     r"|(cell|partition|mesh_error|sensitivities|energy|interface|load|envelope|(angle|path)(_states)?)\.(png|pdf|svg)"
     r"|(cell|interface)(_\d{4,}\.vtu|\.pvd|\.vtkhdf)"
-    rf"|case_(minus_)?({'|'.join(voigt.SPATIAL_STRAINS)}|temperature)\.(png|pdf|svg)|state_\d+\.(png|pdf|svg)"
+    rf"|case_(minus_)?({'|'.join(voigt.SPATIAL_STRAINS)}|temperature|dT_dx[12])\.(png|pdf|svg)"
+    r"|state_\d+\.(png|pdf|svg)"
 )
 # Files that show that a run has written to the folder.
 SIGNS = (result_json.NAME, field_file.NAME, LOG, LOCK)

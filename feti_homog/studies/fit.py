@@ -17,7 +17,7 @@ from feti_homog.case import interface_section, sections, toml_files
 from feti_homog.materials import engineering_constants, voigt
 from feti_homog.report.text import study_tables
 from feti_homog.results import atomic, result_json
-from feti_homog.studies import case_folders, estimation, fit_result
+from feti_homog.studies import estimation, fit_result
 from feti_homog.studies.axes import Assignment, rounded
 from feti_homog.studies.predictions import Datum, exact_derivatives, predicted
 from feti_homog.studies.study import SILENT, Evaluator, Study

@@ -13,6 +13,7 @@ from feti_homog.typing import Document
 
 PHASES_OF_ONE_FIBRE = 2
 MEASURES = ("principal", "von_mises", "hydrostatic", "utilisation")  # of the stresses in a phase
+CONDUCTIVITIES = tuple(f"k{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
 Column = result_json.DescribedColumn
 
 
@@ -92,9 +93,10 @@ def _constants(document: Document, numbers: Sequence[int]) -> dict[str, float]:
 
 
 def _linear(section: Document, numbers: Sequence[int]) -> dict[str, float]:
-    """Return stiffness, thermal stress and expansion, or their mesh errors, by column name."""
+    """Return stiffness or conductivity, thermal stress and expansion, or their mesh errors, by column name."""
     values = _entries(section.get("effective_stiffness", ()), numbers)
     values |= _entries(section.get("effective_stiffness_compression", ()), numbers, "_compression")
+    values |= _named(CONDUCTIVITIES, np.ravel(section.get("effective_conductivity", ())).tolist())
     values |= _named(voigt.THERMAL_STRESSES, section.get("thermal_stress", ()))
     return values | _named(voigt.EXPANSIONS, section.get("thermal_expansion", ()))
 
@@ -153,6 +155,7 @@ OUTPUT_COLUMNS = (
     Column("multipliers", "", "Lagrange multipliers of the dual problem"),
     Column("iterations", "", "Krylov iterations of all states"),
     Column("Cij", records.STRESS, "entry of L^ef; beside generalized plane strain C66 is the shear modulus of all"),
+    Column("kij", "conductivity", "entry of k^ef, with x3 along the fibres"),
     Column("Cij_compression", records.STRESS, "the same under minus the unit strains, with contact"),
     Column("thermal_Sij", f"{records.STRESS} per unit of temperature", "stress per unit of temperature at no strain"),
     Column("expansion_x1", "1 / temperature", "strain along x1 per unit of temperature at no stress; expansion_x2 too"),

@@ -20,11 +20,13 @@ PANELS = ("C11", "C33", "bulk", "shear")
 SPATIAL_PANELS = ("E_axial", "E_transverse", "G_axial", "G_transverse")  # of generalized plane strain
 RATIOS = ("nu_axial", "nu_transverse", "expansion_axial", "expansion_transverse")
 SECANTS = ("C11", "C33", "C44", "C66")  # of generalized plane strain where faces may touch: there are no constants
+CONDUCTION = ("k11", "k22", "k33")
 COMMON_PANELS = ("C11", "C66")  # of generalized plane strain and plane states together
-BANDS = {"C11": "Reuss to Voigt", "C33": "Reuss to Voigt", "bulk": "Hashin-Shtrikman", "shear": "Hashin-Shtrikman"}
+BANDS = {"C11": "Reuss to Voigt", "C33": "Reuss to Voigt"}
+BANDS |= dict.fromkeys(("bulk", "shear", *CONDUCTION), "Hashin-Shtrikman")
 MARKERS = ("o", "s", "^", "D", "v", "P")
 NAMES = {
-    **{name: f"$C_{{{name[1:]}}}$" for name in ("C11", "C33", "C44", "C66")},
+    **{name: f"${name[0]}_{{{name[1:]}}}$" for name in ("C11", "C33", "C44", "C66", *CONDUCTION)},
     **{
         name: f"{constant.symbol} {constant.way} the fibres{' (1 / temperature)' * name.startswith('expansion')}"
         for name, constant in engineering_constants.ABOUT_FIBRES.items()
@@ -45,7 +47,7 @@ def draw_moduli(directory: Path, table: SweepTable) -> list[Path]:
 def panels_of(table: SweepTable) -> tuple[str, ...]:
     """Return the names of the outputs to draw; empty for cases without moduli."""
     spatial = {voigt.plane_state_of(document).is_spatial for document in table.finished}
-    in_space = (COMMON_PANELS,) if False in spatial else (SPATIAL_PANELS, SECANTS)
+    in_space = (COMMON_PANELS,) if False in spatial else (SPATIAL_PANELS, SECANTS, CONDUCTION)
     choices = in_space if True in spatial else (PANELS,)
     return next((names for names in choices if all(name in table.outputs for name in names)), ())
 
@@ -64,7 +66,7 @@ def moduli_figure(table: SweepTable) -> Figure:
     for axes, name in zip(panels, names, strict=False):
         for style, one_series in enumerate(series):
             _plot_series(axes, table, one_series, name, style)
-        unit = "" if name.startswith(("nu_", "expansion_")) else plot_helpers.stress_label(table.stress_unit)
+        unit = "" if name.startswith(("nu_", "expansion_", "k")) else plot_helpers.stress_label(table.stress_unit)
         axes.set(xlabel="fibre fraction", ylabel=f"{NAMES[name]} {unit}".rstrip())
         plot_helpers.faint_grid(axes)
         axes.tick_params(labelbottom=True)
@@ -87,7 +89,11 @@ def moduli_figure(table: SweepTable) -> Figure:
 def bounds_of(document: Document) -> dict[str, tuple[float, float]]:
     """Return the bounds of a result by panel: Reuss and Voigt for stiffnesses, tighter bounds for constants."""
     bounds = document.get("bounds") or {}
-    pairs = {f"C{k + 1}{k + 1}": (bounds["reuss"][k][k], bounds["voigt"][k][k]) for k in (0, 2) if bounds}
+    pairs: dict[str, Any] = {
+        f"C{k + 1}{k + 1}": (bounds["reuss"][k][k], bounds["voigt"][k][k]) for k in (0, 2) if bounds
+    }
+    forms = document.get("conductivity_estimates") or {}
+    pairs |= dict.fromkeys(CONDUCTION[:2], forms.get("hashin_shtrikman"))
     pairs |= (bounds.get("hashin_shtrikman") or {}) | (document.get("fibre_bounds") or {})
     return {name: pair for name, pair in pairs.items() if pair is not None}
 

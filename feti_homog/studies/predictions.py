@@ -12,7 +12,7 @@ from feti_homog.materials import engineering_constants, laws, voigt
 from feti_homog.report.text import point_tables
 from feti_homog.results import path_curves
 from feti_homog.schema import wording
-from feti_homog.studies.outputs import outputs
+from feti_homog.studies.outputs import CONDUCTIVITIES, outputs
 from feti_homog.typing import Float
 
 TOUGHNESS = "toughness"
@@ -49,8 +49,10 @@ def data_faults(case: Case, data: Sequence[Datum], place: str) -> Iterator[str]:
     elif kind == "path":
         names = [f"{mark}_{name}" for mark in ("onset", "peak", "end") for name in (*stresses, *strains)]
         names = ["onset_load_factor", *names, "dissipated", "work"]
+    elif kind == "conductivity":
+        names = [*CONDUCTIVITIES]
     else:
-        yield f'[analysis] type = "{kind}": a fit takes "stiffness" and "path"'
+        yield f'[analysis] type = "{kind}": a fit takes "stiffness", "path" and "conductivity"'
         return
     if points := [datum for datum in data if datum.strain is not None]:
         yield from (f"{place}{sections.CURVE}: {fault}" for fault in _curve_faults(case, points))
@@ -96,11 +98,14 @@ def _curve_faults(case: Case, points: Sequence[Datum]) -> Iterator[str]:
 def responses(document: path_curves.Document) -> dict[str, float]:
     """Return the result numbers whose scatter matters, by name.
 
-    A stiffness has its constants, a path its onset and peak, other analyses the numbers of their kind.
+    A stiffness has its constants, a conductivity its entries, a path its onset and peak, other analyses the numbers of
+    their kind.
     """
     values, kind = _values(document), document["case"]["analysis"]["type"]
     if kind == "stiffness" or "sensitivities" in document:
         return values
+    if kind == "conductivity":
+        return {name: values[name] for name in CONDUCTIVITIES}
     starts = ("onset_", "peak_") if kind == "path" else (f"{kind}_",)
     return {name: values[name] for name in values if name.startswith(starts) and not name.endswith(point_tables.STATES)}
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from feti_homog.errors import CaseError
 from feti_homog.system.runtime import input_files
-from feti_homog.verify.check_constants import check_constants, check_reciprocity, check_status
+from feti_homog.verify.check_constants import check_conductivity, check_constants, check_reciprocity, check_status
 from feti_homog.verify.check_loads import StateNumbers, States, check_loads, check_tables, rows_of
 from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh, check_mesh_error, check_rates
 from feti_homog.verify.check_path import check_breaks, check_envelope, check_strength
@@ -136,4 +136,6 @@ def laws_of_numbers(findings: Findings, cell: DiscreteCell, states: States) -> N
     check_reciprocity(findings, cell, states)
     if "effective_stiffness" in document:
         check_constants(findings, cell)
+    if "conductivity_estimates" in document:
+        check_conductivity(findings, cell)
     check_sensitivities(findings, cell)

@@ -4,7 +4,7 @@ import numpy as np
 
 from feti_homog.typing import Float
 from feti_homog.verify.check_loads import States
-from feti_homog.verify.constitutive_law import VOIGT, turned
+from feti_homog.verify.constitutive_law import GRADIENT, VOIGT, turned
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import KKT, Findings, relative, solver_limit
 from feti_homog.verify.reading import Status
@@ -44,7 +44,7 @@ def check_reciprocity(findings: Findings, cell: DiscreteCell, states: States) ->
         if cell.files.contact and any((state.status != Status.BONDED).any() for state in own_states):
             continue
         place = f"angle[{number}]." if number >= 0 else ""
-        for name in [name for name in ("effective_stiffness", "stiffness") if name in table]:
+        for name in [name for name in ("effective_stiffness", "effective_conductivity", "stiffness") if name in table]:
             C = np.array(table[name])
             findings.compare("symmetry", C, C.T, np.abs(C).max(), place + name)
         if "thermal_stress" in table:
@@ -94,6 +94,27 @@ def check_constants(findings: Findings, cell: DiscreteCell) -> None:
             else:
                 least = NOISE if name.startswith("nu") else float(name.startswith(RATIOS))
                 findings.compare("moduli", value, expected, max(abs(expected), least), place)
+
+
+def check_conductivity(findings: Findings, cell: DiscreteCell) -> None:
+    """Check the bounds and the estimate of the effective conductivity by their formulas."""
+    k, forms = np.array(cell.files.document["effective_conductivity"]), cell.files.document["conductivity_estimates"]
+    share, (axial, across) = cell.fractions, (cell.stiffnesses[:, place, place] for place in GRADIENT[::-2])
+    limits, bounds = (
+        np.array([1 / (share @ (1 / across)), share @ across]),
+        [forms["wiener"], forms["hashin_shtrikman"]],
+    )
+    findings.compare("bounds", forms["axial"], share @ axial, axial.max(), "conductivity_estimates.axial")
+    resists = any("conductance" in section for section in cell.files.interfaces)
+    findings.require("bounds", bounds == [None, None] if resists else None not in bounds, "conductivity_estimates")
+    if not resists:
+        findings.compare("bounds", bounds[0], limits, limits[1], "conductivity_estimates.wiener")
+        inside = np.linalg.eigvalsh((k + k.T)[:2, :2] / 2)
+        off = [limits[0] - inside.min(), inside.max() - limits[1], 0.0]
+        findings.record("bounds", max(off) / limits[1], "effective_conductivity")
+        pair = [1 / (share @ (1 / (across + k0))) - k0 for k0 in (across.min(), across.max())]
+        place = "conductivity_estimates.hashin_shtrikman"
+        findings.compare("bounds", bounds[1], pair, limits[1], place)
 
 
 def constants_of(C: Float, heat: Float | None) -> dict[str, float]:

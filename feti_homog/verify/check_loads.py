@@ -14,6 +14,7 @@ import numpy as np
 
 from feti_homog.typing import Bool, Document, Float
 from feti_homog.verify.bonds import cohesive_traction, law_at, rubbing_force
+from feti_homog.verify.constitutive_law import GRADIENT
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.elements import ElementFields
 from feti_homog.verify.findings import ROUNDING, Findings
@@ -226,6 +227,10 @@ def rows_of(cell: DiscreteCell) -> Rows:
     if strain := case.get("angle", {}).get("strain"):
         values = np.array([*strain, 0.0] if len(strain) > 3 else strain, float)
         return [(Prescribed(values, np.zeros(len(values), bool)), point) for point in document["angle"]]
+    if (k := document.get("effective_conductivity")) is not None:
+        columns, none = np.zeros((6, 6)), np.zeros(7, bool)
+        columns[np.ix_(GRADIENT, GRADIENT)] = k
+        return [(Prescribed(np.eye(7)[place], none), {"stress": columns[:, place]}) for place in GRADIENT]
     # Unit loads with both signs, and their stresses: the columns of a stiffness, and `thermal_stress`.
     tables = [(point, "stiffness", "", 1.0) for point in document.get("angle", ())]
     tables = tables or [(document, "effective_stiffness", *signed) for signed in (("", 1.0), ("_compression", -1.0))]

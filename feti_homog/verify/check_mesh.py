@@ -10,6 +10,7 @@ from scipy.special import gammaln, roots_legendre
 
 from feti_homog.typing import Bool, Float
 from feti_homog.verify.check_loads import NAMES, States
+from feti_homog.verify.constitutive_law import GRADIENT
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.elements import PLACES, add_at_nodes, quadrature_points
 from feti_homog.verify.findings import ROUNDING, Findings, Section
@@ -223,12 +224,15 @@ def check_mesh_error(findings: Findings, cell: DiscreteCell, state: State) -> No
     elif "mesh_error" in document and not state.temperature:
         k = int(np.abs(state.strain).argmax())
         name = f"effective_stiffness{'_compression' if state.strain[k] < 0 else ''}"
+        if "effective_conductivity" in document:
+            name, k = "effective_conductivity", GRADIENT.index(k)
         error = document["mesh_error"].hint(name)[k][k] / abs(document.hint(name)[k][k])
     if error is not None and not np.isnan(total):
         ratio = (LEAST_SHARE * total + ROUNDING) / (error + ROUNDING)
         findings.record("mesh error", ratio - 1, f"{state.name}, the error of its energy")
     energy = float(state.strain @ state.mean_stress) * cell.area
-    if cell.files.case["analysis"]["type"] != "stiffness" or not energy > 0 or np.isnan(state.mesh_error).all():
+    has_unit_loads = cell.files.case["analysis"]["type"] in ("stiffness", "conductivity")
+    if not has_unit_loads or not energy > 0 or np.isnan(state.mesh_error).all():
         return
     # int d : S : d, where d is the stress interpolated from averages at nodes minus the stress of the element.
     mesh, v, elements = cell.files.mesh, cell.stiffnesses.shape[1], cell.elements

@@ -10,6 +10,7 @@ from feti_homog.typing import Bool, Float
 from feti_homog.verify.findings import ROUNDING
 
 PLANE = [0, 1, 5]  # positions of 11, 22 and 12 in the order [11, 22, 33, 23, 13, 12]
+GRADIENT = [4, 3, 2]  # positions of dT/dx1, dT/dx2 and dT/dx3 in that order
 # Positions of tensor components in the orders [11, 22, 12] and [11, 22, 33, 23, 13, 12].
 VOIGT = {3: np.array([[0, 2], [2, 1]]), 6: np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])}
 Constants = Mapping[str, Any]
@@ -19,11 +20,14 @@ def laws(case: Mapping[str, Any], phases: Sequence[str]) -> tuple[Float, Float]:
     """Compute stiffnesses (phases, v, v) and expansions (phases, v) in the axes of the cell.
 
     In plane strain E33, gamma13 and gamma23 are 0, in plane stress S33, S13 and S23.  Expansions are the strains
-    R_ip R_jq alpha_pq per temperature in generalized plane strain, if all phases have alpha; else 0.  Raises CaseError
-    for a phase of the mesh without a material.
+    R_ip R_jq alpha_pq per temperature in generalized plane strain, if all phases have alpha; else 0.  In conduction the
+    temperature is a displacement along x3.  Raises CaseError for a phase of the mesh without a material.
     """
     plane, stiffnesses, expansions = case["analysis"]["plane"], list[Float](), list[Float]()
     for constants in (phase_constants(case, phase) for phase in phases):
+        if plane == "conduction":
+            stiffnesses.append(_conducting(constants["conductivity"]))
+            continue
         angle, law = float(constants.get("angle", 0.0)), _given_stiffness(constants)
         if len(law) != 3:
             law = law if len(law) else np.asarray(np.linalg.inv(_compliance(constants)), float)
@@ -46,8 +50,8 @@ def laws(case: Mapping[str, Any], phases: Sequence[str]) -> tuple[Float, Float]:
 def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
     """Return whether quadratic elements of phases (phases,) have a bubble and a pressure.
 
-    Elements of isotropic phases do, except in plane stress.  In an isotropic phase one modulus and one ratio give all
-    constants, up to rounding.  Raises as `laws`.
+    Elements of isotropic phases do, except in plane stress and conduction.  In an isotropic phase one modulus and one
+    ratio give all constants, up to rounding.  Raises as `laws`.
     """
     mixed = []
     for constants in (phase_constants(case, phase) for phase in phases):
@@ -57,14 +61,15 @@ def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
             isotropic = {"young": constants["E_transverse"], "poisson": -compliance[0, 1] / compliance[0, 0]}
             is_isotropic = np.allclose(compliance, _compliance(isotropic), rtol=ROUNDING, atol=0)
         mixed.append(is_isotropic)
-    return np.asarray(np.array(mixed, bool) & (case["analysis"]["plane"] != "stress"))
+    return np.asarray(np.array(mixed, bool) & (case["analysis"]["plane"] not in ("stress", "conduction")))
 
 
 def rounding(case: Mapping[str, Any], phases: Sequence[str], stiffnesses: Float) -> tuple[float, float]:
     """Return n eps times the largest condition of a compliance, and times the contrast of the stiffnesses."""
-    conditions = [np.linalg.cond(_compliance(phase_constants(case, phase))) for phase in phases]
+    constants = [] if case["analysis"]["plane"] == "conduction" else [phase_constants(case, name) for name in phases]
+    condition = max((np.linalg.cond(_compliance(phase)) for phase in constants), default=1.0)
     sizes, lost = np.abs(stiffnesses).max(axis=(1, 2)), 6 * np.finfo(float).eps
-    return float(lost * max(conditions)), float(lost * sizes.max() / sizes.min())
+    return float(lost * condition), float(lost * sizes.max() / sizes.min())
 
 
 def out_of_plane(case: Mapping[str, Any], phases: Sequence[str]) -> Float:
@@ -95,6 +100,15 @@ def phase_constants(case: Mapping[str, Any], phase: str) -> Constants:
     if not isinstance(constants, Mapping):
         raise CaseError(f"result.json: the case has no material for the phase {phase} of result.h5")
     return constants
+
+
+def _conducting(k: Any) -> Float:
+    """(6, 6) C_3i3j = k_ij for a displacement along x3 alone; the rest is arbitrary, of the size of k."""
+    tensor = np.array([k["transverse"], k["transverse"], k["axial"]] if isinstance(k, Mapping) else k, float)
+    tensor = tensor * np.eye(3) if tensor.ndim < 2 else tensor
+    law = np.abs(tensor).max() * np.eye(6)
+    law[np.ix_(GRADIENT, GRADIENT)] = (tensor + tensor.T) / 2
+    return np.asarray(law)
 
 
 def _given_stiffness(constants: Constants) -> Float:

@@ -183,7 +183,7 @@ REASONS = {
     ),
     "residuals of the solver, of which only the tolerance is checked": ("checks",),
     "texts": ("warnings", "remarks", "faults"),
-    "closed formulas, which no field bears witness to": ("estimates", "fibre_bounds"),
+    "closed formulas, which no field bears witness to": ("estimates", "fibre_bounds", "maxwell"),
     "estimates of the mesh's error, but for energies": ("mesh_error",),
     "derivatives under contact or with a temperature, but for energies": ("derivatives",),
     "energies that breaks at tips would release": ("G_I", "G_II"),

@@ -79,7 +79,7 @@ class State:
     """A state, the group /state/K of result.h5.
 
     Vectors have c = 2 and tensors v = 3 components [11, 22, 12]; in generalized plane strain c = 3 and v = 6, in the
-    order [11, 22, 33, 23, 13, 12].
+    order [11, 22, 33, 23, 13, 12].  In conduction displacement 3 is the temperature, stress [33, 23, 13] -flux.
 
     Attributes:
         strain, mean_stress: (v,) macroscopic strain E and stress Sigma.
@@ -144,8 +144,8 @@ class ResultFiles:
 
     @property
     def is_spatial(self) -> bool:
-        """Return whether the case has generalized plane strain."""
-        return bool(self.case["analysis"]["plane"] == "generalized")
+        """Return whether the case has generalized plane strain or conduction."""
+        return self.case["analysis"]["plane"] in ("generalized", "conduction")
 
     @property
     def contact(self) -> bool:
@@ -154,9 +154,12 @@ class ResultFiles:
 
     @property
     def interfaces(self) -> Sequence[Mapping[str, Any]]:
-        """Return the sections [[interface]]; empty if all bonds are perfect."""
+        """Return the sections [[interface]], conductances as axial stiffnesses; empty if all bonds are perfect."""
         sections: Any = self.case.get("interface", [])
-        return sections if isinstance(sections, list) else [sections]
+        sections = sections if isinstance(sections, list) else [sections]
+        return [
+            {"axial_stiffness": bond["conductance"], **bond} if "conductance" in bond else bond for bond in sections
+        ]
 
     @property
     def points(self) -> Points:

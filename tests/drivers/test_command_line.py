@@ -10,6 +10,7 @@ import pytest
 from matplotlib.image import imread
 from reference.references import BONDED
 from support.command_line import case_file, command_line
+from support.jobs import ROOT
 from support.sweep_files import BY_BODIES
 
 PICTURES = ("cell.png", "partition.png", "mesh_error.png", "case_E11.png", "case_E22.png", "case_gamma12.png")
@@ -60,6 +61,21 @@ def test_run_writes_every_file_at_any_number_of_ranks(tmp_path, ranks):
     assert_fields(out)
     assert_pictures(out)
     assert command_line(0, "verify", out).returncode == 0
+
+
+def test_conductivity_writes_its_files(tmp_path):
+    case, out = tmp_path / "conductivity.toml", tmp_path / "results"
+    case.write_text((ROOT / "drivers/conductivity.toml").read_text().replace("mesh_size = 0.08", "mesh_size = 0.2"))
+    job = command_line(2, "run", case, "--out", out)
+    assert job.returncode == 0, job.stderr
+    pictures = {name for name in FILES if not name.startswith("case_")} | {"case_dT_dx1.png", "case_dT_dx2.png"}
+    assert {path.name for path in out.iterdir()} == pictures
+    assert all(imread(path)[..., :3].std() > 0.05 for path in out.glob("*.png"))
+    for words in ("dT/dx3: ", "Effective conductivity, axes", "across: Maxwell", "Status      done"):
+        assert words in job.stdout
+    assert command_line(0, "verify", out).returncode == 0
+    text = command_line(0, "keys", "conductivity").stdout
+    assert all(words in text for words in ('"conductivity": the effective', "[material.PHASE], conductor"))
 
 
 def assert_document(document, ranks):

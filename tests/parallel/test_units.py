@@ -39,13 +39,26 @@ CASES = {
         "interface": STRENGTH | {"axial_strength": 0.025},
         "path": {"waypoints": [{"temperature": -100.0}, {"S11": 0.03, "gamma13": 0.02}]},
     },
+    "conductivity": {
+        "analysis": "conductivity",
+        "plane": "conduction",
+        "interface": ARC | {"conductance": 2.0},
+        "matrix": {"conductivity": 0.2},
+        "fibre": {"conductivity": {"axial": 10.0, "transverse": 1.5}},
+    },
+    "bonded conductors": {
+        "analysis": "conductivity",
+        "plane": "conduction",
+        "matrix": {"conductivity": 0.2},
+        "fibre": {"conductivity": 3.0},
+    },
     "envelope": {"analysis": "envelope", "interface": STRENGTH, "envelope": {"plane": ["S11", "S22"], "directions": 4}},
 }
 
 
-def document(analysis, plane="strain", cell=None, petsc=None, fibre=GLASS, **sections):
+def document(analysis, plane="strain", cell=None, petsc=None, fibre=GLASS, matrix=EPOXY, **sections):
     """Return a case; phases expand where that is solved for."""
-    phases = {"matrix": EPOXY, "fibre": fibre}
+    phases = {"matrix": matrix, "fibre": fibre}
     if plane != "generalized":
         phases = {
             name: {k: v for k, v in phase.items() if not k.startswith("expansion")} for name, phase in phases.items()

@@ -14,6 +14,7 @@ from feti_homog.analysis.result import Result
 OF_UNITS = {
     **dict.fromkeys(("", "degrees", "s", "bytes"), (0, 0, 0)),
     "unit of the moduli": (1, 0, 0),
+    "conductivity": (1, 0, 0),  # in place of moduli
     "1 / unit of the moduli": (-1, 0, 0),
     "unit of the cell": (0, 1, 0),
     "unit of the cell squared": (0, 2, 0),
@@ -32,7 +33,8 @@ APART = {"case", "digest", "version", "date", "timings", "memory", "checksum", "
 # The same of the entries of a case, by their names.
 OF_CASE = {
     r"young|E\d|E_\w+|G\d\d|G_\w+|stiffness|\w+_strength|S\d\d|stress": (1, 0, 0),
-    r"(normal|tangential|axial)_stiffness": (1, -1, 0),
+    r"conductivity|axial|transverse": (1, 0, 0),
+    r"(normal|tangential|axial)_stiffness|conductance": (1, -1, 0),
     r"tractions": (1, 0, 0),
     r"\w*toughness": (1, 1, 0),
     r"width|height|openings|(fibre_|inner_)?radius|x|y|a|b": (0, 1, 0),

@@ -174,7 +174,23 @@ DERIVATIVES: dict[str, dict[str, Any]] = {
         "output": {"sensitivities": True},
     },
 }
-CASES |= MIXED_PATHS | LOADS | DERIVATIVES
+CONDUCTOR, TENSOR = {"conductivity": 0.2}, [[2.0, 0.3, 0.1], [0.3, 1.0, -0.2], [0.1, -0.2, 5.0]]
+CONDUCTION: dict[str, dict[str, Any]] = {
+    "conductivity": {
+        "cell": HEXAGONAL | {"order": 2},
+        "matrix": CONDUCTOR,
+        "fibre": {"conductivity": {"axial": 10.0, "transverse": 1.0}},
+        "plane": "conduction",
+    },
+    "conductance": {
+        "cell": SQUARE,
+        "matrix": CONDUCTOR,
+        "fibre": {"conductivity": TENSOR},
+        "plane": "conduction",
+        "interface": {"conductance": 0.7} | debonded(110.0),
+    },
+}
+CASES |= MIXED_PATHS | LOADS | DERIVATIVES | CONDUCTION
 
 
 def document(kind: str) -> dict[str, Any]:
@@ -183,6 +199,8 @@ def document(kind: str) -> dict[str, Any]:
     analysis = next((name for name in ("angle", "path", "envelope", "load") if name in parts), "stiffness")
     material = {"matrix": parts.pop("matrix", MATRIX), "fibre": parts.pop("fibre", FIBRE)}
     plane = {"type": analysis, "plane": parts.pop("plane", "strain")}
+    if plane["plane"] == "conduction":
+        plane = {"type": "conductivity"}
     output = {"pictures": False} | ({"states": parts.pop("states", "all")} if "path" in parts else {})
     output |= parts.pop("output", {})
     return {"name": kind, "material": material, "analysis": plane, "output": output} | parts

@@ -14,28 +14,27 @@ import pytest
 PACKAGE = Path(__file__).parents[2] / "feti_homog"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 # Lines, of the modules beside the packages under "."; the second numbers: phase stresses, start of damage, figures,
-# begun runs, the load of a path in the bar of a sweep, arrays of result.json a line each, the keys in which an
-# interrupted run differs, warnings of studies.
+# begun runs and their messages; the third: conductivity.
 LINES = {
     ".": 470,
-    "analysis": 3000 + 129,
-    "case": 2880 + 42,
-    "commands": 560 + 14,
-    "fem": 1150,
+    "analysis": 3000 + 130 + 110,
+    "case": 2880 + 45 + 30,
+    "commands": 560 + 15,
+    "fem": 1150 + 5,
     "feti": 6300,
     "homogenization": 3230 + 55,
     "interface": 4000,
-    "materials": 1430 + 95,
+    "materials": 1430 + 95 + 110,
     "mesh": 5500,
     "microstructure": 2140,
-    "report": 3420 + 170,
+    "report": 3420 + 170 + 50,
     "results": 2430 + 75,
     "schema": 430,
     "studies": 2950,
     "system": 1770,
-    "verify": 3100 + 165,
+    "verify": 3100 + 165 + 50,
 }
-FILES, TOTAL = 310, 45000 + 290
+FILES, TOTAL = 310, 45000 + 300 + 370
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.0, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

@@ -89,6 +89,10 @@ CASES = {
         "interface": {"axial_strength": 1.0},
         "envelope": {"plane": ["S22", "S13"], "directions": 4},
     },
+    "conductivity": {
+        "analysis": {"type": "conductivity"},
+        "material": {"matrix": {"conductivity": 0.2}, "fibre": {"conductivity": 1.0}},
+    },
     "envelope by energy": {"interface": ENERGY, "envelope": {"plane": ["E11", "E22"], "directions": 4}},
 }
 SWEEP = {"sweep": {"cell.mesh_size": [0.25, 0.3]}}
@@ -148,7 +152,7 @@ def unmatched(names: Iterable[str], patterns: Iterable[str]) -> tuple[set[str], 
 
 def expression(pattern: str) -> re.Pattern[str]:
     words = re.escape(pattern)
-    words = re.sub(r"(?<=[CS])(ij|ii)", r"[1-6][1-6]", words)
+    words = re.sub(r"(?<=[CSk])(ij|ii)", r"[1-6][1-6]", words)
     return re.compile(re.sub(r"(?<![A-Za-z])([A-Z]{2,}|K)(?![a-z])", ".+", words))
 
 

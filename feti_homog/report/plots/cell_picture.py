@@ -19,6 +19,7 @@ from matplotlib.tri import Triangulation
 from scipy.spatial import cKDTree
 
 from feti_homog.report.plots import decimation, drawn_cell, plot_helpers
+from feti_homog.report.text.summary import reported
 from feti_homog.typing import Array, Document
 
 IN_LEGEND = 12  # most phases in the legend, which would otherwise cover the cell
@@ -175,7 +176,7 @@ def deformed(cell: drawn_cell.DrawnCell, state: Any, document: Document) -> Figu
 
     The figure also has the states of the interface.  Displacements in the plane are magnified, beside the undeformed
     outline.  A shear along the fibres moves nothing in the plane: contour lines of the axial displacement u_3 show the
-    shear.
+    shear, isotherms a conduction, with minus the flux.
     """
     drawn, attributes, output = cell.drawn, cell.file.attrs, document.get("case", {}).get("output", {})
     displacement, load = decimation.drawn_displacement(state, drawn), drawn_cell.LoadLabels.of(document)
@@ -195,7 +196,12 @@ def deformed(cell: drawn_cell.DrawnCell, state: Any, document: Document) -> Figu
     bar = drawn_cell.bar_beside(axes, shapes, extend)
     bar.ax.ticklabel_format(axis="y", scilimits=(-2, 4))
     bar.set_label(f"${plot_helpers.STRESS_SYMBOLS[component]}$ {plot_helpers.stress_label(attributes['stress_unit'])}")
-    if is_axial(state):
+    if reported(document).name == "conductivity":
+        title = rf"$\partial T / \partial x_{component[1]} = 1$"
+        bar.set_label(f"$-q_{component[1]}$ (unit of k times that of the gradient)")
+        caption = f"$T$ every {draw_levels(axes, state, drawn):g}"
+        line = Line2D([], [], color=LEVEL_INK, linewidth=LEVEL_WIDTH, label=caption)
+    elif is_axial(state):
         step = draw_levels(axes, state, drawn)
         caption = f"$u_3$ every {step:g} {plot_helpers.plain(attributes['length_unit'])}".rstrip()
         line = Line2D([], [], color=LEVEL_INK, linewidth=LEVEL_WIDTH, label=caption)

@@ -25,6 +25,7 @@ def plot(
 
     - cell.png: materials; partition.png: body parts; mesh_error.png: estimated mesh error;
     - each load: case_E11.png, case_minus_E11.png, ... (unit strains), case_temperature.png or state_K.png;
+    - `conductivity`: case_dT_dx1.png, case_dT_dx2.png;
     - sensitivities.png, if the case asks for them;
     - `angle`: angle.png, angle_states.png; `path`: path.png, path_states.png, path.gif, energy.png;
     - `load`: load.png; `envelope`: envelope.png;
@@ -88,6 +89,11 @@ def of_fields(
         if report.is_followed and look == plot_helpers.PLAIN:
             paths.append(deformed_panels.animation(file, document, scale, directory / "path.gif"))
     for number, state in {} if report.is_curve else states.items():
+        if report.name == "conductivity":
+            if not state.attrs["strain"][2]:  # along the fibres the gradient is uniform
+                name = f"case_{state.attrs['label']}".replace("/", "_")
+                paths.append(save(cell_picture.deformed(cell, state, document), name))
+            continue
         strain = state.attrs["strain"]
         loads = dict(zip(voigt.voigt_names(len(strain))[0], strain, strict=True))
         loads["temperature"] = state.attrs.get("temperature", 0.0)
@@ -96,7 +102,7 @@ def of_fields(
         name = f"case_{'minus_' if value < 0 else ''}{load}" if is_unit else f"state_{number}"
         paths.append(save(cell_picture.deformed(cell, state, document), report.picture or name))
     broken = any((state["status"][:] != drawn_cell.BONDED).any() for state in states.values())
-    if broken or (report.is_followed and states):
+    if (broken and report.name != "conductivity") or (report.is_followed and states):
         from feti_homog.report.plots import traction_plots  # perfect bonding has no picture
 
         paths.append(save(traction_plots.figure(cell, document), "interface"))

@@ -39,6 +39,31 @@ def stiffnesses(document: Document) -> list[Table]:
     return tables
 
 
+def conductivity(document: Document) -> list[Table]:
+    """Return tables of k^ef and its mesh errors, with closed forms and bounds for the directions across."""
+    names, k = ("x1", "x2", "x3"), document["effective_conductivity"]
+    columns = [Column("", -6), *(Column(name, 16, ".8g") for name in names)]
+    title = f"Effective conductivity, {engineering_constants.CELL_AXES}"
+    tables = [Table(title, columns, [[name, *row] for name, row in zip(names, np.array(k).tolist(), strict=True)])]
+    if (errors := _errors(document).get("effective_conductivity")) is not None:
+        columns = [Column("", -6), *(Column(name, 16, ".1e") for name in names)]
+        tables.append(Table(MESH_ERROR, columns, [[name, *row] for name, row in zip(names, errors, strict=True)]))
+    if (forms := document.get("conductivity_estimates")) is not None:
+        rows = [["along: mean", forms["axial"], k[2][2], forms["axial"]]]
+        for label, key in (("Wiener", "wiener"), ("Hashin-Shtrikman", "hashin_shtrikman")):
+            lower, upper = forms.get(key) or (None, None)
+            rows += (
+                []
+                if lower is None
+                else [[f"{name} {label}", lower, k[i][i], upper] for i, name in enumerate(names[:2])]
+            )
+        if (estimate := forms.get("maxwell")) is not None:
+            rows.append(["across: Maxwell", estimate, (k[0][0] + k[1][1]) / 2, estimate])
+        columns = [NAMES, *(Column(name, 14, ".7g") for name in ("lower", "computed", "upper"))]
+        tables.append(Table("Bounds and estimates", columns, rows, title_in_head=True))
+    return tables
+
+
 def _errors(document: Document) -> Document:
     """Return the mesh errors of a result; empty without estimates."""
     estimated: Document = document.get("mesh_error") or {}

@@ -13,7 +13,7 @@ from typing import Any
 from feti_homog.materials import voigt
 from feti_homog.report.text import phase_tables
 from feti_homog.report.text.constant_tables import sensitivities, table
-from feti_homog.report.text.stiffness_tables import bounds, constants, moduli, stiffnesses, thermal
+from feti_homog.report.text.stiffness_tables import bounds, conductivity, constants, moduli, stiffnesses, thermal
 from feti_homog.report.text.tables import ERROR, WIDTH, Column, Table
 from feti_homog.typing import Document
 
@@ -46,11 +46,14 @@ ANGLE = ReportedAnalysis("angle", "debonding angle", is_curve=True)
 PATH = ReportedAnalysis("path", "load path", is_curve=True, is_followed=True)
 LOAD = ReportedAnalysis("load", "equilibrium under a load", picture="load")
 ENVELOPE = ReportedAnalysis("envelope", "onset of debonding")
-ANALYSES = {entry.name: entry for entry in (ANGLE, PATH, LOAD, ENVELOPE, STIFFNESS)}
+CONDUCTIVITY = ReportedAnalysis("conductivity", "effective conductivity")
+ANALYSES = {entry.name: entry for entry in (ANGLE, PATH, LOAD, ENVELOPE, CONDUCTIVITY, STIFFNESS)}
 
 
 def reported(document: Document) -> ReportedAnalysis:
     """Return the analysis of a result.json; for an empty document, the stiffness."""
+    if document.get("effective_conductivity") is not None:
+        return CONDUCTIVITY
     return next((analysis for name, analysis in ANALYSES.items() if document.get(name)), STIFFNESS)
 
 
@@ -127,6 +130,8 @@ def answers(document: Document, most: int | None = None) -> list[Table]:
         from feti_homog.report.text.path_table import path_table  # with the landmarks of a path
 
         tables.append(path_table(document, most))
+    elif name == "conductivity":
+        tables += conductivity(document)
     elif name != "stiffness":
         from feti_homog.report.text import point_tables
 
@@ -149,8 +154,8 @@ def answers(document: Document, most: int | None = None) -> list[Table]:
 def title_of(document: Document) -> str:
     """Return a title of case name, analysis and plane state."""
     case = document["case"]
-    what = reported(document).title
-    return f"{case.get('name', '')}: {what}, plane {case['analysis']['plane']}".lstrip(": ")
+    plane = "" if reported(document) == CONDUCTIVITY else f", plane {case['analysis']['plane']}"
+    return f"{case.get('name', '')}: {reported(document).title}{plane}".lstrip(": ")
 
 
 def _heading(document: Document) -> list[str]:

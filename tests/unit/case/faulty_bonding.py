@@ -100,7 +100,7 @@ FAULTY_BONDINGS: dict[str, str] = {
         debonded('{fibre = 1, angle = 60, centre = "pi"}'),
     "[interface] debonded[0].center = 10: unknown key; did you mean centre?":
         debonded("{fibre = 1, angle = 60, center = 10}"),
-    'debonded[0].angle = 60: belongs to [analysis] type = "stiffness" or "path" or "load" or "envelope", ':
+    'debonded[0].angle = 60: belongs to [analysis] type = "stiffness" or "path" or "load" or "envelope" or "co':
         of_type("angle", ANGLE, "[interface]", f"debonded = [{ARC}]"),
     '[angle]: missing section; [analysis] type = "angle" needs it': of_type("angle", BARE_ARC),
     '[angle]: belongs to [analysis] type = "angle", not "stiffness"': ended(f"{ANGLE}\n"),

@@ -10,12 +10,22 @@ from support.base_case import (
     SPATIAL,
     TRANSVERSE,
     cell,
+    changed,
     ended,
     faults,
     fibre,
 )
 
 GIVEN = "young = 1.0\npoisson = 0.2\n"
+
+
+def conducting(*lines: str, fibre: str = "conductivity = 1.0") -> str:
+    """Return a case of conductivity with these lines at its end."""
+    matrix = "[material.matrix]\nyoung = 88.0\npoisson = 0.299\n"
+    edits = (matrix, "[material.matrix]\nconductivity = 0.2\n"), (FIBRE, f"[material.fibre]\n{fibre}\n")
+    case = changed(*edits, ('type = "stiffness"\nplane = "strain"', 'type = "conductivity"'))
+    return "\n".join([case, *lines, ""])
+
 
 FAULTY_MATERIALS: dict[str, str] = {
     **faults(BASE, {
@@ -117,4 +127,36 @@ FAULTY_MATERIALS: dict[str, str] = {
     "[material.fibre] expansion = [1e-06, 1e-06, 2e-06]: expected a number":
         fibre(GIVEN + "expansion = [1e-6, 1e-6, 2e-6]\n"),
     "[material.fibre] young: missing\n[material.fibre] poisson: missing": fibre("expansion = 1e-6\n"),
+    '[material.fibre] young, poisson: missing; conductivity alone serves [analysis] type = "conductivity"':
+        fibre("conductivity = 1\n"),
+    '[material.fibre] conductivity: missing; [analysis] type = "conductivity" needs it': conducting(fibre=GIVEN),
+    "[material.fibre] conductivity = -1.0: expected a table {axial, transverse}, a symmetric 3x3 array of numbers or a":
+        conducting(fibre="conductivity = -1.0"),
+    "[material.fibre] conductivity.transverse: missing; expected a number above 0":
+        conducting(fibre="conductivity = {axial = 1.0}"),
+    "[material.fibre] conductivity = [[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]: expected a symmetric matrix":
+        conducting(fibre="conductivity = [[1.0, 0.5, 0.0], [0, 1, 0], [0, 0, 1]]"),
+    "[material.fibre] conductivity = [[1.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 1.0]]: expected a positive definite":
+        conducting(fibre="conductivity = [[1.0, 2.0, 0.0], [2.0, 1, 0], [0, 0, 1]]"),
+    "[material.fibre], [material.matrix]: conductivities that differ by a factor of 5.0e+16: expected at most":
+        conducting(fibre="conductivity = 1e16"),
+    '[interface] normal_stiffness = 3.0: belongs to [analysis] type = "stiffness" or "angle" or "path" or "load" or':
+        conducting("[interface]", "debonded = []", "normal_stiffness = 3.0"),
+    '[interface] normal_strength = 3.0: belongs to [analysis] type = "path" or "envelope", not "conductivity"':
+        conducting("[interface]", "debonded = []", "normal_strength = 3.0"),
+    '[interface] contact = true: belongs to [analysis] type = "stiffness"':
+        conducting("[interface]", "debonded = []", "contact = true"),
+    "[interface] conductance = 0: expected a conductance above 0, or inf":
+        conducting("[interface]", "debonded = []", "conductance = 0"),
+    '[interface] conductance = 2.0: belongs to [analysis] type = "conductivity", not "stiffness"':
+        ended("[interface]\ndebonded = []\nconductance = 2.0\n"),
+    '[load]: belongs to [analysis] type = "load", not "conductivity"': conducting("[load]", "to = {E11 = 1.0}"),
+    '[output] sensitivities = true: belongs to [analysis] type = "stiffness" or "load"':
+        conducting("[output]", "sensitivities = true"),
+    '[output] stress = "S11": belongs to [analysis] type = "stiffness"': conducting("[output]", 'stress = "S11"'),
+    '[output] deformation_scale = 2.0: belongs to [analysis] type = "stiffness"':
+        conducting("[output]", "deformation_scale = 2.0"),
+    '[analysis] plane = "strain": expected "conduction", or no plane, in type = "conductivity"':
+        conducting().replace('type = "conductivity"', 'type = "conductivity"\nplane = "strain"'),
+    '[analysis] plane = "conduction": belongs to type = "conductivity"': cell('"strain"', '"conduction"'),
 }  # fmt: skip

@@ -109,6 +109,7 @@ VALUES = {
     "normal_stiffness": (STRONG, 1.0, 2.0),
     "tangential_stiffness": (STRONG, 1.0, 2.0),
     "axial_stiffness": (STRONG, 1.0, 2.0),
+    "conductance": ({}, 1.0, 2.0),
     "normal_strength": ({}, 1.0, 2.0),
     "tangential_strength": ({}, 1.0, 2.0),
     "axial_strength": ({}, 1.0, 2.0),
@@ -138,6 +139,9 @@ def test_sections_differ_in_the_keys_of_a_pair_alone(name):
     ]
     whole = document(sections) | {"path": {"to": {"E11": 0.1}}}
     whole["analysis"]["plane"] = "generalized"
+    if name == "conductance":
+        phases = {phase: {"conductivity": 1.0} for phase in ("matrix", "fibre")}
+        whole = document(sections, "stiffness") | {"analysis": {"type": "conductivity"}, "material": phases}
     if keys_of(InterfaceSection)[name].by_pair:
         read = Case.parse(whole).resolved()["interface"]
         assert [section[name] for section in read] != [read[0][name]] * 2

@@ -15,6 +15,7 @@ from support.base_case import (
 )
 from unit.case.faulty_bonding import ANGLE, ARC, BARE_ARC, PATH, debonded, of_type
 from unit.case.faulty_envelopes import BONDS, envelope
+from unit.case.faulty_materials import conducting
 
 MESH = changed(MESH_CELL)
 
@@ -68,6 +69,15 @@ VALID_CASES = {
         "[interface]\nnormal_stiffness = 10\ntangential_stiffness = 5",
         'criterion = "energy"\ntoughness = 2\ngrowth = "springs"\nmode_sensitivity = 0',
     ),
+    "conductivity": conducting("[interface]", f"debonded = [{ARC}]", "conductance = 2.0"),
+    "conductivity, of a tensor, and a stiffness": conducting(
+        fibre="young = 3\npoisson = 0.3\nstrength = {von_mises = 3.0}\n"
+        "conductivity = [[2.0, 0.5, 0.1], [0.5, 1, 0], [0.1, 0, 1]]"
+    ),
+    "conductivity along and across": conducting(fibre="conductivity = {axial = 10.0, transverse = 1.0}").replace(
+        "mesh_size = 0.05", "accuracy = 1e-3"
+    ),
+    "stiffness of conducting phases": fibre("young = 3\npoisson = 0.3\nconductivity = 2.0\n"),
     "scatter": of_type("path", "[path]\nstrain = [0.1, 0, 0]", "[interface]\nscatter = {shape = 8.0, seed = 2}"),
     "curve of a mesh": MESH + "[interface]\n",
     "angle": of_type("angle", ANGLE, BARE_ARC, "contact = false"),

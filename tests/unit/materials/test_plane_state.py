@@ -4,13 +4,16 @@ import numpy as np
 import pytest
 from support.cases import make_case
 
+from feti_homog import Case
 from feti_homog.homogenization import phase_laws
 from feti_homog.materials.laws import out_of_plane, stiffness_of
 from feti_homog.materials.material_forms import Isotropic
-from feti_homog.materials.voigt import PLANE_STATES, plane_state_of
+from feti_homog.materials.voigt import CONDUCTION, PLANE_STATES, plane_state_of
+
+MECHANICAL = {name: state for name, state in PLANE_STATES.items() if not state.is_scalar}
 
 
-@pytest.mark.parametrize("state", PLANE_STATES.values(), ids=PLANE_STATES)
+@pytest.mark.parametrize("state", MECHANICAL.values(), ids=MECHANICAL)
 def test_strains_are_the_loads_of_the_problems(state):
     case = make_case(plane=state.name, matrix={"young": 3.0, "poisson": 0.3, "expansion": 1e-5},
                      fibre={"young": 70.0, "poisson": 0.2, "expansion": 1e-6})  # fmt: skip
@@ -20,7 +23,7 @@ def test_strains_are_the_loads_of_the_problems(state):
     assert plane_state_of({"case": case.resolved()}) is state
 
 
-@pytest.mark.parametrize("state", PLANE_STATES.values(), ids=PLANE_STATES)
+@pytest.mark.parametrize("state", MECHANICAL.values(), ids=MECHANICAL)
 def test_stiffnesses_have_the_components_of_the_state(state):
     material = Isotropic(young=3.0, poisson=0.3)
     stiffness = stiffness_of(material, state.name)
@@ -30,6 +33,20 @@ def test_stiffnesses_have_the_components_of_the_state(state):
     trace = 3.0 / (1 - 0.3) if state.is_sheet else 3.0 / ((1 + 0.3) * (1 - 2 * 0.3))
     expected = trace if state.is_sheet else trace * (1.0 + 0.3 * (state.normals - 2))
     assert stiffness[0] @ tension == pytest.approx(expected)
+
+
+def test_conduction_has_the_gradient_of_one_unknown():
+    document = {
+        "cell": {"geometry": "square", "fibre_fraction": 0.4},
+        "material": {"matrix": {"conductivity": 0.2}, "fibre": {"conductivity": {"axial": 10.0, "transverse": 1.0}}},
+        "analysis": {"type": "conductivity"},
+    }
+    case = Case.parse(document)
+    (problem,) = phase_laws.problems(case)
+    assert (problem.components, problem.strains, len(problem.loads)) == (1, 2, 3)
+    assert plane_state_of({"case": case.resolved()}) is CONDUCTION and Case.parse(case.resolved()) == case
+    assert phase_laws.law(case, "matrix", problem).tolist() == (0.2 * np.eye(3)).tolist()
+    assert phase_laws.law(case, "fibre", problem).tolist() == np.diag([1.0, 1.0, 10.0]).tolist()
 
 
 @pytest.mark.parametrize(("name", "S33"), [("stress", 0.0), ("strain", 0.3)])

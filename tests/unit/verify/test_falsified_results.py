@@ -16,7 +16,7 @@ from support.falsifications import (
     shift,
     swap_rows,
 )
-from support.verified_results import CASES, LOADS, MIXED_PATHS, falsified
+from support.verified_results import CASES, CONDUCTION, LOADS, MIXED_PATHS, falsified
 
 from feti_homog.verify.certificate import verify
 from feti_homog.verify.check_state import check_gluing
@@ -54,7 +54,7 @@ def test_results_obey_every_law(results, kind):
     broken = {finding.name for finding in certificate.findings}
     assert broken >= {"stress", "equilibrium", "periodicity", "jump", "mean stress", "Hill", "load", "tables", "cell"}
     assert ("penetration" in broken) == (
-        kind not in ("bonded", "rubber", "plane", "overlap", "load", *LINEAR, *ENVELOPES)
+        kind not in ("bonded", "rubber", "plane", "overlap", "load", *LINEAR, *ENVELOPES, *CONDUCTION)
     )
     assert ("energy" in broken) == (kind in (*PATHS, *LOADS, "loaded angle"))
     assert ("stress load" in broken) == (kind in (*MIXED_PATHS, *LOADS) or kind.startswith("friction"))
@@ -205,6 +205,26 @@ FALSE = {
     "a bound": ("bonded", document("bounds", "hashin_shtrikman", "shear", 1), {"bounds"}),
     "a fraction": ("bonded", document("cell", "fractions", "fibre"), {"cell"}),
     "an area": ("bonded", document("cell", "area"), {"cell"}),
+    "a conductivity": ("conductivity", document("effective_conductivity", 2, 2), {"tables"}),
+    "a coupling of conductivities": (
+        "conductance", document("effective_conductivity", 0, 1, factor=1.01), {"tables", "symmetry"},
+    ),
+    "a conductivity of a phase": (
+        "conductivity", document("case", "material", "fibre", "conductivity", "axial"),
+        {"stress", "mean stress", "bounds"},
+    ),
+    "a tensor of a phase": (
+        "conductance", document("case", "material", "fibre", "conductivity", 0, 0),
+        {"stress", "equilibrium", "mean stress"},
+    ),
+    "a conductance": ("conductance", document("case", "interface", "conductance", factor=1.01), {"bond"}),
+    "a bound of conductivities": (
+        "conductivity", document("conductivity_estimates", "hashin_shtrikman", 1), {"bounds"},
+    ),
+    "a mean of conductivities": ("conductivity", document("conductivity_estimates", "axial"), {"bounds"}),
+    "a temperature": (
+        "conductivity", shift("axial_displacement"), {"stress", "periodicity", "jump", "equilibrium", "mean stress"},
+    ),
     "a number of elements": ("bonded", document("cell", "elements", to=1), {"cell"}),
 }  # fmt: skip
 

@@ -1,0 +1,71 @@
+"""`analysis.type = "conductivity"`: the effective conductivity k^ef, of heat, electricity or diffusion."""
+
+from typing import Any
+
+import numpy as np
+
+from feti_homog.analysis.constants import energy_error, fibre_radii, note_accuracy, note_outside, unit_errors
+from feti_homog.analysis.context import AnalysisContext
+from feti_homog.analysis.result_records import MeshErrors
+from feti_homog.homogenization import averaging, phase_laws, unit_cell
+from feti_homog.materials import laws, phase_bounds
+from feti_homog.typing import Float
+
+
+def run(context: AnalysisContext) -> dict[str, Any]:
+    """Return the `Result` entry `effective_conductivity`, with closed forms and mesh errors.  Collective.
+
+    div q = 0 with q = -k grad T and grad T = G + grad T*: axial shear with the shear moduli k, under a gradient along
+    the fibres too, whose T* vanishes unless a phase has k13 or k23.  Column j is -<q> under the unit gradient j.
+    """
+    columns, responses = context.unit_responses("", context.bonds(None), context.loads.zero_multipliers(), 1.0)
+    k = columns["stiffness"]
+    errors, responses = unit_errors(context, responses)
+    context.record_unit_states(responses, 1.0, "", 0)
+    context.checks.require("k^ef", {"symmetry": averaging.asymmetry(k)})
+    document: dict[str, Any] = {"effective_conductivity": k}
+    if (forms := closed_forms(context.cell)) is not None:
+        document["conductivity_estimates"] = forms
+    if not errors:
+        return document
+    energy = energy_error(k, errors)["mesh_error"]
+    note_accuracy(context, energy)
+    if forms is not None and forms.wiener is not None and forms.hashin_shtrikman is not None:
+        _note_bounds(context, k, errors[0].absolute, forms, energy)
+    return document | {"mesh_error": MeshErrors(effective_conductivity=errors[0].absolute, energy=energy, constants={})}
+
+
+def closed_forms(cell: unit_cell.TornCell) -> phase_bounds.ConductivityEstimates | None:
+    """Return closed forms of a cell; None with voids, debonded arcs, and phases with a direction in the plane.
+
+    A fibre of radius a with the conductance h acts as one of the conductivity 1 / (1/k + 1/(h a)).  Collective.
+    """
+    tensors = {phase: laws.conductivity(cell.case.material_of(phase)) for phase in cell.summary.phases}
+    alike = all(np.array_equal(k, np.diag([k[0, 0], k[0, 0], k[2, 2]])) for k in tensors.values())
+    if cell.summary.voids or cell.sum_over_ranks(int(cell.debonded(None).sum())) or not alike:
+        return None
+    shares, matrix = cell.fractions(), cell.summary.phases[0]
+    c, across = np.array([shares[phase] for phase in tensors]), np.array([k[0, 0] for k in tensors.values()])
+    wiener = hashin_shtrikman = maxwell = None
+    if not phase_laws.has_springs(cell.case):
+        wiener = float(1 / (c @ (1 / across))), float(c @ across)
+        lower, upper = (phase_bounds.dispersed(c, across, float(k)) for k in (across.min(), across.max()))
+        hashin_shtrikman = lower, upper
+    if (radii := fibre_radii(cell)) is not None:
+        ((h,), *_) = (*phase_laws.springs(cell.case, cell.solver.problem).stiffness, (np.inf,))
+        acting = [across[0], *(1 / (1 / k[0, 0] + 1 / (h * radii[p])) for p, k in tensors.items() if p != matrix)]
+        maxwell = phase_bounds.dispersed(c, acting, float(across[0]))
+    axial = float(c @ [k[2, 2] for k in tensors.values()])
+    return phase_bounds.ConductivityEstimates(axial, wiener, hashin_shtrikman, maxwell)
+
+
+def _note_bounds(
+    context: AnalysisContext, k: Float, errors: Float, forms: phase_bounds.ConductivityEstimates, energy: float
+) -> None:
+    """Note conductivities across the fibres outside their bounds, as `constants.note_outside`."""
+    least, largest = np.linalg.eigvalsh((k + k.T)[:2, :2] / 2)
+    error = np.asarray(errors[:2, :2].max())
+    limits = forms.hashin_shtrikman if largest - least <= error else forms.wiener
+    assert limits is not None
+    values = {"k across, least": np.asarray(least), "k across, largest": np.asarray(largest)}
+    note_outside(context, dict.fromkeys(values, limits), values, dict.fromkeys(values, error), energy)
