@@ -49,10 +49,12 @@ class DeformedCell(drawn_cell.DrawnCell):
         cell, states = drawn_cell.DrawnCell.of(file, limit), [file[f"state/{n}"] for n in numbers]
         component = plot_helpers.stress_component(document["case"]["output"].get("stress", "auto"), states)
         mark_of = landmarks.marks(document) if reported(document).is_followed else {}
-        # At the end, once all fibres have come off, stresses may be many times those of the peak.
-        marked = [state for state in states if mark_of.get(int(state.attrs["point"]), "end") != "end"] or states
-        stress = np.concatenate([plot_helpers.nodal_stress(state, component, cell.drawn) for state in marked])
-        colours = plot_helpers.colour_range(stress, np.tile(cell.drawn.node_areas, len(marked)))
+        stress = np.array([plot_helpers.nodal_stress(state, component, cell.drawn) for state in states])
+        colours, areas = plot_helpers.colour_range(stress, cell.drawn.node_areas), cell.drawn.node_areas
+        if mark_of.get(int(states[-1].attrs["point"])) == "end" and len(states) > 1:
+            # At the end, once all fibres have come off, stresses may be many times those before.
+            before, end = (plot_helpers.colour_range(part, areas) for part in (stress[:-1], stress[-1]))
+            colours = before if _reach(end[0]) > 2.0 * _reach(before[0]) else colours
         parts = vars(cell) | {"component": component, "colours": colours, "scale": scale, "marks": mark_of}
         return cls(**parts, labels=drawn_cell.LoadLabels.of(document))
 
@@ -75,8 +77,7 @@ class DeformedCell(drawn_cell.DrawnCell):
         stress = plot_helpers.nodal_stress(state, self.component, self.drawn)
         mark = self.marks.get(attributes["point"])
         of_state = plot_helpers.colour_range(stress, self.drawn.node_areas)
-        common, largest = (max(abs(limits.vmin or 0.0), abs(limits.vmax or 0.0)) for limits in (norm, of_state[0]))
-        if mark == "end" and largest > 2.0 * common:
+        if mark == "end" and _reach(of_state[0]) > 2.0 * _reach(norm):
             norm, colours, mark = *of_state[:2], "end, own colours"
         shapes = plot_helpers.shade_triangles(axes, self.drawn, moved, stress, norm, colours)
         plot_helpers.draw_segments(axes, moved[self.borders], "black", 0.5)
@@ -201,6 +202,11 @@ def panels(file: Any, document: Document, scale: float) -> Figure:
     if handles:
         figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
     return figure
+
+
+def _reach(limits: Normalize) -> float:
+    """Return the largest absolute value in a colour range."""
+    return max(abs(limits.vmin or 0.0), abs(limits.vmax or 0.0))
 
 
 def _inches(size: Array, width: float) -> tuple[float, float]:

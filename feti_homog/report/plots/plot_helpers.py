@@ -155,8 +155,9 @@ def draw_segments(
 def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, Colormap, str]:
     """Choose the colour range and the colour map of a stress.
 
-    Zero is white, tension red and pressure blue in all pictures; the range ends near the values.  Values (n,) have
-    weights `areas` (n,), 1 by default: meshes are fine at tips, where stresses are singular.
+    Zero is white, tension red and pressure blue in all pictures; the range ends near the values, or has zero in the
+    middle if tension and pressure are similar.  Values (n,), or (states, n) in one range, have weights `areas` (n,), 1
+    by default: meshes are fine at tips, where stresses are singular.
 
     Returns:
         colour range, colour map, and the ends of the range beyond which values lie.
@@ -164,6 +165,9 @@ def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, 
     norm, extend = value_range(values, areas)
     bottom, top = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
     largest = max(-bottom, top) or 1.0
+    if min(-bottom, top) > 0.5 * largest:
+        bottom, top = -largest, largest
+        norm, extend = Normalize(bottom, top), _outside(values, bottom, top)
     # A range far from zero still begins with a light colour.
     first, last = min(0.5 + 0.5 * bottom / largest, 0.55), max(0.5 + 0.5 * top / largest, 0.45)
     shades = mpl.colormaps["RdBu_r"](np.linspace(first, last, 256))
@@ -175,7 +179,8 @@ def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, 
 def value_range(values: Array, areas: Array | None = None) -> tuple[Normalize, str]:
     """Choose the colour range of a field.
 
-    At most 0.5 % of the area lies beyond either end.  A field uniform to 1 % has one colour.
+    At most 0.5 % of the area lies beyond either end, in each state of values (states, n).  A field uniform to 1 % has
+    one colour.
 
     Returns:
         colour range, and the ends of the range beyond which values lie.
@@ -186,9 +191,12 @@ def value_range(values: Array, areas: Array | None = None) -> tuple[Normalize, s
         half = 0.5 * (abs(middle) or 1.0)
         return Normalize(middle - half, middle + half), "neither"
     # Like numpy.percentile, weighted by area.
-    order, weights = np.argsort(values), np.ones_like(values) if areas is None else areas
-    below = np.cumsum(weights[order]) - weights[order]
-    bottom, top = np.interp([OUTLIERS, 1.0 - OUTLIERS], below / max(float(below[-1]), 1e-300), values[order]).tolist()
+    ends = []
+    for state in np.atleast_2d(values):
+        order, weights = np.argsort(state), np.ones_like(state) if areas is None else areas
+        below = np.cumsum(weights[order]) - weights[order]
+        ends.append(np.interp([OUTLIERS, 1.0 - OUTLIERS], below / max(float(below[-1]), 1e-300), state[order]))
+    bottom, top = float(np.min(ends)), float(np.max(ends))
     slack = 0.05 * (top - bottom)
     bottom, top = (low if bottom - low < slack else bottom), (high if high - top < slack else top)
     return Normalize(bottom, top), _outside(values, bottom, top)
