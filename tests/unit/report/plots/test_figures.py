@@ -12,7 +12,7 @@ from PIL import Image
 from support.sample_output import Sample, in_space, sample
 
 from feti_homog.errors import CaseError, FetiHomogError
-from feti_homog.report.plots import cell_picture, decimation, deformed_panels, figures, plot_helpers
+from feti_homog.report.plots import cell_picture, decimation, figures, plot_helpers
 from feti_homog.report.plots.drawn_cell import DrawnCell, InterfaceEdges
 from feti_homog.results.field_file import FieldFile
 from feti_homog.results.result_json import SCHEMA
@@ -254,25 +254,6 @@ def test_the_colour_range_of_states_has_both_signs(states: Any, expected: tuple[
     assert (norm.vmin, norm.vmax, extend) == (*expected, "neither")
     values[0, 0], values[-1, -1] = -90.0, 90.0
     assert plot_helpers.colour_range(values)[2] == "both"
-
-
-def test_panels_have_the_colours_of_all_states(tmp_path: Path, monkeypatch: Any) -> None:
-    """A state without a landmark and of the other sign counts; the end of far larger stresses does not."""
-    document = listed("path", load_factor=[0.1, 0.2, 1], strain=[[0.1, 0, 0]] * 3, stress=[[9, 0, 0]] * 3)
-    monkeypatch.setattr(deformed_panels.landmarks, "marks", lambda document: {0: "peak", 2: "end"})
-    write(tmp_path, sample(4))
-    with h5py.File(tmp_path / "result.h5", "r+") as file:
-        for number, value in enumerate((2.0, -3.0, 3.5)):
-            table = file[f"state/{number}/stress"]
-            table[:] = value * np.linspace(0.0, 1.0, len(table))[:, None]
-            file[f"state/{number}"].attrs["point"] = number
-        ranges = []
-        for last in (1.0, 100.0):
-            file["state/2/stress"][:] *= last
-            cell = deformed_panels.DeformedCell.of_states(file, range(3), document, 1.0, 10_000)
-            ranges.append((cell.colours[0].vmin, cell.colours[0].vmax))
-    assert ranges[0][0] == -ranges[0][1] and 2.5 < ranges[0][1] <= 3.5
-    assert ranges[1][0] == -ranges[1][1] and 2.0 < ranges[1][1] <= 3.0
 
 
 def test_values_count_by_their_area() -> None:
