@@ -23,7 +23,7 @@ from typing import Any
 import figures
 import numpy as np
 from effective_stiffness import REFERENCE
-from figures import INK
+from figures import ENTRY_INK
 from mpi4py.MPI import Intracomm
 from numpy.typing import NDArray
 
@@ -116,10 +116,11 @@ def _curves(
     entries: Sequence[str],
 ) -> None:  # fmt: skip
     """Draw a colour per entry and a line style per case."""
-    for entry, ink in zip(entries, INK, strict=False):
+    inks = [ENTRY_INK["33" if letter != "C" and entry == "12" else entry] for entry in entries]
+    for entry, ink in zip(entries, inks, strict=True):
         axes.plot([], [], color=ink, label=f"${letter}_{{{entry}}}$")
     for name, style in styles.items():
-        for column, ink in zip(values[name].T, INK, strict=False):
+        for column, ink in zip(values[name].T, inks, strict=True):
             axes.plot(angles, column, style, color=ink, linewidth=1.6)
         axes.plot([], [], style, color="0.3", label=name)
     axes.set(xlabel="debonding angle (degrees)", xlim=(0, 360), xticks=range(0, 361, 60))

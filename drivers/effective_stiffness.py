@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from figures import EQUATION_38, INK, STYLE, add_output_options, computed, written
+from figures import ENTRY_INK, EQUATION_38, STYLE, add_output_options, computed, written
 from mpi4py.MPI import Intracomm
 
 from feti_homog import Case, launch
@@ -68,8 +68,8 @@ def draw(fractions: Sequence[float], sweep: Sequence[Any], path: Path) -> Path:
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(5, 3.5), layout="constrained")
         axes = figure.subplots()
-        for (name, (i, j)), ink in zip(ENTRIES.items(), INK, strict=False):
-            axes.plot(fractions, [L[i, j] for L in sweep], "o-", color=ink, label=f"$C_{{{name[1:]}}}$")
+        for name, (i, j) in ENTRIES.items():
+            axes.plot(fractions, [L[i, j] for L in sweep], "o-", color=ENTRY_INK[name[1:]], label=f"$C_{{{name[1:]}}}$")
         axes.set(xlabel="fibre fraction", ylabel="effective stiffness (GPa)", ylim=(0, None))
         axes.grid(color="0.92", linewidth=0.6)
         axes.set_title("hexagonal cell, plane strain")

@@ -15,7 +15,9 @@ from feti_homog import Case, Result, run
 EQUATION_38 = {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}}  # GPa
 EQUATION_42 = {"matrix": {"young": 100.0, "poisson": 0.4}, "fibre": {"young": 500.0, "poisson": 0.2}}  # GPa
 STYLE = {"font.size": 10, "savefig.dpi": 200, "axes.spines.top": False, "axes.spines.right": False}
-INK = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d")
+# Colours of Okabe and Ito, as in the pictures of the program: one a component.
+INK = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
+ENTRY_INK = dict(zip(("11", "22", "33", "12"), INK, strict=True))  # of the stiffness; the stress S12 has that of C33
 
 
 def parser(description: str, name: str, mesh_size: float, refine: int, order: int) -> argparse.ArgumentParser:

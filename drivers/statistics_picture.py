@@ -14,7 +14,7 @@ from pattern_statistics import SECTORS, FibreStatistics
 from feti_homog.report.plots.plot_helpers import STYLE, faint_grid, plain, save
 from feti_homog.typing import Float
 
-COLOURS = ("#1f4e9c", "#c44e00", "#2a7f3f")
+COLOURS = ("#0072B2", "#D55E00", "#009E73")
 ORDINALS = ("nearest", "second", "third")
 BINS = 20
 

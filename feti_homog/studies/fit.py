@@ -107,16 +107,19 @@ class Fit(Study):
         if evaluator.comm.rank == 0 and not evaluator.quiet and (line := self.axes()):
             standard_streams.say(f"remark: {line}")
 
+        evaluations = Evaluations(self, evaluator)
+
         def write(estimates: estimation.ParameterEstimates) -> dict[str, Any]:
             from feti_homog.studies import pictures  # only a rank that draws loads Matplotlib
 
             document = {"name": self.name, **fit_result.content(self.unknowns, self.data, estimates)}
             rows = [[datum[name] for name in fit_result.HEAD] for datum in document["measured"]]
             atomic.replace_text(evaluator.directory / "measured.csv", result_json.csv_text([fit_result.HEAD, *rows]))
-            pictures.draw_fit(evaluator.directory / "fit.png", document)
+            results = [answer.document for answer in evaluations.answers[_rounded(estimates.x)]]
+            pictures.draw_fit(evaluator.directory / "fit.png", document, results)
             return document
 
-        return mpi_errors.on_root(evaluator.comm, write, Evaluations(self, evaluator).estimate())
+        return mpi_errors.on_root(evaluator.comm, write, evaluations.estimate())
 
     def text(self, document: Mapping[str, Any]) -> str:
         return study_tables.fit_text(document)

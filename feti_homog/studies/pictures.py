@@ -1,6 +1,6 @@
 """Draw moduli.png, moduli of a sweep over the fibre fraction, and fit.png, residuals and fit curves."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import cycle
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from feti_homog.materials import engineering_constants, voigt
 from feti_homog.report.plots import plot_helpers
+from feti_homog.results import path_curves
 from feti_homog.studies.sweep_table import Series, SweepTable, series_over, varies
 from feti_homog.typing import Document
 
@@ -24,6 +25,7 @@ CONDUCTION = ("k11", "k22", "k33")
 COMMON_PANELS = ("C11", "C66")  # of generalized plane strain and plane states together
 BANDS = {"C11": "Reuss to Voigt", "C33": "Reuss to Voigt"}
 BANDS |= dict.fromkeys(("bulk", "shear", *CONDUCTION), "Hashin-Shtrikman")
+BAND_SHADES = {"Reuss to Voigt": "0.92"}
 MARKERS = ("o", "s", "^", "D", "v", "P")
 NAMES = {
     **{name: f"${name[0]}_{{{name[1:]}}}$" for name in ("C11", "C33", "C44", "C66", *CONDUCTION)},
@@ -60,30 +62,35 @@ def moduli_figure(table: SweepTable) -> Figure:
     series = series_over(table, FRACTION)[: len(MARKERS)]
     ratios = RATIOS if panels_of(table) == SPATIAL_PANELS else ()
     names = [*panels_of(table), *(name for name in ratios if name in table.outputs)]
-    rows = -(-len(names) // len(PANELS))
-    picture = Figure(figsize=(14.4, 3.6 * rows + 0.6), layout="constrained")
-    panels = picture.subplots(rows, len(PANELS), sharex=True, squeeze=False).ravel()
+    rows = -(-len(names) // 2)
+    picture = Figure(figsize=(7.2, 2.6 * rows + 0.8), layout="constrained")
+    panels = picture.subplots(rows, 2, sharex=True, squeeze=False).ravel()
     for axes, name in zip(panels, names, strict=False):
         for style, one_series in enumerate(series):
             _plot_series(axes, table, one_series, name, style)
         unit = "" if name.startswith(("nu_", "expansion_", "k")) else plot_helpers.stress_label(table.stress_unit)
-        axes.set(xlabel="fibre fraction", ylabel=f"{NAMES[name]} {unit}".rstrip())
+        axes.set(xlabel="fibre fraction", ylabel=f"{NAMES[name]}\n{unit}".rstrip())
+        _limit(axes, BANDS.get(name) == "Reuss to Voigt")
         plot_helpers.faint_grid(axes)
         axes.tick_params(labelbottom=True)
     for axes in panels[len(names) :]:
         axes.set_axis_off()
+    picture.align_ylabels()
     planes = sorted({document["case"]["analysis"]["plane"] for document in table.finished})
-    picture.suptitle(f"{plot_helpers.plain(table.name)}: plane {' and '.join(planes)}", fontsize=12)
-    legend: dict[str, Any] = {}
-    for axes in panels[::-1]:
-        handles, labels = axes.get_legend_handles_labels()
-        legend |= dict(zip(labels, handles, strict=True))
-    for columns in range(min(len(legend), 5), 0, -1):  # as many columns as the width of the picture allows
-        box = picture.legend([*legend.values()], [*legend], loc="outside lower center", ncols=columns, frameon=False)
-        if columns == 1 or box.get_window_extent().width <= picture.bbox.width:
-            break
-        box.remove()
+    picture.suptitle(f"{plot_helpers.plain(table.name)}: plane {' and '.join(planes)}")
+    handles = [handle for axes in panels[::-1] for handle in axes.get_legend_handles_labels()[0]]
+    plot_helpers.legend_below(picture, [*{handle.get_label(): handle for handle in handles}.values()])
     return picture
+
+
+def _limit(axes: Axes, is_wide: bool) -> None:
+    """Limit the ordinate to the computed values, with their bounds unless these are wide."""
+    shapes = [shape for shape in axes.collections if not (is_wide and shape.get_label() == "Reuss to Voigt")]
+    corners = [np.asarray(path.vertices)[:, 1] for shape in shapes for path in shape.get_paths()]
+    values = np.concatenate([*(np.asarray(line.get_ydata(), float) for line in axes.lines), *corners])
+    low, high = np.nanmin(values), np.nanmax(values)
+    margin = 0.06 * (high - low) or 0.06 * abs(high) or 1.0
+    axes.set_ylim(low - margin, high + margin)
 
 
 def bounds_of(document: Document) -> dict[str, tuple[float, float]]:
@@ -116,28 +123,31 @@ def _plot_series(axes: Axes, table: SweepTable, series: Series, name: str, style
     band = np.array([np.mean(pairs, axis=0) for pairs in limits])
     if np.isfinite(band).any():
         label = BANDS.get(name, "Hill, Hashin")
-        axes.fill_between(series.x, *band.T, color="0.88", linewidth=0.0, zorder=0, label=label)
+        axes.fill_between(series.x, *band.T, color=BAND_SHADES.get(label, "0.82"), lw=0.0, zorder=0, label=label)
     mean, spread = statistics.mean[numbers], np.nan_to_num(statistics.ci95[numbers])
-    axes.plot(series.x, mean, color=colour, marker=marker, markersize=4.5, linewidth=1.2, label=series.label or None)
+    axes.plot(series.x, mean, color=colour, marker=marker, markersize=3.5, linewidth=1.2, label=series.label or None)
     if spread.any():
         label = "95 % confidence of the mean"
         axes.errorbar(series.x, mean, spread, fmt="none", ecolor=colour, elinewidth=1.2, capsize=2.5, label=label)
-    if (errors := table.statistics.get(f"{name}_mesh_error")) is not None:
-        wide: dict[str, Any] = {"elinewidth": 7.0, "alpha": 0.35, "zorder": 1, "label": "estimated error of the mesh"}
-        axes.errorbar(series.x, mean, np.nan_to_num(errors.mean[numbers]), fmt="none", ecolor=colour, **wide)
+    errors = table.statistics.get(f"{name}_mesh_error")
+    bars = np.zeros(len(mean)) if errors is None else np.nan_to_num(errors.mean[numbers])
+    # Errors that no reader could see have no entry in the legend.
+    if bars.max(initial=0.0) > 0.005 * np.ptp(np.nan_to_num(mean)):
+        wide: dict[str, Any] = {"elinewidth": 9.0, "alpha": 0.35, "zorder": 1, "label": "estimated error of the mesh"}
+        axes.errorbar(series.x, mean, bars, fmt="none", ecolor=colour, **wide)
 
 
-def draw_fit(path: Path, document: Mapping[str, Any]) -> Path:
+def draw_fit(path: Path, document: Mapping[str, Any], results: Sequence[Document] = ()) -> Path:
     """Draw the residuals and fit curves to a file.  Raises FetiHomogError if it cannot be written."""
     with mpl.rc_context(plot_helpers.STYLE):
-        return plot_helpers.save(fit_figure(document), path)
+        return plot_helpers.save(fit_figure(document, results), path)
 
 
-def fit_figure(document: Mapping[str, Any]) -> Figure:
+def fit_figure(document: Mapping[str, Any], results: Sequence[Document] = ()) -> Figure:
     """Draw the residuals and fit curves.
 
     The first panel has a row for each single value, with its residual in standard deviations; the second has measured
-    and computed curves.
+    points and the computed curves of the `results` of the tests, without results the computed values at the points.
     """
     single = [row for row in document["measured"] if row["strain"] is None]
     points = [row for row in document["measured"] if row["strain"] is not None]
@@ -155,8 +165,8 @@ def fit_figure(document: Mapping[str, Any]) -> Figure:
         axes.set_yticks(place, [plot_helpers.plain(label) for label in labels])
         axes.invert_yaxis()
         axes.set(xlabel="(computed - measured) / std", title="measured / computed")
-        if len(np.unique(tests)) > 1:
-            axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        if len(np.unique(tests)) > 1 and not points:
+            plot_helpers.legend_below(figure, axes.get_legend_handles_labels()[0])
     if points:
         numbers = dict.fromkeys(row["test"] for row in points)
         for test, colour, marker in zip(numbers, cycle(plot_helpers.INK), cycle(MARKERS), strict=False):
@@ -165,8 +175,15 @@ def fit_figure(document: Mapping[str, Any]) -> Figure:
                 for name in ("strain", "value", "std", "computed")
             )
             panels[-1].errorbar(x, y, std, fmt=marker, color=colour, markersize=4, label=f"test {test}, measured")
-            panels[-1].plot(x, computed, color=colour, label=f"test {test}, computed")
-        panels[-1].set(xlabel=points[0]["strain_name"], ylabel=points[0]["name"])
-        panels[-1].legend(frameon=False)
-    figure.suptitle(f"{plot_helpers.plain(document['name'])}: computed and measured", fontsize=12)
+            curve = path_curves.rising_strain(results[test - 1]) if results else None
+            if curve is not None:
+                stresses = voigt.voigt_names(curve.shape[1] - 1)[1]
+                name = next(row["name"] for row in points if row["test"] == test)
+                x, computed = np.sign(x[-1]) * curve[:, -1], curve[:, stresses.index(name)]
+            panels[-1].plot(x, computed, color=colour, linewidth=1.2, label=f"test {test}, computed")
+        symbols = [f"${plot_helpers.SYMBOLS[points[0][name]]}$" for name in ("strain_name", "name")]
+        unit = plot_helpers.stress_unit(results[points[0]["test"] - 1]["case"]) if results else ""
+        panels[-1].set(xlabel=f"macroscopic strain {symbols[0]}", ylabel=f"stress {symbols[1]} {unit}".rstrip())
+        plot_helpers.finish_curves(panels[-1])
+    figure.suptitle(f"{plot_helpers.plain(document['name'])}: computed and measured")
     return figure

@@ -107,13 +107,9 @@ def in_axes_of_the_cell(document: Document) -> EffectiveMaterial:
         symmetry = f"Orthotropic; {text} are left out."
         compliance = np.where(COUPLINGS, 0.0, compliance)
         expansion = None if expansion is None else expansion * [1, 1, 1, 0, 0, 0]
-    return EffectiveMaterial(
-        **_origin(document),
-        symmetry=symmetry,
-        compliance=(compliance + compliance.T) / 2.0,
-        expansion=expansion,
-        errors=constant_tables.in_material_axes(constant_tables.mesh_errors(document)),
-    )
+    errors = constant_tables.in_material_axes(constant_tables.mesh_errors(document))
+    values: dict[str, Any] = {"compliance": (compliance + compliance.T) / 2.0, "expansion": expansion, "errors": errors}
+    return EffectiveMaterial(**_origin(document), symmetry=symmetry, **values)
 
 
 def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
@@ -137,19 +133,12 @@ def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
         axial, transverse = _numbers([computed["expansion_axial"], computed["expansion_transverse"]], (2,))
         expansion = np.array([axial, transverse, transverse, 0.0, 0.0, 0.0])
     symmetry = f"The nearest transversely isotropic material, at a relative distance of {computed['deviation']:.2g}."
-    errors = (document.get("mesh_error") or {}).get("constants", {})
-    return EffectiveMaterial(
-        **_origin(document),
-        symmetry=symmetry,
-        compliance=compliance,
-        expansion=expansion,
-        errors={
-            name: float(errors[constant])
-            for constant, about in engineering_constants.ABOUT_FIBRES.items()
-            if constant in errors
-            for name in about.card
-        },
-    )
+    computed_errors = (document.get("mesh_error") or {}).get("constants", {})
+    cards = engineering_constants.ABOUT_FIBRES.items()
+    pairs = [(computed_errors[key], about.card) for key, about in cards if key in computed_errors]
+    values: dict[str, Any] = {"compliance": compliance, "expansion": expansion}
+    values["errors"] = {name: float(error) for error, names in pairs for name in names}
+    return EffectiveMaterial(**_origin(document), symmetry=symmetry, **values)
 
 
 def _origin(document: Document) -> dict[str, Any]:

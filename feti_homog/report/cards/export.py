@@ -196,12 +196,8 @@ def csv_table(material: effective_material.EffectiveMaterial) -> str:
 
 
 FORMATS: dict[str, Callable[[effective_material.EffectiveMaterial], str]] = {
-    "abaqus": abaqus,
-    "calculix": calculix,
-    "ansys": ansys,
-    "moose": moose,
-    "csv": csv_table,
-}
+    "abaqus": abaqus, "calculix": calculix, "ansys": ansys, "moose": moose, "csv": csv_table,
+}  # fmt: skip
 SYMMETRIES: dict[str, Callable[[Document], effective_material.EffectiveMaterial]] = {
     "orthotropic": effective_material.in_axes_of_the_cell,
     "transversely isotropic": effective_material.nearest_transversely_isotropic,

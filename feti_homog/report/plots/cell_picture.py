@@ -14,7 +14,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 from matplotlib.tri import Triangulation
 from scipy.spatial import cKDTree
 
@@ -28,9 +28,11 @@ TURN = 0.618  # golden section: as a fraction of the colour circle, it never rep
 LEAST_SIZE = 3.0  # points; smallest font size
 LEVEL_INK, LEVEL_WIDTH = "0.15", 0.6  # style of the contour lines of u_3
 UNDEFORMED = "0.5"
+CUT = "#B00000"  # of bodies
+FLAT = 0.02  # standard deviation in each phase / largest stress, below which colours do not tell values
 
 
-def figure(cell: drawn_cell.DrawnCell) -> Figure:
+def figure(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
     """Draw the materials of the cell with the fibre numbers.
 
     The figure also has the strength factors of the fibres if these factors differ.
@@ -39,19 +41,21 @@ def figure(cell: drawn_cell.DrawnCell) -> Figure:
     phases = list(attributes["phases"])
     # Pale colours leave black numbers readable.
     inks = np.array([mpl.colors.to_rgba(MATRIX), *(0.45 + 0.55 * _cyclic_colours(len(phases) - 1))])
-    picture, axes = _outlined(cell, inks[drawn.phase])
+    picture, axes = _outlined(cell, inks[drawn.phase], look)
     factors = fibres["strength"][:] if "strength" in fibres else np.ones(len(fibres["number"]))
     varies = bool((factors != 1.0).any())
-    write_fibre_numbers(axes, cell, drawn_cell.cell_scale(attributes), factors if varies else None)
+    longest = max(attributes["width"], attributes["height"])
+    inches = float((picture.get_size_inches() - drawn_cell.MARGINS).min()) / longest
+    write_fibre_numbers(axes, cell, inches, factors if varies else None)
     text = "\nbelow the numbers: strength / that of [interface]" if varies else ""
-    axes.set_title(_title(attributes, _count(drawn.body.max() + 1, "body", "bodies")) + text)
+    axes.set_title(_title(attributes, f"bodies: {drawn.body.max() + 1}") + text)
     present = np.unique(drawn.phase)
     # Legends leave out labels that begin with "_".
     labels = [f" {name}" if name.startswith("_") else name for name in phases]
     entries = [Patch(facecolor=inks[k], edgecolor="black", linewidth=0.6, label=labels[k]) for k in present[:IN_LEGEND]]
     if len(present) > IN_LEGEND:
         entries.append(Patch(facecolor="none", edgecolor="none", label=f"and {len(present) - IN_LEGEND} others"))
-    drawn_cell.legend_below(axes, entries, 3)
+    plot_helpers.legend_below(picture, entries, 3)
     return picture
 
 
@@ -60,31 +64,30 @@ def _cyclic_colours(count: int) -> Array:
     return np.asarray(mpl.colormaps["hsv"]((0.58 + TURN * np.arange(count)) % 1.0))
 
 
-def partition(cell: drawn_cell.DrawnCell) -> Figure:
-    """Draw the parts of the cell, each in a tone of its rank's colour.
+def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
+    """Draw the subdomains, each in a colour of its own, on several ranks in the colour of its rank.
 
-    A part is the piece of one body in one subdomain; a subdomain across several materials has one part in each body.
+    A subdomain across several materials counts once for each body.
     """
     drawn = cell.drawn
-    parts, ranks = drawn.subdomain.max() + 1, np.unique(drawn.rank)
-    base = _cyclic_colours(drawn.rank.max() + 1)[:, :3]
-    rank_of = np.zeros(parts, int)
-    rank_of[drawn.subdomain] = drawn.rank
-    tones = 0.25 + 0.6 * (TURN * np.arange(parts) % 1.0)[:, None]  # parts with close numbers differ much
-    colours = np.column_stack([(1.0 - tones) * base[rank_of] + tones, np.ones(parts)])
-    picture, axes = _outlined(cell, colours[drawn.subdomain])
-    plot_helpers.draw_segments(axes, drawn.points[decimation.outline_edges(drawn, drawn.subdomain)], "black", 0.5)
-    text = _count(bodies := drawn.body.max() + 1, "body", "bodies")
-    text += f" in {parts} parts" if parts != bodies else ""
-    axes.set_title(_title(cell.file.attrs, f"{text} on {_count(len(ranks), 'rank', 'ranks')}"))
-    entries = [Patch(facecolor=0.55 * base[k] + 0.45, edgecolor="black", label=f"rank {k}") for k in ranks[:IN_LEGEND]]
-    if len(entries) > 1:
-        entries += [Patch(facecolor="none", label=f"to rank {ranks[-1]}")] * (len(ranks) > IN_LEGEND)
-        drawn_cell.legend_below(axes, entries, 3)
+    ranks = np.unique(drawn.rank)
+    kind, coloured = ("rank", drawn.rank) if len(ranks) > 1 else ("part", drawn.subdomain)
+    colours = 0.4 + 0.6 * _cyclic_colours(coloured.max() + 1)
+    picture, axes = _outlined(cell, colours[coloured], look)
+    cuts = decimation.outline_edges(drawn, drawn.subdomain)
+    plot_helpers.draw_segments(axes, drawn.points[cuts], CUT, 1.1)
+    plot_helpers.draw_segments(axes, drawn.points[cell.borders], "black", 0.9)
+    text = f"bodies: {drawn.body.max() + 1}, parts: {drawn.subdomain.max() + 1}, ranks: {len(ranks)}"
+    axes.set_title(_title(cell.file.attrs, text))
+    numbers = np.unique(coloured)
+    entries: list[Any] = [Patch(facecolor=colours[k], label=f"{kind} {k}") for k in numbers[:5]]
+    entries += [Patch(facecolor="none", label=f"to {kind} {numbers[-1]}")] * (len(numbers) > 5)
+    entries += [Line2D([], [], color=CUT, label="cut within a body")] * (len(cuts) > len(cell.borders))
+    plot_helpers.legend_below(picture, entries, 3)
     return picture
 
 
-def mesh_error(cell: drawn_cell.DrawnCell) -> Figure | None:
+def mesh_error(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure | None:
     """Draw the cell coloured by its mesh error density; return None without error estimates.
 
     Density: fraction of the strain energy error / fraction of the area, the largest over all states.  Singular tips
@@ -94,17 +97,13 @@ def mesh_error(cell: drawn_cell.DrawnCell) -> Figure | None:
     tables = [state["mesh_error"] for state in file.get("state", {}).values() if "mesh_error" in state]
     if not tables:
         return None
-    first, second, third = np.moveaxis(drawn.points[drawn.triangles], 1, 0)
-    (x, y), (u, v) = (second - first).T, (third - first).T
-    area = np.abs(x * v - y * u) / 2 / (file.attrs["width"] * file.attrs["height"])
-    elements = drawn.group / drawn.pieces
-    density: Array = (
-        np.max([decimation.triangle_means(table, None, drawn) for table in tables], axis=0) * elements / area
-    )
+    area = drawn.areas / (file.attrs["width"] * file.attrs["height"])
+    errors = np.max([decimation.triangle_means(table, None, drawn) for table in tables], axis=0)
+    density: Array = errors * drawn.group / drawn.pieces / area
     highest = float(density.max(initial=0.0))
     if not 0.0 < highest < np.inf:
         return None
-    picture, axes = drawn_cell.figure_of(file.attrs)
+    picture, axes = drawn_cell.figure_of(file.attrs, look)
     top = float(plot_helpers.value_range(density, area)[0].vmax or highest)
     lowest = top / 10.0**4  # smaller densities, on hardly any area, have one colour
     colours = ScalarMappable(LogNorm(lowest, top), "magma_r")
@@ -114,16 +113,16 @@ def mesh_error(cell: drawn_cell.DrawnCell) -> Figure | None:
     extend = "both" if highest > top else "min"
     bar = drawn_cell.bar_beside(axes, colours, extend)
     letters = int((picture.get_figheight() - 1.2) / 0.075)
-    bar.set_label(fill("error of the strain energy / energy, per share of the area", letters))
+    bar.set_label(fill("local error / mean strain energy (both per area)", letters))
     plot_helpers.draw_segments(axes, drawn.points[cell.borders], "black", 0.7)
     drawn_cell.label_cell_axes(axes, file.attrs)
-    axes.set_title(_title(file.attrs, "estimated error of the mesh"))
+    axes.set_title(_title(file.attrs, "estimated error of the mesh (dark: large)"))
     return picture
 
 
-def _outlined(cell: drawn_cell.DrawnCell, colours: Array) -> tuple[Figure, Axes]:
+def _outlined(cell: drawn_cell.DrawnCell, colours: Array, look: plot_helpers.Look) -> tuple[Figure, Axes]:
     """Draw the cell with triangle colours (q, 4) and body outlines."""
-    picture, axes = drawn_cell.figure_of(cell.file.attrs)
+    picture, axes = drawn_cell.figure_of(cell.file.attrs, look)
     plot_helpers.fill_triangles(axes, cell.drawn, cell.drawn.points, colours, len(cell.drawn.triangles) <= 6000)
     plot_helpers.draw_segments(axes, cell.drawn.points[cell.borders], "black", 0.9)
     drawn_cell.label_cell_axes(axes, cell.file.attrs)
@@ -132,10 +131,6 @@ def _outlined(cell: drawn_cell.DrawnCell, colours: Array) -> tuple[Figure, Axes]
 
 def _title(attributes: Any, text: str) -> str:
     return f"{plot_helpers.plain(attributes['title'])}\n{text}".lstrip()
-
-
-def _count(number: int, one: str, many: str) -> str:
-    return f"{number} {one if number == 1 else many}"
 
 
 def write_fibre_numbers(axes: Axes, cell: drawn_cell.DrawnCell, inches: float, factors: Array | None = None) -> None:
@@ -171,7 +166,9 @@ def write_fibre_numbers(axes: Axes, cell: drawn_cell.DrawnCell, inches: float, f
             axes.text(x, y, text, fontsize=size, ha="center", va="center", clip_on=True)
 
 
-def deformed(cell: drawn_cell.DrawnCell, state: Any, document: Document) -> Figure:
+def deformed(
+    cell: drawn_cell.DrawnCell, state: Any, document: Document, look: plot_helpers.Look = plot_helpers.PLAIN
+) -> Figure:
     """Draw the deformed cell in a state, coloured by a stress component.
 
     The figure also has the states of the interface.  Displacements in the plane are magnified, beside the undeformed
@@ -183,18 +180,22 @@ def deformed(cell: drawn_cell.DrawnCell, state: Any, document: Document) -> Figu
     title, scale = load.label(state.attrs), 0.0
     if not is_axial(state):
         largest = decimation.largest_scale(displacement, drawn)
-        size, length = float(np.ptp(drawn.points, axis=0).min()), plot_helpers.largest_length(displacement)
+        size, length = float(np.ptp(drawn.points, axis=0).min()), float(np.linalg.norm(displacement, axis=1).max())
         chosen = output.get("deformation_scale")
         scale = plot_helpers.magnification(length, size, largest=largest) if chosen is None else chosen
         title += f", displacement × {scale:g}"
     moved = drawn.points + scale * displacement
-    figure, axes = drawn_cell.figure_of(attributes)
+    figure, axes = drawn_cell.figure_of(attributes, look)
     component = plot_helpers.stress_component(output.get("stress", "auto"), [state])
     stress = plot_helpers.nodal_stress(state, component, drawn)
     norm, colours, extend = plot_helpers.colour_range(stress, drawn.node_areas)
     shapes = plot_helpers.shade_triangles(axes, drawn, moved, stress, norm, colours)
     bar = drawn_cell.bar_beside(axes, shapes, extend)
-    bar.ax.ticklabel_format(axis="y", scilimits=(-2, 4))
+    bar.formatter = StrMethodFormatter("{x:.6g}")  # without a power of ten above the bar
+    phases = {name: stress[drawn.triangles[drawn.phase == k]] for k, name in enumerate(attributes["phases"])}
+    phases = {name: values for name, values in phases.items() if values.size}
+    if max(values.std() for values in phases.values()) < FLAT * np.abs(stress).max():
+        title += "\nmeans: " + ", ".join(f"{name} {values.mean():.4g}" for name, values in phases.items())
     bar.set_label(f"${plot_helpers.STRESS_SYMBOLS[component]}$ {plot_helpers.stress_label(attributes['stress_unit'])}")
     if reported(document).name == "conductivity":
         title = rf"$\partial T / \partial x_{component[1]} = 1$"
@@ -216,7 +217,7 @@ def deformed(cell: drawn_cell.DrawnCell, state: Any, document: Document) -> Figu
     marks = cell.interface.mark(axes, moved, state)
     drawn_cell.label_cell_axes(axes, attributes)
     handles = [*(marks if len(marks) > 1 else ()), line]
-    drawn_cell.legend_below(axes, handles, min(len(handles), 3))
+    plot_helpers.legend_below(figure, handles, 3)
     axes.set_title(_title(attributes, title))
     return figure
 

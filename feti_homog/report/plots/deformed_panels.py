@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import h5py
@@ -24,10 +25,10 @@ from feti_homog.results import atomic, field_file, field_guard, landmarks
 from feti_homog.typing import Array, Document
 
 MAX_PANELS = 6
+OWN_COLOURS = "end, own colours"
 MAX_FRAMES, FRAME_TIME = 24, 250  # of the animation; milliseconds
 PANEL_LIMIT = 30_000  # triangles in a panel
 WIDTH, FRAME, MOST_HEIGHT = 8.0, 3.6, 6.0  # inches: all panels, an animated cell, the highest cell
-LOADS_IN_PANEL = 2  # loads in one line of a panel title
 
 
 @dataclass(frozen=True)
@@ -49,10 +50,13 @@ class DeformedCell(drawn_cell.DrawnCell):
         cell, states = drawn_cell.DrawnCell.of(file, limit), [file[f"state/{n}"] for n in numbers]
         component = plot_helpers.stress_component(document["case"]["output"].get("stress", "auto"), states)
         mark_of = landmarks.marks(document) if reported(document).is_followed else {}
-        # At the end, once all fibres have come off, stresses may be many times those of the peak.
-        marked = [state for state in states if mark_of.get(int(state.attrs["point"]), "end") != "end"] or states
-        stress = np.concatenate([plot_helpers.nodal_stress(state, component, cell.drawn) for state in marked])
-        colours = plot_helpers.colour_range(stress, np.tile(cell.drawn.node_areas, len(marked)))
+        stress = np.array([plot_helpers.nodal_stress(state, component, cell.drawn) for state in states])
+        colours, areas = plot_helpers.colour_range(stress, cell.drawn.node_areas), cell.drawn.node_areas
+        if mark_of.get(int(states[-1].attrs["point"])) == "end" and len(states) > 1:
+            # At the end, once all fibres have come off, stresses may be many times those before.
+            before, end = (plot_helpers.colour_range(part, areas) for part in (stress[:-1], stress[-1]))
+            if np.abs(end[0].inverse([0.0, 1.0])).max() > 2.0 * np.abs(before[0].inverse([0.0, 1.0])).max():
+                colours, mark_of = before, mark_of | {max(mark_of): OWN_COLOURS}
         parts = vars(cell) | {"component": component, "colours": colours, "scale": scale, "marks": mark_of}
         return cls(**parts, labels=drawn_cell.LoadLabels.of(document))
 
@@ -68,32 +72,34 @@ class DeformedCell(drawn_cell.DrawnCell):
     def draw(self, axes: Axes, number: int, moved: Array) -> Any:
         """Draw the cell in a state, with its nodes at `moved` (p, 2); return the coloured triangles.
 
-        The end of a path has a range of its own if its stresses would all have the last colour of the common range.
+        The end of a path has a range of its own if its stresses are more than twice those before.
         """
         state, (norm, colours, _) = self.state(number), self.colours
         attributes = state.attrs
         stress = plot_helpers.nodal_stress(state, self.component, self.drawn)
         mark = self.marks.get(attributes["point"])
-        of_state = plot_helpers.colour_range(stress, self.drawn.node_areas)
-        common, largest = (max(abs(limits.vmin or 0.0), abs(limits.vmax or 0.0)) for limits in (norm, of_state[0]))
-        if mark == "end" and largest > 2.0 * common:
-            norm, colours, mark = *of_state[:2], "end, own colours"
+        if mark == OWN_COLOURS:
+            norm, colours, _ = plot_helpers.colour_range(stress, self.drawn.node_areas)
         shapes = plot_helpers.shade_triangles(axes, self.drawn, moved, stress, norm, colours)
         plot_helpers.draw_segments(axes, moved[self.borders], "black", 0.5)
         self.interface.mark(axes, moved, state, magnified=0.8)
         axes.set_aspect("equal")
         axes.set(xticks=(), yticks=())
         axes.set_axis_off()
+        # Letters are about half of the font size wide; a panel is a quarter wider than its axes before the layout.
+        letters = int(180.0 * axes.bbox.width / axes.figure.dpi / float(axes.title.get_fontsize()))
         title = f"{mark}: {attributes['label']}" if mark else attributes["label"]
-        axes.set_title(f"{title}\n{self.labels.label(attributes, LOADS_IN_PANEL)}", fontsize=9, y=1.0)
+        if mark and len(title) > letters:
+            title = f"{fill(mark, letters)}:\n{attributes['label']}"
+        load = self.labels.label(attributes, 2) if letters > 30 else self.labels.words(attributes)[0]
+        axes.set_title(f"{title}\n{load}", y=1.0)
         return shapes
 
     def bar(self, axes: Axes, shapes: Any) -> None:
         """Draw the colour bar of the shapes beside the axes; a bar for the end of a path alone has a title."""
         is_common = shapes.norm is self.colours[0]
         bar = drawn_cell.bar_beside(axes, shapes, self.colours[2] if is_common else shapes.cmap.colorbar_extend)
-        bar.ax.set_title("" if is_common else "end", fontsize=8)
-        bar.ax.tick_params(labelsize=8)
+        bar.ax.set_title("" if is_common else "end")
         bar.locator = MaxNLocator(6)
 
     @property
@@ -152,7 +158,7 @@ def shown_scale(file: Any, document: Document) -> float:
     for number in shown_states(document, MAX_FRAMES, len(file["state"])):
         state = file[f"state/{number}"]
         u = decimation.drawn_displacement(state, drawn)
-        displacement = max(displacement, plot_helpers.largest_length(u))
+        displacement = max(displacement, float(np.linalg.norm(u, axis=1).max()))
         largest = min(largest, decimation.largest_scale(u, drawn))
         opening = max(opening, float(state["jump"][:, 0].max(initial=0.0)))
     size = float(min(file.attrs["width"], file.attrs["height"]))
@@ -171,7 +177,7 @@ def shown_states(document: Document, most: int, count: int) -> list[int]:
     return sorted({round(k) for k in np.linspace(0, count - 1, min(most, count))})
 
 
-def panels(file: Any, document: Document, scale: float) -> Figure:
+def panels(file: Any, document: Document, scale: float, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
     """Draw panels of several states: path landmarks, or angles."""
     count, analysis = len(file["state"]), reported(document)
     if analysis.is_followed:
@@ -184,7 +190,7 @@ def panels(file: Any, document: Document, scale: float) -> Figure:
     size = np.subtract(*_corners(places)[::-1])
     rows, columns = _grid(len(numbers), size[0] / size[1])
     height = _inches(size, (WIDTH - 0.5) / columns)[1] + 0.55  # with room for a colour bar and a title
-    figure = Figure(figsize=(WIDTH, rows * height + 0.7), layout="constrained")
+    figure = look.figure(WIDTH, rows * height + 0.7)
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     shapes = [cell.draw(axes, number, moved) for axes, number, moved in zip(grid, numbers, places, strict=False)]
     if shapes[-1].norm is not cell.colours[0]:
@@ -194,12 +200,11 @@ def panels(file: Any, document: Document, scale: float) -> Figure:
     for axes in grid[len(numbers) :]:
         axes.set_axis_off()
     grid[0].autoscale_view()
-    figure.suptitle(f"{plot_helpers.plain(file.attrs['title'])}: {cell.caption}".lstrip(": "), fontsize=11)
+    figure.suptitle(f"{plot_helpers.plain(file.attrs['title'])}: {cell.caption}".lstrip(": "))
     states = [cell.interface.state(drawn_cell.states_of_nodes(cell.state(number))) for number in numbers]
     present = np.unique(np.concatenate(states))
     handles = drawn_cell.state_legend([kind for kind in drawn_cell.STATE_NAMES if kind in present])
-    if handles:
-        figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
+    plot_helpers.legend_below(figure, handles)
     return figure
 
 
@@ -232,7 +237,7 @@ def animation(file: Any, document: Document, scale: float, path: Path) -> Path:
     figure = Figure(figsize=(FRAME + 0.55, _inches(high - low, FRAME)[1] + 1.05), dpi=100, layout="constrained")
     canvas: Any = FigureCanvasAgg(figure)
     axes, frames = figure.subplots(), list[Image.Image]()
-    figure.suptitle(cell.caption, fontsize=10)
+    figure.suptitle(cell.caption)
     for number, moved in zip(reversed(numbers), reversed(places), strict=True):
         for artist in [*axes.collections, *axes.patches, *axes.child_axes]:
             artist.remove()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, Literal
@@ -12,12 +12,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.transforms import ScaledTranslation
 from scipy.spatial import cKDTree
 
 from feti_homog.materials import voigt
 from feti_homog.report.plots.decimation import SAME_PLACE, TRIANGLE_LIMIT, DrawnMesh, drawn_mesh, outline_edges
-from feti_homog.report.plots.plot_helpers import SYMBOLS, draw_segments, unit_label
+from feti_homog.report.plots.plot_helpers import PLAIN, SYMBOLS, Look, draw_segments, unit_label
 from feti_homog.report.text.summary import reported
 from feti_homog.results import path_curves
 from feti_homog.typing import Array, Document
@@ -36,6 +35,7 @@ BONDED, CLOSED, OPEN, DAMAGED = NodeState
 STATE_NAMES = {BONDED: "bonded", DAMAGED: "damaged", CLOSED: "in contact", OPEN: "open"}
 STATE_COLOURS = {BONDED: "black", CLOSED: "#E69F00", OPEN: "#0072B2"}
 STATE_WIDTHS = {BONDED: 0.8, CLOSED: 2.6, OPEN: 2.0, DAMAGED: 2.0}
+SIDE, MARGINS = 4.8, np.array([1.9, 1.4])  # inches: longer side of a cell in a picture, room for text and a bar
 # An edge has the state of that end which comes later in this order.
 ORDER = np.array(list(STATE_NAMES))
 
@@ -132,28 +132,13 @@ def _wrapped(points: Array, period: Array, tolerance: float) -> Array:
     return np.asarray(inside)
 
 
-def figure_of(attributes: Any) -> tuple[Figure, Axes]:
-    """Return a figure with axes for the cell, and room for text and a colour bar.
-
-    The places are given in inches: a layout engine would draw all text twice to find them.
-    """
-    width, height = (cell_scale(attributes) * float(attributes[name]) for name in ("width", "height"))
-    size = width + 1.9, max(height, width / 4) + 1.2
-    figure, sides = Figure(figsize=size), {"left": 0.7 / size[0], "right": (0.7 + width) / size[0]}
-    return figure, figure.subplots(gridspec_kw=sides | {"bottom": 0.6 / size[1], "top": 1.0 - 0.6 / size[1]})
-
-
-def legend_below(axes: Axes, handles: Sequence[Any], columns: int) -> None:
-    """Add a legend below the axes of a cell and their labels."""
-    figure: Any = axes.figure
-    below = axes.transAxes + ScaledTranslation(0.0, -0.5, figure.dpi_scale_trans)
-    place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "bbox_transform": below}
-    axes.legend(handles=handles, ncols=columns, frameon=False, **place)
-
-
-def cell_scale(attributes: Any) -> float:
-    """Return the inches in the picture per length unit of the cell."""
-    return 4.8 / max(float(attributes["width"]), float(attributes["height"]))
+def figure_of(attributes: Any, look: Look = PLAIN) -> tuple[Figure, Axes]:
+    """Return a figure with axes for the cell, and room for text and a colour bar."""
+    width, height = (
+        SIDE * np.array([attributes["width"], attributes["height"]]) / max(attributes["width"], attributes["height"])
+    )
+    figure = look.figure(width + MARGINS[0], max(height, width / 4) + MARGINS[1], "compressed")
+    return figure, figure.subplots()
 
 
 def label_cell_axes(axes: Axes, attributes: Any) -> None:
@@ -163,7 +148,6 @@ def label_cell_axes(axes: Axes, attributes: Any) -> None:
     axes.margins(0.03)
     axes.set_xlabel(f"$x_1$ {unit}")
     axes.set_ylabel(f"$x_2$ {unit}")
-    axes.spines[["top", "right"]].set_visible(False)
 
 
 def bar_beside(axes: Axes, shapes: Any, extend: str) -> Any:
@@ -228,5 +212,5 @@ class LoadLabels:
 
 def _formula(name: str, value: float) -> str:
     mantissa, _, exponent = f"{value:.4g}".partition("e")
-    power = rf" \cdot 10^{{{int(exponent)}}}" if exponent else ""
-    return f"${SYMBOLS[name]} = {{{mantissa}}}{power}$"
+    power = rf"{{\cdot}}10^{{{int(exponent)}}}" if exponent else ""
+    return f"${SYMBOLS[name]}={{{mantissa}}}{power}$"

@@ -45,7 +45,7 @@ def plot(
     document = output_folder.latest(directory) if stored else {}
     if component is not None:
         document.setdefault("case", {}).setdefault("output", {})["stress"] = component
-    with mpl.rc_context(plot_helpers.STYLE):
+    with mpl.rc_context(look.style):
         if "unfinished" not in document and document.get("case", {}).get("output", {}).get("fields", True):
             try:
                 with h5py.File(directory / field_file.NAME, "r") as file:
@@ -77,15 +77,15 @@ def of_fields(
         if str(chosen) not in states:
             labels = ", ".join(f"{number} ({state.attrs['label']})" for number, state in states.items())
             raise CaseError(f"--state {chosen}: expected the number of a state of {directory}: {labels}")
-        return [save(cell_picture.deformed(cell, states[str(chosen)], document), f"state_{chosen}")]
+        return [save(cell_picture.deformed(cell, states[str(chosen)], document, look), f"state_{chosen}")]
     pictures = {"cell": cell_picture.figure, "partition": cell_picture.partition, "mesh_error": cell_picture.mesh_error}
-    figures = ((name, draw(cell)) for name, draw in pictures.items())
+    figures = ((name, draw(cell, look)) for name, draw in pictures.items())
     paths = [save(figure, name) for name, figure in figures if figure is not None]
     if report.is_curve and states:
         from feti_homog.report.plots import deformed_panels
 
         scale = deformed_panels.shown_scale(file, document)
-        paths.append(save(deformed_panels.panels(file, document, scale), f"{report.name}_states"))
+        paths.append(save(deformed_panels.panels(file, document, scale, look), f"{report.name}_states"))
         if report.is_followed and look == plot_helpers.PLAIN:
             paths.append(deformed_panels.animation(file, document, scale, directory / "path.gif"))
     for number, state in {} if report.is_curve else states.items():
@@ -100,10 +100,10 @@ def of_fields(
         (load, value), *further_loads = [load for load in loads.items() if load[1]] or [("", 0.0)]
         is_unit = abs(value) == 1.0 and not further_loads
         name = f"case_{'minus_' if value < 0 else ''}{load}" if is_unit else f"state_{number}"
-        paths.append(save(cell_picture.deformed(cell, state, document), report.picture or name))
+        paths.append(save(cell_picture.deformed(cell, state, document, look), report.picture or name))
     broken = any((state["status"][:] != drawn_cell.BONDED).any() for state in states.values())
     if (broken and report.name != "conductivity") or (report.is_followed and states):
         from feti_homog.report.plots import traction_plots  # perfect bonding has no picture
 
-        paths.append(save(traction_plots.figure(cell, document), "interface"))
+        paths.append(save(traction_plots.figure(cell, document, look), "interface"))
     return paths

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from scipy.spatial.distance import cdist
 
 from feti_homog.materials import voigt
 from feti_homog.report.plots import drawn_cell, plot_helpers
@@ -16,19 +17,20 @@ from feti_homog.typing import Array, Document
 MARKS = {"first_softening_": "v", "first_break_": "D", "": "*"}  # of landmarks
 LEGIBLE = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5}  # background of numbers on curves
 STATES = {drawn_cell.BONDED: "bonded", drawn_cell.OPEN: "open", drawn_cell.CLOSED: "closed"}
+ROUND = (1, 2, 5, 10)  # steps of ticks
 UNLOADED = np.linspace(0.0, 1.0, 16, endpoint=False)  # fractions of the first load, before the first point
 # Colours of the parts of the energy.
 AREAS = {
     "stored in the bodies": "#9db8de",
     "stored in springs": "#5d86c4",
     "fracture energy": "#d98a54",
-    "lost in breaks beyond it": "#f0cfb3",
+    "other losses in breaks": "#f0cfb3",
     "lost in breaks": "#d98a54",
     "heat of friction": "#b8455f",
 }
 
 
-def figure(document: Document) -> Figure:
+def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
     """Draw stresses and interface states against the leading strain, with the landmarks.
 
     A panel between both shows a temperature that changes.  Selected points have their numbers.
@@ -39,10 +41,11 @@ def figure(document: Document) -> Figure:
     strain = strains[:, component]
     style: dict[str, Any] = {"marker": "o", "markersize": 2.5} if len(points) <= 60 else {}
     warms = any(point.get("temperature") for point in points)
-    picture = Figure(figsize=(7.2, 6.8 + 1.6 * warms), layout="constrained")
+    picture = look.figure(7.2, 7.2 + 1.6 * warms)
+    narrow = picture.get_figwidth() < plot_helpers.NARROW
     upper, *middle, lower = picture.subplots(2 + warms, 1, sharex=True, height_ratios=(2.2, *[1] * warms, 1))
     _stress_curves(upper, document, strain, components, style)
-    upper.set_ylabel(f"macroscopic stress {plot_helpers.stress_unit(case)}")
+    upper.set_ylabel(f"stress\n{plot_helpers.stress_unit(case)}")
     lower.set_xlabel(f"macroscopic strain ${plot_helpers.SYMBOLS[voigt.voigt_names(strains.shape[1])[0][component]]}$")
     title = plot_helpers.title_of(case, f"plane {case['analysis']['plane']}")
     titles = title, document.get("unfinished"), *plot_helpers.bond_limits(case)
@@ -54,32 +57,26 @@ def figure(document: Document) -> Figure:
     # The panels of path_states.png show the same points.
     by_state = landmarks.kept_points(document)
     numbers = [by_state[state] for state in landmarks.landmark_states(document, 6, len(by_state))]
-    peak, unit = landmarks.peak_of(document), case.get("output", {}).get("stress_unit", "")
+    peak = landmarks.peak_of(document)
+    unit = "" if narrow else plot_helpers.plain(case.get("output", {}).get("stress_unit", ""))
     curve, ink = np.stack([strain, stress[:, component]], axis=1), plot_helpers.STRESS_INK[peak["stress_name"]]
-    star: dict[str, Any] = {"markeredgecolor": "white", "zorder": 5, "linestyle": "none", "color": ink}
+    star: dict[str, Any] = {"markeredgecolor": "white", "linestyle": "none", "color": ink}
     for title, mark in MARKS.items():
         if f"{title}event" in peak:
             name = title.replace("_", " ").strip() or landmarks.name_of(document, peak)
-            caption = f"{name} {peak[f'{title}stress']:.4g} {plot_helpers.plain(unit)}".rstrip()
-            label = "\n".join(filter(None, [caption, landmarks.bond_of(peak, title).replace(" degrees", "°")]))
+            bond = "" if narrow else landmarks.bond_of(peak, title).replace(" degrees", "°")
+            label = f"{name} {peak[f'{title}stress']:.4g} {unit}".rstrip() + f"\n{bond}".rstrip()
             place = peak[f"{title}strain"], peak[f"{title}stress"]
-            upper.plot(*place, mark, markersize=11 if mark == "*" else 8, **star, label=label)
+            # Smaller marks lie above the star of the same point.
+            upper.plot(*place, mark, ms=13 if mark == "*" else 7, zorder=5 + (mark != "*"), **star, label=label)
+    upper.margins(y=0.12)  # room for numbers
     for axes in (upper, *middle, lower):
         axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
-        plot_helpers.finish_curves(axes)
-    upper.margins(y=0.12)  # room for numbers
-    text: dict[str, Any] = {"color": "0.3", "fontsize": 7, "ha": "center", "va": "center", "bbox": LEGIBLE}
-    pointer: dict[str, Any] = {"arrowstyle": "-", "color": "0.3", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
-    for number, rise in zip(numbers, np.diff(curve[numbers, 1], prepend=0.0), strict=True):
-        offset = (-6, 16) if rise >= 0.0 else (16, -12)  # clear of the curve at peaks and at the ends of drops
-        upper.annotate(str(number), curve[number], offset, textcoords="offset points", arrowprops=pointer, **text)
-    if "damaged_share" in points[0]:  # softening laws have damaged bonds that hold
-        right = lower.twinx()
-        right.plot(strain, [p["damaged_share"] for p in points], color="0.5", linestyle="--", linewidth=1.0)
-        right.set_ylabel("damaged share of interfaces", color="0.4", fontsize=8)
-        right.tick_params(colors="0.4", labelsize=8)
-        right.spines["top"].set_visible(False)
-        lower.legend(frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.12, 1.0))
+        if axes.dataLim.ymin >= -path_curves.ZERO * axes.dataLim.ymax:
+            axes.set_ylim(bottom=-0.02 * axes.dataLim.ymax or None)
+    upper.xaxis.set_major_locator(MaxNLocator(5 if narrow else 7, steps=ROUND))
+    plot_helpers.finish_curves(upper, *middle, lower)
+    _number_points(upper, curve, numbers)
     return picture
 
 
@@ -94,37 +91,50 @@ def _stress_curves(
     stress = np.array([point["stress"] for point in points])
     names = voigt.voigt_names(stress.shape[1])[1]
     rising = path_curves.load_controlled(points[:first]) if document["case"]["path"]["method"] == "events" else None
-    along = stress.shape[1] + path_curves.leading_component(document)
+    along, drawn = stress.shape[1] + path_curves.leading_component(document), list[Array]()
+    folds = rising is not None and bool((np.diff([point["load_factor"] for point in points[:first]]) < 0.0).any())
     for i in components:
         name, ink = plot_helpers.SYMBOLS[names[i]], plot_helpers.STRESS_INK[names[i]]
         thin: dict[str, Any] = {"label": f"${name}$", "linewidth": 1.4} if rising is None else {"linewidth": 0.8}
+        line: dict[str, Any] = {"color": ink, "linewidth": 2.0, "linestyle": _line_style(stress[:, i], drawn)}
         from_zero = np.append(0.0, strain[:first]), np.append(0.0, stress[:first, i])
         axes.plot(*from_zero, color=ink, alpha=0.8, **thin, **style)
         if first < len(points):
-            axes.plot(strain[first - 1 :], stress[first - 1 :, i], color=ink, linewidth=2.0, marker="o", ms=3.5)
+            axes.plot(strain[first - 1 :], stress[first - 1 :, i], **line, marker="o", ms=3.5)
         if rising is not None:
-            axes.plot(rising[:, along], rising[:, i], color=ink, linewidth=2.0, label=f"${name}$")
-    if rising is not None:
+            axes.plot(rising[:, along], rising[:, i], **line, label=f"${name}$")
+    if folds:
         of_some = "\nof the first leg" if first < len(points) else ""
         axes.plot([], [], color="0.3", linewidth=0.8, **style, label=f"all equilibria{of_some}")
         axes.plot([], [], color="0.3", linewidth=2.0, label=f"rising {path_curves.what_rises(document)}")
     if first < len(points):
         axes.plot([], [], color="0.3", linewidth=2.0, marker="o", ms=3.5, label="later legs")
-    axes.xaxis.set_major_locator(MaxNLocator(7))
+
+
+def _line_style(values: Array, drawn: list[Array]) -> str:
+    """Return dashes for a curve (n,) that mostly covers one already drawn, and add the curve to these."""
+    tolerance = 0.01 * max(np.abs([values, *drawn]).max(), 1e-300)
+    covers = any(np.mean(np.abs(values - other) <= tolerance) > 0.5 for other in drawn)
+    drawn.append(values)
+    return "--" if covers else "-"
 
 
 def _count_curves(axes: Axes, document: Document, strain: Array, style: Mapping[str, Any]) -> None:
     """Draw counts of bonded, open and closed nodes: thin at all equilibria, thick at a rising load."""
-    points, rising = document["path"], _records(document)
+    points, rising, drawn = document["path"], _records(document), list[Array]()
     for kind, key in STATES.items():
         ink, label = drawn_cell.STATE_COLOURS[kind], drawn_cell.STATE_NAMES[kind]
         count = np.array([point[key] for point in points])
+        line: dict[str, Any] = {"color": ink, "linestyle": _line_style(count, drawn), "label": label}
         if rising is None:
-            axes.plot(strain, count, color=ink, linewidth=1.4, label=label, **style)
+            axes.plot(strain, count, **line, linewidth=1.4, **style)
         else:  # after a break the next branch carries the load
             axes.plot(strain, count, color=ink, linewidth=0.6, alpha=0.5)
-            axes.step(strain[rising], count[rising], where="pre", color=ink, linewidth=1.8, label=label)
-    axes.set_ylabel("interface nodes")
+            axes.step(strain[rising], count[rising], where="pre", **line, linewidth=1.8)
+    if "damaged_share" in points[0]:  # softening laws have damaged bonds that hold
+        damaged = [point["damaged_share"] * sum(point[key] for key in STATES.values()) for point in points]
+        axes.plot(strain, damaged, color=drawn_cell.damage_colour(0.5), linewidth=1.2, label="damaged, by length")
+    axes.set_ylabel("interface\nnodes")
 
 
 def _records(document: Document) -> Array | None:
@@ -135,8 +145,30 @@ def _records(document: Document) -> Array | None:
     return np.flatnonzero(load >= np.maximum.accumulate(load))
 
 
-def energies(document: Document) -> Figure | None:
-    """Draw the energies per area as a stack over the path position.
+def _number_points(axes: Axes, curve: Array, numbers: Sequence[int]) -> None:
+    """Write point numbers with lines to a curve (points, 2), each beside its point where most room is."""
+    style: dict[str, Any] = {"color": "0.3", "fontsize": "small", "ha": "center", "va": "center", "bbox": LEGIBLE}
+    pointer: dict[str, Any] = {"arrowstyle": "-", "color": "0.3", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
+    style |= {"textcoords": "offset points", "arrowprops": pointer}
+    figure: Any = axes.figure
+    figure.draw_without_rendering()  # places the axes
+    scale, angles = 72.0 / figure.dpi, np.radians(np.arange(15.0, 375.0, 30.0))
+    offsets = np.concatenate([r * np.column_stack([np.cos(angles), np.sin(angles)]) for r in (16.0, 27.0)])
+    low, high = scale * axes.bbox.min + 6.0, scale * axes.bbox.max - 6.0
+    places = scale * axes.transData.transform(curve)
+    positions = np.linspace(0, len(curve) - 1, 20 * len(curve))
+    line = np.column_stack([np.interp(positions, range(len(curve)), column) for column in places.T])
+    texts = np.full((1, 2), -1e9)
+    for number in numbers:
+        sides = places[number] + offsets
+        room = np.minimum(np.minimum(cdist(sides, line).min(axis=1), cdist(sides, texts).min(axis=1) / 2.0), 9.0)
+        best = (room - 99.0 * ((sides < low) | (sides > high)).any(axis=1)).argmax()
+        texts = np.append(texts, sides[[best]], axis=0)
+        axes.annotate(str(number), curve[number], offsets[best].tolist(), **style)
+
+
+def energies(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure | None:
+    """Draw the energies per area as a stack over the leading strain or the path position.
 
     The position counts earlier legs and the load fraction on the leg.  On a proportional path the load rises;
     where bonds break, the cell drops to the next branch that carries the load, and breaks lose more energy.
@@ -155,28 +187,32 @@ def energies(document: Document) -> Figure | None:
         lost = _column(points, "dissipated_strain_controlled", rising)
         work = stored + lost
     fracture = np.minimum(fracture, lost)
-    rest = "lost in breaks" + (" beyond it" if fracture.any() else "")
+    rest = "other losses in breaks" if fracture.any() else "lost in breaks"
     # The sum of the parts is the work, except for rounding.
     parts = {"stored in the bodies": stored - springs, "stored in springs": springs, "fracture energy": fracture}
     parts |= {rest: lost - fracture, "heat of friction": heat}
     threshold = path_curves.ZERO * np.abs(stored).max()
     parts = {name: values for name, values in parts.items() if np.abs(values).max() > threshold}
-    place, words = _column(points, "load_factor", rising) * legs, "leg of the path" if legs > 1 else "share of the load"
-    picture = Figure(figsize=(7.2, 4.2), layout="constrained")
+    place, words = _column(points, "load_factor", rising) * legs, "leg of the path"
+    if legs == 1:
+        component = path_curves.leading_component(document)
+        name = voigt.voigt_names(len(points[0]["strain"]))[0][component]
+        place = _column([point | {"leading": point["strain"][component]} for point in points], "leading", rising)
+        words = f"macroscopic strain ${plot_helpers.SYMBOLS[name]}$"
+    picture = look.figure(7.2, 4.6)
     axes = picture.subplots()
     axes.stackplot(place, *parts.values(), labels=[*parts], colors=[AREAS[name] for name in parts])
     axes.plot(place, work, color="0.15", linewidth=1.2, label="work of the loads")
     for leg in range(1, legs):
         axes.axvline(leg, color="0.6", linewidth=0.6, linestyle=":")
-    axes.set_xlim(place[0], place[-1])
+    axes.set_xlim(place.min(), place.max())
     axes.set_ylim(bottom=min(0.0, float(work.min())))
     axes.set_xlabel(words)
     axes.set_ylabel(f"energy per area {plot_helpers.stress_unit(case)}")
     text = "energies along the path" if rising is None else f"energies, the {path_curves.what_rises(document)} rising"
     axes.set_title("\n".join(filter(None, [plot_helpers.title_of(case, text), document.get("unfinished")])))
-    axes.spines[["top", "right"]].set_visible(False)
-    handles, labels = axes.get_legend_handles_labels()
-    axes.legend(handles[::-1], labels[::-1], frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    axes.xaxis.set_major_locator(MaxNLocator(5, steps=ROUND))
+    plot_helpers.legend_below(picture, axes.get_legend_handles_labels()[0][::-1], 3)
     return picture
 
 
@@ -188,7 +224,7 @@ def _column(points: Sequence[Mapping[str, Any]], name: str, rising: Array | None
     """
     values = np.array([float(point.get(name) or 0.0) for point in points])
     load = np.array([point["load_factor"] for point in points])
-    power = {"load_factor": 1, "work": 2, "stored": 2, "stored_in_springs": 2}.get(name, 0)
+    power = {"load_factor": 1, "leading": 1, "work": 2, "stored": 2, "stored_in_springs": 2}.get(name, 0)
     if rising is None:
         return np.append(values[0] * UNLOADED ** max(power, 1), values)
     values, load = values[rising], load[rising]

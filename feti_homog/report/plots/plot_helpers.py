@@ -16,7 +16,6 @@ from matplotlib.colors import Colormap, ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Path2D
-from matplotlib.text import Text
 from matplotlib.tri import Triangulation
 
 from feti_homog.case import bond_laws
@@ -30,7 +29,7 @@ from feti_homog.typing import Array, Document
 SYMBOLS = {
     **{name: f"{name[:-2].replace('gamma', chr(92) + 'gamma')}_{{{name[-2:]}}}" for name in voigt.SPATIAL_STRAINS},
     **{name: rf"\Sigma_{{{name[1:]}}}" for name in voigt.SPATIAL_STRESSES},
-    "temperature": r"\Delta T",
+    "temperature": r"\Delta{T}",  # without a space, at which titles are wrapped
 }
 STRESS_SYMBOLS = {name: rf"\sigma_{{{name[1:]}}}" for name in voigt.SPATIAL_STRESSES}
 # Table of each stress in a state of result.h5, and its column if the table has several.
@@ -44,8 +43,14 @@ OUTLIERS = 0.005  # area fraction that may lie outside a colour range, at either
 INK = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 # Colours of macroscopic stresses: one a component in all pictures.
 STRESS_INK = dict(zip(("S11", "S22", "S12", "S33", "S23", "S13"), INK, strict=False))
-LEAST_TEXT = 6.0  # points; journals take no smaller text
-STYLE = {"font.size": 10, "axes.titlesize": 11, "axes.linewidth": 0.8}
+ENTRY_INK = dict(zip(("C11", "C22", "C33", "C12", "C44", "C55", "C66"), INK, strict=True))  # of the stiffness
+MESH = "0.4"  # colour of element sides
+NARROW = 5.0  # inches; panels of narrower pictures are stacked, and have short labels
+LEAST_TEXT = 7.5  # points; journals take no smaller text
+STYLE = {
+    "font.size": 10, "axes.titlesize": "medium", "figure.titlesize": "medium", "axes.spines.top": False,
+    "axes.spines.right": False, "legend.frameon": False, "legend.columnspacing": 1.2, "legend.handlelength": 1.6,
+}  # fmt: skip
 DPI = 200
 
 
@@ -63,6 +68,17 @@ class Look:
     size: tuple[float, float] | None = None
     title: str | None = None
 
+    @property
+    def style(self) -> dict[str, Any]:
+        """Return the style, with smaller text in a small picture."""
+        width = 18.0 if self.size is None else self.size[0]
+        return STYLE | {"font.size": max(10.0 * min(width / 18.0, 1.0), LEAST_TEXT)}
+
+    def figure(self, width: float, height: float, layout: Any = "constrained") -> Figure:
+        """Return an empty figure of the chosen size, else of `width` and `height` in inches."""
+        size = (width, height) if self.size is None else (self.size[0] / 2.54, self.size[1] / 2.54)
+        return Figure(figsize=size, layout=layout)
+
 
 PLAIN = Look()
 
@@ -71,17 +87,8 @@ def save(figure: Figure, path: Path, look: Look = PLAIN) -> Path:
     """Write the figure, by default without white margins.  Raises FetiHomogError if it cannot be written."""
     if look.title is not None:
         figure.suptitle(plain(look.title)) if figure.get_suptitle() else figure.axes[0].set_title(plain(look.title))
-    if look.size is not None:
-        before = figure.get_size_inches()
-        figure.set_size_inches(look.size[0] / 2.54, look.size[1] / 2.54)
-        scale = float(min(1.0, (figure.get_size_inches() / before).min()))
-        for text in figure.findobj(Text):
-            points = float(text.get_fontsize())
-            text.set_fontsize(max(scale * points, min(LEAST_TEXT, points)))
-        for axes in figure.findobj(Axes):
-            axes.tick_params(labelsize=max(10.0 * scale, LEAST_TEXT))
-        if figure.get_layout_engine() is None:
-            figure.set_layout_engine("compressed")
+    for text in [*figure.texts, *(axes.title for axes in figure.axes)]:
+        text.set_wrap(True)
     file, box = path.with_suffix(f".{look.format}"), "tight" if look.size is None else None
     with missing_letters_as_boxes():
         # Level 4 compresses in a third of the time of the default, 6, to files that are 3 % larger.
@@ -98,19 +105,26 @@ def missing_letters_as_boxes() -> Iterator[None]:
         yield
 
 
-def finish_curves(axes: Axes) -> None:
-    """Add a faint grid behind the curves, and a legend at the right."""
-    faint_grid(axes)
-    handles, names = axes.get_legend_handles_labels()
-    if handles:
-        axes.legend(handles, names, frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+def finish_curves(*panels: Axes) -> None:
+    """Add faint grids behind the curves of a figure, and a legend of all panels below."""
+    for axes in panels:
+        faint_grid(axes)
+    legend_below(panels[0].figure, [line for axes in panels for line in axes.get_legend_handles_labels()[0]])
+
+
+def legend_below(figure: Any, handles: Sequence[Any], limit: int = 5) -> None:
+    """Add a legend below the axes, in as many columns as the figure is wide, at most `limit`."""
+    for columns in range(min(len(handles), limit), 0, -1):
+        legend = figure.legend(handles=handles, loc="outside lower center", ncols=columns)
+        if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
+            break
+        legend.remove()
 
 
 def faint_grid(axes: Axes) -> None:
-    """Draw a faint grid behind the content of the axes, and remove the box."""
+    """Draw a faint grid behind the content of the axes."""
     axes.grid(color="0.92", linewidth=0.6)
     axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
 
 
 def fill_triangles(axes: Axes, drawn: DrawnMesh, points: Array, colours: Array, edges: bool) -> None:
@@ -119,7 +133,7 @@ def fill_triangles(axes: Axes, drawn: DrawnMesh, points: Array, colours: Array, 
     mesh: Any = _add_triangles(axes, points[drawn.triangles].reshape(-1, 2), separate)
     mesh.set_facecolor(np.repeat(colours, 3, axis=0))
     if edges:
-        draw_segments(axes, points[drawn.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)], "0.55", 0.15)
+        draw_segments(axes, points[drawn.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)], MESH, 0.25)
 
 
 def shade_triangles(axes: Axes, drawn: DrawnMesh, points: Array, values: Array, norm: Normalize, colours: Any) -> Any:
@@ -156,8 +170,9 @@ def draw_segments(
 def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, Colormap, str]:
     """Choose the colour range and the colour map of a stress.
 
-    Zero is white, tension red and pressure blue in all pictures; the range ends near the values.  Values (n,) have
-    weights `areas` (n,), 1 by default: meshes are fine at tips, where stresses are singular.
+    Zero is white, tension red and pressure blue in all pictures; the range ends near the values, or has zero in the
+    middle if tension and pressure are similar.  Values (n,), or (states, n) in one range, have weights `areas` (n,), 1
+    by default: meshes are fine at tips, where stresses are singular.
 
     Returns:
         colour range, colour map, and the ends of the range beyond which values lie.
@@ -165,6 +180,9 @@ def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, 
     norm, extend = value_range(values, areas)
     bottom, top = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
     largest = max(-bottom, top) or 1.0
+    if min(-bottom, top) > 0.5 * largest:
+        bottom, top = -largest, largest
+        norm, extend = Normalize(bottom, top), _outside(values, bottom, top)
     # A range far from zero still begins with a light colour.
     first, last = min(0.5 + 0.5 * bottom / largest, 0.55), max(0.5 + 0.5 * top / largest, 0.45)
     shades = mpl.colormaps["RdBu_r"](np.linspace(first, last, 256))
@@ -176,24 +194,32 @@ def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, 
 def value_range(values: Array, areas: Array | None = None) -> tuple[Normalize, str]:
     """Choose the colour range of a field.
 
-    At most 0.5 % of the area lies beyond either end.  A field uniform to 1 % has one colour.
+    At most 0.5 % of the area lies beyond either end, in each state of values (states, n).  A field uniform to 1 % has
+    one colour.
 
     Returns:
         colour range, and the ends of the range beyond which values lie.
     """
     low, high = float(values.min()), float(values.max())
-    if np.ptp(values) <= 0.01 * max(np.abs(values).max(), 1e-300):
+    if high - low <= 0.01 * max(abs(low), abs(high), 1e-300):
         middle = 0.5 * (low + high)
         half = 0.5 * (abs(middle) or 1.0)
         return Normalize(middle - half, middle + half), "neither"
     # Like numpy.percentile, weighted by area.
-    order, weights = np.argsort(values), np.ones_like(values) if areas is None else areas
-    below = np.cumsum(weights[order]) - weights[order]
-    bottom, top = np.interp([OUTLIERS, 1.0 - OUTLIERS], below / max(float(below[-1]), 1e-300), values[order]).tolist()
+    ends = []
+    for state in np.atleast_2d(values):
+        order, weights = np.argsort(state), np.ones_like(state) if areas is None else areas
+        below = np.cumsum(weights[order]) - weights[order]
+        ends.append(np.interp([OUTLIERS, 1.0 - OUTLIERS], below / max(float(below[-1]), 1e-300), state[order]))
+    bottom, top = float(np.min(ends)), float(np.max(ends))
     slack = 0.05 * (top - bottom)
     bottom, top = (low if bottom - low < slack else bottom), (high if high - top < slack else top)
-    ends = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
-    return Normalize(bottom, top), ends[low < bottom, high > top]
+    return Normalize(bottom, top), _outside(values, bottom, top)
+
+
+def _outside(values: Array, bottom: float, top: float) -> str:
+    ends = (bool(values.min() < bottom), bool(values.max() > top))
+    return {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}[ends]
 
 
 def magnification(displacement: float, size: float, opening: float = 0.0, largest: float = math.inf) -> float:
@@ -212,11 +238,6 @@ def magnification(displacement: float, size: float, opening: float = 0.0, larges
     return min(rounded, key=lambda scale: abs(math.log(scale / ideal)))
 
 
-def largest_length(vectors: Array) -> float:
-    """Return the length of the longest vector (n, 2)."""
-    return float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
-
-
 def stress_component(chosen: str, states: Sequence[Any]) -> str:
     """Return the chosen stress, else the stress conjugate to the largest strain of the states.
 
@@ -229,15 +250,10 @@ def stress_component(chosen: str, states: Sequence[Any]) -> str:
     return voigt.voigt_names(strains.shape[1])[1][loaded[int(np.abs(strains[:, loaded]).max(axis=0).argmax())]]
 
 
-def drawn_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
-    """Return a stress component of a state in the drawn triangles (q,)."""
-    table, column = STRESS_TABLES[component]
-    return triangle_means(state[table], column, drawn)
-
-
 def nodal_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
     """Return a stress component at the drawn nodes (p,), averaged over triangles in the same body."""
-    return node_means(drawn_stress(state, component, drawn), drawn)
+    table, column = STRESS_TABLES[component]
+    return node_means(triangle_means(state[table], column, drawn), drawn)
 
 
 def bond_limits(case: Document) -> list[str]:
@@ -255,7 +271,7 @@ def _limits(bond: Document, units: tuple[str, str]) -> str:
     criterion = bond.get("criterion", bond_laws.DEFAULT)
     symbols = [entry for entry in bond_laws.LAWS[criterion].symbols if bond.get(entry[1])]
     constants = [(symbol, key, units[0 if of_stress else 1]) for symbol, key, of_stress in symbols]
-    phrase = [f"${symbol} = {bond[key]:g}$ {plain(label)}".rstrip() for symbol, key, label in constants]
+    phrase = [f"${symbol}={bond[key]:g}$ {plain(label)}".rstrip() for symbol, key, label in constants]
     law = f"{criterion} law" if bond_laws.LAWS[criterion].softens else f"law {criterion}"
     return ", ".join([law, *phrase]) if phrase else "no debonding by load"
 

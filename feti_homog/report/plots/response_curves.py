@@ -26,8 +26,8 @@ FAINTEST = 0.005  # smaller entries have no number
 def plot(directory: Path, document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> list[Path]:
     """Draw all pictures that need only result.json; return their paths."""
     name = reported(document).name
-    pictures = {"sensitivities": sensitivities(document), "energy": path_picture.energies(document)}
-    pictures |= {name: CURVES[name](document)} if name in CURVES else {}
+    pictures = {"sensitivities": sensitivities(document, look), "energy": path_picture.energies(document, look)}
+    pictures |= {name: CURVES[name](document, look)} if name in CURVES else {}
     return [
         plot_helpers.save(drawn, directory / f"{name}.png", look)
         for name, drawn in pictures.items()
@@ -35,25 +35,27 @@ def plot(directory: Path, document: Document, look: plot_helpers.Look = plot_hel
     ]
 
 
-def angle(document: Document) -> Figure:
+def angle(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
     """Draw stiffnesses or stresses against the debonding angle."""
     points, case = document["angle"], document["case"]
     stiff = "stiffness" in points[0]
-    figure = Figure(figsize=(6.4, 4.2), layout="constrained")
+    figure = look.figure(6.4, 4.6)
     axes = figure.subplots()
     angles = [point["angle"] for point in points]
     responses = np.array([point["stiffness" if stiff else "stress"] for point in points])
     if stiff:
         curves = {f"C_{{{i + 1}{j + 1}}}": responses[:, i, j] for i, j in shown_entries(points).values()}
+        inks = [plot_helpers.ENTRY_INK[name] for name in shown_entries(points)]
     else:
         curves = dict(zip((plot_helpers.SYMBOLS[name] for name in voigt.STRESSES), responses.T, strict=True))
-    for (name, column), ink, mark in zip(curves.items(), plot_helpers.INK, MARKS, strict=False):
+        inks = [plot_helpers.STRESS_INK[name] for name in voigt.STRESSES]
+    for (name, column), ink, mark in zip(curves.items(), inks, MARKS, strict=False):
         axes.plot(angles, column, color=ink, marker=mark, markersize=4, linewidth=1.5, label=f"${name}$")
     axes.set_xlabel("debonding angle (degrees)")
     axes.set_ylabel(f"{'effective stiffness' if stiff else 'macroscopic stress'} {plot_helpers.stress_unit(case)}")
     axes.xaxis.set_major_locator(MultipleLocator(60 if angles[-1] > 180 else 30))
     contact = "contact" if all(bond["contact"] for bond in path_curves.interface_sections(document)) else "no contact"
-    load = "" if stiff else f", $E = [{', '.join(f'{e:g}' for e in points[0]['strain'])}]$"
+    load = "" if stiff else f", $E=[{','.join(f'{e:g}' for e in points[0]['strain'])}]$"
     axes.set_title(plot_helpers.title_of(case, f"plane {case['analysis']['plane']}, {contact}{load}"))
     axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
     plot_helpers.finish_curves(axes)
@@ -62,16 +64,16 @@ def angle(document: Document) -> Figure:
     return figure
 
 
-def envelope(document: Document) -> Figure:
+def envelope(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
     """Draw the onset curve with equal axes, coloured by the mode of the first break."""
     case, points = document["case"], document["envelope"]
     plane, broken = case["envelope"]["plane"], [point for point in points if "factor" in point]
-    picture = Figure(figsize=(6.6, 5.6), layout="constrained")
+    picture = look.figure(6.6, 5.6)
     axes = picture.subplots()
     axes.axhline(0.0, color="0.45", linewidth=0.8, zorder=1)
     axes.axvline(0.0, color="0.45", linewidth=0.8, zorder=1)
     places, temperature = loads(points), case["envelope"].get("temperature")
-    notes = [] if temperature is None else [f"$\\Delta T = {{{temperature:g}}}$ first"]
+    notes = [] if temperature is None else [f"$\\Delta{{T}}={{{temperature:g}}}$ first"]
     notes += [f"no onset in {rest} directions"] if (rest := len(points) - len(broken)) else []
     if broken:
         # The closed curve through the loads, open where directions have no onset.
@@ -98,8 +100,7 @@ def envelope(document: Document) -> Figure:
     axes.xaxis.set_major_locator(MaxNLocator(5))  # labels of small stresses are long
     title = plot_helpers.title_of(case, f"onset of debonding, plane {case['analysis']['plane']}")
     axes.set_title("\n".join([title, *plot_helpers.bond_limits(case), *([", ".join(notes)] if notes else [])]))
-    axes.grid(color="0.92", linewidth=0.6)
-    axes.set_axisbelow(True)
+    plot_helpers.faint_grid(axes)
     return picture
 
 
@@ -136,7 +137,7 @@ def _limit(axes: Axes, places: Array) -> list[str]:
     return [f"loads up to {size.max():.4g} are outside"] if far.any() else []
 
 
-def sensitivities(document: Document) -> Figure | None:
+def sensitivities(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure | None:
     """Draw elasticities d ln c / d ln p, rows p and columns c; None without sensitivities."""
     tables = constant_tables.sensitivities(document)
     if not tables or not tables[0].rows:
@@ -145,21 +146,22 @@ def sensitivities(document: Document) -> Figure | None:
     values = np.array([[np.nan if isinstance(entry, str) else entry for entry in row[1:]] for row in tables[0].rows])
     names_width = 0.4 + 0.085 * max(map(len, names))
     size = names_width + CELL[0] * values.shape[1] + 1.2, 1.4 + CELL[1] * len(names)
-    picture = Figure(figsize=size, layout="constrained")
+    picture = look.figure(*size)
     axes = picture.subplots()
     highest = max(float(np.abs(values[np.isfinite(values)]).max(initial=0.0)), FAINTEST)
     image = axes.imshow(values, cmap="RdBu_r", norm=Normalize(-highest, highest), aspect="auto")
-    for (row, column), value in np.ndenumerate(values):
+    narrow = picture.get_figwidth() < plot_helpers.NARROW
+    for (row, column), value in np.ndenumerate(values) if not narrow else ():
         text = "-" if np.isnan(value) else f"{value:.2f}" if abs(value) >= FAINTEST else ""
         axes.text(column, row, text, ha="center", va="center", color="white" if abs(value) > 0.6 * highest else "black")
-    heads = [column.name.replace("_", "_\n") for column in tables[0].columns[1:]]
-    axes.set_xticks(range(values.shape[1]), heads)
+    heads = [column.name if narrow else column.name.replace("_", "_\n") for column in tables[0].columns[1:]]
+    axes.set_xticks(range(values.shape[1]), heads, rotation=90 if narrow else 0)
     axes.set_yticks(range(len(names)), names)
     axes.tick_params(length=0, labeltop=True, labelbottom=False)
     axes.spines[:].set_visible(False)
-    picture.colorbar(image, ax=axes, label="relative change / relative change")
+    picture.colorbar(image, ax=axes, label="" if narrow else "relative change / relative change")
     title = "change of a constant (%) by a change of a parameter by 1 %"
-    picture.suptitle(plot_helpers.title_of(document["case"], title), fontsize=11)
+    picture.suptitle(plot_helpers.title_of(document["case"], title))
     return picture
 
 

@@ -29,7 +29,7 @@ NAMES = {
 }
 
 
-def figure(cell: drawn_cell.DrawnCell, document: Document) -> Figure:
+def figure(cell: drawn_cell.DrawnCell, document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
     """Draw tractions, jumps and damage around the most debonded or damaged, else most loaded fibres, one per row."""
     file, labels, names = cell.file, drawn_cell.LoadLabels.of(document), _chosen_states(cell.file, document)
     fibre, status = file["interface/fibre"][:], file[f"state/{names[-1]}/status"][:]
@@ -42,9 +42,11 @@ def figure(cell: drawn_cell.DrawnCell, document: Document) -> Figure:
     harmed, largest = np.unique(fibre[harm > 0.0]), np.full(len(bodies), -np.inf)
     np.maximum.at(largest, place, load)
     order = np.lexsort((-largest, -np.bincount(place, harm)))  # by damage, then by the largest normal traction
-    chosen = np.sort(bodies[order][: min(4, max(len(harmed), 1))])
-    picture = Figure(figsize=(1.5 + 3.75 * len(quantities), 2.4 * len(chosen) + 1.5), layout="constrained")
-    grid = picture.subplots(len(chosen), len(quantities), sharex="row", sharey="col", squeeze=False)
+    picture = look.figure(1.5 + 3.75 * len(quantities), 2.4 * min(4, max(len(harmed), 1)) + 1.5)
+    stacked, rows = picture.get_figwidth() < plot_helpers.NARROW, int(picture.get_figheight() / 1.5)
+    chosen = np.sort(bodies[order][: 1 if stacked else min(4, max(len(harmed), 1), max(rows, 1))])
+    shape = (len(quantities), 1) if stacked else (len(chosen), len(quantities))
+    grid = picture.subplots(*shape, sharey=False if stacked else "col", squeeze=False).reshape(len(chosen), -1)
     stress = plot_helpers.stress_label(file.attrs["stress_unit"])
     length = plot_helpers.unit_label(file.attrs["length_unit"]) or "(cell units)"
     for row, body in zip(grid, chosen, strict=True):
@@ -54,37 +56,43 @@ def figure(cell: drawn_cell.DrawnCell, document: Document) -> Figure:
         row[0].set_ylabel(f"traction {stress}")
         row[1].set_ylabel(f"jump {length}")
         for axes in row[2:]:
-            axes.set(ylabel="damage of the bonds", ylim=(-0.03, 1.03))
+            axes.set(ylabel="damage", ylim=(-0.03, 1.03))
         fibre_name = f"fibre {file['interface/fibre_number'][along.nodes[0]]}"
         is_fibre = body in file["fibre/body"][:]
-        row[0].set_title(fibre_name if is_fibre else f"coating of {fibre_name}", fontsize=10, loc="left")
+        row[0].set_title(fibre_name if is_fibre else f"coating of {fibre_name}", loc="left")
+        for axes in row if stacked else ():
+            axes.set_title(f"{axes.get_title('left')} {axes.get_ylabel()}".strip(), loc="left")
+            axes.set_ylabel("")
+            axes.label_outer()
     for first, *lower_axes in grid.T:
-        first.legend(frameon=False, fontsize=9, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=3)
-        # The shared range ends where a few nodes at singular tips exceed all others.
-        values = np.concatenate(
-            [np.asarray(line.get_ydata(), float) for axes in (first, *lower_axes) for line in axes.lines]
-        )
-        low, high = np.percentile(values, (SPIKES, 100.0 - SPIKES))
-        low, high = 2.0 * low - high, 2.0 * high - low
-        if first is grid[0][1] and np.abs(values).max() < SAME_PLACE**2 * file.attrs["width"]:
-            first.set_ylim(-1.0, 1.0)  # jumps of bonded faces are rounding
-        elif high > low and (values.min() < low or values.max() > high):
-            first.set_ylim(max(values.min(), low), min(values.max(), high))
+        first.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=3)
+        lines = [line for axes in (first, *lower_axes) for line in axes.lines]
+        _limit(first, np.concatenate([np.asarray(line.get_ydata(), float) for line in lines]))
+    if np.abs(last_state["jump"][:]).max() < SAME_PLACE**2 * file.attrs["width"]:
+        grid[0][1].set_ylim(-1.0, 1.0)  # jumps of bonded faces are rounding
     shaded = status[np.isin(fibre, chosen)]
     patches = [
         Patch(color=drawn_cell.STATE_COLOURS[kind], label=drawn_cell.STATE_NAMES[kind], **SHADE)
         for kind in (drawn_cell.OPEN, drawn_cell.CLOSED)
         if kind in shaded
     ]
-    picture.legend(handles=patches, loc="outside lower center", ncols=2, frameon=False)
+    plot_helpers.legend_below(picture, patches)
     before, last = (file[f"state/{name}"].attrs for name in (names[0], names[-1]))
     title = f"{last['label']}: {labels.label(last)}"
     if len(names) > 1:
-        title += f"   (dashed: {before['label']}: {labels.label(before)})"
+        title += f" (dashed: {before['label']})" if stacked else f" (dashed: {before['label']}: {labels.label(before)})"
     if len(harmed) > len(chosen):
-        title += f"\nthe {len(chosen)} most debonded or damaged of {len(harmed)} interfaces"
-    picture.suptitle(title, fontsize=10)
+        title += f"\nthe most debonded or damaged of {len(harmed)} interfaces"
+    picture.suptitle(title)
     return picture
+
+
+def _limit(axes: Axes, values: Array) -> None:
+    """End the ordinate where a few nodes at singular tips exceed all other values (n,)."""
+    low, high = np.percentile(values, (SPIKES, 100.0 - SPIKES))
+    low, high = 2.0 * low - high, 2.0 * high - low
+    if high > low and (values.min() < low or values.max() > high):
+        axes.set_ylim(max(values.min(), low), min(values.max(), high))
 
 
 def _chosen_states(file: Any, document: Document) -> list[str]:
@@ -134,7 +142,6 @@ def _panel(axes: Axes, states: list[Any], quantity: str, place: Coordinate) -> N
     axes.set(xlim=place.ends, xlabel=place.label)
     if place.is_direction:
         axes.xaxis.set_major_locator(MultipleLocator(60))
-    axes.spines[["top", "right"]].set_visible(False)
 
 
 @dataclass(frozen=True)

@@ -70,27 +70,23 @@ def _errors(document: Document) -> Document:
     return estimated
 
 
-def value_and_error(value: float, error: float | None, form: str) -> tuple[str, str]:
-    """Write a constant and its mesh error as texts.
-
-    The error has two digits, the constant as many decimals; without an error the constant has format `form`.
-    """
-    if error is None:
-        return number(value, form), ""
-    # An error below the digits printed without it, or a constant of extreme size.
-    if not error > 1e-7 * abs(value) or not 1e-4 < abs(value) < 1e8:
-        return number(value, form), f"{error:.1e}"
-    decimals = max(0, 1 - floor(log10(error)))
-    return f"{value:.{decimals}f}", f"{error:.{decimals}f}"
-
-
 def with_errors(title: str, values: Mapping[str, float], errors: Mapping[str, float], abreast: int) -> Table:
-    """Return a table of constants and mesh errors, `abreast` per line; ratios in pairs have six decimals."""
+    """Return a table of constants and mesh errors, `abreast` per line; ratios in pairs have six decimals.
+
+    An error has two digits, its constant as many decimals.
+    """
     rows = []
-    for name, computed in values.items():
-        form = ".6f" if abreast == PAIRS and name not in STRESS_MODULI else ".7g"
-        value, error = value_and_error(computed, errors.get(name), form)
-        rows.append([name, value, f"+- {error}" if error else ""][: 3 if errors else 2])
+    for name, value in values.items():
+        form, error_form, error = (
+            ".6f" if abreast == PAIRS and name not in STRESS_MODULI else ".7g",
+            ".1e",
+            errors.get(name),
+        )
+        # Other errors are below the digits printed without them, or their constants have extreme sizes.
+        if error is not None and error > 1e-7 * abs(value) and 1e-4 < abs(value) < 1e8:
+            form = error_form = f".{max(0, 1 - floor(log10(error)))}f"
+        texts = [name, number(value, form), "" if error is None else f"+- {error:{error_form}}"]
+        rows.append(texts[: 3 if errors else 2])
     width = max((len(name) for name in values), default=0) + 2
     columns = [Column("", -width, indent=0), Column("computed", 13), Column("mesh error", -13, indent=1)]
     return Table(title, columns[: 3 if errors else 2], rows, abreast=abreast)

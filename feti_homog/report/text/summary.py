@@ -86,32 +86,19 @@ def summary(document: Document) -> str:
         settings += _field("Iterations", [a_state, f"{sum(counts)} for {len(counts)} states", *condition])
     memory = f"{size / 2**20:.0f} MiB" if size < 2**30 else f"{size / 2**30:.2f} GiB"
     remarks = [(label, str(text)) for label in REMARKS for text in document.get(f"{label.lower()}s", ())]
-    blocks = [
-        _heading(document),
-        settings,
-        *(table.lines for table in answers(document)),
-        checks(document).lines,
-        [
-            *_field("Time", [f"{stage}{GLUE}{took:.2f}{GLUE}s" for stage, took in document["timings"].items()]),
-            *_field("Memory", [f"{memory} per rank at most"]),
-        ],
-        [line for label, text in remarks for line in _field(label, [text])],
-        _field("Status", [str(document["status"])]),
-    ]
-    return _joined(blocks)
+    costs = _field("Time", [f"{stage}{GLUE}{took:.2f}{GLUE}s" for stage, took in document["timings"].items()])
+    costs += _field("Memory", [f"{memory} per rank at most"])
+    tables = [*(table.lines for table in answers(document)), checks(document).lines]
+    notes = [line for label, text in remarks for line in _field(label, [text])]
+    return _joined([_heading(document), settings, *tables, costs, notes, _field("Status", [str(document["status"])])])
 
 
 def short_summary(document: Document) -> str:
     """Return the tables, the largest check error and the status of a result."""
     law, error = max(document["checks"].items(), key=lambda check: check[1])
     verdict = _field("Checks", [f"largest relative error {error:.1e} ({law})"])
-    return _joined(
-        [
-            _heading(document),
-            *(table.lines for table in answers(document)),
-            [*verdict, *_field("Status", [str(document["status"])])],
-        ]
-    )
+    verdict += _field("Status", [str(document["status"])])
+    return _joined([_heading(document), *(table.lines for table in answers(document)), verdict])
 
 
 def notebook(document: Document) -> str:

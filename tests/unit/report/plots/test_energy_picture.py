@@ -17,7 +17,7 @@ ENERGIES = {
 PARTS = {"stored in the bodies": [3.0, 4.0, 2.0], "stored in springs": [1.0, 2.0, 1.5]}
 HEAT = {"heat of friction": [0.0, 1.0, 2.5]}
 LOST = {"lost in breaks": [0.0, 2.0, 2.0]}
-SPLIT = {"fracture energy": [0.0, 1.5, 2.0], "lost in breaks beyond it": [0.0, 0.5, 0.0]}
+SPLIT = {"fracture energy": [0.0, 1.5, 2.0], "other losses in breaks": [0.0, 0.5, 0.0]}
 
 
 def path(loads: list[float], **energies: list[float]) -> dict[str, Any]:
@@ -62,10 +62,11 @@ def test_energies_at_rising_loads_and_results_without_energies() -> None:
     document = path([0.5, 0.25, 1.0], **ENERGIES | {"stored": [4.0, 1.0, 2.0], "stored_in_springs": [0.0] * 3})
     document["case"]["path"]["waypoints"].pop()
     for point, lost in zip(document["path"], (0.0, 3.0, 3.5), strict=True):
-        point["dissipated_strain_controlled"] = lost
+        point |= {"dissipated_strain_controlled": lost, "strain": [0.02 * point["load_factor"], 0, 0]}
     figure = path_picture.energies(document)
     assert figure is not None
-    loads, work = figure.axes[0].lines[0].get_data()
-    np.testing.assert_allclose(work[loads == 0.5], [4.0, 2.0 / 4.0 + 3.5])
+    strains, work = figure.axes[0].lines[0].get_data()
+    np.testing.assert_allclose(work[strains == 0.01], [4.0, 2.0 / 4.0 + 3.5])
+    assert figure.axes[0].get_xlabel() == "macroscopic strain $E_{11}$" and strains[-1] == 0.02
     assert work[-1] == 5.5
     assert path_picture.energies(path([0.5, 0.6, 1.0])) is None

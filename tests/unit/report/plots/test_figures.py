@@ -240,6 +240,22 @@ def test_the_colour_range_leaves_out_outliers(values: Any, expected: tuple[float
         assert min(red[1], blue[1]) > 0.9 and blue[0] > red[0]
 
 
+@pytest.mark.parametrize(
+    ("states", "expected"),
+    [
+        ([(-34.0, -8.0), (-20.0, 23.0)], (-34.0, 34.0)),  # of similar size
+        ([(-34.0, -8.0), (0.0, 6.0)], (-34.0, 6.0)),
+        ([(1.0, 2.0), (0.0, 0.0)], (0.0, 2.0)),
+    ],
+)
+def test_the_colour_range_of_states_has_both_signs(states: Any, expected: tuple[float, float]) -> None:
+    values = np.array([np.linspace(*ends, 1001) for ends in states])
+    norm, _, extend = plot_helpers.colour_range(values)
+    assert (norm.vmin, norm.vmax, extend) == (*expected, "neither")
+    values[0, 0], values[-1, -1] = -90.0, 90.0
+    assert plot_helpers.colour_range(values)[2] == "both"
+
+
 def test_values_count_by_their_area() -> None:
     """Most of a thousand values at a tip, which is no part of the cell, are beyond the colours."""
     values = np.append(np.linspace(1, 2, 1001), np.linspace(-90, 90, 1001))

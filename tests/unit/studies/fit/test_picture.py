@@ -37,9 +37,27 @@ def test_curves_have_points_with_deviations_and_lines_through_what_is_computed()
         common | {"strain": 0.1 * k, "value": 5.0 * k, "std": 1.0 + k, "computed": 6.0 * k} for k in (1.0, 2.0, 3.0)
     ]
     (axes,) = pictures.fit_figure({"name": "fit", "measured": rows}).axes
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("E11", "S22")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("macroscopic strain $E_{11}$", r"stress $\Sigma_{22}$")
     named = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
     np.testing.assert_allclose(named["test 3, computed"].get_xydata(), [[0.1, 6.0], [0.2, 12.0], [0.3, 18.0]])
     points, _, (bars,) = named["test 3, measured"]
     np.testing.assert_allclose(points.get_xydata(), [[0.1, 5.0], [0.2, 10.0], [0.3, 15.0]])
     np.testing.assert_allclose([segment[:, 1] for segment in bars.get_segments()], [[3, 7], [7, 13], [11, 19]])
+
+
+def test_curves_of_results_are_whole_with_units():
+    """Between the measured strains 0.1 and 0.2 the stress falls at the load of the break, from 8 to 2."""
+    points = [
+        {"load_factor": t, "strain": [e, 0, 0], "stress": [0, s, 0]} for t, e, s in [(0.5, 0.1, 8.0), (1.0, 0.2, 4.0)]
+    ]
+    case = {
+        "analysis": {"plane": "strain"},
+        "path": {"strain": [0.2, 0, 0], "method": "events"},
+        "output": {"stress_unit": "MPa"},
+    }
+    row = {"test": 1, "name": "S22", "strain_name": "E11", "residual": 0.0, "std": 1.0}
+    rows = [row | {"strain": 0.1 * k, "value": 5.0, "computed": 8.0 / k} for k in (1.0, 2.0)]
+    (axes,) = pictures.fit_figure({"name": "fit", "measured": rows}, [{"case": case, "path": points}]).axes
+    assert axes.get_ylabel() == r"stress $\Sigma_{22}$ (MPa)"
+    named = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
+    np.testing.assert_allclose(named["test 1, computed"].get_xydata(), [[0, 0], [0.1, 8], [0.1, 2], [0.2, 4]])
