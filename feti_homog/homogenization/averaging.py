@@ -141,7 +141,7 @@ class Homogenization:
         opening = distributed_arrays.allreduce_sum(self.cell.comm, self._strain_of_jumps.T @ opened)
         energy = float(energy) + self._stretched(state)
         rubbing = self._rubbing(state)
-        acting, scales = self.interface.acting(state.bonds, strain, state.asked), self.interface.scales
+        acting, scales = self.interface.scales.acting(strain, state.asked), self.interface.scales
         largest = (self._largest(u) + scales.imposed(acting)) or 1.0
         imposed = float(scales.imposed_strain(acting).max()) or 1.0
         reuss = scales.stress_scale(acting) * imposed

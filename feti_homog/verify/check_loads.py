@@ -7,7 +7,6 @@ strain component.
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
 from typing import Any, Self
 
 import numpy as np
@@ -140,12 +139,11 @@ def check_loads(findings: Findings, cell: DiscreteCell, states: States, rows: Ro
     A path keeps `[output] states` states, at points that result.json lists, the first and the last among them.
     """
     document, numbers, count = cell.files.document, [state.point for state in states], len(rows)
-    largest, imposed = max((float(np.abs(state.mean_stress).max()) for state in states), default=0.0), 0.0
-    for state, (load, _) in product(states[:1], rows):
-        # The scale of stresses is that of the bonded cell: computed strains are no scale for prescribed stresses.
-        strains, v = np.where(load.by_stress, 0.0, load.values), len(state.strain)
-        imposed = max(imposed, float(np.abs(cell.reuss @ cell.loads(strains[:v], float(strains[v:].sum()))).max()))
-    scales = cell.largest_strain or 1.0, max(largest, imposed) or 1.0
+    # The scale of stresses is that of the bonded cell: computed strains are no scale for prescribed stresses.
+    given, v = (np.where(load.by_stress, 0.0, load.values) for load, _ in rows), len(cell.reuss)
+    stresses = [cell.reuss @ cell.loads(strains[:v], float(strains[v:].sum())) for strains in given]
+    largest = float(np.abs([*stresses, *(state.mean_stress for state in states)]).max(initial=0.0))
+    scales = cell.largest_strain or 1.0, largest or 1.0
     if "path" in document:
         findings.require("tables", list(document["states"]) == numbers, "states, which differ between the two files")
         in_order = [*numbers[:1], *numbers[-1:]] == [0, count - 1] and numbers == sorted({*numbers})
@@ -172,9 +170,8 @@ def _check_load(findings: Findings, load: Prescribed, numbers: Document, scales:
     values, by_stress = load.values[:v], load.by_stress[:v]
     findings.record("load", np.abs(strain - values)[~by_stress] / scales[0], f"{place}, strain")
     findings.record("stress load", np.abs(stress - values)[by_stress] / scales[1], f"{place}, stress")
-    temperature = float(load.values[v:].sum())
-    off = float(numbers.get(TEMPERATURE, 0.0)) - temperature
-    findings.record("load", abs(off) / max(abs(temperature), 1.0), f"{place}, temperature")
+    temperature, value = float(load.values[v:].sum()), numbers.get(TEMPERATURE, 0.0)
+    findings.compare("load", value, temperature, max(abs(temperature), 1.0), f"{place}, temperature")
 
 
 def check_tables(findings: Findings, cell: DiscreteCell, states: States, pairs: Pairs) -> None:
@@ -189,7 +186,8 @@ def check_tables(findings: Findings, cell: DiscreteCell, states: States, pairs: 
     longest = float(lengths(np.ones(len(nodes.length), bool)).max(initial=0.0)) or 1.0
     total, points_with_state = nodes.length.sum() or 1.0, {state.point for state in states}
     of_section = nodes.length[:, None] * (nodes.pair[:, None] == np.arange(sections))
-    stress = max((float(np.abs(state.mean_stress).max()) for state in states), default=0.0) or 1.0
+    sizes = [(cell.scales_of(state).stress, *np.abs(state.mean_stress)) for state in states]
+    stress = float(np.max(sizes, initial=0.0)) or 1.0
     energy = max([state.stored for state, _ in pairs], default=0.0) + cell.rounded_energy
     for state, (_, entries) in pairs:
         debonded, damaged = state.status != Status.BONDED, (state.damage > 0.0) & (state.damage < 1.0)

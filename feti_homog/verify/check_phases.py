@@ -96,7 +96,7 @@ def _measures(stress: Float, strength: Mapping[str, Any] | None) -> dict[str, Fl
     p = np.trace(stress, axis1=1, axis2=2) / 3
     deviator = stress - p[:, None, None] * np.eye(3)
     q = np.sqrt(1.5 * np.einsum("nij,nij->n", deviator, deviator))
-    third = np.divide(13.5 * np.linalg.det(deviator), q**3, out=np.zeros_like(q), where=q > 0)
+    third = np.divide(13.5 * np.linalg.det(deviator), q**3, out=np.zeros_like(q), where=q**3 > 0)
     first = p + 2 / 3 * q * np.cos(np.arccos(np.clip(third, -1.0, 1.0)) / 3)
     values = {"principal": first, "von_mises": q, "hydrostatic": p}
     if strength is None:

@@ -183,10 +183,9 @@ class DiscreteCell:
         """Add the largest thermal strain of a phase to a strain (v,)."""
         return np.asarray(strain + np.abs(self.expansions * temperature).max(axis=0))
 
-    def scales(self, strain: Float, temperature: float, slip: float = 0.0) -> Scales:
-        """Compute the scales of a load and a slip under friction; at least ROUNDING x the largest scales."""
+    def scales(self, strain: Float, temperature: float) -> Scales:
+        """Compute the scales of a load; at least ROUNDING x the largest scales."""
         loads, longest, (width, height) = self.loads(strain, temperature), float(self.files.size.max()), self.files.size
-        loads = np.asarray(loads + np.copysign(slip / longest, loads))
         corners = np.array([[width, 0.0], [0.0, height], [width, height]])
         displacement = float(np.abs(corners @ gradient(loads).T).max())
         displacement += abs(float(loads[2])) * longest if len(loads) > 3 else 0.0  # bounds the contraction by E33
@@ -194,10 +193,16 @@ class DiscreteCell:
         unit = ROUNDING * self.largest_strain  # a path may come back to strain 0
         return Scales(*map(max, sizes, (unit, unit * float(np.abs(self.reuss).max()), unit * longest)))
 
+    @cached_property
+    def _scales_on_path(self) -> list[Scales]:
+        """Return the scales of all points with friction, which leaves the rounding of earlier tractions."""
+        points = self.files.document.get("path", ()) if friction_at(self.files).any() else ()
+        return [self.scales(np.array(point["strain"]), float(point.get("temperature", 0.0))) for point in points]
+
     def scales_of(self, state: State) -> Scales:
-        """Compute the scales of a state."""
-        slip = float(np.abs(state.jump).max(initial=0.0)) if friction_at(self.files).any() else 0.0
-        return self.scales(state.strain, state.temperature, slip)
+        """Compute the scales of a state; with friction the largest scales on the path up to the state."""
+        sizes = [self.scales(state.strain, state.temperature), *self._scales_on_path[: state.point + 1]]
+        return Scales(*map(max, zip(*sizes, strict=True)))
 
     def largest_displacement(self, state: State) -> float:
         """Compute a scale of displacements: the largest fluctuation plus the displacement E x."""

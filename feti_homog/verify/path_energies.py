@@ -130,8 +130,8 @@ def check_heat(findings: Findings, cell: DiscreteCell, states: States) -> None:
 def check_step_heat(findings: Findings, cell: DiscreteCell, before: StateNumbers, state: StateNumbers) -> None:
     """Check that an increment without breaks has the heat: tractions at its end times its slips.
 
-    The error is relative to the tractions times the total slips.  The work is no evidence of heat: runs compute it as
-    the sum of stored energy, loss and heat.
+    The error is relative to the heat so far plus the tractions times the slips since the beginning, whose difference
+    is the heat.  The work is no evidence of heat: runs compute it as the sum of stored energy, loss and heat.
     """
     files, at = cell.files, state.point
     points = files.document["path"]
@@ -142,10 +142,10 @@ def check_step_heat(findings: Findings, cell: DiscreteCell, before: StateNumbers
     slips = [(s.jump - law_at(files, damage=s.damage).jumps(s.traction))[:, 1] for s in (before, state)]
     rubs = (state.status == Status.CLOSED) & (friction_at(files) > 0.0)
     force = np.where(rubs, state.traction[:, 1], 0.0) * files.interface.length / cell.area
-    heat = points[at]["friction_heat"] - points[before.point]["friction_heat"]
-    scale = np.abs(force) @ (np.abs(slips[0]) + np.abs(slips[1]))
-    scale += ROUNDED_TERMS * max(abs(points[number]["stored"]) for number in (before.point, at))
-    findings.compare("heat", force @ (slips[1] - slips[0]), heat, scale or 1e-300, f"path[{at}].friction_heat")
+    heats, stored = ([points[number][name] for number in (before.point, at)] for name in ("friction_heat", "stored"))
+    scale = np.abs(force) @ (np.abs(slips[0]) + np.abs(slips[1])) + ROUNDED_TERMS * np.abs([*heats, *stored]).max()
+    made, heat = force @ (slips[1] - slips[0]), heats[1] - heats[0]
+    findings.compare("heat", made, heat, scale or 1e-300, f"path[{at}].friction_heat")
 
 
 def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:

@@ -75,12 +75,17 @@ class Falsified:
         """Return a stress that strains of this size cause in the matrix, the softer body of a bond."""
         return sum(bulk_and_shear(MATRIX)) * np.abs(strain).max()
 
-    def reuss(self):
-        """(3, 3) Reuss' bound of the stiffness."""
-        of_phases = [bulk_and_shear(phase) for phase in (MATRIX, FIBRE)]
+    def bounds(self):
+        """(2, 2) Reuss' and Voigt's bounds of the moduli."""
+        moduli = np.array([bulk_and_shear(phase) for phase in (MATRIX, FIBRE)])
         x, y = self.polygon().T
         fibre = (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2 / WIDTH**2
-        K, G = (1 / ((1 - fibre) / matrix + fibre / own) for matrix, own in zip(*of_phases, strict=True))
+        shares = np.array([1 - fibre, fibre])
+        return 1 / (shares @ (1 / moduli)), shares @ moduli
+
+    def reuss(self):
+        """(3, 3) Reuss' bound of the stiffness."""
+        K, G = self.bounds()[0]
         return np.array([[K + G, K - G, 0], [K - G, K + G, 0], [0, 0, G]])
 
     def polygon(self):
@@ -220,22 +225,29 @@ def test_open_faces_that_bear_a_force(falsified):
     falsified.assert_only(falsified.checks(borne, status), kkt_complementarity=expected)
 
 
-def test_faces_that_stick_beyond_their_friction(rubbing):
-    """All stick, those of the last rank in their place: by how much shear exceeds mu p, of the largest traction."""
-    which, mu = rubbing.arc & (rubbing.comm.rank == rubbing.comm.size - 1), 0.05
-    friction = np.where(which, mu, 1e3)
+@pytest.mark.parametrize(("share", "seen"), [(1.0, 1), (1e-4, 1), (-1e-4, 2), (1e-16, 0)])
+def test_faces_that_stick_beyond_their_friction(rubbing, share, seen):
+    """All stick, those of the last rank in their place: by how much shear exceeds mu p, of the largest traction.
+
+    After the load a share of its state is left, relative to the strain that was times the ratio of the bounds.
+    """
+    friction = np.where(rubbing.arc & (rubbing.comm.rank == rubbing.comm.size - 1), 0.05, 1e3)
     faces = SlidingCell(CoupledInterfaces(rubbing.interface), friction, 0.0 * friction)
     bonds = replace(torn_cells.bonds(rubbing.status(CLOSED)), sliding=np.zeros(len(friction), np.int8))
     load = Load.strain(PRESSED)
     status, start = faces.begin(bonds, PRESSED)
     given = Prescribed(load.by_stress, faces.given(load), np.zeros(len(status)))
     x, _ = faces.faces.linear(0 * status, given, start)
-    state = faces.equilibrium([load], bonds, x)
-    traction = rubbing.interface.traction(state.solution)
-    beyond = rubbing.everywhere(np.abs(traction[which, 1]) - mu * np.maximum(-traction[which, 0], 0.0)).max()
-    largest = max(np.abs(rubbing.everywhere(traction)).max(), rubbing.bond_stress(PRESSED))
-    assert beyond > 1e-2 * largest
-    parallel_assert(rubbing.comm, state.certificate["kkt_friction"] == pytest.approx(beyond / largest, rel=1e-6))
+    state = faces.equilibrium([load, Load.strain((share == 1.0) * PRESSED)], bonds, share * x)
+    traction = rubbing.everywhere(rubbing.interface.traction(state.solution))
+    (normal, shear), mu = traction[rubbing.everywhere(rubbing.arc)].T, rubbing.everywhere(friction[rubbing.arc])
+    reuss, voigt = rubbing.bounds()
+    least = np.abs(share * PRESSED).max(), (reuss / voigt).min() * np.abs(PRESSED).max()
+    largest = max(np.abs(traction).max(), rubbing.bond_stress(np.array(least)))
+    beyond, tension = (np.abs(shear) - mu * np.maximum(-normal, 0.0)).max() / largest, max(normal.max(), 0.0) / largest
+    for number, (law, expected) in enumerate([("kkt_friction", beyond), ("kkt_tension", tension)]):
+        parallel_assert(rubbing.comm, state.certificate[law] == pytest.approx(expected, rel=1e-6, abs=1e-30), law)
+        assert expected > (1e-2 if share == 1.0 else 1e-5) if number < seen else expected < 1e-14, law
 
 
 def test_a_stress_that_is_not_the_prescribed_one(falsified):

@@ -272,7 +272,7 @@ class ContactProblem:
 
     def certificate(self, bonds: BondState, solution: DualSolution, asked: Float) -> dict[str, float]:
         """Measure the errors in the KKT conditions by `kkt_errors`; `asked` as in `Equilibrium`.  Collective."""
-        status, gained, acting = bonds.status, self._gained(bonds), self.acting(bonds, solution.strain, asked)
+        status, gained, acting = bonds.status, self._gained(bonds), self.scales.acting(solution.strain, asked)
         damaged = gained > 0.0
         # A pulled bond opens by the damage; under pressure the bond would overlap.
         overlap = np.minimum(gained * solution.lam[self.nodes.row], 0.0)
@@ -280,11 +280,3 @@ class ContactProblem:
         debonded = ((status != BONDED) & self.contact) | damaged
         closed = (status == CLOSED) | (damaged & bonds.pressed)
         return kkt_errors(self.scales, self.traction(solution), gap, debonded, closed, acting)
-
-    def acting(self, bonds: BondState, strain: Float, asked: Float) -> Float:
-        """Return the load sizes (v,) from the strain and, with friction, residual jumps.  Collective."""
-        if bonds.gap_and_slip is not None:
-            jump = self.solver.comm.allreduce(float(np.abs(bonds.gap_and_slip).max(initial=0.0)), MPI.MAX)
-            is_strain = np.arange(len(strain)) < self.solver.problem.strains
-            strain = np.maximum(np.abs(strain), np.where(is_strain, jump / self.size.max(), 0.0))
-        return self.scales.acting(strain, asked)

@@ -24,6 +24,7 @@ class LoadScales:
         mean_stiffness: (v, v) mean stiffness <L>, Voigt's bound for strains.
         least_bonded_stiffness: (v, v) Reuss' bound <L^-1>^-1 for strains, <L> for other loads.
         largest_stiffness: largest entry of Reuss' bound.
+        bound_ratio: least ratio of Reuss' to Voigt's bound for strains: least share of `asked` that a stress causes.
         roots: (v,) square roots of the diagonal of `least_bonded_stiffness`, inf for loads without a stress; strains
             times these roots, and stresses over them, are comparable.
         longest: (k,) largest tributary length on the interface of each node.
@@ -41,6 +42,8 @@ class LoadScales:
         self.least_bonded_stiffness[:m, m:] = self.least_bonded_stiffness[m:, :m] = 0.0
         self.least_bonded_stiffness[:m, :m] = phase_bounds.reuss(shares, stiffnesses[:, :m, :m])
         self.largest_stiffness = float(np.abs(self.least_bonded_stiffness[:m, :m]).max())
+        ratios = np.linalg.solve(self.mean_stiffness[:m, :m], self.least_bonded_stiffness[:m, :m])
+        self.bound_ratio = float(np.linalg.eigvals(ratios).real.min())
         self.roots = np.full(len(self.mean_stiffness), np.inf)
         self.roots[:stresses] = np.sqrt(self.least_bonded_stiffness.diagonal()[:stresses])
         # Actions other than strains cause the largest strains of free bodies: a soft body that expands hardly moves a
@@ -112,10 +115,13 @@ class LoadScales:
         return np.asarray(strain)
 
     def acting(self, strain: Float, asked: Float) -> Float:
-        """Limit the strain sizes (v,) of a state to ABSURD times `asked`, as scales for errors."""
-        limit = ABSURD * self.imposed_strain(asked).max()
-        is_strain = np.arange(len(strain)) < self.solver.problem.strains
-        return np.where(is_strain, np.minimum(np.abs(strain), limit), np.abs(strain))
+        """Bound the strain sizes (v,) of a state by `bound_ratio` and ABSURD times `asked`, as scales for errors.
+
+        The lower bound counts where a path with friction returns to zero stress.
+        """
+        sizes, m = np.abs(strain), self.solver.problem.strains
+        sizes[:m] = np.clip(sizes[:m], self.bound_ratio * asked[:m], ABSURD * self.imposed_strain(asked).max())
+        return np.asarray(sizes)
 
     def excess(self, strain: Float, asked: Float) -> float:
         """Return the largest strain of a state (v,), relative to the largest strain of `asked` (v,)."""

@@ -270,24 +270,25 @@ class SlidingCell:
         # Rounding in an unloaded problem is as large as in the loaded problem.
         largest = max(scale.imposed_strain(strain).max() for scale, strain in zip(scales, asked, strict=True))
         # The jumps in friction come from x: the jumps of F lambda would be divided by a vanishing compliance.
-        stresses, jumps = list[Float](), list[Float]()
+        acting, jumps = list[Float](), list[Float]()
         for problem_loads, strains, (problem, (jump, strain)) in zip(of_problems, asked, self._parts(x), strict=True):
             solution = problem.solution(bonds, jump, strain)
             strains[: problem.solver.problem.strains] = largest
             certificate = problem.interface.certificate(bonds, solution, strains)
             states.append(Equilibrium(problem_loads[-1], bonds, solution, 0, 1, 0, certificate, strains))
-            stresses.append(problem.interface.scales.bond_stress(problem.interface.acting(bonds, strain, strains)))
+            acting.append(problem.interface.scales.acting(strain, strains))
             jumps.append(jump.reshape(-1, problem.solver.jump_operator.components))
         plane, *axial = states
         # Bonds, compressed faces and the friction on these faces resist rigid motions.
         row, is_closed = self.interface.nodes.row, bonds.status == CLOSED
-        is_pressed = is_closed & (plane.solution.lam[row] < -self.interface.scales.force_noise(plane.solution))
+        noise = scales[0].force_noise(replace(plane.solution, strain=acting[0]))
+        is_pressed = is_closed & (plane.solution.lam[row] < -noise)
         active = self.interface.active(np.where(is_closed & ~is_pressed, OPEN, bonds.status).astype(np.int8))
         active[row[is_pressed & (self.friction > 0.0)] + 1] = 1.0
         plane = replace(plane, free_motions=int(self.solver.natural.free_motions(active).shape[1]))
         traction, node = self.cell.traction([state.solution for state in states]), self._face_nodes
-        largest = self.interface.scales.over_interface(np.abs(traction).max(axis=1, initial=0.0))
-        largest = np.max([largest, *stresses], axis=0)
+        largest = scales[0].over_interface(np.abs(traction).max(axis=1, initial=0.0))
+        largest = np.max([largest, *(scale.bond_stress(of) for scale, of in zip(scales, acting, strict=True))], axis=0)
         traction[node] -= (
             np.hstack(jumps)[self._position] * self._springs[node] / self.interface.nodes.length[node, None]
         )

@@ -37,9 +37,9 @@ def test_loads_ask_for_strains_of_the_bonded_cell(scales):
 
 
 @pytest.mark.parametrize(("strain", "acting", "excess"), [(0.1, 0.1, 10.0), (1e7, 10.0, 1e9)])
-def test_a_strain_that_came_out_is_a_scale_up_to_a_multiple_of_the_load(scales, strain, acting, excess):
+def test_a_strain_that_came_out_is_a_scale_from_that_of_the_load_up_to_a_multiple(scales, strain, acting, excess):
     asked = np.array([0.0025, 0.0, 0.01])
-    np.testing.assert_allclose(scales.acting(np.array([0.001, 0.0, -strain]), asked), [0.001, 0.0, acting])
+    np.testing.assert_allclose(scales.acting(np.array([0.001, 0.0, -strain]), asked), [0.0025, 0.0, acting])
     assert scales.excess(np.array([0.001, 0.0, -strain]), asked) == pytest.approx(excess)
 
 
