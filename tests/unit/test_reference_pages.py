@@ -20,6 +20,7 @@ from feti_homog.materials.strength import CRITERIA
 from feti_homog.results.result_json import columns
 from feti_homog.studies import case_runs, collect, sweep_cases
 from feti_homog.studies.outputs import COLUMNS, OUTPUT_COLUMNS, STATISTICS_COLUMNS, outputs
+from feti_homog.system.runtime.progress_bar import Progress
 
 pytestmark = pytest.mark.slow
 
@@ -110,7 +111,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Provide a folder of results of each case."""
     root = tmp_path_factory.mktemp("results")
     for name in CASES:
-        run(Case.parse(document(name)), root / name, MPI.COMM_SELF, quiet=True)
+        run(Case.parse(document(name)), root / name, Progress(MPI.COMM_SELF, quiet=True))
     return {name: root / name for name in CASES}
 
 

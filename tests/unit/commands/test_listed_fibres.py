@@ -15,6 +15,7 @@ from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError
 from feti_homog.mesh.arrange import arrange
 from feti_homog.microstructure.fibre_table import read_table
+from feti_homog.system.runtime.progress_bar import Progress
 
 CELL = 'geometry = "hexagonal"\nfibre_fraction = 0.4\n'
 FIBRES = 'fibre_list = [{x = 1, y = 2, radius = 0.3}, {x = 2.8, y = 2, radius = 0.3, phase = "fibre:2"}]'
@@ -76,7 +77,7 @@ def test_the_table_of_ellipses_gives_the_cell(of, tmp_path):
     source = case_of(tmp_path / "case.toml", OVALS, coating)
     source.write_text(source.read_text().replace("mesh_size = 0.05\n", ""))
     if of == "result":
-        run(load(source), tmp_path / "result", MPI.COMM_SELF, quiet=True)
+        run(load(source), tmp_path / "result", Progress(MPI.COMM_SELF, quiet=True))
     (tmp_path / "t.csv").write_text(listed_fibres.table(tmp_path / "result" if of == "result" else source))
     assert (tmp_path / "t.csv").read_text().splitlines()[1] == "x,y,radius,phase,a,b,angle,coating"
     again = case_of(tmp_path / "again.toml", 'geometry = "table"\nfile = "t.csv"\n', coating)

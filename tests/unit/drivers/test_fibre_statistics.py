@@ -16,6 +16,7 @@ from feti_homog.analysis.runner import run
 from feti_homog.case import cases
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.microstructure.random_fibres import nearest_neighbours
+from feti_homog.system.runtime.progress_bar import Progress
 
 MESHES = Path(__file__).parents[3] / "meshes"
 SMALL = BASE.replace('geometry = "hexagonal"\n', f"{RANDOM}width = 40.0\n").replace("0.05", "0.1")
@@ -34,7 +35,7 @@ def columns(path):
 
 def test_a_case_and_its_result_have_the_same_fibres(tmp_path):
     path = write(tmp_path / "case.toml", SMALL + "[output]\npictures = false\nfields = false\n")
-    run(cases.load(path), tmp_path / "result", MPI.COMM_SELF, quiet=True)
+    run(cases.load(path), tmp_path / "result", Progress(MPI.COMM_SELF, quiet=True))
     of_case, of_result = fibre_statistics.pattern(path, None), fibre_statistics.pattern(tmp_path / "result", None)
     assert (of_case.width, of_result.width, of_case.periodic, of_result.periodic) == (40.0, 40.0, True, True)
     away = (of_result.centres - of_case.centres + 20) % 40 - 20
