@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+pytestmark = pytest.mark.slow
 PACKAGE = Path(__file__).parents[2] / "feti_homog"
 METHODS = ("fullmatch", "match", "search", "split", "sub", "finditer", "findall")
 # Patterns that are arguments of a function: (module, text of the argument).
@@ -27,7 +28,7 @@ RUNS = (
 )  # fmt: skip
 ENDS, STARTS = ("", "!"), ("", '"')
 # Characters, the slowest texts alone from one length to the next; times of a linear pattern, and least seconds of one.
-LENGTHS, SLOWEST, ALLOWED, SHORTEST = (1000, 20_000, 100_000, 1_000_000), 1, 50, 0.01
+LENGTHS, SLOWEST, ALLOWED, SHORTEST = (1000, 20_000, 100_000, 1_000_000), 8, 50, 0.01
 
 
 @cache
@@ -93,6 +94,6 @@ def test_regular_expressions_are_linear(name):
     assert not fault(*expressions()[name])
 
 
-@pytest.mark.parametrize("pattern", [r"\s*=", r"<A.*?>"])
+@pytest.mark.parametrize("pattern", [r"\s*=", r"\d+x"])
 def test_regular_expressions_that_are_not_linear_are_found(pattern):
     assert fault(re.compile(pattern), {"search"})
