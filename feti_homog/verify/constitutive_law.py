@@ -65,9 +65,10 @@ def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
 
 
 def rounding(case: Mapping[str, Any], phases: Sequence[str], stiffnesses: Float) -> tuple[float, float]:
-    """Return n eps times the largest condition of a compliance, and times the contrast of the stiffnesses."""
+    """Return n eps times the ratio of volumetric to least compliance, and times the contrast of the stiffnesses."""
     constants = [] if case["analysis"]["plane"] == "conduction" else [phase_constants(case, name) for name in phases]
-    condition = max((np.linalg.cond(_compliance(phase)) for phase in constants), default=1.0)
+    compliances = [_compliance(phase) for phase in constants]  # of an incompressible phase, pressures have own limits
+    condition = max((S[:3, :3].sum() / 3 * np.linalg.norm(np.linalg.inv(S), 2) for S in compliances), default=1.0)
     sizes, lost = np.abs(stiffnesses).max(axis=(1, 2)), 6 * np.finfo(float).eps
     return float(lost * condition), float(lost * sizes.max() / sizes.min())
 

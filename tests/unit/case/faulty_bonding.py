@@ -76,7 +76,7 @@ FAULTY_BONDINGS: dict[str, str] = {
         "[path] increments = 0": "expected an integer at least 1",
     }),
     "interface = 3: expected a section [interface]": "interface = 3\n" + BASE,
-    "[interface] debonded: missing; expected a list of arcs {fibre, centre, angle}, or []":
+    "[interface] debonded: missing; expected a list of arcs {fibre, centre, angle}, at most 10000 of them, or []":
         ended("[interface]\ncontact = false\n"),
     '[interface] normal_stiffness: missing; law = "energy" needs it\n'
     '[interface] tangential_stiffness: missing; law = "energy" needs it':

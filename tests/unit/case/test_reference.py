@@ -40,7 +40,7 @@ def test_every_key_says_in_a_sentence_what_it_means(row):
         ("material", "E_transverse", ("a number above 0", "stress", "required")),
         ("material", "expansion_axial", ("a number", "1 / temperature", "")),
         ("interface", "normal_strength", ("a traction above 0, or inf", "stress", "inf")),
-        ("interface", "debonded", ("a list of arcs {fibre, centre, angle}", "", "[]")),
+        ("interface", "debonded", ("a list of arcs {fibre, centre, angle}, at most 10000 of them", "", "[]")),
         ("angle", "values", ("a rising list of numbers from 0 to 360, at most 1000 of them", "degrees", "required")),
         ("output", "stress_unit", ("a text in one line", "", '""')),
         ("path", "increments", ("an integer at least 1 and at most 1000000", "", "required")),

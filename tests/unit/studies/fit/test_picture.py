@@ -48,7 +48,8 @@ def test_curves_have_points_with_deviations_and_lines_through_what_is_computed()
 def test_curves_of_results_are_whole_with_units():
     """Between the measured strains 0.1 and 0.2 the stress falls at the load of the break, from 8 to 2."""
     points = [
-        {"load_factor": t, "strain": [e, 0, 0], "stress": [0, s, 0]} for t, e, s in [(0.5, 0.1, 8.0), (1.0, 0.2, 4.0)]
+        {"load_factor": t, "broke": 0, "strain": [e, 0, 0], "stress": [0, s, 0]}
+        for t, e, s in [(0.5, 0.1, 8.0), (1.0, 0.2, 4.0)]
     ]
     case = {
         "analysis": {"plane": "strain"},
