@@ -100,8 +100,9 @@ def case_remarks(case: Case) -> tuple[str, ...]:
     """Note the teeth that follow from a tolerance, and a fibre fraction other than that of the matched table."""
     cell, lines = case.cell, tuple[str, ...]()
     if phase_laws.has_softening(case) and case.interfaces[0].teeth is None:
-        count = len(vars(phase_laws.bond_law(case.interfaces, np.zeros(0, np.int64)))["levels"]) - 1
-        lines = (f"[interface] softening_tolerance = {case.interfaces[0].softening_tolerance:g}: {count} teeth a bond",)
+        levels = getattr(phase_laws.bond_law(case.interfaces, np.zeros(0, np.int64)), "levels", ())
+        remark = f"[interface] softening_tolerance = {case.interfaces[0].softening_tolerance:g}: "
+        lines = (f"{remark}{len(levels) - 1} teeth a bond",) if len(levels) else ()
     if cell.match is None or cell.matched is None or cell.fibre_fraction is None:
         return lines
     fraction = cell.matched.fibre_fraction

@@ -157,7 +157,7 @@ def test_f_lambda_finds_errors_of_a_followed_answer(comm, on_active):
         wrong = (solver.active.mask == on_active)[:, None] * size * right
         influence._followed.answer = right + wrong
         if ends:
-            with pytest.raises(ConvergenceError, match="off"):
+            with pytest.raises(ConvergenceError, match="relative error"):
                 solver.solve(E, np.zeros(solver.rows))
             continue
         solver.solve(E, np.zeros(solver.rows))

@@ -222,7 +222,7 @@ def test_springs_too_soft_beside_a_cut_fibre_are_refused(comm):
     assert len(softly_held(comm, 1e-4, 1.0, 2, **pieces)[0]) == 2
     with pytest.raises(ConvergenceError, match=r'growth = "released": rounding hides .*e-03 .* at most 1e-06'):
         softly_held(comm, 1e-6, 1e6, 2, **pieces)
-    with pytest.raises(ConvergenceError, match="springs too soft beside the pieces of cut fibres"):
+    with pytest.raises(ConvergenceError, match=r"springs (are )?too soft beside"):
         softly_held(comm, 1e-16, 1e6, 2, **pieces)
 
 

@@ -113,8 +113,7 @@ def faults_of_solvers(options: Mapping[str, str]) -> list[str]:
     applied once, because some methods fail only then.  PETSc marks the options that it reads, and prints all readable
     options with -help.  Options that print are removed for this time.
     """
-    faults, database, comm = list[str](), PETSc.Options(), PETSc.COMM_SELF
-    viewers = [name for name in options if values.is_viewer(name) or table.SHOWING.search(name)]
+    faults, viewers, database, comm = [], [*filter(values.is_viewer, options)], PETSc.Options(), PETSc.COMM_SELF
     try:
         for name in viewers:
             database.delValue(name)

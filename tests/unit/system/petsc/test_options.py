@@ -32,14 +32,6 @@ def test_a_case_without_options_on_the_command_line():
     assert not any(map(database.hasName, ("feti_view", "feti_ksp_monitor", "feti_ksp_rtol")))
 
 
-def test_trials_of_options_print_nothing(given, capfd):
-    for name in ("feti_coarse_ksp_view", "feti_ksp_view"):
-        given(name, "")
-    with case_options({"feti_coarse_ksp_type": "preonly"}):
-        assert PETSc.Options().hasName("feti_coarse_ksp_view")
-    assert capfd.readouterr().out == ""
-
-
 def test_the_command_line_comes_first_and_is_there_for_the_next_case(given):
     given("feti_view", "false")
     given("feti_ksp_monitor", "true")
