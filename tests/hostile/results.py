@@ -242,7 +242,7 @@ def of_layout_and_events(prepared: Path) -> Iterator[Attempt]:
         for name, make in EVENTS.items():
             changes = {"checkpoint/events": make, "result_json": os.unlink}
             files = {"c.toml": PREPARED["unfinished"][1], "out": copy_of(prepared / "unfinished", **changes)}
-            yield Attempt("checkpoints", f"{name}, {command}", words, "checkpoint", files, (2,))
+            yield Attempt("checkpoints", f"{name}, {command}", words, "/out", files, (2,))  # of other ranks, first
 
 
 def attempts(prepared: Path) -> Iterator[Attempt]:

@@ -43,8 +43,8 @@ OPTIONS: dict[str, tuple[str, str]] = {
     "no folder of a monitor": ("-feti_ksp_monitor ascii:/nonexistent/m", "-feti_ksp_monitor ascii:/nonexistent/m: "),
     "flag with a word": ("-feti_view abc", "-feti_view abc: expected true or false, or no value"),
     "capital letters": ("-FETI_KSP_RTOL abc", "-feti_ksp_rtol abc: expected a number above 0 and below 1"),
-    "errors of PETSc": ("-feti_ksp_error_if_not_converged", "-feti_ksp_error_if_not_converged: expected nothing"),
-    "traps": ("-fp_trap", "-fp_trap: expected nothing"),
+    "errors of PETSc": ("-feti_ksp_error_if_not_converged", "-feti_ksp_error_if_not_converged: expected false"),
+    "traps": ("-fp_trap", "-fp_trap: expected false"),
     "no folder of the news": ("-info /nonexistent/x", "-info /nonexistent/x: expected a file"),
     "no folder of memory": ("-malloc_view /nonexistent/x", "-malloc_view /nonexistent/x: expected a file"),
     "workspace of a thousand times": (
@@ -72,7 +72,7 @@ CASES: dict[str, tuple[str, str]] = {
     "no such factorization": (petsc('feti_sub_pc_type = "lux"'), "-feti_sub_pc_type lux: expected one of cholesky, lu"),
     "factors that leave nothing": (
         petsc('feti_schur_pc_type = "lu"'),
-        "-feti_schur_pc_type lu: expected cholesky, for",
+        "-feti_schur_pc_type lu: expected cholesky, because",
     ),
     "library that leaves nothing": (
         petsc('feti_schur_pc_factor_mat_solver_type = "cholmod"'),
