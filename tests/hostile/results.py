@@ -238,11 +238,12 @@ def of_layout_and_events(prepared: Path) -> Iterator[Attempt]:
             files = {"out": copy_of(prepared / "path", result_h5=make)}
             yield Attempt("layout of fields", f"{name}, {command}", (command, "@/out"), expected, files, (2,))
     resume, plot = ("run", "@/c.toml", "--out", "@/out", "--resume"), COMMANDS["plot"]
-    for command, words in (("resume", resume), ("plot", plot)):
+    # On other ranks, resume names the ranks first.
+    for command, words, expected in (("resume", resume, "/out"), ("plot", plot, "checkpoint")):
         for name, make in EVENTS.items():
             changes = {"checkpoint/events": make, "result_json": os.unlink}
             files = {"c.toml": PREPARED["unfinished"][1], "out": copy_of(prepared / "unfinished", **changes)}
-            yield Attempt("checkpoints", f"{name}, {command}", words, "/out", files, (2,))  # of other ranks, first
+            yield Attempt("checkpoints", f"{name}, {command}", words, expected, files, (2,))
 
 
 def attempts(prepared: Path) -> Iterator[Attempt]:
