@@ -86,7 +86,7 @@ AXIS = KeyRow("SECTION.KEY", sections.AXIS_EXPECTED, "", "", "", sections.AXIS_M
 
 
 def tables(word: str = "") -> list[TableReference]:
-    """Return the reference tables in the `ORDER` of sections, of one section, or with a word.
+    """Return the key tables: all in `ORDER`, one section, or all with a word.
 
     The search ignores case, and takes underscores for spaces, in names and descriptions of keys and sections.
 

@@ -97,7 +97,7 @@ def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles
 
 
 def case_remarks(case: Case) -> tuple[str, ...]:
-    """Note the teeth that follow from a tolerance, and a fibre fraction other than that of the matched table."""
+    """Note the number of teeth that a tolerance gives, and a fibre fraction that differs from the matched table."""
     cell, lines = case.cell, tuple[str, ...]()
     if phase_laws.has_softening(case) and case.interfaces[0].teeth is None:
         levels = getattr(phase_laws.bond_law(case.interfaces, np.zeros(0, np.int64)), "levels", ())

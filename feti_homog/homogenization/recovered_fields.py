@@ -45,7 +45,7 @@ class RecoveredFields:
 
 
 def recover(cell: TornCell, response: Response | None, problem: Problem | None = None) -> RecoveredFields:
-    """Recover the response fields; without a response those of `problem`, by default the cell's, are 0.  Collective."""
+    """Recover the fields of a response; without one, zero fields in `problem`, by default the cell's.  Collective."""
     nodes, problem = cell.jumps.nodes, problem or cell.solver.problem
     m, (c, v) = problem.strains, (problem.components, len(problem.loads))
     if response is None:

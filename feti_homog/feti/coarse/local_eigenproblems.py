@@ -1,4 +1,4 @@
-"""Soft modes of one subdomain, from an eigenproblem on its boundary or from eigenproblems on its faces.
+"""Compute soft modes of a subdomain by eigenproblems on its boundary or its faces.
 
 For a subdomain s with Schur complement S_s and constraints B_s, boundary displacements p with
 

@@ -16,7 +16,7 @@ from feti_homog.typing import Float, Int
 
 @dataclass(eq=False)
 class Subdomain:
-    """One subdomain: a piece of one body or of several bonded bodies.
+    """One subdomain: a piece of a body, or of several bonded bodies.
 
     It has n node classes with c displacements each, and a kernel of dimension k.  K takes by far the most memory:
     `build` assembles K, the first `take_stiffness` hands it over to its caller, and later calls assemble it anew.

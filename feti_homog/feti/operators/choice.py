@@ -13,7 +13,7 @@ KINDS = ("auto", "implicit", "explicit")
 
 @dataclass(frozen=True)
 class SubdomainSize:
-    """The sizes and properties of one subdomain, from which `choose` decides.
+    """The sizes and properties of one subdomain, as arguments of `choose`.
 
     Attributes:
         dofs: number of degrees of freedom.
