@@ -26,6 +26,10 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     document: dict[str, Any] = {"effective_conductivity": k}
     if (forms := closed_forms(context.cell)) is not None:
         document["conductivity_estimates"] = forms
+    if context.case.output.sensitivities:
+        from feti_homog.analysis.sensitivities import sensitivities  # few runs need sensitivities
+
+        document |= sensitivities(context, document, responses, False)
     if not errors:
         return document
     energy = energy_error(k, errors)["mesh_error"]

@@ -1,4 +1,4 @@
-"""Derivatives of a stiffness, its constants or the state under a load, by the material and spring constants."""
+"""Derivatives of stiffness and its constants, conductivity, or a loaded state, by constants of phases and springs."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -21,16 +21,23 @@ Constant = tuple[str, float]
 def sensitivities(
     context: AnalysisContext, document: Mapping[str, Any], responses: Sequence[averaging.Response], one_sided: bool
 ) -> dict[str, Any]:
-    """Return the `Result` entry `sensitivities` of a stiffness.  Collective.
+    """Return the `Result` entry `sensitivities` of a stiffness or conductivity.  Collective.
 
     Args:
-        document: the entries `effective_stiffness` and, if a temperature is a load, `thermal_stress`.
+        document: the entry `effective_conductivity`; or `effective_stiffness` and, if a temperature is a load,
+            `thermal_stress`.
         responses: the responses to all unit loads.
         one_sided: debonded faces touch without tension; each column is then differentiated with the faces fixed as
             under its load.
     """
+    k, groups = document.get("effective_conductivity"), context.loads.by_problem(responses)
+    if k is not None:
+        entries = stiffness_derivatives.derivatives(_cells(context), groups)
+        return _entry(
+            _entries(k, None, "k"), {(e.name, e.value): e.energies[0].ravel().tolist() for e in entries}, False
+        )
     C, thermal = document["effective_stiffness"], document.get("thermal_stress")
-    groups, columns = context.loads.by_problem(responses), dict[Constant, list[float]]()
+    columns = dict[Constant, list[float]]()
     if not one_sided:
         for change in stiffness_derivatives.derivatives(_cells(context), groups):
             changes = material_derivatives.constant_changes(C, thermal, *_secants(change.energies))
@@ -102,9 +109,9 @@ def _secants(energies: Sequence[Float]) -> tuple[Float, Float | None]:
     return changed["stiffness"], changed.get("thermal_stress")
 
 
-def _entries(C: Float, thermal: Float | None) -> dict[str, float]:
-    """Return the entries of an unsymmetric stiffness, and the normal thermal stresses, by name."""
-    entries = {f"C{i + 1}{j + 1}": float(value) for (i, j), value in np.ndenumerate(C)}
+def _entries(C: Float, thermal: Float | None, symbol: str = "C") -> dict[str, float]:
+    """Return the entries of a stiffness or conductivity, and the normal thermal stresses, by name."""
+    entries = {f"{symbol}{i + 1}{j + 1}": float(value) for (i, j), value in np.ndenumerate(C)}
     return entries | dict(zip(voigt.THERMAL_STRESSES[:3], map(float, [] if thermal is None else thermal), strict=False))
 
 

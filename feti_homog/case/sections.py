@@ -22,7 +22,7 @@ PREFIXED = r"feti_\w+"  # options of [petsc]
 OPTION_EXPECTED = "a text, a number, true or false"
 SWEEP = "sweep"
 UNCERTAINTY, CORRELATION = "uncertainty", "correlation"
-DIFFERENTIABLE = ("stiffness", "load")
+DIFFERENTIABLE = ("stiffness", "load", "conductivity")
 """Analysis types with sensitivities."""
 UNKNOWN, MEASURED, TEST, CURVE = "unknown", "measured", "test", "curve"
 FIT_SECTIONS = (UNKNOWN, MEASURED, TEST)
@@ -146,9 +146,9 @@ class Output:
     sensitivities: bool = key(
         types.boolean,
         "Derivatives of every constant of the cell by every constant of its phases and elastic interfaces, and by the "
-        "fraction of a bonded square or hexagonal pattern, and a picture of them, in [analysis] type = "
-        '"stiffness" and "load". Bonded cells need no further solve. With contact they are those at fixed status, for '
-        "which every load takes as many solves more as there are unit loads. Faces with friction have none.",
+        'fraction of a bonded square or hexagonal pattern, and a picture of them, in [analysis] type = "stiffness", '
+        '"load" and "conductivity". Bonded cells need no further solve. With contact they are those at fixed status, '
+        "for which every load takes as many solves more as there are unit loads. Faces with friction have none.",
         default=False,
     )
     pictures: bool = key(

@@ -66,7 +66,7 @@ def is_mixed(case: Case, phase: str) -> bool:
 def law_derivatives(case: Case, phase: str, change: material_derivatives.LawChange) -> tuple[Float, ...]:
     """Differentiate `law` in the plane problem and, if present, in the axial problem."""
     problem, dC = problems(case)[0], change.stiffness
-    if problem == PLANE:
+    if problem in (PLANE, CONDUCTION):
         return (dC,)
     axial, dC = dC[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)], dC[np.ix_(IN_PLANE, IN_PLANE)]
     material = case.material_of(phase)

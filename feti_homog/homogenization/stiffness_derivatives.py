@@ -1,4 +1,4 @@
-"""Stiffness derivatives by phase and elastic interface constants, without further solves.
+"""Derivatives of stiffness and conductivity by phase and elastic interface constants, without further solves.
 
 Let e_i be the strains under the unit load i, followed by the other uniform loads.  The stiffness of a linear cell is
 
@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from feti_homog.case import Case, cell_section, material_sections
-from feti_homog.fem import Problem, assembly, bubble, shape_functions
+from feti_homog.fem import CONDUCTION, Problem, assembly, bubble, shape_functions
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.domain_partition import ROUNDING, CellSummary
@@ -72,7 +72,9 @@ def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response
         label = f"interface.{number + 1}" if len(case.interfaces) > 1 else "interface"
         # The problems and components of the springs that have a stiffness.
         springs_of_keys = {"normal_stiffness": [(0, 0)], "tangential_stiffness": [(0, 1)], "axial_stiffness": [(1, 0)]}
-        if bond.axial_stiffness is None:
+        if cells[0].solver.problem == CONDUCTION:
+            springs_of_keys = {"conductance": [(0, 0)]}
+        elif bond.axial_stiffness is None:
             springs_of_keys["tangential_stiffness"].append((1, 0))
         for key, pairs_of_key in springs_of_keys.items():
             value = getattr(bond, key)

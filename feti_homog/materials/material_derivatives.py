@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from feti_homog.materials import material_forms
 from feti_homog.materials.engineering_constants import constants
-from feti_homog.materials.laws import COUPLINGS, expansion, known_compliance, stiffness_of
+from feti_homog.materials.laws import COUPLINGS, conductivity, expansion, known_compliance, stiffness_of
 from feti_homog.materials.voigt import IN_PLANE, IN_PLANE_BLOCK, PLANE_STATES, strain_rotation
 from feti_homog.typing import Float
 
@@ -47,6 +47,11 @@ class LawChange:
 def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawChange]:
     """Yield the derivatives by each given constant; in space expansions come last."""
     C, none = stiffness_of(material, plane), np.zeros(6)
+    if PLANE_STATES[plane].is_scalar:
+        yield from (
+            LawChange(f"conductivity{end}", value, change, none) for end, value, change in _of_conduction(material)
+        )
+        return
     is_general = isinstance(material, material_forms.General)
     for name, value, change in (_of_entries if is_general else _of_constants)(material, plane, C):
         yield LawChange(name, value, change, none)
@@ -69,7 +74,7 @@ def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawCh
 
 def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:
     """Yield the derivatives by engineering constants: dC = -C dS C with the plane state's compliance S."""
-    skipped = ("angle", "expansion", "strength", *material_forms.EXPANSION_PAIR)
+    skipped = ("angle", "expansion", "strength", "conductivity", *material_forms.EXPANSION_PAIR)
     names = [field.name for field in fields(material) if field.name not in skipped]
     values = {name: value for name in names if (value := getattr(material, name)) is not None}
     turn = strain_rotation(-getattr(material, "angle", 0.0))
@@ -95,6 +100,25 @@ def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, floa
         changed[[i, j], [j, i]] += 1j * STEP
         full = changed.imag / STEP if len(matrix) == len(C) else _of_plane_state(changed, plane, condensed="stress")
         yield f"stiffness.C{i + 1}{j + 1}", float((matrix[i, j] + matrix[j, i]) / 2), full
+
+
+def _of_conduction(material: material_forms.Material) -> Iterator[tuple[str, float, Float]]:
+    """Yield the end of the key, the value and dk (3, 3) by each conductivity in the cell's axes."""
+    k = material.conductivity
+    if isinstance(k, material_forms.FibreConductivity):
+        yield ".axial", k.axial, np.diag([0.0, 0.0, 1.0])
+        yield ".transverse", k.transverse, np.diag([1.0, 1.0, 0.0])
+    elif isinstance(k, float):
+        yield "", k, np.eye(3)
+    else:
+        for i, j in zip(*np.triu_indices(3), strict=True):
+            unit = np.eye(3)[[i, j]]
+            tensor = conductivity(material)
+            yield (
+                f".k{i + 1}{j + 1}",
+                float(tensor[i, j]),
+                np.outer(*unit) if i == j else np.outer(*unit) + np.outer(*unit[::-1]),
+            )
 
 
 def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:

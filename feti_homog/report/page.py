@@ -11,7 +11,7 @@ import tomli_w
 
 from feti_homog.errors import CaseError
 from feti_homog.materials import voigt
-from feti_homog.report.cards import effective_material, export
+from feti_homog.report.cards import export
 from feti_homog.report.text.summary import REMARKS, answers, checks, summary, title_of
 from feti_homog.results import atomic, output_folder
 from feti_homog.typing import Document
@@ -84,9 +84,9 @@ def page(document: Document, directory: Path) -> str:
         for remark in document.get(f"{label.lower()}s", ())
     ]
     texts = dict[str, str]()
-    for form, card in export.FORMATS.items():
+    for form in export.FORMATS:
         with suppress(CaseError):  # of a result without a material, or one that the format cannot carry
-            texts[f"Material card, {form}"] = card(effective_material.in_axes_of_the_cell(document))
+            texts[f"Material card, {form}"] = export.card_of(document, form)
     texts["Case file, with the defaults of its keys"] = tomli_w.dumps(document["case"])
     *cards, case = (
         f"<details><summary>{name}</summary>\n<pre>{escape(text)}</pre></details>" for name, text in texts.items()

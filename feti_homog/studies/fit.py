@@ -61,15 +61,15 @@ class Fit(Study):
         """
 
         def set_output(document: dict[str, Any]) -> None:
-            """Restrict the output to numbers, and derivatives of a stiffness unless debonded faces may touch."""
+            """Restrict the output to numbers, and derivatives but for debonded faces that may touch."""
             cell, analysis, output = (document.get(name, {}) for name in ("cell", "analysis", "output"))
             if isinstance(output, dict):
-                is_stiffness = isinstance(analysis, dict) and analysis.get("type") == "stiffness"
+                kind = analysis.get("type") if isinstance(analysis, dict) else None
                 # Faces in contact may be debonded from the start: arcs, or lines of a user's mesh.
                 is_mesh = isinstance(cell, dict) and cell.get("geometry") == "mesh"
                 tables = [table for table in interface_section.interface_tables(document) if isinstance(table, dict)]
                 touching = [table.get("contact") is not False for table in tables if is_mesh or table.get("debonded")]
-                has_derivatives = is_stiffness and not any(touching)
+                has_derivatives = kind == "conductivity" or (kind == "stiffness" and not any(touching))
                 document["output"] = {"mesh_error": False} | output | SILENT | {"sensitivities": has_derivatives}
 
         points = [self.tests[test] | dict(zip(self.paths, _rounded(x), strict=True)) for test, x in places]

@@ -32,21 +32,7 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
         return
     data = document["sensitivities"]
     names = data["parameters"]
-    # All constants of phases and springs on which the answer depends; their names end in .k for one of several numbers,
-    # in .Cij for an entry of a stiffness.
-    material, sections, needed = cell.files.case["material"], cell.files.interfaces, set[str]()
-    for phase in {*cell.files.phases} & material.keys():
-        for key, value in material[phase].items():
-            if key != "strength" and ("thermal_stress" in document or not key.startswith("expansion")):
-                numbers = np.array(value, float)
-                ends = [f".{k + 1}" for k in range(len(numbers))] if numbers.ndim else [""]
-                if numbers.ndim > 1:
-                    ends = [f".C{i + 1}{j + 1}" for i, j in np.argwhere(np.triu(numbers))]
-                needed |= {f"material.{phase}.{key}{end}" for end in ends}
-    for number, section in enumerate(sections, start=1):
-        name = f"interface.{number}" if len(sections) > 1 else "interface"
-        needed |= {f"{name}.{key}" for key in SPRINGS if np.isfinite(float(section.get(key) or np.inf))}
-    missing = sorted(needed.difference(names))
+    missing = sorted(_parameters(cell).difference(names))
     findings.record("tables", [np.inf] * len(missing), lambda i: f"sensitivities, {missing[i]}")
     places = (_place(dict(cell.files.case), name) for name in names)
     values = np.array([np.array(table[key], float)[index] for table, key, index in places])
@@ -71,6 +57,31 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
     check(findings, cell, states, (energies[0] - energies[1]) / (2 * STEP), direction)
 
 
+def _parameters(cell: DiscreteCell) -> set[str]:
+    """Return all constants of phases and springs on which the result depends.
+
+    Names end in .k for one of several numbers, in .Cij or .kij for an entry of a stiffness or conductivity.
+    """
+    document, sections, names = cell.files.document, cell.files.interfaces, set[str]()
+    material, conducts = cell.files.case["material"], "effective_conductivity" in document
+    pairs = [(phase, key) for phase in {*cell.files.phases} & material.keys() for key in material[phase]]
+    for phase, key in pairs:
+        if (key == "conductivity") is not conducts or key == "strength":
+            continue
+        if "thermal_stress" in document or not key.startswith("expansion"):
+            value = material[phase][key]
+            numbers = np.array([*value] if isinstance(value, dict) else value)
+            ends = [f".{end}" for end in (value if isinstance(value, dict) else range(1, numbers.size + 1))]
+            if numbers.ndim > 1:
+                ends = [f".{'Ck'[conducts]}{i + 1}{j + 1}" for i, j in np.argwhere(np.triu(numbers))]
+            names |= {f"material.{phase}.{key}{end}" for end in (ends if numbers.ndim else [""])}
+    springs = ("conductance",) if conducts else SPRINGS
+    for number, section in enumerate(sections, start=1):
+        name = f"interface.{number}" if len(sections) > 1 else "interface"
+        names |= {f"{name}.{key}" for key in springs if np.isfinite(float(section.get(key) or np.inf))}
+    return names
+
+
 def _check_moduli(findings: Findings, cell: DiscreteCell, states: list[State], slope: Float, direction: Float) -> None:
     """Check constants of a stiffness and their derivatives `slope` (v, v) along `direction` (parameters,).
 
@@ -78,14 +89,18 @@ def _check_moduli(findings: Findings, cell: DiscreteCell, states: list[State], s
     fields under other loads with the same status, which are not in the files: only the values are checked.
     """
     document, data = cell.files.document, cell.files.document["sensitivities"]
-    C, heat = np.array(document["effective_stiffness"]), document.get("thermal_stress")
+    k, heat = document.get("effective_conductivity"), document.get("thermal_stress")
+    C = np.array(document["effective_stiffness"] if k is None else k)
     heat, n = None if heat is None else np.array(heat), len(C)
-    law, floor, constants = "moduli", NOISE, constants_of(C, heat)
-    if data.get("at_fixed_status"):
+    law, floor = "moduli" if k is None else "constants", NOISE
+    constants = constants_of(C, heat) if k is None else _entries("k", C)
+    if k is not None:
+        changes = _entries("k", slope[::-1, ::-1])  # the states are in the order of `GRADIENT`
+    elif data.get("at_fixed_status"):
         data.leaves_open("derivatives")
         law, floor = "constants", 0.0
-        entries = {f"C{i + 1}{j + 1}": value for (i, j), value in np.ndenumerate(C)}
-        constants = {name: value for name, value in constants.items() if name.startswith("thermal")} | entries
+        thermal = {name: value for name, value in constants.items() if name.startswith("thermal")}
+        constants = thermal | _entries("C", C)
         changes = {f"C{k + 1}{k + 1}": slope[k, k] for k in range(n)}
         for name, energy in zip(changes, np.diag(_energies(cell, states, cell.files.case)), strict=True):
             value = data["constant_values"][data["constants"].index(name)]
@@ -104,6 +119,10 @@ def _check_moduli(findings: Findings, cell: DiscreteCell, states: list[State], s
         if name in changes:
             scale = max(float(np.abs(terms).max()), size)
             findings.compare("sensitivities", terms.sum(), changes[name], scale, name)
+
+
+def _entries(symbol: str, matrix: Float) -> dict[str, float]:
+    return {f"{symbol}{i + 1}{j + 1}": float(value) for (i, j), value in np.ndenumerate(matrix)}
 
 
 def _check_load(findings: Findings, cell: DiscreteCell, states: list[State], slope: Float, direction: Float) -> None:
@@ -145,6 +164,8 @@ def _place(case: Case, name: str) -> tuple[Any, str, tuple[int, ...]]:
     if section == "material" or isinstance(table, list):
         first = keys.pop(0)
         table = table[int(first) - 1] if isinstance(table, list) else table[first]
+    if isinstance(table[keys[0]], dict):
+        table = table[keys.pop(0)]
     return table, keys[0], tuple(int(digit) - 1 for digit in "".join(keys[1:]) if digit.isdigit())
 
 

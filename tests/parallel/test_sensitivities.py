@@ -1,4 +1,4 @@
-"""Derivatives of stiffnesses against differences of whole runs, and Euler's relation, at any number of ranks."""
+"""Derivatives of stiffness and conductivity against differences of whole runs, and Euler's relation."""
 
 import copy
 
@@ -23,6 +23,7 @@ TURNED = {
     "angle": 33.0,
 }  # fmt: skip
 GENERAL = {"stiffness": [[10.0, 2.0, 0.5], [2.0, 8.0, 0.1], [0.5, 0.1, 3.0]]}
+ACROSS, TENSOR = {"axial": 10.0, "transverse": 1.0}, [[0.2, 0.05, 0.02], [0.05, 0.3, -0.01], [0.02, -0.01, 0.4]]
 SIZING = {"young": 1.2, "poisson": 0.4, "expansion": 8e-5}
 ARC = [{"fibre": "all", "centre": 20.0, "angle": 90.0}]
 SPRINGS = {"normal_stiffness": 50.0, "tangential_stiffness": 20.0, "contact": False}
@@ -37,7 +38,7 @@ def document(cell, plane, materials, interface=None):
     given = {
         "cell": cell,
         "material": materials,
-        "analysis": {"type": "stiffness", "plane": plane},
+        "analysis": {"type": "conductivity" if plane == "conduction" else "stiffness", "plane": plane},
         "output": {"sensitivities": True, "mesh_error": False},
         "petsc": {"feti_ksp_rtol": 1e-13},
     }
@@ -45,8 +46,20 @@ def document(cell, plane, materials, interface=None):
 
 
 CASES = {
-    "springs, coatings, expansions": document(
-        COATED | {"order": 1}, "generalized", {"matrix": EPOXY, "fibre": CARBON, "coating": SIZING}, SPRINGS
+    "springs, coatings, expansions": document(  # a stiffness does not depend on conductivities
+        COATED | {"order": 1}, "generalized",
+        {"matrix": EPOXY | {"conductivity": 0.2}, "fibre": CARBON | {"conductivity": ACROSS}, "coating": SIZING},
+        SPRINGS,
+    ),
+    "conduction": document(
+        PLAIN | {"order": 2}, "conduction", {"matrix": {"conductivity": TENSOR}, "fibre": {"conductivity": ACROSS}},
+        {"conductance": 0.7, "debonded": ARC},
+    ),
+    "conduction with coatings": document(
+        COATED | {"order": 1}, "conduction",
+        {phase: {"conductivity": k} for phase, k in (("matrix", 0.2), ("fibre", ACROSS), ("coating", 0.7))},
+        [{"between": ["coating", "matrix"], "conductance": 3.0, "debonded": []},
+         {"between": ["fibre", "coating"], "conductance": 0.5, "debonded": []}],
     ),
     "along the fibres alone": document(
         PLAIN | {"order": 2}, "generalized", {"matrix": EPOXY, "fibre": TURNED}, SPRINGS | {"axial_stiffness": 5.0}
@@ -67,10 +80,16 @@ def moved(case, names, values):
     changed = copy.deepcopy(case)
     for name, value in zip(names, values, strict=True):
         section, *keys = name.split(".")
-        place = changed[section] if section == "interface" else changed[section][keys.pop(0)]
-        if keys[0] == "stiffness":
+        place = changed[section]
+        if isinstance(place, list):
+            place = place[int(keys.pop(0)) - 1]
+        elif section != "interface":
+            place = place[keys.pop(0)]
+        if keys[0] == "conductivity" and isinstance(place[keys[0]], dict):
+            place = place[keys.pop(0)]
+        if len(keys) > 1:
             i, j = int(keys[1][1]) - 1, int(keys[1][2]) - 1
-            place["stiffness"][i][j] = place["stiffness"][j][i] = float(value)
+            place[keys[0]][i][j] = place[keys[0]][j][i] = float(value)
         else:
             place[keys[0]] = float(value)
     return changed
@@ -100,8 +119,8 @@ def test_derivatives_are_those_of_the_answer(comm, name):
 @pytest.mark.parametrize("name", CASES)
 def test_stiffness_is_homogeneous_of_degree_one_in_those_of_all_phases(comm, name):
     found = run(Case.parse(CASES[name]), comm).sensitivities
-    stiff = [n.endswith((*STIFF, "_stiffness")) or ".stiffness." in n for n in found.parameters]
-    moduli = [k for k, n in enumerate(found.constants) if n[0] in "CEGK"]
+    stiff = [n.endswith((*STIFF, "_stiffness")) or ".stiffness." in n or "conduct" in n for n in found.parameters]
+    moduli = [k for k, n in enumerate(found.constants) if n[0] in "CEGKk"]
     total = found.derivatives[:, stiff] @ found.parameter_values[stiff]
     largest = np.abs(found.constant_values[moduli]).max()
     np.testing.assert_allclose(total[moduli], found.constant_values[moduli], rtol=1e-10, atol=1e-10 * largest)
@@ -158,7 +177,7 @@ def test_derivatives_with_contact_are_those_at_fixed_status(comm, name):
     assert (np.abs(found.derivatives @ direction - expected) < 1e-6 * scale).all()
 
 
-def test_only_a_stiffness_and_a_load_have_them():
+def test_an_envelope_has_none():
     case = copy.deepcopy(CASES["voids"])
     case["analysis"]["type"] = "envelope"
     with pytest.raises(CaseError, match=r"\[output\] sensitivities = true: belongs to .*stiffness"):

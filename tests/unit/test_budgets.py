@@ -22,19 +22,19 @@ LINES = {
     "commands": 560 + 15,
     "fem": 1150 + 5,
     "feti": 6300,
-    "homogenization": 3230 + 60,
+    "homogenization": 3230 + 60 + 5,
     "interface": 4000,
-    "materials": 1430 + 95 + 110,
+    "materials": 1430 + 95 + 135,
     "mesh": 5500,
     "microstructure": 2140,
-    "report": 3420 + 170 + 50,
+    "report": 3420 + 170 + 175,
     "results": 2430 + 85,
     "schema": 430,
     "studies": 2950,
     "system": 1770 + 5,
-    "verify": 3100 + 170 + 50,
+    "verify": 3100 + 170 + 70,
 }
-FILES, TOTAL = 310, 45000 + 370 + 370
+FILES, TOTAL = 310, 45000 + 370 + 550
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.0, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

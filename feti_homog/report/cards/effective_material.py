@@ -1,7 +1,7 @@
 """The effective material of a result in card axes (axis 1 along the fibre), and the text parts of all cards."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from textwrap import wrap
 from typing import Any
@@ -28,6 +28,7 @@ AXES = (
     f"{', '.join(engineering_constants.OF_THE_CELL.values())} of the cell. nu_ij = -eps_j/eps_i under stress along i."
 )
 TINY = float(np.finfo(float).tiny)
+CSV_COLUMNS = ("name", "value", "unit", "meaning")
 NEGLIGIBLE = 1e-3
 """Couplings up to this part of sqrt(C_ii C_jj), and shears up to this part of the largest expansion, are left out. It
 is far above what irregular meshes make of symmetric cells (1e-6), and below what is known of constants (1e-2)."""
@@ -93,7 +94,7 @@ def in_axes_of_the_cell(document: Document) -> EffectiveMaterial:
     """
     C = _stiffness(document)[np.ix_(ORDER, ORDER)]
     computed = document.get("thermal_expansion")
-    expansion = None if computed is None else _numbers(computed, (6,))[ORDER]
+    expansion = None if computed is None else numbers(computed, (6,))[ORDER]
     compliance = np.linalg.inv(C)
     size = np.sqrt(np.diag(C))
     sizes = [float(np.abs(C / np.outer(size, size))[COUPLINGS].max())]
@@ -122,7 +123,7 @@ def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
     _stiffness(document)
     computed = document["transversely_isotropic"]
     names = ("E_axial", "E_transverse", "nu_axial", "nu_transverse", "G_axial")
-    E_a, E_t, nu_a, nu_t, G_a = _numbers([computed[name] for name in names], (5,))
+    E_a, E_t, nu_a, nu_t, G_a = numbers([computed[name] for name in names], (5,))
     compliance = np.diag([1 / E_a, 1 / E_t, 1 / E_t, 2 * (1 + nu_t) / E_t, 1 / G_a, 1 / G_a])
     compliance[0, 1:3] = compliance[1:3, 0] = -nu_a / E_a
     compliance[1, 2] = compliance[2, 1] = -nu_t / E_t
@@ -130,7 +131,7 @@ def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
         raise ValueError("transversely_isotropic: no stable material")
     expansion = None
     if computed["expansion_axial"] is not None:
-        axial, transverse = _numbers([computed["expansion_axial"], computed["expansion_transverse"]], (2,))
+        axial, transverse = numbers([computed["expansion_axial"], computed["expansion_transverse"]], (2,))
         expansion = np.array([axial, transverse, transverse, 0.0, 0.0, 0.0])
     symmetry = f"The nearest transversely isotropic material, at a relative distance of {computed['deviation']:.2g}."
     computed_errors = (document.get("mesh_error") or {}).get("constants", {})
@@ -147,30 +148,34 @@ def _origin(document: Document) -> dict[str, Any]:
     return {"name": case["name"], "version": document["version"], "stress_unit": case["output"]["stress_unit"]}
 
 
-def _stiffness(document: Document) -> Float:
-    """Return the symmetric positive definite stiffness (6, 6) in cell axes."""
-    analysis = document["case"]["analysis"]
+def require_done(document: Document) -> None:
+    """Raise CaseError, with the first fault, if a result did not converge or has other faults."""
     if document["status"] != "done":
         faults = document.get("faults") or ["it was not finished"]
         more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
         raise CaseError(f'its status is "{document["status"]}": {faults[0]}{more}; run the case again')
+
+
+def _stiffness(document: Document) -> Float:
+    """Return the symmetric positive definite stiffness (6, 6) in cell axes."""
+    require_done(document)
+    analysis = document["case"]["analysis"]
     if document.get("effective_stiffness") is None:
-        raise CaseError(
-            f'analysis.type = "{analysis["type"]}" has no effective stiffness; cards need "stiffness" or "envelope"'
-        )
+        text = f'analysis.type = "{analysis["type"]}" has no effective stiffness'
+        raise CaseError(f'{text}; cards need "stiffness", "envelope" or "conductivity"')
     if analysis["plane"] != "generalized":
         text = f'plane = "{analysis["plane"]}" gives constants of the plane; cards need plane = "generalized"'
         raise CaseError(text)
     if document.get("effective_stiffness_compression") is not None:
         raise CaseError("its debonded faces touch under some loads alone; cards are of linear materials")
-    C = _numbers(document["effective_stiffness"], (6, 6))
+    C = numbers(document["effective_stiffness"], (6, 6))
     C = (C + C.T) / 2.0
     if not voigt.is_positive_definite(C):
         raise CaseError("its effective stiffness is not positive definite; cards are of stable materials")
     return C
 
 
-def _numbers(value: Any, shape: tuple[int, ...]) -> Float:
+def numbers(value: Any, shape: tuple[int, ...]) -> Float:
     """Convert a value to a finite array of shape `shape`.  Raises TypeError or ValueError if that is impossible."""
     array = np.array(value, float)
     if array.shape != shape or not np.isfinite(array).all():
@@ -192,6 +197,11 @@ def comments(material: EffectiveMaterial, mark: str) -> list[str]:
     if material.errors:
         errors = ", ".join(f"{name} {value:.1e}" for name, value in material.errors.items())
         paragraphs.append(f"Estimated errors by the mesh: {errors}.")
+    return comment_lines(paragraphs, mark)
+
+
+def comment_lines(paragraphs: Iterable[str], mark: str) -> list[str]:
+    """Wrap paragraphs to comment lines in ASCII that begin with `mark`."""
     lines = (line for text in paragraphs for line in wrap(text.encode("ascii", "backslashreplace").decode(), 100))
     return [f"{mark} {line}" for line in lines]
 
@@ -201,6 +211,16 @@ def number(value: float, width: int = 24) -> str:
     value = float(value) + 0.0  # no -0.0
     forms = [repr(value), *(f"{value:.{digits}E}" for digits in range(16, 3, -1))]
     return next(form for form in forms if len(form) <= width)
+
+
+def quoted(values: Iterable[float]) -> str:
+    """Write values as a list for MOOSE."""
+    return f"'{' '.join(number(value) for value in values)}'"
+
+
+def moose_block(name: str, **parameters: str) -> list[str]:
+    """Return the lines that form a block for MOOSE."""
+    return [f"  [{name}]", *(f"    {key} = {value}" for key, value in parameters.items()), "  []"]
 
 
 def identifier(name: str) -> str:

@@ -23,7 +23,7 @@ import numpy as np
 
 from feti_homog.errors import CaseError
 from feti_homog.materials import engineering_constants, voigt
-from feti_homog.report.cards import effective_material
+from feti_homog.report.cards import effective_conductor, effective_material
 from feti_homog.results import output_folder, result_json
 from feti_homog.typing import Document, Float
 
@@ -43,7 +43,6 @@ ANSYS_LABELS = {
 }  # fmt: skip
 SYMMETRIC21 = tuple((row, column) for row in range(6) for column in range(row, 6))
 SYMMETRIC9 = tuple((row, column) for row, column in SYMMETRIC21 if column < 3 or row == column)
-CSV_COLUMNS = ("name", "value", "unit", "meaning")
 FIBRE_AXES = ("the fibre (x3 of the cell)", "x1 of the cell", "x2 of the cell")
 COMPONENTS = ("11", "22", "33", "gamma23", "gamma13", "gamma12")
 
@@ -137,15 +136,15 @@ def moose(material: effective_material.EffectiveMaterial) -> str:
     name, C = effective_material.identifier(material.name), material.stiffness
     method, entries = ("symmetric9", SYMMETRIC9) if material.is_orthotropic else ("symmetric21", SYMMETRIC21)
     lines = [*effective_material.comments(material, "#"), "[Materials]"]
-    lines += _block(
+    lines += effective_material.moose_block(
         f"{name}_elasticity",
         type="ComputeElasticityTensor",
         fill_method=method,
-        C_ijkl=_quoted(C[i, j] for i, j in entries),
+        C_ijkl=effective_material.quoted(C[i, j] for i, j in entries),
     )
     if material.expansion is not None:
         lines += ["  # The name of the expansion belongs in eigenstrain_names of the strain."]
-        lines += _block(
+        lines += effective_material.moose_block(
             f"{name}_temperature_rise",
             type="ParsedMaterial",
             property_name=f"{name}_temperature_rise",
@@ -154,22 +153,14 @@ def moose(material: effective_material.EffectiveMaterial) -> str:
             constant_expressions="'0'",
             expression="'temperature - stress_free_temperature'",
         )
-        lines += _block(
+        lines += effective_material.moose_block(
             f"{name}_expansion",
             type="ComputeEigenstrain",
-            eigen_base=_quoted(material.expansion * TENSOR_SHEARS),
+            eigen_base=effective_material.quoted(material.expansion * TENSOR_SHEARS),
             prefactor=f"{name}_temperature_rise",
             eigenstrain_name=f"{name}_expansion",
         )
     return "\n".join([*lines, "[]"])
-
-
-def _block(name: str, **parameters: str) -> list[str]:
-    return [f"  [{name}]", *(f"    {key} = {value}" for key, value in parameters.items()), "  []"]
-
-
-def _quoted(values: Iterable[float]) -> str:
-    return f"'{' '.join(effective_material.number(value) for value in values)}'"
 
 
 def csv_table(material: effective_material.EffectiveMaterial) -> str:
@@ -192,7 +183,7 @@ def csv_table(material: effective_material.EffectiveMaterial) -> str:
         meaning = f"stiffness: stress {digits} under the unit strain {COMPONENTS[j]}"
         rows.append((f"C{i + 1}{j + 1}", C[i, j], unit, meaning))
     texts = [(name, effective_material.number(value), *words) for name, value, *words in rows]
-    return result_json.csv_text([CSV_COLUMNS, *texts]).removesuffix("\n")
+    return result_json.csv_text([effective_material.CSV_COLUMNS, *texts]).removesuffix("\n")
 
 
 FORMATS: dict[str, Callable[[effective_material.EffectiveMaterial], str]] = {
@@ -202,6 +193,13 @@ SYMMETRIES: dict[str, Callable[[Document], effective_material.EffectiveMaterial]
     "orthotropic": effective_material.in_axes_of_the_cell,
     "transversely isotropic": effective_material.nearest_transversely_isotropic,
 }
+
+
+def card_of(document: Document, form: str, symmetry: str = "orthotropic") -> str:
+    """Return the card for a result with a stiffness or a conductivity.  Raises as `SYMMETRIES` and `FORMATS`."""
+    if document.get("effective_conductivity") is not None:
+        return effective_conductor.FORMATS[form](effective_conductor.conductor(document, symmetry))
+    return FORMATS[form](SYMMETRIES[symmetry](document))
 
 
 def card(directory: Path, form: str, symmetry: str) -> str:
@@ -222,7 +220,7 @@ def card(directory: Path, form: str, symmetry: str) -> str:
     document = result_json.read(directory)
     path = directory / result_json.NAME
     try:
-        return FORMATS[form](SYMMETRIES[symmetry](document))
+        return card_of(document, form, symmetry)
     except CaseError as error:
         raise CaseError(*(f"cannot export {path}: {fault}" for fault in error.faults)) from error
     except (AttributeError, KeyError, TypeError, ValueError) as error:

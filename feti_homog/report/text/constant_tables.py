@@ -43,7 +43,7 @@ def table(document: Document) -> Table:
 
 # Constants of which sensitivities are shown, by whether the cell is in space; all are in result.json.
 SHOWN = {
-    False: ("C11", "C22", "C12", "C33", "E1", "E2", "nu12", "G12"),
+    False: ("C11", "C22", "C12", "C33", "E1", "E2", "nu12", "G12", "k11", "k22", "k33"),
     True: tuple(name for name in engineering_constants.ABOUT_FIBRES if name != "K_transverse"),
 }
 MOST = 9  # of other constants
@@ -88,4 +88,4 @@ def mesh_errors(document: Document) -> dict[str, float]:
 
 def shown(names: Sequence[str]) -> list[str]:
     """Return the constants that tables show; the first MOST for a load or secants in space."""
-    return [name for name in SHOWN["E3" in names] if name in names] if "E1" in names else list(names[:MOST])
+    return [name for name in SHOWN["E3" in names] if name in names] if {"E1", "k11"} & {*names} else list(names[:MOST])

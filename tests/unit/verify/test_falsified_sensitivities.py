@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from support.falsifications import broken
-from support.verified_results import CARBON, FIBRE, HEXAGONAL, MATRIX, SPRINGS, SQUARE, TURNED, WARM, falsified
+from support.verified_results import CARBON, FIBRE, HEXAGONAL, MATRIX, SPRINGS, SQUARE, TENSOR, TURNED, WARM, falsified
 
 from feti_homog import Case, run
 from feti_homog.verify.certificate import verify
@@ -12,7 +12,8 @@ from feti_homog.verify.certificate import verify
 pytestmark = pytest.mark.slow
 
 INCOMPRESSIBLE = {"young": 3.0, "poisson": 0.45}
-SIZING = {"young": 120.0, "poisson": 0.25, "expansion": 3e-5}
+SIZING = {"young": 120.0, "poisson": 0.25, "expansion": 3e-5, "conductivity": 0.7}
+CONDUCTORS = {"matrix": {"conductivity": TENSOR}, "fibre": {"conductivity": {"axial": 10.0, "transverse": 1.0}}}
 TOUCHING = {"contact": True, "debonded": [{"fibre": "all", "centre": 20.0, "angle": 90.0}]}
 LOADS = {
     "load": {"E11": -0.01, "E22": 0.02, "gamma12": 0.0},
@@ -27,6 +28,7 @@ CASES = {
         {"matrix": WARM, "fibre": CARBON, "coating": SIZING},
         [SPRINGS | {"between": ["coating", "matrix"]}, SPRINGS | {"between": ["fibre", "coating"]}],
     ),
+    "conduction": ("conduction", SQUARE | {"order": 2}, CONDUCTORS, {"conductance": 0.7, "debonded": []}),
     "strain": ("strain", SQUARE | {"order": 2}, {"matrix": INCOMPRESSIBLE, "fibre": TURNED}, None),
     "contact": ("generalized", SQUARE, {"matrix": WARM, "fibre": CARBON}, SPRINGS | TOUCHING),
     "load": ("strain", SQUARE, {"matrix": MATRIX, "fibre": FIBRE}, TOUCHING),
@@ -42,7 +44,7 @@ def test_sensitivities_are_verified(tmp_path, kind):
     case = {
         "cell": cell | {"mesh_size": 0.25},
         "material": materials,
-        "analysis": {"type": "stiffness", "plane": plane},
+        "analysis": {"type": "conductivity" if plane == "conduction" else "stiffness", "plane": plane},
         "output": {"sensitivities": True, "pictures": False, "mesh_error": False},
         "petsc": {}
         if kind in LOADS or kind == "contact"
@@ -59,7 +61,7 @@ def test_sensitivities_are_verified(tmp_path, kind):
     def edit(document, _):
         table = document["sensitivities"]
         rows = np.abs(np.array(table["derivatives"]) * table["parameter_values"])
-        k = next(k for k, name in enumerate(table["constants"]) if name in ("stored", "E1", "C22"))
+        k = next(k for k, name in enumerate(table["constants"]) if name in ("stored", "E1", "C22", "k22"))
         table["derivatives"][k][int(rows[k].argmax())] *= 1 + 1e-3
 
     def doubled(document, _):

@@ -1,0 +1,69 @@
+"""Cards of a conductivity: the tensor of the result, turned to the axes of a card."""
+
+import csv
+import io
+import re
+
+import numpy as np
+import pytest
+
+from feti_homog.errors import CaseError
+from feti_homog.report.cards import export
+
+K = np.array([[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 7.0]])
+COUPLED = np.array([[1.0, 0.3, 0.1], [0.3, 2.0, -0.2], [0.1, -0.2, 7.0]])
+TURN = np.eye(3)[[2, 0, 1]]
+"""Rows are the axes of a card in the cell: x3, x1, x2."""
+
+
+def document(k, **entries):
+    """Return a finished result with the conductivity k."""
+    case = {"name": "ply", "analysis": {"type": "conductivity", "plane": "conduction"}}
+    return {"case": case, "version": "1", "status": "done", "effective_conductivity": k.tolist()} | entries
+
+
+def read(text, form):
+    """Return the conductivity (3, 3) of a card by a reader of its own."""
+    if form in ("abaqus", "calculix"):
+        block = text.splitlines()[text.splitlines().index("*CONDUCTIVITY, TYPE=ORTHO") + 1]
+        return np.diag([float(word) for word in block.split(",")])
+    if form == "ansys":
+        labels = dict(line.split(",")[1::2] for line in text.splitlines() if line.startswith("MP,"))
+        return np.diag([float(labels[name]) for name in ("KXX", "KYY", "KZZ")])
+    if form == "moose":
+        return np.array(re.search(r"tensor_values = '(.*)'", text)[1].split(), float).reshape(3, 3)
+    rows = {row["name"]: float(row["value"]) for row in csv.DictReader(io.StringIO(text))}
+    return np.array([[rows[f"k{min(i, j)}{max(i, j)}"] for j in (1, 2, 3)] for i in (1, 2, 3)])
+
+
+@pytest.mark.parametrize("form", export.FORMATS)
+def test_tensor_is_read_back_in_axes_of_the_card(form):
+    assert (read(export.card_of(document(K), form), form) == TURN @ K @ TURN.T).all()
+
+
+@pytest.mark.parametrize("form", export.FORMATS)
+def test_couplings_go_where_the_format_has_a_place(form):
+    if form in ("moose", "csv"):
+        assert (read(export.card_of(document(COUPLED), form), form) == TURN @ COUPLED @ TURN.T).all()
+    else:
+        with pytest.raises(CaseError, match=r"couplings in its axes, .* use --transversely-isotropic"):
+            export.card_of(document(COUPLED), form)
+
+
+@pytest.mark.parametrize("form", export.FORMATS)
+def test_nearest_transversely_isotropic_conductivity_has_the_mean_across(form):
+    text = export.card_of(document(COUPLED), form, "transversely isotropic")
+    assert (read(text, form) == np.diag([7.0, 1.5, 1.5])).all()
+
+
+def test_noise_of_meshes_is_left_out_and_named():
+    noisy = K + 1e-4 * (1 - np.eye(3))
+    text = export.card_of(document(noisy, mesh_error={"effective_conductivity": (0.01 * K).tolist()}), "abaqus")
+    assert (read(text, "abaqus") == TURN @ K @ TURN.T).all()
+    assert "Couplings of up to 7.1e-05 sqrt(kii kjj) are left out." in text
+    assert "k11 7.0e-02, k22 1.0e-02, k33 2.0e-02" in text
+
+
+def test_unfinished_results_have_no_card():
+    with pytest.raises(CaseError, match='its status is "not converged": check hill'):
+        export.card_of(document(K, status="not converged", faults=["check hill"]), "abaqus")
