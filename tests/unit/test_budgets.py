@@ -27,7 +27,7 @@ LINES = {
     "materials": 1430 + 95 + 135,
     "mesh": 5500,
     "microstructure": 2140,
-    "report": 3420 + 170 + 175,
+    "report": 3420 + 170 + 185,
     "results": 2430 + 85,
     "schema": 430,
     "studies": 2950,

@@ -78,11 +78,15 @@ def sensitivities(document: Document) -> list[Table]:
 
 
 def mesh_errors(document: Document) -> dict[str, float]:
-    """Return estimated mesh errors of constants, stiffness entries (C11, ...) and expansions, by name."""
+    """Return estimated mesh errors of constants, stiffness (C11, ...) and conductivity (k11, ...), by name."""
     numbers: Document = document.get("mesh_error") or {}
-    entries = np.ndenumerate(np.array(numbers.get("effective_stiffness", [])))
+    tensors = {"C": numbers.get("effective_stiffness"), "k": numbers.get("effective_conductivity")}
     strains = dict(zip(voigt.EXPANSIONS[:3], map(float, numbers.get("thermal_expansion", ())), strict=False))
-    named = {f"C{i + 1}{j + 1}": float(error) for (i, j), error in entries}
+    named = {
+        f"{symbol}{i + 1}{j + 1}": float(error)
+        for symbol, tensor in tensors.items()
+        for (i, j), error in np.ndenumerate([] if tensor is None else tensor)
+    }
     return named | {**numbers.get("constants", {})} | strains
 
 

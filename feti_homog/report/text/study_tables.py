@@ -81,7 +81,7 @@ def scatter_text(document: Document) -> str:
     if any(min(result["shares"]) < -LEAST_SHARE for result in results):
         lines.append("Negative shares: correlated numbers act against each other")
     if any(result["mesh_error"] is None for result in results):
-        lines.append("+- mesh: estimated for stiffnesses and constants alone, with [output] mesh_error = true")
+        lines.append("+- mesh: for stiffnesses, constants, conductivities alone, with [output] mesh_error = true")
     for k, number in enumerate(inputs):
         noisy = [
             result["name"]

@@ -55,7 +55,7 @@ def test_every_number_stands_under_its_head():
     assert cells[1][4] == "-" and lines[5] == f"By differences of runs: {names[1]}"
     words = "Standard error over the cells above half of the slope by"
     assert lines[6] == "Negative shares: correlated numbers act against each other"
-    assert lines[7].startswith("+- mesh: estimated for stiffnesses and constants alone")
+    assert lines[7].startswith("+- mesh: for stiffnesses, constants, conductivities alone")
     assert lines[8:] == [f"{words} {names[0]}: nu12", f"{words} {names[1]}: C11"]
 
 
