@@ -27,14 +27,14 @@ LINES = {
     "materials": 1430 + 95 + 135,
     "mesh": 5500,
     "microstructure": 2140,
-    "report": 3420 + 170 + 185,
+    "report": 3420 + 170 + 120,
     "results": 2430 + 85,
     "schema": 430,
     "studies": 2950,
     "system": 1770 + 5,
     "verify": 3100 + 170 + 70,
 }
-FILES, TOTAL = 310, 45000 + 370 + 550
+FILES, TOTAL = 310, 45000 + 370 + 490
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.0, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

@@ -28,7 +28,6 @@ AXES = (
     f"{', '.join(engineering_constants.OF_THE_CELL.values())} of the cell. nu_ij = -eps_j/eps_i under stress along i."
 )
 TINY = float(np.finfo(float).tiny)
-CSV_COLUMNS = ("name", "value", "unit", "meaning")
 NEGLIGIBLE = 1e-3
 """Couplings up to this part of sqrt(C_ii C_jj), and shears up to this part of the largest expansion, are left out. It
 is far above what irregular meshes make of symmetric cells (1e-6), and below what is known of constants (1e-2)."""
@@ -211,16 +210,6 @@ def number(value: float, width: int = 24) -> str:
     value = float(value) + 0.0  # no -0.0
     forms = [repr(value), *(f"{value:.{digits}E}" for digits in range(16, 3, -1))]
     return next(form for form in forms if len(form) <= width)
-
-
-def quoted(values: Iterable[float]) -> str:
-    """Write values as a list for MOOSE."""
-    return f"'{' '.join(number(value) for value in values)}'"
-
-
-def moose_block(name: str, **parameters: str) -> list[str]:
-    """Return the lines that form a block for MOOSE."""
-    return [f"  [{name}]", *(f"    {key} = {value}" for key, value in parameters.items()), "  []"]
 
 
 def identifier(name: str) -> str:

@@ -43,6 +43,7 @@ ANSYS_LABELS = {
 }  # fmt: skip
 SYMMETRIC21 = tuple((row, column) for row in range(6) for column in range(row, 6))
 SYMMETRIC9 = tuple((row, column) for row, column in SYMMETRIC21 if column < 3 or row == column)
+CSV_COLUMNS = ("name", "value", "unit", "meaning")
 FIBRE_AXES = ("the fibre (x3 of the cell)", "x1 of the cell", "x2 of the cell")
 COMPONENTS = ("11", "22", "33", "gamma23", "gamma13", "gamma12")
 
@@ -136,15 +137,15 @@ def moose(material: effective_material.EffectiveMaterial) -> str:
     name, C = effective_material.identifier(material.name), material.stiffness
     method, entries = ("symmetric9", SYMMETRIC9) if material.is_orthotropic else ("symmetric21", SYMMETRIC21)
     lines = [*effective_material.comments(material, "#"), "[Materials]"]
-    lines += effective_material.moose_block(
+    lines += _block(
         f"{name}_elasticity",
         type="ComputeElasticityTensor",
         fill_method=method,
-        C_ijkl=effective_material.quoted(C[i, j] for i, j in entries),
+        C_ijkl=_quoted(C[i, j] for i, j in entries),
     )
     if material.expansion is not None:
         lines += ["  # The name of the expansion belongs in eigenstrain_names of the strain."]
-        lines += effective_material.moose_block(
+        lines += _block(
             f"{name}_temperature_rise",
             type="ParsedMaterial",
             property_name=f"{name}_temperature_rise",
@@ -153,14 +154,22 @@ def moose(material: effective_material.EffectiveMaterial) -> str:
             constant_expressions="'0'",
             expression="'temperature - stress_free_temperature'",
         )
-        lines += effective_material.moose_block(
+        lines += _block(
             f"{name}_expansion",
             type="ComputeEigenstrain",
-            eigen_base=effective_material.quoted(material.expansion * TENSOR_SHEARS),
+            eigen_base=_quoted(material.expansion * TENSOR_SHEARS),
             prefactor=f"{name}_temperature_rise",
             eigenstrain_name=f"{name}_expansion",
         )
     return "\n".join([*lines, "[]"])
+
+
+def _block(name: str, **parameters: str) -> list[str]:
+    return [f"  [{name}]", *(f"    {key} = {value}" for key, value in parameters.items()), "  []"]
+
+
+def _quoted(values: Iterable[float]) -> str:
+    return f"'{' '.join(effective_material.number(value) for value in values)}'"
 
 
 def csv_table(material: effective_material.EffectiveMaterial) -> str:
@@ -183,7 +192,7 @@ def csv_table(material: effective_material.EffectiveMaterial) -> str:
         meaning = f"stiffness: stress {digits} under the unit strain {COMPONENTS[j]}"
         rows.append((f"C{i + 1}{j + 1}", C[i, j], unit, meaning))
     texts = [(name, effective_material.number(value), *words) for name, value, *words in rows]
-    return result_json.csv_text([effective_material.CSV_COLUMNS, *texts]).removesuffix("\n")
+    return result_json.csv_text([CSV_COLUMNS, *texts]).removesuffix("\n")
 
 
 FORMATS: dict[str, Callable[[effective_material.EffectiveMaterial], str]] = {
@@ -198,7 +207,7 @@ SYMMETRIES: dict[str, Callable[[Document], effective_material.EffectiveMaterial]
 def card_of(document: Document, form: str, symmetry: str = "orthotropic") -> str:
     """Return the card for a result with a stiffness or a conductivity.  Raises as `SYMMETRIES` and `FORMATS`."""
     if document.get("effective_conductivity") is not None:
-        return effective_conductor.FORMATS[form](effective_conductor.conductor(document, symmetry))
+        return effective_conductor.card(document, form, symmetry)
     return FORMATS[form](SYMMETRIES[symmetry](document))
 
 
