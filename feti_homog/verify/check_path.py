@@ -45,9 +45,10 @@ def check_breaks(findings: Findings, cell: DiscreteCell, states: States) -> None
         findings.compare("breaks", broke, expected, 1.0, f"{state.name}, bonds that broke")
         if has_toughness:
             law, damages = law_at(cell.files, damaged), (state.damage[damaged], after.damage[damaged])
-            bounds = law.absorbed_range(*damages)
             if by_events and after.point == state.point + 1:
                 bounds = (law.absorbed(law.mode(state.traction[damaged]), *damages),) * 2
+            else:
+                bounds = law.absorbed_range(*damages)
             low, high = (float(energies @ cell.files.interface.length[damaged]) / cell.area for energies in bounds)
             grown = points[after.point]["fracture_energy"] - points[state.point]["fracture_energy"]
             off = max(low - grown, grown - high, 0.0) / scale
