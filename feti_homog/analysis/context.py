@@ -150,7 +150,7 @@ class AnalysisContext:
 
     @property
     def recovers_again(self) -> bool:
-        """Return whether the run recovers interior displacements repeatedly, so that factors pay."""
+        """Return whether the run recovers interior displacements repeatedly, so that keeping factors pays off."""
         return self.states.has_place or self.case.output.sensitivities or self.case.analysis.type == "angle"
 
     def bonds(self, opening: float | None) -> BondState:

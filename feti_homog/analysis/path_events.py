@@ -190,8 +190,8 @@ def resumable(context: AnalysisContext) -> int:
         return 0
     stored_events = context.checkpoint.count()
     if (count := holding(context, stored_events)) < stored_events:
-        say(f"  event {count} of the checkpoint does not hold: it and all after it are found again")
-    begin = "there is no checkpoint: the path begins at its beginning"
+        say(f"  event {count} of the checkpoint is invalid: the run computes it and all later events again")
+    begin = "there is no checkpoint: the path starts from the beginning"
     say(f"  {f'{count} events are taken from the checkpoint' if stored_events else begin}")
     return count
 

@@ -1,4 +1,4 @@
-"""The progress of a long computation in steps: a bar on a terminal, a line a minute in a file."""
+"""The progress of a long computation in steps: a bar on a terminal, one line per minute in a file."""
 
 import time
 from collections.abc import Callable, Iterator

@@ -191,7 +191,7 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
 
     Raises:
         CaseError: with all faults.
-        TypeError: `values` is no mapping.
+        TypeError: `values` is not a mapping.
     """
     document = to_document(values)
     contents, faults = _read_sections(document, folder)

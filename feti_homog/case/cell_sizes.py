@@ -108,12 +108,12 @@ def sized(
 
 
 def default_size(cell: Cell) -> list[str]:
-    """Name `accuracy` if the default elements of a table are longer than the mean radius."""
+    """Suggest `accuracy` if the default elements for a fibre table are longer than the mean radius."""
     if cell.table is None or cell.table.width is None or cell.accuracy is not None or cell.mesh_size != Cell.mesh_size:
         return []
     ratio = cell.mesh_size / 2**cell.refine * cell.table.width / float(cell.table.radius.mean())
-    line = f"[cell] mesh_size = {cell.mesh_size:g}, the default: elements of up to {ratio:.2g} mean radii of fibres"
-    return [f"{line}; accuracy = 0.01 chooses a mesh by the error of the stiffness"] if ratio > 1.0 else []
+    line = f"[cell] mesh_size = {cell.mesh_size:g}, the default: elements up to {ratio:.2g} mean fibre radii long"
+    return [f"{line}; accuracy = 0.01 chooses a mesh by the stiffness error"] if ratio > 1.0 else []
 
 
 def fibres_and_height(cell: Cell) -> tuple[int, float]:

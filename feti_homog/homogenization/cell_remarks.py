@@ -189,7 +189,7 @@ def _law_warnings(case: Case) -> list[str]:
             section = interface_section.interface_label(number, len(case.interfaces))
             lines.append(
                 f"[{section}] tangential_stiffness = {bond.tangential_stiffness:g}: the energy of bonds whose mode "
-                f"changes depends on the way; expected {similar * bond.normal_stiffness:.7g}, of normal_stiffness "
+                f"changes depends on the path; expected {similar * bond.normal_stiffness:.7g}, of normal_stiffness "
                 "(normal_toughness / tangential_toughness) (tangential_strength / normal_strength)^2"
             )
     bond, most = case.interfaces[0], interface_section.InterfaceSection.softening_tolerance

@@ -202,7 +202,7 @@ def _checked_stiffness(material: material_forms.General) -> Float:
 
 
 def _symmetric(name: str, rows: material_forms.Matrix) -> Float:
-    """Return a matrix without its asymmetry, which is rounding; ValueError for more."""
+    """Remove the rounding asymmetry of a matrix.  Raises ValueError for a larger asymmetry."""
     matrix = np.array(rows)
     if not np.allclose(matrix, matrix.T, rtol=0.0, atol=NOISE * np.abs(matrix).max()):
         raise ValueError(f"{name} = {wording.toml_value(rows)}: expected a symmetric matrix")
@@ -261,7 +261,7 @@ def known_compliance(material: material_forms.Orthotropic | material_forms.Trans
 
 
 def transverse_ratio(material: material_forms.TransverselyIsotropic) -> float:
-    """Return nu_transverse, or E_transverse/(2 G_transverse) - 1.  Raises ValueError unless one of both is given."""
+    """Return nu_transverse, or E_transverse/(2 G_transverse) - 1.  Raises ValueError unless exactly one is given."""
     ratio, shear = material.nu_transverse, material.G_transverse
     if ratio is not None and shear is None:
         return ratio

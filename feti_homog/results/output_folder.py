@@ -169,7 +169,7 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
     lock = file_locks.Lock(directory / LOCK)
 
     def hold() -> tuple[list[Path], str]:
-        """Return new folders, innermost first, and a warning or an empty text."""
+        """Return new folders, innermost first, and a warning or an empty string."""
         made = [path for path in (directory, *directory.parents) if not path.exists()]
         try:
             directory.mkdir(parents=True, exist_ok=True)

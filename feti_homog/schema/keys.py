@@ -68,7 +68,7 @@ class Key:
         instead: hint to another key for tables where a condition fails, or empty.
         unless: other keys of the table; a table with one of them does not need the key.
         by_pair: whether sections [[interface]] may have different values of the key.
-        presentation: whether the key changes the appearance of results alone, and no number.
+        presentation: whether the key changes only the appearance of results, and no number.
     """
 
     type: ValueType

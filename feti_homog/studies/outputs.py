@@ -137,7 +137,7 @@ CASE_COLUMNS = (
     Column("point", "", "number of the point, from 1"),
     Column("realisation", "", "number of the realisation of the point, from 1"),
     Column("status", "", "`done`, `not converged`, `failed`, `damaged`, `running`, `interrupted` or `waiting`"),
-    Column("reason", "", "why there is no result; of an unfinished path its points and load"),
+    Column("reason", "", "why there is no result; for an unfinished path, its points and load"),
 )
 INPUT_COLUMNS = (Column("SECTION.KEY", "that of the key", "value of a key that varies"),)
 MODULI = {column.name for column in result_json.columns(engineering_constants.Moduli)}

@@ -128,7 +128,7 @@ class SweepTable:
 
         Returns:
             Strains (g,), g = CURVE_POINTS, and c stresses of n finished realisations, (n, g, c).  Both are empty if
-            the cases are no straight paths, or no strain rises with the load.
+            the cases are not straight paths, or no strain rises with the load.
         """
         paths = [path for path in map(path_curves.rising_strain, self.results_of(point)) if path is not None]
         if not paths:

@@ -210,5 +210,5 @@ class DiscreteCell:
 
     @property
     def rounded_energy(self) -> float:
-        """Return an energy per area for scales: without bonds, the stored energy may be rounding alone."""
+        """Return a floor (energy per area) for energy scales: a cell without bonds may store only rounding."""
         return ROUNDED_TERMS * float(np.abs(self.reuss).max()) * self.largest_strain**2

@@ -94,7 +94,7 @@ class Findings:
             self._worst[law] = replace(self._checks[law], violation=value, where=place)
 
     def compare(self, law: str, value: Any, expected: Any, scale: ArrayLike, where: Place) -> None:
-        """Record |value - expected| / scale; inf if the shapes of both differ."""
+        """Record |value - expected| / scale; inf if the shapes differ."""
         value, expected = np.asarray(value, float), np.asarray(expected, float)
         self.record(law, relative(value - expected, scale) if value.shape == expected.shape else np.inf, where)
 

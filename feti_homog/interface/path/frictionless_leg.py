@@ -30,7 +30,7 @@ class FrictionlessLeg(Leg):
                      bonds break: a point; equilibrium at the same s without these bonds.
         advance      With a linear response, predict the first break, the beginning of a contact change, and the
                      end of the leg.  Equilibrium at the first of these; if the stress is not on the line, or a bond
-                     is overloaded, an event was missed: halve the way until no event is missed.  The result is
+                     is overloaded, an event was missed: halve the step until no event is missed.  The result is
           a break    the worst bonds break: a point; equilibrium at the same s without these bonds;
           a change   a point; equilibrium a little further, where the change is beyond doubt;
           less       a point if contact states have changed.
@@ -64,7 +64,7 @@ class FrictionlessLeg(Leg):
         return self._share >= 1.0 or not self._state.converged
 
     def _settle(self, begin: PathState) -> None:
-        """Find the equilibrium at s with the bonds of `begin`.  Collective."""
+        """Find the equilibrium at the present leg fraction s, with the bonds of `begin`.  Collective."""
         self._bends_before, self._false_alarm, self._from = np.inf, False, begin
         self._go_to(self._share)
 
@@ -77,7 +77,7 @@ class FrictionlessLeg(Leg):
         return self.cell.equilibrium(self._load_at(share), bonds, lam)
 
     def _stand(self, share: float, state: Equilibrium) -> None:
-        """Set the state to an equilibrium at a leg fraction, and add the energies of the way."""
+        """Set the state to an equilibrium at a leg fraction, and add the energies since the last state."""
         if share >= self._bends_before:
             self._bends_before = np.inf
         self._share, self._state, self._bonds = share, state, state.bonds

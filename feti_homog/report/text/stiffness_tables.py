@@ -183,7 +183,7 @@ def constants(document: Document) -> list[Table]:
 
 
 def _with_estimates(document: Document) -> str:
-    """Name the kind of cell that has estimates, unlike this cell."""
+    """Name the cells for which estimates exist, unlike for this cell."""
     case, cell = document.get("case", {}), document.get("cell", {})
     if len(cell.get("fractions", ())) == 1:
         return "composites"

@@ -1,4 +1,4 @@
-"""Calls on rank 0 or on all ranks whose exceptions are raised on every rank, so that no rank waits for ever."""
+"""Calls on rank 0 or on all ranks whose exceptions are raised on every rank, so that no rank waits forever."""
 
 from __future__ import annotations
 

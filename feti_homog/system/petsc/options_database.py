@@ -48,7 +48,7 @@ def case_options(options: Mapping[str, values.Value]) -> Iterator[None]:
 
 
 def _set(database: PETSc.Options, name: str, value: values.Value | None) -> None:
-    """Set an option, without a value for an empty text; delete the option for None."""
+    """Set an option, without a value for an empty string; delete the option for None."""
     if value is None:
         database.delValue(name)
     else:
@@ -56,7 +56,7 @@ def _set(database: PETSc.Options, name: str, value: values.Value | None) -> None
 
 
 def given_options() -> dict[str, str]:
-    """Return PETSc's options by lower-case name; an option without a value has an empty text."""
+    """Return PETSc's options by lower-case name; an option without a value has an empty string."""
     return {name.lower(): value or "" for name, value in PETSc.Options().getAll().items()}
 
 
@@ -66,7 +66,7 @@ def choices(prefix: str) -> list[str]:
 
 
 def without_iterations() -> str:
-    """Return a remark on options that print iterations, for runs without iterations, else an empty text."""
+    """Return a remark on options that print iterations, for runs without iterations; else ""."""
     printing = [f"-{name}" for name in given_options() if name.startswith("feti_ksp_") and table.only_prints(name)]
     return f"{', '.join(printing)}: the run has no iterations to print" if printing else ""
 

@@ -34,9 +34,9 @@ class LocksUnsupported(FetiHomogError):
 
 
 class Lock:
-    """A lock on the file `path`, which the last holder removes; `shared` locks exclude exclusive locks alone.
+    """A lock on the file `path`, which the last holder removes; `shared` locks exclude only exclusive locks.
 
-    `acquire` tries for `timeout` seconds.  A lock is a context manager, too.
+    `acquire` tries for `timeout` seconds.  A lock is also a context manager.
     """
 
     def __init__(self, path: Path, shared: bool = False, timeout: float = LOCK_TIMEOUT_S) -> None:
@@ -141,7 +141,7 @@ def tag() -> str:
 
 
 def has_ended(name: str) -> bool:
-    """Return whether the process of a `tag` has ended; False on other machines."""
+    """Return whether the process that made a `tag` has ended; False for tags of other machines."""
     match = TAG.fullmatch(name)
     return match is not None and match["host"] == socket.gethostname() and match["began"] != _began(match["process"])
 
