@@ -37,14 +37,14 @@ def run(
 ) -> result.Result:
     """Run a case on the ranks of `comm`, by default all ranks.
 
-    Collective over `comm`; other ranks need not take part.  PETSc starts with PETSC_OPTIONS alone unless the program
-    has started it before; the section `petsc` of the case has the case options.  Returns the result on every rank.
+    Collective over `comm`; other ranks need not take part.  Unless PETSc already runs, it starts with only
+    PETSC_OPTIONS; the section `petsc` of the case has the case options.  Returns the result on every rank.
 
     Args:
         out: a folder for the files that `feti-homog run` writes; by default the run writes no files.
         fields: whether `result.fields` holds mesh, interface and states in memory, distributed over the ranks.
         resume: with `out`, continue an interrupted path in the same folder.
-        quiet: print nothing; else as the command line.
+        quiet: print nothing; otherwise print as the command line does.
 
     Raises:
         TypeError: `case` is not a Case.

@@ -76,10 +76,10 @@ def sized(
     """Set mesh size, refinement and element order of a cell by its accuracy.
 
     For an accuracy eps and elements of order p, the coarsest mesh is refined r times, with the least r such that
-    `coarse_error` / 4^(p r) <= eps. Of two orders, the result has the one with fewer nodes, about p^2 4^r. Faults go to
+    `coarse_error` / 4^(p r) <= eps. The order with fewer nodes, about p^2 4^r, is chosen. Faults are added to
     `faults`: r above MOST_REFINED, and a given linear order whose elements lock. The size of the coarsest mesh is half
-    the distance between equally many fibres on a square lattice, in two digits, and at most half the width: circles and
-    gaps have smaller elements, so still coarser meshes have hardly fewer elements.
+    the distance between as many fibres on a square lattice, to two digits, and at most half the width: circles and
+    gaps have smaller elements, so that coarser meshes would hardly have fewer elements.
 
     Args:
         table: the [cell] table of the file, with or without an order.

@@ -29,7 +29,7 @@ def _stress(name: str, *only: keys.Condition) -> Any:
 class MixedLoad:
     """Prescribed components of a macroscopic load: the strain or the stress of each, never both.
 
-    What a load of a path does not name stays as it was prescribed last; what none has named so far is free of stress.
+    On a path, components that a load does not name stay as last prescribed; they are free of stress at first.
     """
 
     E11: float | None = _strain("E11")

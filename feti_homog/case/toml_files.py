@@ -119,7 +119,7 @@ def with_values(
 ) -> dict[str, Any]:
     """Return a copy of a document with other values at some paths.
 
-    A table is merged into its section, None takes a key out, a missing section is made.  A number, from 1, selects one
+    A table is merged into its section, None removes a key, a missing section is created.  A number, from 1, selects one
     of several sections or an entry of a list; Cij are both entries of a symmetric stiffness.  Faults, which begin with
     `place`, are appended to `faults`.
     """

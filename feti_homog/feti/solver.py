@@ -237,7 +237,7 @@ class FetiSolver:
     def destroy(self) -> None:
         """Free the Krylov methods and the coarse factors after the last solve.  Collective.
 
-        Without this call, a rank frees its Krylov methods when the last reference to the solver goes.
+        Without this call, a rank frees its Krylov methods when the last reference to the solver disappears.
         """
         self._destroy_krylov()
         self.natural.destroy()

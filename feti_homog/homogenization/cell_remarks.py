@@ -58,7 +58,7 @@ def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -
 def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
     """List the remarks on a mesh and its interfaces.
 
-    Remarks concern the mesh, an [interface] without effect, and nodes that never part; `pairs` as `share_entities`.
+    They concern the mesh, an [interface] without effect, and nodes that never part; for `pairs` see `share_entities`.
     """
     lines, has_curve = [*torus.mesh.remarks], len(torus.mesh.debonded_edges) > 0
     if case.interface is None:

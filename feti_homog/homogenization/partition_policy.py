@@ -59,7 +59,7 @@ class PartitionPolicy:
             often that uncut bodies pay as long as their boundaries' dense matrices are small.
         tiles: tiles in the coarse mesh.
         across_dofs: where nothing can part, cells up to this size are cut across materials, not body by body.
-        across_piece_dofs: size of a piece across materials, with the multipliers of a smaller piece within a body.
+        across_piece_dofs: size of a piece across materials, with as many multipliers as a smaller piece within a body.
         whole_dofs: on one rank, a cell across materials is whole up to this size: one sparse factor takes less time
             than dense piece matrices, which need half the memory.
         whole_ranks: largest number of ranks with one piece per rank across materials; the Schur complements are

@@ -52,7 +52,7 @@ def plane_stiffness(material: material_forms.Material, plane: str) -> Float:
     """Return C (3, 3): [S11, S22, S12] = C [E11, E22, gamma12], symmetric positive definite, in stress units.
 
     `plane` is "stress" (S33 = 0), "strain" (E33 = 0), or "generalized", where C is the block at E33 = 0. Raises
-    ValueError, with the keys at fault, if the constants leave C open or belong to no stable material.
+    ValueError, with the keys at fault, if the constants do not determine C or belong to no stable material.
     """
     material = _elastic(material)
     if isinstance(material, material_forms.Isotropic):
@@ -76,7 +76,7 @@ def plane_stiffness(material: material_forms.Material, plane: str) -> Float:
 def conductivity(material: material_forms.Material) -> Float:
     """Return k (3, 3): q = -k grad T in the cell's axes, symmetric positive definite.
 
-    Raises ValueError, with the key at fault, for a phase without conductivity, and for another matrix.
+    Raises ValueError, with the key at fault, for a missing conductivity, and for a matrix that is not SPD.
     """
     k = material.conductivity
     if k is None:
@@ -124,7 +124,7 @@ def spatial_stiffness(material: material_forms.Material) -> Float:
 def expansion(material: material_forms.Material) -> Float | None:
     """Return the free strains (6,) per unit of temperature in the cell's axes; None if the case has no expansion.
 
-    Raises ValueError, with the keys at fault, if expansions are given twice or by half.
+    Raises ValueError, with the keys at fault, if expansions are given twice or incompletely.
     """
     free = material.expansion
     if isinstance(material, material_forms.TransverselyIsotropic):
@@ -146,7 +146,7 @@ def expansion(material: material_forms.Material) -> Float | None:
 def out_of_plane(material: material_forms.Material, plane: str) -> tuple[Float, Float]:
     """Return the rows s and e (3,): S33 = s . [S11, S22, S12], E33 = e . [S11, S22, S12], in plane strain and stress.
 
-    S33 vanishes in plane stress, E33 in plane strain.  Rows that the constants leave open are NaN.
+    S33 vanishes in plane stress, E33 in plane strain.  Rows that the constants do not determine are NaN.
     """
     # E33 = row . [S11, S22, S12] + S33 / young
     material = _elastic(material)

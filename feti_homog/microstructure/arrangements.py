@@ -163,11 +163,11 @@ def clearance(arrangement: Arrangement) -> float:
 
 
 def clear_shift(arrangement: Arrangement) -> Arrangement:
-    """Shift an arrangement such that no cell side is tangent to an outline.
+    """Shift an arrangement so that no cell side is tangent to an outline.
 
-    The candidates along an axis are the middles of the widest gaps between tangents. Among the combinations of both
-    axes the corner farthest from all outlines is selected. In symmetric cells, as of two discs, several corners are
-    equal except for rounding errors: the first is selected, so that the length unit does not matter. Corners in
+    The candidates along an axis are the middles of the widest gaps between tangents. Combined, they give corners, of
+    which the one farthest from all outlines is selected. In symmetric cells, for example with two discs, several
+    corners are equal up to rounding errors: the first is selected, so that the length unit does not matter. Corners in
     voids are excluded (`in_voids`).
     """
     size, outlines = arrangement.size, arrangement.shells[0]

@@ -139,7 +139,7 @@ class TableReader:
     def read(self, table_class: type[T], table: object, section: str, prefix: str = "") -> T | None:
         """Convert a table to an instance of `table_class`; return None if the table is faulty.
 
-        Every fault adds a line to `faults`, where keys stand as [`section`] `prefix` key.
+        Every fault adds a line to `faults`, where keys are written as [`section`] `prefix` key.
         """
         if not isinstance(table, dict):
             self.faults.append(f"{section} = {toml_value(table)}: expected a section [{section}]")

@@ -28,7 +28,7 @@ def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
 def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numbers) -> dict[str, float]:
     """Return the numbers in result.json by column name; `numbers` are i and j in Cij of a stiffness (3, 3).
 
-    Components that are noise beside the others of their point, or along the whole path, are zero.
+    Components that are noise relative to the others at their point, or along the whole path, are set to zero.
     """
     solver = document["solver"]
     cell, fractions = document["cell"], document["cell"].get("fractions", {})

@@ -1,6 +1,6 @@
 """Compute the result scatter by uncertain inputs, to compare with the scatter of random cells and the mesh error.
 
-Derivatives are exact where results have derivatives, else central differences between runs one standard deviation
+Derivatives are exact where results have them, otherwise central differences between runs one standard deviation
 below and above the mean.  A random cell may change its arrangement between these runs: the standard error of the
 slopes over the cells shows this.
 

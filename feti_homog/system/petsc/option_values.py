@@ -25,7 +25,7 @@ CASE_FILE = ".toml"
 def can_be_written(file: str) -> bool:
     """Return whether a file can be opened for writing, or created in its folder.
 
-    A pipe without a reader cannot, because opening it would wait.
+    The result is False for a pipe without a reader, because opening the pipe would block.
     """
     if not file or "\0" in file or file.endswith(os.sep):
         return False

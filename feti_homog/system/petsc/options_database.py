@@ -18,7 +18,7 @@ READ_WHEN_SOLVING = {f"feti_ksp_{key}" for key in ("converged_reason", "converge
 def case_options(options: Mapping[str, values.Value]) -> Iterator[None]:
     """Insert the options of a case below the options of the command line, for the block.
 
-    PETSc's flags have no value false: false flags are removed for the block.
+    PETSc's flags cannot be false: false flags are removed for the block.
 
     Raises:
         CaseError: before the block, if an option of this program is misspelt or has an invalid value, or if a solver
@@ -111,7 +111,7 @@ def faults_of_solvers(options: Mapping[str, str]) -> list[str]:
 
     `options` has the names without dash and the values in the database.  Every solver is made for a 1 x 1 matrix and
     applied once, because some methods fail only then.  PETSc marks the options that it reads, and prints all readable
-    options with -help.  Options that print are removed for this time.
+    options with -help.  Options that print are removed meanwhile.
     """
     faults, viewers, database, comm = [], [*filter(values.is_viewer, options)], PETSc.Options(), PETSc.COMM_SELF
     try:
