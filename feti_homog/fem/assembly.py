@@ -34,7 +34,7 @@ class Assembly:
         K: (dofs, dofs) stiffness, Eq. (28), force per length.
         Q: (dofs, v) int B^T L; a strain E has the load -Q E, Eq. (29), and the stress integral |Omega| L E + Q^T u*.
         slopes: (classes, 2) int dN/dx of the shape functions.
-        areas: (materials,) areas of the materials, with the sum |Omega|.
+        areas: (materials,) areas of the materials; their sum is |Omega|.
     """
 
     K: csr_matrix

@@ -101,7 +101,7 @@ BY_COST = PartitionPolicy(across_dofs=400_000)
 def can_be_cut_across(case: Case) -> bool:
     """Return whether subdomains may reach across materials.
 
-    Subdomains may if nothing can part and the case does not set the cut.  Jumps at nearly incompressible phases
+    They may if nothing can part and the case does not prescribe the cut.  Jumps at nearly incompressible phases
     and between very different stiffnesses need scales of single bodies; dual solver options assume single bodies.
     """
     asked, free = case.decomposition, ("auto", None, None, "torus")

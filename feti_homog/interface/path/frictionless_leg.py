@@ -86,7 +86,7 @@ class FrictionlessLeg(Leg):
         self._from = self._path_state()
 
     def _advance(self) -> Iterator[Point]:
-        """Advance past the next event, or as far as the response is straight.  Collective.
+        """Advance past the next event, or to the end of the straight response.  Collective.
 
         Raises:
             NotCarriedError: neither open nor touching faces carry the load's stresses.
@@ -134,7 +134,7 @@ class FrictionlessLeg(Leg):
         return self._used()[1] > 1.0 - UTILISATION_TIE
 
     def _approach(self, target: float, end: Sequence[DualSolution]) -> bool:
-        """Advance to the target, or as far as the response is straight.
+        """Advance to the target, or to the end of the straight response.
 
         Return whether the leg has reached the target; `end` has the solutions at the end of the leg.
         """
