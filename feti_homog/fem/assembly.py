@@ -155,7 +155,7 @@ class GroupedSum:
 
     @classmethod
     def of(cls, target: Int) -> GroupedSum:
-        """Group element entries by `target`, the sum number of every entry."""
+        """Group element entries by `target`, the index of the sum that receives each entry."""
         entries = np.argsort(target, axis=None, kind="stable")
         return cls(entries, np.unique(target.ravel()[entries], return_index=True)[1])
 
