@@ -154,7 +154,7 @@ def remove_files() -> None:
 
 
 def _began(process: int | str) -> str:
-    """Return the start of a process in clock ticks since boot, by proc(5); empty without the process."""
+    """Return the start time of a process in clock ticks since boot, by proc(5); empty if there is no process."""
     try:
         return Path(f"/proc/{process}/stat").read_text(errors="replace").rpartition(")")[2].split()[19]
     except OSError:
