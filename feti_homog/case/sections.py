@@ -129,9 +129,9 @@ class Output:
     fields: bool = key(types.boolean, "Write result.h5 and result.xdmf.", default=True)
     states: int | str = key(
         STATES,
-        "The points of a path whose fields are written: at most so many, the first, the last, those around the deepest "
-        'drops of the stress, up to half, the others evenly between; "peaks": the ends and those around all drops of '
-        'more than 1 % of the largest stress; "all". The curve has every point.',
+        "The points of a path whose fields are written. A number: at most this many points: both ends, up to half "
+        'around the deepest stress drops, the rest evenly between. "peaks": both ends and the points around all drops '
+        'of more than 1 % of the largest stress. "all": every point. The curve always has every point.',
         default=20,
         only=PATH_ANALYSIS,
     )

@@ -92,7 +92,7 @@ def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles
         bodies_alone = f"each of the {bodies} bodies is at least one"
         why = bodies_alone if bodies > asked else "pieces that METIS leaves in several parts were split"
     else:
-        why = f"METIS makes no more of {coarse_triangles} coarse triangles; a smaller mesh_size has more"
+        why = f"METIS makes no more from {coarse_triangles} coarse triangles; a smaller mesh_size gives more"
     return (f"[decomposition] subdomains = {asked}: {subdomains} were made: {why}",)
 
 

@@ -45,7 +45,7 @@ UTILISATION = "Strength of the phase, whose utilisation is computed with its lar
 
 @dataclass(frozen=True, kw_only=True)
 class FibreConductivity:
-    """Conductivities of a phase that conducts alike in all directions of the plane."""
+    """Conductivities of a phase that is isotropic in the plane."""
 
     axial: float = key(POSITIVE, "Along x3.", unit=CONDUCTIVITY_UNIT)
     transverse: float = key(POSITIVE, "In the plane.", unit=CONDUCTIVITY_UNIT)

@@ -37,7 +37,7 @@ class FrictionlessLeg(Leg):
         touch        Open faces do not carry the stresses of the load: a point where the faces touch.
         end          s = 1: a point.
 
-    A predicted change that does not come is a false alarm: up to the next change only halving finds changes.
+    A predicted change that does not occur is a false alarm: up to the next change, only halving finds changes.
     """
 
     _state: Equilibrium

@@ -66,7 +66,7 @@ class Point:
     """A point of a load path.
 
     Attributes:
-        load_factor: position on the path, 0 to 1; all legs count alike.
+        load_factor: position on the path, 0 to 1, with equal parts for all legs.
         scale: ratio of the point's state to the equilibrium `state`.
         state: equilibrium.
         broke: number of bonds that part after this state; with increments, in the step before this state.

@@ -72,7 +72,7 @@ class DeformedCell(drawn_cell.DrawnCell):
     def draw(self, axes: Axes, number: int, moved: Array) -> Any:
         """Draw the cell in a state, with its nodes at `moved` (p, 2); return the coloured triangles.
 
-        The end of a path has a range of its own if its stresses are more than twice those before.
+        The end of a path has its own colour range if its stresses are more than twice the earlier stresses.
         """
         state, (norm, colours, _) = self.state(number), self.colours
         attributes = state.attrs

@@ -142,7 +142,7 @@ class Table:
 
     @property
     def html(self) -> str:
-        """Return the table as HTML, each block as a table of its own."""
+        """Return the table as HTML, each block as a separate table."""
         notes = "".join(f"<small>{escape(line)}</small>" for line in (*self.above, *self.below))
         text = f"<table><caption>{escape(self.title)}{notes}</caption>"
         for number, (columns, part) in enumerate(self.blocks):
