@@ -1,6 +1,6 @@
-"""Locks between processes on machines that share a file system, and files that are removed with a process.
+"""Locks between processes on machines that share a file system, and files that are removed when a process ends.
 
-The system releases a lock at any end of its process, even by SIGKILL.
+The system releases a lock whenever its process ends, even by SIGKILL.
 """
 
 import contextlib
