@@ -94,7 +94,7 @@ def write(folder: Path, found: dict[int, Result]) -> list[Path]:
         print(f"{seed:>4}{modulus:>10.0f}{first:>17.2f}{peak:>10.2f}{strain:>9.5f}{points:>8}")
     peaks = np.array([r[3] for r in rows])
     mean, scatter = peaks.mean(), peaks.std(ddof=1) if len(peaks) > 1 else 0.0
-    print(f"peak: {mean:.2f} MPa in the mean, standard deviation {scatter:.2f} MPa ({100 * scatter / mean:.1f} %)")
+    print(f"peak: {mean:.2f} MPa on average, standard deviation {scatter:.2f} MPa ({100 * scatter / mean:.1f} %)")
     figure = Figure(figsize=(6.6, 4.4), layout="constrained")
     axes = figure.subplots()
     for k, result in enumerate(found.values()):

@@ -1,6 +1,6 @@
 """FETI-based homogenization of fibre composites; see the README.  Importing it starts neither MPI nor PETSc.
 
-From a program of one's own, under `mpirun` or not:
+In your own program, under `mpirun` or not:
 
     from feti_homog import Case, run
     case = Case.load("case.toml")
@@ -10,11 +10,11 @@ From a program of one's own, under `mpirun` or not:
     run(case.replace({"material.fibre.young": 80.0}))           # other values by dotted key, checked again
     run(case, out="results", fields=True).fields    # with files, and with mesh and states in memory
 
-- `Case`: a checked case, of a file (`Case.load`) or of a document of the same sections (`Case.parse`).
+- `Case`: a checked case, from a file (`Case.load`) or a document with the same sections (`Case.parse`).
 - `run`: a case's `Result`.  `run_sweep`, `collect_sweep`: results of many cases, and their table.
 - `run_fit`: constants of cases from measured values.
 - `draw_state`: the deformed cell of a state into Matplotlib's axes.  `read_state`: its fields as arrays.
-- `launch`: a program with options of its own and PETSc's, whose errors end as on the command line.
+- `launch`: run a program with its own and PETSc's options; errors end it as on the command line.
 - `CaseError`, `MeshError`, `ConvergenceError`, all of them `FetiHomogError`: raised on all ranks, `faults` in words.
 """
 

@@ -37,14 +37,14 @@ def run(
 ) -> result.Result:
     """Run a case on the ranks of `comm`, by default all ranks.
 
-    Collective over `comm`; other ranks need not take part.  PETSc starts with PETSC_OPTIONS alone unless the program
-    has started it before; the section `petsc` of the case has the case options.  Returns the result on every rank.
+    Collective over `comm`; other ranks need not take part.  Unless PETSc already runs, it starts with only
+    PETSC_OPTIONS; the section `petsc` of the case has the case options.  Returns the result on every rank.
 
     Args:
         out: a folder for the files that `feti-homog run` writes; by default the run writes no files.
         fields: whether `result.fields` holds mesh, interface and states in memory, distributed over the ranks.
         resume: with `out`, continue an interrupted path in the same folder.
-        quiet: print nothing; else as the command line.
+        quiet: print nothing; otherwise print as the command line does.
 
     Raises:
         TypeError: `case` is not a Case.
@@ -98,7 +98,7 @@ def run_sweep(
 def collect_sweep(out: str | Path, comm: Intracomm | None = None, *, pictures: bool = True) -> list[str]:
     """Write cases.csv, statistics.csv and the sweep picture.  Collective.
 
-    The sweep may still be running.  Returns lines to print.  Raises CaseError if `out` is no sweep folder.
+    The sweep may still be running.  Returns lines to print.  Raises CaseError if `out` is not a sweep folder.
     """
     with _started(comm) as comm:
         from feti_homog.studies import collect
@@ -176,7 +176,7 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
 
 
 def _start_petsc(words: Sequence[str], comm: Intracomm) -> None:
-    """Start PETSc with the options in `words` and in PETSC_OPTIONS.  Collective.  Raises CaseError for faulty ones."""
+    """Start PETSc with the options `words` and PETSC_OPTIONS.  Collective.  Raises CaseError for faulty options."""
     others, of_environment = option_values.split_argv(os.environ.get("PETSC_OPTIONS", "").split())
     options = option_values.named_values([*of_environment, *words])
     faults = [f"PETSC_OPTIONS: {word}: expected options of PETSc and their values" for word in others]
@@ -193,9 +193,9 @@ def _start_petsc(words: Sequence[str], comm: Intracomm) -> None:
 def folder(name: str | Path) -> Path:
     """Convert a name to a path.  Raises CaseError for null characters, and for "", which Path takes for "."."""
     if name == "":
-        raise CaseError('"" is no name of a folder; the current one is "."')
+        raise CaseError('"" is not a folder name; the current folder is "."')
     if "\0" in str(name):
-        raise CaseError(f"{str(name)!r} is no name of a folder: names have no null characters")
+        raise CaseError(f"{str(name)!r} is not a folder name: names have no null characters")
     return Path(name)
 
 

@@ -39,7 +39,7 @@ def _command(words: Sequence[str], comm: Intracomm) -> int:
     actions = next(action.choices for action in commands._actions if isinstance(action, argparse._SubParsersAction))
     ours = {name[2:] for action in actions.values() for name in action._option_string_actions if name.startswith("--")}
     if misplaced := sorted(ours & PETSc.Options().getAll().keys() - {"help"}):
-        raise CaseError(*(f"command line: -{name} is no option of PETSc; did you mean --{name}?" for name in misplaced))
+        raise CaseError(*(f"command line: -{name} is not a PETSc option; did you mean --{name}?" for name in misplaced))
     arguments = parsed(commands, words or ["--help"], comm)
     module, _, name = arguments.action.partition(".")
     getattr(importlib.import_module(f"feti_homog.commands.{module}"), name)(arguments, comm)

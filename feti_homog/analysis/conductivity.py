@@ -42,7 +42,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 def closed_forms(cell: unit_cell.TornCell) -> phase_bounds.ConductivityEstimates | None:
     """Return closed forms of a cell; None with voids, debonded arcs, and phases with a direction in the plane.
 
-    A fibre of radius a with the conductance h acts as one of the conductivity 1 / (1/k + 1/(h a)).  Collective.
+    A fibre of radius a with the conductance h acts like a fibre with conductivity 1 / (1/k + 1/(h a)).  Collective.
     """
     tensors = {phase: laws.conductivity(cell.case.material_of(phase)) for phase in cell.summary.phases}
     alike = all(np.array_equal(k, np.diag([k[0, 0], k[0, 0], k[2, 2]])) for k in tensors.values())

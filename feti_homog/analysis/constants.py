@@ -100,7 +100,7 @@ def _comparisons(cell: unit_cell.TornCell, fractions: Mapping[str, float]) -> di
 
 
 def fibre_radii(cell: unit_cell.TornCell) -> dict[str, float] | None:
-    """Return a radius of each fibre phase; None unless closed estimates hold, for which springs need equal radii."""
+    """Return a radius for each fibre phase; None if closed estimates do not apply (on springs, radii must be equal)."""
     summary, case, has_springs = cell.summary, cell.case, phase_laws.has_springs(cell.case)
     radii = {phase: summary.radii[summary.constituent_phase == k] for k, phase in enumerate(summary.phases) if k}
     is_plain = phase_names.COATING not in summary.phases and all(bond.between is None for bond in case.interfaces)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class CellLoads:
-    """The loads of a cell, and its averages under them.
+    """The loads of a cell, and averages over the cell under each load.
 
     Attributes:
         problems: the plane problem, in which faces may touch; in generalized plane strain also the axial problem.
@@ -105,7 +105,7 @@ class AnalysisContext:
         resume: whether a path continues from the checkpoint.
         log: function that receives a line about each path event.
         events: name of the file with all these lines.
-        opening: function of the context: the text of entries of result.json known before the analysis.  Collective.
+        opening: function of the context for the entries of result.json before the analysis, as text.  Collective.
         undetermined: undetermined strains at each point under one load.
         excess: largest ratio of the strains under one load to the strains of the bonded cell.
         notes: remarks on the result.
@@ -150,7 +150,7 @@ class AnalysisContext:
 
     @property
     def recovers_again(self) -> bool:
-        """Return whether the run recovers interior displacements repeatedly, so that factors pay."""
+        """Return whether the run recovers interior displacements repeatedly, so that keeping factors pays off."""
         return self.states.has_place or self.case.output.sensitivities or self.case.analysis.type == "angle"
 
     def bonds(self, opening: float | None) -> BondState:

@@ -28,13 +28,13 @@ SUFFIXES = ("", "_axial")
 class Work:
     """The energies per cell area up to a path point.
 
-    Breaks lose the work of the loads minus the stored energy.
+    The loss in breaks is the work of the loads minus the stored energy.
 
     Attributes:
-        all_equilibria: energies if every bond breaks at its break load, through the snap-back of the first leg.
+        all_equilibria: energies along all equilibria, where each bond breaks at its break load, with snap-back.
         load_controlled: loss if the load only rises on the first leg, as in a test.  A bond in a snap-back then
             breaks at the largest load t so far and loses (t / break load)^2 times the energy, because the response
-            has degree one in the load.
+            is homogeneous in the load.
     """
 
     all_equilibria: path_points.Energies = path_points.NO_ENERGIES
@@ -190,8 +190,8 @@ def resumable(context: AnalysisContext) -> int:
         return 0
     stored_events = context.checkpoint.count()
     if (count := holding(context, stored_events)) < stored_events:
-        say(f"  event {count} of the checkpoint does not hold: it and all after it are found again")
-    begin = "there is no checkpoint: the path begins at its beginning"
+        say(f"  event {count} of the checkpoint is invalid: the run computes it and all later events again")
+    begin = "there is no checkpoint: the path starts from the beginning"
     say(f"  {f'{count} events are taken from the checkpoint' if stored_events else begin}")
     return count
 
@@ -199,8 +199,8 @@ def resumable(context: AnalysisContext) -> int:
 def holding(context: AnalysisContext, count: int) -> int:
     """Count the valid events among the first `count` of the checkpoint.  Collective.
 
-    Completes and checks the last events, back to the point at which F lambda has confirmed every problem.  Events from
-    a failed check or a wrong mean onwards are not valid.
+    Completes and checks the last events, back to the point at which F lambda has confirmed every problem.  Events are
+    invalid from the first failed check or wrong mean on.
     """
     first, waiting = count, set(SUFFIXES[: len(context.loads.problems)])
     while first:

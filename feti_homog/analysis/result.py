@@ -72,7 +72,7 @@ class Result:
     """The result of a case, equal on all ranks except for `fields`.
 
     `print` shows a short summary, a notebook shows tables.  The manual lists all keys of result.json; entries that the
-    analysis does not compute are None.  Constants are attributes, too: `result.E1` is that of `moduli` or `constants`.
+    analysis does not compute are None.  Constants are attributes, too: `result.E1` comes from `moduli` or `constants`.
 
     Attributes:
         effective_stiffness: L^ef, (3, 3) or in generalized plane strain (6, 6); its columns are the stresses under the
@@ -236,7 +236,7 @@ class Result:
 
         With s = sqrt(toughness / toughness in the case), s times the loads and s^2 times the toughness of every
         interface, the same events have s times the strains and stresses and s^2 times the energies, provided that
-        bonds break by energy on springs of fixed stiffness.  The result has no fields, states and digest, which only a
+        bonds break by energy on springs of fixed stiffness.  The result has no fields, states or digest, which only a
         run makes.  Raises ValueError for any other result, and for a toughness that is not positive.
         """
         from feti_homog.analysis import path_scaling  # used only for paths by energy

@@ -1,4 +1,4 @@
-"""The progress of a long computation in steps: a bar on a terminal, a line a minute in a file."""
+"""The progress of a long computation in steps: a bar on a terminal, one line per minute in a file."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -18,7 +18,7 @@ def shown(
     """Show the finished share of a computation, the rate of steps, and the time used and left.
 
     The block calls `advance(share, count, text, known)` after each step; `known` steps were not computed here.  The
-    time left supposes that the rest of the share takes as long as the share since the last known step.
+    time left assumes that the rest of the share takes as long as the share since the last known step.
     """
     if (within := progress.within) is not None:
         yield lambda share, count, text, known: within(share, f"{label} {share:.0%}, {text}")

@@ -70,9 +70,9 @@ class Case:
     def replace(self, changes: Mapping[str, Any]) -> Case:
         """Return the checked case with other values by dotted key, as `{"material.fibre.young": 80.0}`.
 
-        The other keys are those that the file or document gives.  A number, from 1, selects one of several sections or
-        an entry of a list, as `interface.2.friction` and `material.fibre.expansion.3`; `material.fibre.stiffness.C12`
-        are both entries; None takes a key out.  Raises CaseError with all faults.
+        All other keys stay as in the file or document.  A number, from 1, selects one of several sections or an entry
+        of a list, as in `interface.2.friction` and `material.fibre.expansion.3`; `material.fibre.stiffness.C12` sets
+        both symmetric entries; None removes a key.  Raises CaseError with all faults.
         """
         (document, folder), faults = self.source, list[str]()
         changed = with_values(document, dict(leaves(to_document(changes))), faults)
@@ -191,7 +191,7 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
 
     Raises:
         CaseError: with all faults.
-        TypeError: `values` is no mapping.
+        TypeError: `values` is not a mapping.
     """
     document = to_document(values)
     contents, faults = _read_sections(document, folder)

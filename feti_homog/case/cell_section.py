@@ -46,7 +46,7 @@ random_key, meshed_key = partial(key, only=RANDOM), partial(key, only=MESHED)
 class Cell:
     """Geometry of the periodic cell and its mesh. Keys of another geometry keep their defaults.
 
-    Two fields are no keys: `table` has the contents of `file` or `fibre_list` for geometry = "table", with the cell
+    Two fields are not keys: `table` has the contents of `file` or `fibre_list` for geometry = "table", with the cell
     size, and `matched` has the fibres of `match`.
     """
 

@@ -76,10 +76,10 @@ def sized(
     """Set mesh size, refinement and element order of a cell by its accuracy.
 
     For an accuracy eps and elements of order p, the coarsest mesh is refined r times, with the least r such that
-    `coarse_error` / 4^(p r) <= eps. Of two orders, the result has the one with fewer nodes, about p^2 4^r. Faults go to
+    `coarse_error` / 4^(p r) <= eps. The order with fewer nodes, about p^2 4^r, is chosen. Faults are added to
     `faults`: r above MOST_REFINED, and a given linear order whose elements lock. The size of the coarsest mesh is half
-    the distance between equally many fibres on a square lattice, in two digits, and at most half the width: circles and
-    gaps have smaller elements, so still coarser meshes have hardly fewer elements.
+    the distance between as many fibres on a square lattice, to two digits, and at most half the width: circles and
+    gaps have smaller elements, so that coarser meshes would hardly have fewer elements.
 
     Args:
         table: the [cell] table of the file, with or without an order.
@@ -108,12 +108,12 @@ def sized(
 
 
 def default_size(cell: Cell) -> list[str]:
-    """Name `accuracy` if the default elements of a table are longer than the mean radius."""
+    """Suggest `accuracy` if the default elements for a fibre table are longer than the mean radius."""
     if cell.table is None or cell.table.width is None or cell.accuracy is not None or cell.mesh_size != Cell.mesh_size:
         return []
     ratio = cell.mesh_size / 2**cell.refine * cell.table.width / float(cell.table.radius.mean())
-    line = f"[cell] mesh_size = {cell.mesh_size:g}, the default: elements of up to {ratio:.2g} mean radii of fibres"
-    return [f"{line}; accuracy = 0.01 chooses a mesh by the error of the stiffness"] if ratio > 1.0 else []
+    line = f"[cell] mesh_size = {cell.mesh_size:g}, the default: elements up to {ratio:.2g} mean fibre radii long"
+    return [f"{line}; accuracy = 0.01 chooses a mesh by the stiffness error"] if ratio > 1.0 else []
 
 
 def fibres_and_height(cell: Cell) -> tuple[int, float]:

@@ -60,17 +60,17 @@ ARCS = types.list_of(types.table_of(Arc, ""), "a list of arcs {fibre, centre, an
 
 @dataclass(frozen=True, kw_only=True)
 class InterfaceSection:
-    """Bonding of fibres and matrix: what is debonded from the start, and the tractions that debond more.
+    """Bonding of fibres and matrix: arcs debonded from the start, and tractions at which further bonds break.
 
-    Without this section bonding is perfect. Several sections [[interface]], each with its pair of phases, have the same
-    contact, law with its teeth, branch and growth, and scatter.
+    Without this section bonding is perfect. Several sections [[interface]], one per pair of phases, must have the same
+    contact, scatter, and law with its teeth, branch and growth.
 
     None stands for an unlimited strength.
     """
 
     contact: bool = key(
         types.boolean,
-        "true: debonded faces do not overlap, they touch, with friction where there is a coefficient. false: they "
+        "true: debonded faces may touch, with friction if a coefficient is given, but not overlap. false: they "
         "overlap freely.",
         default=True,
         only=kinds.MECHANICAL,
@@ -87,15 +87,15 @@ class InterfaceSection:
     )
     friction_on_damage: bool = pair_key(
         types.boolean,
-        "true: friction acts on the damaged share of bonds that hold, too, with the whole of their pressure. false: on "
-        "broken bonds alone.",
+        "true: friction also acts on the damaged fraction of unbroken bonds, under their full pressure. false: only on "
+        "broken bonds.",
         default=False,
         only=(kinds.PATH_ANALYSIS, kinds.SOFTENING),
     )
     debonded: tuple[Arc, ...] = pair_key(
         ARCS,
-        'What is debonded from the start; needed in type = "angle", and in type = "stiffness" unless the cell is a '
-        'mesh (there lines in a physical curve "debonded" are debonded too).',
+        'Arcs debonded from the start; required for type = "angle", and for type = "stiffness" unless the cell is a '
+        'mesh (whose lines in a physical curve "debonded" are debonded, too).',
         default=(),
     )
     normal_stiffness: float | None = pair_key(

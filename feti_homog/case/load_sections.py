@@ -29,7 +29,7 @@ def _stress(name: str, *only: keys.Condition) -> Any:
 class MixedLoad:
     """Prescribed components of a macroscopic load: the strain or the stress of each, never both.
 
-    What a load of a path does not name stays as it was prescribed last; what none has named so far is free of stress.
+    On a path, components that a load does not name stay as last prescribed; they are free of stress at first.
     """
 
     E11: float | None = _strain("E11")
@@ -190,7 +190,7 @@ class Envelope(AnalysisSection):
 
 @dataclass(frozen=True, kw_only=True)
 class LoadPath(AnalysisSection):
-    """Macroscopic loads that are gone through, straight from zero to each waypoint. Give strain, to or waypoints."""
+    """Macroscopic loads along straight lines from zero through all waypoints. Give strain, to or waypoints."""
 
     breaks: ClassVar[bool] = True
     is_followed: ClassVar[bool] = True
@@ -210,8 +210,8 @@ class LoadPath(AnalysisSection):
     )
     waypoints: tuple[Strain | MixedLoad, ...] | None = key(
         WAYPOINTS,
-        "Loads that are gone through one after the other, each a strain or a table as in to; each differs from the one "
-        "before. What a table does not name stays as it was prescribed last, at first free of stress.",
+        "Loads that the path reaches in turn, each a strain or a table as in to; each differs from the one before. "
+        "Components that a table does not name stay as last prescribed, at first free of stress.",
         default=None,
     )
     method: str = key(
@@ -222,18 +222,18 @@ class LoadPath(AnalysisSection):
     increments: int | None = key(
         types.integer(least=1, most=1_000_000),
         "Number of load steps of the whole path, at least one for each waypoint. Steps end on every waypoint if it "
-        "is a multiple of their number; others pass by the corners of the path.",
+        "is a multiple of the number of waypoints; otherwise they cut the corners of the path.",
         only=kinds.BY_INCREMENTS,
     )
     release: str = key(
         types.choice("all", "worst"),
-        'In a step "all" bonds over their strength break at once, or the "worst" first, until none is over.',
+        'In a step, "all" overloaded bonds break at once, or the "worst" first, until none is overloaded.',
         default="all",
         only=kinds.BY_INCREMENTS,
     )
     max_events: int = key(
         types.integer(least=1, most=10**9),
-        "Stop after so many events, with exit code 3; --resume with a higher number goes on.",
+        "Stop after this many events, with exit code 3; --resume with a higher number continues.",
         default=100_000,
         only=kinds.BY_EVENTS,
     )

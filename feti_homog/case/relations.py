@@ -61,7 +61,7 @@ def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], pl
 def axes_lines(
     kind: str, section: load_sections.AnalysisSection, materials: Mapping[str, material_forms.Material], plane: str
 ) -> tuple[str, ...]:
-    """Return a remark on axes that a user could mistake for ply axes, in generalized plane strain alone."""
+    """Return a remark on axes that a user could mistake for ply axes, only in generalized plane strain."""
     if plane != voigt.GENERALIZED.name:
         return ()
     from feti_homog.materials import engineering_constants  # needed in generalized plane strain alone
@@ -150,7 +150,7 @@ def _of_branch(interface: InterfaceSection) -> dict[str, Any]:
 
 
 def _faults_within(interface: InterfaceSection, table: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the faults of an interface section: softening numbers, too little energy, and friction.
+    """Yield the faults of an interface section: softening numbers, too small toughness, and friction.
 
     `table` is the section as in the file; a separate rule reports its missing keys.
     """

@@ -19,7 +19,7 @@ from feti_homog.schema import key, keys, limits, types, wording
 Scalar = str | int | float | bool
 
 PREFIXED = r"feti_\w+"  # options of [petsc]
-OPTION_EXPECTED = "a text, a number, true or false"
+OPTION_EXPECTED = "a string, a number, true or false"
 SWEEP = "sweep"
 UNCERTAINTY, CORRELATION = "uncertainty", "correlation"
 DIFFERENTIABLE = ("stiffness", "load", "conductivity")
@@ -101,23 +101,23 @@ class Analysis:
 
 @dataclass(frozen=True, kw_only=True)
 class Decomposition:
-    """Into which subdomains the cell is cut. Give one of the first two keys, or neither."""
+    """Decomposition of the cell into subdomains. Give one of the first two keys, or neither."""
 
     subdomains: int | None = key(
         types.integer(least=1, most=1_000_000),
-        "Number of subdomains, at least that of the bodies; large bodies are cut to the fastest size.",
+        "Number of subdomains, at least one per body; by default, large bodies are cut to the fastest size.",
         absent="automatic",
     )
     max_dofs: int | None = key(
         types.integer(least=100, most=10**9),
-        "Bodies are cut such that no subdomain has many more unknowns than this.",
+        "Bodies are cut so that no subdomain has many more unknowns than this.",
         absent="automatic",
     )
     cut: str = key(
         types.choice("auto", "bodies"),
-        "What is cut: bodies one by one; or what is faster, which in cells up to 400 000 unknowns in which nothing can "
-        "part is the whole cell, across its materials, unless stiffnesses differ by more than 1e4, or one of the other "
-        "keys or an option of the solver is given, other than its tolerances and those that only print.",
+        "bodies: each body is cut by itself. auto: the faster way, which is to cut the whole cell across its materials "
+        "if nothing can part, unknowns are at most 400 000, stiffnesses differ by at most 1e4, and neither another key "
+        "nor a solver option is given, except tolerances and options that only print.",
         default="auto",
     )
 
@@ -129,9 +129,9 @@ class Output:
     fields: bool = key(types.boolean, "Write result.h5 and result.xdmf.", default=True)
     states: int | str = key(
         STATES,
-        "The points of a path whose fields are written: at most so many, the first, the last, those around the deepest "
-        'drops of the stress, up to half, the others evenly between; "peaks": the ends and those around all drops of '
-        'more than 1 % of the largest stress; "all". The curve has every point.',
+        "The points of a path whose fields are written. A number: at most this many points: both ends, up to half "
+        'around the deepest stress drops, the rest evenly between. "peaks": both ends and the points around all drops '
+        'of more than 1 % of the largest stress. "all": every point. The curve always has every point.',
         default=20,
         only=PATH_ANALYSIS,
     )
@@ -186,13 +186,13 @@ class Unknown:
 
 @dataclass(frozen=True, kw_only=True)
 class Measured:
-    """A measured NAME = {value, std}, of several tests as measured.NAME in a section [[test]] for each."""
+    """A measured value NAME = {value, std}; for several tests, measured.NAME in a section [[test]] per test."""
 
     value: float = key(
         types.real(),
-        "Measured value. Names of a stiffness are those of `sensitivities` in result.json, such as E1 or G_axial: E1, "
-        "E2, G12 are across the fibres, E_axial, G_axial, expansion_axial along them. Those of a path are those of "
-        "cases.csv, such as onset_S11 and peak_S11. A section [[test]] has besides the keys in which its case differs, "
+        "Measured value. Names for a stiffness are as in `sensitivities` of result.json, such as E1 or G_axial: E1, "
+        "E2, G12 are across the fibres, E_axial, G_axial, expansion_axial along them. Names for a path are as in "
+        "cases.csv, such as onset_S11 and peak_S11. A section [[test]] also has the keys in which its case differs, "
         "such as cell.fibre_fraction = 0.5.",
     )
     std: float = key(STD, "Standard deviation of the measurement.")

@@ -51,12 +51,12 @@ def read_document(path: str | Path) -> dict[str, Any]:
 def to_document(values: object) -> dict[str, Any]:
     """Convert Python and NumPy values to TOML types.
 
-    NumPy scalars become numbers, arrays and tuples become lists, paths become texts. Values of other types stay as they
-    are: the keys refuse them.
+    NumPy scalars become numbers, arrays and tuples become lists, paths become strings. Values of other types stay
+    unchanged: the keys refuse them.
 
     Raises:
-        TypeError: the values are no mapping.
-        CaseError: a key is no text, an integer is too large for messages, or tables are too long, too deep or a circle.
+        TypeError: the values are not a mapping.
+        CaseError: a key is not a string, an integer is too large for messages, or tables are long, deep or circular.
     """
     if not isinstance(values, Mapping):
         raise TypeError(
@@ -119,7 +119,7 @@ def with_values(
 ) -> dict[str, Any]:
     """Return a copy of a document with other values at some paths.
 
-    A table is merged into its section, None takes a key out, a missing section is made.  A number, from 1, selects one
+    A table is merged into its section, None removes a key, a missing section is created.  A number, from 1, selects one
     of several sections or an entry of a list; Cij are both entries of a symmetric stiffness.  Faults, which begin with
     `place`, are appended to `faults`.
     """
@@ -135,7 +135,7 @@ def with_values(
                 else:
                     table = table.setdefault(name, {})
                 if not isinstance(table, dict | list):
-                    faults.append(f"{place}{wording.dotted_key(path)}: {wording.toml_value(name)} is no section")
+                    faults.append(f"{place}{wording.dotted_key(path)}: {wording.toml_value(name)} is not a section")
                     return document
             table, name = _one_of(table, last), wording.dotted_key(above)
             if isinstance(table, list):
@@ -155,7 +155,7 @@ def with_values(
 
 
 def _one_of(table: Any, name: str) -> Any:
-    """Return the only section or row of a list, unless `name` is the number of the section; else the table."""
+    """Return the only entry of a list, unless `name` is a section number; return any other table unchanged."""
     is_one = isinstance(table, list) and len(table) == 1
     return table[0] if is_one and isinstance(table[0], list if name.isdecimal() else dict | list) else table
 
@@ -166,11 +166,11 @@ def short_digest(content: bytes) -> str:
 
 
 def _named_items(table: Mapping[Any, Any], path: TomlPath, faults: list[str]) -> list[tuple[str, Any]]:
-    """Return the items of a table, and report all keys that are no text."""
+    """Return the items of a table, and report every key that is not a string."""
     wrong = [name for name in table if not isinstance(name, str)]
     if wrong:
         place = f"[{wording.dotted_key(path)}] " if path else ""
-        faults += [f"{place}{name!r}: expected a text as key, not {_article(name)}" for name in wrong]
+        faults += [f"{place}{name!r}: expected a string as key, not {_article(name)}" for name in wrong]
     return [(str(name), value) for name, value in table.items() if isinstance(name, str)]
 
 

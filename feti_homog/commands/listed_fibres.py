@@ -54,7 +54,7 @@ def table(source: Path) -> str:
 
 
 def _words(values: Float) -> list[str]:
-    """Convert numbers (N,) to exact decimal texts; NaN to an empty text."""
+    """Convert numbers (N,) to exact decimal strings; NaN to an empty string."""
     return ["" if np.isnan(value) else repr(value) for value in values.tolist()]
 
 

@@ -34,7 +34,7 @@ class Assembly:
         K: (dofs, dofs) stiffness, Eq. (28), force per length.
         Q: (dofs, v) int B^T L; a strain E has the load -Q E, Eq. (29), and the stress integral |Omega| L E + Q^T u*.
         slopes: (classes, 2) int dN/dx of the shape functions.
-        areas: (materials,) areas of the materials, with the sum |Omega|.
+        areas: (materials,) areas of the materials; their sum is |Omega|.
     """
 
     K: csr_matrix
@@ -155,7 +155,7 @@ class GroupedSum:
 
     @classmethod
     def of(cls, target: Int) -> GroupedSum:
-        """Group element entries by `target`, the sum number of every entry."""
+        """Group element entries by `target`, the index of the sum that receives each entry."""
         entries = np.argsort(target, axis=None, kind="stable")
         return cls(entries, np.unique(target.ravel()[entries], return_index=True)[1])
 

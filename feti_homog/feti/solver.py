@@ -208,7 +208,7 @@ class FetiSolver:
         return solutions
 
     def completed(self, solution: DualSolution) -> DualSolution:
-        """Return the solution with alpha; without, it must belong to the present state.  Collective."""
+        """Return the solution with alpha; a solution that lacks alpha must belong to the present state.  Collective."""
         return solution if solution.alpha is not None else self._jumps.completed(solution, self.d)
 
     def boundary_displacement(self, solution: DualSolution) -> Float:
@@ -237,7 +237,7 @@ class FetiSolver:
     def destroy(self) -> None:
         """Free the Krylov methods and the coarse factors after the last solve.  Collective.
 
-        Without this call, a rank frees its Krylov methods when the last reference to the solver goes.
+        Without this call, a rank frees its Krylov methods when the last reference to the solver disappears.
         """
         self._destroy_krylov()
         self.natural.destroy()

@@ -61,7 +61,7 @@ class SolverOptions:
         )
 
     def want_soft_modes(self, bodies_are_cut: bool) -> bool:
-        """Return whether to search for soft modes: if an option says so, or by default in cut bodies."""
+        """Return whether to search for soft modes: on request, or by default in cut bodies."""
         return self.coarse_space == "adaptive" or (self.coarse_space == "auto" and bodies_are_cut)
 
 

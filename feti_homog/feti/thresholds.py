@@ -13,7 +13,7 @@ class Thresholds:
     """The sizes at which the solver changes its method.  Tests and studies may replace the defaults.
 
     "Measured" refers to `scripts/measure_thresholds.py NAME VALUE...` with the values in brackets; "vectors" are coarse
-    vectors a subdomain.  Numbers without a unit are ratios or counts.
+    vectors per subdomain.  Numbers without a unit are ratios or counts.
 
     Attributes:
         dense_boundary_dofs: largest number n of boundary dofs for which `-feti_dual_operator auto` makes dense
@@ -96,7 +96,7 @@ KEPT_EXCHANGES = 4
 # and the preconditioner by triangular solves (`scripts/benchmark_path`).
 DENSE_INVERSE_COST = 1 / 700
 # Largest lambda / mu of mixed elements in the diagonal of K that scales jumps (`scripts/robustness --poisson`).  Fibres
-# beside a matrix with the same modulus and nu = 0.4999 take 15 iterations and 9 coarse vectors a subdomain with 2, 11
+# beside a matrix with the same modulus and nu = 0.4999 take 15 iterations and 9 coarse vectors per subdomain with 2, 11
 # iterations with 9, 36 without a bound; pieces beside fibres a thousand times stiffer 15, 15 and 79 iterations.
 SCALED_LAME = 2.0
 # Columns up to which dense products one after the other are faster than all at once (`scripts/measure_kernels.py`).

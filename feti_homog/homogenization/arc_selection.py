@@ -102,7 +102,7 @@ class EstimatedNodes:
 
 
 def fibre_faults(case: Case, centres: Float) -> list[str]:
-    """List faults in the fibres of arcs; centres (fibres, 2) are NaN for fibres without a centre."""
+    """List faults in all debonded arcs; centres (fibres, 2) are NaN for fibres without a centre."""
     lines = []
     for pair, interface in enumerate(case.interfaces):
         label = interface_section.interface_label(pair, len(case.interfaces))

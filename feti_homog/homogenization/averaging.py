@@ -111,7 +111,7 @@ class Homogenization:
     def response(self, state: Equilibrium, scale: float, brief: bool = False) -> Response:
         """Average an equilibrium, multiplied by `scale`.  Collective.
 
-        If `brief`, average a state without kernel amplitudes from its multipliers, with contact checks alone.
+        If `brief`, average a state without kernel amplitudes from its multipliers, and check only the contact.
 
         Raises:
             ConvergenceError: the numbers of the state are not finite.

@@ -58,7 +58,7 @@ def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -
 def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
     """List the remarks on a mesh and its interfaces.
 
-    Remarks concern the mesh, an [interface] without effect, and nodes that never part; `pairs` as `share_entities`.
+    They concern the mesh, an [interface] without effect, and nodes that never part; for `pairs` see `share_entities`.
     """
     lines, has_curve = [*torus.mesh.remarks], len(torus.mesh.debonded_edges) > 0
     if case.interface is None:
@@ -92,7 +92,7 @@ def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles
         bodies_alone = f"each of the {bodies} bodies is at least one"
         why = bodies_alone if bodies > asked else "pieces that METIS leaves in several parts were split"
     else:
-        why = f"METIS makes no more of {coarse_triangles} coarse triangles; a smaller mesh_size has more"
+        why = f"METIS makes no more from {coarse_triangles} coarse triangles; a smaller mesh_size gives more"
     return (f"[decomposition] subdomains = {asked}: {subdomains} were made: {why}",)
 
 
@@ -189,7 +189,7 @@ def _law_warnings(case: Case) -> list[str]:
             section = interface_section.interface_label(number, len(case.interfaces))
             lines.append(
                 f"[{section}] tangential_stiffness = {bond.tangential_stiffness:g}: the energy of bonds whose mode "
-                f"changes depends on the way; expected {similar * bond.normal_stiffness:.7g}, of normal_stiffness "
+                f"changes depends on the path; expected {similar * bond.normal_stiffness:.7g}, of normal_stiffness "
                 "(normal_toughness / tangential_toughness) (tangential_strength / normal_strength)^2"
             )
     bond, most = case.interfaces[0], interface_section.InterfaceSection.softening_tolerance

@@ -95,7 +95,7 @@ class SharedVertices:
     ) -> list[Array]:
         """Combine the values (n, k) of equal rows (n, 3) on home ranks.  Collective.
 
-        `combine` takes a number of each row, and the values.  The results are arrays with the lengths of `parts`.
+        `combine` takes the numbers of equal rows, and the values.  The results are arrays with the lengths of `parts`.
         """
         comm, home = self._comm, rows[:, 1:].sum(axis=1) // 2 % self._comm.size
         rows, values, source, position = distributed_arrays.exchange(

@@ -57,7 +57,7 @@ class EnergyErrors:
 
     @property
     def signed(self) -> Float:
-        """The signed error (k, k): computed less exact."""
+        """The signed error (k, k): computed - exact."""
         return self.elements + self.arcs
 
     @property
@@ -107,7 +107,7 @@ def energy_errors(
 
 
 def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
-    """Return the ratios of element and arc errors to errors with `fewer` halvings less.  Collective."""
+    """Return the ratios of element and arc errors to errors on a lattice `fewer` halvings coarser.  Collective."""
     order = cell.lattice.order
     if cell.summary.across and fewer:
         return SAMPLED[any(s.is_mixed for s in cell.subdomains)]
@@ -117,7 +117,7 @@ def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
 
 
 def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
-    """Return whether the coarser mesh gives the error.  Collective.
+    """Return whether the mesh error follows from a coarser mesh.  Collective.
 
     Errors fall more slowly at corners and tips.  The result is false for cells with fibres other than circles and
     ellipses, or with straight sides at voids; and for debonded arcs with quadratic elements, or with tips to which the

@@ -59,7 +59,7 @@ class PartitionPolicy:
             often that uncut bodies pay as long as their boundaries' dense matrices are small.
         tiles: tiles in the coarse mesh.
         across_dofs: where nothing can part, cells up to this size are cut across materials, not body by body.
-        across_piece_dofs: size of a piece across materials, with the multipliers of a smaller piece within a body.
+        across_piece_dofs: size of a piece across materials, with as many multipliers as a smaller piece within a body.
         whole_dofs: on one rank, a cell across materials is whole up to this size: one sparse factor takes less time
             than dense piece matrices, which need half the memory.
         whole_ranks: largest number of ranks with one piece per rank across materials; the Schur complements are
@@ -101,7 +101,7 @@ BY_COST = PartitionPolicy(across_dofs=400_000)
 def can_be_cut_across(case: Case) -> bool:
     """Return whether subdomains may reach across materials.
 
-    Subdomains may if nothing can part and the case does not set the cut.  Jumps at nearly incompressible phases
+    They may if nothing can part and the case does not prescribe the cut.  Jumps at nearly incompressible phases
     and between very different stiffnesses need scales of single bodies; dual solver options assume single bodies.
     """
     asked, free = case.decomposition, ("auto", None, None, "torus")

@@ -29,7 +29,7 @@ POWERS = {"strength": 1, "toughness": 2}
 def problems(case: Case) -> tuple[Problem, ...]:
     """Return the plane problem and, in generalized plane strain, the axial problem; expansions add a temperature.
 
-    Conduction is a problem of its own.
+    Conduction is a separate problem.
     """
     state = voigt.PLANE_STATES[case.analysis.plane]
     if not state.is_spatial or state.is_scalar:

@@ -90,8 +90,8 @@ Largest = tuple[Float, Float]
 def largest_stresses(cell: TornCell, states: Sequence[Sequence[Response | None]]) -> list[dict[str, Largest]]:
     """Find the largest stresses of each phase in each state, in one pass.  Collective.
 
-    The principal stress is the largest with its sign, the hydrostatic stress a third of the trace.  Phases whose
-    constants leave S33 open have no entry.
+    The principal stress is the largest one, signed; the hydrostatic stress is a third of the trace.  Phases whose
+    constants do not determine S33 have no entry.
 
     Args:
         states: responses of each problem in each state; a problem without a response has zero stresses.

@@ -112,7 +112,7 @@ class SpringSides:
         return np.asarray(beyond), distributed_arrays.allreduce_sum(self._comm, lumped - on_sides - on_arcs - on_arcs.T)
 
     def _in_space(self, components: Float) -> Float:
-        """Rotate normal and tangential components to plane vectors (n, 2, k); keep components (n, 1, k)."""
+        """Rotate normal and tangential components to plane vectors (n, 2, k); keep axial components (n, 1, k)."""
         if components.shape[1] == 1:
             return components
         normal = self._normal

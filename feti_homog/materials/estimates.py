@@ -146,7 +146,7 @@ def cylinders_in_matrix(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) ->
 
 
 def mori_tanaka(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Put every fibre alone in the matrix, under the mean field of the matrix, by `cylinders_in_matrix`.
+    """Put every fibre by itself into the matrix, under the mean field of the matrix, by `cylinders_in_matrix`.
 
     The method allows any kinds of round fibres, also on springs.  Mori and Tanaka 1973, Benveniste 1987; transversely
     isotropic phases: Chen, Dvorak and Benveniste 1992; springs: Benveniste 1985.

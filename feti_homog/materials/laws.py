@@ -52,7 +52,7 @@ def plane_stiffness(material: material_forms.Material, plane: str) -> Float:
     """Return C (3, 3): [S11, S22, S12] = C [E11, E22, gamma12], symmetric positive definite, in stress units.
 
     `plane` is "stress" (S33 = 0), "strain" (E33 = 0), or "generalized", where C is the block at E33 = 0. Raises
-    ValueError, with the keys at fault, if the constants leave C open or belong to no stable material.
+    ValueError, with the keys at fault, if the constants do not determine C or belong to no stable material.
     """
     material = _elastic(material)
     if isinstance(material, material_forms.Isotropic):
@@ -76,7 +76,7 @@ def plane_stiffness(material: material_forms.Material, plane: str) -> Float:
 def conductivity(material: material_forms.Material) -> Float:
     """Return k (3, 3): q = -k grad T in the cell's axes, symmetric positive definite.
 
-    Raises ValueError, with the key at fault, for a phase without conductivity, and for another matrix.
+    Raises ValueError, with the key at fault, for a missing conductivity, and for a matrix that is not SPD.
     """
     k = material.conductivity
     if k is None:
@@ -124,7 +124,7 @@ def spatial_stiffness(material: material_forms.Material) -> Float:
 def expansion(material: material_forms.Material) -> Float | None:
     """Return the free strains (6,) per unit of temperature in the cell's axes; None if the case has no expansion.
 
-    Raises ValueError, with the keys at fault, if expansions are given twice or by half.
+    Raises ValueError, with the keys at fault, if expansions are given twice or incompletely.
     """
     free = material.expansion
     if isinstance(material, material_forms.TransverselyIsotropic):
@@ -146,7 +146,7 @@ def expansion(material: material_forms.Material) -> Float | None:
 def out_of_plane(material: material_forms.Material, plane: str) -> tuple[Float, Float]:
     """Return the rows s and e (3,): S33 = s . [S11, S22, S12], E33 = e . [S11, S22, S12], in plane strain and stress.
 
-    S33 vanishes in plane stress, E33 in plane strain.  Rows that the constants leave open are NaN.
+    S33 vanishes in plane stress, E33 in plane strain.  Rows that the constants do not determine are NaN.
     """
     # E33 = row . [S11, S22, S12] + S33 / young
     material = _elastic(material)
@@ -202,7 +202,7 @@ def _checked_stiffness(material: material_forms.General) -> Float:
 
 
 def _symmetric(name: str, rows: material_forms.Matrix) -> Float:
-    """Return a matrix without its asymmetry, which is rounding; ValueError for more."""
+    """Remove the rounding asymmetry of a matrix.  Raises ValueError for a larger asymmetry."""
     matrix = np.array(rows)
     if not np.allclose(matrix, matrix.T, rtol=0.0, atol=NOISE * np.abs(matrix).max()):
         raise ValueError(f"{name} = {wording.toml_value(rows)}: expected a symmetric matrix")
@@ -261,7 +261,7 @@ def known_compliance(material: material_forms.Orthotropic | material_forms.Trans
 
 
 def transverse_ratio(material: material_forms.TransverselyIsotropic) -> float:
-    """Return nu_transverse, or E_transverse/(2 G_transverse) - 1.  Raises ValueError unless one of both is given."""
+    """Return nu_transverse, or E_transverse/(2 G_transverse) - 1.  Raises ValueError unless exactly one is given."""
     ratio, shear = material.nu_transverse, material.G_transverse
     if ratio is not None and shear is None:
         return ratio

@@ -45,7 +45,7 @@ UTILISATION = "Strength of the phase, whose utilisation is computed with its lar
 
 @dataclass(frozen=True, kw_only=True)
 class FibreConductivity:
-    """Conductivities of a phase that conducts alike in all directions of the plane."""
+    """Conductivities of a phase that is isotropic in the plane."""
 
     axial: float = key(POSITIVE, "Along x3.", unit=CONDUCTIVITY_UNIT)
     transverse: float = key(POSITIVE, "In the plane.", unit=CONDUCTIVITY_UNIT)
@@ -142,7 +142,7 @@ class TransverselyIsotropic:
 class General:
     """The stiffness itself: 3x3 for the plane state of the case, or 6x6 for all plane states.
 
-    x3 is normal to a plane of symmetry: of a 6x6 stiffness, 23 and 13 are coupled to each other alone.
+    x3 is normal to a plane of symmetry: in a 6x6 stiffness, 23 and 13 are coupled only to each other.
     """
 
     stiffness: Matrix = key(
@@ -162,7 +162,7 @@ class General:
 
 @dataclass(frozen=True)
 class Conductor:
-    """Conductivity alone, of phases whose stiffness is not asked for."""
+    """Only the conductivity, for phases whose stiffness is not needed."""
 
     conductivity: Conductivity = key(CONDUCTIVITY, CONDUCTS, unit=CONDUCTIVITY_UNIT)
     expansion: None = None

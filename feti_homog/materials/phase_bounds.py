@@ -119,7 +119,7 @@ class Estimates:
 
 @dataclass(frozen=True)
 class ConductivityEstimates:
-    """Closed forms for the conductivity of phases that conduct alike in all directions of the plane."""
+    """Closed forms for the conductivity of composites whose phases conduct isotropically in the plane."""
 
     axial: float = described("along the fibres: the mean, which is exact", "conductivity")
     wiener: Pair | None = described(

@@ -1,7 +1,7 @@
 """Compute the utilisation of phases by strength criteria: 1 at failure, proportional to the stress.
 
-Maximum principal stress sigma_1 / X; von Mises; Drucker and Prager by both uniaxial strengths; for fibres along x3 the
-largest of Hashin's four modes (J. Appl. Mech. 47 (1980) 329).
+Criteria: maximum principal stress sigma_1 / X; von Mises; Drucker and Prager, fitted to both uniaxial strengths; for
+fibres along x3 the largest of Hashin's four modes (J. Appl. Mech. 47 (1980) 329).
 """
 
 from collections.abc import Mapping

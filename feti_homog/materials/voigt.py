@@ -34,8 +34,8 @@ class PlaneState:
         is_sheet: whether S33 vanishes; otherwise E33 vanishes or is a load.
         is_spatial: whether all six strains and a temperature are loads: then axial shear is a separate problem, the
             stiffness is (6, 6), and constants, estimates and bounds are spatial.
-        is_scalar: whether the unknown is a temperature: its gradient has the places [13, 23, 33] of strains, and the
-            flux -q those of stresses.
+        is_scalar: whether the unknown is a temperature: its gradient takes the positions [13, 23, 33] of strains, and
+            -q the same positions of stresses.
         numbers: index of each plane strain in the names Cij of stiffness entries.
     """
 

@@ -144,7 +144,7 @@ def flip_double_arcs(triangles: Int32, phase: Int32, arc_edges: Int32, arc_circl
 
 
 def double_arcs(triangles: Int32, arc_edges: Int32, arc_circle: Int32, nodes: int) -> tuple[Int32, Int32]:
-    """Find triangles with two edges on one circle, and the corner between both edges."""
+    """Find triangles with two edges on one circle, and the corner between the two edges."""
     if len(arc_edges) == 0:
         return np.zeros(0, np.int32), np.zeros(0, np.int32)
     keys = edge_keys(arc_edges, nodes)
@@ -186,7 +186,7 @@ def can_debond(mesh: CoarseMesh, pairs: Int32) -> Bool:
 
 
 def _neighbours(mesh: CoarseMesh) -> tuple[Int32, Index, Bool]:
-    """Return triangle edges (3m, 2) as lower copies, pairs (e, 2) of equal edges, and a mask (3m,) of others."""
+    """Return triangle edges (3m, 2) as lower copies, pairs (e, 2) of equal edges, and a mask (3m,) of single edges."""
     pairs = _low_copies(mesh, edges(mesh.triangles))
     order, alone = np.stack(twins(edge_keys(pairs, len(mesh.points))), axis=1), np.ones(len(pairs), bool)
     alone[order] = False

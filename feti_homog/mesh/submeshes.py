@@ -107,7 +107,7 @@ class SubmeshesOfRank:
 
     @property
     def loads(self) -> Int:
-        """The number of coarse triangles in each subdomain."""
+        """The load (s,) of each subdomain: its number of coarse triangles."""
         return np.bincount(self.member, minlength=len(self.index))
 
     def cut(self) -> list[Submesh]:
@@ -275,6 +275,6 @@ def _all(parts: Sequence[object], name: str) -> Array:
 
 
 def _numbers(parts: Sequence[object], name: str, of: str) -> Int:
-    """Concatenate the index arrays `name`, which count the entries of the arrays `of`."""
+    """Concatenate the index arrays `name`, each shifted by the number of `of` entries before."""
     ends = np.cumsum([0, *(len(getattr(part, of)) for part in parts)])
     return np.concatenate([getattr(part, name) + end for part, end in zip(parts, ends, strict=False)])

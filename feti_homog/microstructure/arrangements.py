@@ -163,11 +163,11 @@ def clearance(arrangement: Arrangement) -> float:
 
 
 def clear_shift(arrangement: Arrangement) -> Arrangement:
-    """Shift an arrangement such that no cell side is tangent to an outline.
+    """Shift an arrangement so that no cell side is tangent to an outline.
 
-    The candidates along an axis are the middles of the widest gaps between tangents. Among the combinations of both
-    axes the corner farthest from all outlines is selected. In symmetric cells, as of two discs, several corners are
-    equal except for rounding errors: the first is selected, so that the length unit does not matter. Corners in
+    The candidates along an axis are the middles of the widest gaps between tangents. Combined, they give corners, of
+    which the one farthest from all outlines is selected. In symmetric cells, for example with two discs, several
+    corners are equal up to rounding errors: the first is selected, so that the length unit does not matter. Corners in
     voids are excluded (`in_voids`).
     """
     size, outlines = arrangement.size, arrangement.shells[0]
@@ -211,7 +211,7 @@ def _away(outlines: Outlines, places: Float, size: Float) -> Float:
 
 
 def _tangents(arrangement: Arrangement) -> Float:
-    """Return the coordinates (k, 2, 2) of the tangents to k outlines across both axes, on either side."""
+    """Return the coordinates (k, 2, 2), by axis and side, of the tangents to k outlines normal to the axes."""
     outlines, _ = arrangement.shells
     return np.asarray(outlines.centres[:, :, None] + outlines.extents * [-1.0, 1.0])
 

@@ -25,7 +25,7 @@ def moves(outlines: Outlines, size: Float) -> Float:
     LEAST_GAP and MOST_GAP. Each step replaces the distances |v| >= r by n . v >= r, with the present directions n;
     since n . v <= |v|, its solution keeps the distances.
 
-    Outlines that are no discs have the radii of equal-area discs; n is the direction of the largest gap
+    Other outlines than discs have the radii of equal-area discs; n is the direction of the largest gap
     n . v - r, where r is the sum of both supports along n.
 
     Raises:

@@ -24,8 +24,8 @@ LEAST_CLEARANCE = 1e-3
 def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> Arrangement:
     """Arrange the fibres of a table, in row order, and then the voids.
 
-    Of the periodic images of a fibre the first row counts. In a cut window, fibres that overlap across the border are
-    moved apart.
+    If several rows list images of one fibre, the first row counts. In a cut window, fibres that overlap across the
+    border are moved apart.
 
     The corner that the table gives remains if no cell side touches a disc and the corner lies in no void (`in_voids`),
     so that the table of a random cell gives the mesh of that cell. Otherwise fibres are shifted (`clear_shift`), and

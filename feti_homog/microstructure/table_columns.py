@@ -46,7 +46,7 @@ def lines_of(path: Path) -> Iterator[tuple[int, str, str]]:
     A line is its number from 1, its content or an empty string, and the comment behind "#".
 
     Raises:
-        CaseError: the file cannot be read, or is no text.
+        CaseError: the file cannot be read, or is not text.
     """
     try:
         content = input_files.read(path, MAX_BYTES)
@@ -126,7 +126,7 @@ class SourceColumn:
     value: Callable[[float], float]
 
     def read(self, word: str, delimiter: str | None) -> float | str:
-        """Convert a cell to a number; a cell that is no number remains a text."""
+        """Convert a cell to a number; return any other cell unchanged."""
         number = None if self.name == "phase" else number_of(word, delimiter)
         return word if number is None else self.value(number)
 
@@ -156,7 +156,7 @@ def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceC
 
 
 def are_units(words: Sequence[str]) -> bool:
-    """Return whether a line has units alone, which some programs write below the names."""
+    """Return whether a line has only units, which some programs write below the names."""
     return bool(set(words) - {"", "-"}) and all(ROW_UNIT.fullmatch(word) for word in words if word)
 
 
@@ -167,7 +167,7 @@ def misspelt(word: str, missing: Sequence[str]) -> str:
 
 
 def number_of(word: str, delimiter: str | None) -> float | None:
-    """Convert a word to a number, with a decimal point or comma; None if it is no number."""
+    """Convert a word to a number, with a decimal point or comma; None if it is not a number."""
     try:
         value = float(word if delimiter == "," else word.replace(",", "."))
     except ValueError:

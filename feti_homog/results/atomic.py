@@ -37,7 +37,7 @@ def replace(path: Path, write: Callable[[Path], object]) -> Path:
 
 
 def replace_text(path: Path, text: str) -> Path:
-    """Replace a file by a text, in one step as `replace` does."""
+    """Replace the content of a file by a string, in one step as `replace` does."""
     return replace(path, lambda part: part.write_text(text, encoding="utf-8"))
 
 

@@ -197,7 +197,7 @@ def _with_write_errors(path: Path, function: Callable[..., Any], *args: Any) -> 
 
 
 def _create(part: Path, size: int) -> None:
-    """Create an empty HDF5 file by system calls: where they fail, HDF5 may crash or hang."""
+    """Create an empty HDF5 file by plain system calls, since HDF5 may crash or hang if they fail."""
     part.parent.mkdir(parents=True, exist_ok=True)
     try:
         with h5py.File("empty", "w", driver="core", backing_store=False) as file:
@@ -219,7 +219,7 @@ def _set_attributes(file: Any, name: str, attributes: Mapping[str, Any]) -> None
 
 
 def _reserve(part: Path, start: int, size: int) -> None:
-    """Reserve disk space for a file: without space, MPI-IO may wait for ever."""
+    """Reserve disk space for a file: without space, MPI-IO may wait forever."""
     with part.open("r+b") as stream:
         os.posix_fallocate(stream.fileno(), start, size)
 

@@ -1,4 +1,4 @@
-"""Check that result.h5 has no tables beyond its own bytes, nor of other sizes, before a table is read."""
+"""Check links, sizes and layout of all tables in result.h5 before any table is read."""
 
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from feti_homog.system.runtime import input_files
 def require_own(path: Path) -> None:
     """Refuse links other than hard links, tables that are larger than the file or lie elsewhere, and other layouts.
 
-    Other links may lead to pipes, other files or back.  Raises CaseError; FetiHomogError for an unreadable file.
+    Other links may lead to pipes, other files, or in circles.  Raises CaseError; FetiHomogError for an unreadable file.
     """
     if not path.is_file():
         raise CaseError(f"cannot read {path}: it is missing; run the case again")
@@ -32,14 +32,14 @@ def require_own(path: Path) -> None:
                         room[entry.is_virtual] -= entry.nbytes
                         is_table = not entry.is_virtual or {s.file_name for s in entry.virtual_sources()} == {"."}
                     if not is_table or min(room.values()) < 0:
-                        raise CaseError(f"{path}: no result: {group.name}/{name} is no table of numbers within it")
+                        raise CaseError(f"{path}: no result: {group.name}/{name} is not a table of numbers in it")
             _require_layout(path, file)
     except (AttributeError, OSError, RuntimeError, KeyError) as error:
         raise input_files.unreadable(path, error if isinstance(error, OSError) else OSError(error.args[0])) from error
 
 
 def _require_layout(path: Path, file: Any) -> None:
-    """Compare shapes and types with `field_layout`; rows are those of points, triangles and fibres in the file."""
+    """Compare shapes and types with `field_layout`; the tables of points, triangles and fibres give the row counts."""
     counted = {"n": "mesh/points", "m": "mesh/triangles", "k": "interface/points", "f": "fibre/number"}
     counts = {symbol: (*file[table].shape, 0)[0] for symbol, table in counted.items()}
     states = [f"state/{number}" for number in range(len(file.get("state", ())))]

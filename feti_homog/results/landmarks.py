@@ -27,7 +27,7 @@ PEAK, LARGEST, SO_FAR = "peak", "largest stress", "largest so far"
 def turning_points(values: Float, threshold: float) -> list[int]:
     """Return the alternating peaks and valleys of a curve (n,), as point numbers.
 
-    Neighbours differ by more than `threshold`.  An end of the curve counts if it differs by more from its neighbour.
+    Successive turning points differ by more than `threshold`; an end of the curve counts if it also does.
     """
     entries, low, high, rises, falls = list[int](), 0, 0, True, True
     for number, value in enumerate(values):

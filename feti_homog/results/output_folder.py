@@ -119,8 +119,8 @@ def _is_own(path: Path) -> bool:
 def latest(directory: Path) -> dict[str, Any]:
     """Return the content of result.json, or of an unfinished path with more points.  Call on one rank.
 
-    An unfinished path has the entry `unfinished`, which its `status` repeats: the number of its points and its load.
-    Raises CaseError without such a file, for a damaged and for an unreadable one.
+    For an unfinished path, the entry `unfinished` and the `status` give the number of points and the load.
+    Raises CaseError for a missing, damaged or unreadable file.
     """
     from feti_homog.results import checkpoints  # only paths have checkpoints
 
@@ -169,7 +169,7 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
     lock = file_locks.Lock(directory / LOCK)
 
     def hold() -> tuple[list[Path], str]:
-        """Return new folders, innermost first, and a warning or an empty text."""
+        """Return new folders, innermost first, and a warning or an empty string."""
         made = [path for path in (directory, *directory.parents) if not path.exists()]
         try:
             directory.mkdir(parents=True, exist_ok=True)

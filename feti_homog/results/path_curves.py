@@ -56,7 +56,7 @@ def changed_components(document: Document) -> list[int]:
 def leading_component(document: Document) -> int:
     """Return the component with the largest strain on the `leading_points`, among those that the waypoints change.
 
-    If the waypoints change the temperature alone, all components are compared.
+    If the waypoints change only the temperature, all components are compared.
     """
     largest = np.abs([point["strain"] for point in leading_points(document)]).max(axis=0)
     changed = changed_components(document) or list(range(len(largest)))
@@ -151,9 +151,9 @@ def scales_with_toughness(document: Document) -> bool:
 def load_controlled(points: Sequence[Point]) -> Float:
     """Return stresses and strains (v, 2 c) at the corners of a proportional path under a rising load.
 
-    At a load t where bonds break, all bonds break that cannot carry t without the first bonds.  The cell then follows
-    the next stable branch, with a point at load t'.  Each branch is a ray through zero, Sigma(t) = Sigma(t') t / t', as
-    for the strains.  Under a prescribed strain the stress falls; under a prescribed stress the strain jumps.
+    Where bonds break at a load t, all further bonds break that cannot carry t without them.  The cell then follows the
+    next stable branch, with a point at load t'.  Each branch is a ray through zero: Sigma(t) = Sigma(t') t / t',
+    and the strains likewise.  Under a prescribed strain the stress falls; under a prescribed stress the strain jumps.
     """
     load = np.array([point["load_factor"] for point in points])
     values = np.array([[*point["stress"], *point["strain"]] for point in points])

@@ -32,7 +32,7 @@ SCHEMA = 1  # version of the layout: raise when a key changes name or meaning, o
 def write(directory: Path, document: Mapping[str, Any]) -> Path:
     """Write `directory`/result.json, and the folder if needed; return the file path.
 
-    NumPy arrays and scalars become lists and numbers, tuples lists, paths text. The file is replaced in one
+    NumPy arrays and scalars become lists and numbers, tuples lists, paths strings. The file is replaced in one
     step: a reader finds the old document or the new one. Call on one rank.
 
     Raises:
@@ -142,7 +142,7 @@ def _in_columns(kind: type) -> dict[str, records.Description]:
 
 
 def csv_text(rows: Iterable[Iterable[Any]], end: str = "\n") -> str:
-    """Return rows as CSV, with an apostrophe before texts that a spreadsheet would compute."""
+    """Return rows as CSV, with an apostrophe before strings that a spreadsheet would compute."""
     stream, formula = io.StringIO(newline=""), re.compile(r"[=@]|[+-](?![0-9.]+([eE][+-][0-9]+)?$)")
     texts = ([f"'{cell}" if isinstance(cell, str) and formula.match(cell) else cell for cell in row] for row in rows)
     csv.writer(stream, lineterminator=end).writerows(texts)
@@ -158,10 +158,10 @@ def dumps(document: Mapping[str, Any]) -> str:
 def loads(text: str) -> dict[str, Any]:
     """Parse a document and verify its checksum, which is removed.
 
-    A text without a checksum is not verified.
+    A document without a checksum is not verified.
 
     Raises:
-        ValueError: the text is not JSON, no table, or does not match its checksum.
+        ValueError: the text is not JSON or not a table, or does not match its checksum.
     """
     try:
         document = json.loads(text)

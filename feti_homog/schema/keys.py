@@ -68,7 +68,7 @@ class Key:
         instead: hint to another key for tables where a condition fails, or empty.
         unless: other keys of the table; a table with one of them does not need the key.
         by_pair: whether sections [[interface]] may have different values of the key.
-        presentation: whether the key changes the appearance of results alone, and no number.
+        presentation: whether the key changes only the appearance of results, and no number.
     """
 
     type: ValueType
@@ -139,7 +139,7 @@ class TableReader:
     def read(self, table_class: type[T], table: object, section: str, prefix: str = "") -> T | None:
         """Convert a table to an instance of `table_class`; return None if the table is faulty.
 
-        Every fault adds a line to `faults`, where keys stand as [`section`] `prefix` key.
+        Every fault adds a line to `faults`, where keys are written as [`section`] `prefix` key.
         """
         if not isinstance(table, dict):
             self.faults.append(f"{section} = {toml_value(table)}: expected a section [{section}]")

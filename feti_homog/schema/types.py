@@ -29,7 +29,7 @@ class ValueType:
         store: conversion of a valid value to the form in the dataclass.
         table: dataclass of a table, which `TableReader` reads; None for other values.
         item: type of the entries of a list with tables; None for other values.
-        options: valid texts of a choice.
+        options: valid strings of a choice.
     """
 
     expected: str
@@ -129,7 +129,7 @@ def file_name(expected: str, *suffixes: str) -> ValueType:
 
 
 def choice(*options: str) -> ValueType:
-    """Return the type of texts that equal one of the `options`."""
+    """Return the type of strings that equal one of the `options`."""
     words = "one of " + ", ".join(map(toml_value, options))
     return ValueType(words, lambda value: value in options, str, options=options)
 
@@ -139,4 +139,4 @@ POSITIVE_OR_INF = ValueType(
 )
 """The type of keys in which inf differs from a missing value."""
 boolean = ValueType("true or false", lambda value: isinstance(value, bool), bool)
-text = ValueType("a text in one line", lambda value: isinstance(value, str) and value.isprintable(), str)
+text = ValueType("a string in one line", lambda value: isinstance(value, str) and value.isprintable(), str)

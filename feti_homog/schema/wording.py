@@ -51,7 +51,7 @@ def _line(value: object) -> str:
 
 
 def toml_key(name: str) -> str:
-    """Write a key nearly as in TOML, in one short line, with quotes if it is no bare key."""
+    """Write a key nearly as in TOML, in one short line, with quotes unless it is a bare key."""
     is_bare = re.fullmatch(rf"[A-Za-z0-9_-]{{1,{LONGEST_VALUE}}}", name)
     return name if is_bare else toml_value(name)
 
@@ -79,6 +79,6 @@ def suggestion(name: str, known: Iterable[str], owners: Mapping[str, str]) -> st
 
 
 def limit_in_words(limit: float, value: float, digits: int) -> str:
-    """Write a limit with so many digits (at least `digits`) that `value` >= the written limit."""
+    """Write a limit with the fewest digits, at least `digits`, such that `value` >= the written limit."""
     texts = (f"{limit:.{count}g}" for count in range(digits, 18))
     return next((text for text in texts if value >= float(text)), repr(limit))

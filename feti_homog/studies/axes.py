@@ -149,7 +149,7 @@ def rounded(value: float) -> float:
 
 
 def _of_key(value: float, path: toml_files.TomlPath) -> Any:
-    """Round a value, to an integer if the key accepts integers alone."""
+    """Round a value, to an integer if the key accepts only integers."""
     value = rounded(value)
     section = sections.SECTIONS.get(path[0])
     entry = keys.keys_of(section).get(path[1]) if section is not None and len(path) == 2 else None

@@ -187,7 +187,7 @@ def stored_state(directory: Path, entry: SweepCase) -> CaseState:
                 return CaseState(Status.DAMAGED, f"{path} is of another case")
             return CaseState(Status(document["status"]), "; ".join(document["faults"]), document)
     except (FetiHomogError, KeyError, TypeError, ValueError) as error:
-        return CaseState(Status.DAMAGED, f"{path} is no readable result: {error}")
+        return CaseState(Status.DAMAGED, f"{path} is not a readable result: {error}")
     if not (folder / ERROR_FILE).is_file():
         return CaseState(Status.WAITING)
     try:

@@ -180,7 +180,7 @@ class Evaluations:
         return np.concatenate([answer.values for answer in self.answers[key]])
 
     def jacobian(self, x: Float) -> Float:
-        """Return the derivatives (m, n) of the data at x (n,), if need be by finite differences.  On rank 0."""
+        """Return the derivatives (m, n) of the data at x (n,), if necessary by finite differences.  On rank 0."""
         key, names = _rounded(x), [*self.fit.unknowns]
         J = np.zeros((len(self.values(x)), len(key)))
         missing = list[tuple[int, int]]()
@@ -208,7 +208,7 @@ class Evaluations:
         return self._run(name, places)
 
     def _run(self, name: str, places: Sequence[tuple[int, Point]]) -> list[Answer]:
-        """Run cases for pairs of a test number and unknowns.  Collective.  Returns the answers on rank 0 alone."""
+        """Run cases for pairs of a test number and unknowns.  Collective.  Returns the answers only on rank 0."""
         comm = self.evaluator.comm
         documents = self.evaluator.results(name, mpi_errors.on_root(comm, self.fit.cases, places))
         data = [self.fit.data_of(test) for test, _ in places]

@@ -28,7 +28,7 @@ def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
 def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numbers) -> dict[str, float]:
     """Return the numbers in result.json by column name; `numbers` are i and j in Cij of a stiffness (3, 3).
 
-    Components that are noise beside the others of their point, or along the whole path, are zero.
+    Components that are noise relative to the others at their point, or along the whole path, are set to zero.
     """
     solver = document["solver"]
     cell, fractions = document["cell"], document["cell"].get("fractions", {})
@@ -137,7 +137,7 @@ CASE_COLUMNS = (
     Column("point", "", "number of the point, from 1"),
     Column("realisation", "", "number of the realisation of the point, from 1"),
     Column("status", "", "`done`, `not converged`, `failed`, `damaged`, `running`, `interrupted` or `waiting`"),
-    Column("reason", "", "why there is no result; of an unfinished path its points and load"),
+    Column("reason", "", "why there is no result; for an unfinished path, its points and load"),
 )
 INPUT_COLUMNS = (Column("SECTION.KEY", "that of the key", "value of a key that varies"),)
 MODULI = {column.name for column in result_json.columns(engineering_constants.Moduli)}

@@ -98,8 +98,8 @@ def _curve_faults(case: Case, points: Sequence[Datum]) -> Iterator[str]:
 def responses(document: path_curves.Document) -> dict[str, float]:
     """Return the result numbers whose scatter matters, by name.
 
-    A stiffness has its constants, a conductivity its entries, a path its onset and peak, other analyses the numbers of
-    their kind.
+    For a stiffness these are its constants, for a conductivity its entries, for a path its onset and peak, for other
+    analyses the numbers of their points.
     """
     values, kind = _values(document), document["case"]["analysis"]["type"]
     if kind == "stiffness" or "sensitivities" in document:

@@ -150,7 +150,7 @@ def case_documents(
 ) -> list[tuple[SweepCase, dict[str, Any]]]:
     """Return the sweep cases, unchecked, with their documents.
 
-    The cases run through all points; further realisations follow, of points with a random cell alone.  Faults of the
+    The cases run through all points; further realisations follow, only of points with a random cell.  Faults of the
     points and of the realisations are appended to `faults`.
     """
     documents = [toml_files.with_values(base, point, faults, f"[{section}] ") for point in points]

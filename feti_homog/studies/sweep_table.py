@@ -49,7 +49,7 @@ class SweepTable:
         name, stress_unit: as in the sweep.
         folder, point, realisation, status, reason: values for each case; `reason` explains a failure.
         inputs: by dotted key the value of each case, None if the key does not vary in the case.
-        outputs: by name the values (cases,), NaN for cases without the output; of unfinished paths those so far.
+        outputs: by name the values (cases,), NaN for cases without the output; for unfinished paths, values so far.
         documents: result.json of finished cases, else None.
     """
 
@@ -128,7 +128,7 @@ class SweepTable:
 
         Returns:
             Strains (g,), g = CURVE_POINTS, and c stresses of n finished realisations, (n, g, c).  Both are empty if
-            the cases are no straight paths, or no strain rises with the load.
+            the cases are not straight paths, or no strain rises with the load.
         """
         paths = [path for path in map(path_curves.rising_strain, self.results_of(point)) if path is not None]
         if not paths:

@@ -62,7 +62,7 @@ class BondLaw(ABC):
         return np.zeros(len(psi))
 
     def absorbed(self, psi: Float, before: Float, after: Float) -> Float:
-        """Compute energies per area (k,) for a rise of damage `before` to `after` (k,), in modes psi (k,)."""
+        """Compute energies per area (k,) for damage that rises from `before` to `after` (k,), in modes psi (k,)."""
         return self.lost(psi)
 
     def absorbed_range(self, before: Float, after: Float) -> tuple[Float, Float]:

@@ -45,7 +45,7 @@ class Certificate:
 
     @property
     def text(self) -> str:
-        """Write the certificate as text, with one line a law."""
+        """Write the certificate as text, with one line per law."""
         broken = sum(not finding.holds for finding in self.findings)
         verdict = f"{broken} of {len(self.findings)} laws are broken" if broken else "every law holds"
         names = [f"  {', '.join(names)}: {reason}" for reason, names in self.unchecked.items()]

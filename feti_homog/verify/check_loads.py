@@ -89,10 +89,10 @@ def damaged_at(point: Document) -> int:
 
 @dataclass(frozen=True)
 class StateNumbers(State):
-    """A state without `FIELDS`, which only one state at a time keeps in memory; with cohesive tractions.
+    """A state with cohesive tractions but without `FIELDS`, which only one state at a time keeps in memory.
 
     Attributes:
-        stored, in_springs: energies per area: <sigma : (eps - alpha T)> / 2 with all springs, and in springs alone.
+        stored, in_springs: energies per area: <sigma : (eps - alpha T)> / 2 with all springs, and only in springs.
         released: (k,) whether a bond is at a tip that breaks by energy release.
         used: (k,) utilisation at bonded nodes, NaN where `released`, else 0.
         heat: conjugate of the temperature, -<alpha : sigma>.
@@ -139,7 +139,7 @@ def check_loads(findings: Findings, cell: DiscreteCell, states: States, rows: Ro
     A path keeps `[output] states` states, at points that result.json lists, the first and the last among them.
     """
     document, numbers, count = cell.files.document, [state.point for state in states], len(rows)
-    # The scale of stresses is that of the bonded cell: computed strains are no scale for prescribed stresses.
+    # The scale of stresses is that of the bonded cell: computed strains are not a scale for prescribed stresses.
     given, v = (np.where(load.by_stress, 0.0, load.values) for load, _ in rows), len(cell.reuss)
     stresses = [cell.reuss @ cell.loads(strains[:v], float(strains[v:].sum())) for strains in given]
     largest = float(np.abs([*stresses, *(state.mean_stress for state in states)]).max(initial=0.0))

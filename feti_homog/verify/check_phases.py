@@ -91,7 +91,7 @@ def _stresses(cell: DiscreteCell, state: State) -> tuple[Float, Float]:
 def _measures(stress: Float, strength: Mapping[str, Any] | None) -> dict[str, Float]:
     """Compute principal, von Mises and hydrostatic stresses (n,), and the utilisation (n,) of a strength.
 
-    s1 = p + 2/3 q cos(arccos(27 J3 / (2 q^3)) / 3) with q = sqrt(3/2 s : s) and J3 = det s of the deviator s.
+    s1 = p + 2/3 q cos(arccos(27 J3 / (2 q^3)) / 3) with q = sqrt(3/2 s : s) and J3 = det s for the deviator s.
     """
     p = np.trace(stress, axis1=1, axis2=2) / 3
     deviator = stress - p[:, None, None] * np.eye(3)

@@ -195,7 +195,7 @@ class DiscreteCell:
 
     @cached_property
     def _scales_on_path(self) -> list[Scales]:
-        """Return the scales of all points with friction, which leaves the rounding of earlier tractions."""
+        """Return the scales of all path points with friction, where rounding of earlier tractions remains."""
         points = self.files.document.get("path", ()) if friction_at(self.files).any() else ()
         return [self.scales(np.array(point["strain"]), float(point.get("temperature", 0.0))) for point in points]
 
@@ -210,5 +210,5 @@ class DiscreteCell:
 
     @property
     def rounded_energy(self) -> float:
-        """Return an energy per area for scales: without bonds, the stored energy may be rounding alone."""
+        """Return a floor (energy per area) for energy scales: a cell without bonds may store only rounding."""
         return ROUNDED_TERMS * float(np.abs(self.reuss).max()) * self.largest_strain**2

@@ -94,7 +94,7 @@ class Findings:
             self._worst[law] = replace(self._checks[law], violation=value, where=place)
 
     def compare(self, law: str, value: Any, expected: Any, scale: ArrayLike, where: Place) -> None:
-        """Record |value - expected| / scale; inf if the shapes of both differ."""
+        """Record |value - expected| / scale; inf if the shapes differ."""
         value, expected = np.asarray(value, float), np.asarray(expected, float)
         self.record(law, relative(value - expected, scale) if value.shape == expected.shape else np.inf, where)
 
@@ -241,7 +241,7 @@ Points = Sequence[Section]
 def unchecked(document: Section) -> dict[str, list[str]]:
     """Map reasons to the names of numbers that no law has read, such as path[].iterations.
 
-    The name of a table stands for its numbers if no law has read one.  Copies of tables are always in the list.
+    The name of a table represents its numbers if no law has read any.  Copies of tables are always in the list.
     """
     names = (document.unread, document.places)
     unread, total = (Counter(re.sub(r"\[\d+\]", "[]", place) for place in places) for places in names)

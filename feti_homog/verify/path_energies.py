@@ -106,7 +106,7 @@ def check_stored(findings: Findings, cell: DiscreteCell, states: States) -> None
 def check_heat(findings: Findings, cell: DiscreteCell, states: States) -> None:
     """Check that the work is stored, lost in breaks, or becomes heat.
 
-    Heat never falls, and `dissipated` changes in breaks alone.  With friction the energy depends on the path, so that
+    Heat never falls, and `dissipated` changes only in breaks.  With friction the energy depends on the path, so that
     the loss in breaks has no bounds.  Bonds break after the point of an event, before the point of an increment.
     """
     points, by_events = cell.files.document["path"], cell.files.case["path"]["method"] == "events"
@@ -131,7 +131,7 @@ def check_step_heat(findings: Findings, cell: DiscreteCell, before: StateNumbers
     """Check that an increment without breaks has the heat: tractions at its end times its slips.
 
     The error is relative to the heat so far plus the tractions times the slips since the beginning, whose difference
-    is the heat.  The work is no evidence of heat: runs compute it as the sum of stored energy, loss and heat.
+    is the heat.  The work is not evidence of heat: runs compute it as the sum of stored energy, loss and heat.
     """
     files, at = cell.files, state.point
     points = files.document["path"]

@@ -46,7 +46,7 @@ class Cohesive(QuadraticStrength):
         return np.asarray(np.sqrt(energy * (high - low) / self.absorbed(self.mode(traction), low, high)))
 
     def absorbed(self, psi: Float, before: Float, after: Float) -> Float:
-        """Compute energies per area (k,) for a rise of damage `before` to `after` (k,), in modes psi (k,)."""
+        """Compute energies per area (k,) for damage that rises from `before` to `after` (k,), in modes psi (k,)."""
         return self._area(after, *self._mode(psi)) - self._area(before, *self._mode(psi))
 
     def absorbed_range(self, before: Float, after: Float) -> tuple[Float, Float]:

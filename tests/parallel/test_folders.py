@@ -100,7 +100,7 @@ def test_folders_that_cannot_be_used_are_refused_and_left_as_they_are(comm, shar
 @pytest.mark.parametrize(
     ("out", "message"),
     [
-        ("", '"" is no name of a folder'),
+        ("", '"" is not a folder name'),
         ("a\0b", "names have no null characters"),
         ("/proc/results", "--out /proc/results: cannot be made"),
         ("/dev/null/results", "is a file"),

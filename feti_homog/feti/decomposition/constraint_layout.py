@@ -36,7 +36,7 @@ class InterfaceNodes:
         pair: (k,) number of the interface in the case.
         bodies: (k, 2) outer body and fibre body.
         precracked: (k,) whether the node is debonded in the mesh.
-        fibre_node: (k,) number of the node copy in the fibre among the fine nodes of this rank.
+        fibre_node: (k,) local fine node number of the copy in the fibre.
     """
 
     row: Int

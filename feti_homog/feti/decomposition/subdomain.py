@@ -180,7 +180,7 @@ class Subdomain:
     def elimination_order(self) -> Int | None:
         """Return an elimination order (cn,) of all dofs, or None where the library's order is cheaper.
 
-        It is cheaper below LEAST_ORDERED_DOFS, and if all nodes are coarse nodes: then all triangles would be halved.
+        This holds below LEAST_ORDERED_DOFS dofs, and for coarse nodes only, where all triangles would be halved.
         """
         pays = self.n_dofs >= LEAST_ORDERED_DOFS and self.mesh.lattice.intervals > 1
         return self.problem.dofs(refinement.elimination_order(self.mesh)) if pays else None

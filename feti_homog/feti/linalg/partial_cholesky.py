@@ -31,7 +31,7 @@ class System(IntEnum):
 
 
 class XType(IntEnum):
-    """The content of a CHOLMOD matrix: positions of entries alone, or positions and values."""
+    """The content of a CHOLMOD matrix: only the positions of entries, or positions and values."""
 
     PATTERN, REAL = 0, 1
 

@@ -145,7 +145,7 @@ class DistributedSolver:
     """A solver X = A^-1 B for definite matrices A (n, n), sums over ranks.
 
     Up to n = REPLICATED_UNKNOWNS, every rank factors the whole matrix, by CHOLMOD; above, all ranks factor the matrix
-    together, by MUMPS.  Options with the prefix choose other solvers; with `ksp_type` or `pc_type` all ranks solve
+    together, by MUMPS.  Options with the prefix replace these solvers; with `ksp_type` or `pc_type` all ranks solve
     together for any n.
     """
 

@@ -1,7 +1,7 @@
 """The boundary operators of one subdomain: Schur complement S and flexibility S+, dense or by sparse factors.
 
 S and S+ are symmetric and stored in one square array, so that a product reads n^2 / 2 numbers.  One partial
-factorization gives S.  The dual problem needs the boundary alone: the factor is kept only if displacements inside are
+factorization gives S.  The dual problem needs only the boundary: the factor is kept only if displacements inside are
 needed.  Sparse factors replace dense matrices that would be too large.
 """
 

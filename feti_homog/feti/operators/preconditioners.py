@@ -3,7 +3,7 @@
 M^-1 = W^-1 B D^-1 S D^-1 B^T W^-1 on the active rows, with W = B D^-1 B^T and the mean diagonal stiffness D of every
 node.  W is block-diagonal by node.  S is the boundary block of K (lumped), or its Schur complement (Dirichlet).
 
-Springs at the few nodes where both bodies are cut belong to no subdomain.  Let X be the unit columns of their rows and
+Springs at the few nodes where both bodies are cut belong to no subdomain.  Let X be the unit vectors of their rows and
 C their compliances.  The preconditioner H, which is M^-1 or H_0, then becomes
 
     H - H X (C^-1 + X^T H X)^-1 X^T H.
@@ -99,7 +99,7 @@ class StiffnessScaled(Preconditioner):
         return np.asarray(self.DBT @ self.jump_operator.gather(self.W_inverse @ g))
 
     def multipliers(self, forces: Float) -> Float:
-        """Compute B_D f = W^-1 B D^-1 f (owned rows, k); if f = B^T lam with active rows alone, this is lam."""
+        """Compute B_D f = W^-1 B D^-1 f (owned rows, k); if f = B^T lam with lam on active rows, this is lam."""
         return np.asarray(self.W_inverse @ self.jump_operator.sum(self.BD @ forces))
 
     def apply(self, r: Float) -> Float:

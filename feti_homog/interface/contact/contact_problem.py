@@ -47,7 +47,7 @@ class ContactProblem:
         contact: whether faces resist overlap; if not, damaged bonds are still stiff under pressure.
         size: (2,) cell size, a scale of displacements.
         softening: maps bonds and a mask (k,) of tension to ratios C / C_0 (k, 3) of springs, or None if all are 1.
-        block_pivots: block pivots since the last progress before single nodes change; 0 begins with single nodes.
+        block_pivots: number of block pivots without progress after which single nodes change; 0: from the start.
     """
 
     solver: FetiSolver

@@ -92,7 +92,7 @@ class _Fibres:
         return amplitudes, squeezes
 
     def shares(self, before: Float, after: Float, noise: float) -> tuple[float, float]:
-        """Return both fractions of the way between gaps (k,), as `FloatingBodies.admissible_share`."""
+        """Return both fractions of a step between gaps (k,), as `FloatingBodies.admissible_share`."""
         shares = [(1.0, 1.0)]
         for node, motion, *_ in self.nodes_and_motions(after < -2 * noise):
             a, b = before[node], after[node]
@@ -135,7 +135,7 @@ class FloatingBodies:
         return np.asarray(self.coarse.unconstrained_modes @ amplitudes), squeezes[first : first + len(gap)]
 
     def admissible_share(self, before: Float, after: Float) -> tuple[float, float]:
-        """Return the fractions of the way between gaps (k,) up to which all fibres have room.
+        """Return the fractions of a step between gaps (k,) up to which all fibres have room.
 
         The fractions are the largest w <= 1 for which all fibres have amplitudes a with
 
@@ -168,7 +168,7 @@ class FloatingBodies:
 
 
 def shares_to_zero(before: Float, after: Float, noise: float | Float) -> tuple[float, float]:
-    """Return the fractions of the way at which the first value (k,) reaches 0 and -2 noise.
+    """Return the fractions of the step at which the first value (k,) reaches 0 and -2 noise.
 
     Both fractions are 1 if no value falls that far.  Values that end above -2 noise, a number or (k,), may be the
     solver's error and do not count.

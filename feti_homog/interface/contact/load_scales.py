@@ -8,7 +8,7 @@ from feti_homog.interface.loads import Load
 from feti_homog.materials import phase_bounds
 from feti_homog.typing import Float
 
-# Multiple of the bonded cell's strains beyond which strains are no scale for errors.
+# Multiple of the bonded cell's strains beyond which strains are not a scale for errors.
 ABSURD = 1e3
 # Sizes up to this many relative tolerances of the Krylov method, times the largest force or the imposed displacement,
 # may be the solver's error, which in solves from good multipliers was a few hundredths of a tolerance.
@@ -31,7 +31,7 @@ class LoadScales:
     """
 
     def __init__(self, solver: FetiSolver, size: Float) -> None:
-        """Compute the scales of a dual solver and the cell size (2,).  Collective."""
+        """Compute the scales for a dual solver and a cell with sides `size` (2,).  Collective."""
         self.solver, self.size = solver, size
         m, stresses, nodes = solver.problem.strains, solver.problem.stresses, solver.jump_operator.nodes
         parts = self.solver.comm.allgather([(s.areas, s.laws) for s in self.solver.subdomains])

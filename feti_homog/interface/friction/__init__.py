@@ -1,6 +1,6 @@
 """Coulomb friction on debonded faces.
 
-Imports `feti`, `interface`, `interface.contact` and `system`.  Main entries: `coulomb_faces` (dense arrays alone) and
+Imports `feti`, `interface`, `interface.contact` and `system`.  Main entries: `coulomb_faces` (only dense arrays) and
 `sliding_cell`.
 """
 

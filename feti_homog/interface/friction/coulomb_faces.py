@@ -112,7 +112,7 @@ class StatusSearch:
         return next(self._tried(status), None)
 
     def _tried(self, status: Status) -> Iterator[tuple[Status, Float]]:
-        """Yield all admissible statuses, the closest to a guess first; nothing for too many sets."""
+        """Yield all admissible statuses, the closest to a guess first; yield none if there are too many candidates."""
         choosers = np.flatnonzero(self.allowed.sum(axis=1) > 1)
         if self.allowed[choosers].sum(axis=1).astype(float).prod() > MOST_TRIED:
             return

@@ -111,9 +111,9 @@ class CondensedProblem:
 
 
 class AxialFaces:
-    """The axial problem in the matrix S of `coulomb_faces`, with eliminated jumps: g = K^-1 b E.
+    """The part of the matrix S of `coulomb_faces` for the axial problem, with eliminated jumps: g = K^-1 b E.
 
-    A stiffness of HELD times the diagonal entry holds each row: the largest entry may belong to a stiff spring.
+    A spring of HELD times the row's diagonal entry holds each row: the largest entry may belong to a stiff spring.
 
     Attributes:
         problem: condensed axial problem.

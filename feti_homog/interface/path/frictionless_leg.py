@@ -30,14 +30,14 @@ class FrictionlessLeg(Leg):
                      bonds break: a point; equilibrium at the same s without these bonds.
         advance      With a linear response, predict the first break, the beginning of a contact change, and the
                      end of the leg.  Equilibrium at the first of these; if the stress is not on the line, or a bond
-                     is overloaded, an event was missed: halve the way until no event is missed.  The result is
+                     is overloaded, an event was missed: halve the step until no event is missed.  The result is
           a break    the worst bonds break: a point; equilibrium at the same s without these bonds;
           a change   a point; equilibrium a little further, where the change is beyond doubt;
           less       a point if contact states have changed.
         touch        Open faces do not carry the stresses of the load: a point where the faces touch.
         end          s = 1: a point.
 
-    A predicted change that does not come is a false alarm: up to the next change only halving finds changes.
+    A predicted change that does not occur is a false alarm: up to the next change, only halving finds changes.
     """
 
     _state: Equilibrium
@@ -64,7 +64,7 @@ class FrictionlessLeg(Leg):
         return self._share >= 1.0 or not self._state.converged
 
     def _settle(self, begin: PathState) -> None:
-        """Find the equilibrium at s with the bonds of `begin`.  Collective."""
+        """Find the equilibrium at the present leg fraction s, with the bonds of `begin`.  Collective."""
         self._bends_before, self._false_alarm, self._from = np.inf, False, begin
         self._go_to(self._share)
 
@@ -77,7 +77,7 @@ class FrictionlessLeg(Leg):
         return self.cell.equilibrium(self._load_at(share), bonds, lam)
 
     def _stand(self, share: float, state: Equilibrium) -> None:
-        """Set the state to an equilibrium at a leg fraction, and add the energies of the way."""
+        """Set the state to an equilibrium at a leg fraction, and add the energies since the last state."""
         if share >= self._bends_before:
             self._bends_before = np.inf
         self._share, self._state, self._bonds = share, state, state.bonds
@@ -86,7 +86,7 @@ class FrictionlessLeg(Leg):
         self._from = self._path_state()
 
     def _advance(self) -> Iterator[Point]:
-        """Advance past the next event, or as far as the response is straight.  Collective.
+        """Advance past the next event, or to the end of the straight response.  Collective.
 
         Raises:
             NotCarriedError: neither open nor touching faces carry the load's stresses.
@@ -134,7 +134,7 @@ class FrictionlessLeg(Leg):
         return self._used()[1] > 1.0 - UTILISATION_TIE
 
     def _approach(self, target: float, end: Sequence[DualSolution]) -> bool:
-        """Advance to the target, or as far as the response is straight.
+        """Advance to the target, or to the end of the straight response.
 
         Return whether the leg has reached the target; `end` has the solutions at the end of the leg.
         """

@@ -103,7 +103,7 @@ class Leg(ABC):
         return self._used()[1] > 1.0 + UTILISATION_TIE and self.state.converged
 
     def _break_overloaded(self, is_due: bool = False) -> Iterator[path_points.Point]:
-        """Break the worst bonds at s while bonds are overloaded, and first if a break is due.  Collective."""
+        """Break the worst bonds at s until no bond is overloaded; if `is_due`, break at least once.  Collective."""
         while is_due or self._is_overloaded():
             broke, softened, broken = self._release(self._used()[2])
             yield self._point(broke, softened, broken)

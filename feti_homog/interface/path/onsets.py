@@ -78,10 +78,10 @@ class Onset:
 
 
 def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, before: Float, after: Float) -> float:
-    """Return the fraction of the way between tractions (k, c) at which the first bond breaks, or inf.  Collective.
+    """Return the fraction of a step between tractions (k, c) at which the first bond breaks, or inf.  Collective.
 
     A convex utilisation, below 1 at the beginning and above 1 at the end, passes 1 once: bisection.  Without convexity
-    the bisection takes the first part of the way that ends with a utilisation above 1.
+    the bisection takes the first part of the step that ends with a utilisation above 1.
     """
     law, bonded = law.in_state(cell, bonds), bonds.status == BONDED
     step, low, high = after - before, np.zeros(len(before)), np.full(len(before), np.inf)
@@ -96,7 +96,7 @@ def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, before:
 
 
 def first_change(interface: ContactProblem, state: Equilibrium, end: DualSolution) -> tuple[float, float]:
-    """Return the fractions of the way where contact begins to change, and surely has changed.
+    """Return the fractions of a step where contact begins to change, and where it surely has changed.
 
     Both are 1 without a change.  A tension or an overlap of twice the solver's error is sure.  A closed node opens
     when its force vanishes; open nodes of a fixed fibre close when their gap vanishes, open nodes of a free fibre when

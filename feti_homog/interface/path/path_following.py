@@ -5,7 +5,7 @@ degree one: one solve gives the load of the next break, which may be lower than 
 control the load, see `leg`.  `increments` is the paper's loop.
 
 Energy.  A break happens at constant load, at which stresses or strains jump, and releases work minus stored energy;
-between breaks no energy is lost.  The `energies` of a point belong to the way from the last point.
+between breaks no energy is lost.  The `energies` of a point count from the last point.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -58,8 +58,8 @@ def increments(
 ) -> Iterator[Point]:
     """Yield the points of the paper's loop, which breaks all overloaded bonds at equal load steps.  Collective.
 
-    The state of a point follows its breaks.  `begin.leg` is the number of finished steps.  With `worst_only` the worst
-    bonds are released first, alone.  A point without convergence is the last one; with friction the last point may be
+    The state of a point follows its breaks.  `begin.leg` is the number of finished steps.  With `worst_only`, only the
+    worst bonds break at a time.  A point without convergence is the last one; with friction the last point may be
     at the largest load that the cell carries.
 
     Raises:

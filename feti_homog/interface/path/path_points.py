@@ -40,13 +40,13 @@ class PathState:
     stretched: float = 0.0
 
     def energies_to(self, after: Macroscopic) -> Energies:
-        """Return the energies of the way from the last point to a state; a contact change loses no energy."""
+        """Return the energies between the last point and a state; a contact change loses no energy."""
         lost = 0.0 if self.broken is None else self.last.released_to(after)
         return Energies(after.stored - self.last.stored + lost, lost, self.broken or 0.0)
 
 
 class Energies(NamedTuple):
-    """The energies per cell area on a way: work, released energy, fracture energy of breaks, heat of friction."""
+    """The energies per cell area between two points: work, released energy, fracture energy, frictional heat."""
 
     work: float
     released: float
@@ -66,7 +66,7 @@ class Point:
     """A point of a load path.
 
     Attributes:
-        load_factor: position on the path, 0 to 1; all legs count alike.
+        load_factor: position on the path, 0 to 1, with equal parts for all legs.
         scale: ratio of the point's state to the equilibrium `state`.
         state: equilibrium.
         broke: number of bonds that part after this state; with increments, in the step before this state.
@@ -95,9 +95,9 @@ def unloaded(cell: CoupledInterfaces, bonds: BondState) -> PathState:
 def break_bonds(
     cell: CoupledInterfaces, law: BondLaw, which: Bool, state: Equilibrium, place: PathState
 ) -> tuple[int, int, PathState]:
-    """Break the bonds `which` (k,) in the modes of an equilibrium of any size.  Collective.
+    """Break the bonds `which` (k,) in the modes of their tractions, of any magnitude, in an equilibrium.  Collective.
 
-    Return the numbers of bonds, on all ranks, that part and that soften, and the path state `place` with the break.
+    Return how many bonds part and how many soften, over all ranks, and the path state `place` after the break.
     """
     traction, bonds = held_traction(cell, state), state.bonds
     history, parts = law.after(bonds, which, traction)

@@ -115,7 +115,7 @@ class BareOutline:
         return outline.Outline(nodes, replace(curves, node=number[curves.node]), ellipses, self.disc, self.around)
 
     def _sides(self, axis: int) -> Iterator[tuple[Float, Curves]]:
-        """Yield the nodes (n, 2) and the curves of both sides along `axis`; the nodes of both sides match."""
+        """Yield the nodes (n, 2) and the curves of the two sides along `axis`, whose nodes match."""
         places = outline.crossings(self.curves, axis, self.size)
         begin, span = places[:-1], np.diff(places)
         longest = np.full((len(span), 2), self.field.largest)

@@ -140,7 +140,7 @@ class Segments(Lines):
 
 @dataclass(frozen=True)
 class Sampling:
-    """The numbers of positions for samples of the edge size.
+    """The numbers of sample positions for the edge size.
 
     Attributes:
         arc, side, bridge: positions along an arc, a piece of a side and a bridge.

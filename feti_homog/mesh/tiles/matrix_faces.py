@@ -35,7 +35,7 @@ class CentreLines:
         ends: (e, 2) discs.
         angle: (e,) direction from the first to the second disc.
         gap: (e,) distance between the circles.
-        facing: (e, 2, 2) the point on each of both circles that faces the other circle.
+        facing: (e, 2, 2) the point on each circle that faces the other circle.
         clearance: (e,) least distance between the line and the centre of a third disc / radius of that disc.
     """
 

@@ -128,8 +128,8 @@ class Shape(Protocol):
     """A shape that table rows may have, other than a disc.
 
     Attributes:
-        name: plural name of the shape, as "ellipses".
-        columns: columns that this shape alone needs.
+        name: plural name of the shape, such as "ellipses".
+        columns: columns that only this shape needs.
         sizes: columns of the largest lengths, in place of "radius" unless they include it.
         has_tips: whether the mesh of the shape may have nodes at debonded arc tips.
     """

@@ -19,12 +19,12 @@ REPLACING = tuple(shape.sizes for shape in SHAPES if "radius" not in shape.sizes
 
 
 def given_shapes(rows: Columns, has_tips: bool) -> list[Shape]:
-    """Return the shapes that occur in a table, those with tip nodes in their meshes or those without."""
+    """Return the shapes in a table with or, unless `has_tips`, without tip nodes in their meshes."""
     return [shape for shape in SHAPES if shape.has_tips == has_tips and shape.given(rows).any()]
 
 
 def columns_without_tips(rows: Columns) -> dict[str, Float]:
-    """Return the columns (N,) of shapes without tips by name, NaN in other rows; empty without such rows."""
+    """Return the columns (N,) that shapes without tip nodes use, by name; NaN in rows of other shapes."""
     shapes = given_shapes(rows, has_tips=False)
     mask = np.logical_or.reduce([np.zeros(len(rows["x"]), bool), *(shape.given(rows) for shape in shapes)])
     names = {name for shape in shapes for name in (*shape.sizes, *shape.columns, "angle")}
@@ -71,7 +71,7 @@ def with_parts(outlines: Outlines, parts: Sequence[tuple[Bool, Outlines]]) -> Ou
 
 
 def elliptic(outlines: Outlines) -> Ellipses:
-    """Replace outlines that are no ellipses by equal-area discs."""
+    """Replace outlines other than ellipses by equal-area discs."""
     has_core = outlines.cores.any(axis=(1, 2), keepdims=True)
     return Ellipses(outlines.centres, np.where(has_core, outlines.radii[:, None, None] * np.eye(2), outlines.frames))
 

@@ -65,7 +65,7 @@ def _cyclic_colours(count: int) -> Array:
 
 
 def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
-    """Draw the subdomains, each in a colour of its own, on several ranks in the colour of its rank.
+    """Draw the subdomains, each in its own colour or, on several ranks, in the colour of its rank.
 
     A subdomain across several materials counts once for each body.
     """

@@ -72,7 +72,7 @@ class DeformedCell(drawn_cell.DrawnCell):
     def draw(self, axes: Axes, number: int, moved: Array) -> Any:
         """Draw the cell in a state, with its nodes at `moved` (p, 2); return the coloured triangles.
 
-        The end of a path has a range of its own if its stresses are more than twice those before.
+        The end of a path has its own colour range if its stresses are more than twice the earlier stresses.
         """
         state, (norm, colours, _) = self.state(number), self.colours
         attributes = state.attrs
@@ -96,7 +96,7 @@ class DeformedCell(drawn_cell.DrawnCell):
         return shapes
 
     def bar(self, axes: Axes, shapes: Any) -> None:
-        """Draw the colour bar of the shapes beside the axes; a bar for the end of a path alone has a title."""
+        """Draw the colour bar of the shapes beside the axes; only a bar for the end of a path has a title."""
         is_common = shapes.norm is self.colours[0]
         bar = drawn_cell.bar_beside(axes, shapes, self.colours[2] if is_common else shapes.cmap.colorbar_extend)
         bar.ax.set_title("" if is_common else "end")

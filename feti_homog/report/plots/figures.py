@@ -32,7 +32,7 @@ def plot(
     - interface.png, of a path or a debonded interface: tractions, jumps and damage around fibres.
 
     [output] of the case in result.json chooses stress component (default: by the unit strain) and deformation scale.
-    A case without fields has curves alone.  A `component` replaces the stress; a `state` gives state_K.png alone.  Call
+    A case without fields has only curves.  A `component` replaces the stress; a `state` gives only state_K.png.  Call
     on one rank.
 
     Raises:
@@ -63,7 +63,7 @@ def plot(
 def of_fields(
     directory: Path, file: Any, document: Document, look: plot_helpers.Look, chosen: int | None = None
 ) -> list[Path]:
-    """Draw the pictures that show the mesh or a field, or one state alone; return the picture paths."""
+    """Draw the pictures that show the mesh or a field, or only one state; return the picture paths."""
     cell, report = drawn_cell.DrawnCell.of(file), reported(document)
     states = {number: file[f"state/{number}"] for number in sorted(file.get("state", ()), key=int)}
     stress = document.get("case", {}).get("output", {}).get("stress", "auto")

@@ -33,7 +33,7 @@ AREAS = {
 def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
     """Draw stresses and interface states against the leading strain, with the landmarks.
 
-    A panel between both shows a temperature that changes.  Selected points have their numbers.
+    A panel between the two shows a temperature that changes.  Selected points have their numbers.
     """
     points, case = document["path"], document["case"]
     component, components = path_curves.leading_component(document), path_curves.shown_stresses(document)
@@ -112,7 +112,7 @@ def _stress_curves(
 
 
 def _line_style(values: Array, drawn: list[Array]) -> str:
-    """Return dashes for a curve (n,) that mostly covers one already drawn, and add the curve to these."""
+    """Return dashes if a curve (n,) mostly covers a `drawn` curve, else a solid line; add it to `drawn`."""
     tolerance = 0.01 * max(np.abs([values, *drawn]).max(), 1e-300)
     covers = any(np.mean(np.abs(values - other) <= tolerance) > 0.5 for other in drawn)
     drawn.append(values)
@@ -146,7 +146,7 @@ def _records(document: Document) -> Array | None:
 
 
 def _number_points(axes: Axes, curve: Array, numbers: Sequence[int]) -> None:
-    """Write point numbers with lines to a curve (points, 2), each beside its point where most room is."""
+    """Label points on a curve (points, 2) with `numbers` and pointers, each where there is most room."""
     style: dict[str, Any] = {"color": "0.3", "fontsize": "small", "ha": "center", "va": "center", "bbox": LEGIBLE}
     pointer: dict[str, Any] = {"arrowstyle": "-", "color": "0.3", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
     style |= {"textcoords": "offset points", "arrowprops": pointer}

@@ -12,7 +12,7 @@ STRESSES = {"principal": "principal", "von_mises": "von Mises", "hydrostatic": "
 
 
 def phase_tables(document: Document) -> list[Table]:
-    """Return the stresses and the utilisations in the states; at some points of a curve; nothing without them."""
+    """Return tables of stresses and utilisations in all states, or at some points on a curve; [] without stresses."""
     phases = document.get("phase_stresses", ())
     if not phases:
         return []
@@ -55,6 +55,6 @@ def _states(document: Document, count: int) -> Sequence[int]:
 
 
 def _entry(phase: Document, name: str, k: int) -> tuple[Any, str]:
-    """Return a value and its position in words, none of a value that is zero."""
+    """Return a value and its position in words, "-" for the value zero."""
     value, (x, y) = without_noise(phase[name][k]), phase[f"{name}_at"][k]
     return value, f"{x:.3g}, {y:.3g}" if value else "-"

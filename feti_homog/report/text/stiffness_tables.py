@@ -73,7 +73,7 @@ def _errors(document: Document) -> Document:
 def with_errors(title: str, values: Mapping[str, float], errors: Mapping[str, float], abreast: int) -> Table:
     """Return a table of constants and mesh errors, `abreast` per line; ratios in pairs have six decimals.
 
-    An error has two digits, its constant as many decimals.
+    Errors have two digits, and constants as many decimals as their errors.
     """
     rows = []
     for name, value in values.items():
@@ -183,7 +183,7 @@ def constants(document: Document) -> list[Table]:
 
 
 def _with_estimates(document: Document) -> str:
-    """Name the kind of cell that has estimates, unlike this cell."""
+    """Name the cells for which estimates exist, unlike for this cell."""
     case, cell = document.get("case", {}), document.get("cell", {})
     if len(cell.get("fractions", ())) == 1:
         return "composites"

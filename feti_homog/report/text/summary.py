@@ -175,7 +175,7 @@ def _cell(document: Document) -> list[str]:
         lines += _field("Match", [Path(shape["match"]).name, phrases])
     if factors := [fibre["strength"] for fibre in document.get("fibres", ()) if "strength" in fibre]:
         low, high = (f"{end:.4f} (fibre {factors.index(end) + 1})" for end in (min(factors), max(factors)))
-        mean = f"{sum(factors) / len(factors):.4f} in the mean"
+        mean = f"{sum(factors) / len(factors):.4f} on average"
         lines += _field("Strengths", [f"{low} to {high} times those of [interface]", mean])
     return lines + _field("Mesh", mesh)
 

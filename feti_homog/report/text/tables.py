@@ -60,9 +60,9 @@ class Column:
 
     Attributes:
         name: the head of the column.
-        width: characters in text; negative for texts, which stand on the left.
+        width: characters in text; negative for strings, which are aligned left.
         form: format of numbers in text.
-        indent: spaces before texts on the left.
+        indent: spaces before left-aligned strings.
     """
 
     name: str
@@ -76,7 +76,7 @@ class Column:
         return f"{self.name:<{-self.width}}" if self.width < 0 else f"{self.name:>{self.width}}"
 
     def cell(self, value: Any) -> str:
-        """Write a cell as text: texts unchanged, numbers in column format."""
+        """Write a cell as text: strings unchanged, numbers in column format."""
         if self.width < 0:
             return f"{' ' * self.indent + value:<{-self.width}}"
         return f" {number(value, self.form):>{self.width - 1}}"
@@ -84,13 +84,13 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """A table of texts and numbers; rows are as long as `columns` or shorter.
+    """A table of strings and numbers; rows are as long as `columns` or shorter.
 
     Attributes:
         above, below: lines of the text before the heads, and after the rows; notes in HTML.
-        title_in_head: in text the title stands where the first column has its head.
+        title_in_head: in text, the title replaces the head of the first column.
         abreast: rows per line of text, without heads; 0 for one row per line with heads.
-        most_columns: columns behind the first; more are blocks below each other, without unknown rows.
+        most_columns: most columns after the first; further columns form blocks below, without unknown rows.
     """
 
     title: str
@@ -129,7 +129,7 @@ class Table:
 
     @property
     def cells(self) -> list[list[str]]:
-        """Return the rows as texts: numbers with the column decimals, or seven digits."""
+        """Return the rows as strings: numbers with the column decimals, or seven digits."""
         forms = [column.form if SAME_IN_HTML.fullmatch(column.form) else ".7g" for column in self.columns]
         return [
             # Noise becomes zero, but even small errors stay unchanged.
@@ -142,7 +142,7 @@ class Table:
 
     @property
     def html(self) -> str:
-        """Return the table as HTML, each block as a table of its own."""
+        """Return the table as HTML, each block as a separate table."""
         notes = "".join(f"<small>{escape(line)}</small>" for line in (*self.above, *self.below))
         text = f"<table><caption>{escape(self.title)}{notes}</caption>"
         for number, (columns, part) in enumerate(self.blocks):
@@ -153,7 +153,7 @@ class Table:
 
 
 def number(value: Any, form: str) -> str:
-    """Format a number, without the sign of a rounded zero; texts stay unchanged."""
+    """Format a number, without the sign of a rounded zero; strings stay unchanged."""
     if isinstance(value, str):
         return value
     text = format(value, form)

@@ -1,4 +1,4 @@
-"""Calls on rank 0 or on all ranks whose exceptions are raised on every rank, so that no rank waits for ever."""
+"""Calls on rank 0 or on all ranks whose exceptions are raised on every rank, so that no rank waits forever."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ class RemoteError(RuntimeError):
 def on_root(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
     """Call a function on rank 0, and return the result on every rank.  Collective.
 
-    Every rank raises an exception of rank 0.  Arguments on other ranks are ignored.  The result must be picklable, and
-    `function` must not communicate.
+    An exception on rank 0 is raised on every rank.  Arguments on other ranks are ignored.  The result must be
+    picklable, and `function` must not communicate.
     """
     result: T = comm.bcast(on_root_only(comm, function, *args, **kwargs), root=0)
     return result

@@ -1,6 +1,6 @@
 """Functions of PETSc's C interface that petsc4py 3.18 does not bind, and exceptions in callbacks.
 
-The extension module of petsc4py resolves PETSc's symbols, so that no library has to be found.
+The extension module of petsc4py resolves PETSc's symbols, so that no library search is needed.
 """
 
 import ctypes

@@ -100,7 +100,7 @@ CLOSE = 0.9
 
 
 def unknown_options(names: Iterable[str]) -> list[str]:
-    """Return one fault for every name (without dash) that is no option of the solver or of PETSc."""
+    """Return one fault for every name (without dash) that is not an option of the solver or of PETSc."""
     faults = []
     for name in names:
         hint = ""
@@ -137,12 +137,12 @@ def suggestion(name: str) -> str:
 
 
 def solver_prefix(name: str) -> str:
-    """Return the longest prefix in PREFIXES with which a name begins, else an empty text."""
+    """Return the longest prefix in PREFIXES with which a name begins, else an empty string."""
     return max((prefix for prefix in PREFIXES if name.startswith(prefix) and name != prefix), key=len, default="")
 
 
 def help_text() -> str:
-    """Return the help on the options of the solver, one line an option."""
+    """Return the help on the solver options, one line per option."""
     usages = [f"-{option.name} {option.value}".strip() for option in OPTIONS]
     width = max(map(len, usages))
     lines = [

@@ -25,7 +25,7 @@ CASE_FILE = ".toml"
 def can_be_written(file: str) -> bool:
     """Return whether a file can be opened for writing, or created in its folder.
 
-    A pipe without a reader cannot, because opening it would wait.
+    The result is False for a pipe without a reader, because opening the pipe would block.
     """
     if not file or "\0" in file or file.endswith(os.sep):
         return False
@@ -85,7 +85,7 @@ def _text(value: Value) -> str:
 
 
 def _real(text: str) -> float:
-    """Convert a text to a number, or NaN if it is none."""
+    """Convert a string to a number, NaN if that is impossible."""
     try:
         return math.nan if "_" in text else float(text)
     except ValueError:
@@ -182,7 +182,7 @@ def split_argv(argv: Sequence[str]) -> tuple[list[str], list[str]]:
 def named_values(words: Sequence[str]) -> dict[str, str]:
     """Return the values of PETSc's options by name without dash, also from options files.
 
-    An option without a value has an empty text.
+    An option without a value has an empty string.
     """
     values: dict[str, str] = {}
     name = ""

@@ -18,7 +18,7 @@ READ_WHEN_SOLVING = {f"feti_ksp_{key}" for key in ("converged_reason", "converge
 def case_options(options: Mapping[str, values.Value]) -> Iterator[None]:
     """Insert the options of a case below the options of the command line, for the block.
 
-    PETSc's flags have no value false: false flags are removed for the block.
+    PETSc's flags cannot be false: false flags are removed for the block.
 
     Raises:
         CaseError: before the block, if an option of this program is misspelt or has an invalid value, or if a solver
@@ -48,7 +48,7 @@ def case_options(options: Mapping[str, values.Value]) -> Iterator[None]:
 
 
 def _set(database: PETSc.Options, name: str, value: values.Value | None) -> None:
-    """Set an option, without a value for an empty text; delete the option for None."""
+    """Set an option, without a value for an empty string; delete the option for None."""
     if value is None:
         database.delValue(name)
     else:
@@ -56,7 +56,7 @@ def _set(database: PETSc.Options, name: str, value: values.Value | None) -> None
 
 
 def given_options() -> dict[str, str]:
-    """Return PETSc's options by lower-case name; an option without a value has an empty text."""
+    """Return PETSc's options by lower-case name; an option without a value has an empty string."""
     return {name.lower(): value or "" for name, value in PETSc.Options().getAll().items()}
 
 
@@ -66,7 +66,7 @@ def choices(prefix: str) -> list[str]:
 
 
 def without_iterations() -> str:
-    """Return a remark on options that print iterations, for runs without iterations, else an empty text."""
+    """Return a remark on options that print iterations, for runs without iterations; else ""."""
     printing = [f"-{name}" for name in given_options() if name.startswith("feti_ksp_") and table.only_prints(name)]
     return f"{', '.join(printing)}: the run has no iterations to print" if printing else ""
 
@@ -111,7 +111,7 @@ def faults_of_solvers(options: Mapping[str, str]) -> list[str]:
 
     `options` has the names without dash and the values in the database.  Every solver is made for a 1 x 1 matrix and
     applied once, because some methods fail only then.  PETSc marks the options that it reads, and prints all readable
-    options with -help.  Options that print are removed for this time.
+    options with -help.  Options that print are removed meanwhile.
     """
     faults, viewers, database, comm = [], [*filter(values.is_viewer, options)], PETSc.Options(), PETSc.COMM_SELF
     try:

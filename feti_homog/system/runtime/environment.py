@@ -34,7 +34,7 @@ def prefer_own_toolkits() -> None:
 def ignore_settings_of_the_folder() -> None:
     """Import Matplotlib without the `matplotlibrc` of the current folder, and draw without windows.
 
-    Matplotlib reads this file first, when it is imported, and raises an exception if the file is damaged.
+    Matplotlib would read this file on import, and raise an exception if the file is damaged.
     """
     os.environ["MPLBACKEND"] = "agg"
     if not os.path.exists("matplotlibrc") or "matplotlib" in sys.modules:

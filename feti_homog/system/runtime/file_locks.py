@@ -1,6 +1,6 @@
-"""Locks between processes on machines that share a file system, and files that are removed with a process.
+"""Locks between processes on machines that share a file system, and files that are removed when a process ends.
 
-The system releases a lock at any end of its process, even by SIGKILL.
+The system releases a lock whenever its process ends, even by SIGKILL.
 """
 
 import contextlib
@@ -34,9 +34,9 @@ class LocksUnsupported(FetiHomogError):
 
 
 class Lock:
-    """A lock on the file `path`, which the last holder removes; `shared` locks exclude exclusive locks alone.
+    """A lock on the file `path`, which the last holder removes; `shared` locks exclude only exclusive locks.
 
-    `acquire` tries for `timeout` seconds.  A lock is a context manager, too.
+    `acquire` tries for `timeout` seconds.  A lock is also a context manager.
     """
 
     def __init__(self, path: Path, shared: bool = False, timeout: float = LOCK_TIMEOUT_S) -> None:
@@ -141,7 +141,7 @@ def tag() -> str:
 
 
 def has_ended(name: str) -> bool:
-    """Return whether the process of a `tag` has ended; False on other machines."""
+    """Return whether the process that made a `tag` has ended; False for tags of other machines."""
     match = TAG.fullmatch(name)
     return match is not None and match["host"] == socket.gethostname() and match["began"] != _began(match["process"])
 
@@ -154,7 +154,7 @@ def remove_files() -> None:
 
 
 def _began(process: int | str) -> str:
-    """Return the start of a process in clock ticks since boot, by proc(5); empty without the process."""
+    """Return the start time of a process in clock ticks since boot, by proc(5); empty if there is no process."""
     try:
         return Path(f"/proc/{process}/stat").read_text(errors="replace").rpartition(")")[2].split()[19]
     except OSError:

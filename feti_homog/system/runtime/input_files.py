@@ -27,7 +27,7 @@ def opened(path: Path, pipes: bool = False) -> BinaryIO:
     With `pipes`, pipes and devices are accepted, too, such as `<(...)` of a shell.
 
     Raises:
-        OSError: the file cannot be opened, or is no regular file.
+        OSError: the file cannot be opened, or is not a regular file.
     """
     descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | (0 if pipes else os.O_NONBLOCK))
     kind = os.fstat(descriptor).st_mode

@@ -24,7 +24,7 @@ class Description:
 
     Attributes:
         meaning: meaning in words.
-        unit: unit, empty for pure numbers, counts and texts.
+        unit: unit, empty for pure numbers, counts and strings.
         shape: shape of an array, as "(3, 3)" or "(n, 2)"; empty for other values.
         components: names of the columns that an array fills in a table.
         spatial_components: `components` in generalized plane strain, if they differ.
@@ -122,7 +122,7 @@ def _restored_value(hint: Any, value: Any) -> Any:
 
 
 def _require(value: Any, kind: Any) -> None:
-    """Raise TypeError for a value of another type; a truth value is no number."""
+    """Raise TypeError for a value of another type; a truth value is not a number."""
     if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
         raise TypeError(f"{value!r:.40} has another type than expected")
 

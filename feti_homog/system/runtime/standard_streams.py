@@ -1,7 +1,7 @@
 """Standard output and error, whose failure does not stop a run, and signals that end the process.
 
 After Ctrl-C, or a signal of a launcher or batch system, the process prints one line and ends at once.  Python runs
-signal handlers between two of its own steps, which a mesher or a factorization may delay for long; libraries replace
+signal handlers only between its bytecodes, which a mesher or a factorization may delay for long; libraries replace
 handlers; and an exception in the middle of a collective call would leave other ranks waiting.  So the signals are
 blocked, and a thread waits for them.
 """
@@ -29,8 +29,8 @@ KEPT = "\n\t"  # characters that are printed although they are not printable; ot
 def end_on_signals() -> None:
     """End the process after SIGINT, SIGTERM or SIGXCPU, with exit code 130, 143 or 152 (128 + signal).
 
-    Before, rank 0 prints a line on standard error, and lock files and unfinished files are removed.  Ignored signals,
-    as in a background job of a shell, remain ignored.  This function must be called before any thread starts.
+    Before it ends, rank 0 prints a line on standard error, and lock files and unfinished files are removed.  Ignored
+    signals, as in a background job of a shell, remain ignored.  This function must be called before any thread starts.
     """
     awaited = {number for number in ENDING if signal.getsignal(number) is not signal.SIG_IGN}
     # Writing shows that the reader of a pipe has closed it.

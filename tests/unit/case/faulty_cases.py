@@ -45,12 +45,12 @@ FAULTY_CASES = {
         "[output] pictures = 1": "expected true or false",
         '[output] stress = "S21"': 'expected one of "auto", "S11", "S22", "S12", "S33", "S23", "S13"',
         '[output] stress = "S33"': 'belongs to [analysis] plane = "generalized", not "strain"',
-        '[output] stress_unit = "G\\nPa"': "expected a text in one line",
+        '[output] stress_unit = "G\\nPa"': "expected a string in one line",
         "[output] deformation_scale = -1": "expected a number at least 0",
         "[cell] width = 0.0": "expected a number at least 1e-09 and at most 1e+09",
         "[petsc] ksp_rtol = 1e-08": "expected the prefix feti_",
         "[petsc] log_view = true": "expected the prefix feti_; PETSc's own options are for the command line",
-        "[petsc] feti_ksp_rtol = [1e-08]": "expected a text, a number, true or false",
+        "[petsc] feti_ksp_rtol = [1e-08]": "expected a string, a number, true or false",
         "[petsc] feti = {ksp_rtol = 1e-08}": "expected the prefix feti_",
     }),
     **faults(changed(MESH_CELL), {
@@ -74,7 +74,7 @@ FAULTY_CASES = {
     "material = 3: expected sections [material.matrix], [material.fibre]":
         "material = 3\n" + BASE.replace(BASE[BASE.index("[material.matrix]") : BASE.index("[analysis]")], ""),
     "refine: unknown key; it belongs to [cell]": "refine = 2\n" + BASE,
-    "name = 3: expected a text": "name = 3\n" + BASE,
+    "name = 3: expected a string": "name = 3\n" + BASE,
     "[cell] mesh_sise = 0.05: unknown key; did you mean mesh_size?": cell("mesh_size", "mesh_sise"),
     "[cell] fiber_fraction = 0.4: unknown key; did you mean fibre_fraction?\n[cell] fibre_fraction: missing":
         cell("fibre_fraction", "fiber_fraction"),

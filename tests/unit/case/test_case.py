@@ -152,7 +152,7 @@ def test_replaced_values_make_the_case_of_the_edited_file(tmp_path):
         ("material.fibre.yuong", 1.0, "[material.fibre] yuong = 1.0: unknown key; did you mean young?"),
         ("material.fibre.young", None, "[material.fibre] young: missing; expected a number above 0"),
         ("materials.fibre.young", 1.0, "[materials]: unknown section; did you mean material?"),
-        ("cell.mesh_size.fine", 1.0, 'cell.mesh_size.fine: "mesh_size" is no section'),
+        ("cell.mesh_size.fine", 1.0, 'cell.mesh_size.fine: "mesh_size" is not a section'),
     ],
 )
 def test_faults_of_replaced_values_are_those_of_files(tmp_path, key, value, fault):

@@ -50,7 +50,7 @@ SIZES = {"": "4", "refine = 1": "2", "refine = 2": "", "mesh_size = 0.2": "", "a
 def test_long_elements_by_default_name_the_way_to_choose_them(keys, elements, tmp_path):
     """0.05 of a width of 40 is 2: four mean radii of 0.5."""
     remarks = case_of(tmp_path, f"width = 40\nheight = 30\n{keys}").remarks()
-    assert [line for line in remarks if f"default: elements of up to {elements} mean radii" in line] == [*remarks]
+    assert [line for line in remarks if f"default: elements up to {elements} mean fibre radii" in line] == [*remarks]
     assert bool(remarks) == bool(elements) and all("; accuracy = 0.01 chooses" in line for line in remarks)
 
 

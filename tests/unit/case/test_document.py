@@ -99,12 +99,12 @@ def test_what_is_no_mapping_is_a_type_error(values):
 CIRCLE: list[Any] = []
 CIRCLE += [CIRCLE, CIRCLE]
 FAULTY: dict[str, tuple[dict[Any, Any], str]] = {
-    "number as section": ({3: {}}, "3: expected a text as key, not an int"),
-    "number as key": ({"cell": {3: 4}}, "[cell] 3: expected a text as key, not an int"),
-    "number as phase": ({"material": {None: {}}}, "[material] None: expected a text as key, not a NoneType"),
+    "number as section": ({3: {}}, "3: expected a string as key, not an int"),
+    "number as key": ({"cell": {3: 4}}, "[cell] 3: expected a string as key, not an int"),
+    "number as phase": ({"material": {None: {}}}, "[material] None: expected a string as key, not a NoneType"),
     "key of an arc": (
         {"interface": {"debonded": [{1: 2}]}},
-        "[interface.debonded] 1: expected a text as key, not an int",
+        "[interface.debonded] 1: expected a string as key, not an int",
     ),
     "path as section": ({"cell": Path("cell.msh")}, 'cell = "cell.msh": expected a section [cell]'),
     "array as section": ({"cell": np.zeros(2)}, "cell = [0.0, 0.0]: expected a section [cell]"),

@@ -174,8 +174,8 @@ def test_sweeps_vary_a_key_of_one_section():
     "path, words",
     [
         (("interface", "normal_strength"), "there are 2 sections [[interface]]; expected interface.1.normal_strength"),
-        (("interface", "3", "normal_strength"), '"3" is no section'),
-        (("interface", "0", "normal_strength"), '"0" is no section'),
+        (("interface", "3", "normal_strength"), '"3" is not a section'),
+        (("interface", "0", "normal_strength"), '"0" is not a section'),
     ],
 )
 def test_sweeps_say_which_section_they_lack(path, words):

@@ -42,9 +42,9 @@ def test_every_key_says_in_a_sentence_what_it_means(row):
         ("interface", "normal_strength", ("a traction above 0, or inf", "stress", "inf")),
         ("interface", "debonded", ("a list of arcs {fibre, centre, angle}, at most 10000 of them", "", "[]")),
         ("angle", "values", ("a rising list of numbers from 0 to 360, at most 1000 of them", "degrees", "required")),
-        ("output", "stress_unit", ("a text in one line", "", '""')),
+        ("output", "stress_unit", ("a string in one line", "", '""')),
         ("path", "increments", ("an integer at least 1 and at most 1000000", "", "required")),
-        ("name", "name", ("a text in one line", "", "the file's name")),
+        ("name", "name", ("a string in one line", "", "the file's name")),
     ],
 )
 def test_rows_are_those_of_the_keys(section, key, expected):

@@ -78,7 +78,7 @@ def test_bonding_that_a_mesh_does_not_have_is_remarked(curve, sections, expected
 @pytest.mark.parametrize(
     ("asked", "words"),
     [
-        (1000, r"(\d+) were made: METIS makes no more of \d+ coarse triangles; a smaller mesh_size has more"),
+        (1000, r"(\d+) were made: METIS makes no more from \d+ coarse triangles; a smaller mesh_size gives more"),
         (1, r"(\d+) were made: each of the 3 bodies is at least one"),
         (3, None),
     ],

@@ -175,7 +175,7 @@ def test_sweeps_that_contradict_their_case_are_refused(tmp_path):
     path.write_text(CASE)
     with pytest.raises(CaseError, match="feti-homog run"):
         sweep_cases.load(path)
-    with pytest.raises(CaseError, match=r"cell\.order: \"cell\" is no section"):
+    with pytest.raises(CaseError, match=r"cell\.order: \"cell\" is not a section"):
         sweep_cases.expand({"cell": 3, "sweep": {"cell.order": [1]}}, Path())
 
 
