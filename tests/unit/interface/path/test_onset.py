@@ -70,7 +70,8 @@ def from_zero(law, traction):
     pull, shear, along = np.maximum(traction[..., 0], 0.0), *np.abs(np.moveaxis(traction[..., 1:], -1, 0))
     if isinstance(law, Strength):
         shares = pull / law.normal, shear / law.tangential, along / law.axial
-        return 1 / (np.max(shares, axis=0) if isinstance(law, MaxStrength) else np.sqrt(np.square(shares).sum(axis=0)))
+        together = {MaxStrength: np.max, QuadraticStrength: lambda parts, axis: np.sqrt(np.square(parts).sum(axis))}
+        return 1 / together[type(law)](shares, axis=0)
     opening = pull**2 / (2 * law.normal_stiffness)
     sliding = shear**2 / (2 * law.tangential_stiffness) + along**2 / (2 * law.axial_stiffness)
     psi = np.arctan2(np.sqrt(sliding), np.sqrt(opening))
