@@ -31,12 +31,15 @@ SYMBOLS = {
     **{name: rf"\Sigma_{{{name[1:]}}}" for name in voigt.SPATIAL_STRESSES},
     "temperature": r"\Delta{T}",  # without a space, at which titles are wrapped
 }
+VON_MISES = "von_mises"
 STRESS_SYMBOLS = {name: rf"\sigma_{{{name[1:]}}}" for name in voigt.SPATIAL_STRESSES}
+STRESS_SYMBOLS[VON_MISES] = r"\sigma_{vM}"
 # Table of each stress in a state of result.h5, and its column if the table has several.
 STRESS_TABLES: dict[str, tuple[str, int | None]] = {
     **{name: ("stress", column) for column, name in enumerate(voigt.STRESSES)},
     "S33": ("stress_33", None),
     **{name: ("axial_stress", column) for column, name in enumerate(voigt.AXIAL_STRESSES)},
+    VON_MISES: ("stress_33", None),  # and the others
 }
 OUTLIERS = 0.005  # area fraction that may lie outside a colour range, at either end
 # Of curves: the colours of Okabe and Ito, which the colour-blind tell apart.
@@ -251,9 +254,13 @@ def stress_component(chosen: str, states: Sequence[Any]) -> str:
 
 
 def nodal_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
-    """Return a stress component at the drawn nodes (p,), averaged over triangles in the same body."""
-    table, column = STRESS_TABLES[component]
-    return node_means(triangle_means(state[table], column, drawn), drawn)
+    """Return a stress at the drawn nodes (p,), averaged over triangles in the same body."""
+    name, column = STRESS_TABLES[component]
+    table = state[name]
+    if component == VON_MISES:  # of the mean stresses of elements, as in `viewed_states`
+        shears = state["axial_stress"][:] if "axial_stress" in state else np.zeros((len(table), 2))
+        table = voigt.spatial_von_mises(state["stress"][:], table[:], shears)
+    return node_means(triangle_means(table, column, drawn), drawn)
 
 
 def bond_limits(case: Document) -> list[str]:
