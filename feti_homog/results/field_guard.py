@@ -16,7 +16,8 @@ def require_own(path: Path) -> None:
     Other links may lead to pipes, other files or back.  Raises CaseError; FetiHomogError for an unreadable file.
     """
     if not path.is_file():
-        raise CaseError(f"cannot read {path}: it is missing; run the case again")
+        stored = " with --resume: the checkpoint has its events" if (path.parent / "checkpoint/events").is_file() else ""
+        raise CaseError(f"cannot read {path}: the fields are missing; run the case again{stored}")
     room = {True: 64 * path.stat().st_size, False: path.stat().st_size}  # of views, which show tables, and of tables
     try:
         with h5py.File(path, "r", locking=False) as file:

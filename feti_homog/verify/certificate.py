@@ -69,8 +69,11 @@ def verify(directory: Path) -> Certificate:
 
 def _verified(directory: Path) -> Certificate:
     """Check all laws in this process."""
+    reason = "numbers are missing, or of another kind or shape"
     try:
         with opened(directory) as files, np.errstate(all="ignore"):  # numbers that are not finite break their laws
+            if files.altered:
+                reason = f"{' and '.join(files.altered)} changed since the run, or is of another: both do not fit"
             cell, document = DiscreteCell.of(files), files.document
             findings = Findings(checks_of(cell))
             findings.record("files", len(files.altered), ", ".join(files.altered))
@@ -83,8 +86,8 @@ def _verified(directory: Path) -> Certificate:
             status = ": ".join(["the run reports", document.hint("status"), *(["; ".join(faults)] if faults else [])])
             return Certificate(findings.worst(), title, status, unchecked(document))
     except DAMAGE as error:
-        fault = f"{type(error).__name__} {error}"
-        raise CaseError(f"{directory}: files do not belong together or are incomplete: {fault}") from error
+        entry = f" (without {error})" if isinstance(error, KeyError) else ""
+        raise CaseError(f"{directory}: {reason}{entry}") from error
 
 
 def checks_of(cell: DiscreteCell) -> list[Finding]:

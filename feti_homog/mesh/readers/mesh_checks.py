@@ -211,12 +211,18 @@ def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
     faults = []
     for axis, side in SIDES:
         nodes, partners = (np.flatnonzero(plane[:, axis] == k * size[axis]) for k in (side, 1 - side))
+        if len(nodes) < len(partners):  # the other side lists its nodes
+            continue
+        advice = f"; {len(partners)} nodes face {len(nodes)}: mesh both sides with {len(nodes)} (gmsh: Periodic Curve)"
+        advice *= len(nodes) > len(partners)
         along, other = plane[nodes, 1 - axis], np.sort(plane[partners, 1 - axis])
         after = np.clip(np.searchsorted(other, along), 1, len(other) - 1)
         gap = np.minimum(np.abs(other[after] - along), np.abs(other[after - 1] - along))
         shift = np.where(np.arange(3) == axis, (1 - 2 * side) * size[axis], 0.0)
         before, single = f"not periodic, nodes of the {NO_PARTNER[axis, side]}", nodes[gap > SAME_PLACE * size.max()]
-        faults += _listed(before, single, lambda k, s=shift: f"{mesh.node(k)}, expected at {at(mesh.points[k] + s)}")
+        faults += _listed(
+            before, single, lambda k, s=shift: f"{mesh.node(k)}, expected at {at(mesh.points[k] + s)}", advice
+        )
     return faults
 
 
