@@ -16,7 +16,8 @@ def require_own(path: Path) -> None:
     Other links may lead to pipes, other files or back.  Raises CaseError; FetiHomogError for an unreadable file.
     """
     if not path.is_file():
-        stored = " with --resume: the checkpoint has its events" if (path.parent / "checkpoint/events").is_file() else ""
+        has_events = (path.parent / "checkpoint/events").is_file()
+        stored = " with --resume: the checkpoint has its events" if has_events else ""
         raise CaseError(f"cannot read {path}: the fields are missing; run the case again{stored}")
     room = {True: 64 * path.stat().st_size, False: path.stat().st_size}  # of views, which show tables, and of tables
     try:

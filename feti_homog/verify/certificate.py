@@ -13,9 +13,8 @@ from feti_homog.verify.check_constants import check_conductivity, check_constant
 from feti_homog.verify.check_loads import StateNumbers, States, check_loads, check_tables, rows_of
 from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh, check_mesh_error, check_rates
 from feti_homog.verify.check_path import check_breaks, check_envelope, check_strength
-from feti_homog.verify.check_phases import check_phases
 from feti_homog.verify.check_sensitivities import check_sensitivities
-from feti_homog.verify.check_state import check_bonds, check_gluing, check_state
+from feti_homog.verify.check_state import check_bonds, check_gluing, check_phases, check_state
 from feti_homog.verify.constitutive_law import rounding
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Finding, Findings, checks, unchecked

@@ -130,23 +130,14 @@ def faint_grid(axes: Axes) -> None:
     axes.set_axisbelow(True)
 
 
-def fill_triangles(axes: Axes, drawn: DrawnMesh, points: Array, colours: Array, edges: bool) -> None:
-    """Fill triangles with colours (q, 4), without antialiasing, which would leave seams."""
-    separate = np.arange(drawn.triangles.size).reshape(-1, 3)  # each triangle has nodes of its own
-    mesh: Any = _add_triangles(axes, points[drawn.triangles].reshape(-1, 2), separate)
-    mesh.set_facecolor(np.repeat(colours, 3, axis=0))
-    if edges:
-        draw_segments(axes, points[drawn.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)], MESH, 0.25)
-
-
 def shade_triangles(axes: Axes, drawn: DrawnMesh, points: Array, values: Array, norm: Normalize, colours: Any) -> Any:
     """Draw triangles in smooth colours for the nodal values (p,).  The nodes are at `points` (p, 2)."""
-    mesh = _add_triangles(axes, points, drawn.triangles)
+    mesh = add_triangles(axes, points, drawn.triangles)
     mesh.set(array=values, norm=norm, cmap=colours)
     return mesh
 
 
-def _add_triangles(axes: Axes, points: Array, triangles: Array) -> TriMesh:
+def add_triangles(axes: Axes, points: Array, triangles: Array) -> TriMesh:
     """Add triangles to the axes as pixels, also in vector graphics.
 
     Matplotlib's `tripcolor` makes a path of each triangle to find the limits, which takes longer than all the rest.

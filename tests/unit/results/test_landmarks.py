@@ -148,4 +148,6 @@ def test_a_phase_passes_its_strength_between_points(utilisation: Any, place: str
     document = {"path": path([10.0, 20.0, 20.0, 15.0]), "phase_stresses": [phase]}
     lines = passed_strengths(document, peak, range(4))
     assert len(lines) == (place is not None)
-    assert place is None or lines[0].startswith(f"[material.epoxy] strength: the utilisation reaches 1 at about {place}")
+    assert place is None or lines[0].startswith(
+        f"[material.epoxy] strength: the utilisation reaches 1 at about {place}"
+    )
