@@ -133,8 +133,8 @@ def text(word: str = "", results: Sequence[str] = ()) -> str:
     """Write the reference, after an index of all keys by need, or the tables with a word, then lines of results."""
     references = tables(word, results)
     if word:
-        lines = (textwrap.fill(line, WIDTH, subsequent_indent=6 * " ") for line in results)
-        return "\n\n".join(filter(None, [as_text(references), "\n".join(lines)]))
+        described = "\n".join(textwrap.fill(line, WIDTH, subsequent_indent=6 * " ") for line in results)
+        return "\n\n".join(filter(None, [as_text(references), described]))
     groups = {name: dict[str, dict[str, None]]() for name in sections.GROUPS}
     group_of = {place: name for name, places in sections.GROUPS.items() for place in places.split()}
     for table in references:

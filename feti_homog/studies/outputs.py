@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import is_dataclass
 from typing import Any
 
 import numpy as np
@@ -223,8 +222,7 @@ OUTPUT_COLUMNS = (
 
 def named(word: str) -> list[str]:
     """Describe entries of result.json by their name, and columns of cases.csv by one that they stand for, as C11."""
-    kinds = (*vars(result.cell_records).values(), *vars(result.result_records).values(), result.Result)
-    entries = (records.descriptions(kind).get(word) for kind in filter(is_dataclass, kinds))
+    entries = (records.descriptions(kind).get(word) for kind in result.RECORDS)
     lines = [f"result.json, {word}: {meaning}" for meaning in dict.fromkeys(e.meaning for e in entries if e)]
     for column in OUTPUT_COLUMNS:
         pattern = re.sub("i[ij]", r"\\d\\d", column.name).replace("STRAIN", r"(E|gamma)\d\d")

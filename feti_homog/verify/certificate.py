@@ -72,7 +72,7 @@ def _verified(directory: Path) -> Certificate:
     try:
         with opened(directory) as files, np.errstate(all="ignore"):  # numbers that are not finite break their laws
             if files.altered:
-                reason = f"{' and '.join(files.altered)} changed since the run, or is of another: both do not fit"
+                reason = f"{' and '.join(files.altered)} changed since the run, or is of another: the files do not fit"
             cell, document = DiscreteCell.of(files), files.document
             findings = Findings(checks_of(cell))
             findings.record("files", len(files.altered), ", ".join(files.altered))

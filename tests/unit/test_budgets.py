@@ -17,24 +17,24 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 # begun runs and their messages; the third: conductivity.
 LINES = {
     ".": 470,
-    "analysis": 3000 + 130 + 110,
-    "case": 2880 + 45 + 30,
+    "analysis": 3000 + 127 + 110,
+    "case": 2880 + 35 + 30,
     "commands": 560 + 15,
-    "fem": 1150 + 5,
+    "fem": 1150 + 3,
     "feti": 6300,
-    "homogenization": 3230 + 60,
+    "homogenization": 3230 + 42,
     "interface": 4000,
-    "materials": 1430 + 95 + 110,
+    "materials": 1430 + 85 + 110,
     "mesh": 5500,
     "microstructure": 2140,
-    "report": 3420 + 170 + 50,
-    "results": 2430 + 85,
+    "report": 3420 + 172 + 50,
+    "results": 2430 + 110,
     "schema": 430,
     "studies": 2950,
-    "system": 1770 + 5,
-    "verify": 3100 + 170 + 50,
+    "system": 1770 + 3,
+    "verify": 3100 + 156 + 50,
 }
-FILES, TOTAL = 310, 45000 + 370 + 370
+FILES, TOTAL = 310, 45000 + 368 + 370
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.0, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

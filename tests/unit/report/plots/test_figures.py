@@ -203,27 +203,6 @@ def test_the_case_chooses_component_and_scale(tmp_path: Path) -> None:
     assert before[:3] == after[:3] and all(a != b for a, b in zip(before[3:6], after[3:6], strict=True))
 
 
-@pytest.mark.parametrize(
-    ("stress", "S33", "axial", "expected"),
-    [
-        ([3.0, 0.0, 0.0], 0.0, None, 3.0),
-        ([0.0, 0.0, 2.0], 0.0, None, 2.0 * np.sqrt(3.0)),
-        ([5.0, 5.0, 0.0], 5.0, [0.0, 0.0], 0.0),
-        ([0.0, 0.0, 0.0], 0.0, [3.0, -4.0], 5.0 * np.sqrt(3.0)),
-    ],
-)
-def test_a_uniform_stress_has_its_von_mises_stress(
-    tmp_path: Path, stress: list[float], S33: float, axial: list[float] | None, expected: float
-) -> None:
-    with h5py.File(write(tmp_path, sample(3) if axial is None else in_space(sample(3))), "r+") as file:
-        state, values = file["state/1"], {"stress": stress, "stress_33": S33, "axial_stress": axial}
-        for name, value in values.items():
-            if value is not None:
-                state[name][:] = value
-        drawn = DrawnCell.of(file).drawn
-        np.testing.assert_allclose(plot_helpers.nodal_stress(state, "von_mises", drawn), expected, atol=1e-12)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "begin"), [("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<?xml")])
 def test_a_state_is_drawn_alone_in_the_size_and_format_of_a_paper(tmp_path: Path, kind: str, begin: bytes) -> None:
@@ -240,7 +219,7 @@ def test_a_state_is_drawn_alone_in_the_size_and_format_of_a_paper(tmp_path: Path
     assert figures.plot(tmp_path, plot_helpers.Look(kind, (9.0, 8.0), "whole $"), label, "S12") == [path]
     with pytest.raises(CaseError, match=r"--state 7: expected the number or label of a state of .*: 0 \(\w+.*, 2 \("):
         figures.plot(tmp_path, state=7)
-    with pytest.raises(CaseError, match="--component S13: expected a stress that .* has: S11, S22 or S12"):
+    with pytest.raises(CaseError, match=r"--component S13: expected a stress that .* has: S11, S22 or S12"):
         figures.plot(tmp_path, component="S13")
 
 
