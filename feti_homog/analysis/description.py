@@ -101,7 +101,7 @@ def _cost_lines(
 
 def _fibre_lines(case: Case, summary: domain_partition.CellSummary) -> Iterator[str]:
     """Yield lines about the fibres: counts and sizes, mixed phases, and the match of positions."""
-    if case.interface is not None or case.cell.table is not None:
+    if case.interface is not None or case.cell.table is not None or case.cell.has_own_mesh:
         frames, sizes = summary.frames[summary.fibre_bodies], ""
         is_hollow = case.cell.table is not None and bool((case.cell.table.inner_radius > 0).any())
         if len(frames) and np.isfinite(frames).all() and not is_hollow:  # polygons have no frame

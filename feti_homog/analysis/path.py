@@ -20,7 +20,7 @@ from feti_homog.interface.laws import BondLaw
 from feti_homog.interface.path import coulomb_leg, frictionless_leg, path_following, path_points
 from feti_homog.materials import voigt
 from feti_homog.results import landmarks, path_curves
-from feti_homog.system.runtime import standard_streams
+from feti_homog.system.runtime import records, standard_streams
 
 OF_FIBRES = ("debonded_length", "debonding_angle")  # lists of a point, kept where its fields are
 NAMED_FIBRES = 8  # most fibre names in a remark
@@ -230,6 +230,8 @@ def _completed(
         fibre, angle = bonds[peak[f"{title}event"]] if f"{title}event" in peak else (np.nan, np.nan)
         if not np.isnan(fibre):
             peak |= {f"{title}fibre": int(fibre), f"{title}angle": angle}
+    phases = records.plain(context.states.phase_stresses() or ())
+    context.notes += landmarks.passed_strengths(document | {"phase_stresses": phases}, peak, numbers)
     return {"path": tuple(PathPoint(**entry) for entry in entries), "peak": Peak(**peak)} | states
 
 

@@ -285,3 +285,6 @@ class Result:
         from feti_homog.report.text import summary  # only notebooks show tables
 
         return summary.notebook(self.document)
+
+
+RECORDS = (*filter(is_dataclass, (*vars(cell_records).values(), *vars(result_records).values())), Result)

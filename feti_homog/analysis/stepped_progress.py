@@ -1,5 +1,6 @@
 """The progress of a long computation in steps: a bar on a terminal, one line per minute in a file."""
 
+import shutil
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -29,7 +30,9 @@ def shown(
     if progress.on_terminal:
         from tqdm import tqdm  # unused in most runs, and slow to import
 
-        bar = tqdm(total=1.0, desc=label, bar_format="{l_bar}{bar}| {elapsed} used{postfix}", leave=False)
+        columns, rows = shutil.get_terminal_size()  # 80 x 24 of a terminal that says 0 x 0
+        look = "{l_bar}{bar}| {elapsed} used{postfix}"
+        bar = tqdm(total=1.0, desc=label, bar_format=look, leave=False, ncols=columns, nrows=rows)
 
     def advance(share: float, count: int, text: str, known: bool) -> None:
         nonlocal reached, next_line, since
@@ -37,7 +40,8 @@ def shown(
         since = (now, reached, count) if known else since
         seconds, gain, steps = now - since[0], reached - since[1], count - since[2]
         text += f", {60.0 * steps / seconds:,.1f} a minute" if steps and seconds else ""
-        text += f", {timedelta(seconds=round(seconds * (1.0 - reached) / gain))} left" if gain else ""
+        if gain:  # first, since a narrow terminal shows the begin
+            text = f"{timedelta(seconds=round(seconds * (1.0 - reached) / gain))} left, {text}"
         if bar is not None:
             bar.set_postfix_str(text, refresh=False)
             bar.update(reached - bar.n)

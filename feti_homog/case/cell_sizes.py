@@ -178,17 +178,6 @@ def _expected_counts(cell: Cell) -> dict[str, float]:
     return {phase: area * density for phase, density in per_area.items()}
 
 
-def void_count(cell: Cell, fibre_radius: float) -> int:
-    """Return the void count in a random cell of width 1.
-
-    The result is the whole number nearest to the void fraction, at least one.
-    """
-    if not cell.voids:
-        return 0
-    radius = fibre_radius * (1.0 if cell.void_radius is None else cell.void_radius)
-    return max(1, round(cell.voids / (pi * radius**2)))
-
-
 def fractions_in_words(cell: Cell) -> str:
     """Write the fibre and void fractions of a cell without a file as keys."""
     fibres = (

@@ -85,13 +85,13 @@ PAIRS = KeyRow(sections.CORRELATION, PAIR_WORDS, "", "", "", "Correlation of pai
 AXIS = KeyRow("SECTION.KEY", sections.AXIS_EXPECTED, "", "", "", sections.AXIS_MEANING)
 
 
-def tables(word: str = "") -> list[TableReference]:
+def tables(word: str = "", results: Sequence[str] = ()) -> list[TableReference]:
     """Return the key tables: all in `ORDER`, one section, or all with a word.
 
     The search ignores case, and takes underscores for spaces, in names and descriptions of keys and sections.
 
     Raises:
-        CaseError: nothing has the word.
+        CaseError: nothing has the word, and no lines of `results` describe it.
     """
     ranges = _rows(sections.SWEEP, sections.RANGE_KEYS)
     references = [
@@ -117,7 +117,7 @@ def tables(word: str = "") -> list[TableReference]:
         rows = table.rows if _has(word, table.section) else [r for r in table.rows if _has(word, *vars(r).values())]
         if rows or _has(word, table.meaning):
             found.append(replace(table, rows=tuple(sorted(rows, key=lambda row: not _has(word, row.key)))))
-    if not found:
+    if not found and not results:
         names = {*ORDER, *(row.key for table in references for row in table.rows)}
         near = [*wording.SYNONYMS.get(word.lower(), ()), *difflib.get_close_matches(word, sorted(names))]
         words = f"near words: {', '.join(near)}" if near else "`feti-homog keys` lists all keys"
@@ -129,11 +129,12 @@ def _has(word: str, *texts: str) -> bool:
     return any(word.lower().replace("_", " ") in text.lower().replace("_", " ") for text in texts)
 
 
-def text(word: str = "") -> str:
-    """Write the reference, after an index of all keys by need, or the tables with a word in them."""
-    references = tables(word)
+def text(word: str = "", results: Sequence[str] = ()) -> str:
+    """Write the reference, after an index of all keys by need, or the tables with a word, then lines of results."""
+    references = tables(word, results)
     if word:
-        return as_text(references)
+        described = "\n".join(textwrap.fill(line, WIDTH, subsequent_indent=6 * " ") for line in results)
+        return "\n\n".join(filter(None, [as_text(references), described]))
     groups = {name: dict[str, dict[str, None]]() for name in sections.GROUPS}
     group_of = {place: name for name, places in sections.GROUPS.items() for place in places.split()}
     for table in references:

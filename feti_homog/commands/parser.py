@@ -100,11 +100,10 @@ def _add_products(commands: argparse._SubParsersAction[Parser]) -> None:
     plot.add_argument(
         "--format", choices=("png", "pdf", "svg"), default="png", help="pdf, svg: lines and text as vectors"
     )
-    plot.add_argument("--state", type=integer, metavar="N", help="draw state N of result.h5 alone, counted from 0")
-    stresses = ("S11", "S22", "S12", "S33", "S23", "S13")
-    plot.add_argument(
-        "--component", choices=stresses, metavar="NAME", help="stress to draw: S11, S22, S12, ... (von Mises: `fields`)"
-    )
+    words = 'draw this state alone, by its number in result.h5, from 0, or its label, such as "event 12"'
+    plot.add_argument("--state", metavar="STATE", help=words)
+    stresses = ("S11", "S22", "S12", "S33", "S23", "S13", "von_mises")
+    plot.add_argument("--component", choices=stresses, metavar="NAME", help="stress to draw: S11, ..., or von_mises")
     plot.add_argument("--size", type=size, metavar="WxH", help="width and height in centimetres, such as 9x7")
     plot.add_argument("--title", metavar="TEXT", help='title of the pictures; "" for none')
     fields.add_argument(

@@ -38,10 +38,12 @@ def check(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Print the reference of the case file, or of the keys and sections with a word."""
+    """Print the reference of the case file, or of the keys, sections and results with a word."""
     from feti_homog.case import reference
+    from feti_homog.studies import outputs
 
-    text = mpi_errors.on_root_only(comm, reference.text, " ".join(arguments.word))
+    word = " ".join(arguments.word)
+    text = mpi_errors.on_root_only(comm, reference.text, word, outputs.named(word))
     mpi_errors.on_root_only(comm, standard_streams.print_product, text)
 
 

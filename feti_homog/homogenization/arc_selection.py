@@ -101,15 +101,6 @@ class EstimatedNodes:
         return tuple(moved)
 
 
-def fibre_faults(case: Case, centres: Float) -> list[str]:
-    """List faults in all debonded arcs; centres (fibres, 2) are NaN for fibres without a centre."""
-    lines = []
-    for pair, interface in enumerate(case.interfaces):
-        label = interface_section.interface_label(pair, len(case.interfaces))
-        lines += debonded_arcs.faults(interface.debonded, centres, label)
-    return lines
-
-
 def faults(case: Case, nodes: EstimatedNodes, moved: Sequence[debonded_arcs.MovedTips]) -> list[str]:
     """List the arcs, and the nonzero [angle] openings, that select no node."""
     openings: Sequence[float | None] = case.section.openings or [None]

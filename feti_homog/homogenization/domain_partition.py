@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.case import Case
+from feti_homog.case import Case, interface_section
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition import partition
 from feti_homog.homogenization import arc_selection, cell_remarks, partition_policy
@@ -129,16 +129,16 @@ def distribute(
 ) -> list[RankShare]:
     """Cut the cell, and deal the subdomains to the ranks.
 
-    Raises:
-        CaseError: an arc lies on a fibre that cannot have it, or selects no node.
+    Raises CaseError if an arc lies on a fibre that cannot have it, or selects no node.
     """
     torus = Torus.of(mesh)
     numbers, is_fibre = mesh_fibres.fibre_numbers(torus)
     circles, pairs = mesh_fibres.fibre_circles(torus), cell_remarks.pairs_of(case, mesh.phases)
     centres = in_cell(circles[:, :2], mesh.period)
     faults = cell_remarks.faults(case, mesh.phases, *(mesh.phase[side] for side in torus.sides[:2]))
-    faults += arc_selection.fibre_faults(case, centres[is_fibre])
-    moved = (debonded_arcs.NOT_MOVED,) * len(case.interfaces)
+    moved = (debonded_arcs.NOT_MOVED,) * (count := len(case.interfaces))
+    for pair, bond in enumerate(case.interfaces):
+        faults += debonded_arcs.faults(bond.debonded, centres[is_fibre], interface_section.interface_label(pair, count))
     if case.arcs and not faults:
         nodes = arc_selection.EstimatedNodes.of(torus, lattice, pairs, numbers, centres)
         moved = nodes.moved_tips(case, int(is_fibre.sum()))

@@ -75,14 +75,6 @@ def recover(cell: TornCell, response: Response | None, problem: Problem | None =
     return RecoveredFields(total, fluctuation, strain, stress, traction, opening[pair], shares)
 
 
-def out_of_plane_stress(cell: TornCell, stress: Float) -> Float:
-    """Return the stresses S33 (m,) from the stresses (m, 3) in the plane."""
-    plane = cell.case.analysis.plane
-    rules = [laws.out_of_plane(cell.case.material_of(s.submesh.phase), plane)[0] for s in cell.parts]
-    sizes = [len(s.mesh.triangles) for s in cell.parts]
-    return np.asarray(np.einsum("ev,ev->e", stress, np.repeat(np.reshape(rules, (-1, 3)), sizes, axis=0)))
-
-
 Largest = tuple[Float, Float]
 """The largest value (v,) of each measure, of the utilisation in each mode, and its position (v, 2)."""
 

@@ -52,16 +52,12 @@ def utilisation(strength: PhaseStrength, stress: Float, principal: Float, von_mi
     elif "von_mises" in limits:
         ratios = [von_mises / limits["von_mises"]]
     elif "tension" in limits:
-        ratios = [_drucker_prager(limits, stress[:, :3].sum(axis=1), von_mises)]
+        # a sigma_vm + b tr sigma, which is 1 under either uniaxial strength.
+        tension, compression = 1.0 / limits["tension"], 1.0 / limits["compression"]
+        ratios = [(tension + compression) / 2 * von_mises + (tension - compression) / 2 * stress[:, :3].sum(axis=1)]
     else:
         ratios = _hashin(limits, stress)
     return np.asarray(np.maximum(np.stack(ratios, axis=1), 0.0))
-
-
-def _drucker_prager(limits: Mapping[str, float], trace: Float, von_mises: Float) -> Float:
-    """Compute a sigma_vm + b tr sigma, which is 1 under either uniaxial strength."""
-    tension, compression = 1.0 / limits["tension"], 1.0 / limits["compression"]
-    return (tension + compression) / 2 * von_mises + (tension - compression) / 2 * trace
 
 
 def _hashin(limits: Mapping[str, float], stress: Float) -> list[Float]:

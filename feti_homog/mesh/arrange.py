@@ -62,7 +62,8 @@ def random_arrangement(
         members = np.array(phase) == name
         radii[members] *= sqrt(share / (pi * fsum(radii[members] ** 2)))
     coating, clear = (cell.coating or 0.0) * radii, gap * fsum(radii) / fibres
-    if voids := cell_sizes.void_count(cell, float(radii.mean())):
+    void_radius = float(radii.mean()) * (1.0 if cell.void_radius is None else cell.void_radius)
+    if voids := max(1, round(cell.voids / (pi * void_radius**2))) if cell.voids else 0:
         if voids > cell_section.MOST_FIBRES:
             bound = f"expected at most {cell_section.MOST_FIBRES}; make void_radius larger"
             raise MeshError(f"[cell] {cell_sizes.fractions_in_words(cell)}: makes {voids:.2g} voids; {bound}")

@@ -16,7 +16,9 @@ def require_own(path: Path) -> None:
     Other links may lead to pipes, other files, or in circles.  Raises CaseError; FetiHomogError for an unreadable file.
     """
     if not path.is_file():
-        raise CaseError(f"cannot read {path}: it is missing; run the case again")
+        has_events = (path.parent / "checkpoint/events").is_file()
+        stored = " with --resume: the checkpoint has its events" if has_events else ""
+        raise CaseError(f"cannot read {path}: the fields are missing; run the case again{stored}")
     room = {True: 64 * path.stat().st_size, False: path.stat().st_size}  # of views, which show tables, and of tables
     try:
         with h5py.File(path, "r", locking=False) as file:

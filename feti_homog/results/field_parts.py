@@ -8,6 +8,7 @@ import numpy as np
 
 from feti_homog.fem import GENERALIZED
 from feti_homog.homogenization import averaging, phase_laws, recovered_fields, unit_cell
+from feti_homog.materials import laws
 from feti_homog.results.field_layout import FibrePart, Header, InterfacePart, MeshPart, SpatialStatePart, StatePart
 from feti_homog.typing import Float, Float32
 from feti_homog.version import __version__
@@ -86,7 +87,9 @@ def state_part(
     cell: unit_cell.TornCell, response: averaging.Response, load_factor: float, label: str, point: int
 ) -> StatePart:
     """Return the response fields in plane strain or stress. Collective when first called."""
-    fields = recovered_fields.recover(cell, response)
+    fields, plane = recovered_fields.recover(cell, response), cell.case.analysis.plane
+    rules = [laws.out_of_plane(cell.case.material_of(s.submesh.phase), plane)[0] for s in cell.parts]
+    S33_of = np.repeat(np.reshape(rules, (-1, 3)), [len(s.mesh.triangles) for s in cell.parts], axis=0)
     return StatePart(
         strain=response.strain,
         stress_mean=response.stress,
@@ -94,7 +97,7 @@ def state_part(
         point=point,
         label=label,
         stress=fields.stress,
-        stress_33=recovered_fields.out_of_plane_stress(cell, fields.stress),
+        stress_33=np.einsum("ev,ev->e", fields.stress, S33_of),
         mesh_error=_relative(fields.shares, response),
         **_at_nodes(cell, response, fields),
     )

@@ -110,6 +110,26 @@ def name_of(document: path_curves.Document, peak: path_curves.Document) -> str:
     return LARGEST if fall_of(document, peak) < LEAST_FALL else PEAK
 
 
+def passed_strengths(document: path_curves.Document, peak: path_curves.Document, numbers: Sequence[int]) -> list[str]:
+    """Describe the load at which a phase passes its strength before the peak, between the kept points `numbers`.
+
+    Utilisations are linear in between, and from the unloaded cell to the first point.
+    """
+    lines, component = list[str](), voigt.voigt_names(len(document["path"][0]["stress"]))[0].index(peak["strain_name"])
+    means = [np.array([point[name] for point in document["path"]])[numbers, component] for name in ("stress", "strain")]
+    for phase in document.get("phase_stresses", ()):
+        ratios = [0.0, *phase.get("utilisation", ())]
+        k = next((k for k, ratio in enumerate(ratios) if ratio >= 1.0), 0)
+        if k and numbers[k - 1] <= peak["event"]:
+            stress, strain = (np.interp(1.0, ratios[k - 1 : k + 1], np.r_[0.0, mean][k - 1 : k + 1]) for mean in means)
+            place = f"{peak['stress_name']} = {stress:.4g}, {peak['strain_name']} = {strain:.4g}"
+            lines.append(
+                f"[material.{phase['phase']}] strength: the utilisation reaches 1 at about {place}, before the largest "
+                "stress of the path, which takes the phase as elastic beyond"
+            )
+    return lines
+
+
 def marks(document: path_curves.Document) -> dict[int, str]:
     """Return the titles of all landmarks, by rising point number."""
     peak = peak_of(document)

@@ -6,5 +6,5 @@ Main entries: `sweep_cases.load`, `case_runs.run_all`, `collect.collect`, `fit_f
 """
 
 __all__ = [
-    "case_folders", "case_runs", "collect", "fit_file", "sweep_cases", "sweep_table", "uncertainty",
+    "case_folders", "case_runs", "collect", "fit_file", "outputs", "sweep_cases", "sweep_table", "uncertainty",
 ]  # fmt: skip

@@ -1,10 +1,12 @@
 """Outputs of a case: the numbers of result.json that fill cases.csv, and the meaning of all columns."""
 
+import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
+from feti_homog.analysis import result
 from feti_homog.materials import engineering_constants, voigt
 from feti_homog.report.text import point_tables
 from feti_homog.results import landmarks, result_json
@@ -216,6 +218,17 @@ OUTPUT_COLUMNS = (
     Column("seconds_STAGE", "s", "wall time of a stage, the largest over ranks"),
     Column("memory", "bytes", "peak resident memory, the largest over ranks"),
 )
+
+
+def named(word: str) -> list[str]:
+    """Describe entries of result.json by their name, and columns of cases.csv by one that they stand for, as C11."""
+    entries = (records.descriptions(kind).get(word) for kind in result.RECORDS)
+    lines = [f"result.json, {word}: {meaning}" for meaning in dict.fromkeys(e.meaning for e in entries if e)]
+    for column in OUTPUT_COLUMNS:
+        pattern = re.sub("i[ij]", r"\\d\\d", column.name).replace("STRAIN", r"(E|gamma)\d\d")
+        if re.fullmatch(re.sub("[A-Z]{3,}", ".+", pattern), word):
+            lines.append(f"cases.csv, {column.name}: {column.meaning}")
+    return lines
 
 
 COLUMNS = (*CASE_COLUMNS, *INPUT_COLUMNS, *OUTPUT_COLUMNS)

@@ -13,9 +13,8 @@ from feti_homog.verify.check_constants import check_conductivity, check_constant
 from feti_homog.verify.check_loads import StateNumbers, States, check_loads, check_tables, rows_of
 from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh, check_mesh_error, check_rates
 from feti_homog.verify.check_path import check_breaks, check_envelope, check_strength
-from feti_homog.verify.check_phases import check_phases
 from feti_homog.verify.check_sensitivities import check_sensitivities
-from feti_homog.verify.check_state import check_bonds, check_gluing, check_state
+from feti_homog.verify.check_state import check_bonds, check_gluing, check_phases, check_state
 from feti_homog.verify.constitutive_law import rounding
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Finding, Findings, checks, unchecked
@@ -69,8 +68,11 @@ def verify(directory: Path) -> Certificate:
 
 def _verified(directory: Path) -> Certificate:
     """Check all laws in this process."""
+    reason = "numbers are missing, or of another kind or shape"
     try:
         with opened(directory) as files, np.errstate(all="ignore"):  # numbers that are not finite break their laws
+            if files.altered:
+                reason = f"{' and '.join(files.altered)} changed since the run, or is of another: the files do not fit"
             cell, document = DiscreteCell.of(files), files.document
             findings = Findings(checks_of(cell))
             findings.record("files", len(files.altered), ", ".join(files.altered))
@@ -83,8 +85,8 @@ def _verified(directory: Path) -> Certificate:
             status = ": ".join(["the run reports", document.hint("status"), *(["; ".join(faults)] if faults else [])])
             return Certificate(findings.worst(), title, status, unchecked(document))
     except DAMAGE as error:
-        fault = f"{type(error).__name__} {error}"
-        raise CaseError(f"{directory}: files do not belong together or are incomplete: {fault}") from error
+        entry = f" (without {error})" if isinstance(error, KeyError) else ""
+        raise CaseError(f"{directory}: {reason}{entry}") from error
 
 
 def checks_of(cell: DiscreteCell) -> list[Finding]:

@@ -26,7 +26,12 @@ def laws(case: Mapping[str, Any], phases: Sequence[str]) -> tuple[Float, Float]:
     plane, stiffnesses, expansions = case["analysis"]["plane"], list[Float](), list[Float]()
     for constants in (phase_constants(case, phase) for phase in phases):
         if plane == "conduction":
-            stiffnesses.append(_conducting(constants["conductivity"]))
+            # C_3i3j = k_ij for a displacement along x3 alone; the rest is arbitrary, of the size of k.
+            k: Any = constants["conductivity"]
+            tensor = np.array([k["transverse"], k["transverse"], k["axial"]] if isinstance(k, Mapping) else k, float)
+            tensor = tensor * np.eye(3) if tensor.ndim < 2 else tensor
+            stiffnesses.append(np.abs(tensor).max() * np.eye(6))
+            stiffnesses[-1][np.ix_(GRADIENT, GRADIENT)] = (tensor + tensor.T) / 2
             continue
         angle, law = float(constants.get("angle", 0.0)), _given_stiffness(constants)
         if len(law) != 3:
@@ -101,15 +106,6 @@ def phase_constants(case: Mapping[str, Any], phase: str) -> Constants:
     if not isinstance(constants, Mapping):
         raise CaseError(f"result.json: the case has no material for the phase {phase} of result.h5")
     return constants
-
-
-def _conducting(k: Any) -> Float:
-    """(6, 6) C_3i3j = k_ij for a displacement along x3 alone; the rest is arbitrary, of the size of k."""
-    tensor = np.array([k["transverse"], k["transverse"], k["axial"]] if isinstance(k, Mapping) else k, float)
-    tensor = tensor * np.eye(3) if tensor.ndim < 2 else tensor
-    law = np.abs(tensor).max() * np.eye(6)
-    law[np.ix_(GRADIENT, GRADIENT)] = (tensor + tensor.T) / 2
-    return np.asarray(law)
 
 
 def _given_stiffness(constants: Constants) -> Float:

@@ -200,7 +200,7 @@ def altered(directory: Path) -> tuple[str, ...]:
     document, path = _document(directory / JSON), directory / FIELDS
     if not path.is_file():
         has_fields = document["case"].get("output", {}).get("fields", False)
-        raise CaseError(f"{path}: {'missing; run the case again' if has_fields else MISSING_FIELDS}")
+        raise CaseError(f"{path}: {'missing; run the case again (--resume)' if has_fields else MISSING_FIELDS}")
     # `checksum` is the CRC-32 of the text without this last key.
     end = f',\n "checksum": {json.dumps(document.get("checksum"))}\n}}\n'.encode()
     text = input_files.read(directory / JSON).removesuffix(end) + b"\n}"

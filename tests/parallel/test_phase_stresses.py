@@ -176,6 +176,19 @@ def test_at_its_load_factor_each_phase_has_the_utilisation_one(comm):
         assert again.mode == next(each.mode for each in result.phase_stresses if each.phase == phase)
 
 
+def test_a_path_says_where_a_phase_passes_its_strength_before_the_peak(comm):
+    matrix = {"matrix": MATRIX | {"strength": {"tension": 4.0, "compression": 6.0}}, "fibre": FIBRE}
+    alone = result_of(comm, {"E11": 1e-3, "E22": 0.0, "gamma12": 0.0}, plane="strain", material=matrix)
+    factor, (S11, *_) = factors(alone)["matrix"], alone.load.stress
+    path = {"analysis": {"type": "path", "plane": "strain"}, "path": {"strain": [0.2, 0.0, 0.0]}, "material": matrix}
+    for strength, passes in ((10.0, True), (1.0, False)):
+        more = {"interface": {"normal_strength": strength, "tangential_strength": strength}}
+        said = " ".join(result_of(comm, None, plane="strain", **path, **more).remarks)
+        assert ("the utilisation reaches 1" in said) == passes
+        if passes:
+            assert f"about S11 = {factor * S11:.4g}, E11 = {factor * 1e-3:.4g}, before the largest stress" in said
+
+
 @pytest.mark.parametrize(
     ("load", "analysis", "is_proportional"),
     [

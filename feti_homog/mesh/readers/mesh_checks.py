@@ -173,19 +173,6 @@ def missing_corners(plane: Float, origin: Float, size: Float) -> list[str]:
     return [f"no node at the corner {', '.join(missing)} {advice}"] if missing else []
 
 
-def too_large(plane: Float, triangles: Int32, size: Float) -> list[str]:
-    """Report triangles whose total area exceeds the area of the rectangle."""
-    total, cell = abs(areas(plane, triangles).sum()), size.prod()
-    overlap = f"the elements overlap: their area is {total:.9g}, that of the cell {cell:.9g}"
-    return [overlap] if total > (1 + ROUNDING) * cell else []
-
-
-def unrefined_sides(plane: Float, size: Float) -> list[str]:
-    """List sides without inner nodes, where an element would be a neighbour of itself."""
-    bare = [name for (axis, side), name in SIDES.items() if np.count_nonzero(plane[:, axis] == side * size[axis]) < 3]
-    return [f"no node between the corners of the {', '.join(bare)} side: expected one at least"] if bare else []
-
-
 def stray_lines(mesh: RawMesh) -> list[str]:
     """List debonded lines whose ends are not nodes of triangles."""
     bad = mesh.debonded[~np.isin(mesh.debonded, mesh.node_tags).all(axis=1)]
@@ -207,17 +194,26 @@ def unused_curves(mesh: RawMesh) -> tuple[str, ...]:
 
 
 def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
-    """List side nodes without a partner on the opposite side."""
+    """List side nodes without a partner on the opposite side, and sides without inner nodes."""
     faults = []
     for axis, side in SIDES:
         nodes, partners = (np.flatnonzero(plane[:, axis] == k * size[axis]) for k in (side, 1 - side))
+        if len(nodes) < len(partners):  # the other side lists its nodes
+            continue
+        advice = f"; {len(partners)} nodes face {len(nodes)}: mesh both sides with {len(nodes)} (gmsh: Periodic Curve)"
+        advice *= len(nodes) > len(partners)
         along, other = plane[nodes, 1 - axis], np.sort(plane[partners, 1 - axis])
         after = np.clip(np.searchsorted(other, along), 1, len(other) - 1)
         gap = np.minimum(np.abs(other[after] - along), np.abs(other[after - 1] - along))
         shift = np.where(np.arange(3) == axis, (1 - 2 * side) * size[axis], 0.0)
         before, single = f"not periodic, nodes of the {NO_PARTNER[axis, side]}", nodes[gap > SAME_PLACE * size.max()]
-        faults += _listed(before, single, lambda k, s=shift: f"{mesh.node(k)}, expected at {at(mesh.points[k] + s)}")
-    return faults
+        faults += _listed(
+            before, single, lambda k, s=shift: f"{mesh.node(k)}, expected at {at(mesh.points[k] + s)}", advice
+        )
+    # An element between bare sides would be a neighbour of itself.
+    bare = [name for (axis, side), name in SIDES.items() if np.count_nonzero(plane[:, axis] == side * size[axis]) < 3]
+    lines = [f"no node between the corners of the {', '.join(bare)} side: expected one at least"]
+    return [*faults, *(lines if bare else [])]
 
 
 def unmatched_sides(raw: RawMesh, mesh: CoarseMesh) -> list[str]:

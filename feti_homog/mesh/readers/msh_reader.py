@@ -86,8 +86,10 @@ def made(raw: RawMesh, path: str, has_voids: bool = True) -> CoarseMesh:
         plane = np.where(np.abs(plane - level) < mesh_checks.SAME_PLACE * size.max(), level, plane)
     corners = mesh_checks.missing_corners(plane, origin, size)
     _refuse(path, mesh_checks.overlapping(raw), mesh_checks.hanging_nodes(raw, plane, size), corners)
-    _refuse(path, mesh_checks.too_large(plane, raw.triangles, size))
-    _refuse(path, mesh_checks.not_periodic(raw, plane, size), mesh_checks.unrefined_sides(plane, size))
+    total, cell = abs(areas(plane, raw.triangles).sum()), size.prod()
+    overlap = [f"the elements overlap: their area is {total:.9g}, that of the cell {cell:.9g}"]
+    _refuse(path, overlap if total > (1 + mesh_checks.ROUNDING) * cell else [])
+    _refuse(path, mesh_checks.not_periodic(raw, plane, size))
     for axis, low, high in paired_sides(plane, size):
         plane[high, 1 - axis] = plane[low, 1 - axis]
     names, (width, height) = [group[0] for group in raw.groups], size.tolist()

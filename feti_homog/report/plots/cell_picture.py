@@ -123,8 +123,15 @@ def mesh_error(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helper
 def _outlined(cell: drawn_cell.DrawnCell, colours: Array, look: plot_helpers.Look) -> tuple[Figure, Axes]:
     """Draw the cell with triangle colours (q, 4) and body outlines."""
     picture, axes = drawn_cell.figure_of(cell.file.attrs, look)
-    plot_helpers.fill_triangles(axes, cell.drawn, cell.drawn.points, colours, len(cell.drawn.triangles) <= 6000)
-    plot_helpers.draw_segments(axes, cell.drawn.points[cell.borders], "black", 0.9)
+    points, triangles = cell.drawn.points, cell.drawn.triangles
+    # Each triangle has nodes of its own; without antialiasing, which would leave seams.
+    separate = np.arange(triangles.size).reshape(-1, 3)
+    mesh: Any = plot_helpers.add_triangles(axes, points[triangles].reshape(-1, 2), separate)
+    mesh.set_facecolor(np.repeat(colours, 3, axis=0))
+    if len(triangles) <= 6000:
+        sides = points[triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)]
+        plot_helpers.draw_segments(axes, sides, plot_helpers.MESH, 0.25)
+    plot_helpers.draw_segments(axes, points[cell.borders], "black", 0.9)
     drawn_cell.label_cell_axes(axes, cell.file.attrs)
     return picture, axes
 

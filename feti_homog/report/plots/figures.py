@@ -5,6 +5,7 @@ from typing import Any
 
 import h5py
 import matplotlib as mpl
+import numpy as np
 from matplotlib.figure import Figure
 
 from feti_homog.errors import CaseError, FetiHomogError
@@ -18,7 +19,7 @@ from feti_homog.typing import Document
 def plot(
     directory: Path,
     look: plot_helpers.Look = plot_helpers.PLAIN,
-    state: int | None = None,
+    state: int | str | None = None,
     component: str | None = None,
 ) -> list[Path]:
     """Draw the pictures of a result folder into the folder; return the picture paths.
@@ -32,8 +33,8 @@ def plot(
     - interface.png, of a path or a debonded interface: tractions, jumps and damage around fibres.
 
     [output] of the case in result.json chooses stress component (default: by the unit strain) and deformation scale.
-    A case without fields has only curves.  A `component` replaces the stress; a `state` gives only state_K.png.  Call
-    on one rank.
+    A case without fields has only curves.  A `component` replaces the stress; a `state`, by number or label, gives
+    only state_K.png.  Call on one rank.
 
     Raises:
         CaseError: the result has no such state or component.
@@ -61,23 +62,27 @@ def plot(
 
 
 def of_fields(
-    directory: Path, file: Any, document: Document, look: plot_helpers.Look, chosen: int | None = None
+    directory: Path, file: Any, document: Document, look: plot_helpers.Look, chosen: int | str | None = None
 ) -> list[Path]:
     """Draw the pictures that show the mesh or a field, or only one state; return the picture paths."""
     cell, report = drawn_cell.DrawnCell.of(file), reported(document)
     states = {number: file[f"state/{number}"] for number in sorted(file.get("state", ()), key=int)}
     stress = document.get("case", {}).get("output", {}).get("stress", "auto")
-    if any(stress != "auto" and plot_helpers.STRESS_TABLES[stress][0] not in state for state in states.values()):
-        raise CaseError(f"--component {stress}: expected a stress of the plane, S11, S22 or S12, as in {directory}")
+    name = plot_helpers.STRESS_TABLES[stress][0] if stress != "auto" else ""
+    if name and any(name not in state or np.isnan(state[name][:]).any() for state in states.values()):
+        names = "S11, S22 or S12, and S33 or von_mises where the constants of all phases give S33"
+        raise CaseError(f"--component {stress}: expected a stress that {directory} has: {names}")
 
     def save(figure: Figure, name: str) -> Path:
         return plot_helpers.save(figure, directory / f"{name}.png", look)
 
     if chosen is not None:
-        if str(chosen) not in states:
-            labels = ", ".join(f"{number} ({state.attrs['label']})" for number, state in states.items())
-            raise CaseError(f"--state {chosen}: expected the number of a state of {directory}: {labels}")
-        return [save(cell_picture.deformed(cell, states[str(chosen)], document, look), f"state_{chosen}")]
+        labels = {number: state.attrs["label"] for number, state in states.items()}
+        number = next((number for number, label in labels.items() if str(chosen) in (number, label)), None)
+        if number is None:
+            names = ", ".join(f"{number} ({label})" for number, label in labels.items())
+            raise CaseError(f"--state {chosen}: expected the number or label of a state of {directory}: {names}")
+        return [save(cell_picture.deformed(cell, states[number], document, look), f"state_{number}")]
     pictures = {"cell": cell_picture.figure, "partition": cell_picture.partition, "mesh_error": cell_picture.mesh_error}
     figures = ((name, draw(cell, look)) for name, draw in pictures.items())
     paths = [save(figure, name) for name, figure in figures if figure is not None]

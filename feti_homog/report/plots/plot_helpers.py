@@ -31,12 +31,15 @@ SYMBOLS = {
     **{name: rf"\Sigma_{{{name[1:]}}}" for name in voigt.SPATIAL_STRESSES},
     "temperature": r"\Delta{T}",  # without a space, at which titles are wrapped
 }
+VON_MISES = "von_mises"
 STRESS_SYMBOLS = {name: rf"\sigma_{{{name[1:]}}}" for name in voigt.SPATIAL_STRESSES}
+STRESS_SYMBOLS[VON_MISES] = r"\sigma_{vM}"
 # Table of each stress in a state of result.h5, and its column if the table has several.
 STRESS_TABLES: dict[str, tuple[str, int | None]] = {
     **{name: ("stress", column) for column, name in enumerate(voigt.STRESSES)},
     "S33": ("stress_33", None),
     **{name: ("axial_stress", column) for column, name in enumerate(voigt.AXIAL_STRESSES)},
+    VON_MISES: ("stress_33", None),  # and the others
 }
 OUTLIERS = 0.005  # area fraction that may lie outside a colour range, at either end
 # Of curves: the colours of Okabe and Ito, which the colour-blind tell apart.
@@ -127,23 +130,14 @@ def faint_grid(axes: Axes) -> None:
     axes.set_axisbelow(True)
 
 
-def fill_triangles(axes: Axes, drawn: DrawnMesh, points: Array, colours: Array, edges: bool) -> None:
-    """Fill triangles with colours (q, 4), without antialiasing, which would leave seams."""
-    separate = np.arange(drawn.triangles.size).reshape(-1, 3)  # each triangle has nodes of its own
-    mesh: Any = _add_triangles(axes, points[drawn.triangles].reshape(-1, 2), separate)
-    mesh.set_facecolor(np.repeat(colours, 3, axis=0))
-    if edges:
-        draw_segments(axes, points[drawn.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)], MESH, 0.25)
-
-
 def shade_triangles(axes: Axes, drawn: DrawnMesh, points: Array, values: Array, norm: Normalize, colours: Any) -> Any:
     """Draw triangles in smooth colours for the nodal values (p,).  The nodes are at `points` (p, 2)."""
-    mesh = _add_triangles(axes, points, drawn.triangles)
+    mesh = add_triangles(axes, points, drawn.triangles)
     mesh.set(array=values, norm=norm, cmap=colours)
     return mesh
 
 
-def _add_triangles(axes: Axes, points: Array, triangles: Array) -> TriMesh:
+def add_triangles(axes: Axes, points: Array, triangles: Array) -> TriMesh:
     """Add triangles to the axes as pixels, also in vector graphics.
 
     Matplotlib's `tripcolor` makes a path of each triangle to find the limits, which takes longer than all the rest.
@@ -251,9 +245,13 @@ def stress_component(chosen: str, states: Sequence[Any]) -> str:
 
 
 def nodal_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
-    """Return a stress component at the drawn nodes (p,), averaged over triangles in the same body."""
-    table, column = STRESS_TABLES[component]
-    return node_means(triangle_means(state[table], column, drawn), drawn)
+    """Return a stress at the drawn nodes (p,), averaged over triangles in the same body."""
+    name, column = STRESS_TABLES[component]
+    table = state[name]
+    if component == VON_MISES:  # of the mean stresses of elements, as in `viewed_states`
+        shears = state["axial_stress"][:] if "axial_stress" in state else np.zeros((len(table), 2))
+        table = voigt.spatial_von_mises(state["stress"][:], table[:], shears)
+    return node_means(triangle_means(table, column, drawn), drawn)
 
 
 def bond_limits(case: Document) -> list[str]:

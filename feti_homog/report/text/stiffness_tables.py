@@ -49,17 +49,13 @@ def conductivity(document: Document) -> list[Table]:
         columns = [Column("", -6), *(Column(name, 16, ".1e") for name in names)]
         tables.append(Table(MESH_ERROR, columns, [[name, *row] for name, row in zip(names, errors, strict=True)]))
     if (forms := document.get("conductivity_estimates")) is not None:
-        rows = [["along: mean", forms["axial"], k[2][2], forms["axial"]]]
+        rows = [["along: mean", UNKNOWN, k[2][2], UNKNOWN, forms["axial"]]]
         for label, key in (("Wiener", "wiener"), ("Hashin-Shtrikman", "hashin_shtrikman")):
             lower, upper = forms.get(key) or (None, None)
-            rows += (
-                []
-                if lower is None
-                else [[f"{name} {label}", lower, k[i][i], upper] for i, name in enumerate(names[:2])]
-            )
-        if (estimate := forms.get("maxwell")) is not None:
-            rows.append(["across: Maxwell", estimate, (k[0][0] + k[1][1]) / 2, estimate])
-        columns = [NAMES, *(Column(name, 14, ".7g") for name in ("lower", "computed", "upper"))]
+            rows += [[f"{name} {label}", lower, k[i][i], upper, UNKNOWN] for i, name in enumerate(names[:2]) if lower]
+        if forms.get("maxwell") and not forms.get("hashin_shtrikman"):  # of bonded fibres one of these bounds
+            rows.append(["across: Maxwell", UNKNOWN, (k[0][0] + k[1][1]) / 2, UNKNOWN, forms["maxwell"]])
+        columns = [NAMES, *(Column(name, 14, ".7g") for name in ("lower", "computed", "upper", "estimate"))]
         tables.append(Table("Bounds and estimates", columns, rows, title_in_head=True))
     return tables
 

@@ -228,7 +228,7 @@ FAULTY_MESHES: list[tuple[str, MshFile | str | Callable[[Path], object]]] = [
     ("hanging nodes: node 99 (0.375, 0.375) on the edge between node 7 (0.25, 0.25)", _hanging()),
     ("hanging nodes: node 99", _hanging(1e-4)),
     ("the cell is a parallelogram, expected a rectangle", _sheared()),
-    ("node 15 (1, 0.5), expected at (0, 0.5)", grid().moved(n11=(0.1, 0.5))),
+    ("node 15 (1, 0.5), expected at (0, 0.5); 4 nodes face 5: mesh both sides with 5", grid().moved(n11=(0.1, 0.5))),
     ("no node at the corner (1, 1) of the cell", grid().without(31, 32)),
     ("no node at the corner", grid().moved(n25=(0.875, 1.0))),
     ("no node at the corner", _two_islands()),

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feti_homog.results.landmarks import drops, kept, turning_points
+from feti_homog.results.landmarks import drops, kept, passed_strengths, turning_points
 
 
 def path(stresses: Any, loads: Any = None) -> list[dict[str, Any]]:
@@ -130,3 +130,24 @@ def test_on_later_legs_bonds_that_break_at_one_load_make_a_jump() -> None:
     assert kept(points, "peaks", 2) == [0, 2, 5, 6]
     # Of saw teeth, one break at a load, there is none.
     assert kept(points[:3] + points[5:], "peaks", 2) == [0, 4]
+
+
+@pytest.mark.parametrize(
+    ("utilisation", "place"),
+    [
+        ([2.0, 2.5, 9.0, 9.0], "S11 = 5, E11 = 0.125"),  # on the way to the first point
+        ([0.5, 1.5, 9.0, 9.0], "S11 = 15, E11 = 0.375"),  # half way between two points
+        ([0.2, 0.9, 1.1, 9.0], None),  # beyond the peak
+        ([0.2, 0.3, 0.3, 0.9], None),
+        (None, None),
+    ],
+)
+def test_a_phase_passes_its_strength_between_points(utilisation: Any, place: str | None) -> None:
+    peak = {"strain_name": "E11", "stress_name": "S11", "event": 1}
+    phase = {"phase": "epoxy"} | ({} if utilisation is None else {"utilisation": utilisation})
+    document = {"path": path([10.0, 20.0, 20.0, 15.0]), "phase_stresses": [phase]}
+    lines = passed_strengths(document, peak, range(4))
+    assert len(lines) == (place is not None)
+    assert place is None or lines[0].startswith(
+        f"[material.epoxy] strength: the utilisation reaches 1 at about {place}"
+    )

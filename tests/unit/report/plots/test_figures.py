@@ -214,9 +214,12 @@ def test_a_state_is_drawn_alone_in_the_size_and_format_of_a_paper(tmp_path: Path
         assert imread(path).shape[:2] == pytest.approx((8.0 / 2.54 * 200, 9.0 / 2.54 * 200), abs=2)
     if kind == "svg":
         assert content.count(b"<image") == 2 and len(content) < 500_000  # the field and its bar are pixels
-    with pytest.raises(CaseError, match=r"--state 7: expected the number of a state of .*: 0 \(\w+.*, 2 \("):
+    with h5py.File(tmp_path / "result.h5") as file:
+        label = file["state/1"].attrs["label"]
+    assert figures.plot(tmp_path, plot_helpers.Look(kind, (9.0, 8.0), "whole $"), label, "S12") == [path]
+    with pytest.raises(CaseError, match=r"--state 7: expected the number or label of a state of .*: 0 \(\w+.*, 2 \("):
         figures.plot(tmp_path, state=7)
-    with pytest.raises(CaseError, match="--component S13: expected a stress of the plane"):
+    with pytest.raises(CaseError, match=r"--component S13: expected a stress that .* has: S11, S22 or S12"):
         figures.plot(tmp_path, component="S13")
 
 

@@ -6,7 +6,7 @@ from typing import Any
 from feti_homog.case import reference
 from feti_homog.case.sections import TOP_LEVEL
 from feti_homog.report.text.tables import unit
-from feti_homog.studies.outputs import OUTPUT_COLUMNS, outputs
+from feti_homog.studies.outputs import OUTPUT_COLUMNS, named, outputs
 from feti_homog.system.runtime.records import STRESS
 
 
@@ -36,6 +36,17 @@ def test_the_state_under_a_load_has_columns():
     found = outputs(base)
     assert found["load_E11"] == 0.1 and found["load_S11"] == 5.0 and found["load_open"] == 1.0
     assert unit("load_S11", "GPa") == "GPa" == unit("load_stored", "GPa") and unit("load_E11", "GPa") == ""
+
+
+def test_a_name_finds_the_columns_that_stand_for_it_and_entries():
+    names = {**of_envelope([5.0, 2.0, 9.0, 3.0]), **outputs(document([], ("S22", "S12")))}
+    assert all(named(name) for name in names)
+    heads = {name: [line.partition(":")[0] for line in named(name)] for name in ("peak_S22", "peak_E11", "softened")}
+    assert heads == {"peak_S22": ["cases.csv, peak_Sij"], "peak_E11": ["cases.csv, peak_STRAIN"],
+                     "softened": ["result.json, softened"]}  # fmt: skip
+    assert named("peak_S2") == named("nothing") == named("") == []
+    (table,) = reference.tables("peak_S22", named("peak_S22")) or [None]
+    assert table is None and reference.text("peak_S22", named("peak_S22")).startswith("cases.csv, peak_Sij: largest")
 
 
 def test_columns_of_envelopes_are_the_first_axis_the_least_and_the_largest():
