@@ -11,7 +11,7 @@ import numpy as np
 
 from feti_homog.case.cell_section import TOUCHING, Cell
 from feti_homog.case.cell_sizes import mix_faults
-from feti_homog.case.section_values import MESH_SUFFIXES, TABLE_SUFFIXES
+from feti_homog.case.section_values import IMAGE_SUFFIXES, MESH_SUFFIXES, TABLE_SUFFIXES
 from feti_homog.errors import MOST_FAULTS, CaseError
 from feti_homog.schema import wording
 from feti_homog.typing import Bool
@@ -19,7 +19,7 @@ from feti_homog.typing import Bool
 if TYPE_CHECKING:
     from feti_homog.microstructure import fibre_table
 
-SUFFIXES = {"mesh": MESH_SUFFIXES, "table": TABLE_SUFFIXES}
+SUFFIXES = {"mesh": MESH_SUFFIXES, "pixels": IMAGE_SUFFIXES, "table": TABLE_SUFFIXES}
 LIST = "fibre_list"
 # Distance from a cut window / radius, up to which a centre outside counts as on the border.
 LEFT_OUT = 0.01

@@ -37,8 +37,10 @@ TOUCHING["random"] = TOUCHING["hexagonal"]  # the densest packing of circles
 
 GEOMETRY = keys.Selector("cell", "geometry")
 ALL_CIRCULAR, RANDOM, TABLE = GEOMETRY.among(*CIRCULAR), GEOMETRY.among("random"), GEOMETRY.among("table")
-MESH = GEOMETRY.among("mesh")
-MESHED, FROM_A_FILE = GEOMETRY.among(*CIRCULAR, "table"), GEOMETRY.among("table", "mesh")
+MESH, PIXELS = GEOMETRY.among("mesh"), GEOMETRY.among("pixels")
+MESHED, SIZED = GEOMETRY.among(*CIRCULAR, "table"), GEOMETRY.among(*CIRCULAR, "table", "pixels")
+FROM_A_FILE, REPAIRABLE = GEOMETRY.among("table", "mesh", "pixels"), GEOMETRY.among("table", "mesh")
+WINDOWED = GEOMETRY.among("table", "pixels")
 random_key, meshed_key = partial(key, only=RANDOM), partial(key, only=MESHED)
 
 
@@ -51,10 +53,10 @@ class Cell:
     """
 
     geometry: str = key(
-        types.choice(*CIRCULAR, "table", "mesh"),
+        types.choice(*CIRCULAR, "table", "mesh", "pixels"),
         '"square": a fibre in the middle of a square cell; "hexagonal": a cell sqrt(3) times as high as wide with '
         'fibres in the middle and at the corners; "random": fibres in a square cell; "table": fibres of a table, as of '
-        'a micrograph; "mesh": a file of gmsh, Abaqus or VTK.',
+        'a micrograph; "mesh": a file of gmsh, Abaqus or VTK; "pixels": an image of labels.',
     )
     fibre_fraction: float | None = key(
         types.real(above=0.0, below=1.0),
@@ -87,11 +89,12 @@ class Cell:
         "semi-axes longer by coating sqrt(a b).",
         absent="none, or the column coating of a table",
     )
-    mesh_size: float = meshed_key(
+    mesh_size: float = key(
         types.real(least=1e-4, most=0.5),
         "Size of the elements, before refine, / width of the cell. At most 1000000 are made, 20000000 in cells of 400 "
         "or more round fibres and voids, counting the small ones in narrow gaps and thin coatings.",
         default=0.05,
+        only=SIZED,
     )
     interface_size: float | None = meshed_key(
         types.real(least=1e-5, most=0.5),
@@ -190,7 +193,8 @@ class Cell:
         'Relative to the case file. Of geometry = "mesh" the mesh: triangles of three or six nodes that fill a '
         'rectangle, in physical surfaces "matrix", "fibre", "glass", ...; the nodes on opposite sides match. Fibres '
         "may have any shape. Of Abaqus' files (.inp) element sets have these names; of .vtu and .vtk files cell data "
-        '"phase" are 0 in the matrix, 1 in fibre, 2 in fibre:2, ... Of "table" the fibres, a row for each: columns x, '
+        '"phase" are 0 in the matrix, 1 in fibre, 2 in fibre:2, ... Of "pixels" the image (.png, .tif, .npy, .npz), a '
+        'whole number each, see labels. Of "table" the fibres, a row for each: columns x, '
         "y, radius and, if there are any, phase, coating (thickness / radius) and strength "
         "(of its bonds / that of [interface]); of ellipses a and b, the semi-axes, in place of the radius, and angle "
         "from x to a in degrees; of hollow fibres inner_radius; of rounded polygons sides and corner, with the angle "
@@ -213,7 +217,7 @@ class Cell:
         "of a table: fibres that touch, or overlap by less than 1 % of a radius, are made smaller until they do not; "
         "the result names the rows.",
         default="none",
-        only=FROM_A_FILE,
+        only=REPAIRABLE,
     )
     snap_tolerance: float = key(
         types.real(least=0.0, most=0.1),
@@ -230,13 +234,27 @@ class Cell:
     fibre_list: tuple[Mapping[str, Any], ...] | None = key(
         kinds.FIBRE_LIST, "The fibres, in place of file.", only=TABLE, absent="given by file"
     )
+    labels: Mapping[str, str] = key(
+        kinds.LABELS,
+        'The phase of each number in an image, such as {0 = "matrix", 255 = "fibre"}.',
+        only=PIXELS,
+    )
+    pixel: float = key(types.real(least=1e-9, most=1e9), "Edge of a pixel.", unit="length", default=1.0, only=PIXELS)
+    smooth: bool = key(
+        types.boolean,
+        "Of an image: with false each pixel is two triangles, by turns along one diagonal and the other; with true "
+        "gmsh meshes the regions within smooth outlines (marching squares of scikit-image), by mesh_size.",
+        default=False,
+        only=PIXELS,
+    )
     window: str = key(
-        types.choice("periodic", "cut"),
-        'What a table is. "periodic": a cell, whose fibres must not overlap; all are shifted so that its sides cut '
-        'them well, unless a file gives left and bottom. "cut": a piece of something larger, whose fibres may overlap '
-        "across the border: they are moved apart as little as can be. Those with centres outside are left out.",
+        types.choice("periodic", "cut", "mirrored"),
+        'What a table or image is. "periodic": a cell, whose fibres must not overlap; all are shifted so that its '
+        'sides cut them well, unless a file gives left and bottom. "cut", of a table: a piece of something larger, '
+        "whose fibres may overlap across the border: they are moved apart as little as can be. Those with centres "
+        'outside are left out. "mirrored", of an image: beside and above it lie its mirror images, four in a cell.',
         default="periodic",
-        only=TABLE,
+        only=WINDOWED,
     )
     table: fibre_table.FibreTable | None = field(default=None, compare=False)
     matched: fibre_pattern.FibrePattern | None = field(default=None, compare=False)
@@ -256,5 +274,5 @@ class Cell:
 
     @property
     def has_own_mesh(self) -> bool:
-        """Return whether the user provides the mesh."""
-        return self.geometry == "mesh"
+        """Return whether the user provides the mesh, or an image of it."""
+        return self.geometry in ("mesh", "pixels")

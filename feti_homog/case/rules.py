@@ -10,7 +10,7 @@ from typing import Any
 from feti_homog.case import section_values as kinds
 from feti_homog.case.bond_laws import REGISTRY, STIFFNESSES, STRENGTHS
 from feti_homog.case.cell_files import FEWEST_MATCHED
-from feti_homog.case.cell_section import MESH, MESHED, RANDOM, TABLE, Cell
+from feti_homog.case.cell_section import MESH, MESHED, PIXELS, RANDOM, TABLE, Cell
 from feti_homog.case.cell_sizes import CHOSEN
 from feti_homog.case.interface_section import ARCS, Arc, Scatter, interface_tables
 from feti_homog.case.load_sections import MixedLoad
@@ -172,20 +172,36 @@ def _cell() -> Iterator[Rule]:
 def _files() -> Iterator[Rule]:
     """Yield the rules for mesh files, fibre tables and fibre lists."""
     yield exclusive(CELL, "file", "fibre_list")
-    yield needed(CELL, "file", f"missing; expected the name of a {kinds.MESH_FILE}", MESH)
     line = "missing; expected the name of a .csv file, or fibre_list"
     yield needed(CELL, "file", line, TABLE, unless=("fibre_list",))
-    line = f"expected the name of a {kinds.MESH_FILE} for {MESH.in_words('cell')}"
-    yield Rule((*CELL, "file"), lambda name: not str(name).endswith(kinds.TABLE_SUFFIXES), line, (MESH,))
-    line = f"expected the name of a .csv file for {TABLE.in_words('cell')}"
-    yield Rule((*CELL, "file"), lambda name: not str(name).endswith(kinds.MESH_SUFFIXES), line, (TABLE,))
-    line = f'expected "none" or "snap" for {MESH.in_words("cell")}'
-    yield Rule((*CELL, "repair"), lambda value: value != "overlaps", line, (MESH,))
-    line = f'expected "none" or "overlaps" for {TABLE.in_words("cell")}'
-    yield Rule((*CELL, "repair"), lambda value: value != "snap", line, (TABLE,))
+    files = {MESH: (kinds.MESH_FILE, [*kinds.MESH_SUFFIXES]), PIXELS: (kinds.IMAGE_FILE, [*kinds.IMAGE_SUFFIXES])}
+    for condition, (words, _) in files.items():
+        yield needed(CELL, "file", f"missing; expected the name of a {words}", condition)
+    files[TABLE] = ".csv file", [*kinds.TABLE_SUFFIXES]
+    for condition, (words, suffixes) in files.items():
+        others = {suffix for _, some in files.values() for suffix in some} - {*suffixes}
+        yield _refused("file", types.file_name("", *others), f"the name of a {words}", condition)
+    yield _refused("repair", types.choice("overlaps"), '"none" or "snap"', MESH)
+    yield _refused("repair", types.choice("snap"), '"none" or "overlaps"', TABLE)
+    yield _refused("window", types.choice("mirrored"), '"periodic" or "cut"', TABLE)
+    yield _refused("window", types.choice("cut"), '"periodic" or "mirrored"', PIXELS)
+    line = "belongs to smooth = true; else elements are halves of pixels"
+    yield Rule(
+        CELL,
+        lambda cell: cell.get("smooth") is True or cell.get("mesh_size", Cell.mesh_size) == Cell.mesh_size,
+        line,
+        (PIXELS,),
+        ("mesh_size",),
+    )
     for name in ("width", "height"):
         line = "missing; fibre_list has no line such as # width = 120, height = 80"
         yield needed(CELL, name, line, TABLE, beside="fibre_list")
+
+
+def _refused(name: str, values: types.ValueType, ways: str, condition: keys.Condition) -> Rule:
+    """Return the rule that refuses some values of a key of [cell] under a condition."""
+    line = f"expected {ways} for {condition.in_words('cell')}"
+    return Rule((*CELL, name), lambda value: not values.accepts(value), line, (condition,))
 
 
 def _bonds() -> Iterator[Rule]:

@@ -1,6 +1,7 @@
 """Define the value types of case sections, and the selectors that decide which keys belong to a case."""
 
 import math
+import re
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -15,6 +16,8 @@ SEED = types.integer(least=0, most=10**15)
 
 MESH_SUFFIXES = (".msh", ".inp", ".vtu", ".vtk", ".mesh")
 MESH_FILE = ".msh, .inp, .vtu, .vtk or .mesh file"
+IMAGE_SUFFIXES = (".png", ".tif", ".tiff", ".npy", ".npz")
+IMAGE_FILE = ".png, .tif, .npy or .npz file"
 
 
 def _by_phase(words: str, example: str, number: types.ValueType) -> types.ValueType:
@@ -46,7 +49,10 @@ def _positive_or_inf(what: str) -> types.ValueType:
 TABLE_SUFFIXES = (".csv", ".txt", ".dat")
 TABLE_FILE = types.file_name("the name of a .csv file", *TABLE_SUFFIXES)
 NAMES_OF_COLUMNS = types.list_of(types.text, 'a list of names such as ["x", "y", "radius"]', least=3)
-CELL_FILE = types.file_name(f"the name of a {MESH_FILE}, or of a .csv file of a table", *MESH_SUFFIXES, *TABLE_SUFFIXES)
+CELL_FILE = types.file_name(
+    f"the name of a {MESH_FILE}, of a {IMAGE_FILE} of pixels, or of a .csv file of a table",
+    *(*MESH_SUFFIXES, *IMAGE_SUFFIXES, *TABLE_SUFFIXES),
+)
 FIBRE_LIST = types.ValueType(
     "a list of fibres such as {x = 0.5, y = 0.5, radius = 0.3}",
     lambda value: isinstance(value, list) and value != [] and all(isinstance(fibre, dict) for fibre in value),
@@ -62,6 +68,16 @@ PHASES = types.ValueType(
         isinstance(v, dict) and v != {} and all(phase_names.PHASE.fullmatch(k) and _SELECTORS.accepts(v[k]) for k in v)
     ),
     lambda v: {phase: tuple(names if isinstance(names, list) else [names]) for phase, names in v.items()},
+)
+LABELS = types.ValueType(
+    'a table of phases, one of them matrix, by number from 0 to 65535, such as {0 = "matrix", 255 = "fibre"}',
+    lambda v: (
+        isinstance(v, dict)
+        and all(re.fullmatch("0|[1-9][0-9]{0,4}", k) and int(k) < 1 << 16 for k in v)
+        and all(isinstance(name, str) and phase_names.PHASE.fullmatch(name) for name in v.values())
+        and phase_names.MATRIX in v.values()
+    ),
+    dict,
 )
 VOIDS_OF_A_RANDOM_CELL = types.real(least=0.0, most=0.5)
 VOIDS = types.either(f"true of a mesh, or {VOIDS_OF_A_RANDOM_CELL.expected}", VOIDS_OF_A_RANDOM_CELL, types.boolean)

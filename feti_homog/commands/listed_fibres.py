@@ -10,8 +10,7 @@ from feti_homog.analysis import stored_result
 from feti_homog.case import cases, cell_section
 from feti_homog.errors import CaseError
 from feti_homog.mesh import Torus, arrange, coarse_mesh, mesh_fibres
-from feti_homog.mesh.fill import gmsh_mesher
-from feti_homog.mesh.readers import msh_reader
+from feti_homog.mesh.fill import gmsh_mesher, pixel_mesher
 from feti_homog.microstructure import periodic_table
 from feti_homog.microstructure.shapes import Ellipses, shapes
 from feti_homog.typing import Float
@@ -130,7 +129,7 @@ def _of_result(directory: Path) -> ListedFibres:
 
 def _of_cell(cell: cell_section.Cell) -> ListedFibres:
     if cell.has_own_mesh:
-        mesh = msh_reader.read_cell(cell)
+        mesh = pixel_mesher.read_cell(cell)
         torus = Torus.of(mesh)
         numbers, is_fibre = mesh_fibres.fibre_numbers(torus)
         ellipses = Ellipses(

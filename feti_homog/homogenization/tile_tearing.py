@@ -73,9 +73,9 @@ def begin_mesh(case: Case, policy: tiling.TilePolicy) -> gmsh_mesher.UnmeshedCel
     """
     cell: gmsh_mesher.UnmeshedCell | CoarseMesh
     if case.cell.has_own_mesh:
-        from feti_homog.mesh.readers import msh_reader  # imports the readers of all formats
+        from feti_homog.mesh.fill import pixel_mesher  # imports the readers of all formats
 
-        cell = msh_reader.read_cell(case.cell)
+        cell = pixel_mesher.read_cell(case.cell)
     else:
         listed = None if case.cell.table is None else arrange.arrange(case.cell)
         estimate = element_estimate.ElementEstimate.of(case.cell, listed)

@@ -87,7 +87,8 @@ def fibre_frames(torus: Torus) -> Float:
     """
     bodies, edge, _ = _outer_edges(torus)
     frames = np.full((len(torus.constituent_phase), 2, 2), np.nan)
-    frames[bodies] = torus.edge_ellipses.frames[edge]
+    if len(bodies):
+        frames[bodies] = torus.edge_ellipses.frames[edge]
     return frames
 
 
@@ -96,6 +97,8 @@ def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
 
     Also returns an edge (k,) on the largest ellipse of each fibre, and whether all ellipses of a fibre are round (k,).
     """
+    if not len(torus.mesh.ellipses):
+        return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, bool)
     one, other, between = torus.sides
     border = torus.at_void.copy()
     border[between] = torus.constituent[one] != torus.constituent[other]

@@ -5,3 +5,4 @@ KEYS, ENTRIES = 10_000, 100_000  # of a table, of a list
 FIBRES = 100_000  # in a cell, with as many voids: twice as many rows of a table
 ROWS = 10_000  # arcs, waypoints, points of a curve, cases of a sweep: 50 to 500 us each
 SECTIONS = 1000  # [[interface]], for pairs among 45 phases; [[test]]; uncertain numbers
+PIXELS = 100 * FIBRES  # of an image: two triangles each

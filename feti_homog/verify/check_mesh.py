@@ -134,7 +134,7 @@ def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
     is_round = np.isfinite(radius)
     radial = from_centre(rows.points, files.fibres.centre[rows.fibre - 1], files.size) / radius[:, None]
     # Coatings in users' meshes may be on ellipses that the files do not describe.
-    on_arcs = is_quadratic & (is_fibre | (files.case["cell"]["geometry"] != "mesh"))
+    on_arcs = is_quadratic & (is_fibre | (files.case["cell"]["geometry"] not in ("mesh", "pixels")))
     is_known = is_round | np.isfinite(frames[:, 0, 0]) | on_arcs
     return np.where(is_round[:, None], radial, normal), np.asarray(length, float), np.asarray(is_known)
 

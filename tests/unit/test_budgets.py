@@ -14,22 +14,22 @@ import pytest
 PACKAGE = Path(__file__).parents[2] / "feti_homog"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 # Lines, of the modules beside the packages under "."; the second numbers: phase stresses, start of damage, figures,
-# begun runs and their messages; the third: conductivity.
+# begun runs and their messages; the third: conductivity, images.
 LINES = {
     ".": 470,
     "analysis": 3000 + 127 + 110,
-    "case": 2880 + 35 + 30,
-    "commands": 560 + 15,
+    "case": 2880 + 35 + 95,
+    "commands": 560 + 15 + 130,
     "fem": 1150 + 3,
     "feti": 6300,
     "homogenization": 3230 + 42 + 5,
     "interface": 4000,
     "materials": 1430 + 85 + 135,
-    "mesh": 5500,
-    "microstructure": 2140,
+    "mesh": 5500 + 0 + 210,
+    "microstructure": 2140 + 0 + 25,
     "report": 3420 + 172 + 120,
     "results": 2430 + 110,
-    "schema": 430,
+    "schema": 430 + 0 + 5,
     "studies": 2950,
     "system": 1770 + 3,
     "verify": 3100 + 156 + 70,

@@ -45,35 +45,7 @@ def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> C
     refuse_many(field, field.least, arrangement.size)
     with gmsh_session() as gmsh:
         number = _add_surfaces(gmsh, arrangement)
-        # Curves on the right and upper sides copy the nodes of the left and lower sides.
-        curves = [tag for _, tag in gmsh.model.getEntities(1)]
-        boxes = np.array([gmsh.model.getBoundingBox(1, tag) for tag in curves]).reshape(-1, 2, 3)[:, :, :2]
-        for axis, width in enumerate(arrangement.size):
-            sides = []
-            for level in (0.0, width):
-                indices = np.flatnonzero(np.abs(boxes[:, :, axis] - level).max(axis=1) < SAME_PLACE)
-                sides.append([curves[k] for k in indices[np.argsort(boxes[indices, :, 1 - axis].mean(axis=1))]])
-            moved = np.eye(4)
-            moved[axis, 3] = width
-            gmsh.model.mesh.setPeriodic(1, sides[1], sides[0], moved.ravel().tolist())
-        for option in ("MeshSizeFromPoints", "MeshSizeExtendFromBoundary"):
-            gmsh.option.setNumber(f"Mesh.{option}", 0)
-        # gmsh interpolates sizes on a grid, which it reads from a file.
-        size, structured = arrangement.size, gmsh.model.mesh.field.add("Structured")
-        counts = np.clip(np.ceil(size / field.least), FEWEST_CELLS, MOST_CELLS).astype(np.int32) + 1
-        x, y = (np.linspace(0.0, width, count) for width, count in zip(size, counts, strict=True))
-        values = field(np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2))
-        spacing = np.append(size / (counts - 1), 1.0)
-        with TemporaryDirectory() as folder:
-            path = Path(folder) / "sizes"
-            with path.open("wb") as stream:
-                for part in (np.zeros(3), spacing, np.append(counts, 2).astype(np.int32), np.repeat(values, 2)):
-                    part.tofile(stream)
-            gmsh.model.mesh.field.setString(structured, "FileName", str(path))
-            gmsh.model.mesh.field.setAsBackgroundMesh(structured)
-            gmsh.model.mesh.generate(2)
-            gmsh.model.mesh.setOrder(2)
-            raw = raw_mesh(MshContent.of(gmsh))
+        raw = raw_mesh(filled(gmsh, arrangement.size, field))
         precedence = np.array([number[tag] for _, tag in gmsh.model.getEntities(2)], np.int32)
     mesh = made(raw, "table")
     return replace(
@@ -86,6 +58,39 @@ def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> C
         centres=scale * arrangement.centres[: arrangement.fibres],
         origin=arrangement.origin,
     )
+
+
+def filled(gmsh: ModuleType, size: Float, field: SizeField) -> MshContent:
+    """Fill the surfaces of a cell with periodic second-order triangles of the sizes in a field."""
+    # Curves on the right and upper sides copy the nodes of the left and lower sides.
+    curves = [tag for _, tag in gmsh.model.getEntities(1)]
+    boxes = np.array([gmsh.model.getBoundingBox(1, tag) for tag in curves]).reshape(-1, 2, 3)[:, :, :2]
+    for axis, width in enumerate(size):
+        sides = []
+        for level in (0.0, width):
+            indices = np.flatnonzero(np.abs(boxes[:, :, axis] - level).max(axis=1) < SAME_PLACE)
+            sides.append([curves[k] for k in indices[np.argsort(boxes[indices, :, 1 - axis].mean(axis=1))]])
+        moved = np.eye(4)
+        moved[axis, 3] = width
+        gmsh.model.mesh.setPeriodic(1, sides[1], sides[0], moved.ravel().tolist())
+    for option in ("MeshSizeFromPoints", "MeshSizeExtendFromBoundary"):
+        gmsh.option.setNumber(f"Mesh.{option}", 0)
+    # gmsh interpolates sizes on a grid, which it reads from a file.
+    structured = gmsh.model.mesh.field.add("Structured")
+    counts = np.clip(np.ceil(size / field.least), FEWEST_CELLS, MOST_CELLS).astype(np.int32) + 1
+    x, y = (np.linspace(0.0, width, count) for width, count in zip(size, counts, strict=True))
+    values = field(np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2))
+    spacing = np.append(size / (counts - 1), 1.0)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "sizes"
+        with path.open("wb") as stream:
+            for part in (np.zeros(3), spacing, np.append(counts, 2).astype(np.int32), np.repeat(values, 2)):
+                part.tofile(stream)
+        gmsh.model.mesh.field.setString(structured, "FileName", str(path))
+        gmsh.model.mesh.field.setAsBackgroundMesh(structured)
+        gmsh.model.mesh.generate(2)
+        gmsh.model.mesh.setOrder(2)
+        return MshContent.of(gmsh)
 
 
 def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:

@@ -37,7 +37,7 @@ FAULTY_CASES = {
         "[cell] order = 3": "expected an integer at least 1 and at most 2",
         '[cell] bodies = "tours"': 'expected one of "torus", "plane"',
         "[cell] fibres = 50": 'belongs to geometry = "random", not "hexagonal"',
-        '[cell] file = "cell.msh"': 'belongs to geometry = "table" or "mesh", not "hexagonal"',
+        '[cell] file = "cell.msh"': 'belongs to geometry = "table" or "mesh" or "pixels", not "hexagonal"',
         '[analysis] type = "stifness"': 'expected one of "stiffness"',
         '[analysis] plane = "plane strain"': 'expected one of "strain", "stress", "generalized"',
         "[decomposition] subdomains = 0": "expected an integer at least 1",
@@ -144,7 +144,7 @@ FAULTY_TABLE_CELLS: dict[str, str] = {
     }),
     **faults(BASE, {
         "[cell] height = 2.0": 'belongs to geometry = "table", not "hexagonal"',
-        '[cell] window = "cut"': 'belongs to geometry = "table", not "hexagonal"',
+        '[cell] window = "cut"': 'belongs to geometry = "table" or "pixels", not "hexagonal"',
     }),
     "[cell] file: missing; expected the name of a .csv file, or fibre_list": cell(MESH_CELL[0], 'geometry = "table"'),
     "[cell] file, fibre_list: exclude each other; give one": cell(MESH_CELL[0], TABLE_CELL[1] + '\nfile = "t.csv"'),

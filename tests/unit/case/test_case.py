@@ -40,7 +40,8 @@ def test_keys_that_are_left_out_have_their_defaults(tmp_path):
         "refine": 0, "order": 1, "bodies": "torus", "fibres": None, "width": None, "fibre_radius": None,
         "coating": None, "min_gap": 0.05, "seed": 0, "radius_spread": 0.0, "file": None,
         "phases": None, "columns": None, "repair": "none", "snap_tolerance": 1e-3,
-        "height": None, "fibre_list": None, "window": "periodic", "table": None, "match": None, "matched": None,
+        "height": None, "fibre_list": None, "window": "periodic", "labels": None,
+        "pixel": 1.0, "smooth": False, "table": None, "match": None, "matched": None,
         "voids": None, "void_radius": None,
         "mix": None, "radii": None,
     }  # fmt: skip

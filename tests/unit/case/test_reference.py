@@ -35,7 +35,7 @@ def test_every_key_says_in_a_sentence_what_it_means(row):
     ("section", "key", "expected"),
     [
         ("cell", "mesh_size", ("a number at least 0.0001 and at most 0.5", "", "0.05")),
-        ("cell", "geometry", ('one of "square", "hexagonal", "random", "table", "mesh"', "", "required")),
+        ("cell", "geometry", ('one of "square", "hexagonal", "random", "table", "mesh", "pixels"', "", "required")),
         ("material", "young", ("a number above 0", "stress", "required")),
         ("material", "E_transverse", ("a number above 0", "stress", "required")),
         ("material", "expansion_axial", ("a number", "1 / temperature", "")),

@@ -1,0 +1,145 @@
+"""The coarse mesh of a label image within smooth outlines: contours by marching squares, filled by gmsh.
+
+The sides of the cell lie on lines of pixel centres, between which contours begin and end, so that sides match.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from scipy.ndimage import gaussian_filter, map_coordinates
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
+
+from feti_homog.case import cell_section
+from feti_homog.errors import CaseError, MeshError
+from feti_homog.mesh.coarse_mesh import CoarseMesh
+from feti_homog.mesh.fill.shape_mesher import filled
+from feti_homog.mesh.readers.gmsh_file import MshContent, raw_mesh
+from feti_homog.mesh.readers.msh_reader import made
+from feti_homog.mesh.sizes.element_estimate import refuse_many
+from feti_homog.mesh.sizes.graded_size import MAX_GROWTH, MIN_EDGES_AROUND, NEAREST, PASSAGE_EDGE, SizeField
+from feti_homog.mesh.tiles.tile_filling import gmsh_session
+from feti_homog.typing import Bool, Float, Int32
+
+
+def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell) -> CoarseMesh:
+    """Mesh the regions of an image with phases (rows, columns) within smooth outlines.
+
+    A Gaussian filter, one pixel wide, removes the steps from an indicator; splines follow its contour at the level that
+    keeps the area.
+
+    Raises:
+        CaseError: scikit-image is not installed.
+        MeshError: three phases touch each other, or gmsh cannot fill the outlines.
+    """
+    try:
+        from skimage import measure
+    except ImportError:
+        raise CaseError('[cell] smooth = true: needs scikit-image, as by pip install "feti_homog[images]"') from None
+    mask = _every_other(phase, phases)
+    indicator = gaussian_filter(mask.astype(float), 1.0, mode="wrap")
+    level = float(np.quantile(indicator, 1.0 - mask.mean(), method="midpoint"))
+    # The sides run where they cross contours most steeply.
+    away = np.abs(indicator - level)
+    across = [(away + np.abs(np.roll(indicator, -1, axis) - indicator)).min(axis=axis) for axis in (0, 1)]
+    i = int(np.argmax(across[0]))
+    j = int(np.argmax(np.minimum(across[1], away[:, i])))
+    indicator, phase = (np.roll(array, (-j, -i), (0, 1)) for array in (indicator, phase))
+    rows, width = phase.shape
+    find_contours: Callable[[Float, float], list[Float]] = measure.find_contours
+    curves = [*map(_resampled, find_contours(np.pad(indicator, ((0, 1), (0, 1)), mode="wrap"), level))]
+    size = np.array([1.0, rows / width])
+    field = _size_field(curves, indicator, cell.mesh_size, size)
+    refuse_many(field, field.least, size)
+    with gmsh_session() as gmsh:
+        occ, lines = gmsh.model.occ, []
+        for curve in curves:
+            *places, last = (curve / width).tolist()
+            tags = [occ.addPoint(x, y, 0.0) for y, x in places]
+            tags.append(tags[0] if last == places[0] else occ.addPoint(last[1], last[0], 0.0))
+            lines.append((1, occ.addSpline(tags)))
+        occ.fragment([(2, occ.addRectangle(0.0, 0.0, 0.0, *size.tolist()))], lines)
+        occ.synchronize()
+        try:
+            content = filled(gmsh, size, field)
+        except Exception as error:  # gmsh raises nothing more special
+            advice = "expected larger regions of a phase: filter the image, or smooth = false"
+            raise MeshError(f"[cell] smooth = true: gmsh cannot fill the outlines ({error}); {advice}") from None
+    mesh, scale = made(raw_mesh(_with_phases(content, phase, phases)), "smooth outlines"), width * cell.pixel
+    return replace(
+        mesh,
+        width=scale * mesh.width,
+        height=scale * mesh.height,
+        points=scale * mesh.points,
+        ellipses=mesh.ellipses.scaled(scale),
+        origin=(cell.pixel * (i + 0.5 - width * (2 * i > width)), cell.pixel * (j + 0.5 - rows * (2 * j > rows))),
+    )
+
+
+def _every_other(phase: Int32, phases: tuple[str, ...]) -> Bool:
+    """Mark the phases (rows, columns) that an odd number of outlines parts from the matrix.  Raises MeshError."""
+    n = len(phases)
+    one, other = (np.concatenate([turned.ravel() for turned in pair]) for pair in
+                  ((phase, phase), (np.roll(phase, 1, 0), np.roll(phase, 1, 1))))  # fmt: skip
+    a, b = np.divmod(np.unique(one[one != other] * n + other[one != other]), n)
+    touching = csr_matrix((np.ones(len(a)), (a, b)), shape=(n, n))
+    is_odd = dijkstra(touching, directed=False, indices=0, unweighted=True) % 2 == 1
+    for k in np.flatnonzero(is_odd[a] == is_odd[b])[:1]:
+        names = f"{phases[a[k]]} and {phases[b[k]]} touch beside a third phase"
+        raise MeshError(f"[cell] smooth = true: {names}; expected two phases at an outline, as of fibres in coatings")
+    return np.asarray(is_odd[phase])
+
+
+def _resampled(contour: Float) -> Float:
+    """Place points (k, 2) evenly on a contour, about two pixels apart, both ends included."""
+    length = np.append(0.0, np.cumsum(np.hypot(*np.diff(contour, axis=0).T)))
+    places = np.linspace(0.0, length[-1], max(8, round(length[-1] / 2.0)) + 1)
+    points = np.column_stack([np.interp(places, length, x) for x in contour.T])
+    points[[0, -1]] = contour[[0, -1]]
+    return points
+
+
+def _size_field(curves: list[Float], indicator: Float, largest: float, size: Float) -> SizeField:
+    """Return the size field: small curves have MIN_EDGES_AROUND edges, or half as many if a side cuts them.
+
+    In narrow passages, between points with opposite gradients, edges are shorter.
+    """
+    unit, period = 1.0 / indicator.shape[1], np.array(indicator.shape, float)
+    points = np.concatenate([np.zeros((1, 2)), *curves])
+    edges = [MIN_EDGES_AROUND / (1 if (curve[0] == curve[-1]).all() else 2) for curve in curves]
+    lengths = [np.hypot(*np.diff(curve, axis=0).T).sum() / n for curve, n in zip(curves, edges, strict=True)]
+    length = np.repeat([np.inf, *lengths], [1, *map(len, curves)])
+    slopes = [np.roll(indicator, -1, k) - np.roll(indicator, 1, k) for k in (0, 1)]
+    normal = np.column_stack([map_coordinates(slope, points.T, order=1, mode="grid-wrap") for slope in slopes])
+    normal /= np.maximum(np.hypot(*normal.T), np.finfo(float).tiny)[:, None]
+    count = [*range(1, min(NEAREST, len(points)) + 1)]
+    distance, nearest = cKDTree(points % period, boxsize=period).query(points % period, k=count)
+    faces = np.einsum("ijk,ik->ij", normal[nearest], normal) < -0.5
+    length = np.minimum(length, PASSAGE_EDGE * np.where(faces, distance, np.inf).min(axis=1))
+    length = np.minimum(largest, unit * np.maximum(length, 1.0))
+    return SizeField([(unit * points[:, ::-1], length, np.full(len(points), MAX_GROWTH))], size, largest)
+
+
+def _with_phases(content: MshContent, phase: Int32, phases: tuple[str, ...]) -> MshContent:
+    """Give each surface the phase that prevails among its elements.
+
+    Edges that turn by more than 87 degrees, with a rise of 0.2 lengths, become straight.
+    """
+    ((tags, nodes, entity),) = (rows for kind, rows in content.elements.items() if kind.startswith("Triangle"))
+    order, points = np.argsort(content.tags), content.points.copy()
+    place = order[np.searchsorted(content.tags[order], nodes)]
+    corners, middles = points[place[:, :3], :2], place[:, 3:]
+    onward = np.roll(corners, -1, axis=1)
+    straight = (corners + onward) / 2
+    rise, length = (np.linalg.norm(v, axis=2) for v in (points[middles, :2] - straight, onward - corners))
+    points[middles[rise > 0.2 * length], :2] = straight[rise > 0.2 * length]
+    column, row = np.round(corners.mean(axis=1) * phase.shape[1]).astype(np.int64).T
+    surfaces, which = np.unique(entity, return_inverse=True)
+    votes = np.zeros((len(surfaces), len(phases)), np.int64)
+    np.add.at(votes, (which, phase[row % phase.shape[0], column % phase.shape[1]]), 1)
+    numbers = zip(surfaces.tolist(), (votes.argmax(axis=1) + 1).tolist(), strict=True)
+    groups: dict[tuple[int, int], tuple[int, ...]] = {(2, surface): (number,) for surface, number in numbers}
+    names = {(2, k + 1): name for k, name in enumerate(phases)}
+    return MshContent(content.tags, points, {"Triangle 6": (tags, nodes, entity)}, groups, names)

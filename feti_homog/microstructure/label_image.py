@@ -1,0 +1,104 @@
+"""Read images, and label images whose pixels have the number of a phase, as of segmented micrographs."""
+
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from warnings import simplefilter
+
+import numpy as np
+
+from feti_homog.errors import MOST_FAULTS, CaseError, FetiHomogError
+from feti_homog.microstructure import phase_names
+from feti_homog.schema import limits, wording
+from feti_homog.system.runtime import input_files
+from feti_homog.typing import Array, Int32
+
+# Modes of Pillow with one whole number a pixel: bits, palettes, 8, 16 and 32 bits.
+WHOLE_NUMBERS = {"1", "P", "L", "I", "I;16", "I;16B", "I;16L", "I;16N"}
+
+
+def read_labels(path: Path, labels: Mapping[str, str], is_mirrored: bool) -> tuple[Int32, tuple[str, ...]]:
+    """Read an image, and replace its labels by phases.
+
+    Returns the phase numbers (rows, columns), the lowest row first, and the phase names, the matrix first, others in
+    order. `is_mirrored` puts the mirror images beside and above the image.
+
+    Raises:
+        CaseError: the file is no image with whole numbers, or differs from `labels`, a line each.
+    """
+    image = read_image(path)
+    numbers, counts = np.unique(image, return_counts=True)
+    names = [*map(str, numbers.tolist())]
+    shares = [f"{name}: {share:.3g} %" for name, share in zip(names, 100 * counts / image.size, strict=True)]
+    listed = f"{path.name} has {', '.join(shares[:MOST_FAULTS])}" + ", ..." * (len(names) > MOST_FAULTS)
+    faults = []
+    if unnamed := [name for name in names if name not in labels]:
+        few = ", ".join(unnamed[:3]) + ", ..." * (len(unnamed) > 3)
+        faults.append(f"[cell] labels: no phase of {few}; {listed}")
+    for name in sorted(labels.keys() - {*names}):
+        faults.append(f"[cell] labels {name} = {wording.toml_value(labels[name])}: no pixel has it; {listed}")
+    if faults:
+        raise CaseError(*faults)
+    phases = phase_names.MATRIX, *sorted({*labels.values()} - {phase_names.MATRIX})
+    phase = np.array([phases.index(labels[name]) for name in names], np.int32)[np.searchsorted(numbers, image)]
+    phase = phase[::-1]  # the first row of an image is the upper one
+    if is_mirrored:
+        phase = np.block([[phase, phase[:, ::-1]], [phase[::-1], phase[::-1, ::-1]]])
+        _check_size(path, *phase.shape)
+    return phase, phases
+
+
+def read_image(path: Path, is_grey: bool = False) -> Array:
+    """Return the pixels (rows, columns) in an image file, the upper row first, or with `is_grey` grey values.
+
+    A separate process decodes the file.
+
+    Raises:
+        CaseError: the file is damaged or too large, or has not exactly one image.
+    """
+    memory = 128 * limits.PIXELS
+    image = input_files.in_own_process(path, partial(_decoded, is_grey=is_grey), memory=memory)
+    if image.ndim != 2 or image.dtype.kind not in ("iubf" if is_grey else "iub"):
+        what = f"{'x'.join(map(str, image.shape))} values of type {image.dtype}"
+        raise CaseError(f"{path.name}: {what}; expected two dimensions, and a whole number a pixel")
+    _check_size(path, *image.shape)
+    return image.astype(np.uint8) if image.dtype.kind == "b" else image
+
+
+def _check_size(path: Path, rows: int, columns: int) -> None:
+    if min(rows, columns) < 2 or rows * columns > limits.PIXELS:
+        expected = f"expected two rows and columns or more, and at most {limits.PIXELS} pixels"
+        raise CaseError(f"{path.name}: {columns} x {rows} pixels; {expected}")
+
+
+def _decoded(path: Path, is_grey: bool) -> Array:
+    """Decode an image file.  Raises CaseError."""
+    try:
+        with input_files.opened(path) as stream:
+            if path.suffix.lower() in (".npy", ".npz"):
+                stored = np.load(stream, allow_pickle=False)
+                arrays = [stored] if isinstance(stored, np.ndarray) else [stored[name] for name in stored.files]
+                if len(arrays) != 1:
+                    raise CaseError(f"{path.name}: {len(arrays)} arrays; expected one")
+                return np.asarray(arrays[0])
+            from PIL import Image, UnidentifiedImageError  # comes with Matplotlib
+
+            simplefilter("ignore")
+            Image.MAX_IMAGE_PIXELS = None  # the limit of this program holds
+            try:
+                picture = Image.open(stream)
+            except UnidentifiedImageError:
+                raise CaseError(f"{path.name}: is no image, or damaged") from None
+            _check_size(path, picture.height, picture.width)
+            if (frames := getattr(picture, "n_frames", 1)) > 1:
+                raise CaseError(f"{path.name}: {frames} images; expected one")
+            if is_grey:
+                return np.array(picture if picture.mode in WHOLE_NUMBERS - {"P"} | {"F"} else picture.convert("L"))
+            if picture.mode not in WHOLE_NUMBERS:
+                expected = "expected one whole number a pixel, such as grey values of 8 bits"
+                raise CaseError(f"{path.name}: pixels of mode {picture.mode}; {expected}")
+            return np.array(picture)
+    except FetiHomogError:
+        raise
+    except Exception as error:  # Pillow raises many kinds
+        raise CaseError(f"{path.name}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
