@@ -125,7 +125,12 @@ def _add_products(commands: argparse._SubParsersAction[Parser]) -> None:
     )
     verify.add_argument("--json", action="store_true", help="print the certificate as JSON")
     fibres = _command(commands, "products.fibres", "print the fibres of a cell as a table", FIBRES_HELP)
-    fibres.add_argument("source", type=folder, metavar="CASE.toml|DIR", help="a case file, or a folder of results")
+    source = fibres.add_mutually_exclusive_group(required=True)
+    words = "a case file, or a folder of results"
+    source.add_argument("source", type=folder, nargs="?", metavar="CASE.toml|DIR", help=words)
+    words = "find round fibres in a micrograph; --out FILE.csv also draws them, in FILE_circles.png"
+    source.add_argument("--image", type=Path, metavar="IMAGE", help=words)
+    fibres.add_argument("--pixel", type=length, default=1.0, metavar="LENGTH", help="edge of a pixel of the image")
     fibres.add_argument("--out", type=Path, metavar="FILE.csv", help="write the table to a file instead of printing it")
 
 
@@ -172,6 +177,13 @@ def integer(word: str) -> int:
     if not re.fullmatch(r"[+-]?[0-9]{1,9}", word):
         raise ValueError
     return int(word)
+
+
+def length(word: str) -> float:
+    """Convert a word to a length above 0.  Raises ArgumentTypeError."""
+    if not re.fullmatch(r"[0-9]{0,9}\.?[0-9]{0,9}(e-?[0-9])?", word) or not re.search("[1-9]", word.partition("e")[0]):
+        raise argparse.ArgumentTypeError(f"{word!r}: expected a length above 0, such as 0.5")
+    return float(word)
 
 
 def size(word: str) -> tuple[float, float]:

@@ -62,14 +62,20 @@ def export(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def fibres(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Print the fibres of a case or result as a table, or write it to a file."""
-    from feti_homog.commands import listed_fibres
+    """Print the fibres of a case, a result or an image as a table, or write it to a file."""
+    from feti_homog.commands import listed_fibres, micrograph
 
-    text = mpi_errors.on_root(comm, listed_fibres.table, arguments.source)
+    if arguments.image is None:
+        text = mpi_errors.on_root(comm, listed_fibres.table, arguments.source)
+    else:
+        circles, text = mpi_errors.on_root(comm, micrograph.fibres, arguments.image, arguments.pixel)
     if arguments.out is None:
         mpi_errors.on_root_only(comm, standard_streams.print_product, text)
     elif (path := mpi_errors.on_root_only(comm, output_folder.write_product, arguments.out, text)) is not None:
         standard_streams.say(str(path))
+    if arguments.out is not None and arguments.image is not None:
+        drawn = mpi_errors.on_root(comm, micrograph.draw, arguments.image, circles, arguments.pixel, arguments.out)
+        mpi_errors.on_root_only(comm, standard_streams.say, drawn)
 
 
 def _result_folder(arguments: argparse.Namespace) -> Path:

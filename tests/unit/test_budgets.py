@@ -17,7 +17,7 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 # begun runs and their messages; the third: conductivity, images.
 LINES = {
     ".": 470,
-    "analysis": 3000 + 127 + 110,
+    "analysis": 3000 + 127 + 125,
     "case": 2880 + 35 + 95,
     "commands": 560 + 15 + 130,
     "fem": 1150 + 3,
@@ -32,13 +32,13 @@ LINES = {
     "schema": 430 + 0 + 5,
     "studies": 2950,
     "system": 1770 + 3,
-    "verify": 3100 + 156 + 70,
+    "verify": 3100 + 156 + 75,
 }
 FILES, TOTAL = 310, 45000 + 368 + 490
 # Percent of all lines: private functions that are called once, and imports.
-CALLED_ONCE, IMPORTS = 6.0, 6.0
+CALLED_ONCE, IMPORTS = 6.2, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.
-CONSTANTS, SHARED = 335, 215
+CONSTANTS, SHARED = 340, 217
 # Of 1 000 words of docstrings: "those", "what", "that of"; "of".  Percent of bound names that are pronouns or adverbs.
 VAGUE, OF, PRONOUNS = 1.0, 42.0, 1.0
 NO_NOUNS = {

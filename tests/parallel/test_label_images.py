@@ -1,0 +1,110 @@
+"""Cells of label images against the same quadrilaterals as a mesh, laminates, tables of circles, and other ranks."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from reference.closed_forms import lame, laminate
+from support.cases import FIBRE, MATRIX
+from support.label_images import CIRCLES, RUN, circles_in_pixels, labels_of, write_png
+from support.other_formats import written
+from support.pixel_images import quadrilaterals
+from support.verified_results import SPRINGS
+
+from feti_homog import Case, run
+from feti_homog.analysis.runner import compute
+from feti_homog.verify.certificate import verify
+
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
+
+
+def solved(comm, path, cell=None, **sections):
+    """Return the result of a cell, by default of the image at `path`. Collective."""
+    image = {"geometry": "pixels", "file": str(path), "labels": {"0": "matrix", "1": "fibre"}}
+    return compute(Case.parse(RUN | {"cell": image | (cell or {})} | sections), comm)
+
+
+def saved(comm, path, image):
+    """Write rows of labels from above on rank 0. Collective."""
+    if comm.rank == 0:
+        np.save(path, image)
+    comm.barrier()
+    return path
+
+
+@pytest.mark.parametrize("sections", [{}, {"interface": SPRINGS}], ids=["bonded", "springs"])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_pixels_are_the_same_quadrilaterals_as_a_mesh(comm, shared_path, seed, sections):
+    image = (np.random.default_rng(seed).random((16, 16)) < 0.4).astype(np.uint8)
+    path = saved(comm, shared_path / "image.npy", image[::-1])
+    if comm.rank == 0:
+        written(quadrilaterals(image), shared_path / "quads.inp")
+    comm.barrier()
+    cell = {"geometry": "mesh", "file": str(shared_path / "quads.inp")}
+    expected = compute(Case.parse(RUN | {"cell": cell} | sections), comm)
+    result = solved(comm, path, {"pixel": 1 / 16}, **sections)
+    C, other = result.effective_stiffness, expected.effective_stiffness
+    assert np.abs(C - other).max() < 1e-11 * other.max()
+    errors, others = result.mesh_error.effective_stiffness, expected.mesh_error.effective_stiffness
+    assert np.abs(errors - others).max() < 1e-7 * others.max()  # fits in another order of elements
+
+
+def plane_strain(phase):
+    """Return the stiffness (3, 3) in plane strain."""
+    lam, mu = lame(phase)
+    return np.array([[lam + 2 * mu, lam, 0.0], [lam, lam + 2 * mu, 0.0], [0.0, 0.0, mu]])
+
+
+@pytest.mark.parametrize("pixel", [1e-6, 0.5])
+def test_rows_of_pixels_are_a_laminate(comm, shared_path, pixel):
+    """Stresses across and strains along layers are uniform, which linear elements represent exactly."""
+    rows = np.array([0, 1, 1, 0, 1, 0, 0, 0], np.uint8)
+    path = saved(comm, shared_path / "layers.npy", np.repeat(rows[:, None], 6, axis=1))
+    C = solved(comm, path, {"pixel": pixel}).effective_stiffness
+    expected = laminate([plane_strain(phase) for phase in (MATRIX, FIBRE)], [5 / 8, 3 / 8], across=1)
+    assert np.abs(C - expected).max() < 1e-11 * C.max()
+
+
+def test_first_row_of_an_image_is_the_upper_one_and_mirrors_make_it_whole(comm, shared_path):
+    image = (np.random.default_rng(3).random((7, 5)) < 0.4).astype(np.uint8)
+    whole = np.block([[image[::-1], image[::-1, ::-1]], [image, image[:, ::-1]]])  # from above
+    mirrored = solved(comm, saved(comm, shared_path / "part.npy", image), {"window": "mirrored"})
+    expected = solved(comm, saved(comm, shared_path / "whole.npy", whole))
+    assert np.array_equal(mirrored.effective_stiffness, expected.effective_stiffness)
+    assert (mirrored.cell.width, mirrored.cell.height) == (10.0, 14.0)
+    assert np.abs(mirrored.effective_stiffness[:2, 2]).max() < 0.05 * mirrored.effective_stiffness[0, 0]
+    upper = np.zeros((6, 6), np.uint8)
+    upper[0, :3] = 1
+    result = solved(comm, saved(comm, shared_path / "upper.npy", upper))
+    assert result.fibres[0].centre == pytest.approx((1.5, 5.5))
+
+
+def test_smooth_outlines_give_the_constants_of_the_table_that_was_drawn(comm, shared_path):
+    if comm.rank == 0:
+        write_png(shared_path / "circles.png", labels_of(CIRCLES, 150))
+    comm.barrier()
+    labels, order = {"0": "matrix", "255": "fibre"}, {"order": 2, "mesh_size": 0.05}
+    smooth = solved(comm, shared_path / "circles.png", {"labels": labels, "smooth": True, "pixel": 1 / 150, **order})
+    rows = [{"x": x, "y": y, "radius": r} for x, y, r in CIRCLES]
+    cell = {"geometry": "table", "fibre_list": rows, "width": 1.0, "height": 1.0, **order}
+    table = compute(Case.parse(RUN | {"cell": cell}), comm)
+    C, expected = smooth.effective_stiffness, table.effective_stiffness
+    allowed = table.mesh_error.effective_stiffness + smooth.mesh_error.effective_stiffness
+    # Areas of circles in pixels are off by 1e-3, and constants with them.
+    assert (np.abs(C - expected) < allowed + 1e-3 * expected.max()).all()
+    area = np.pi * sum(r**2 for *_, r in CIRCLES)
+    assert smooth.cell.fractions["fibre"] == pytest.approx(area, rel=2e-3)
+
+
+def test_ranks_agree_and_files_obey_every_law(comm, shared_path):
+    image = circles_in_pixels(30)
+    path = saved(comm, shared_path / "image.npy", image)
+    for name, cell in {"steps": {}, "smooth": {"smooth": True, "mesh_size": 0.1}}.items():
+        document = {"geometry": "pixels", "file": str(path), "labels": {"0": "matrix", "1": "fibre"}, **cell}
+        case = Case.parse(RUN | {"cell": document, "interface": SPRINGS})
+        together = run(case, comm, out=shared_path / name).effective_stiffness
+        alone = compute(case, MPI.COMM_SELF).effective_stiffness
+        assert np.abs(together - alone).max() < 1e-9 * alone.max()
+        if comm.rank == 0:
+            certificate = verify(shared_path / name)
+            assert certificate.holds, certificate.text
+        comm.barrier()

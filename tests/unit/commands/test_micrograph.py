@@ -1,0 +1,77 @@
+"""Fibres of images whose circles are known, and what goes wrong."""
+
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+from scipy.ndimage import zoom
+from scipy.spatial import cKDTree
+
+from feti_homog.commands import micrograph
+from feti_homog.errors import CaseError
+
+SIZE, FINER = 400, 4
+
+
+def circles(seed):
+    """Return circles (n, 3) apart by half a pixel or more, some cut by the border."""
+    rng, found = np.random.default_rng(seed), []
+    for x, y, r in rng.uniform((0, 0, 12), (SIZE, SIZE, 20), (4000, 3)):
+        if all(np.hypot(x - a, y - b) > r + c + 0.5 for a, b, c in found):
+            found.append((x, y, r))
+    return np.array(found)
+
+
+def drawn(path, known, bright=True, noise=10.0):
+    """Write a noisy picture of circles; returns the path."""
+    places = (np.arange(SIZE * FINER) + 0.5) / FINER
+    image = np.full((SIZE * FINER,) * 2, 60.0, np.float32)
+    for a, b, r in known:
+        image[np.hypot(*np.meshgrid(places - a, places - b)) < r] = 190.0
+    image = image.reshape(SIZE, FINER, SIZE, FINER).mean(axis=(1, 3))
+    image += np.random.default_rng(1).normal(0.0, noise, image.shape)
+    Image.fromarray((image if bright else 255 - image).clip(0, 255).astype(np.uint8)[::-1]).save(path)
+    return path
+
+
+@pytest.mark.parametrize("bright", [True, False])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_circles_are_found_within_half_a_pixel(tmp_path, seed, bright):
+    known = circles(seed)
+    whole = ((known[:, :2] > known[:, 2:]) & (known[:, :2] < SIZE - known[:, 2:])).all(axis=1)
+    found, table = micrograph.fibres(drawn(tmp_path / "a.png", known, bright), 0.5)
+    found = found / 0.5
+    distance, nearest = cKDTree(found[:, :2]).query(known[:, :2])
+    assert distance[whole].max() < 0.5 and np.abs(found[nearest, 2] - known[:, 2])[whole].max() < 0.5
+    assert np.count_nonzero(distance < 0.5) >= 0.97 * len(known) and len(found) <= len(known)
+    lines = table.splitlines()
+    assert lines[:2] == ["# width = 200.0, height = 200.0, left = 0.0, bottom = 0.0", "x,y,radius"]
+    assert np.allclose(np.loadtxt(lines[2:], delimiter=","), 0.5 * found, atol=1e-8)
+
+
+def test_circles_are_drawn_beside_the_table_and_not_over_the_image(tmp_path):
+    image = drawn(tmp_path / "a.png", circles(1)[:5])
+    before = image.read_bytes()
+    found, _ = micrograph.fibres(image, 1.0)
+    assert micrograph.draw(image, found, 1.0, tmp_path / "a.csv") == str(tmp_path / "a_circles.png")
+    assert image.read_bytes() == before and (tmp_path / "a_circles.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("image", "words"),
+    [
+        (np.full((20, 20), 7, np.uint8), "found one grey value"),
+        (zoom(np.eye(2, dtype=np.uint8) * 200, 40, order=0), "expected round fibres of 6 pixels in diameter or more"),
+    ],
+)
+def test_images_without_fibres_are_refused(tmp_path, image, words):
+    Image.fromarray(image).save(tmp_path / "a.png")
+    with pytest.raises(CaseError, match=words):
+        micrograph.fibres(tmp_path / "a.png", 1.0)
+
+
+def test_finding_fibres_needs_scikit_image(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "skimage.filters", None)
+    with pytest.raises(CaseError, match=r"--image: needs scikit-image, as by pip install"):
+        micrograph.fibres(tmp_path / "a.png", 1.0)
