@@ -52,7 +52,7 @@ def check_phases(findings: Findings, cell: DiscreteCell, state: State, number: i
                 continue
             size = raised * float(np.abs(column).max()) if measure == "utilisation" else max(scale, rounded)
             findings.compare(LAW, float(reported[number]), column.max(), size, place)
-            distance = np.hypot(*from_centre(points[rows], np.array(at[number]), cell.files.size).T)
+            distance = np.hypot(*from_centre(points[rows], np.array(at[number]), cell.files.shift).T)
             near = column[distance < SAME_PLACE * cell.files.size.max()]
             is_largest = bool((near >= column.max() - SAME_VALUE * size).any())
             findings.require(LAW, is_largest, f"{place}: another position")

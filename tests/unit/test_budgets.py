@@ -14,27 +14,27 @@ import pytest
 PACKAGE = Path(__file__).parents[2] / "feti_homog"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 # Lines, of the modules beside the packages under "."; the second numbers: phase stresses, start of damage, figures,
-# begun runs and their messages; the third: conductivity.
+# begun runs and their messages; the third: conductivity, and sides that do not match.
 LINES = {
     ".": 470,
     "analysis": 3000 + 130 + 110,
-    "case": 2880 + 45 + 30,
+    "case": 2880 + 45 + 55,
     "commands": 560 + 15,
-    "fem": 1150 + 5,
-    "feti": 6300,
-    "homogenization": 3230 + 60,
-    "interface": 4000,
+    "fem": 1150 + 5 + 10,
+    "feti": 6300 + 0 + 65,
+    "homogenization": 3230 + 60 + 15,
+    "interface": 4000 + 0 + 5,
     "materials": 1430 + 95 + 110,
-    "mesh": 5500,
+    "mesh": 5500 + 0 + 45,
     "microstructure": 2140,
     "report": 3420 + 170 + 50,
     "results": 2430 + 85,
     "schema": 430,
     "studies": 2950,
     "system": 1770 + 5,
-    "verify": 3100 + 170 + 50,
+    "verify": 3100 + 170 + 95,
 }
-FILES, TOTAL = 310, 45000 + 370 + 370
+FILES, TOTAL = 310, 45000 + 370 + 370 + 245
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.0, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.
