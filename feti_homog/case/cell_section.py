@@ -225,6 +225,15 @@ class Cell:
         default=1e-3,
         only=MESH,
     )
+    boundary: str = key(
+        types.choice("periodic", "displacement", "traction"),
+        'Conditions on the sides. "displacement": u = E x, for meshes that are not periodic; the stiffness is then an '
+        'upper bound of the effective one of the material that the cell is a piece of. "traction": t = Sigma n, its '
+        "lower bound. Neither needs matching nodes, and both tend to the effective stiffness as cells grow; of "
+        'conductivity they prescribe T = G x and -q n. They belong to type = "stiffness" and "conductivity".',
+        default="periodic",
+        only=MESH,
+    )
     columns: tuple[str, ...] | None = key(
         kinds.NAMES_OF_COLUMNS,
         "Names of the columns of a table, in place of a line of names; others than those of file are not read.",

@@ -22,6 +22,8 @@ TablePath = tuple[str, ...]
 ITEMS = "items"
 """The path entry that denotes every item of a list."""
 CELL, INTERFACE, LOADS = ("cell",), ("interface",), ("strain", "to", "waypoints")
+UNIT_LOADS = ("stiffness", "conductivity")
+"""The analyses under unit loads, at one state of the bonds."""
 PLACES_OF_LOADS: tuple[TablePath, ...] = (("path", "to"), ("path", "waypoints", ITEMS), ("load", "to"))
 PLACES_OF_TABLES: tuple[tuple[TablePath, type[Any]], ...] = (
     *(((section,), contents) for section, contents in SECTIONS.items()),
@@ -158,6 +160,16 @@ def _cell() -> Iterator[Rule]:
     yield Rule((*CELL, "voids"), lambda value: not isinstance(value, bool), line, (RANDOM,))
     line = "expected true or false: the mesh has its voids"
     yield Rule((*CELL, "voids"), lambda value: isinstance(value, bool), line, (MESH,))
+    others = kinds.ANALYSIS_TYPE.among(*(name for name in _values(kinds.ANALYSIS_TYPE) if name not in UNIT_LOADS))
+    line = f"belongs to [analysis] type = {' or '.join(map(wording.toml_value, UNIT_LOADS))}"
+    yield Rule((*CELL, "boundary"), lambda value: value == "periodic", line, (MESH, others))
+    words = "exclude each other; sides match only in periodic cells"
+
+    def matches(cell: Any) -> bool:
+        has_both = has(cell, "boundary", "repair") and cell["boundary"] != "periodic"
+        return not (has_both and cell["repair"] == "snap")
+
+    yield Rule(CELL, matches, words, (MESH,), ("boundary", "repair"))
     yield exclusive(CELL, "match", "voids", words="exclude each other; cells that match a table have no voids")
     pair, line = ("match", "radius_spread"), "exclude each other; the table gives the radii"
     yield Rule(CELL, lambda cell: not has(cell, *pair) or cell["radius_spread"] == 0, line, names=pair)

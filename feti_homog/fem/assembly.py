@@ -217,9 +217,20 @@ def integrals(g: Float, w: Float) -> Float:
     return integral
 
 
-def void_integrals(submesh: Submesh, mesh: FineMesh) -> Float:
-    """Integrate N n (classes, 2) along void sides; n points out of the void, so that u^T int N n ds = int grad u."""
-    sums, nodes = np.zeros((mesh.n_classes, 2)), nodes_along(submesh, mesh, submesh.at_void)
+def side_loads(submesh: Submesh, mesh: FineMesh, problem: Problem) -> Float:
+    """Compute the unit loads (cn, m) of tractions t = Sigma n on the sides, f = -Q Sigma; (cn, 0) if none are given."""
+    if submesh.boundary != "traction":
+        return np.zeros((problem.components * mesh.n_classes, 0))
+    unit = np.concatenate(np.eye(problem.strains)[problem.voigt], axis=1)
+    return np.asarray((boundary_integrals(submesh, mesh, submesh.at_side) @ unit).reshape(-1, problem.strains))
+
+
+def boundary_integrals(submesh: Submesh, mesh: FineMesh, edges: Bool) -> Float:
+    """Integrate N n (classes, 2) along torus edges; n points into the body, so that u^T int N n ds = int grad u.
+
+    The integral of grad u is over the void beyond the edges.
+    """
+    sums, nodes = np.zeros((mesh.n_classes, 2)), nodes_along(submesh, mesh, edges)
     products = LINEAR if mesh.lattice.triangles.shape[1] == 3 else QUADRATIC
     step = len(products) - 1
     for first in range(0, nodes.shape[1] - 1, step):

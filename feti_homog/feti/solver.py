@@ -5,6 +5,10 @@ With f = -Q E for a load E (v,), which begins with the macroscopic strain, Eqs. 
     (F + C) lam - G alpha = d E,  G^T lam = 0,  u* = K+ (-Q E - B^T lam) + R alpha,  d = -B K+ Q.
 
 C is the compliance of elastic bonds: their faces part by B u* = C lam.  Rigid bonds (glue) have C = 0.
+
+Where tractions t = Sigma n are given on the sides, Sigma (m,) follows E among the loads, such that the sides keep the
+mean strain: int u* (x) n ds = 0, which makes E the mean strain and Sigma the mean stress (`FetiSolver.closure`).
+Tractions push single subdomains: then G^T lam = -R^T Q E.
 """
 
 import weakref
@@ -16,6 +20,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from feti_homog.errors import NotCarriedError
 from feti_homog.fem import PLANE, Problem
 from feti_homog.feti import factory
 from feti_homog.feti.decomposition.jump_operator import GLUE, InterfaceSprings, JumpOperator
@@ -88,6 +93,7 @@ class FetiSolver:
             from feti_homog.feti.confirmation import InfluenceSolutions  # with the modules of the exact inverse
 
             self._by_columns = InfluenceSolutions(comm, self.exact_inverse, self.operator, self.natural, self._jumps)
+        self._closure: Float | None = None
         self._view = PETSc.Options("feti_").getBool("view", False)
         # Shell contexts call Python, so the solver destroys them: PETSc finalizes after the interpreter has shut down.
         self._krylov: dict[int, Krylov] = {}
@@ -138,9 +144,11 @@ class FetiSolver:
         return np.asarray(self.comm.allreduce(local))
 
     def stress_integral(self, solution: DualSolution) -> Float:
-        """Compute |UC| Sigma = int sigma dA = torn_stiffness E + d^T lam (v,).  Collective."""
-        forces = self.comm.allreduce(self.d.T @ solution.lam)
-        return np.asarray(self.torn_stiffness @ solution.strain + forces)
+        """Compute |UC| Sigma = torn_stiffness E + d^T lam, and of pulled sides -int u* (x) n ds.  Collective."""
+        local = self.d.T @ solution.lam
+        if self.is_pulled and solution.alpha is not None:
+            local = local + self._pushes.T @ solution.alpha[self.natural.owned_modes]
+        return np.asarray(self.torn_stiffness @ solution.strain + self.comm.allreduce(local))
 
     def set_state(self, active: Float, compliance: Float) -> None:
         """Set the active rows and the spring compliance.  Collective.
@@ -158,6 +166,38 @@ class FetiSolver:
             self.natural.activate(active)
         if change:
             self.preconditioner.activate(active)
+            self._closure = None
+
+    @cached_property
+    def _pushes(self) -> Float:
+        """Compute R^T Q (owned modes, v + m) of tractions on sides; without, (owned modes, v) and 0."""
+        pushes: Float = np.concatenate([self.condensed.boundary[:0], *(s.R.T @ s.Q for s in self.subdomains)])
+        pushes[:, : len(self.problem.loads)] = 0.0
+        return pushes
+
+    @property
+    def is_pulled(self) -> bool:
+        """Return whether tractions are given on the sides, which push subdomains."""
+        return self.natural.kernel_dimension > 0 and self.condensed.boundary.shape[1] > len(self.problem.loads)
+
+    @property
+    def closure(self) -> Float:
+        """Return the loads (v + m, v) under unit E: E, and Sigma on the sides, if given, that keeps the mean strain.
+
+        Collective when first read in a state; raises NotCarriedError if tractions pull at a free body.
+        """
+        if self._closure is None:
+            v, n = len(self.problem.loads), self.condensed.boundary.shape[1]
+            self._closure = np.eye(v)
+            if n > v:
+                free = self.natural.unconstrained_modes[self.natural.owned_modes].T @ self._pushes
+                largest = self.comm.allreduce(np.abs(self._pushes).max(initial=0.0), MPI.MAX)
+                if np.abs(self.comm.allreduce(free)).max(initial=0.0) > np.sqrt(np.finfo(float).eps) * largest:
+                    raise NotCarriedError('[cell] boundary = "traction": it pulls at bodies that have no bonds')
+                solutions = self.solve_many(np.eye(n), np.zeros((self.rows, n)))
+                kept = np.stack([self.stress_integral(solution)[v:] for solution in solutions], axis=1)
+                self._closure = np.vstack([np.eye(v), np.linalg.solve(kept[:, v:], -kept[:, :v])])
+        return np.asarray(self._closure)
 
     def solve(self, strain: Float, start: Float) -> DualSolution:
         """Solve the dual problem for a load `strain` (v,).  Collective; see `solve_many`."""
@@ -170,15 +210,20 @@ class FetiSolver:
         With influence columns, raises as `InfluenceSolutions.record`.
 
         Args:
-            strains: (k, v) loads E.
+            strains: (k, v) loads E, or (k, v + m) loads with given Sigma.
             starts: (owned rows, k) initial multipliers.
         """
-        k, columns = len(strains), self._by_columns
+        k, columns = len(strains), None if self.is_pulled else self._by_columns
+        if strains.shape[1] == len(self.problem.loads):
+            strains = strains @ self.closure.T
         self.solves += k
         if columns is not None and (solutions := columns.solutions(strains, self.d)) is not None:
             return solutions
         krylov = self._krylov_for(k)
-        torn_jump = self.d @ strains.T
+        torn_jump, balance = self.d @ strains.T, np.zeros((self.rows, k))
+        if self.is_pulled:
+            balance = self.natural.balancing(-self._pushes @ strains.T)
+            torn_jump -= self.operator.apply(balance)
         torn = self._jumps.norms(torn_jump)
         right = self._jumps.projected(torn_jump)
         jump = self._jumps.norms(right)
@@ -201,7 +246,7 @@ class FetiSolver:
             self.condition = max(self.condition, largest / smallest)
             if self._view:
                 PETSc.Sys.Print(krylov.describe(iterations), comm=self.comm)
-        parts = lam * scale, torn_jump - applied * scale, iterations, reason, np.maximum(jump, rounding)
+        parts = lam * scale + balance, torn_jump - applied * scale, iterations, reason, np.maximum(jump, rounding)
         solutions = self._jumps.solutions(strains, *parts)
         if columns is not None:
             columns.record(solutions if has_jump.all() else [], self.d)

@@ -85,7 +85,7 @@ class EstimatedNodes:
         parts = np.ones(points.shape[:2], bool)
         parts[:, [0, -1]] = ~torus.never_part[torus.node_class[torus.edges[plane]]]
         side, step = np.nonzero(parts)
-        directions = debonded_arcs.angles(points[parts], inner[side], centres, torus.mesh.period)
+        directions = debonded_arcs.angles(points[parts], inner[side], centres, torus.mesh.shift)
         is_vertex = (step == 0) | (step == lattice.intervals)
         return cls(numbers[inner[side]], pair[pair >= 0][side], directions, is_vertex)
 

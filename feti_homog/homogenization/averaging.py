@@ -66,6 +66,11 @@ class Response:
         return f"{voigt.STRAINS[k]} {self.strain[k]:.4g}, {voigt.STRESSES[k]} {self.stress[k]:.4g}"
 
     @property
+    def all_loads(self) -> Float:
+        """The loads of the response, `DualSolution.strain`."""
+        return self.scale * self.state.solution.strain
+
+    @property
     def debonded(self) -> int:
         """The number of debonded interface nodes."""
         return self.counts["open"] + self.counts["closed"]
@@ -126,15 +131,17 @@ class Homogenization:
             energy = float(stress @ strain) - self._rubbing(state)
             return self._scaled(state, scale, stress, energy, np.zeros(0), {})
         cell, solver, state = self.cell, self.cell.solver, self.interface.completed(state)
-        strain, u = state.solution.strain, solver.boundary_displacement(state.solution)
+        loads, u = state.solution.strain, solver.boundary_displacement(state.solution)
+        strain = loads[: len(self.loads)]
         # <sigma>, <eps*> over bodies and voids, and <sigma:eps>.
-        without_u, from_u = solver.condensed.stiffness @ strain, solver.condensed.boundary.T @ u
-        work = strain @ solver.condensed.energy @ strain + 2 * strain @ from_u
+        without_u, from_u = solver.condensed.stiffness @ loads, solver.condensed.boundary.T @ u
+        work = loads @ solver.condensed.energy @ loads + 2 * loads @ from_u
         work += u @ solver.interface_operators.apply_schur(u)
         sums = np.concatenate([without_u + from_u, self._strain_of_displacements.T @ u, [work]])
         stress, star, (energy,) = np.split(
-            distributed_arrays.allreduce_sum(cell.comm, sums) / cell.summary.area, [len(strain), -1]
+            distributed_arrays.allreduce_sum(cell.comm, sums) / cell.summary.area, [len(loads), -1]
         )
+        sides, stress = stress[len(strain) :], solver.closure.T @ stress
         springs = state.solution.compliance * state.solution.lam
         active = self.interface.active(state.status) * (coupled_interfaces.slipped(self.interface, state) == 0.0)
         opened = state.solution.jump * (1 - active) + springs
@@ -145,8 +152,9 @@ class Homogenization:
         largest = (self._largest(u) + scales.imposed(acting)) or 1.0
         imposed = float(scales.imposed_strain(acting).max()) or 1.0
         reuss = scales.stress_scale(acting) * imposed
+        left = np.abs(sides if sides.size else star - opening / self.cell.summary.area).max()
         checks = {
-            "strain": float(np.abs(star - opening / self.cell.summary.area).max() / imposed) + self._strain_inside,
+            "strain": float(left / imposed) + (0.0 if sides.size else self._strain_inside),
             "hill": float(abs(energy + rubbing - stress @ strain) / (max(abs(energy), reuss) or 1.0)),
         }
         if solver.jump_operator.global_rows:
@@ -165,7 +173,7 @@ class Homogenization:
         self, state: Equilibrium, scale: float, stress: Float, energy: float, u: Float, checks: dict[str, float]
     ) -> Response:
         """Multiply a state by `scale`; `energy` is <sigma:eps> of the state.  Collective."""
-        means = scale * state.solution.strain, scale * stress
+        means = scale * state.solution.strain[: len(stress)], scale * stress
         energies = scale**2 * energy / 2, scale**2 * self._stretched(state) / 2
         errors, damage = checks | state.certificate, self.damage(state.bonds)
         return Response(*means, scale, *energies, state, scale * u, errors, self.counts(state.status), damage)
@@ -227,8 +235,7 @@ class Homogenization:
                 continue
             inside = np.ones(s.n_dofs, bool)
             inside[boundary] = False
-            if s.submesh.pinned >= 0:  # the pinned node does not move
-                inside[s.problem.dofs(np.array([s.submesh.pinned]))] = False
+            inside[s.problem.dofs(s.held)] = False  # these nodes do not move
             inner = max(inner, float(np.abs(s.mean_strain(np.flatnonzero(inside))).max(initial=0.0)))
         return float(self.cell.comm.allreduce(inner, MPI.MAX) / self.cell.comm.allreduce(size, MPI.MAX))
 

@@ -73,9 +73,9 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
     if counts := [f"at {mask.sum()} {kind}" for mask, kind in kinds if mask.any()]:
         lines.append(f"[interface] nodes that never part: {', '.join(counts)}")
     # A bond at the pinned node, Eq. (15).
-    pinned = np.searchsorted(torus.class_keys, submeshes.pinned_class(torus))
-    if not torus.never_part[pinned] and torus.meeting[pinned] >= 2:
-        x, y = torus.mesh.points[np.flatnonzero(torus.node_class == pinned)[0]] + torus.mesh.origin
+    pinned = np.searchsorted(torus.class_keys, submeshes.pinned_classes(torus))
+    if len(pinned) == 1 and not torus.never_part[pinned[0]] and torus.meeting[pinned[0]] >= 2:
+        x, y = torus.mesh.points[np.flatnonzero(torus.node_class == pinned[0])[0]] + torus.mesh.origin
         lines.append(
             f"[interface] the node at ({x:.6g}, {y:.6g}) never parts: it holds the cell, for all nodes of the mesh are "
             "on interfaces; use a finer mesh"
@@ -97,8 +97,11 @@ def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles
 
 
 def case_remarks(case: Case) -> tuple[str, ...]:
-    """Note the number of teeth that a tolerance gives, and a fibre fraction that differs from the matched table."""
+    """Note the conditions on sides, the teeth that a tolerance gives, and a fraction unlike the matched table's."""
     cell, lines = case.cell, tuple[str, ...]()
+    if cell.boundary != "periodic":
+        bound = "an upper" if cell.boundary == "displacement" else "a lower"
+        return (f'[cell] boundary = "{cell.boundary}": the result is {bound} bound of the effective one',)
     if phase_laws.has_softening(case) and case.interfaces[0].teeth is None:
         levels = getattr(phase_laws.bond_law(case.interfaces, np.zeros(0, np.int64)), "levels", ())
         remark = f"[interface] softening_tolerance = {case.interfaces[0].softening_tolerance:g}: "

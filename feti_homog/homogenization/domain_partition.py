@@ -29,6 +29,7 @@ class CellSummary:
         interface_edge: longest coarse edge between phases.
         numbers: (constituents,) number, from 1 as in case files, of a fibre, or of the fibre inside a coating; 0 for
             the matrix.
+        shift: (2,) distance between periodic images, `CoarseMesh.shift`.
         is_fibre: (constituents,) whether a constituent is a fibre, not the matrix or a coating.
         constituent_phase: (constituents,) index of the phase in `phases`.
         centres, radii: (constituents, 2) and (constituents,) centres in the cell and radii of fibres, else NaN.
@@ -61,6 +62,7 @@ class CellSummary:
     voids: int
     match_distance: float | None
     remarks: tuple[str, ...]
+    shift: Float
     across: bool = False
     interface_nodes: int | None = None
 
@@ -92,11 +94,6 @@ class CellSummary:
         """List the changes made to a user's mesh."""
         moved = f"nodes on the sides of the mesh were moved by up to {self.snapped:.3g} to match"
         return [moved] if self.snapped > 64 * np.finfo(float).eps * (self.width + self.height) else []
-
-    @property
-    def period(self) -> Float:
-        """The width and height (2,) of the cell."""
-        return np.array([self.width, self.height])
 
     @property
     def area(self) -> float:
@@ -134,7 +131,7 @@ def distribute(
     torus = Torus.of(mesh)
     numbers, is_fibre = mesh_fibres.fibre_numbers(torus)
     circles, pairs = mesh_fibres.fibre_circles(torus), cell_remarks.pairs_of(case, mesh.phases)
-    centres = in_cell(circles[:, :2], mesh.period)
+    centres = in_cell(circles[:, :2], mesh.period) if mesh.boundary == "periodic" else circles[:, :2]
     faults = cell_remarks.faults(case, mesh.phases, *(mesh.phase[side] for side in torus.sides[:2]))
     moved = (debonded_arcs.NOT_MOVED,) * (count := len(case.interfaces))
     for pair, bond in enumerate(case.interfaces):
@@ -175,10 +172,11 @@ def distribute(
         voids=coarse_mesh.voids(mesh) if torus.at_void.any() else 0,
         match_distance=match_distance(case, mesh.width, mesh.height, centres[is_fibre], circles[is_fibre, 2]),
         remarks=(*cell_remarks.case_remarks(case), *cell_remarks.mesh_remarks(case, torus, pairs), *notes),
+        shift=mesh.shift,
         across=across,
         interface_nodes=_interface_nodes(torus, pairs, lattice) if across else None,
     )
-    shares = submeshes.cut_for_ranks(torus, cut.subdomain, table, n_ranks, submeshes.pinned_class(torus))
+    shares = submeshes.cut_for_ranks(torus, cut.subdomain, table, n_ranks, submeshes.pinned_classes(torus))
     return [RankShare(summary, table, pairs, part) for part in shares]
 
 
@@ -215,6 +213,7 @@ def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triang
             *cell_remarks.case_remarks(case),
             *cell_remarks.subdomain_remarks(case, len(regions.phase), subdomains, triangles),
         ),
+        shift=np.array([regions.width, regions.height]),
     )
 
 
@@ -258,5 +257,5 @@ def _interface_nodes(torus: Torus, pairs: Int, lattice: ReferenceLattice) -> int
     between = edge[pairs[torus.mesh.phase[first], torus.mesh.phase[second]] >= 0]
     plane = np.unique(torus.torus_edge, return_index=True)[1][between]
     ends = np.unique(torus.node_class[torus.edges[plane]])
-    may_part = ~torus.never_part[ends] & (torus.class_keys[ends] != submeshes.pinned_class(torus))
+    may_part = ~torus.never_part[ends] & ~np.isin(torus.class_keys[ends], submeshes.pinned_classes(torus))
     return len(between) * (lattice.intervals - 1) + int(may_part.sum())

@@ -121,7 +121,7 @@ class EnergyReleaseRates:
     def __init__(self, cell: TornCell, interface: ContactProblem) -> None:
         """Gather the interface nodes, and find the boundaries that limit a crack extension.  Collective."""
         nodes = interface.nodes
-        self.cell, self.interface, self._period = cell, interface, cell.summary.period
+        self.cell, self.interface, self._period = cell, interface, cell.summary.shift
         self._chains = debonded_arcs.InterfaceChains(cell.neighbours.adjacency)
         self._extensions = [CrackExtension(s, self._period) for s in cell.subdomains]
         self.points, self.bodies = self._gathered(nodes.points), self._gathered(nodes.bodies)

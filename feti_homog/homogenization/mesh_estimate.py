@@ -148,7 +148,7 @@ def _recovered(
     displacements at the coarse nodes instead, with hardly smaller errors.
     """
     u = np.stack([response.u for response in responses], axis=1)
-    loads = np.stack([response.strain for response in responses], axis=1)
+    loads, v = np.stack([response.all_loads for response in responses], axis=1), len(responses[0].strain)
     boundary, is_nested, across = cell.solver.interface_operators, lattice is not cell.lattice, cell.summary.across
     # For groups with one phase: members, mesh, displacements (classes, c, k), and positions (c classes,) as in `Group`.
     solved = list[tuple[Members, FineMesh, Float, Int]]()
@@ -175,7 +175,8 @@ def _recovered(
     groups_of_rank, meshes = list[Group](), list[tuple[list[Submesh], FineMesh]]()
     for members, mesh, displacement, position in solved:
         first, pieces = members[0], [s.submesh for s in members]
-        stress = stress_recovery.RecoveredStress.on(mesh, first.L, first.problem, displacement, loads, first.is_mixed)
+        E, mixed = loads[:v], first.is_mixed
+        stress = stress_recovery.RecoveredStress.on(mesh, first.L, first.problem, displacement, E, mixed)
         sides = arc_error.ArcSides.of(stress, pieces, lattice)
         groups_of_rank.append(Group(stress, sides, position[:: first.problem.components]))
         meshes.append((pieces, mesh))
@@ -250,7 +251,7 @@ def _forces(cell: TornCell, responses: Sequence[Response], groups: Sequence[Grou
         jumps = cell.jumps
         BT = jumps.B.T.tocsr()
         u = np.concatenate([np.zeros((0, k)), *(group.stress.u.reshape(-1, k) for group in groups)])
-        solutions = [replace(response.state.solution, strain=response.strain) for response in responses]
+        solutions = [replace(response.state.solution, strain=response.all_loads) for response in responses]
         lam = np.stack([cell.across_bonds(solution, x)[0] for solution, x in zip(solutions, u.T, strict=True)], axis=1)
     else:
         jumps, BT = cell.solver.jump_operator, cell.solver.interface_operators.BT

@@ -96,7 +96,7 @@ def largest_stresses(cell: TornCell, states: Sequence[Sequence[Response | None]]
         for *_, more in further:
             stress += more
         if not np.isnan(stress).any():
-            places = in_cell(points, cell.summary.period)[:, None]
+            places = in_cell(points, cell.summary.shift)[:, None]
             for largest, tensors in zip(by_phase, stress, strict=True):
                 largest[phase].append(_largest(_measures(cell.case.material_of(phase), tensors.T), places))
     by_state = zip(*cell.comm.allgather([*map(_joined, by_phase)]), strict=True)
@@ -115,8 +115,9 @@ def singularities(cell: TornCell, states: Sequence[Response | None]) -> set[str]
 def _stresses(cell: TornCell, responses: Sequence[Response | None]) -> Iterator[tuple[str, Float, Float]]:
     """Yield phase, points (n, 2) and stresses (s, 6, n) of each chunk of elements."""
     at = [number for number, response in enumerate(responses) if response is not None]
-    u, loads = (np.stack([vars(responses[number])[name] for number in at], axis=1) for name in ("u", "strain"))
-    for part, displacement in cell.displacements(u, loads):
+    u, all_loads = (np.stack([getattr(responses[k], name) for k in at], axis=1) for name in ("u", "all_loads"))
+    loads = all_loads[: len(cell.solver.problem.loads)]
+    for part, displacement in cell.displacements(u, all_loads):
         L, problem, m = part.L, part.problem, part.problem.strains
         # The stresses in space follow from those conjugate to displacement strains.
         rows, constants = np.zeros((6, m)), np.zeros((6, len(at)))

@@ -96,7 +96,8 @@ def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str,
     Return int e_i (x) e_j (v, k, v, k) by material for k unit loads, and the energy derivatives (k, k) by ln R of all
     fibres, which are 0 unless the case has a fraction in `_fractions`.
     """
-    problem, loads = cell.solver.problem, np.stack([response.strain for response in responses], axis=1)
+    problem, all_loads = cell.solver.problem, np.stack([response.all_loads for response in responses], axis=1)
+    loads = all_loads[: len(problem.loads)]
     boundary = np.stack([response.u for response in responses], axis=1)
     m, (v, k) = problem.strains, loads.shape
     # From [strains of displacements, 1], whose products are summed, to [strains of displacements, other loads].
@@ -105,7 +106,7 @@ def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str,
     materials = dict.fromkeys(material_sections.provider(phase, cell.case.materials) for phase in cell.summary.phases)
     sums = {material: np.zeros((m * k + 1,) * 2) for material in materials}
     grows, growth = any(_fractions(cell.case)), np.zeros((k, k))
-    for s, displacement in cell.displacements(boundary, loads):
+    for s, displacement in cell.displacements(boundary, all_loads):
         u = displacement.reshape(-1, problem.components, k)
         V = _velocity(s.mesh.points, cell.summary) if grows else None
         for first in range(0, len(s.mesh.triangles), assembly.ELEMENTS_AT_ONCE):
@@ -213,7 +214,7 @@ def _velocity(points: Float, cell: CellSummary) -> Float:
 
     In a fibre with centre c, V is x - c; outside, V falls to 0 halfway to the next fibre.
     """
-    centres, radii, period = cell.centres[cell.is_fibre], cell.radii[cell.is_fibre], cell.period
+    centres, radii, period = cell.centres[cell.is_fibre], cell.radii[cell.is_fibre], cell.shift
     V = np.zeros_like(points)
     for number, (centre, radius) in enumerate(zip(centres, radii, strict=True)):
         gaps = np.linalg.norm(centres[:, None] + IMAGES * period - centre, axis=2) - radii[:, None] - radius

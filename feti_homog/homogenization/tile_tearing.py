@@ -167,12 +167,12 @@ def tear_by_tiles(
     neighbours = comm.gather(mpi_errors.agree(comm, _neighbours, torus, subdomain))
     rank = mpi_errors.on_root(comm, _assigned, loads, neighbours or [], comm.size)
     table = submeshes.SubdomainTable(body, rank, nesting, regions.phase)
-    # All ranks together pin one class, see `submeshes.pinned_class`.
+    # All ranks together pin one class, see `submeshes.pinned_classes`.
     at_interface, in_matrix = np.zeros((2, len(torus.class_keys)), bool)
     at_interface[torus.node_class[torus.mesh.arc_edges]] = True
     in_matrix[torus.node_class[torus.mesh.triangles[torus.constituent == 0]]] = True
     candidates = comm.allgather(submeshes.pinning(torus, np.select([at_interface, in_matrix], [2, 0], 1)))
-    pinned: int = min(chain.from_iterable(candidates))[-1]
+    pinned = np.array(min(chain.from_iterable(candidates))[-1:])
     shares = mpi_errors.agree(comm, lambda: list(submeshes.cut_for_ranks(torus, subdomain, table, comm.size, pinned)))
     summary = mpi_errors.on_root(comm, summary_of, case, noded, len(body), int(load.sum()))
     return RankShare(summary, table, phase_pairs, submeshes.joined(distributed_arrays.alltoall(comm, shares)))

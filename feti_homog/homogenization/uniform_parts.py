@@ -117,7 +117,9 @@ class ForcesBetweenParts:
         used, material = np.unique(law, return_inverse=True)
         mixed = tuple(parts[k].is_mixed for k in used)
         body = assembly.assemble(mesh, np.stack([parts[k].L for k in used]), problem, mixed, material)
-        self._dofs, self._K, self._Q = problem.dofs(classes), body.K, body.Q
+        sides = np.concatenate([assembly.side_loads(p.submesh, p.mesh, problem) for p in parts])
+        self._dofs, self._K = problem.dofs(classes), body.K
+        self._Q = np.hstack([body.Q, sides[self._dofs]])
         blocks = jump_operator.NodeBlocks(comm, jumps, csr_matrix(jumps.B @ jumps.B.T))
         self._inverse = blocks.inverse(np.ones(jumps.owned[1] - jumps.owned[0]))
 
@@ -176,8 +178,7 @@ def nested_interiors(
         for k, s, mesh in zip(group, members, meshes, strict=True):
             of_fine = np.full(s.n_dofs, inside)
             of_fine[boundary.dofs[k]] = boundary.offsets[k] + np.arange(len(boundary.dofs[k]))
-            if s.submesh.pinned >= 0:
-                of_fine[s.problem.dofs(np.array([s.submesh.pinned]))] = NONE
+            of_fine[s.problem.dofs(s.held)] = NONE
             fine = np.empty(mesh.n_classes, np.int64)
             fine[mesh.node_class[mesh.nodes]] = s.mesh.node_class[s.mesh.nodes[:, nested]]
             numbers.append(of_fine[s.problem.dofs(fine)])
@@ -186,7 +187,9 @@ def nested_interiors(
         mesh = refinement.joined(meshes)
         body = assembly.assemble(mesh, first.L, first.problem, first.is_mixed)
         interior = one_subdomain.Interior(body.K, fixed)
-        loads = body.Q[interior.dofs] if any(s.submesh.at_void.any() for s in members) else None
+        sides = [assembly.side_loads(s.submesh, mesh, s.problem) for s, mesh in zip(members, meshes, strict=True)]
+        Q = np.hstack([body.Q, np.concatenate(sides)])
+        loads = Q[interior.dofs] if sides[0].size or any(s.submesh.at_void.any() for s in members) else None
         yield NestedInterior(members, mesh, fixed, position[fixed], interior, loads)
 
 

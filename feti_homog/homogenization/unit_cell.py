@@ -121,7 +121,7 @@ class TornCell:
         from feti_homog.homogenization.spring_errors import SpringSides
 
         jumps = self.solver.jump_operator
-        return SpringSides(jumps, self.neighbours, self.parts, self.lattice, self.summary.period)
+        return SpringSides(jumps, self.neighbours, self.parts, self.lattice, self.summary.shift)
 
     @cached_property
     def class_nodes(self) -> Int:
@@ -150,7 +150,7 @@ class TornCell:
     def directions(self) -> Float:
         """The directions (k,) in degrees from fibre centres to this rank's interface nodes."""
         nodes = self.solver.jump_operator.nodes
-        return debonded_arcs.angles(nodes.points, nodes.fibre, self.summary.centres, self.summary.period)
+        return debonded_arcs.angles(nodes.points, nodes.fibre, self.summary.centres, self.summary.shift)
 
     @cached_property
     def nested_lattice(self) -> ReferenceLattice:

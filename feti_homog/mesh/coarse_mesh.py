@@ -11,12 +11,17 @@ from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.typing import Bool, Float, Index, Int, Int32
 
 
+def on_sides(ends: Float, size: Float) -> Bool:
+    """Return whether edges with `ends` (k, 2, 2) lie on a side of the rectangle [0, width] x [0, height]."""
+    return np.asarray(((ends == 0).all(axis=1) | (ends == size).all(axis=1)).any(axis=1))
+
+
 def paired_sides(points: Float, period: Float) -> Iterator[tuple[int, Int, Int]]:
     """Yield the pairs of points that differ by one period.
 
     Args:
         points: (n, 2) nodes or edge middles; coordinates on sides are exactly 0 or the period.
-        period: (2,) width and height.
+        period: (2,) width and height, or the distance between images of a cell without any.
 
     Yields:
         The axis normal to a pair of sides, the points (k,) on the side at 0, and the partners (k,) on the side at the
@@ -25,7 +30,8 @@ def paired_sides(points: Float, period: Float) -> Iterator[tuple[int, Int, Int]]
     for axis in (0, 1):
         along = points[:, 1 - axis]
         low, high = (np.flatnonzero(points[:, axis] == level) for level in (0.0, period[axis]))
-        yield axis, low[np.argsort(along[low])], high[np.argsort(along[high])]
+        if len(high):
+            yield axis, low[np.argsort(along[low])], high[np.argsort(along[high])]
 
 
 @dataclass(frozen=True)
@@ -48,6 +54,7 @@ class CoarseMesh:
         snapped: largest move of a node in a user's mesh to make opposite sides match.
         origin: lower left corner of the cell in the coordinates of the user.
         remarks: differences of a cell from the fibre table, and unused curves in a user's mesh, in a line each.
+        boundary: conditions on the sides, `periodic`, `displacement` or `traction`; only the first has images of nodes.
         centres: (fibres, 2) fibre centres, if the precedence is the fibre number from 1, with the numbers of coatings
             behind in the same order; else None.
     """
@@ -68,11 +75,17 @@ class CoarseMesh:
     origin: tuple[float, float] = (0.0, 0.0)
     remarks: tuple[str, ...] = ()
     centres: Float | None = None
+    boundary: str = "periodic"
 
     @property
     def period(self) -> Float:
         """The width and height (2,) of the cell."""
         return np.array([self.width, self.height])
+
+    @property
+    def shift(self) -> Float:
+        """The distance (2,) between periodic images; without images far longer than any cell."""
+        return self.period if self.boundary == "periodic" else np.full(2, 1e30)
 
     @property
     def circles(self) -> Float:
@@ -190,12 +203,14 @@ def _neighbours(mesh: CoarseMesh) -> tuple[Int32, Index, Bool]:
     pairs = _low_copies(mesh, edges(mesh.triangles))
     order, alone = np.stack(twins(edge_keys(pairs, len(mesh.points))), axis=1), np.ones(len(pairs), bool)
     alone[order] = False
+    if mesh.boundary != "periodic":
+        alone &= ~on_sides(mesh.points[pairs], mesh.period)
     return pairs, order, alone
 
 
 def _low_copies(mesh: CoarseMesh, pairs: Int32) -> Int32:
     """Move edges (k, 2) on the right or upper side to the opposite side."""
-    for axis, low, high in paired_sides(mesh.points, mesh.period):
+    for axis, low, high in paired_sides(mesh.points, mesh.shift):
         partner = np.zeros(len(mesh.points), dtype=np.int32)
         partner[high] = low
         on_high = np.all(mesh.points[pairs, axis] == mesh.period[axis], axis=1)

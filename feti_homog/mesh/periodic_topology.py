@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, representatives, twins
+from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, on_sides, representatives, twins
 from feti_homog.microstructure import phase_names
 from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.typing import Bool, Float, Int, Int32
@@ -55,13 +55,15 @@ class Torus:
         """Identify the periodic images of a mesh, and number the constituents."""
         node_class = np.unique(mesh.representative, return_inverse=True)[1]
         edges, triangle_edges = plane_edges_of(mesh)
-        low_edge = representatives(mesh.points[edges].mean(axis=1), mesh.width, mesh.height)
+        low_edge = representatives(mesh.points[edges].mean(axis=1), *mesh.shift)
         torus_edge = np.unique(low_edge, return_inverse=True)[1]
         one, other = edge_pairs(torus_edge[triangle_edges])
         same = mesh.phase[one] == mesh.phase[other]
         label = components(len(mesh.triangles), one[same], other[same])
         keys = np.arange(node_class.max() + 1), np.arange(torus_edge.max() + 1)
         at_void = np.bincount(torus_edge[triangle_edges].ravel()) == 1
+        if mesh.boundary != "periodic":
+            at_void[torus_edge] &= ~on_sides(mesh.points[edges], mesh.period)
         torus = cls(mesh, node_class, edges, triangle_edges, torus_edge, label, *keys, at_void)
         # Fibres of equal precedence are numbered in the order of the circles.
         circle = np.full(len(edges), len(mesh.ellipses))
@@ -138,9 +140,10 @@ class Torus:
             return np.zeros(len(self.class_keys), bool)
         one, other, edge = self.sides
         between = edge[self.constituent[one] != self.constituent[other]]
-        ends = (self.edge_ends[some].ravel() for some in (between, self.at_void))
+        alone = np.bincount(self.triangle_torus_edges.ravel()) == 1
+        ends = (self.edge_ends[some].ravel() for some in (between, alone))
         shared, free = (np.bincount(classes, minlength=len(self.class_keys)) for classes in ends)
-        # Each edge between constituents ends a sector, and so do both sides of a void together.
+        # Each edge between constituents ends a sector, and so do both sides of a void, or outside, together.
         sectors = shared + free // 2
         return np.asarray((self.meeting == 2) & ((sectors != 2) | (shared == 0)))
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from feti_homog.mesh.coarse_mesh import on_sides
 from feti_homog.mesh.periodic_topology import Torus, present
 from feti_homog.typing import Array, Bool, Float, Int
 
@@ -37,7 +38,9 @@ class Submesh:
         touching: (classes,) as `Torus.touching`.
         class_keys, edge_keys: global numbers of classes and torus edges.
         period, origin: (2,) width and height of the cell; its lower left corner in the coordinates of the user.
-        pinned: local number of the class that is pinned against translations of the cell, Eq. (15), or -1.
+        pinned: local numbers of the classes that do not move: one against translations of the cell, Eq. (15), or those
+            on its sides.
+        boundary: conditions on the sides, as in `CoarseMesh`.
     """
 
     index: int
@@ -60,7 +63,16 @@ class Submesh:
     edge_keys: Int
     period: Float
     origin: Float
-    pinned: int
+    pinned: Int
+    boundary: str
+
+    @property
+    def at_side(self) -> Bool:
+        """The mask (torus edges,) of edges on sides without a periodic image."""
+        mask = np.zeros(len(self.edge_keys), bool)
+        if self.boundary != "periodic":
+            mask[self.edge_class] = on_sides(self.points[self.edges], self.period)
+        return mask
 
 
 @dataclass(frozen=True)
@@ -119,11 +131,11 @@ class SubmeshesOfRank:
 
 
 def cut_for_ranks(
-    torus: Torus, subdomain: Int, table: SubdomainTable, n_ranks: int, pinned: int
+    torus: Torus, subdomain: Int, table: SubdomainTable, n_ranks: int, pinned: Int
 ) -> Iterator[SubmeshesOfRank]:
     """Yield the submeshes of each rank.
 
-    `subdomain` (m,) has the subdomain of each triangle, and `pinned` is the key of the pinned class.
+    `subdomain` (m,) has the subdomain of each triangle, and `pinned` the keys of the pinned classes.
     """
     everything = _whole(torus, pinned)
     for r in range(n_ranks):
@@ -138,7 +150,7 @@ def cut_bodies(torus: Torus, members: Int) -> Iterator[Submesh]:
     """Yield one submesh without a pinned class for each constituent of triangles `members` (m,)."""
     order = members[np.argsort(torus.constituent[members], kind="stable")]
     ends = np.flatnonzero(np.diff(torus.constituent[order])) + 1
-    everything = _whole(torus, -1)
+    everything = _whole(torus, np.zeros(0, np.int64))
     for triangles in np.split(order, ends) if len(order) else ():
         yield replace(part(everything, triangles), body=int(torus.constituent[triangles[0]]))
 
@@ -149,7 +161,6 @@ def part(submesh: Submesh, members: Int) -> Submesh:
     edges, triangle_edges = present(submesh.triangle_edges[members], len(submesh.edges))
     classes, vertex_class = present(submesh.vertex_class[vertices], len(submesh.class_keys))
     torus_edges, edge_class = present(submesh.edge_class[edges], len(submesh.edge_keys))
-    pinned_here = np.flatnonzero(classes == submesh.pinned)
     return replace(
         submesh,
         constituent=submesh.constituent[members],
@@ -167,22 +178,25 @@ def part(submesh: Submesh, members: Int) -> Submesh:
         touching=submesh.touching[classes],
         class_keys=submesh.class_keys[classes],
         edge_keys=submesh.edge_keys[torus_edges],
-        pinned=int(pinned_here[0]) if len(pinned_here) else -1,
+        pinned=np.flatnonzero(np.isin(classes, submesh.pinned)),
     )
 
 
-def pinned_class(torus: Torus) -> int:
-    """Return the key of the pinned class, Eq. (15).
+def pinned_classes(torus: Torus) -> Int:
+    """Return the keys of the pinned classes: one of a periodic cell, Eq. (15), or all on sides that move by E x.
 
-    The class lies inside the matrix, nearest to a corner of the cell. On an interface, a pinned class would join faces
-    that must be able to part; in a fibre, it would hold the fibre when all bonds are broken.  The choice changes u* by
-    a constant only.
+    The one class lies inside the matrix, nearest to a corner of the cell. On an interface, a pinned class would join
+    faces that must be able to part; in a fibre, it would hold the fibre when all bonds are broken.  The choice changes
+    u* by a constant only.
     """
+    if torus.mesh.boundary != "periodic":
+        nodes = on_sides(torus.mesh.points[:, None], torus.mesh.period)
+        return np.asarray(torus.node_class[nodes & (torus.mesh.boundary == "displacement")])
     outside = np.zeros(len(torus.class_keys), bool)
     outside[torus.node_class[torus.mesh.triangles[torus.constituent_phase[torus.constituent] > 0]]] = True
     # By preference inside the matrix, else where bodies never part, else inside any body.
     ((*_, key),) = pinning(torus, np.select([torus.never_part, torus.meeting == 2, outside], [1, 3, 2], 0))
-    return key
+    return np.array([key])
 
 
 def pinning(torus: Torus, unfit: Int) -> list[tuple[int, float, int]]:
@@ -200,10 +214,9 @@ def pinning(torus: Torus, unfit: Int) -> list[tuple[int, float, int]]:
     return [(int(unfit[k]), float(distance[k]), int(torus.class_keys[k])) for k in best]
 
 
-def _whole(torus: Torus, pinned: int) -> Submesh:
-    """Make one submesh of all triangles; `pinned` is the key of the pinned class."""
+def _whole(torus: Torus, pinned: Int) -> Submesh:
+    """Make one submesh of all triangles; `pinned` has the keys of the pinned classes."""
     mesh = torus.mesh
-    pinned_here = np.flatnonzero(torus.class_keys == pinned)
     return Submesh(
         index=0,
         body=0,
@@ -225,7 +238,8 @@ def _whole(torus: Torus, pinned: int) -> Submesh:
         edge_keys=torus.edge_keys,
         period=mesh.period,
         origin=np.array(mesh.origin),
-        pinned=int(pinned_here[0]) if len(pinned_here) else -1,
+        pinned=np.flatnonzero(np.isin(torus.class_keys, pinned)),
+        boundary=mesh.boundary,
     )
 
 
@@ -247,7 +261,7 @@ def joined_meshes(meshes: list[Submesh]) -> Submesh:
     """Join submeshes; identify classes and torus edges, but no plane vertices and plane edges."""
     class_keys, first_class, class_of = np.unique(_all(meshes, "class_keys"), return_index=True, return_inverse=True)
     edge_keys, first, edge_of = np.unique(_all(meshes, "edge_keys"), return_index=True, return_inverse=True)
-    pinned = [np.searchsorted(class_keys, mesh.class_keys[mesh.pinned]) for mesh in meshes if mesh.pinned >= 0]
+    pinned = np.concatenate([mesh.class_keys[mesh.pinned] for mesh in meshes])
     return replace(
         meshes[0],
         constituent=_all(meshes, "constituent"),
@@ -265,7 +279,7 @@ def joined_meshes(meshes: list[Submesh]) -> Submesh:
         touching=_all(meshes, "touching")[first_class],
         class_keys=class_keys,
         edge_keys=edge_keys,
-        pinned=int(pinned[0]) if pinned else -1,
+        pinned=np.flatnonzero(np.isin(class_keys, pinned)),
     )
 
 

@@ -42,12 +42,12 @@ def check_mesh(findings: Findings, cell: DiscreteCell) -> None:
     mesh, (width, height), porosity = cell.files.mesh, cell.files.size, section.get("porosity", 0.0)
     findings.record("mesh", np.where(elements.least_jacobian > 0, 0.0, np.inf), "element {}".format)
     findings.compare("mesh", elements.area.sum(), (1 - porosity) * cell.area, cell.area, "the sum of element areas")
-    normals = sides.normal[sides.at_void]
+    normals = sides.normal[sides.alone]
     findings.compare("mesh", normals.sum(axis=0), [0, 0], cell.files.size.max(), "the sides at voids are closed")
     agrees = bool(sides.at_void.any()) == (porosity > 0)
-    findings.require("mesh", agrees, f"cell.porosity = {porosity:g}, {len(normals)} sides at voids")
+    findings.require("mesh", agrees, f"cell.porosity = {porosity:g}, {sides.at_void.sum()} sides at voids")
     sums = np.hypot(*(sides.normal + sides.normal[sides.partner]).T) / np.hypot(*sides.normal.T)
-    mismatch = np.where(sides.at_void, 0.0, np.where(sides.partner < 0, np.inf, sums))  # inf: several partners
+    mismatch = np.where(sides.alone, 0.0, np.where(sides.partner < 0, np.inf, sums))  # inf: several partners
     findings.record("mesh", mismatch, lambda i: f"a side of element {sides.element[i]}")
     counts = {"width": width, "height": height, "area": cell.area}
     counts |= {"elements": len(mesh.triangles), "nodes": len(mesh.points)}
@@ -132,7 +132,7 @@ def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
     normal = np.column_stack([up, -right]) / np.hypot(right, up)[:, None]
     radius = np.where(is_fibre, files.fibres.radius[rows.fibre - 1], np.nan)
     is_round = np.isfinite(radius)
-    radial = from_centre(rows.points, files.fibres.centre[rows.fibre - 1], files.size) / radius[:, None]
+    radial = from_centre(rows.points, files.fibres.centre[rows.fibre - 1], files.shift) / radius[:, None]
     # Coatings in users' meshes may be on ellipses that the files do not describe.
     on_arcs = is_quadratic & (is_fibre | (files.case["cell"]["geometry"] not in ("mesh", "pixels")))
     is_known = is_round | np.isfinite(frames[:, 0, 0]) | on_arcs
@@ -205,7 +205,7 @@ def check_rates(findings: Findings, cell: DiscreteCell, tips: Section, where: st
     findings.compare("rates", G, first + second, np.abs(G), at)
     findings.compare("rates", first * np.sin(turn) ** 2, second * np.cos(turn) ** 2, np.abs(G), at)
     findings.record("rates", np.where(np.isin(load, LOADS), 0.0, np.inf), at)
-    radii = np.hypot(*from_centre(rows.points, cell.files.fibres.centre[rows.fibre - 1], cell.files.size).T)
+    radii = np.hypot(*from_centre(rows.points, cell.files.fibres.centre[rows.fibre - 1], cell.files.shift).T)
     for t in range(len(G)):
         on_curve = (rows.fibre == number[t]) & (rows.pair == pair[t] - 1)
         # A coating has the number of its fibre, but another radius.

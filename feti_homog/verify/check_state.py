@@ -37,7 +37,7 @@ def check_state(findings: Findings, cell: DiscreteCell, state: State, fields: El
     size += ROUNDED_TERMS * float((weights[:, 0] * stiffest * fields.strain_size).sum() / area)
     findings.compare("mean stress", mean, state.mean_stress, max(size, scales.stress), state.name)
     jump = cell.in_axes(state.jump)
-    integrals = (cell.elements.node_integrals + cell.void_integrals)[cell.nodes.node]
+    integrals = (cell.elements.node_integrals + cell.void_integrals + cell.side_integrals)[cell.nodes.node]
     # A void adds its fraction of E and int sym(u* (x) n) ds, which is closed even where the cell boundary cuts the
     # void.
     slope = state.fluctuation.T @ cell.void_integrals - jump.T @ cell.faces.sums(integrals, of_fibre=False)
@@ -63,8 +63,8 @@ def interface_forces(cell: DiscreteCell, state: State) -> Float:
 def check_gluing(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
     """Check that copies of a node have equal fluctuations, and that forces balance at all nodes.
 
-    Forces on faces balance with the traction.  The rounding of all nodes adds to the reaction of the fixed node, u* =
-    0.
+    Forces on faces balance with the traction, and those on sides with Sigma n if it is given; given displacements on
+    sides are E x.  The rounding of all nodes adds to the reaction of the fixed node, u* = 0.
     """
     nodes, traction, largest = cell.nodes, interface_forces(cell, state), cell.largest_displacement(state)
     # Periodic copies lie in one subdomain.  Glued nodes have one number: the places have even numbers, and the fibre
@@ -77,6 +77,11 @@ def check_gluing(findings: Findings, cell: DiscreteCell, state: State, fields: E
         copy = copy.ravel()
         means = np.stack([(np.bincount(copy, column) / count)[copy] for column in values.T], axis=1)
         findings.compare(law, values, means, largest, lambda i: f"{state.name}, mesh node {nodes.node[i]}")
+    is_given, sigma = cell.files.boundary == "displacement", state.mean_stress[PLACES[len(state.strain)]]
+    on_side = np.unique(cell.sides.nodes[cell.sides.on_side])
+    if is_given:
+        on_sides = np.abs(state.fluctuation[on_side])
+        findings.record("sides", on_sides / largest, lambda i: f"{state.name}, mesh node {on_side[i]}")
     scale = max(fields.largest_force, float(np.abs(traction).max(initial=0.0)))
     scale = max(scale, cell.scales_of(state).stress * float(np.sqrt(cell.elements.area.min())) * 1e-3)
     is_fixed = (state.fluctuation == 0.0).all(axis=1)
@@ -86,7 +91,8 @@ def check_gluing(findings: Findings, cell: DiscreteCell, state: State, fields: E
     scales = scale + np.where(is_fixed, rounding_of_all, rounding)
     findings.record("equilibrium", relative(inner, scales[:, None]), f"{state.name}, mesh node {{}}".format)
     # Sums of forces over glued nodes, the last group of the loop.
-    sums = np.stack([np.bincount(copy, column) for column in fields.force[nodes.node].T], axis=1, dtype=float)
+    force = fields.force if is_given else fields.force + cell.side_integrals @ sigma.T  # n inwards
+    sums = np.stack([np.bincount(copy, column) for column in force[nodes.node].T], axis=1, dtype=float)
     # The traction pulls the fibre, its reaction the matrix.
     row = cell.faces.row[first]
     on_face = row >= 0
@@ -95,6 +101,8 @@ def check_gluing(findings: Findings, cell: DiscreteCell, state: State, fields: E
     def name(i: int) -> str:
         return f"{state.name}, mesh node {nodes.node[first[i]]}" + f" (interface node {row[i]})" * bool(on_face[i])
 
+    if is_given:  # where unknown reactions act
+        sums[copy[np.isin(nodes.node, on_side)]] = 0.0
     has_fixed = np.bincount(copy, is_fixed[nodes.node]) > 0
     scales = scale + np.where(has_fixed, rounding_of_all, rounding)
     findings.record("equilibrium", relative(sums, scales[:, None]), name)
@@ -174,7 +182,7 @@ def check_phases(findings: Findings, cell: DiscreteCell, state: State, number: i
                 continue
             size = raised * float(np.abs(column).max()) if measure == "utilisation" else max(scale, rounded)
             findings.compare(LAW, float(reported[number]), column.max(), size, place)
-            distance = np.hypot(*from_centre(points[rows], np.array(at[number]), cell.files.size).T)
+            distance = np.hypot(*from_centre(points[rows], np.array(at[number]), cell.files.shift).T)
             near = column[distance < SAME_PLACE * cell.files.size.max()]
             is_largest = bool((near >= column.max() - SAME_VALUE * size).any())
             findings.require(LAW, is_largest, f"{place}: another position")

@@ -90,21 +90,23 @@ class DiscreteCell:
         mesh = files.mesh
         stiffnesses, free = laws(files.case, files.phases)
         elements = Elements(mesh, stiffnesses, mixed_phases(files.case, files.phases))
-        sides, nodes, radius = torus.torn(mesh, files.size)
+        sides, nodes, radius = torus.torn(mesh, files.size, files.shift)
         parts, inwards = torus.bodies(mesh, files.phases, sides)
         # Places where exactly two bodies meet along one line, and the section of their bonds.
         node_depth = inwards[parts[nodes.subdomain]]
         members = np.unique(np.column_stack([nodes.place, node_depth, nodes.phase]), axis=0)
         on_line = torus.along_one_line(sides, nodes, parts[mesh.subdomain])
+        if files.boundary == "displacement":  # nodes on sides never part
+            on_line[nodes.place[np.isin(nodes.node, sides.nodes[sides.on_side])]] = False
         two = np.flatnonzero((np.bincount(members[:, 0], minlength=nodes.places) == 2) & on_line)
         outer, last = np.searchsorted(members[:, 0], two), np.searchsorted(members[:, 0], two, side="right") - 1
         pairs, pair, innermost = pairs_of(files), np.full(nodes.places, -1), np.zeros(nodes.places, np.int64)
         pair[two], innermost[two] = pairs[members[outer, 2], members[last, 2]], members[last, 1]
         is_fibre = np.asarray((pair[nodes.place] >= 0) & (node_depth == innermost[nodes.place]))
         # The place nearest to each interface node.
-        points, size = files.interface.points, files.size
-        tree = cKDTree(torus.wrapped(mesh.points[nodes.node], size), boxsize=size)
-        distance, nearest = tree.query(torus.wrapped(points, size), distance_upper_bound=radius)
+        points, size, shift = files.interface.points, files.size, files.shift
+        tree = cKDTree(torus.wrapped(mesh.points[nodes.node], shift), boxsize=shift)
+        distance, nearest = tree.query(torus.wrapped(points, shift), distance_upper_bound=radius)
         place = np.append(nodes.place, -1)[nearest]
         row_of = np.full(nodes.places, -1)
         row_of[place[place >= 0]] = np.flatnonzero(place >= 0)
@@ -154,7 +156,7 @@ class DiscreteCell:
     def directions(self) -> Float:
         """Compute directions (k,) in degrees from the fibre centres to the interface nodes."""
         rows = self.files.interface
-        x, y = torus.from_centre(rows.points, self.files.fibres.centre[rows.fibre - 1], self.files.size).T
+        x, y = torus.from_centre(rows.points, self.files.fibres.centre[rows.fibre - 1], self.files.shift).T
         return np.asarray(np.degrees(np.arctan2(y, x)))
 
     @cached_property
@@ -172,9 +174,18 @@ class DiscreteCell:
 
     @cached_property
     def void_integrals(self) -> Float:
-        """Compute int N_a n ds (n, 2) along voids: sum_b int N_a dN_b/ds x_b on a side, turned to the normal."""
+        """Return `integrals` (n, 2) along voids."""
+        return self.integrals(self.sides.at_void)
+
+    @cached_property
+    def side_integrals(self) -> Float:
+        """Return `integrals` (n, 2) along the sides of a cell that is not periodic."""
+        return self.integrals(self.sides.on_side)
+
+    def integrals(self, which: Bool) -> Float:
+        """Compute int N_a n ds (n, 2), n inwards: sum_b int N_a dN_b/ds x_b on a side, turned to the normal."""
         sums, points = np.zeros_like(self.files.mesh.points), self.files.mesh.points
-        nodes = self.sides.nodes[self.sides.at_void]
+        nodes = self.sides.nodes[which]
         M = np.array([[-3, -1, 4], [1, 3, -4], [-4, 4, 0]]) / 6 if nodes.shape[1] == 3 else np.array([[-1, 1]] * 2) / 2
         add_at_nodes(sums, nodes, M @ points[nodes] @ np.array([[0, 1], [-1, 0]]))
         return sums

@@ -143,6 +143,7 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool, phases: Sequence[f
         ("phases", "largest stresses of the phases follow from u, relative to the largest", 1e-7),
         ("mesh error", "errors of the elements add up to those of averaged stresses, by a factor less 1", 1.5),
         ("periodicity", "u* is the same at the copies of a node in its subdomain, relative to the largest u", 1e-13),
+        ("sides", "u* = 0 on sides that move by E x, relative to the largest u", 1e-13),
         ("continuity", "u* is the same where subdomains are glued, relative to the largest u", solver),
         ("equilibrium", "forces of the elements and tractions balance at every node, relative to the largest", balance),
         ("jump", "gap and slip are the differences of the faces' u*, relative to the largest u", rounding),

@@ -148,6 +148,16 @@ class ResultFiles:
         return self.case["analysis"]["plane"] in ("generalized", "conduction")
 
     @property
+    def boundary(self) -> str:
+        """Return the conditions on the sides of the cell."""
+        return str(self.case["cell"].get("boundary", "periodic"))
+
+    @property
+    def shift(self) -> Float | None:
+        """Return the distance (2,) between periodic images; None without images."""
+        return self.size if self.boundary == "periodic" else None
+
+    @property
     def contact(self) -> bool:
         """Return whether debonded faces must not overlap."""
         return any(section.get("contact", False) for section in self.interfaces)

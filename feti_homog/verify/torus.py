@@ -1,4 +1,7 @@
-"""Places on the torus of the periodic cell: torn nodes and sides at a place, and the bodies that meet there."""
+"""Places on the torus of the periodic cell: torn nodes and sides at a place, and the bodies that meet there.
+
+The `shift` (2,) between images is the size of a periodic cell, and None if other conditions hold on its sides.
+"""
 
 from dataclasses import dataclass
 
@@ -23,14 +26,21 @@ class TornSides:
         nodes: (s, 2 or 3) both ends, and the middle node if any.
         normal: (s, 2) outward normal times chord length.
         partner: (s,) other side at the same place of the torus; -1 if none or several.
-        at_void: (s,) whether a side has no other side at its place.
+        alone: (s,) whether a side has no other side at its place.
+        on_side: (s,) whether such a side lies on a side of a cell that is not periodic; else it is at a void.
     """
 
     element: Int
     nodes: Int
     normal: Float
     partner: Int
-    at_void: Bool
+    alone: Bool
+    on_side: Bool
+
+    @property
+    def at_void(self) -> Bool:
+        """Return whether a side (s,) bounds a void."""
+        return self.alone & ~self.on_side
 
 
 @dataclass(frozen=True)
@@ -48,7 +58,7 @@ class TornNodes:
         return int(self.place.max(initial=-1)) + 1
 
 
-def torn(mesh: Mesh, size: Float) -> tuple[TornSides, TornNodes, float]:
+def torn(mesh: Mesh, size: Float, shift: Float | None) -> tuple[TornSides, TornNodes, float]:
     """Find torn sides and nodes on the torus of a cell with `size` (2,), and the radius of a place."""
     m, columns = mesh.triangles.shape
     local = [(side, (side + 1) % 3, 3 + side)[: columns // 3 + 1] for side in range(3)]
@@ -61,35 +71,40 @@ def torn(mesh: Mesh, size: Float) -> tuple[TornSides, TornNodes, float]:
     chord = ends[:, 1] - ends[:, 0]
     normal = np.stack([chord[:, 1], -chord[:, 0]], axis=1)
     radius = SAME_PLACE * float(np.hypot(*normal.T).min(initial=float(size.min())))
-    side_place = same_places(ends.mean(axis=1), size, radius)
+    side_place = same_places(ends.mean(axis=1), shift, radius)
     order, sharers = np.argsort(side_place, kind="stable"), np.bincount(side_place, minlength=1)
     pairs = (np.cumsum(sharers) - sharers)[sharers == 2]
     partner = np.full(len(side_place), -1)
     partner[order[pairs]], partner[order[pairs + 1]] = order[pairs + 1], order[pairs]
-    sides = TornSides(element, nodes, normal, partner, np.asarray(sharers[side_place] == 1))
+    alone, low = np.asarray(sharers[side_place] == 1), mesh.points.min(axis=0)
+    on_level = [(np.abs(ends - level) < radius).all(axis=1) for level in (low, low + size)]
+    on_side = alone & np.any(on_level, axis=(0, 2)) & (shift is None)
+    sides = TornSides(element, nodes, normal, partner, alone, np.asarray(on_side))
     number, first = np.unique(nodes, return_index=True)
     owner = element[first // nodes.shape[1]]
-    place = same_places(mesh.points[number], size, radius)
+    place = same_places(mesh.points[number], shift, radius)
     return sides, TornNodes(number, place, np.asarray(mesh.subdomain[owner]), np.asarray(mesh.phase[owner])), radius
 
 
-def wrapped(points: Float, size: Float) -> Float:
-    """Shift points (k, 2) by periods to coordinates in [0, size)."""
-    inside = points - np.floor(points / size) * size
-    return np.asarray(np.where(inside >= size, 0.0, inside))
+def wrapped(points: Float, shift: Float | None) -> Float:
+    """Shift points (k, 2) by periods to coordinates in [0, shift)."""
+    if shift is None:
+        return points
+    inside = points - np.floor(points / shift) * shift
+    return np.asarray(np.where(inside >= shift, 0.0, inside))
 
 
-def from_centre(points: Float, centres: Float, size: Float) -> Float:
+def from_centre(points: Float, centres: Float, shift: Float | None) -> Float:
     """Compute vectors (k, 2) from the nearest periodic images of centres to points."""
     difference = points - centres
-    return np.asarray(difference - np.round(difference / size) * size)
+    return np.asarray(difference if shift is None else difference - np.round(difference / shift) * shift)
 
 
-def same_places(points: Float, size: Float, radius: float) -> Int:
+def same_places(points: Float, shift: Float | None, radius: float) -> Int:
     """Assign place numbers (k,) to points (k, 2), equal within `radius` on the torus."""
     if not len(points):
         return np.zeros(0, np.int64)
-    pairs = cKDTree(wrapped(points, size), boxsize=size).query_pairs(radius, output_type="ndarray")
+    pairs = cKDTree(wrapped(points, shift), boxsize=shift).query_pairs(radius, output_type="ndarray")
     graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
     return np.asarray(connected_components(graph, directed=False)[1], np.int64)
 
@@ -97,14 +112,14 @@ def same_places(points: Float, size: Float, radius: float) -> Int:
 def along_one_line(sides: TornSides, nodes: TornNodes, part: Int) -> Bool:
     """Return whether two bodies meet along one line at places (places,).
 
-    `part` (m,) is the body of an element.  Both bodies then end at two sides, not all at voids; middle nodes always do.
+    `part` (m,) is the body of an element.  Both bodies then end at two sides, not all alone; middle nodes always do.
     """
-    apart = ~sides.at_void & (part[sides.element] != part[sides.element[sides.partner]])
+    apart = ~sides.alone & (part[sides.element] != part[sides.element[sides.partner]])
     place = np.full(int(nodes.node.max(initial=-1)) + 1, -1)
     place[nodes.node] = nodes.place
-    groups = sides.nodes[apart, :2], sides.nodes[sides.at_void, :2], sides.nodes[:, 2:]
-    facing, at_void, middle = (np.bincount(place[group].ravel(), minlength=nodes.places) for group in groups)
-    return np.asarray((middle > 0) | ((facing + at_void == 4) & (facing > 0)))
+    groups = sides.nodes[apart, :2], sides.nodes[sides.alone, :2], sides.nodes[:, 2:]
+    facing, alone, middle = (np.bincount(place[group].ravel(), minlength=nodes.places) for group in groups)
+    return np.asarray((middle > 0) | ((facing + alone == 4) & (facing > 0)))
 
 
 def bodies(mesh: Mesh, phases: tuple[str, ...], sides: TornSides) -> tuple[Int, Int]:

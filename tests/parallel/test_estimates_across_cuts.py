@@ -32,7 +32,7 @@ def errors(comm, cell, cut, policy, **more):
     torn, _, responses = solve(make_case(**cell, decomposition=cut, **more), comm, policy=policy)
     found = energy_errors(torn, responses, nested=False)
     middles = [part.mesh.points[part.mesh.triangles[:, :3]].mean(axis=1) for part in torn.parts]
-    rows = np.column_stack([np.concatenate([np.zeros((0, 2)), *middles]) % torn.summary.period, found.shares])
+    rows = np.column_stack([np.concatenate([np.zeros((0, 2)), *middles]) % torn.summary.shift, found.shares])
     rows = np.concatenate(comm.allgather(rows))
     torn.destroy()
     return found, rows[np.lexsort(np.round(rows[:, :2], 9).T), 2:]

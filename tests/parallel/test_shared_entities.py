@@ -9,7 +9,7 @@ from feti_homog.feti.decomposition.partition import decompose, pieces_for_size
 from feti_homog.feti.decomposition.shared_entities import share_entities
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.mesh.submeshes import SubdomainTable, cut_for_ranks, pinned_class
+from feti_homog.mesh.submeshes import SubdomainTable, cut_for_ranks, pinned_classes
 
 pytestmark = [pytest.mark.parallel, pytest.mark.quick]
 PAIRS = np.array([[-1, 0], [0, -1]])
@@ -26,7 +26,7 @@ def shared_by_ranks(torus, comm, intervals=2):
     pieces = pieces_for_size(np.bincount(torus.constituent), 1, 20)
     cut = decompose(torus, torus.constituent, pieces, comm.size)
     table = SubdomainTable.of(torus, cut.subdomain, cut.rank)
-    own = list(cut_for_ranks(torus, cut.subdomain, table, comm.size, pinned_class(torus)))[comm.rank]
+    own = list(cut_for_ranks(torus, cut.subdomain, table, comm.size, pinned_classes(torus)))[comm.rank]
     lattice = ReferenceLattice.of({1: 0, 2: 1}[intervals], 1)
     return cut, share_entities(comm, own, table, PAIRS, lattice)
 
@@ -39,7 +39,7 @@ def test_they_are_those_of_several_subdomains(torus, comm):
             for k in key:
                 expected.setdefault((kind, k), set()).add(owner)
     expected = {key: owners for key, owners in expected.items() if len(owners) > 1}
-    expected.pop((False, pinned_class(torus)), None)
+    expected.pop((False, int(pinned_classes(torus)[0])), None)
     owners = [set(own.tolist()) for own in np.split(share.sharer, share.pointer[1:-1])]
     found = dict(zip(zip(share.is_edge.tolist(), share.key.tolist(), strict=True), owners, strict=True))
     assert found == {key: own for key, own in expected.items() if any(cut.rank[k] == comm.rank for k in own)}

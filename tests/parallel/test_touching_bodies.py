@@ -24,7 +24,7 @@ from feti_homog.materials.laws import plane_stiffness
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers.msh_reader import read
 from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.mesh.submeshes import SubdomainTable, cut_for_ranks, pinned_class
+from feti_homog.mesh.submeshes import SubdomainTable, cut_for_ranks, pinned_classes
 from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.verify.certificate import verify
 
@@ -206,6 +206,6 @@ def test_sides_folded_onto_each_other_are_refused(comm: Any, shared_path: Any, a
     torus = on_root(comm, folded)
     subdomain = torus.constituent
     table = SubdomainTable.of(torus, subdomain, np.arange(2) % comm.size)
-    own = list(cut_for_ranks(torus, subdomain, table, comm.size, pinned_class(torus)))[comm.rank]
+    own = list(cut_for_ranks(torus, subdomain, table, comm.size, pinned_classes(torus)))[comm.rank]
     with pytest.raises(MeshError, match=r"no normal at \(2.125, -0.875\)"):
         share_entities(comm, own, table, np.array([[-1, 0], [0, -1]]), ReferenceLattice.of(0, 1))

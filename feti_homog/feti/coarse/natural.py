@@ -29,7 +29,7 @@ class NaturalCoarseSpace:
         R: (boundary dofs, owned modes) kernels on the boundaries.
         G: (owned rows, m).
         body: (m,) body numbers of the modes.
-        pinned_body: body with the pinned node class, -1 without a pinned class.
+        pinned_body: body with the pinned node class, or one of several; -1 without a pinned class.
         unconstrained_modes: (m, z) orthonormal amplitudes of the motions that no active row resists, sparse.
         unknowns: (u,) owned modes, and modes in the owned rows of G or in local unconstrained modes.
         factorizations: number of factorizations of G^T G.
@@ -51,7 +51,7 @@ class NaturalCoarseSpace:
         self.R = csr_matrix(block_diag(kernels)) if kernels else csr_matrix((0, 0))
         body = np.repeat([s.submesh.body for s in subdomains], [R.shape[1] for R in kernels])
         self.body = np.concatenate(comm.allgather(body)).astype(np.int64)
-        pinned = [s.submesh.body for s in subdomains if s.submesh.pinned >= 0]
+        pinned = [s.submesh.body for s in subdomains if len(s.held) or s.is_supported]
         self.pinned_body: int = comm.allreduce(max(pinned, default=-1), MPI.MAX)
         owned = jump_operator.owned[1] - jump_operator.owned[0]
         columns = np.arange(first, first + modes)
@@ -113,6 +113,17 @@ class NaturalCoarseSpace:
         amplitudes = np.zeros((self.kernel_dimension, *x.shape[1:]))
         amplitudes[self.owned_modes] = self.solver.solve(self._GT @ x)[positions]
         return distributed_arrays.allreduce_sum(self.comm, amplitudes)
+
+    def balancing(self, forces: Float) -> Float:
+        """Compute G (G^T G)^-1 e (owned rows, k): least multipliers of active rows with G^T lam = e.  Collective.
+
+        `forces` (owned modes, k) are the rows of e of local subdomains.
+        """
+        if not self._is_factored:
+            self.factor()
+        right = np.zeros((len(self.unknowns), forces.shape[1]))
+        right[np.searchsorted(self.unknowns, np.arange(self.kernel_dimension)[self.owned_modes])] = forces
+        return np.asarray(self._G @ self.solver.solve(right))
 
     def project(self, x: Float) -> Float:
         """Compute P x for x (owned rows,) or (owned rows, k), 0 on inactive rows.  Collective."""

@@ -61,14 +61,13 @@ def entity_code(key: Int, is_edge: Bool | bool) -> Int:
 
 
 def find_sharers(comm: MPI.Intracomm, meshes: SubmeshesOfRank, table: submeshes.SubdomainTable) -> Sharers:
-    """Find the entities that local subdomains share, without the pinned class.  Collective."""
+    """Find the entities that local subdomains share, without pinned classes.  Collective."""
     mesh = meshes.whole
     corner, side = mesh.vertex_class[mesh.triangles], mesh.edge_class[mesh.triangle_edges]
     one_sided = np.bincount(side.ravel(), minlength=len(mesh.edge_keys)) == 1
     at_border = np.zeros(len(mesh.class_keys), bool)
     at_border[mesh.vertex_class[mesh.edges[one_sided[mesh.edge_class]]]] = True
-    if mesh.pinned >= 0:
-        corner = np.where(corner == mesh.pinned, -1, corner)
+    corner = np.where(np.isin(corner, mesh.pinned), -1, corner)
     # Unique pairs of an entity that other ranks may have, as a code, and a local subdomain.
     vertices, edges = _several(corner, meshes.member, at_border), _several(side, meshes.member, one_sided)
     kinds = (False, mesh.class_keys, *vertices), (True, mesh.edge_keys, *edges)

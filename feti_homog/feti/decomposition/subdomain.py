@@ -27,11 +27,12 @@ class Subdomain:
         problem: components of the displacement, and unit loads.
         L: (v, v) stiffness of the material, see `assemble`; with several materials, their mean over the area.
         laws, material: arguments of `assemble`; with one material, `laws` is (1, v, v) and `material` None.
-        Q: (cn, v) unit loads: f = -Q E.
-        slopes: (n, 2) int dN/dx; 0 at the pinned class.
+        Q: (cn, v) unit loads: f = -Q E; with given tractions on the sides (cn, v + m), f = -Q [E, Sigma].
+        slopes: (n, 2) int dN/dx; 0 at held classes.
         areas: (materials,) area of a material.
         R: (cn, k) orthonormal kernel of K: translations, and a rotation in the plane if the piece can turn,
-            without the motions that the pinned class stops.
+            without the motions that held classes stop.
+        held: classes that do not move: pinned ones, and those between on sides that move by E x.
         positions: (n, 2) unwrapped positions of the classes.
         is_thin: whether the body is thin, such as a ring much thinner than its radius: K+ is ill-conditioned.
         is_outer: whether no other body lies around the body.
@@ -48,8 +49,10 @@ class Subdomain:
     slopes: Float
     areas: Float
     R: Float
+    held: Int
     positions: Float
     _built_stiffness: csr_matrix | None = field(repr=False)
+    _support: csr_matrix | None = field(default=None, init=False, repr=False)
     is_thin: bool = False
     is_outer: bool = False
     mixed: assembly.Mixed = False
@@ -103,21 +106,29 @@ class Subdomain:
         shift, closes = mesh_fibres.unwrap(submesh)
         positions = np.empty((mesh.n_classes, 2))
         positions[mesh.node_class[mesh.nodes]] = mesh.points[mesh.nodes] + shift[:, None]
-        R = kernel(problem, positions, closes, submesh.pinned)
-        K = _pinned(body.K, problem, submesh.pinned)
+        held = submesh.pinned
+        if submesh.boundary == "displacement":
+            held = np.union1d(held, mesh.node_class[assembly.nodes_along(submesh, mesh, submesh.at_side)])
+        R = kernel(problem, positions, closes, held)
+        K = _held(body.K, problem, held)
         # The rigid-body modes are in the kernel of K; NaN is above any tolerance.
         residual = abs(K @ R).max(initial=0.0) / abs(K.data).max()
         if not residual <= ZERO_TOLERANCE:
             faults = f"|K R| / |K| = {residual:.1e}, expected at most {ZERO_TOLERANCE:.0e}; its elements are degenerate"
             raise MeshError(f"{label(submesh)}: {faults}")
-        Q, slopes = body.Q, body.slopes
-        if submesh.pinned >= 0:
-            Q[problem.dofs(np.array([submesh.pinned]))], slopes[submesh.pinned] = 0.0, 0.0
+        Q, slopes = np.hstack([body.Q, assembly.side_loads(submesh, mesh, problem)]), body.slopes
+        Q[problem.dofs(held)], slopes[held] = 0.0, 0.0
         laws = laws.reshape(-1, *laws.shape[-2:])
         L = np.einsum("k,kij->ij", body.areas / body.areas.sum(), laws) if len(laws) > 1 else laws[0]
-        return cls(
-            submesh, mesh, problem, L, laws, material, Q, slopes, body.areas, R, positions, K, mixed=mixed, **flags
-        )
+        subdomain = cls(
+            submesh, mesh, problem, L, laws, material, Q, slopes, body.areas, R, held, positions, K,
+            mixed=mixed, **flags,
+        )  # fmt: skip
+        if submesh.boundary == "traction" and submesh.index == 0:
+            # Sides that move freely do not hold the cell: springs do, in which tractions in equilibrium cause no force.
+            subdomain._support = subdomain._springs(K, np.arange(mesh.n_classes))
+            subdomain._built_stiffness, subdomain.R = (K + subdomain._support).tocsr(), R[:, :0]
+        return subdomain
 
     def mean_strain(self, dofs: Int) -> Float:
         """Compute weights w (k, m): w^T u is the contribution of u on `dofs` (k,) to int eps*.
@@ -127,7 +138,7 @@ class Subdomain:
         """
         m, slopes = self.problem.strains, self.slopes
         if self.submesh.at_void.any():
-            slopes = slopes + assembly.void_integrals(self.submesh, self.mesh)
+            slopes = slopes + assembly.boundary_integrals(self.submesh, self.mesh, self.submesh.at_void)
         return np.asarray((slopes @ np.concatenate(np.eye(m)[self.problem.voigt], axis=1)).reshape(-1, m)[dofs])
 
     @property
@@ -136,9 +147,22 @@ class Subdomain:
         return float(self.areas.sum())
 
     @property
+    def volume_stiffness(self) -> Float:
+        """Return |Omega| L, 0 for tractions on sides, in the shape of Q^T Q."""
+        C = np.zeros((self.Q.shape[1],) * 2)
+        C[: len(self.L), : len(self.L)] = self.area * self.L
+        return C
+
+    @property
     def loads_inside(self) -> bool:
-        """Return whether unit loads act on nodes that are not shared: at voids, or where materials meet."""
-        return self.material is not None or bool(self.submesh.at_void.any())
+        """Return whether unit loads act on nodes that are not shared: at voids and sides, or where materials meet."""
+        is_pulled = self.Q.shape[1] > len(self.L)
+        return self.material is not None or is_pulled or bool(self.submesh.at_void.any())
+
+    @property
+    def is_supported(self) -> bool:
+        """Return whether springs hold the subdomain, in a cell with given tractions on the sides."""
+        return self._support is not None
 
     def without_rounding(self, answers: Float, dofs: Int) -> Float:
         """Remove rounding from the displacements `answers` = -K+ Q (k, v) of `dofs` (k,).
@@ -191,9 +215,10 @@ class Subdomain:
         return self.assemble_stiffness() if K is None else K
 
     def assemble_stiffness(self) -> csr_matrix:
-        """Assemble K (cn, cn), Eq. (28), with scaled unit rows for the pinned class (15)."""
+        """Assemble K (cn, cn), Eq. (28), with scaled unit rows for held classes (15)."""
         body = assembly.assemble(self.mesh, self.laws, self.problem, self.mixed, self.material)
-        return _pinned(body.K, self.problem, self.submesh.pinned)
+        K = _held(body.K, self.problem, self.held)
+        return K if self._support is None else (K + self._support).tocsr()
 
     def fixing(self, K: csr_matrix, candidates: Int) -> tuple[Int, Float]:
         """Compute rho Rf Rf^T (f, f) on fixing dofs (f,), which makes K + rho Rf Rf^T SPD.
@@ -206,7 +231,7 @@ class Subdomain:
             return np.zeros(0, np.int64), np.zeros((0, 0))
         # Three far-apart nodes for three modes, else the node farthest from the pinned class.
         x = self.positions[candidates]
-        origin = self.positions[self.submesh.pinned] if self.submesh.pinned >= 0 else x.mean(axis=0)
+        origin = self.positions[self.held[:1]] if len(self.held) else x.mean(axis=0)
         apart = [np.argmax(((x - origin) ** 2).sum(axis=1))]
         if self.R.shape[1] >= 3:
             apart.append(np.argmax(((x - x[apart[0]]) ** 2).sum(axis=1)))
@@ -220,17 +245,21 @@ class Subdomain:
 
     def regularised(self, K: csr_matrix, candidates: Int) -> csr_matrix:
         """Compute K + rho Rf Rf^T (cn, cn); see `fixing`."""
+        return (K + self._springs(K, candidates)).tocsr()
+
+    def _springs(self, K: csr_matrix, candidates: Int) -> csr_matrix:
+        """Return rho Rf Rf^T (cn, cn); see `fixing`."""
         dofs, block = self.fixing(K, candidates)
         rows, columns = np.meshgrid(dofs, dofs, indexing="ij")
-        return (K + csr_matrix((block.ravel(), (rows.ravel(), columns.ravel())), shape=K.shape)).tocsr()
+        return csr_matrix((block.ravel(), (rows.ravel(), columns.ravel())), shape=K.shape)
 
 
-def kernel(problem: Problem, positions: Float, rotates: bool, pinned: int) -> Float:
-    """Compute orthonormal rigid-body modes (cn, k) of nodes at `positions` (n, 2); node `pinned` (or -1) is fixed."""
+def kernel(problem: Problem, positions: Float, rotates: bool, held: Int) -> Float:
+    """Compute orthonormal rigid-body modes (cn, k) of nodes at `positions` (n, 2), without motions of nodes `held`."""
     n, c = len(positions), problem.components
-    free = np.zeros((n, c, 0)) if pinned >= 0 else np.tile(np.eye(c), (n, 1, 1))
-    if rotates and problem.turns:
-        centre = positions[pinned] if pinned >= 0 else positions.mean(axis=0)
+    free = np.zeros((n, c, 0)) if len(held) else np.tile(np.eye(c), (n, 1, 1))
+    if rotates and problem.turns and len(held) < 2:
+        centre = positions[held[0]] if len(held) else positions.mean(axis=0)
         x, y = (positions - centre).T
         turn = np.stack([-y, x], axis=1)[..., None] / max(np.ptp(x), np.ptp(y))
         free = np.concatenate([free, turn], axis=2)
@@ -244,14 +273,14 @@ def label(submesh: Submesh) -> str:
     return f"subdomain {submesh.index}{kind} near ({x:.6g}, {y:.6g})"
 
 
-def _pinned(K: csr_matrix, problem: Problem, pinned: int) -> csr_matrix:
-    """Replace the rows and columns of the node `pinned` in K by a multiple of I; -1 pins no node."""
-    if pinned < 0:
+def _held(K: csr_matrix, problem: Problem, held: Int) -> csr_matrix:
+    """Replace the rows and columns of the nodes `held` in K by a multiple of I."""
+    if not len(held):
         return K
-    dofs, largest = problem.dofs(np.array([pinned])), K.diagonal().max()
-    K.data[np.isin(K.indices, dofs)] = 0.0
-    for dof in dofs:
-        row = slice(*K.indptr[dof : dof + 2])
-        K.data[row] = np.where(K.indices[row] == dof, largest, 0.0)
+    is_held, largest = np.zeros(K.shape[0], bool), K.diagonal().max()
+    is_held[problem.dofs(held)] = True
+    row = np.repeat(np.arange(K.shape[0]), np.diff(K.indptr))
+    of_held = is_held[K.indices] | is_held[row]
+    K.data[of_held] = np.where(K.indices[of_held] == row[of_held], largest, 0.0)
     K.eliminate_zeros()
     return K

@@ -86,7 +86,7 @@ class InterfaceOperators:
         rank alone, if rounding leaves the stiffness of a subdomain without a factor.
         """
         self.comm, self.jump_operator, self.subdomains = jump_operator.comm, jump_operator, subdomains
-        self._loads = len(jump_operator.problem.loads)
+        self._loads = max([len(jump_operator.problem.loads), *(s.Q.shape[1] for s in subdomains)])
         first = np.cumsum([0, *(s.n_dofs for s in subdomains)])
         # All degrees of freedom of nodes with a constraint.
         constrained = np.split(jump_operator.B.getnnz(axis=0) > 0, first[1:])[:-1]

@@ -45,7 +45,7 @@ class ExplicitInterfaceOperator:
         fixed, self._term = subdomain.fixing(K, np.unique(subdomain.problem.nodes(dofs)))
         self._fixed = np.searchsorted(dofs, fixed)
         self.n, self._subdomain = len(dofs), subdomain
-        self.factor, q, C, order = None, subdomain.Q[dofs], subdomain.area * subdomain.L, subdomain.elimination_order()
+        self.factor, q, C, order = None, subdomain.Q[dofs], subdomain.volume_stiffness, subdomain.elimination_order()
         if subdomain.loads_inside:
             condensed = condensed_with_loads(K, dofs, subdomain.Q, order, keep_factor)
             both, q, C, self.factor = condensed.S, condensed.q, C + condensed.C, condensed.factor
@@ -167,7 +167,7 @@ class ImplicitInterfaceOperator:
             self.interior = Interior(K, dofs, s.elimination_order())
             self.interior.answers = self.interior.solve(-s.Q[self.interior.dofs])
             u[self.interior.dofs] = self.interior.answers
-            C = s.area * s.L + s.Q.T @ u
+            C = s.volume_stiffness + s.Q.T @ u
             self.condensed = CondensedLoads(s.Q[dofs], C, C + s.Q.T @ u + u.T @ (K @ u))
             return
         # In a subdomain without a boundary any nodes can be fixed.
@@ -183,7 +183,7 @@ class ImplicitInterfaceOperator:
     @cached_property
     def condensed(self) -> CondensedLoads:
         """Condense the unit loads to the boundary; loads inside need the interior."""
-        s, q, C = self._subdomain, self._subdomain.Q[self.dofs], self._subdomain.area * self._subdomain.L
+        s, q, C = self._subdomain, self._subdomain.Q[self.dofs], self._subdomain.volume_stiffness
         if s.loads_inside:
             inside = s.Q[self.interior.dofs]
             u = self.interior.solve(-inside)

@@ -128,5 +128,8 @@ class LoadScales:
         return float(self.imposed_strain(strain).max() / (self.imposed_strain(asked).max() or np.inf))
 
     def imposed_strain(self, loads: Float) -> Float:
-        """Return the strain sizes, (m,) or (m, n), that loads (v,) or (v, n) cause in the bonded cell."""
-        return np.asarray(self._strains @ np.abs(loads))
+        """Return the strain sizes, (m,) or (m, n), that loads (v,) or (v, n) cause in the bonded cell.
+
+        Loads behind the first v, which follow from them, do not count.
+        """
+        return np.asarray(self._strains @ np.abs(loads[: self._strains.shape[1]]))

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, edge_keys, edges, twins, void_edges
+from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, edge_keys, edges, on_sides, twins, void_edges
 from feti_homog.mesh.periodic_topology import Torus, components, edge_pairs
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, at, first_of
 from feti_homog.schema import types
@@ -146,8 +146,7 @@ def hanging_nodes(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
     _, first, number = np.unique(edge_keys(pairs, len(plane)), return_index=True, return_counts=True)
     single = pairs[first[number == 1]]
     ends = plane[single]
-    on_side = np.any(np.all(ends == 0, axis=1) | np.all(ends == size, axis=1), axis=1)
-    inner = single[~on_side]
+    inner = single[~on_sides(ends, size)]
     if len(inner) == 0:
         return []
     nodes = np.unique(inner)
@@ -219,7 +218,7 @@ def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
 def unmatched_sides(raw: RawMesh, mesh: CoarseMesh) -> list[str]:
     """List side edges without an image on the opposite side: a void lies along the side."""
     pairs, faults = edges(mesh.triangles), []
-    for axis, side in SIDES:
+    for axis, side in SIDES if mesh.boundary == "periodic" else ():
         levels = (k * mesh.period[axis] for k in (side, 1 - side))
         sides, opposite = (pairs[np.all(mesh.points[pairs, axis] == level, axis=1)] for level in levels)
         keys, images = (edge_keys(mesh.representative[some], len(mesh.points)) for some in (sides, opposite))
@@ -247,5 +246,9 @@ def void_faults(raw: RawMesh, mesh: CoarseMesh, has_voids: bool) -> list[str]:
     ends = mesh.representative[pairs]
     crowded = pairs[(np.bincount(ends.ravel(), minlength=len(mesh.points))[ends] > 2).any(axis=1)]
     faults = _listed("voids that touch in a node, as at ", crowded, raw.edge)
+    if mesh.boundary == "traction":
+        at_sides = pairs[on_sides(mesh.points[pairs].reshape(-1, 1, 2), mesh.period).reshape(-1, 2).any(axis=1)]
+        line = 'voids at the sides, where boundary = "traction" has no material to pull at: '
+        faults += _listed(line, at_sides, raw.edge)
     slits = first_of(map(raw.edge, pairs), len(pairs), shown=2)
     return faults + ([f"voids without an area, beside {slits}"] if empty < ROUNDING else [])

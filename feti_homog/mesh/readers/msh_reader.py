@@ -42,10 +42,16 @@ def read_cell(cell: cell_section.Cell) -> CoarseMesh:
     """Read the mesh file of a cell, with the repair that the case selects. Raises as `read`."""
     assert cell.file is not None
     snap = cell.snap_tolerance if cell.repair == "snap" else None
-    return read(cell.file, snap, cell.phases, bool(cell.voids))
+    return read(cell.file, snap, cell.phases, bool(cell.voids), cell.boundary)
 
 
-def read(path: Path, snap: float | None = None, phases: Selectors | None = None, has_voids: bool = False) -> CoarseMesh:
+def read(
+    path: Path,
+    snap: float | None = None,
+    phases: Selectors | None = None,
+    has_voids: bool = False,
+    boundary: str = "periodic",
+) -> CoarseMesh:
     """Read the coarse mesh from a file, and move it to [0, width] x [0, height].
 
     The file, of a suffix in LOADERS, has triangles with three or six nodes, in either sense, in physical surfaces
@@ -69,10 +75,10 @@ def read(path: Path, snap: float | None = None, phases: Selectors | None = None,
     _refuse(path.name, mesh_checks.not_finite(raw))
     raw, moved = (raw, 0.0) if snap is None else snapped(raw, snap)
     unused = tuple(escaped(f"{path.name}: {remark}") for remark in mesh_checks.unused_curves(raw))
-    return replace(made(raw, path.name, has_voids), snapped=moved, remarks=unused)
+    return replace(made(raw, path.name, has_voids, boundary), snapped=moved, remarks=unused)
 
 
-def made(raw: RawMesh, path: str, has_voids: bool = True) -> CoarseMesh:
+def made(raw: RawMesh, path: str, has_voids: bool = True, boundary: str = "periodic") -> CoarseMesh:
     """Check a raw mesh and convert it; faults begin with `path`. Raises as `read`."""
     _refuse(path, mesh_checks.not_planar(raw), mesh_checks.flat(raw), mesh_checks.duplicate_nodes(raw))
     # All triangles become counter-clockwise; middle nodes belong to edges of either direction.
@@ -89,8 +95,9 @@ def made(raw: RawMesh, path: str, has_voids: bool = True) -> CoarseMesh:
     total, cell = abs(areas(plane, raw.triangles).sum()), size.prod()
     overlap = [f"the elements overlap: their area is {total:.9g}, that of the cell {cell:.9g}"]
     _refuse(path, overlap if total > (1 + mesh_checks.ROUNDING) * cell else [])
-    _refuse(path, mesh_checks.not_periodic(raw, plane, size))
-    for axis, low, high in paired_sides(plane, size):
+    _refuse(path, mesh_checks.not_periodic(raw, plane, size) if boundary == "periodic" else [])
+    shift = size if boundary == "periodic" else np.full(2, np.inf)
+    for axis, low, high in paired_sides(plane, shift):
         plane[high, 1 - axis] = plane[low, 1 - axis]
     names, (width, height) = [group[0] for group in raw.groups], size.tolist()
     phases = ("matrix", *sorted(set(names) - {"matrix"}))
@@ -103,12 +110,13 @@ def made(raw: RawMesh, path: str, has_voids: bool = True) -> CoarseMesh:
         phase=phase,
         phases=phases,
         precedence=phase,
-        representative=representatives(plane, width, height),
+        representative=representatives(plane, *shift),
         ellipses=Ellipses.round(np.zeros((0, 3))),
         arc_edges=np.zeros((0, 2), np.int32),
         arc_circle=np.zeros(0, np.int32),
         debonded_edges=np.searchsorted(raw.node_tags, raw.debonded).astype(np.int32),
         origin=(float(origin[0]), float(origin[1])),
+        boundary=boundary,
     )
     _refuse(path, mesh_checks.unmatched_sides(raw, mesh))
     _refuse(path, mesh_checks.islands(raw, mesh), mesh_checks.void_faults(raw, mesh, has_voids))

@@ -153,18 +153,21 @@ def write_fibre_numbers(axes: Axes, cell: drawn_cell.DrawnCell, inches: float, f
     if len(fibres["number"]) > 2000:  # such small numbers would be illegible
         return
     period, low = np.array([cell.file.attrs[name] for name in ("width", "height")]), drawn.points.min(axis=0)
-    outline = cKDTree(drawn.points[np.unique(cell.borders)])
+    outline, middles = cKDTree(drawn.points[np.unique(cell.borders)]), drawn.points[drawn.triangles].mean(axis=1)
+    elements = cKDTree(middles)
     shifts = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2)
     tables = (fibres[name][:] for name in ("number", "body", "centre", "radius"))
     for k, (number, body, centre, radius) in enumerate(zip(*tables, strict=True)):
+        places, room = np.zeros((0, 2)), radius
         if np.isfinite(radius):  # the centres of the periodic images, moved into the cell
             images, margin = centre + shifts * period, np.minimum(0.4 * radius, 0.4 * period)
             moved = np.clip(images, low + margin, low + period - margin)
-            places, room = moved[np.linalg.norm(moved - images, axis=1) <= 0.85 * radius], radius
-        else:  # the point of the body farthest from its outlines
-            middles = drawn.points[drawn.triangles[drawn.body == body]].mean(axis=1)
-            distance = outline.query(middles)[0]
-            places, room = middles[[distance.argmax()]], distance.max()
+            places = moved[np.linalg.norm(moved - images, axis=1) <= 0.85 * radius]
+            places = places[drawn.body[elements.query(places)[1]] == body]  # cells that do not repeat have no images
+        if not len(places):  # the point of the body farthest from its outlines
+            of_body = middles[drawn.body == body]
+            distance = outline.query(of_body)[0]
+            places, room = of_body[[distance.argmax()]], distance.max()
         size = float(np.clip(room * inches * 72 / 2.2, LEAST_SIZE, 11.0))  # points, 2.2 characters in the room
         text = str(number)
         if factors is not None:

@@ -8,7 +8,7 @@ from support.pixel_images import SYMMETRIES, pixel_mesh
 
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers.msh_reader import read
-from feti_homog.mesh.submeshes import pinned_class
+from feti_homog.mesh.submeshes import pinned_classes
 
 # Rows from below: the fibre winds around the cell along the lowest, and its branches touch at (1, 2) / 4.
 BRANCHES = np.array([[1, 1, 1, 1], [1, 0, 0, 0], [0, 1, 0, 0], [0, 1, 0, 0]])
@@ -60,6 +60,6 @@ def test_what_never_parts_is_pinned_rather_than_what_may(tmp_path: Path) -> None
     assert torus.never_part.all()
     torus = torus_of(tmp_path, BRANCHES)
     inside = torus.meeting == 1
-    assert inside[pinned_class(torus)]
+    assert inside[pinned_classes(torus)]
     thin = torus_of(tmp_path, np.array([[1, 1, 1], [1, 0, 0], [0, 1, 0]]))
-    assert not (thin.meeting == 1).any() and thin.never_part[pinned_class(thin)]
+    assert not (thin.meeting == 1).any() and thin.never_part[pinned_classes(thin)]
