@@ -37,7 +37,7 @@ TOUCHING["random"] = TOUCHING["hexagonal"]  # the densest packing of circles
 
 GEOMETRY = keys.Selector("cell", "geometry")
 ALL_CIRCULAR, RANDOM, TABLE = GEOMETRY.among(*CIRCULAR), GEOMETRY.among("random"), GEOMETRY.among("table")
-MESH, PIXELS = GEOMETRY.among("mesh"), GEOMETRY.among("pixels")
+MESH, PIXELS, OWN_MESH = GEOMETRY.among("mesh"), GEOMETRY.among("pixels"), GEOMETRY.among("mesh", "pixels")
 MESHED, SIZED = GEOMETRY.among(*CIRCULAR, "table"), GEOMETRY.among(*CIRCULAR, "table", "pixels")
 FROM_A_FILE, REPAIRABLE = GEOMETRY.among("table", "mesh", "pixels"), GEOMETRY.among("table", "mesh")
 WINDOWED = GEOMETRY.among("table", "pixels")
@@ -232,7 +232,7 @@ class Cell:
         "lower bound. Neither needs matching nodes, and both tend to the effective stiffness as cells grow; of "
         'conductivity they prescribe T = G x and -q n. They belong to type = "stiffness" and "conductivity".',
         default="periodic",
-        only=MESH,
+        only=OWN_MESH,
     )
     columns: tuple[str, ...] | None = key(
         kinds.NAMES_OF_COLUMNS,

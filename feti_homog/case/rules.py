@@ -10,7 +10,7 @@ from typing import Any
 from feti_homog.case import section_values as kinds
 from feti_homog.case.bond_laws import REGISTRY, STIFFNESSES, STRENGTHS
 from feti_homog.case.cell_files import FEWEST_MATCHED
-from feti_homog.case.cell_section import MESH, MESHED, PIXELS, RANDOM, TABLE, Cell
+from feti_homog.case.cell_section import MESH, MESHED, OWN_MESH, PIXELS, RANDOM, TABLE, Cell
 from feti_homog.case.cell_sizes import CHOSEN
 from feti_homog.case.interface_section import ARCS, Arc, Scatter, interface_tables
 from feti_homog.case.load_sections import MixedLoad
@@ -162,14 +162,14 @@ def _cell() -> Iterator[Rule]:
     yield Rule((*CELL, "voids"), lambda value: isinstance(value, bool), line, (MESH,))
     others = kinds.ANALYSIS_TYPE.among(*(name for name in _values(kinds.ANALYSIS_TYPE) if name not in UNIT_LOADS))
     line = f"belongs to [analysis] type = {' or '.join(map(wording.toml_value, UNIT_LOADS))}"
-    yield Rule((*CELL, "boundary"), lambda value: value == "periodic", line, (MESH, others))
+    yield Rule((*CELL, "boundary"), lambda value: value == "periodic", line, (OWN_MESH, others))
     words = "exclude each other; sides match only in periodic cells"
+    for name, needs_images in (("repair", "snap"), ("smooth", True)):
 
-    def matches(cell: Any) -> bool:
-        has_both = has(cell, "boundary", "repair") and cell["boundary"] != "periodic"
-        return not (has_both and cell["repair"] == "snap")
+        def matches(cell: Any, name: str = name, needs_images: Any = needs_images) -> bool:
+            return not has(cell, "boundary", name) or cell["boundary"] == "periodic" or cell[name] != needs_images
 
-    yield Rule(CELL, matches, words, (MESH,), ("boundary", "repair"))
+        yield Rule(CELL, matches, words, (OWN_MESH,), ("boundary", name))
     yield exclusive(CELL, "match", "voids", words="exclude each other; cells that match a table have no voids")
     pair, line = ("match", "radius_spread"), "exclude each other; the table gives the radii"
     yield Rule(CELL, lambda cell: not has(cell, *pair) or cell["radius_spread"] == 0, line, names=pair)

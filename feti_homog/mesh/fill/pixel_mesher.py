@@ -1,5 +1,7 @@
 """The coarse mesh of a label image: two triangles a pixel, or regions within smooth outlines."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from feti_homog.case import cell_section
@@ -34,7 +36,7 @@ def read_cell(cell: cell_section.Cell) -> CoarseMesh:
     points, number = np.column_stack([np.tile(x, rows + 1), np.repeat(y, n)]), np.repeat(phase.ravel(), 2)
     # Diagonals join nodes of an even sum of row and column.
     halves = HALVES.astype(np.int32)[(low // n + low % n) % 2]
-    return CoarseMesh(
+    mesh = CoarseMesh(
         width=float(x[-1]),
         height=float(y[-1]),
         points=points,
@@ -42,9 +44,11 @@ def read_cell(cell: cell_section.Cell) -> CoarseMesh:
         phase=number,
         phases=phases,
         precedence=number,
-        representative=representatives(points, float(x[-1]), float(y[-1])),
+        representative=np.arange(len(points)),
         ellipses=Ellipses.round(np.zeros((0, 3))),
         arc_edges=np.zeros((0, 2), np.int32),
         arc_circle=np.zeros(0, np.int32),
         debonded_edges=np.zeros((0, 2), np.int32),
+        boundary=cell.boundary,
     )
+    return replace(mesh, representative=representatives(points, *mesh.shift))
