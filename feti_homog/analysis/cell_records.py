@@ -25,9 +25,7 @@ class CellInfo:
     height: float = described("height of the cell", records.LENGTH)
     area: float = described("area of the cell", f"{records.LENGTH} squared")
     fibre_fraction: float = described("share of all phases but matrix and coating in the area of the cell")
-    fractions: Mapping[str, float] = described(
-        "share of each phase in the area of the cell", entries={"PHASE": "that of one phase"}
-    )
+    fractions: Mapping[str, float] = described("area share of each phase", entries={"PHASE": "share of one phase"})
     elements: int = described("triangles of the refined mesh")
     nodes: int = described("nodes of the refined mesh, once for each body in each subdomain: depends on ranks")
     mesh_size: float | None = described(
@@ -180,9 +178,7 @@ class StiffnessBounds:
 
     voigt: Float = described("upper bound of the stiffness: uniform strain", records.STRESS, "(3, 3)")
     reuss: Float = described("lower bound of the stiffness: uniform stress", records.STRESS, "(3, 3)")
-    hashin_shtrikman: phase_bounds.Bounds | None = described(
-        "bounds of isotropic composites; null if a phase is not isotropic"
-    )
+    hashin_shtrikman: phase_bounds.Bounds | None = described("isotropic bounds; null if a phase is not isotropic")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

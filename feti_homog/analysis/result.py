@@ -73,19 +73,6 @@ class Result:
 
     `print` shows a short summary, a notebook shows tables.  The manual lists all keys of result.json; entries that the
     analysis does not compute are None.  Constants are attributes, too: `result.E1` comes from `moduli` or `constants`.
-
-    Attributes:
-        effective_stiffness: L^ef, (3, 3) or in generalized plane strain (6, 6); its columns are the stresses under the
-            unit strains.
-        effective_stiffness_compression: L^ef under minus the unit strains, if debonded faces touch without tension.
-        effective_conductivity: k^ef (3, 3), whose columns are -<q> under unit gradients of the temperature.
-        compliance, thermal_stress, thermal_expansion: in generalized plane strain, (6, 6) and (6,).
-        moduli, bounds: for perfectly bonded cells.
-        mesh_error: estimated mesh errors of a stiffness and its constants.
-        sensitivities: derivatives of a stiffness by the constants of the case.
-        tips: energy release rates for a stiffness with debonded arcs; the points of an angle have `tips` too.
-        angle, path, envelope: points of these analyses; `points` has angles and paths as arrays.
-        fields: mesh, interface and states on this rank, if the run keeps them; not in result.json.
     """
 
     schema: int = described("version of this layout", default=result_json.SCHEMA)
@@ -103,9 +90,7 @@ class Result:
     remarks: tuple[str, ...] = described("assumptions about settings that the case does not give", default=())
     faults: tuple[str, ...] = described("solves that did not converge and checks that failed")
     status: str = described("`done`, or `not converged` if there are faults")
-    moduli: engineering_constants.Moduli | None = described(
-        "engineering moduli of a perfectly bonded cell", default=None
-    )
+    moduli: engineering_constants.Moduli | None = described("engineering moduli of a bonded cell", default=None)
     bounds: cell_records.StiffnessBounds | None = described("bounds of a perfectly bonded cell", default=None)
     effective_stiffness: Float | None = described(
         "L^ef: columns are stresses under unit strains", records.STRESS, result_records.EITHER_STIFFNESS, default=None
@@ -141,27 +126,19 @@ class Result:
         "ranges of Young's and shear moduli across the fibres", default=None
     )
     estimates: phase_bounds.Estimates | None = described(
-        "closed estimates of the same, of a cell without debonding", default=None
+        "closed estimates of the same, without debonding", default=None
     )
     fibre_bounds: phase_bounds.FibreBounds | None = described("bounds of the same, of rigid bonds", default=None)
     conductivity_estimates: phase_bounds.ConductivityEstimates | None = described(
         "closed forms of a conductivity, without debonding and voids", default=None
     )
-    mesh_error: result_records.MeshErrors | None = described(
-        "estimated errors of a stiffness by its mesh", default=None
-    )
+    mesh_error: result_records.MeshErrors | None = described("estimated mesh errors of a stiffness", default=None)
     sensitivities: cell_records.Sensitivities | None = described(
-        "derivatives of a stiffness, if the case asks for them", default=None
+        "derivatives of the results, if asked for", default=None
     )
-    tips: result_records.TipRates | None = described(
-        "energy release rates at the tips of debonded arcs, of a stiffness", default=None
-    )
-    angle: tuple[result_records.AnglePoint, ...] | None = described(
-        "points of analysis `angle`, as in angle.csv", default=None
-    )
-    path: tuple[result_records.PathPoint, ...] | None = described(
-        "points of analysis `path`, as in path.csv", default=None
-    )
+    tips: result_records.TipRates | None = described("energy release rates at tips of debonded arcs", default=None)
+    angle: tuple[result_records.AnglePoint, ...] | None = described("points of an angle, as in angle.csv", default=None)
+    path: tuple[result_records.PathPoint, ...] | None = described("points of a path, as in path.csv", default=None)
     peak: result_records.Peak | None = described("peak of the path, with its first break", default=None)
     load: result_records.LoadPoint | None = described("state of analysis `load`, as in load.csv", default=None)
     envelope: tuple[result_records.EnvelopePoint, ...] | None = described(
@@ -175,9 +152,7 @@ class Result:
         default=None,
     )
     resumed: int | None = described("points of a path that were taken from a checkpoint", default=None)
-    result_h5: result_json.FileSeal | None = described(
-        "size and checksum of result.h5, if the run wrote it", default=None
-    )
+    result_h5: result_json.FileSeal | None = described("size and checksum of result.h5, if written", default=None)
     timings: Mapping[str, float] = described(
         "wall time of each stage, the largest over ranks",
         records.SECONDS,
@@ -269,9 +244,8 @@ class Result:
             return table[name]
         places = {key: f"result.{record}" for record, part in parts.items() for key in part}
         names = [*table, *(key for key, value in vars(self).items() if value is not None)]
-        raise AttributeError(
-            f"this result has no {name}: {wording.suggestion(name, names, places)}", name=name, obj=self
-        )
+        hint = wording.suggestion(name, names, places)
+        raise AttributeError(f"this result has no {name}: {hint}", name=name, obj=self)
 
     def __repr__(self) -> str:
         return f"Result({self.case.get('name', '')!r}, {self.case['analysis']['type']}, {self.status})"

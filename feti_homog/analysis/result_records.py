@@ -81,9 +81,7 @@ class TipRates:
     G_I: Float = described("its part in opening", ENERGY, "(t,)")
     G_II: Float = described("its part in shear", ENERGY, "(t,)")
     psi: Float = described("its mode, tan^2 psi = G_II / G_I: 0 opens, 90 shears", records.DEGREES, "(t,)")
-    length: Float = described(
-        "length behind the tip at which the modes of rigid bonds are separated", records.LENGTH, "(t,)"
-    )
+    length: Float = described("length behind the tip at which rigid bonds separate the modes", records.LENGTH, "(t,)")
     interface: tuple[int, ...] | None = described(OWN_SECTION, default=None)
 
 
@@ -108,9 +106,7 @@ class AnglePoint:
         default=None,
     )
     strain: Float | None = described("macroscopic strain that is given", "", "(3,)", voigt.STRAINS, default=None)
-    stress: Float | None = described(
-        "macroscopic stress under it", records.STRESS, "(3,)", voigt.STRESSES, default=None
-    )
+    stress: Float | None = described("stress under it", records.STRESS, "(3,)", voigt.STRESSES, default=None)
     stored: float | None = described("energy stored under it per area of the cell", records.STRESS, default=None)
     stored_in_springs: float | None = described("the share of elastic interfaces in it", records.STRESS, default=None)
     mesh_error: float | None = described(
@@ -160,9 +156,7 @@ class PathPoint:
         "friction and `friction_heat`",
         records.STRESS,
     )
-    dissipated: float = described(
-        "energy lost to breaks so far per area of the cell, along all equilibria", records.STRESS
-    )
+    dissipated: float = described("energy lost to breaks so far per cell area, along all equilibria", records.STRESS)
     dissipated_strain_controlled: float = described("the same if the load only rises on the first leg", records.STRESS)
     friction_heat: float | None = described(
         "heat of friction so far per area of the cell: `work` is `stored`, `dissipated` and this",
@@ -184,9 +178,7 @@ class PathPoint:
     damaged_share: float | None = described("the same of damaged bonds that hold, of laws that soften", default=None)
     debonded_length: Float | None = described(f"{DEBONDED_LENGTH}, {KEPT}", records.LENGTH, "(f,)", default=None)
     debonding_angle: Float | None = described(f"{DEBONDED_ANGLE}; {KEPT}", records.DEGREES, "(f,)", default=None)
-    tips: Tips | None = described(
-        "of bonds that break by energy, at the points that `states` in [output] chooses", default=None
-    )
+    tips: Tips | None = described("of bonds that break by energy, at points of `states` in [output]", default=None)
     bonded: int = described("bonded interface nodes")
     open: int = described("debonded interface nodes without contact")
     closed: int = described("debonded interface nodes in contact")
@@ -263,9 +255,7 @@ class EnvelopePoint:
     All fields but `angle` are missing if no load in this direction breaks a bond.
     """
 
-    angle: float = described(
-        "direction of the load in the plane, from the first axis towards the second", records.DEGREES
-    )
+    angle: float = described("direction of the load in the plane, from the first axis to the second", records.DEGREES)
     factor: float | None = described(
         "load at onset, in the unit of the axes: their values are `factor` times cosine and sine of `angle`; 0 if the "
         "change of temperature alone breaks a bond",

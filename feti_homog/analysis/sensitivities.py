@@ -32,12 +32,9 @@ def sensitivities(
     """
     k, groups = document.get("effective_conductivity"), context.loads.by_problem(responses)
     if k is not None:
-        entries = stiffness_derivatives.derivatives(_cells(context), groups)
-        return _entry(
-            _entries(k, None, "k"), {(e.name, e.value): e.energies[0].ravel().tolist() for e in entries}, False
-        )
-    C, thermal = document["effective_stiffness"], document.get("thermal_stress")
-    columns = dict[Constant, list[float]]()
+        rates = stiffness_derivatives.derivatives(_cells(context), groups)
+        return _entry(_entries(k, None, "k"), {(e.name, e.value): e.energies[0].ravel().tolist() for e in rates}, False)
+    C, thermal, columns = document["effective_stiffness"], document.get("thermal_stress"), dict[Constant, list[float]]()
     if not one_sided:
         for change in stiffness_derivatives.derivatives(_cells(context), groups):
             changes = material_derivatives.constant_changes(C, thermal, *_secants(change.energies))

@@ -239,10 +239,8 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
         elif name not in sections.TOP_LEVEL:
             is_section = isinstance(value, dict)
             key = f"[{wording.toml_key(name)}]" if is_section else wording.toml_key(name)
-            of_fit = (
-                "it belongs to the file of a fit; `feti-homog fit` runs it" if name in sections.FIT_SECTIONS else ""
-            )
-            hint = of_fit or wording.suggestion(name, sections.TOP_LEVEL, sections.KEY_OWNERS)
+            fit = "it belongs to the file of a fit; `feti-homog fit` runs it" if name in sections.FIT_SECTIONS else ""
+            hint = fit or wording.suggestion(name, sections.TOP_LEVEL, sections.KEY_OWNERS)
             faults.append(f"{key}: unknown {'section' if is_section else 'key'}; {hint}")
     if complaint := types.text.complaint(name := document.get("name", "case")):
         faults.append(f"name = {wording.toml_value(name)}: {complaint}")

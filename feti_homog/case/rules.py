@@ -163,13 +163,13 @@ def _cell() -> Iterator[Rule]:
     others = kinds.ANALYSIS_TYPE.among(*(name for name in _values(kinds.ANALYSIS_TYPE) if name not in UNIT_LOADS))
     line = f"belongs to [analysis] type = {' or '.join(map(wording.toml_value, UNIT_LOADS))}"
     yield Rule((*CELL, "boundary"), lambda value: value == "periodic", line, (OWN_MESH, others))
-    words = "exclude each other; sides match only in periodic cells"
-    for name, needs_images in (("repair", "snap"), ("smooth", True)):
+    line = 'excludes repair = "snap" and smooth = true, whose sides match'
 
-        def matches(cell: Any, name: str = name, needs_images: Any = needs_images) -> bool:
-            return not has(cell, "boundary", name) or cell["boundary"] == "periodic" or cell[name] != needs_images
+    def matches(cell: Any) -> bool:
+        is_periodic = not has(cell, "boundary") or cell["boundary"] == "periodic"
+        return is_periodic or (cell.get("repair") != "snap" and cell.get("smooth") is not True)
 
-        yield Rule(CELL, matches, words, (OWN_MESH,), ("boundary", name))
+    yield Rule(CELL, matches, line, (OWN_MESH,), ("boundary",))
     yield exclusive(CELL, "match", "voids", words="exclude each other; cells that match a table have no voids")
     pair, line = ("match", "radius_spread"), "exclude each other; the table gives the radii"
     yield Rule(CELL, lambda cell: not has(cell, *pair) or cell["radius_spread"] == 0, line, names=pair)

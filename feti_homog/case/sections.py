@@ -151,9 +151,7 @@ class Output:
         "for which every load takes as many solves more as there are unit loads. Faces with friction have none.",
         default=False,
     )
-    pictures: bool = key(
-        types.boolean, "Draw PNG files; without fields, the curves alone.", default=True, presentation=True
-    )
+    pictures: bool = key(types.boolean, "Draw PNG files, without fields curves alone.", default=True, presentation=True)
     report: bool = key(types.boolean, "Write report.html: tables, checks, pictures.", default=False, presentation=True)
     stress: str = key(
         types.choice("auto", "S11", "S22", "S12", *OUT_OF_PLANE_STRESSES),

@@ -112,9 +112,7 @@ def _of_result(directory: Path) -> ListedFibres:
         return _of_cell(cases.parse(document["case"], directory).cell)
     unknown = (np.nan, np.nan)
     centres = np.array([fibre.get("centre") or unknown for fibre in fibres], float).reshape(-1, 2)
-    axes = [
-        (radius, radius) if (radius := fibre.get("radius")) else fibre.get("semi_axes") or unknown for fibre in fibres
-    ]
+    axes = [(r, r) if (r := fibre.get("radius")) else fibre.get("semi_axes") or unknown for fibre in fibres]
     a, b = np.array(axes, float).reshape(-1, 2).T
     return ListedFibres(
         np.array([cell["width"], cell["height"]]),

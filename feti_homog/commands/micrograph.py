@@ -73,16 +73,16 @@ def _fitted(points: Float, circles: Float, size: tuple[int, ...]) -> tuple[float
     Returns the part of the points on circles, and the circles (k, 3) with points on most of their rims in the image.
     """
     part = 0.0
-    for reach, least in FITS:
+    for reach, share in FITS:
         circles = circles[circles[:, 2] >= SMALLEST]
         circles = circles[_apart(circles)]
         if not len(circles) or not len(points):
             return 0.0, circles[:0]
-        distance, near = cKDTree(circles[:, :2]).query(points, range(1, min(NEAREST, len(circles)) + 1))
-        off = np.abs(distance - circles[near, 2])
-        place, best = np.arange(len(points)), off.argmin(axis=1)
-        owner, off = near[place, best], off[place, best]
-        is_on = off < np.maximum(reach * circles[owner, 2], 1.0)
+        distance, nearest = cKDTree(circles[:, :2]).query(points, range(1, min(NEAREST, len(circles)) + 1))
+        error = np.abs(distance - circles[nearest, 2])
+        place, best = np.arange(len(points)), error.argmin(axis=1)
+        owner, error = nearest[place, best], error[place, best]
+        is_on = error < np.maximum(reach * circles[owner, 2], 1.0)
         part, owner = float(is_on.mean()), owner[is_on]
         # x^2 + y^2 = 2 a x + 2 b y + c about the centre of before, by normal equations.
         x, y = (points[is_on] - circles[owner, :2]).T
@@ -91,7 +91,7 @@ def _fitted(points: Float, circles: Float, size: tuple[int, ...]) -> tuple[float
         right = [np.bincount(owner, row * (x**2 + y**2), len(circles)) for row in rows]
         rim = circles[:, :2] + circles[:, 2:] * RIM[:, None]
         visible = ((rim > 0.0) & (rim < size)).all(axis=2).mean(axis=0)
-        is_round = np.bincount(owner, minlength=len(circles)) > least * visible * 2 * np.pi * circles[:, 2]
+        is_round = np.bincount(owner, minlength=len(circles)) > share * visible * 2 * np.pi * circles[:, 2]
         N, b = np.stack(sums, axis=1).reshape(-1, 3, 3)[is_round], np.stack(right, axis=1)[is_round, :, None]
         moved = np.linalg.solve(N, b)[..., 0]
         radius = np.sqrt(moved[:, 2] + moved[:, 0] ** 2 + moved[:, 1] ** 2)

@@ -97,9 +97,7 @@ def _add_products(commands: argparse._SubParsersAction[Parser]) -> None:
     for parser in of_result:
         parser.add_argument("directory", type=folder, metavar="DIR")
     plot, _, fields, export, verify = of_result
-    plot.add_argument(
-        "--format", choices=("png", "pdf", "svg"), default="png", help="pdf, svg: lines and text as vectors"
-    )
+    plot.add_argument("--format", choices=("png", "pdf", "svg"), default="png", help="pdf, svg: vector graphics")
     words = 'draw this state alone, by its number in result.h5, from 0, or its label, such as "event 12"'
     plot.add_argument("--state", metavar="STATE", help=words)
     stresses = ("S11", "S22", "S12", "S33", "S23", "S13", "von_mises")
@@ -126,10 +124,10 @@ def _add_products(commands: argparse._SubParsersAction[Parser]) -> None:
     verify.add_argument("--json", action="store_true", help="print the certificate as JSON")
     fibres = _command(commands, "products.fibres", "print the fibres of a cell as a table", FIBRES_HELP)
     source = fibres.add_mutually_exclusive_group(required=True)
-    words = "a case file, or a folder of results"
-    source.add_argument("source", type=folder, nargs="?", metavar="CASE.toml|DIR", help=words)
-    words = "find round fibres in a micrograph; --out FILE.csv also draws them, in FILE_circles.png"
-    source.add_argument("--image", type=Path, metavar="IMAGE", help=words)
+    text = "a case file, or a folder of results"
+    source.add_argument("source", type=folder, nargs="?", metavar="CASE.toml|DIR", help=text)
+    text = "find round fibres in a micrograph; --out FILE.csv also draws them, in FILE_circles.png"
+    source.add_argument("--image", type=Path, metavar="IMAGE", help=text)
     fibres.add_argument("--pixel", type=length, default=1.0, metavar="LENGTH", help="edge of a pixel of the image")
     fibres.add_argument("--out", type=Path, metavar="FILE.csv", help="write the table to a file instead of printing it")
 

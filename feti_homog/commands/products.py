@@ -74,8 +74,8 @@ def fibres(arguments: argparse.Namespace, comm: Intracomm) -> None:
     elif (path := mpi_errors.on_root_only(comm, output_folder.write_product, arguments.out, text)) is not None:
         standard_streams.say(str(path))
     if arguments.out is not None and arguments.image is not None:
-        drawn = mpi_errors.on_root(comm, micrograph.draw, arguments.image, circles, arguments.pixel, arguments.out)
-        mpi_errors.on_root_only(comm, standard_streams.say, drawn)
+        picture = arguments.image, circles, arguments.pixel, arguments.out
+        mpi_errors.on_root_only(comm, lambda: standard_streams.say(micrograph.draw(*picture)))
 
 
 def _result_folder(arguments: argparse.Namespace) -> Path:

@@ -121,8 +121,6 @@ def faults(case: Case, nodes: EstimatedNodes, moved: Sequence[debonded_arcs.Move
                     lines.append(f"{line}.fibre: fibre {fibre} has no interface {kind}")
                     continue
                 whose = "any fibre" if fibre is None else f"fibre {fibre}"
-                words = (
-                    f"no node of {whose} is within the arc of {angle} degrees; make it wider, or the elements smaller"
-                )
-                lines.append(f"{line}: {words}")
+                words = f"no node of {whose} is within the arc of {angle} degrees"
+                lines.append(f"{line}: {words}; make it wider, or the elements smaller")
     return list(dict.fromkeys(lines))

@@ -143,22 +143,21 @@ def distribute(
     if faults:
         raise CaseError(*faults)
     parts = torus.constituent if case.cell.bodies == "torus" else torus.plane_parts()
-    bodies, triangles = int(parts.max()) + 1, len(mesh.triangles)
-    across = (cut := _cut_across(case, torus, lattice, n_ranks, policy)) is not None
+    bodies, across = int(parts.max()) + 1, (cut := _cut_across(case, torus, lattice, n_ranks, policy)) is not None
     if cut is None:
         sides = parts[np.stack(torus.sides[:2])]
         shared_edges = np.bincount(sides[:, sides[0] != sides[1]].ravel(), minlength=bodies)
         pieces = partition_policy.wanted_pieces(case, np.bincount(parts), shared_edges, lattice, n_ranks, policy)
         cut = partition.decompose(torus, parts, pieces, n_ranks)
     table = submeshes.SubdomainTable.of(torus, cut.subdomain, cut.rank, across)
-    notes = cell_remarks.subdomain_remarks(case, bodies, len(cut.rank), triangles)
+    notes = cell_remarks.subdomain_remarks(case, bodies, len(cut.rank), len(mesh.triangles))
     summary = CellSummary(
         width=mesh.width,
         height=mesh.height,
         phases=mesh.phases,
         bodies=bodies,
         subdomains=len(cut.rank),
-        coarse_triangles=triangles,
+        coarse_triangles=len(mesh.triangles),
         interface_edge=cell_remarks.longest(mesh.points[coarse_mesh.interface_edges(mesh)]),
         numbers=numbers,
         is_fibre=is_fibre,

@@ -72,9 +72,7 @@ class TransverseIsotropy:
     G_axial: float = described("shear modulus along the fibres", records.STRESS)
     G_transverse: float = described("shear modulus across the fibres", records.STRESS)
     K_transverse: float = described("bulk modulus across the fibres in plane strain", records.STRESS)
-    expansion_axial: float | None = described(
-        "expansion along the fibres; null if a phase does not give its own", PER_TEMPERATURE
-    )
+    expansion_axial: float | None = described("expansion along the fibres; null if a phase gives none", PER_TEMPERATURE)
     expansion_transverse: float | None = described("expansion across the fibres; null likewise", PER_TEMPERATURE)
     deviation: float = described(
         "relative distance of the stiffness, as a fourth-order tensor, to the nearest transversely isotropic one"

@@ -48,9 +48,7 @@ def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawCh
     """Yield the derivatives by each given constant; in space expansions come last."""
     C, none = stiffness_of(material, plane), np.zeros(6)
     if PLANE_STATES[plane].is_scalar:
-        yield from (
-            LawChange(f"conductivity{end}", value, change, none) for end, value, change in _of_conduction(material)
-        )
+        yield from (LawChange(f"conductivity{end}", k, change, none) for end, k, change in _of_conduction(material))
         return
     is_general = isinstance(material, material_forms.General)
     for name, value, change in (_of_entries if is_general else _of_constants)(material, plane, C):
@@ -112,13 +110,9 @@ def _of_conduction(material: material_forms.Material) -> Iterator[tuple[str, flo
         yield "", k, np.eye(3)
     else:
         for i, j in zip(*np.triu_indices(3), strict=True):
-            unit = np.eye(3)[[i, j]]
-            tensor = conductivity(material)
-            yield (
-                f".k{i + 1}{j + 1}",
-                float(tensor[i, j]),
-                np.outer(*unit) if i == j else np.outer(*unit) + np.outer(*unit[::-1]),
-            )
+            unit = np.zeros((3, 3))
+            unit[[i, j], [j, i]] = 1.0
+            yield f".k{i + 1}{j + 1}", float(conductivity(material)[i, j]), unit
 
 
 def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:

@@ -59,8 +59,8 @@ def read_image(path: Path, is_grey: bool = False) -> Array:
     memory = 128 * limits.PIXELS
     image = input_files.in_own_process(path, partial(_decoded, is_grey=is_grey), memory=memory)
     if image.ndim != 2 or image.dtype.kind not in ("iubf" if is_grey else "iub"):
-        what = f"{'x'.join(map(str, image.shape))} values of type {image.dtype}"
-        raise CaseError(f"{path.name}: {what}; expected two dimensions, and a whole number a pixel")
+        shape = "x".join(map(str, image.shape))
+        raise CaseError(f"{path.name}: {shape} values of type {image.dtype}; expected a whole number a pixel, in rows")
     _check_size(path, *image.shape)
     return image.astype(np.uint8) if image.dtype.kind == "b" else image
 

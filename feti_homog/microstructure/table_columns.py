@@ -143,9 +143,7 @@ def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceC
         # MATLAB's orientation is an angle; other programs' are in radians, or from another axis.
         bare = ["angle" if name == "orientation" else name for name in bare]
     # An angle is measured as a picture is seen, for coordinates whose y points down.
-    values: dict[str, Callable[[float], float]] = (
-        {"angle": lambda value: -value} if AXES_OF_PICTURES & set(bare) else {}
-    )
+    values: dict[str, Callable[[float], float]] = {"angle": lambda value: -value} if AXES_OF_PICTURES & {*bare} else {}
     columns = [SourceColumn(place, name, values.get(name, float)) for place, name in enumerate(bare) if name in known]
     for others, name, value in OTHERS:
         given = {column.name for column in columns}

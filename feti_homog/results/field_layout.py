@@ -78,14 +78,10 @@ class InterfacePart:
 
     points: Float = described("positions of the interface nodes", records.LENGTH, "(k, 2)")
     normal: Float = described("unit normals (n1, n2), from fibre to matrix; tangents are (-n2, n1)", shape="(k, 2)")
-    length: Float = described(
-        "tributary length: the length of interface that a node represents", records.LENGTH, "(k,)"
-    )
+    length: Float = described("tributary length: interface length that a node represents", records.LENGTH, "(k,)")
     fibre: AnyInt = described("body of the fibre, or of its coating", shape="(k,)", dtype="int32")
     fibre_number: AnyInt = described("number of the fibre, from 1", shape="(k,)", dtype="int32")
-    pair: AnyInt = described(
-        "place, from 0, of its section among the case's [[interface]]", shape="(k,)", dtype="int32"
-    )
+    pair: AnyInt = described("place, from 0, of its section in the case's [[interface]]", shape="(k,)", dtype="int32")
     fibre_node: AnyInt = described("a node of the mesh on the fibre's face, from 0", shape="(k,)", dtype="int64")
     vertex: AnyInt = described("number of the interface node, from 0: viewers' elements", shape="(k, 1)", dtype="int64")
     matrix_node: AnyInt = described(
@@ -100,9 +96,7 @@ class StatePart:
     """One cell state and this rank's part of its fields."""
 
     strain: Float = described(f"macroscopic strain {', '.join(voigt.STRAINS)}", shape="(3,)")
-    stress_mean: Float = described(
-        f"macroscopic stress {', '.join(voigt.STRESSES)}", records.STRESS, "(3,)", name="stress"
-    )
+    stress_mean: Float = described(f"mean stress {', '.join(voigt.STRESSES)}", records.STRESS, "(3,)", name="stress")
     load_factor: float = described("position on the path, 0 to 1; 1 of other analyses")
     point: int = described("number, from 0, of its point in `path` or `angle` of result.json; 0 of a stiffness")
     label: str = described("label of the state, as `E11`, `60 deg E11`, `event 12`")
@@ -111,7 +105,7 @@ class StatePart:
         records.LENGTH,
         "(n, 2)",
     )
-    stress: Float = described(f"means over the elements, {', '.join(voigt.STRESSES)}", records.STRESS, "(m, 3)")
+    stress: Float = described(f"element means, {', '.join(voigt.STRESSES)}", records.STRESS, "(m, 3)")
     stress_33: Float = described(
         "stress 33, out of the plane: 0 in plane stress, NaN where the material's constants do not determine it",
         records.STRESS,
@@ -129,9 +123,7 @@ class StatePart:
         records.LENGTH,
         "(k, 2)",
     )
-    traction_vector: Float = described(
-        "`traction` as (x, y, z), along x3 `axial_traction` or 0", records.STRESS, "(k, 3)"
-    )
+    traction_vector: Float = described("`traction` as (x, y, z), in x3 `axial_traction` or 0", records.STRESS, "(k, 3)")
     jump_vector: Float = described("`jump` as (x, y, z), along x3 `axial_jump` or 0", records.LENGTH, "(k, 3)")
     displacement_fibre: Float = described("displacement (x, y, z) of the fibre's face", records.LENGTH, "(k, 3)")
     displacement_matrix: Float = described(
@@ -184,10 +176,6 @@ class SpatialStatePart(StatePart):
     axial_displacement: Float = described(
         "displacement along x3 at x3 = 0, that of the macroscopic strain included", records.LENGTH, "(n,)"
     )
-    axial_stress: Float = described(
-        f"means over the elements, {', '.join(voigt.AXIAL_STRESSES)}", records.STRESS, "(m, 2)"
-    )
+    axial_stress: Float = described(f"element means, {', '.join(voigt.AXIAL_STRESSES)}", records.STRESS, "(m, 2)")
     axial_traction: Float = described("sigma n along x3", records.STRESS, "(k,)")
-    axial_jump: Float = described(
-        "slip along x3: displacement of the matrix minus that of the fibre", records.LENGTH, "(k,)"
-    )
+    axial_jump: Float = described("slip along x3: matrix displacement minus fibre displacement", records.LENGTH, "(k,)")

@@ -143,9 +143,7 @@ def marks(document: path_curves.Document) -> dict[int, str]:
     entries = {title: peak[name] for title, name in places.items() if name in peak}
     entries["end"] = len(document["path"]) - 1
     numbers = sorted({int(number) for number in entries.values()})
-    return {
-        number: " and ".join(title for title, position in entries.items() if position == number) for number in numbers
-    }
+    return {number: " and ".join(title for title, place in entries.items() if place == number) for number in numbers}
 
 
 Drop = tuple[float, int, int]

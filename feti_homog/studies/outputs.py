@@ -163,9 +163,7 @@ OUTPUT_COLUMNS = (
     Column("expansion_x1", "1 / temperature", "strain along x1 per unit of temperature at no stress; expansion_x2 too"),
     Column("expansion_STRAIN", "1 / temperature", "the same of a shear strain"),
     Column("anisotropy_normal", records.STRESS, "C11 - C22"),
-    Column(
-        "anisotropy_shear", records.STRESS, "C33 - (C11 + C22 - 2 C12) / 4; with generalized plane strain C66 - ..."
-    ),
+    Column("anisotropy_shear", records.STRESS, "C33 - (C11 + C22 - 2 C12) / 4; in generalized plane strain C66 - ..."),
     *result_json.columns(engineering_constants.Moduli),
     *(
         column

@@ -167,9 +167,7 @@ class ResultFiles:
         """Return the sections [[interface]], conductances as axial stiffnesses; empty if all bonds are perfect."""
         sections: Any = self.case.get("interface", [])
         sections = sections if isinstance(sections, list) else [sections]
-        return [
-            {"axial_stiffness": bond["conductance"], **bond} if "conductance" in bond else bond for bond in sections
-        ]
+        return [{"axial_stiffness": row["conductance"], **row} if "conductance" in row else row for row in sections]
 
     @property
     def points(self) -> Points:

@@ -20,21 +20,21 @@ LINES = {
     "analysis": 3000 + 127 + 125,
     "case": 2880 + 35 + 120,
     "commands": 560 + 15 + 130,
-    "fem": 1150 + 3 + 10,
+    "fem": 1150 + 3 + 11,
     "feti": 6300 + 0 + 65,
     "homogenization": 3230 + 42 + 20,
     "interface": 4000 + 0 + 5,
     "materials": 1430 + 85 + 135,
     "mesh": 5500 + 0 + 255,
     "microstructure": 2140 + 0 + 25,
-    "report": 3420 + 172 + 120,
+    "report": 3420 + 172 + 122,
     "results": 2430 + 110,
     "schema": 430 + 0 + 5,
     "studies": 2950,
     "system": 1770 + 3,
     "verify": 3100 + 156 + 120,
 }
-FILES, TOTAL = 310, 45000 + 368 + 1215
+FILES, TOTAL = 310, 45000 + 368 + 1132
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.2, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

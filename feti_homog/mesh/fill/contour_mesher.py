@@ -3,7 +3,6 @@
 The sides of the cell lie on lines of pixel centres, between which contours begin and end, so that sides match.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -48,8 +47,7 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
     j = int(np.argmax(np.minimum(across[1], away[:, i])))
     indicator, phase = (np.roll(array, (-j, -i), (0, 1)) for array in (indicator, phase))
     rows, width = phase.shape
-    find_contours: Callable[[Float, float], list[Float]] = measure.find_contours
-    curves = [*map(_resampled, find_contours(np.pad(indicator, ((0, 1), (0, 1)), mode="wrap"), level))]
+    curves = [*map(_resampled, measure.find_contours(np.pad(indicator, ((0, 1), (0, 1)), mode="wrap"), level))]
     size = np.array([1.0, rows / width])
     field = _size_field(curves, indicator, cell.mesh_size, size)
     refuse_many(field, field.least, size)
@@ -81,9 +79,8 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
 def _every_other(phase: Int32, phases: tuple[str, ...]) -> Bool:
     """Mark the phases (rows, columns) that an odd number of outlines parts from the matrix.  Raises MeshError."""
     n = len(phases)
-    one, other = (np.concatenate([turned.ravel() for turned in pair]) for pair in
-                  ((phase, phase), (np.roll(phase, 1, 0), np.roll(phase, 1, 1))))  # fmt: skip
-    a, b = np.divmod(np.unique(one[one != other] * n + other[one != other]), n)
+    a, b = np.divmod(np.unique([phase * n + np.roll(phase, 1, axis) for axis in (0, 1)]), n)
+    a, b = a[a != b], b[a != b]
     touching = csr_matrix((np.ones(len(a)), (a, b)), shape=(n, n))
     is_odd = dijkstra(touching, directed=False, indices=0, unweighted=True) % 2 == 1
     for k in np.flatnonzero(is_odd[a] == is_odd[b])[:1]:

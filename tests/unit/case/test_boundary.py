@@ -30,7 +30,7 @@ def test_a_path_refuses_them(tmp_path):
 
 def test_sides_that_need_not_match_are_not_snapped(tmp_path):
     found = faults({"folder": tmp_path, "boundary": "displacement", "repair": "snap"})
-    assert found == ("[cell] boundary, repair: exclude each other; sides match only in periodic cells",)
+    assert found == ('[cell] boundary: excludes repair = "snap" and smooth = true, whose sides match',)
 
 
 def test_other_values_and_other_cells(tmp_path):

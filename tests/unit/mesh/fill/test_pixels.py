@@ -157,8 +157,8 @@ GREY = np.eye(4, dtype=np.uint8)
     [
         ("a.png", np.stack([GREY] * 3, -1), "pixels of mode RGB; expected one whole number"),
         ("a.tif", GREY.astype(np.float32), "pixels of mode F; expected one whole number"),
-        ("a.npy", np.stack([GREY] * 3), "3x4x4 values of type uint8; expected two dimensions"),
-        ("a.npy", 0.5 * GREY, "4x4 values of type float64; expected two dimensions"),
+        ("a.npy", np.stack([GREY] * 3), "3x4x4 values of type uint8; expected a whole number a pixel, in rows"),
+        ("a.npy", 0.5 * GREY, "4x4 values of type float64; expected a whole number a pixel, in rows"),
         ("a.npy", GREY[:1], "4 x 1 pixels; expected two rows"),
         ("a.npz", [GREY, GREY], "2 arrays; expected one"),
         ("a.png", 2 * GREY, "no phase of 2; a.png has 0: 75 %, 2: 25 %"),
