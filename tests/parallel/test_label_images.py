@@ -31,17 +31,18 @@ def saved(comm, path, image):
     return path
 
 
+@pytest.mark.parametrize("boundary", ["periodic", "displacement", "traction"])
 @pytest.mark.parametrize("sections", [{}, {"interface": SPRINGS}], ids=["bonded", "springs"])
 @pytest.mark.parametrize("seed", [1, 2])
-def test_pixels_are_the_same_quadrilaterals_as_a_mesh(comm, shared_path, seed, sections):
+def test_pixels_are_the_same_quadrilaterals_as_a_mesh(comm, shared_path, seed, sections, boundary):
     image = (np.random.default_rng(seed).random((16, 16)) < 0.4).astype(np.uint8)
     path = saved(comm, shared_path / "image.npy", image[::-1])
     if comm.rank == 0:
         written(quadrilaterals(image), shared_path / "quads.inp")
     comm.barrier()
-    cell = {"geometry": "mesh", "file": str(shared_path / "quads.inp")}
+    cell = {"geometry": "mesh", "file": str(shared_path / "quads.inp"), "boundary": boundary}
     expected = compute(Case.parse(RUN | {"cell": cell} | sections), comm)
-    result = solved(comm, path, {"pixel": 1 / 16}, **sections)
+    result = solved(comm, path, {"pixel": 1 / 16, "boundary": boundary}, **sections)
     C, other = result.effective_stiffness, expected.effective_stiffness
     assert np.abs(C - other).max() < 1e-11 * other.max()
     errors, others = result.mesh_error.effective_stiffness, expected.mesh_error.effective_stiffness
