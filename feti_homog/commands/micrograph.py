@@ -11,7 +11,6 @@ from feti_homog.microstructure import label_image
 from feti_homog.report.plots import plot_helpers
 from feti_homog.typing import Bool, Float
 
-NEAREST = 6  # circles to which a contour point may belong
 SMALLEST = 3.0  # radius in pixels
 # Of each fit, the largest distance / radius of a point on a circle, and the least part of the visible rim with points.
 FITS = (0.1, 0.2), (0.1, 0.4), (0.05, 0.7)
@@ -78,7 +77,7 @@ def _fitted(points: Float, circles: Float, size: tuple[int, ...]) -> tuple[float
         circles = circles[_apart(circles)]
         if not len(circles) or not len(points):
             return 0.0, circles[:0]
-        distance, nearest = cKDTree(circles[:, :2]).query(points, range(1, min(NEAREST, len(circles)) + 1))
+        distance, nearest = cKDTree(circles[:, :2]).query(points, range(1, min(6, len(circles)) + 1))
         error = np.abs(distance - circles[nearest, 2])
         place, best = np.arange(len(points)), error.argmin(axis=1)
         owner, error = nearest[place, best], error[place, best]

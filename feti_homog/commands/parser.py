@@ -124,8 +124,7 @@ def _add_products(commands: argparse._SubParsersAction[Parser]) -> None:
     verify.add_argument("--json", action="store_true", help="print the certificate as JSON")
     fibres = _command(commands, "products.fibres", "print the fibres of a cell as a table", FIBRES_HELP)
     source = fibres.add_mutually_exclusive_group(required=True)
-    text = "a case file, or a folder of results"
-    source.add_argument("source", type=folder, nargs="?", metavar="CASE.toml|DIR", help=text)
+    source.add_argument("source", type=folder, nargs="?", metavar="CASE.toml|DIR", help="a case file or results folder")
     text = "find round fibres in a micrograph; --out FILE.csv also draws them, in FILE_circles.png"
     source.add_argument("--image", type=Path, metavar="IMAGE", help=text)
     fibres.add_argument("--pixel", type=length, default=1.0, metavar="LENGTH", help="edge of a pixel of the image")

@@ -27,7 +27,7 @@ LINES = {
     "materials": 1430 + 85 + 135,
     "mesh": 5500 + 0 + 255,
     "microstructure": 2140 + 0 + 25,
-    "report": 3420 + 172 + 122,
+    "report": 3420 + 172 + 124,
     "results": 2430 + 110,
     "schema": 430 + 0 + 5,
     "studies": 2950,

@@ -16,6 +16,7 @@ METHODS = ("fullmatch", "match", "search", "split", "sub", "finditer", "findall"
 # Patterns that are arguments of a function: (module, text of the argument).
 ARGUMENTS = {
     ("mesh.readers.abaqus_file", "pattern"),
+    ("studies.outputs", "re.sub('[A-Z]{3,}', '.+', pattern)"),  # of names of columns
     ("results.output_folder", "re.escape(target.name)"),  # of one name
     ("results.atomic", "f'({names.pattern})\\\\.(?P<tag>.+\\\\.\\\\d+)\\\\.part'"),  # of names in a folder
 }

@@ -151,8 +151,6 @@ FAULTY_MATERIALS: dict[str, str] = {
     '[interface] conductance = 2.0: belongs to [analysis] type = "conductivity", not "stiffness"':
         ended("[interface]\ndebonded = []\nconductance = 2.0\n"),
     '[load]: belongs to [analysis] type = "load", not "conductivity"': conducting("[load]", "to = {E11 = 1.0}"),
-    '[output] sensitivities = true: belongs to [analysis] type = "stiffness" or "load"':
-        conducting("[output]", "sensitivities = true"),
     '[output] stress = "S11": belongs to [analysis] type = "stiffness"': conducting("[output]", 'stress = "S11"'),
     '[output] deformation_scale = 2.0: belongs to [analysis] type = "stiffness"':
         conducting("[output]", "deformation_scale = 2.0"),

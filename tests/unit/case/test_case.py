@@ -36,7 +36,7 @@ def test_keys_that_are_left_out_have_their_defaults(tmp_path):
     assert case.name == "cell"
     assert dataclasses.asdict(case.cell) == {
         "geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.05, "interface_size": None, "tip_size": None,
-        "accuracy": None,
+        "accuracy": None, "boundary": "periodic",
         "refine": 0, "order": 1, "bodies": "torus", "fibres": None, "width": None, "fibre_radius": None,
         "coating": None, "min_gap": 0.05, "seed": 0, "radius_spread": 0.0, "file": None,
         "phases": None, "columns": None, "repair": "none", "snap_tolerance": 1e-3,

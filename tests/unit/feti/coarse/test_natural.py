@@ -39,10 +39,12 @@ def fibre_modes(length, nodes=NODES):
 def loose_fibres(weights=1.0):
     """Fibres in a matrix that is pinned, with pairs of rows (n, t) at each node, which have weights."""
     bodies = [
-        SimpleNamespace(R=-fibre_modes(1.0 + k / FIBRES), submesh=SimpleNamespace(body=k + 1, pinned=-1))
+        SimpleNamespace(
+            R=-fibre_modes(1.0 + k / FIBRES), submesh=SimpleNamespace(body=k + 1), held=(), is_supported=False
+        )
         for k in range(FIBRES)
     ]
-    bodies.append(SimpleNamespace(R=np.zeros((0, 0)), submesh=SimpleNamespace(body=0, pinned=0)))
+    bodies.append(SimpleNamespace(R=np.zeros((0, 0)), submesh=SimpleNamespace(body=0), held=(0,), is_supported=False))
     dofs = [np.arange(len(body.R)) for body in bodies]
     return coarse_space(bodies, dofs, diags(weights * np.ones(ROWS)))
 
@@ -119,7 +121,10 @@ def test_gaps_within_what_turns_as_one_move_nothing():
     n = 2 * NODES
     outer, inner = np.split(np.linalg.qr(np.vstack([fibre_modes(1.0), 0.9 * fibre_modes(1.0)]))[0], 2)
     kernels = np.zeros((2 * n, 0)), np.vstack([-outer, inner]), np.vstack([0 * outer, -inner])
-    bodies = [SimpleNamespace(R=R, submesh=SimpleNamespace(body=k, pinned=-(k > 0))) for k, R in enumerate(kernels)]
+    bodies = [
+        SimpleNamespace(R=R, submesh=SimpleNamespace(body=k), held=(0,) * (k == 0), is_supported=False)
+        for k, R in enumerate(kernels)
+    ]
     space = coarse_space(bodies, [np.arange(2 * n)] * 3, hstack([identity(2 * n)] * 3))
     active, is_open = np.zeros(2 * n), np.zeros(n, bool)
     active[::2], active[n + 1], is_open[-3:] = 1.0, 1.0, True

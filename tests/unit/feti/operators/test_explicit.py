@@ -139,7 +139,7 @@ def test_indefinite_subdomain_is_refused():
     K = csr_matrix(np.diag([1.0, 1.0, -1.0, 1.0]))
     subdomain = SimpleNamespace(
         problem=PLANE, fixing=lambda K, nodes: (np.zeros(0, np.int64), np.zeros((0, 0))), loads_inside=False,
-        Q=np.zeros((4, 3)), area=1.0, L=np.eye(3), elimination_order=lambda: None,
+        Q=np.zeros((4, 3)), volume_stiffness=np.eye(3), elimination_order=lambda: None,
     )  # fmt: skip
     with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
         ExplicitInterfaceOperator(subdomain, K, np.arange(4))
