@@ -18,7 +18,7 @@ def require_own(path: Path) -> None:
     if not path.is_file():
         has_events = (path.parent / "checkpoint/events").is_file()
         stored = " with --resume: the checkpoint has its events" if has_events else ""
-        raise CaseError(f"cannot read {path}: the fields are missing; run the case again{stored}")
+        raise CaseError(f"cannot read {path}: it is missing; run the case again{stored}")
     room = {True: 64 * path.stat().st_size, False: path.stat().st_size}  # of views, which show tables, and of tables
     try:
         with h5py.File(path, "r", locking=False) as file:

@@ -93,22 +93,22 @@ DAMAGES = {
 OF_PLOT = {
     "neither": (
         lambda out: [(out / name).unlink() for name in ("result.json", "result.h5")],
-        "result.h5: the fields are missing; run the case again",
+        "result.h5: it is missing; run the case again",
     ),
     "result.json is a folder": (lambda out: gone(out / "result.json"), "Is a directory"),
-    "no result.h5": (lambda out: (out / "result.h5").unlink(), "result.h5: the fields are missing; run the case again"),
+    "no result.h5": (lambda out: (out / "result.h5").unlink(), "result.h5: it is missing; run the case again"),
     "result.h5 is a folder": (
         lambda out: gone(out / "result.h5"),
-        "result.h5: the fields are missing; run the case again",
+        "result.h5: it is missing; run the case again",
     ),
     "result.json of another run": (
         lambda out: other(out, "result.json"),
         "result.h5: it is damaged, or of another run",
     ),
-    "no folder": (shutil.rmtree, "result.h5: the fields are missing; run the case again"),
+    "no folder": (shutil.rmtree, "result.h5: it is missing; run the case again"),
     "unfinished": (
         lambda out: [(out / name).rename(out / f"{name}.vm.1.part") for name in ("result.json", "result.h5")],
-        "result.h5: the fields are missing; run the case again",
+        "result.h5: it is missing; run the case again",
     ),
 }
 OF_RESUME = {"result of another case": (lambda out: other(out, "result.json"), "holds the result of another case")}

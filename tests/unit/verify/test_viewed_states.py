@@ -131,5 +131,5 @@ def test_a_missing_state_is_named(results):
 
 
 def test_a_result_without_fields_is_one_line(tmp_path):
-    with pytest.raises(CaseError, match=r"^cannot read .*result.h5: the fields are missing; run the case again$"):
+    with pytest.raises(CaseError, match=r"^cannot read .*result.h5: it is missing; run the case again$"):
         read_state(tmp_path)
