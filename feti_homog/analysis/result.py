@@ -73,6 +73,7 @@ class Result:
 
     `print` shows a short summary, a notebook shows tables.  The manual lists all keys of result.json; entries that the
     analysis does not compute are None.  Constants are attributes, too: `result.E1` comes from `moduli` or `constants`.
+    `fields` has the mesh, interface and states on this rank, if the run keeps them; it is not in result.json.
     """
 
     schema: int = described("version of this layout", default=result_json.SCHEMA)
@@ -137,8 +138,8 @@ class Result:
         "derivatives of the results, if asked for", default=None
     )
     tips: result_records.TipRates | None = described("energy release rates at tips of debonded arcs", default=None)
-    angle: tuple[result_records.AnglePoint, ...] | None = described("points of an angle, as in angle.csv", default=None)
-    path: tuple[result_records.PathPoint, ...] | None = described("points of a path, as in path.csv", default=None)
+    angle: tuple[result_records.AnglePoint, ...] | None = described("points of `angle`, as in angle.csv", default=None)
+    path: tuple[result_records.PathPoint, ...] | None = described("points of `path`, as in path.csv", default=None)
     peak: result_records.Peak | None = described("peak of the path, with its first break", default=None)
     load: result_records.LoadPoint | None = described("state of analysis `load`, as in load.csv", default=None)
     envelope: tuple[result_records.EnvelopePoint, ...] | None = described(

@@ -8,7 +8,6 @@ from scipy.spatial import cKDTree
 
 from feti_homog.errors import CaseError
 from feti_homog.microstructure import label_image
-from feti_homog.report.plots import plot_helpers
 from feti_homog.typing import Bool, Float
 
 SMALLEST = 3.0  # radius in pixels
@@ -52,7 +51,12 @@ def fibres(path: Path, pixel: float) -> tuple[Float, str]:
 
 
 def draw(path: Path, circles: Float, pixel: float, table: Path) -> str:
-    """Draw circles over an image, in TABLE_circles.png beside the table; return its name."""
+    """Draw circles over an image, in TABLE_circles.png; return its name.  Raises CaseError if that is the image."""
+    from feti_homog.report.plots import plot_helpers  # with Matplotlib
+
+    picture = table.with_name(f"{table.stem}_circles.png")
+    if picture.resolve() == path.resolve():
+        raise CaseError(f"--out {table}: expected another name; the picture would replace the image {path}")
     image = label_image.read_image(path, is_grey=True)[::-1]
     height, width = (pixel * n for n in image.shape)
     figure = plot_helpers.PLAIN.figure(7.0, 7.0 * height / width)
@@ -63,7 +67,7 @@ def draw(path: Path, circles: Float, pixel: float, table: Path) -> str:
     share = np.pi * (circles[:, 2] ** 2).sum() / (width * height)
     title = f"{len(circles)} fibres; whole circles have {100 * share:.3g} % of the area"
     axes.set(xlim=(0.0, width), ylim=(0.0, height), xlabel="x", ylabel="y", title=title)
-    return str(plot_helpers.save(figure, table.with_name(f"{table.stem}_circles.png")))
+    return str(plot_helpers.save(figure, picture))
 
 
 def _fitted(points: Float, circles: Float, size: tuple[int, ...]) -> tuple[float, Float]:
@@ -92,7 +96,7 @@ def _fitted(points: Float, circles: Float, size: tuple[int, ...]) -> tuple[float
         visible = ((rim > 0.0) & (rim < size)).all(axis=2).mean(axis=0)
         is_round = np.bincount(owner, minlength=len(circles)) > share * visible * 2 * np.pi * circles[:, 2]
         N, b = np.stack(sums, axis=1).reshape(-1, 3, 3)[is_round], np.stack(right, axis=1)[is_round, :, None]
-        moved = np.linalg.solve(N, b)[..., 0]
+        moved = (np.linalg.pinv(N, hermitian=True) @ b)[..., 0]  # points on a line leave N singular
         radius = np.sqrt(moved[:, 2] + moved[:, 0] ** 2 + moved[:, 1] ** 2)
         circles = np.column_stack([circles[is_round, :2] + moved[:, :2], radius])
     return part, circles

@@ -188,7 +188,7 @@ class FetiSolver:
         """
         if self._closure is None:
             v, n = len(self.problem.loads), self.condensed.boundary.shape[1]
-            self._closure = np.eye(v)
+            closure = np.eye(v)
             if n > v:
                 free = self.natural.unconstrained_modes[self.natural.owned_modes].T @ self._pushes
                 largest = self.comm.allreduce(np.abs(self._pushes).max(initial=0.0), MPI.MAX)
@@ -196,8 +196,9 @@ class FetiSolver:
                     raise NotCarriedError('[cell] boundary = "traction": it pulls at bodies that have no bonds')
                 solutions = self.solve_many(np.eye(n), np.zeros((self.rows, n)))
                 kept = np.stack([self.stress_integral(solution)[v:] for solution in solutions], axis=1)
-                self._closure = np.vstack([np.eye(v), np.linalg.solve(kept[:, v:], -kept[:, :v])])
-        return np.asarray(self._closure)
+                closure = np.vstack([closure, np.linalg.solve(kept[:, v:], -kept[:, :v])])
+            self._closure = closure
+        return self._closure
 
     def solve(self, strain: Float, start: Float) -> DualSolution:
         """Solve the dual problem for a load `strain` (v,).  Collective; see `solve_many`."""

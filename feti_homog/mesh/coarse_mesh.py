@@ -1,7 +1,7 @@
 """The coarse periodic mesh of a rectangular cell on rank 0, with interface edges and void edges."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -86,6 +86,11 @@ class CoarseMesh:
     def shift(self) -> Float:
         """The distance (2,) between periodic images; without images far longer than any cell."""
         return self.period if self.boundary == "periodic" else np.full(2, 1e30)
+
+    def scaled(self, factor: float) -> "CoarseMesh":
+        """Return the mesh with all lengths times `factor`."""
+        mesh = replace(self, width=factor * self.width, height=factor * self.height, points=factor * self.points)
+        return replace(mesh, ellipses=self.ellipses.scaled(factor))
 
     @property
     def circles(self) -> Float:

@@ -1,4 +1,4 @@
-"""Laws of one state: stresses, averages, continuity, equilibrium, jumps, bonds, contact, friction, largest stresses."""
+"""Check the fields of one state: averages, equilibrium, interfaces, friction, and the largest stresses of phases."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -1,4 +1,4 @@
-"""Uniform displacements and tractions on the sides: what `verify` recomputes, layers, voids, derivatives."""
+"""Cells under displacements or tractions on the sides: certificates, free bodies, layers, voids and derivatives."""
 
 import json
 
@@ -25,6 +25,9 @@ from feti_homog import run
 from feti_homog.analysis.runner import compute
 from feti_homog.case.cases import Case
 from feti_homog.errors import MeshError, NotCarriedError
+from feti_homog.homogenization import unit_cell
+from feti_homog.system.petsc.options_database import case_options
+from feti_homog.system.runtime.progress_bar import Progress
 from feti_homog.verify.certificate import verify
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
@@ -61,6 +64,14 @@ def test_a_free_body_on_the_sides(comm, shared_path, boundary):
     if boundary == "traction":
         with pytest.raises(NotCarriedError, match=r'^\[cell\] boundary = "traction": .* no bonds'):
             compute(case, comm)
+        with case_options(case.petsc):
+            solver = unit_cell.tear(case, comm, Progress(comm, quiet=True)).solver
+            active = np.ones(solver.rows)
+            active[(solver.jump_operator.nodes.row[:, None] + np.arange(2)).ravel()] = 0.0
+            solver.set_state(active, solver.intact_compliance)
+            for _ in range(2):  # a refused load leaves nothing behind
+                with pytest.raises(NotCarriedError):
+                    _ = solver.closure
     else:
         C = compute(case, comm).effective_stiffness
         assert pytest.approx(reference(comm, case)[0], rel=0, abs=1e-9 * np.abs(C).max()) == C

@@ -1,4 +1,4 @@
-"""Cells under displacements or tractions on the sides: one direct solve of the same refined mesh, with SciPy alone.
+"""Solve a refined cell under displacements or tractions on its sides directly, with SciPy.
 
 It shares the mesh with the program, nothing else: element loops, three displacements a node, its own loads on sides.
 """

@@ -13,7 +13,7 @@ KINDS = ("auto", "implicit", "explicit")
 
 @dataclass(frozen=True)
 class SubdomainSize:
-    """The sizes and properties of one subdomain, as arguments of `choose`.
+    """The arguments of `choose` for one subdomain: sizes and properties.
 
     Attributes:
         dofs: number of degrees of freedom.

@@ -65,15 +65,9 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
         except Exception as error:  # gmsh raises nothing more special
             advice = "expected larger regions of a phase: filter the image, or smooth = false"
             raise MeshError(f"[cell] smooth = true: gmsh cannot fill the outlines ({error}); {advice}") from None
-    mesh, scale = made(raw_mesh(_with_phases(content, phase, phases)), "smooth outlines"), width * cell.pixel
-    return replace(
-        mesh,
-        width=scale * mesh.width,
-        height=scale * mesh.height,
-        points=scale * mesh.points,
-        ellipses=mesh.ellipses.scaled(scale),
-        origin=(cell.pixel * (i + 0.5 - width * (2 * i > width)), cell.pixel * (j + 0.5 - rows * (2 * j > rows))),
-    )
+    mesh = made(raw_mesh(_with_phases(content, phase, phases)), "smooth outlines").scaled(width * cell.pixel)
+    place = i + 0.5 - width * (2 * i > width), j + 0.5 - rows * (2 * j > rows)
+    return replace(mesh, origin=(cell.pixel * place[0], cell.pixel * place[1]))
 
 
 def _every_other(phase: Int32, phases: tuple[str, ...]) -> Bool:

@@ -47,13 +47,8 @@ def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> C
         number = _add_surfaces(gmsh, arrangement)
         raw = raw_mesh(filled(gmsh, arrangement.size, field))
         precedence = np.array([number[tag] for _, tag in gmsh.model.getEntities(2)], np.int32)
-    mesh = made(raw, "table")
     return replace(
-        mesh,
-        width=scale * mesh.width,
-        height=scale * mesh.height,
-        points=scale * mesh.points,
-        ellipses=mesh.ellipses.scaled(scale),
+        made(raw, "table").scaled(scale),
         precedence=precedence[raw.group],
         centres=scale * arrangement.centres[: arrangement.fibres],
         origin=arrangement.origin,

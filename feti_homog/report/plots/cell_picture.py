@@ -156,7 +156,7 @@ def write_fibre_numbers(axes: Axes, cell: drawn_cell.DrawnCell, inches: float, f
     period, low = np.array([cell.file.attrs[name] for name in ("width", "height")]), drawn.points.min(axis=0)
     outline, middles = cKDTree(drawn.points[np.unique(cell.borders)]), drawn.points[drawn.triangles].mean(axis=1)
     elements, sections = cKDTree(middles), json.loads(cell.file.attrs.get("case", "{}"))
-    repeats = sections.get("cell", {}).get("boundary", "periodic") == "periodic"  # else there are no images
+    is_periodic = sections.get("cell", {}).get("boundary", "periodic") == "periodic"  # else there are no images
     shifts = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2)
     tables = (fibres[name][:] for name in ("number", "body", "centre", "radius"))
     for k, (number, body, centre, radius) in enumerate(zip(*tables, strict=True)):
@@ -165,7 +165,7 @@ def write_fibre_numbers(axes: Axes, cell: drawn_cell.DrawnCell, inches: float, f
             images, margin = centre + shifts * period, np.minimum(0.4 * radius, 0.4 * period)
             moved = np.clip(images, low + margin, low + period - margin)
             places = moved[np.linalg.norm(moved - images, axis=1) <= 0.85 * radius]
-            places = places[repeats | (drawn.body[elements.query(places)[1]] == body)]
+            places = places[is_periodic | (drawn.body[elements.query(places)[1]] == body)]
         if not len(places):  # the point of the body farthest from its outlines
             of_body = middles[drawn.body == body]
             distance = outline.query(of_body)[0]

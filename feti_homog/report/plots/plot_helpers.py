@@ -245,7 +245,7 @@ def stress_component(chosen: str, states: Sequence[Any]) -> str:
 
 
 def nodal_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
-    """Return a stress at the drawn nodes (p,), averaged over triangles in the same body."""
+    """Return a stress at the drawn nodes (p,): the mean over triangles that share the node and the body."""
     name, column = STRESS_TABLES[component]
     table = state[name]
     if component == VON_MISES:  # of the mean stresses of elements, as in `viewed_states`

@@ -1,4 +1,4 @@
-"""Fibres of images whose circles are known, and what goes wrong."""
+"""Find known circles in drawn images, and refuse faulty images."""
 
 import sys
 
@@ -58,9 +58,23 @@ def test_circles_are_drawn_beside_the_table_and_not_over_the_image(tmp_path):
     assert image.read_bytes() == before and (tmp_path / "a_circles.png").stat().st_size > 10_000
 
 
+def test_the_picture_replaces_no_image(tmp_path):
+    image = drawn(tmp_path / "a_circles.png", circles(1)[:5])
+    before = image.read_bytes()
+    with pytest.raises(CaseError, match=r"the picture would replace the image"):
+        micrograph.draw(image, np.zeros((0, 3)), 1.0, tmp_path / "a.csv")
+    assert image.read_bytes() == before
+
+
+BAND = np.full((80, 80), 40, np.uint8)
+BAND[70:] = 220
+
+
 @pytest.mark.parametrize(
     ("image", "words"),
     [
+        (BAND, "expected round fibres of 6 pixels in diameter or more"),  # all points of the contour lie on a line
+        (BAND.T, "expected round fibres of 6 pixels in diameter or more"),
         (np.full((20, 20), 7, np.uint8), "found one grey value"),
         (zoom(np.eye(2, dtype=np.uint8) * 200, 40, order=0), "expected round fibres of 6 pixels in diameter or more"),
     ],

@@ -1,4 +1,4 @@
-"""Label images as cells: pixels against the same quadrilaterals, laminates, mirror images, smooth outlines, faults."""
+"""Mesh label images: compare pixels with quadrilaterals and laminates, test mirrors, outlines and faults."""
 
 import builtins
 
