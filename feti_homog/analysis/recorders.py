@@ -10,7 +10,7 @@ from feti_homog.analysis.cell_records import PhaseStresses
 from feti_homog.analysis.result import Fields
 from feti_homog.errors import FetiHomogError
 from feti_homog.homogenization import averaging, recovered_fields, unit_cell
-from feti_homog.materials import strength, voigt
+from feti_homog.materials import strength
 from feti_homog.results import field_file, field_layout, field_parts, result_json
 from feti_homog.system.parallel import mpi_errors
 
@@ -106,7 +106,6 @@ class StateRecorder:
         self._number, self._states, self._say = 0, list[field_layout.StatePart](), say
         self._largest, self._labels = list[dict[str, recovered_fields.Largest]](), list[str]()
         self.has_place = keep or file is not None
-        self._has_stresses = not voigt.PLANE_STATES[cell.case.analysis.plane].is_scalar
         has_strength = any(material.strength for material in cell.case.materials.values())
         self.is_recording = self.has_place or has_strength
         self.error: FetiHomogError | None = None
@@ -114,19 +113,16 @@ class StateRecorder:
 
     def record(self, states: Mapping[str, Sequence[averaging.Response | None]], load_factor: float, point: int) -> None:
         """Record the states of labels, from the response, or None, in each problem.  Collective."""
-        if self.is_recording and self._has_stresses:
-            self._largest += recovered_fields.largest_stresses(self._cell, [*states.values()])
+        if not self.is_recording:
+            return
+        fields = recovered_fields.recover(self._cell, [*states.values()])
+        if any(fields.largest):
+            self._largest += fields.largest
             self._labels += states
             self.singularities |= recovered_fields.singularities(self._cell, [plane for plane, *_ in states.values()])
-        for label, responses in states.items():
-            if self._file is None and not self._keep:
-                return
-            plane, axial = (*responses, None)[:2]
-            state: field_layout.StatePart
-            if plane is None or len(self._cell.problems) > 1:
-                state = field_parts.spatial_state_part(self._cell, plane, axial, load_factor, label, point)
-            else:
-                state = field_parts.state_part(self._cell, plane, load_factor, label, point)
+        if self._file is None and not self._keep:
+            return
+        for state in field_parts.state_parts(self._cell, states, load_factor, point, fields):
             self._write(field_file.FieldFile.write_state, self._number, state)
             self._number += 1
             if self._keep:

@@ -4,13 +4,14 @@ A strain E is [E11, E22, gamma12], followed by the other loads of the problem; a
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
 
 from feti_homog.errors import ConvergenceError
+from feti_homog.feti import DualSolution
 from feti_homog.feti.decomposition import jump_operator
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface import Load
@@ -69,6 +70,12 @@ class Response:
     def all_loads(self) -> Float:
         """The loads of the response, `DualSolution.strain`."""
         return self.scale * self.state.solution.strain
+
+    @property
+    def solution(self) -> DualSolution:
+        """The dual solution of the response."""
+        state = self.state.solution
+        return replace(state, strain=self.all_loads, lam=self.scale * state.lam, jump=self.scale * state.jump)
 
     @property
     def debonded(self) -> int:

@@ -96,7 +96,7 @@ def energy_errors(
         shares.append(np.repeat(of_elements * of_each / 4**fewer, 4**fewer, axis=0))
     elements, arcs = distributed_arrays.allreduce_sum(cell.comm, sums) / area
     if cell.case.interfaces and not cell.summary.across:
-        lam = np.stack([response.scale * response.state.solution.lam for response in responses], axis=1)
+        lam = np.stack([response.solution.lam for response in responses], axis=1)
         state = responses[0].state
         springs = cell.spring_sides.errors(state.status, state.solution.compliance, lam)
         elements, arcs = np.stack([elements, arcs]) + np.stack(springs) / area
@@ -251,11 +251,11 @@ def _forces(cell: TornCell, responses: Sequence[Response], groups: Sequence[Grou
         jumps = cell.jumps
         BT = jumps.B.T.tocsr()
         u = np.concatenate([np.zeros((0, k)), *(group.stress.u.reshape(-1, k) for group in groups)])
-        solutions = [replace(response.state.solution, strain=response.all_loads) for response in responses]
-        lam = np.stack([cell.across_bonds(solution, x)[0] for solution, x in zip(solutions, u.T, strict=True)], axis=1)
+        columns = zip(responses, u.T, strict=True)
+        lam = np.stack([cell.across_bonds(response.solution, x)[0] for response, x in columns], axis=1)
     else:
         jumps, BT = cell.solver.jump_operator, cell.solver.interface_operators.BT
-        lam = np.stack([response.scale * response.state.solution.lam for response in responses], axis=1)
+        lam = np.stack([response.solution.lam for response in responses], axis=1)
     rows = nodes.row[:, None] + np.arange(jumps.components)
     rigid = bool(((state.solution.compliance[rows] == 0.0).all(axis=1) & (state.status == BONDED)).any())
     has_tips = cell.comm.allreduce(rigid, MPI.LOR) and any(response.debonded for response in responses)

@@ -1,7 +1,7 @@
 """The response fields, and the largest stresses in each phase.
 
-Fields are nodal displacements, element means of strains and stresses, tractions and jumps.  The largest stresses are
-those at the integration points: one point in a linear element, six points in a quadratic element.
+Fields are nodal displacements, element means of stresses, tractions and jumps.  The largest stresses are at the
+integration points: one point in a linear element, six points in a quadratic element.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.fem import Problem, assembly, stress_recovery
+from feti_homog.fem import Problem, stress_recovery
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.domain_partition import in_cell
@@ -24,84 +24,81 @@ TIE = 1e-6
 ROUNDING = 1e4 * np.finfo(float).eps
 
 
-@dataclass(frozen=True)
-class RecoveredFields:
-    """The response fields on this rank, with c displacements and v loads.
-
-    Attributes:
-        displacement, fluctuation: (n, c) total H y + u*, Eq. (14), and u* at the plane nodes of the parts.
-        strain, stress: (m, v) means over each element of the local loads and of the conjugate stresses.
-        traction, jump: (k, c) at interface nodes.
-        shares: (m,) contribution of each element to the estimated error of E . Sigma; NaN without an estimate.
-    """
-
-    displacement: Float
-    fluctuation: Float
-    strain: Float
-    stress: Float
-    traction: Float
-    jump: Float
-    shares: Float
-
-
-def recover(cell: TornCell, response: Response | None, problem: Problem | None = None) -> RecoveredFields:
-    """Recover the fields of a response; without one, zero fields in `problem`, by default the cell's.  Collective."""
-    nodes, problem = cell.jumps.nodes, problem or cell.solver.problem
-    m, (c, v) = problem.strains, (problem.components, len(problem.loads))
-    if response is None:
-        n, e = sum(len(s.mesh.points) for s in cell.parts), sum(len(s.mesh.triangles) for s in cell.parts)
-        points, elements, pairs = np.zeros((n, c)), np.zeros((e, v)), np.zeros((len(nodes.row), c))
-        return RecoveredFields(points, points, elements, elements, pairs, pairs, np.zeros(e))
-    solution, loads, shares = response.state.solution, response.strain, response.shares
-    u = cell.displacement(solution)
-    lam, opening = (response.scale * rows for rows in cell.across_bonds(solution, u))
-    pair, u, H = nodes.row[:, None] + np.arange(c), response.scale * u, problem.gradient(loads[:m])
-    totals, fluctuations = [np.zeros((0, c))], [np.zeros((0, c))]
-    strains, stresses = [np.zeros((0, v))], [np.zeros((0, v))]
-    for s, offset in zip(cell.parts, cell.offsets, strict=False):
-        of_part = u[offset : offset + len(s.dofs)].reshape(-1, c)
-        fluctuations.append(of_part[s.mesh.node_class])
-        totals.append(s.mesh.points @ H.T + fluctuations[-1])
-        plane = assembly.element_strain(s.mesh.points, s.mesh.triangles, s.mesh.node_class, of_part, problem)[0]
-        strains.append(np.column_stack([loads[:m] + plane, np.tile(loads[m:], (len(plane), 1))]))
-        stresses.append(strains[-1] @ s.L)
-    total, fluctuation, strain, stress = (np.concatenate(rows) for rows in (totals, fluctuations, strains, stresses))
-    if shares is None and cell.case.output.mesh_error:
-        from feti_homog.homogenization.mesh_estimate import energy_errors  # cases may forgo it
-
-        shares = energy_errors(cell, [response]).shares[:, 0]
-    shares = np.full(len(strain), np.nan) if shares is None else shares
-    traction = lam[pair] / nodes.length[:, None]
-    return RecoveredFields(total, fluctuation, strain, stress, traction, opening[pair], shares)
-
-
 Largest = tuple[Float, Float]
 """The largest value (v,) of each measure, of the utilisation in each mode, and its position (v, 2)."""
 
 
-def largest_stresses(cell: TornCell, states: Sequence[Sequence[Response | None]]) -> list[dict[str, Largest]]:
-    """Find the largest stresses of each phase in each state, in one pass.  Collective.
+@dataclass(frozen=True)
+class RecoveredFields:
+    """The displacements and stresses of s states on this rank, and the largest stresses on all ranks.
 
-    The principal stress is the largest one, signed; the hydrostatic stress is a third of the trace.  Phases whose
-    constants do not determine S33 have no entry.
+    Attributes:
+        displacement: of each problem, u* (dofs, s) of the parts; 0 without a response.
+        stress: (s, 6, e) means over the elements, as `voigt.SPATIAL_STRESSES`; fluxes as shear along the fibres.
+        largest: of each state, the largest stresses in each phase.  The principal stress is the largest one, signed;
+            the hydrostatic stress is a third of the trace.  Phases whose constants do not determine S33 have no entry.
+    """
+
+    displacement: list[Float]
+    stress: Float
+    largest: list[dict[str, Largest]]
+
+
+@dataclass(frozen=True)
+class NodalFields:
+    """The nodal fields of one problem in one state, with c displacements per node.
+
+    Attributes: the `displacement` H y + u* (n, c), Eq. (14), at the plane nodes of the parts, and `traction` and
+    `jump` (k, c) at interface nodes.
+    """
+
+    displacement: Float
+    traction: Float
+    jump: Float
+
+
+def recover(cell: TornCell, states: Sequence[Sequence[Response | None]]) -> RecoveredFields:
+    """Recover the fields of all states, in one pass over the parts.  Collective.
 
     Args:
-        states: responses of each problem in each state; a problem without a response has zero stresses.
+        states: responses of each problem in each state; a problem without a response has zero fields.
     """
-    by_problem = zip(cell.problems, zip(*states, strict=True), strict=False)
-    fields = [_stresses(problem, responses) for problem, responses in by_problem if any(responses)]
+    by_problem = [*zip((cell, cell.axial or cell), zip(*states, strict=True), strict=False)]
+    u = [np.zeros((torn.offsets[-1], len(states))) for torn, _ in by_problem]
+    passes = [_stresses(*pair, out) for pair, out in zip(by_problem, u, strict=True) if any(pair[1])]
+    means = np.zeros((len(states), 6, sum(len(part.mesh.triangles) for part in cell.parts)))
     by_phase: list[dict[str, list[Largest]]] = [{phase: [] for phase in cell.summary.phases} for _ in states]
+    first, is_scalar = 0, voigt.PLANE_STATES[cell.case.analysis.plane].is_scalar
+    components = [*voigt.IN_PLANE, 2] if cell.solver.problem.turns and cell.axial is None else [*range(6)]
     # Ranks without parts, too, begin with all problems, whose parts are collective: so strict.
-    for (phase, points, stress), *further in zip(*fields, strict=True):
+    for (phase, chunk, stress), *further in zip(*passes, strict=True):
         for *_, more in further:
             stress += more
-        if not np.isnan(stress).any():
-            places = in_cell(points, cell.summary.shift)[:, None]
-            for largest, tensors in zip(by_phase, stress, strict=True):
+        weights = chunk.weights / chunk.weights.sum(axis=1, keepdims=True)
+        last = first + len(weights)
+        means[:, components, first:last], first = (stress[:, components] * weights).sum(axis=-1), last
+        if not is_scalar and not np.isnan(stress).any():
+            places = in_cell(chunk.points.reshape(-1, 2), cell.summary.shift)[:, None]
+            for largest, tensors in zip(by_phase, stress.reshape(*stress.shape[:2], -1), strict=True):
                 largest[phase].append(_largest(_measures(cell.case.material_of(phase), tensors.T), places))
     by_state = zip(*cell.comm.allgather([*map(_joined, by_phase)]), strict=True)
     gathered = ({name: [rank[name] for rank in state if name in rank] for name in by_phase[0]} for state in by_state)
-    return [*map(_joined, gathered)]
+    return RecoveredFields(u, means, [*map(_joined, gathered)])
+
+
+def nodal_fields(cell: TornCell, response: Response | None, u: Float, problem: Problem) -> NodalFields:
+    """Compute the nodal fields of a response with the recovered u* (dofs,); zero without one.  Collective."""
+    nodes, c = cell.jumps.nodes, problem.components
+    if response is None:
+        n, k = sum(len(part.mesh.points) for part in cell.parts), len(nodes.row)
+        return NodalFields(np.zeros((n, c)), np.zeros((k, c)), np.zeros((k, c)))
+    lam, opening = cell.across_bonds(response.solution, u)
+    H, totals = problem.gradient(response.strain[: problem.strains]), [np.zeros((0, c))]
+    for part, offset in zip(cell.parts, cell.offsets, strict=False):
+        of_part = u[offset : offset + len(part.dofs)].reshape(-1, c)
+        totals.append(part.mesh.points @ H.T + of_part[part.mesh.node_class])
+    pair = nodes.row[:, None] + np.arange(c)
+    return NodalFields(np.concatenate(totals), lam[pair] / nodes.length[:, None], opening[pair])
 
 
 def singularities(cell: TornCell, states: Sequence[Response | None]) -> set[str]:
@@ -112,12 +109,15 @@ def singularities(cell: TornCell, states: Sequence[Response | None]) -> set[str]
     return {name for name, exists in (("corners of fibres", corners), ("tips of debonding", tips)) if exists}
 
 
-def _stresses(cell: TornCell, responses: Sequence[Response | None]) -> Iterator[tuple[str, Float, Float]]:
-    """Yield phase, points (n, 2) and stresses (s, 6, n) of each chunk of elements."""
+def _stresses(
+    cell: TornCell, responses: Sequence[Response | None], out: Float
+) -> Iterator[tuple[str, stress_recovery.ElementStresses, Float]]:
+    """Yield the phase, points and stresses (s, 6, e, q) of each chunk of elements; `out` (dofs, s) takes u*."""
     at = [number for number, response in enumerate(responses) if response is not None]
     u, all_loads = (np.stack([getattr(responses[k], name) for k in at], axis=1) for name in ("u", "all_loads"))
     loads = all_loads[: len(cell.solver.problem.loads)]
-    for part, displacement in cell.displacements(u, all_loads):
+    for (part, displacement), offset in zip(cell.displacements(u, all_loads), cell.offsets, strict=False):
+        out[offset : offset + len(displacement), at] = displacement
         L, problem, m = part.L, part.problem, part.problem.strains
         # The stresses in space follow from those conjugate to displacement strains.
         rows, constants = np.zeros((6, m)), np.zeros((6, len(at)))
@@ -134,7 +134,7 @@ def _stresses(cell: TornCell, responses: Sequence[Response | None]) -> Iterator[
             stress = rows @ chunk.stress.reshape(-1, m, len(at)).transpose(2, 1, 0) + constants.T[:, :, None]
             everywhere = np.zeros((len(responses), *stress.shape[1:]))  # also in states without a response
             everywhere[at] = np.where(np.abs(stress) < noise, 0.0, stress)
-            yield part.submesh.phase, chunk.points.reshape(-1, 2), everywhere
+            yield part.submesh.phase, chunk, everywhere.reshape(*everywhere.shape[:2], *chunk.weights.shape)
 
 
 def _measures(material: material_forms.Material, stress: Float) -> Float:

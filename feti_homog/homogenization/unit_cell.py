@@ -83,11 +83,6 @@ class TornCell:
         """The operator that finds the multipliers between parts.  Collective when first read."""
         return uniform_parts.ForcesBetweenParts(self.comm, self.parts, self.jumps)
 
-    def displacement(self, solution: DualSolution) -> Float:
-        """Return the displacements u* (dofs,) of this rank's parts.  Collective."""
-        u = self.solver.boundary_displacement(solution)
-        return np.concatenate([np.zeros(0), *(part for _, part in self.displacements(u, solution.strain))])
-
     def displacements(self, u: Float, loads: Float, keep: bool = True) -> Iterator[tuple[UniformPart, Float]]:
         """Extend the boundary displacements to the displacements u* of each part.
 

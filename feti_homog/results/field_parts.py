@@ -2,13 +2,14 @@
 
 import json
 import os
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from feti_homog.fem import GENERALIZED
 from feti_homog.homogenization import averaging, phase_laws, recovered_fields, unit_cell
-from feti_homog.materials import laws
+from feti_homog.materials import voigt
 from feti_homog.results.field_layout import FibrePart, Header, InterfacePart, MeshPart, SpatialStatePart, StatePart
 from feti_homog.typing import Float, Float32
 from feti_homog.version import __version__
@@ -83,70 +84,66 @@ def interface_part(cell: unit_cell.TornCell) -> InterfacePart:
     )
 
 
-def state_part(
-    cell: unit_cell.TornCell, response: averaging.Response, load_factor: float, label: str, point: int
-) -> StatePart:
-    """Return the response fields in plane strain or stress. Collective when first called."""
-    fields, plane = recovered_fields.recover(cell, response), cell.case.analysis.plane
-    rules = [laws.out_of_plane(cell.case.material_of(s.submesh.phase), plane)[0] for s in cell.parts]
-    S33_of = np.repeat(np.reshape(rules, (-1, 3)), [len(s.mesh.triangles) for s in cell.parts], axis=0)
-    return StatePart(
-        strain=response.strain,
-        stress_mean=response.stress,
-        load_factor=load_factor,
-        point=point,
-        label=label,
-        stress=fields.stress,
-        stress_33=np.einsum("ev,ev->e", fields.stress, S33_of),
-        mesh_error=_relative(fields.shares, response),
-        **_at_nodes(cell, response, fields),
-    )
-
-
-def spatial_state_part(
+def state_parts(
     cell: unit_cell.TornCell,
-    plane: averaging.Response | None,
-    axial: averaging.Response | None,
+    states: Mapping[str, Sequence[averaging.Response | None]],
     load_factor: float,
-    label: str,
     point: int,
-) -> SpatialStatePart:
-    """Return the fields in generalized plane strain, from responses of the plane and the axial problem.
+    fields: recovered_fields.RecoveredFields,
+) -> Iterator[StatePart]:
+    """Yield the recovered `fields` of each state, from the response, or None, in each problem.  Collective.
 
-    A problem without a response has zero fields.  Conduction takes the place of the axial problem.  Collective when
-    first called.
+    A problem without a response has zero fields.  Conduction takes the place of the axial problem.
 
     Raises:
-        ValueError: there is no response.
+        ValueError: a state has no response.
     """
-    response = plane or axial
-    if response is None:
-        raise ValueError("expected a response")
-    in_plane = recovered_fields.recover(cell, plane, None if cell.axial else GENERALIZED)
-    along = recovered_fields.recover(cell.axial or cell, axial)
-    return SpatialStatePart(
-        strain=phase_laws.spatial_vector(*(r if r is None else r.strain for r in (plane, axial))),
-        stress_mean=phase_laws.spatial_vector(*(r if r is None else r.stress for r in (plane, axial))),
-        temperature=0.0 if plane is None or len(plane.strain) == 4 else float(plane.strain[4]),
-        load_factor=load_factor,
-        point=point,
-        label=label,
-        stress=in_plane.stress[:, :3],
-        stress_33=in_plane.stress[:, 3] + along.stress[:, 2:].sum(axis=1),
-        mesh_error=_relative(in_plane.shares + along.shares, plane, axial),
-        axial_displacement=along.displacement[:, 0],
-        axial_stress=along.stress[:, 1::-1],  # the axial problem has [13, 23], the file [23, 13]
-        axial_traction=along.traction[:, 0],
-        axial_jump=along.jump[:, 0],
-        **_at_nodes(cell, response, in_plane, along),
-    )
+    axial_cell = cell.axial or cell
+    for number, (label, responses) in enumerate(states.items()):
+        plane, axial = (*responses, None)[:2]
+        response, stress = plane or axial, fields.stress[number]
+        if response is None:
+            raise ValueError("expected a response")
+        shares = [_shares(torn, r) for torn, r in ((cell, plane), (axial_cell, axial)) if r is not None]
+        u = [x[:, number] for x in fields.displacement]
+        problem = cell.solver.problem if cell.solver.problem.turns else GENERALIZED
+        in_plane = recovered_fields.nodal_fields(cell, plane, u[0], problem)
+        common: dict[str, Any] = {"load_factor": load_factor, "point": point, "label": label}
+        common |= {"mesh_error": _relative(np.sum(shares, axis=0), *responses), "stress_33": stress[2]}
+        common["stress"] = stress[voigt.IN_PLANE].T
+        if plane is not None and cell.axial is None:
+            common |= _at_nodes(cell, response, in_plane)
+            yield StatePart(strain=plane.strain, stress_mean=plane.stress, **common)
+            continue
+        along = recovered_fields.nodal_fields(axial_cell, axial, u[-1], axial_cell.solver.problem)
+        yield SpatialStatePart(
+            strain=phase_laws.spatial_vector(*(r if r is None else r.strain for r in (plane, axial))),
+            stress_mean=phase_laws.spatial_vector(*(r if r is None else r.stress for r in (plane, axial))),
+            temperature=0.0 if plane is None or len(plane.strain) == 4 else float(plane.strain[4]),
+            axial_displacement=along.displacement[:, 0],
+            axial_stress=stress[[3, 4]].T,
+            axial_traction=along.traction[:, 0],
+            axial_jump=along.jump[:, 0],
+            **common,
+            **_at_nodes(cell, response, in_plane, along),
+        )
+
+
+def _shares(cell: unit_cell.TornCell, response: averaging.Response) -> Float:
+    """Return the contributions (e,) of elements to the error of E . Sigma; NaN without estimates.  Collective."""
+    shares = response.shares
+    if shares is None and cell.case.output.mesh_error:
+        from feti_homog.homogenization.mesh_estimate import energy_errors  # cases may forgo it
+
+        shares = energy_errors(cell, [response]).shares[:, 0]
+    return np.full(sum(len(part.mesh.triangles) for part in cell.parts), np.nan) if shares is None else shares
 
 
 def _at_nodes(
     cell: unit_cell.TornCell,
     response: averaging.Response,
-    in_plane: recovered_fields.RecoveredFields,
-    along: recovered_fields.RecoveredFields | None = None,
+    in_plane: recovered_fields.NodalFields,
+    along: recovered_fields.NodalFields | None = None,
 ) -> dict[str, Any]:
     """Return displacements, and the fields at interface nodes, by their dataset names.
 
