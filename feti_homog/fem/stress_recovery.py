@@ -207,7 +207,8 @@ class RecoveredStress:
             int ds_i : S : ds_j (k, k), and the element contributions (e, k) to its diagonal, (0, k) without shares.
         """
         m, k = self.problem.strains, self.loads.shape[1]
-        total, shares = np.zeros((m * k, m * k)), [np.zeros((0, k))]
+        total, shares = np.zeros((k, k)), [np.zeros((0, k))]
+        root = np.kron(np.linalg.cholesky(self.flexibility), np.eye(k))
         for chunk in self.elements:
             # Differences (q, e, m, k) at points in the elements, times the roots of the weights.
             if self.order == 2:
@@ -221,8 +222,9 @@ class RecoveredStress:
                 np.take(self.fits[:, 0], corners, axis=0, out=difference, mode="clip")  # clip needs no buffer
                 difference += (difference[0] + difference[1] + difference[2]) / 3 - 2 * chunk.stress.reshape(e, m * k)
                 difference = (difference * np.sqrt(chunk.weights / 12)).reshape(3, e, m, k)
-            flat = difference.reshape(-1, m * k)
+            difference = (difference.reshape(-1, m * k) @ root).reshape(difference.shape)
+            flat = difference.reshape(-1, k)
             total += flat.T @ flat
             if with_shares:
-                shares.append((self.flexibility @ difference * difference).sum(axis=(0, 2)))
-        return np.einsum("ab,akbl->kl", self.flexibility, total.reshape(m, k, m, k)), np.concatenate(shares)
+                shares.append(np.einsum("qemk,qemk->ek", difference, difference))
+        return total, np.concatenate(shares)
